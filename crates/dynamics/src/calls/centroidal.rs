@@ -1,11 +1,10 @@
 //! The momentum of the whole robot about its centre of mass, and all terms of the equations of motion at once.
 
+use super::kinematics::{forward_kinematics, forward_velocities};
 use crate::data::Data;
 use crate::passes::all_terms::{self, AllTerms};
 use crate::passes::centroidal::{CentroidalMap, CentroidalMapRate, run_map, run_map_rate};
 use crate::passes::frames::{Placements, Velocities};
-use crate::passes::kinematics::{positions, velocities};
-use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar};
 
@@ -31,9 +30,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     data: &'d mut Data<S>,
     q: &[S],
 ) -> CentroidalMap<'d, S> {
-    data.check(model);
-    check("q", q.len(), model.nq());
-    positions(model, &mut data.world, q);
+    forward_kinematics(model, data, q);
     run_map(model, &data.world, &mut data.centroidal);
     data.centroidal.map()
 }
@@ -61,11 +58,7 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
     v: &[S],
 ) -> CentroidalMapRate<'d, S> {
-    data.check(model);
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    positions(model, &mut data.world, q);
-    velocities(model, &data.world, &mut data.moving, v);
+    forward_velocities(model, data, q, v);
     run_map_rate(model, &data.world, &data.moving, &mut data.centroidal);
     data.centroidal.map_rate()
 }
@@ -97,11 +90,7 @@ pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
     v: &[S],
 ) -> AllTerms<'d, S, R> {
-    data.check(model);
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    positions(model, &mut data.world, q);
-    velocities(model, &data.world, &mut data.moving, v);
+    forward_velocities(model, data, q, v);
     all_terms::run(model, &data.world, &data.moving, &mut data.centroidal, &mut data.all_terms);
     let kinematics = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
     AllTerms {

@@ -3,7 +3,7 @@
 use super::differentiated::State;
 use super::forward_dynamics::{check_arguments as check_forward, one_by_one as accelerate};
 use super::inverse_dynamics::check_arguments;
-use super::kinematics::{forward_accelerations, forward_velocities};
+use super::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
 use super::limbs::{Task, run as run_limbs};
 use crate::data::{Data, check_forces};
 use crate::derivatives::centroidal_derivatives::{self as centroidal, CentroidalDerivatives};
@@ -40,10 +40,8 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
     f_ext: &[Force<S>],
 ) -> &'d DMatrix<S> {
-    data.check(model);
-    check("q", q.len(), model.nq());
     check_forces(f_ext.len(), model.nodes().len());
-    positions(model, &mut data.world, q);
+    forward_kinematics(model, data, q);
     statics::run_derivative(model, &data.world, &mut data.statics, f_ext);
     &data.statics.dtau_dq
 }
@@ -176,11 +174,9 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
     v: &[S],
 ) -> CoriolisDerivatives<'d, S> {
-    data.check(model);
-    check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
+    forward_kinematics(model, data, q);
     let still = core::mem::take(&mut data.rnea_derivatives.still);
-    positions(model, &mut data.world, q);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &still, &[], &[Vec3::zero()]);
     let d = &mut data.rnea_derivatives;
     d.still = still;
@@ -228,7 +224,7 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S, R> {
     check_forward(model, data, q, v, tau, f_ext);
-    if data.minv.by_factor()
+    if data.minv.by_factor
         && !data.aba_derivatives.solve.pays()
         && run_limbs(Task::AbaDerivatives, model, data, q, v, tau, f_ext)
     {
@@ -256,7 +252,7 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
     a_kept.copy_from_slice(&data.aba.qdd);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext, &[]);
     data.aba_derivatives.a = a_kept;
-    if data.minv.by_factor() {
+    if data.minv.by_factor {
         minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
     } else {
         minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // those of `aba`
@@ -276,7 +272,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let nonzero_rows = if float_freely { &out.nonzero_rows } else { model.nonzero_rows() };
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-    minus_products(data.minv.matrix().as_slice(), dtau, da, nonzero_rows);
+    minus_products(data.minv.Minv.as_slice(), dtau, da, nonzero_rows);
     if float_freely {
         aba::boost(out, &d.qd);
     }
@@ -313,5 +309,5 @@ pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
 /// What `aba_derivatives` has left.
 pub(crate) fn view_of_aba<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> AbaDerivatives<'d, S, R> {
     let aba::Workspace { a, da_dq, da_dv, .. } = &data.aba_derivatives;
-    AbaDerivatives { a, da_dq, da_dv, da_dtau: data.minv.matrix(), state: view(model, data).state }
+    AbaDerivatives { a, da_dq, da_dv, da_dtau: &data.minv.Minv, state: view(model, data).state }
 }

@@ -146,7 +146,7 @@ pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     rnea(model, data, q, v, &zero, f_ext); // h − Σ Jᵢᵀ f_ext,i
     data.forward_dynamics.zero = zero;
     crba(model, data, q);
-    let (d, h, M) = (&mut data.forward_dynamics, data.rnea.tau(), data.crba.matrix());
+    let (d, h, M) = (&mut data.forward_dynamics, &data.rnea.tau, &data.crba.M);
     match method {
         ForwardDynamicsMethod::Dense => run_dense(d, h, M, tau),
         _ => run_sparse(d, h, M, tau),

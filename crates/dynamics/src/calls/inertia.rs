@@ -58,12 +58,12 @@ pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     data.check(model);
     model.check_regular();
     check("q", q.len(), model.nq());
-    if data.minv.by_factor() {
+    if data.minv.by_factor {
         if run_limbs(Task::Minv, model, data, q, &[], &[], &[]) {
             return &data.minv.Minv;
         }
         crba(model, data, q);
-        minv::from_matrix(&mut data.minv, data.crba.matrix());
+        minv::from_matrix(&mut data.minv, &data.crba.M);
         return &data.minv.Minv;
     }
     positions(model, &mut data.world, q);

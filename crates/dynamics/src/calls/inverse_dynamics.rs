@@ -1,8 +1,8 @@
 //! Inverse dynamics: the efforts that make a robot move as it is told.
 
+use super::kinematics::{forward_kinematics, forward_velocities};
 use super::limbs::{Task, run as run_limbs};
 use crate::data::{Data, check_forces};
-use crate::passes::kinematics::{positions, velocities};
 use crate::passes::{coriolis, rnea, statics};
 use condyle_linalg::check;
 use condyle_model::Model;
@@ -127,10 +127,8 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
-    data.check(model);
-    check("q", q.len(), model.nq());
     check_forces(f_ext.len(), model.nodes().len());
-    positions(model, &mut data.world, q);
+    forward_kinematics(model, data, q);
     statics::run(model, &data.world, &mut data.statics, f_ext);
     &data.statics.tau
 }
@@ -161,11 +159,7 @@ pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
     v: &[S],
 ) -> &'d DMatrix<S> {
-    data.check(model);
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    positions(model, &mut data.world, q);
-    velocities(model, &data.world, &mut data.moving, v);
+    forward_velocities(model, data, q, v);
     coriolis::run(model, &data.world, &data.moving, &mut data.coriolis);
     &data.coriolis.C
 }

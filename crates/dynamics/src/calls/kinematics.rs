@@ -185,10 +185,8 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
     v: &[S],
 ) -> Velocities<'d, S, R> {
-    data.check(model);
-    check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
-    positions(model, &mut data.world, q);
+    forward_kinematics(model, data, q);
     velocities(model, &data.world, &mut data.moving, v);
     Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
 }
@@ -218,12 +216,8 @@ pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     v: &[S],
     a: &[S],
 ) -> Accelerations<'d, S, R> {
-    data.check(model);
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
     check("a", a.len(), model.nv());
-    positions(model, &mut data.world, q);
-    velocities(model, &data.world, &mut data.moving, v);
+    forward_velocities(model, data, q, v);
     accelerations(model, &data.world, &mut data.moving, a);
     let velocities = Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving };
     Accelerations { velocities }

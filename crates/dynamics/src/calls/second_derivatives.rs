@@ -198,10 +198,10 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     check_forward(model, data, q, v, tau, f_ext);
     in_turn(model, data, q, v, tau, f_ext);
     let mut mu = core::mem::take(&mut data.aba_hessian.mu);
-    aba::multiply(data.minv.matrix(), lambda, &mut mu); // μ = M⁻¹ λ
+    aba::multiply(&data.minv.Minv, lambda, &mut mu); // μ = M⁻¹ λ
     rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &mu);
     data.aba_hessian.mu = mu;
-    let (first, Minv) = (&data.aba_derivatives, data.minv.matrix());
+    let (first, Minv) = (&data.aba_derivatives, &data.minv.Minv);
     aba::run(model.nonzero_rows(), first, Minv, &data.rnea_hessian, &mut data.aba_hessian);
     let first = view_of_aba(model, data);
     let aba::Workspace { dqdq, dvdq, dvdv, dtaudq, .. } = &data.aba_hessian;

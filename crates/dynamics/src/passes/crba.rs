@@ -27,12 +27,6 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-impl<S> Workspace<S> {
-    pub(crate) fn matrix(&self) -> &DMatrix<S> {
-        &self.M
-    }
-}
-
 /// The whole algorithm, for bodies that are placed.
 #[inline(always)]
 pub(crate) fn pass<L: Columns>(l: &L, w: &World<L::S>, IC: &mut [Inertia<L::S>], M: &mut [L::Number]) {

@@ -52,17 +52,6 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-impl<S> Workspace<S> {
-    /// Whether M⁻¹ is best had from M.
-    pub(crate) fn by_factor(&self) -> bool {
-        self.by_factor
-    }
-
-    pub(crate) fn matrix(&self) -> &DMatrix<S> {
-        &self.Minv
-    }
-}
-
 /// y −= Σ sᵣ xᵣ, entry by entry, for six rows xᵣ of n numbers, from column `from` on.
 #[inline(always)]
 fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S]) {

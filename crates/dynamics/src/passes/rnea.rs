@@ -61,12 +61,6 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-impl<S> Workspace<S> {
-    pub(crate) fn tau(&self) -> &[S] {
-        &self.tau
-    }
-}
-
 /// The whole algorithm, down and up each branch in turn.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
