@@ -18,10 +18,6 @@
 use alloc::vec::Vec;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-fn vector<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
-    to.collect_seq(limits.iter().map(|x| x.is_finite().then_some(*x)))
-}
-
 fn vector_or<'de, D: Deserializer<'de>>(from: D, otherwise: f64) -> Result<Vec<f64>, D::Error> {
     let limits = Vec::<Option<f64>>::deserialize(from)?;
     Ok(limits.into_iter().map(|x| x.unwrap_or(otherwise)).collect())
@@ -36,7 +32,7 @@ pub mod lower {
     /// # Errors
     /// Those of the serializer.
     pub fn serialize<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
-        vector(limits, to)
+        to.collect_seq(limits.iter().map(|x| x.is_finite().then_some(*x)))
     }
 
     /// Reads −∞ for nothing.
@@ -50,15 +46,8 @@ pub mod lower {
 
 /// Greatest values, ∞ where there is none.
 pub mod upper {
+    pub use super::lower::serialize;
     use super::*;
-
-    /// Writes nothing for what is not finite.
-    ///
-    /// # Errors
-    /// Those of the serializer.
-    pub fn serialize<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
-        vector(limits, to)
-    }
 
     /// Reads ∞ for nothing.
     ///

@@ -38,17 +38,6 @@ pub(super) enum Sets<T: Real> {
     Long(Vec<ConstraintSet<T::Long<Gate>>>),
 }
 
-/// The same for each set, whatever its lanes.
-macro_rules! each {
-    ($sets:expr, $some:ident => $body:expr) => {
-        match $sets {
-            Sets::Single($some) => $body,
-            Sets::Short($some) => $body,
-            Sets::Long($some) => $body,
-        }
-    };
-}
-
 impl<T: Real> Batch<T> {
     /// Plans constraints of a model, for this batch, and allocates everything.
     ///
@@ -83,7 +72,7 @@ fn made<S: condyle_spatial::Scalar>(
 impl<T: Real> BatchConstraints<T> {
     /// The number of rows of J, and of numbers of λ of each state.
     pub fn rows(&self) -> usize {
-        each!(&self.sets, sets => sets[0].rows())
+        each!(Sets, &self.sets, sets => sets[0].rows())
     }
 
     /// The rows of constraint k.
@@ -91,12 +80,12 @@ impl<T: Real> BatchConstraints<T> {
     /// # Panics
     /// If there is no such constraint.
     pub fn range(&self, k: usize) -> Range<usize> {
-        each!(&self.sets, sets => sets[0].range(k))
+        each!(Sets, &self.sets, sets => sets[0].range(k))
     }
 
     /// Changes how redundant constraints share their forces.
     pub fn set_proximal(&mut self, proximal: Proximal) {
-        each!(&mut self.sets, sets => sets.iter_mut().for_each(|set| set.proximal = proximal));
+        each!(Sets, &mut self.sets, sets => sets.iter_mut().for_each(|set| set.proximal = proximal));
     }
 
     /// Changes where constraint k wants its frame to be in all states, between calls. Allocates nothing.
@@ -110,7 +99,7 @@ impl<T: Real> BatchConstraints<T> {
         if let Some(what) = target.wrong() {
             return Err(Error::Constraint { constraint: k, what: what.to_owned() });
         }
-        each!(&mut self.sets, sets => sets.iter_mut().try_for_each(|set| set.set_target(k, target.lift())))
+        each!(Sets, &mut self.sets, sets => sets.iter_mut().try_for_each(|set| set.set_target(k, target.lift())))
     }
 
     /// Whether a batch can use these: it has as many threads, and as many lanes, as the one that made them.
@@ -126,6 +115,6 @@ impl<T: Real> BatchConstraints<T> {
     /// Panics unless this was made for a model with the same joints and frames in the same places.
     #[track_caller]
     pub(super) fn check(&self, model: &Model) {
-        each!(&self.sets, sets => sets[0].check(model));
+        each!(Sets, &self.sets, sets => sets[0].check(model));
     }
 }

@@ -8,6 +8,17 @@
 //!
 //! Each function is an entry of a table (`table.rs`), which calls that for a single state on lanes.
 
+/// The same of whichever vectors an `InLanes` or `Sets` has.
+macro_rules! each {
+    ($Of:ident, $of:expr, $some:ident => $body:expr) => {
+        match $of {
+            $Of::Single($some) => $body,
+            $Of::Short($some) => $body,
+            $Of::Long($some) => $body,
+        }
+    };
+}
+
 pub(crate) mod centroidal;
 pub(crate) mod constrained;
 pub(crate) mod constraints;
@@ -175,11 +186,7 @@ impl<T: Real> Batch<T> {
         constraints: Option<&mut BatchConstraints<T>>,
         written: Option<&mut [&mut [T]]>,
     ) {
-        match &self.lanes {
-            InLanes::Single(g) => g.check(model),
-            InLanes::Short(g) => g.check(model),
-            InLanes::Long(g) => g.check(model),
-        }
+        each!(InLanes, &self.lanes, group => group.check(model));
         if let Some(constraints) = &constraints {
             constraints.check(model);
             assert!(constraints.fits(self), "constraints: made for another batch");

@@ -144,9 +144,7 @@ impl<'b, T: Real> Matrices<'b, T> {
         check_state(k, self.states);
         let [m, n] = self.shape;
         match self.of {
-            Stored::InLanes(InLanes::Single(group), kind) => group.matrix(kind, k),
-            Stored::InLanes(InLanes::Short(group), kind) => group.matrix(kind, k),
-            Stored::InLanes(InLanes::Long(group), kind) => group.matrix(kind, k),
+            Stored::InLanes(lanes, kind) => each!(InLanes, lanes, group => group.matrix(kind, k)),
             Stored::ByRows(rows) => DMatrixView::from_slice_with_strides(&rows[k * m * n..(k + 1) * m * n], m, n, n, 1),
         }
     }
@@ -169,9 +167,7 @@ impl<'b, T: Real> Matrices<'b, T> {
         let [m, n] = self.shape;
         check("to", to.len(), self.states * m * n);
         match self.of {
-            Stored::InLanes(InLanes::Single(group), kind) => group.write_rows(kind, to),
-            Stored::InLanes(InLanes::Short(group), kind) => group.write_rows(kind, to),
-            Stored::InLanes(InLanes::Long(group), kind) => group.write_rows(kind, to),
+            Stored::InLanes(lanes, kind) => each!(InLanes, lanes, group => group.write_rows(kind, to)),
             Stored::ByRows(rows) => to.copy_from_slice(rows),
         }
     }

@@ -122,15 +122,11 @@ fn shape(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
     let a = size[0];
     match kind {
         "sphere" => (4.0 / 3.0 * PI * a * a * a, [0.4 * a * a; 3]),
-        "box" => {
+        "box" | "ellipsoid" => {
             let (b, c) = (size[1], size[2]);
-            let moments = [(b * b + c * c) / 3.0, (a * a + c * c) / 3.0, (a * a + b * b) / 3.0];
-            (8.0 * a * b * c, moments)
-        }
-        "ellipsoid" => {
-            let (b, c) = (size[1], size[2]);
-            let moments = [(b * b + c * c) / 5.0, (a * a + c * c) / 5.0, (a * a + b * b) / 5.0];
-            (4.0 / 3.0 * PI * a * b * c, moments)
+            let (filled, part) = if kind == "box" { (8.0, 3.0) } else { (4.0 / 3.0 * PI, 5.0) };
+            let moments = [(b * b + c * c) / part, (a * a + c * c) / part, (a * a + b * b) / part];
+            (filled * a * b * c, moments)
         }
         "cylinder" => {
             let h = 2.0 * size[1];
