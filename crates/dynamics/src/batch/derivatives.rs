@@ -11,6 +11,7 @@ use crate::calls::derivatives::{
 use crate::calls::parameter_derivatives::Input;
 use crate::calls::second_derivatives::{AbaHessian, RneaHessian, aba_hessian, each_unit_hessian, rnea_hessian};
 use crate::derivatives::centroidal_derivatives::CentroidalDerivatives;
+use crate::lanes::limbs::pass::Arguments;
 use crate::passes::energy::EnergyDerivatives;
 use condyle_spatial::block::Real;
 
@@ -196,7 +197,7 @@ batched! {
     fn rnea_second_derivatives(model, data => to; q, v, a, f_ext)
     with wide -> BatchRneaHessian<'_, T> [[NV, NV, NV], [NV, NV, NV], [NV, NV, NV], [NV, NV, NV]] {
         let nv = model.nv();
-        each_unit_hessian(model, data, [q, v, a], f_ext, &mut wide[..nv], |i, matrices| {
+        each_unit_hessian(model, data, Arguments { q, v, x: a, f_ext }, &mut wide[..nv], |i, matrices| {
             for (result, matrix) in matrices.into_iter().enumerate() {
                 to.part(result, [i, nv], matrix.as_slice(), nv);
             }

@@ -1,14 +1,15 @@
 //! Forward dynamics under constraints, its derivatives, and the equations differentiated.
 
+use super::inverse_dynamics::check_arguments;
 use super::limbs_constrained;
 use crate::constraints::constrained_derivatives::{By, invert, respond};
-use crate::constraints::constrained_dynamics::{Inputs, equations, evaluate, factorize, solve};
+use crate::constraints::constrained_dynamics::{equations, evaluate, factorize, solve};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::kkt_derivatives::{differentiate_motion, load, turn};
-use crate::data::{Data, check_forces};
+use crate::data::Data;
 use crate::derivatives::rnea_derivatives;
+use crate::lanes::limbs::pass::Arguments;
 use crate::passes::kinematics::positions;
-use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
@@ -63,10 +64,10 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> Constrained<'d, S> {
-    let inputs = Inputs { q, v, tau, f_ext };
-    check_arguments(model, data, constraints, &inputs);
-    if !limbs_constrained::run(model, data, constraints, inputs) {
-        run(model, data, constraints, inputs);
+    let arguments = Arguments { q, v, x: tau, f_ext };
+    check(model, data, constraints, arguments);
+    if !limbs_constrained::run(model, data, constraints, arguments) {
+        run(model, data, constraints, arguments);
     }
     Constrained {
         a: &data.constrained_dynamics.qdd,
@@ -79,19 +80,10 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
 /// Panics unless the arguments fit.
 #[inline]
 #[track_caller]
-fn check_arguments<S: Scalar, R>(
-    model: &Model<R>,
-    data: &Data<S>,
-    constraints: &ConstraintSet<S>,
-    inputs: &Inputs<'_, S>,
-) {
-    data.check(model);
+fn check<S: Scalar, R>(model: &Model<R>, data: &Data<S>, constraints: &ConstraintSet<S>, arguments: Arguments<'_, S>) {
+    check_arguments(model, data, "tau", arguments);
     constraints.check(model);
     model.check_regular();
-    check("q", inputs.q.len(), model.nq());
-    check("v", inputs.v.len(), model.nv());
-    check("tau", inputs.tau.len(), model.nv());
-    check_forces(inputs.f_ext.len(), model.nodes().len());
 }
 
 /// The whole algorithm over the factor of M, for arguments that fit.
@@ -99,7 +91,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
     constraints: &mut ConstraintSet<S>,
-    Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
+    Arguments { q, v, x: tau, f_ext }: Arguments<'_, S>,
 ) {
     positions(model, &mut data.world, q);
     let (world, d) = (&data.world, &mut data.constrained_dynamics);
@@ -170,9 +162,9 @@ pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> ConstrainedEquations<'d, S> {
-    let inputs = Inputs { q, v, tau, f_ext };
-    check_arguments(model, data, constraints, &inputs);
-    differentiate(model, data, constraints, inputs);
+    let arguments = Arguments { q, v, x: tau, f_ext };
+    check(model, data, constraints, arguments);
+    differentiate(model, data, constraints, arguments);
     ConstrainedEquations {
         a: &data.constrained_dynamics.qdd,
         lambda: &constraints.lambda,
@@ -191,13 +183,13 @@ pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
     constraints: &mut ConstraintSet<S>,
-    inputs: Inputs<'_, S>,
+    arguments: Arguments<'_, S>,
 ) {
-    run(model, data, constraints, inputs);
+    run(model, data, constraints, arguments);
     let (world, qdd) = (&data.world, &data.constrained_dynamics.qdd);
     let (d, id) = (&mut data.constrained_derivatives, &mut data.rnea_derivatives);
-    load(model, constraints, world, inputs.f_ext, &mut d.forces);
-    rnea_derivatives::run(model, world, id, inputs.v, qdd, &d.forces, &[]);
+    load(model, constraints, world, arguments.f_ext, &mut d.forces);
+    rnea_derivatives::run(model, world, id, arguments.v, qdd, &d.forces, &[]);
     turn(constraints, world, &id.dtau_dq, &mut d.dtau_dq);
     differentiate_motion(constraints, world, &id.bodies);
 }
@@ -263,9 +255,9 @@ pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> ConstrainedDerivatives<'d, S> {
-    let inputs = Inputs { q, v, tau, f_ext };
-    check_arguments(model, data, constraints, &inputs);
-    differentiate(model, data, constraints, inputs);
+    let arguments = Arguments { q, v, x: tau, f_ext };
+    check(model, data, constraints, arguments);
+    differentiate(model, data, constraints, arguments);
     let (d, id) = (&mut data.constrained_derivatives, &data.rnea_derivatives);
     invert(constraints, &data.constrained_dynamics.factor, &mut d.P);
     respond(constraints, By::Position, &d.P, &d.dtau_dq, &mut d.da_dq);

@@ -1,11 +1,13 @@
 //! Inverse dynamics under constraints: the efforts and the constraints' accelerations for a motion and forces that are
 //! given, and their derivatives.
 
+use super::inverse_dynamics;
 use crate::constraints::constrained_dynamics::evaluate;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::kkt_derivatives::{differentiate_motion, load, turn};
-use crate::data::{Data, check_forces};
+use crate::data::Data;
 use crate::derivatives::rnea_derivatives;
+use crate::lanes::limbs::pass::Arguments;
 use crate::passes::kinematics::{accelerations, positions, velocities};
 use crate::passes::rnea;
 use condyle_linalg::check;
@@ -203,11 +205,7 @@ fn check_arguments<S: Scalar, R>(
     [q, v, a, lambda]: [&[S]; 4],
     f_ext: &[Force<S>],
 ) {
-    data.check(model);
+    inverse_dynamics::check_arguments(model, data, "a", Arguments { q, v, x: a, f_ext });
     constraints.check(model);
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    check("a", a.len(), model.nv());
     check("lambda", lambda.len(), constraints.rows());
-    check_forces(f_ext.len(), model.nodes().len());
 }

@@ -1,7 +1,7 @@
 //! First derivatives of inverse and forward dynamics, of momentum and of energies.
 
 use super::differentiated::State;
-use super::forward_dynamics::{check_arguments as check_forward, one_by_one as accelerate};
+use super::forward_dynamics::one_by_one as accelerate;
 use super::inverse_dynamics::check_arguments;
 use super::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
 use super::limbs::{Task, run as run_limbs};
@@ -9,6 +9,7 @@ use crate::data::{Data, check_forces};
 use crate::derivatives::centroidal_derivatives::{self as centroidal, CentroidalDerivatives};
 use crate::derivatives::{aba_derivatives as aba, rnea_derivatives as rnea};
 use crate::lanes::limbs::LaneView;
+use crate::lanes::limbs::pass::Arguments;
 use crate::passes::energy::{self, EnergyDerivatives};
 use crate::passes::kinematics::{PlacementCache, positions};
 use crate::passes::{minv, statics};
@@ -111,25 +112,20 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
     f_ext: &[Force<S>],
 ) -> RneaDerivatives<'d, S, R> {
-    check_arguments(model, data, q, v, a, f_ext);
-    if run_limbs(Task::RneaDerivatives, model, data, q, v, a, f_ext) {
+    let arguments = Arguments { q, v, x: a, f_ext };
+    check_arguments(model, data, "a", arguments);
+    if run_limbs(Task::RneaDerivatives, model, data, arguments) {
         data.rnea_derivatives.qd.copy_from_slice(v);
         data.rnea_derivatives.qdd.copy_from_slice(a);
     } else {
-        one_by_one(model, data, q, v, a, f_ext);
+        one_by_one(model, data, arguments);
     }
     view(model, data)
 }
 
 /// Body by body, for arguments that fit; leaves what second derivatives are made of.
-pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    data: &mut Data<S>,
-    q: &[S],
-    v: &[S],
-    a: &[S],
-    f_ext: &[Force<S>],
-) {
+pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
+    let Arguments { q, v, x: a, f_ext } = arguments;
     positions(model, &mut data.world, q);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
 }
@@ -223,31 +219,27 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> AbaDerivatives<'d, S, R> {
-    check_forward(model, data, q, v, tau, f_ext);
+    let arguments = Arguments { q, v, x: tau, f_ext };
+    model.check_regular();
+    check_arguments(model, data, "tau", arguments);
     if data.minv.by_factor
         && !data.aba_derivatives.solve.pays()
-        && run_limbs(Task::AbaDerivatives, model, data, q, v, tau, f_ext)
+        && run_limbs(Task::AbaDerivatives, model, data, arguments)
     {
         data.aba_derivatives.a.copy_from_slice(&data.aba.qdd);
         data.rnea_derivatives.qd.copy_from_slice(v);
         data.rnea_derivatives.qdd.copy_from_slice(&data.aba.qdd);
         multiply(model, data);
     } else {
-        in_turn(model, data, q, v, tau, f_ext);
+        in_turn(model, data, arguments);
     }
     view_of_aba(model, data)
 }
 
 /// Body by body, for arguments that fit; leaves what second derivatives are made of.
-pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    data: &mut Data<S>,
-    q: &[S],
-    v: &[S],
-    tau: &[S],
-    f_ext: &[Force<S>],
-) {
-    accelerate(model, data, q, v, tau, f_ext);
+pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
+    let Arguments { v, f_ext, .. } = arguments;
+    accelerate(model, data, arguments);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
     a_kept.copy_from_slice(&data.aba.qdd);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext, &[]);

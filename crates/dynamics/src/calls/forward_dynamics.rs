@@ -1,14 +1,14 @@
 //! Forward dynamics: how a robot accelerates under the efforts that it is given.
 
 use super::inertia::crba;
-use super::inverse_dynamics::rnea;
+use super::inverse_dynamics::{check_arguments, rnea};
 use super::limbs::{Task, run as run_limbs};
-use crate::data::{Data, check_forces};
+use crate::data::Data;
+use crate::lanes::limbs::pass::Arguments;
 use crate::passes::aba;
 use crate::passes::factored_dynamics::{ForwardDynamicsMethod, run_dense, run_sparse};
 use crate::passes::kinematics::positions;
 use crate::selection;
-use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 
@@ -43,39 +43,23 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     tau: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
-    check_arguments(model, data, q, v, tau, f_ext);
-    if !run_limbs(Task::Aba, model, data, q, v, tau, f_ext) {
-        one_by_one(model, data, q, v, tau, f_ext);
+    let arguments = Arguments { q, v, x: tau, f_ext };
+    model.check_regular();
+    check_arguments(model, data, "tau", arguments);
+    if !run_limbs(Task::Aba, model, data, arguments) {
+        one_by_one(model, data, arguments);
     }
     &data.aba.qdd
 }
 
-/// Panics unless the arguments of forward dynamics fit.
-#[inline]
-#[track_caller]
-pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) {
-    data.check(model);
-    model.check_regular();
-    check("q", q.len(), model.nq());
-    check("v", v.len(), model.nv());
-    check("tau", tau.len(), model.nv());
-    check_forces(f_ext.len(), model.nodes().len());
-}
-
 /// Body by body, for arguments that fit; leaves what depends on q behind.
-pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(
-    model: &Model<R>,
-    data: &mut Data<S>,
-    q: &[S],
-    v: &[S],
-    tau: &[S],
-    f_ext: &[Force<S>],
-) {
+pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
     if model.has_mimic() {
-        by_factor(model, data, q, v, tau, f_ext, ForwardDynamicsMethod::Sparse);
+        by_factor(model, data, arguments, ForwardDynamicsMethod::Sparse);
         data.aba.qdd.copy_from_slice(&data.forward_dynamics.qdd);
         return;
     }
+    let Arguments { q, v, x: tau, f_ext } = arguments;
     positions(model, &mut data.world, q);
     aba::run(model, &data.world, &mut data.aba, v, tau, f_ext);
 }
@@ -122,11 +106,13 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
     method: Option<ForwardDynamicsMethod>,
 ) -> &'d [S] {
-    check_arguments(model, data, q, v, tau, f_ext);
+    let arguments = Arguments { q, v, x: tau, f_ext };
+    model.check_regular();
+    check_arguments(model, data, "tau", arguments);
     match method.unwrap_or(ForwardDynamicsMethod::fastest(model)) {
         ForwardDynamicsMethod::ArticulatedBody => aba(model, data, q, v, tau, f_ext),
         method => {
-            by_factor(model, data, q, v, tau, f_ext, method);
+            by_factor(model, data, arguments, method);
             &data.forward_dynamics.qdd
         }
     }
@@ -136,10 +122,7 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
 pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
-    q: &[S],
-    v: &[S],
-    tau: &[S],
-    f_ext: &[Force<S>],
+    Arguments { q, v, x: tau, f_ext }: Arguments<'_, S>,
     method: ForwardDynamicsMethod,
 ) {
     let zero = core::mem::take(&mut data.forward_dynamics.zero);

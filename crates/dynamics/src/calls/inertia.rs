@@ -2,6 +2,7 @@
 
 use super::limbs::{Task, run as run_limbs};
 use crate::data::Data;
+use crate::lanes::limbs::pass::Arguments;
 use crate::passes::kinematics::positions;
 use crate::passes::{aba, crba, minv};
 use condyle_linalg::check;
@@ -28,7 +29,7 @@ use nalgebra::DMatrix;
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
     data.check(model);
     check("q", q.len(), model.nq());
-    if run_limbs(Task::Crba, model, data, q, &[], &[], &[]) {
+    if run_limbs(Task::Crba, model, data, Arguments { q, v: &[], x: &[], f_ext: &[] }) {
         return &data.crba.M;
     }
     positions(model, &mut data.world, q);
@@ -59,7 +60,7 @@ pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     model.check_regular();
     check("q", q.len(), model.nq());
     if data.minv.by_factor {
-        if run_limbs(Task::Minv, model, data, q, &[], &[], &[]) {
+        if run_limbs(Task::Minv, model, data, Arguments { q, v: &[], x: &[], f_ext: &[] }) {
             return &data.minv.Minv;
         }
         crba(model, data, q);

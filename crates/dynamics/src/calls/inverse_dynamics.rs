@@ -3,6 +3,7 @@
 use super::kinematics::{forward_kinematics, forward_velocities};
 use super::limbs::{Task, run as run_limbs};
 use crate::data::{Data, check_forces};
+use crate::lanes::limbs::pass::Arguments;
 use crate::passes::{coriolis, rnea, statics};
 use condyle_linalg::check;
 use condyle_model::Model;
@@ -10,8 +11,9 @@ use condyle_spatial::{Constant, Force, Scalar};
 use nalgebra::DMatrix;
 
 /// RNEA with the limbs side by side where there are some, else body by body.
-fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
-    if !run_limbs(Task::Rnea, model, data, q, v, a, f_ext) {
+fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
+    if !run_limbs(Task::Rnea, model, data, arguments) {
+        let Arguments { q, v, x: a, f_ext } = arguments;
         rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, f_ext);
     }
 }
@@ -40,19 +42,21 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     a: &[S],
     f_ext: &[Force<S>],
 ) -> &'d [S] {
-    check_arguments(model, data, q, v, a, f_ext);
-    run(model, data, q, v, a, f_ext);
+    let arguments = Arguments { q, v, x: a, f_ext };
+    check_arguments(model, data, "a", arguments);
+    run(model, data, arguments);
     &data.rnea.tau
 }
 
-/// Panics unless the arguments fit.
+/// Panics unless the arguments fit, of which the third has this name.
 #[inline]
 #[track_caller]
-pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, q: &[S], v: &[S], a: &[S], f_ext: &[Force<S>]) {
+pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str, arguments: Arguments<'_, S>) {
+    let Arguments { q, v, x, f_ext } = arguments;
     data.check(model);
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
-    check("a", a.len(), model.nv());
+    check(name, x.len(), model.nv());
     check_forces(f_ext.len(), model.nodes().len());
 }
 
@@ -72,7 +76,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
     let zero = core::mem::take(&mut data.rnea.zero);
-    run(model, data, q, v, &zero, &[]);
+    run(model, data, Arguments { q, v, x: &zero, f_ext: &[] });
     data.rnea.zero = zero;
     &data.rnea.tau
 }
@@ -96,7 +100,7 @@ pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Da
     data.check(model);
     check("q", q.len(), model.nq());
     let zero = core::mem::take(&mut data.rnea.zero);
-    run(model, data, q, &zero, &zero, &[]);
+    run(model, data, Arguments { q, v: &zero, x: &zero, f_ext: &[] });
     data.rnea.zero = zero;
     &data.rnea.tau
 }

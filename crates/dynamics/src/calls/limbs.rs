@@ -12,7 +12,7 @@ use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::gate::{Fused, Level, is, level, renamed};
 use condyle_spatial::register_kernel;
-use condyle_spatial::{Constant, Force, Scalar};
+use condyle_spatial::{Constant, Scalar};
 
 /// The function that is asked for.
 #[derive(Clone, Copy, Debug)]
@@ -119,17 +119,14 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     task: Task,
     model: &Model<R>,
     data: &mut Data<S>,
-    q: &[S],
-    v: &[S],
-    x: &[S],
-    f_ext: &[Force<S>],
+    arguments: Arguments<'_, S>,
 ) -> bool {
     let Some(plan) = ready(model, data) else { return false };
     if model.has_mimic() && !matches!(task, Task::Rnea) {
         return false; // joints that share a coordinate
     }
     // SAFETY: S and R are f64.
-    unsafe { enter(task, renamed(model), plan, renamed(data), Arguments::new(q, v, x, f_ext)) }
+    unsafe { enter(task, renamed(model), plan, renamed(data), arguments.fused()) }
     true
 }
 

@@ -2,7 +2,6 @@
 #![allow(unsafe_code)]
 
 use super::limbs::{load_steps, place_steps, ready};
-use crate::constraints::constrained_dynamics::Inputs;
 use crate::constraints::constraint_lanes::{ConstraintLanes, WIDE};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::data::Data;
@@ -88,11 +87,11 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
     constraints: &mut ConstraintSet<S>,
-    Inputs { q, v, tau, f_ext }: Inputs<'_, S>,
+    arguments: Arguments<'_, S>,
 ) -> bool {
     let Some(plan) = ready(model, data).filter(|_| constraints.limbs.is_some()) else { return false };
     // SAFETY: S and R are f64, and `Fused` is the same.
-    unsafe { enter(renamed(model), plan, renamed(data), renamed(constraints), Arguments::new(q, v, tau, f_ext)) }
+    unsafe { enter(renamed(model), plan, renamed(data), renamed(constraints), arguments.fused()) }
     true
 }
 

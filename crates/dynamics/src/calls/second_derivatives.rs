@@ -1,10 +1,10 @@
 //! Second derivatives of inverse and forward dynamics, contracted with a vector or as tensors.
 
 use super::derivatives::{AbaDerivatives, RneaDerivatives, in_turn, one_by_one, view, view_of_aba};
-use super::forward_dynamics::check_arguments as check_forward;
 use super::inverse_dynamics::check_arguments;
 use crate::data::Data;
 use crate::derivatives::{aba_hessian as aba, rnea_hessian as rnea};
+use crate::lanes::limbs::pass::Arguments;
 use crate::workspace::{filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::check;
@@ -61,8 +61,9 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     lambda: &[S],
 ) -> RneaHessian<'d, S, R> {
     check("lambda", lambda.len(), model.nv());
-    check_arguments(model, data, q, v, a, f_ext);
-    one_by_one(model, data, q, v, a, f_ext);
+    let arguments = Arguments { q, v, x: a, f_ext };
+    check_arguments(model, data, "a", arguments);
+    one_by_one(model, data, arguments);
     rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
     let first = view(model, data);
     let rnea::Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
@@ -121,7 +122,7 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
 ) {
     check("out", out.lambda.len(), model.nv());
     let RneaSecondDerivatives { dqdq, dvdq, dvdv, dadq, lambda } = out;
-    each_unit_hessian(model, data, [q, v, a], f_ext, lambda, |i, matrices| {
+    each_unit_hessian(model, data, Arguments { q, v, x: a, f_ext }, lambda, |i, matrices| {
         for (to, from) in [&mut dqdq[i], &mut dvdq[i], &mut dvdv[i], &mut dadq[i]].into_iter().zip(matrices) {
             to.copy_from(from);
         }
@@ -132,13 +133,12 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
 pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
-    [q, v, a]: [&[S]; 3],
-    f_ext: &[Force<S>],
+    arguments: Arguments<'_, S>,
     lambda: &mut [S],
     mut give: impl FnMut(usize, [&DMatrix<S>; 4]),
 ) {
-    check_arguments(model, data, q, v, a, f_ext);
-    one_by_one(model, data, q, v, a, f_ext);
+    check_arguments(model, data, "a", arguments);
+    one_by_one(model, data, arguments);
     lambda.fill(S::zero());
     for i in 0..model.nv() {
         lambda[i] = S::one();
@@ -195,8 +195,10 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     lambda: &[S],
 ) -> AbaHessian<'d, S, R> {
     check("lambda", lambda.len(), model.nv());
-    check_forward(model, data, q, v, tau, f_ext);
-    in_turn(model, data, q, v, tau, f_ext);
+    let arguments = Arguments { q, v, x: tau, f_ext };
+    model.check_regular();
+    check_arguments(model, data, "tau", arguments);
+    in_turn(model, data, arguments);
     let mut mu = core::mem::take(&mut data.aba_hessian.mu);
     aba::multiply(&data.minv.Minv, lambda, &mut mu); // μ = M⁻¹ λ
     rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &mu);

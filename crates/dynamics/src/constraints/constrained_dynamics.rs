@@ -231,12 +231,3 @@ kernel! {
         }
     }
 }
-
-/// What dynamics under constraints read.
-#[derive(Clone, Copy)]
-pub(crate) struct Inputs<'a, S> {
-    pub q: &'a [S],
-    pub v: &'a [S],
-    pub tau: &'a [S],
-    pub f_ext: &'a [Force<S>],
-}

@@ -73,24 +73,24 @@ impl Scratch {
     }
 }
 
-/// The arguments of a call.
+/// The arguments of inverse or of forward dynamics.
 #[derive(Clone, Copy)]
-pub(crate) struct Arguments<'a> {
-    pub q: &'a [Fused],
-    pub v: &'a [Fused],
+pub(crate) struct Arguments<'a, S = Fused> {
+    pub q: &'a [S],
+    pub v: &'a [S],
     /// An acceleration or an effort.
-    pub x: &'a [Fused],
-    pub f_ext: &'a [Force<Fused>],
+    pub x: &'a [S],
+    pub f_ext: &'a [Force<S>],
 }
 
-impl<'a> Arguments<'a> {
-    /// The arguments of a call.
+impl<'a, S> Arguments<'a, S> {
+    /// The same numbers.
     ///
     /// # Safety
     /// `S` is `f64`.
-    pub(crate) unsafe fn new<S>(q: &'a [S], v: &'a [S], x: &'a [S], f_ext: &'a [Force<S>]) -> Self {
+    pub(crate) unsafe fn fused(self) -> Arguments<'a> {
         // SAFETY: `Fused` is a transparent wrapper, and a force is `repr(C)`.
-        unsafe { Self { q: renamed(q), v: renamed(v), x: renamed(x), f_ext: renamed(f_ext) } }
+        unsafe { Arguments { q: renamed(self.q), v: renamed(self.v), x: renamed(self.x), f_ext: renamed(self.f_ext) } }
     }
 }
 
