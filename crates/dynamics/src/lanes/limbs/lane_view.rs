@@ -21,7 +21,7 @@ impl<'d> LaneView<'d> {
     /// oX of body b.
     pub(crate) fn pose<S: Scalar>(self, b: usize) -> Se3<S> {
         let (step, lane) = self.plan.place(b);
-        let Se3 { rotation: Mat3 { x, y, z }, translation } = self.scratch.world.oX[step];
+        let Se3 { rotation: Mat3 { x, y, z }, translation } = &self.scratch.world.oX[step];
         let rotation = Mat3 { x: vector(x, lane), y: vector(y, lane), z: vector(z, lane) };
         Se3::new(rotation, vector(translation, lane))
     }
@@ -29,33 +29,36 @@ impl<'d> LaneView<'d> {
     /// S of a column of body b, the k-th.
     pub(crate) fn column<S: Scalar>(self, b: usize, k: usize) -> Motion<S> {
         let (step, lane) = self.plan.place(b);
-        motion(self.scratch.world.S[self.plan.steps[step].idx_v + k], lane)
+        motion(&self.scratch.world.S[self.plan.steps[step].idx_v + k], lane)
     }
 
     /// Velocity of body b, and its acceleration with gravity as the world's.
     pub(crate) fn moving<S: Scalar>(self, b: usize) -> (Motion<S>, Motion<S>) {
         let (step, lane) = self.plan.place(b);
-        (motion(self.scratch.bodies.v[step], lane), motion(self.scratch.bodies.a[step], lane))
+        (motion(&self.scratch.bodies.v[step], lane), motion(&self.scratch.bodies.a[step], lane))
     }
 
     /// Iᶜ of body b.
     pub(crate) fn carried<S: Scalar>(self, b: usize) -> Inertia<S> {
         let (step, lane) = self.plan.place(b);
-        let Inertia { mass, mass_com, rotational: r } = self.scratch.bodies.IC[step];
+        let Inertia { mass, mass_com, rotational: r } = &self.scratch.bodies.IC[step];
         let n = |x| number(x, lane);
-        let rotational = Sym3 { xx: n(r.xx), xy: n(r.xy), yy: n(r.yy), xz: n(r.xz), yz: n(r.yz), zz: n(r.zz) };
+        let rotational = Sym3 { xx: n(&r.xx), xy: n(&r.xy), yy: n(&r.yy), xz: n(&r.xz), yz: n(&r.yz), zz: n(&r.zz) };
         Inertia { mass: n(mass), mass_com: vector(mass_com, lane), rotational }
     }
 }
 
-fn number<S: Scalar>(x: Four, lane: usize) -> S {
-    S::splat(lanes(&[x])[lane]) // out of memory: this is called with the instructions of any processor
+#[inline(always)]
+fn number<S: Scalar>(x: &Four, lane: usize) -> S {
+    S::splat(lanes(core::slice::from_ref(x))[lane]) // out of memory: this runs with the instructions of any processor
 }
 
-fn vector<S: Scalar>(v: Vec3<Four>, lane: usize) -> Vec3<S> {
-    Vec3::new(number(v.x, lane), number(v.y, lane), number(v.z, lane))
+#[inline(always)]
+fn vector<S: Scalar>(v: &Vec3<Four>, lane: usize) -> Vec3<S> {
+    Vec3::new(number(&v.x, lane), number(&v.y, lane), number(&v.z, lane))
 }
 
-fn motion<S: Scalar>(m: Motion<Four>, lane: usize) -> Motion<S> {
-    Motion::new(vector(m.linear, lane), vector(m.angular, lane))
+#[inline(always)]
+fn motion<S: Scalar>(m: &Motion<Four>, lane: usize) -> Motion<S> {
+    Motion::new(vector(&m.linear, lane), vector(&m.angular, lane))
 }
