@@ -3,32 +3,10 @@
 
 use crate::function::Array;
 use crate::graph::{Id, Node};
-use crate::steps::Step;
+use crate::step::{Entries, Step, Term};
 
 /// The entries that a loop has at least.
 const FEWEST: usize = 4;
-
-/// Sums Σ ± eachₖ common for each k.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Entries {
-    /// The sums, from which nothing is computed.
-    pub ids: Vec<Id>,
-    /// The place of the first one among all results; the others follow.
-    pub first: usize,
-    /// The first one is added.
-    pub terms: Vec<Term>,
-}
-
-/// A term of each sum.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Term {
-    /// Whether it is subtracted.
-    pub minus: bool,
-    /// The value in each sum. These values follow one another in the work space.
-    pub each: Vec<Id>,
-    /// What it is multiplied by in all sums. The first term may be values alone.
-    pub common: Option<Id>,
-}
 
 /// A term of one sum: whether it is subtracted, and its factors, of which a value has one.
 type Of = (bool, [Option<Id>; 2]);

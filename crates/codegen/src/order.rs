@@ -1,7 +1,8 @@
 //! The order of a function's steps: such that few values are under way at a time.
 
 use crate::graph::Id;
-use crate::steps::{Step, Steps};
+use crate::step::Step;
+use crate::steps::Steps;
 use std::collections::BTreeSet;
 
 /// The registers that a processor has, of which an order should need no more.

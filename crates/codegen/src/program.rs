@@ -1,10 +1,10 @@
 //! A function as a program: its steps in order, in parts of bounded size, with the places of what one part leaves to others.
 
-use crate::entries::Term;
 use crate::function::Function;
 use crate::graph::Id;
 use crate::order::order;
-use crate::steps::{Angle, Step, Steps};
+use crate::step::{Angle, Step, Term};
+use crate::steps::Steps;
 use core::iter::successors;
 use core::ops::Range;
 

@@ -1,56 +1,12 @@
 //! The steps of a function: its graph with products fused into the sums that they go into, both parts of an angle computed
 //! together, and entries of a result that are alike in a loop.
 
-use crate::entries::{self, Entries};
+use crate::entries;
 use crate::function::{Function, Operations};
 use crate::graph::{Id, Node};
+use crate::step::{Angle, Step};
 use crate::sums::Sums;
 use std::collections::HashMap;
-
-/// A step.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Step {
-    /// A value as the graph computes it.
-    Plain(Id, Node),
-    /// a b + c.
-    MulAdd(Id, [Id; 3]),
-    /// a b − c.
-    MulSub(Id, [Id; 3]),
-    /// c − a b.
-    SubMul(Id, [Id; 3]),
-    /// The sine and the cosine of an angle.
-    SinCos(Angle),
-    /// A loop.
-    Entries(Entries),
-}
-
-impl Step {
-    /// The values that it computes.
-    pub(crate) fn makes(&self) -> impl Iterator<Item = Id> {
-        let (few, many) = match *self {
-            Self::Plain(id, _) | Self::MulAdd(id, _) | Self::MulSub(id, _) | Self::SubMul(id, _) => {
-                ([Some(id), None], &[][..])
-            }
-            Self::SinCos(Angle { sin, cos, .. }) => ([sin, cos], &[][..]),
-            Self::Entries(ref entries) => ([None; 2], &entries.ids[..]),
-        };
-        few.into_iter().flatten().chain(many.iter().copied())
-    }
-
-    /// The values from which it computes them.
-    pub(crate) fn takes(&self) -> impl Iterator<Item = Id> {
-        let (few, many) = match *self {
-            Self::Plain(_, node) => {
-                let mut operands = node.operands();
-                ([operands.next(), operands.next(), operands.next()], &[][..])
-            }
-            Self::MulAdd(_, abc) | Self::MulSub(_, abc) | Self::SubMul(_, abc) => (abc.map(Some), &[][..]),
-            Self::SinCos(Angle { angle, .. }) => ([Some(angle), None, None], &[][..]),
-            Self::Entries(ref entries) => ([None; 3], &entries.terms[..]),
-        };
-        few.into_iter().flatten().chain(many.iter().flat_map(|term| term.each.iter().copied().chain(term.common)))
-    }
-}
 
 /// All steps of a function, each after those from which it takes values.
 #[derive(Debug)]
@@ -63,14 +19,6 @@ pub(crate) struct Steps<'f> {
     pub angles: Vec<Angle>,
     /// The values of all outputs.
     pub results: &'f [Id],
-}
-
-/// An angle, with its sine and its cosine where they are needed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Angle {
-    pub angle: Id,
-    pub sin: Option<Id>,
-    pub cos: Option<Id>,
 }
 
 /// The operations that an angle may take to be known at once.

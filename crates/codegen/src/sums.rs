@@ -5,7 +5,7 @@
 //! x − (a b + c d) is two steps. Terms are added in the order in which they were recorded, as soon as they are there.
 
 use crate::graph::{Graph, Id, Node};
-use crate::steps::Step;
+use crate::step::Step;
 
 /// A term: a value, and whether it is subtracted.
 #[derive(Clone, Copy, Debug)]

@@ -5,11 +5,10 @@ mod casadi;
 mod cuda;
 mod rust;
 
-use crate::entries::{Entries, Term};
 use crate::function::{Array, Function};
 use crate::graph::{Id, Node};
 use crate::program::{Place, Program};
-use crate::steps::{Angle, Step};
+use crate::step::{Angle, Entries, Step, Term};
 use core::fmt::Write;
 
 /// A file of code.

@@ -4,7 +4,7 @@ use super::{Dialect, SourceFile, Writer, description, digits, heading, prefixed}
 use crate::function::Array;
 use crate::graph::Node;
 use crate::program::Program;
-use crate::steps::Step;
+use crate::step::Step;
 use core::fmt::Write;
 
 /// What `core` lacks, of the type of numbers.
