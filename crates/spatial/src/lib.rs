@@ -34,6 +34,7 @@ pub mod finite;
 mod scalar;
 #[doc(hidden)]
 pub mod simd;
+mod storage;
 
 pub use algebra::inertia::{ArticulatedInertia, Inertia};
 pub use algebra::lie;
@@ -47,3 +48,4 @@ pub use scalar::{elementary, lane_dual};
 pub use simd::level;
 #[doc(hidden)]
 pub use simd::{gate, lanes::moves, pack as block};
+pub use storage::{Array, Dense, DenseMatrix, Matrix, MatrixStorage, matrix};

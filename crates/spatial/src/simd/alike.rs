@@ -1,0 +1,168 @@
+//! Types of which the memory is the same under two names of a scalar: `f64`, and [`Fused`], which is a transparent wrapper of it.
+#![allow(unsafe_code)]
+
+use crate::algebra::inertia::{ArticulatedInertia, Inertia};
+use crate::algebra::motion::{Force, Motion};
+use crate::algebra::quaternion::Quaternion;
+use crate::algebra::se3::Se3;
+use crate::algebra::vector::{Mat3, Sym3, Vec3};
+use crate::simd::fused::Fused;
+use core::mem::ManuallyDrop;
+
+/// A type that may be read and written as `B`, where it stands in memory.
+///
+/// What a kernel is called with is made of such types: a `Vec<S>` in a workspace, whose layout nobody promises, is refused by the
+/// compiler, where an [`Array`](crate::storage::Array) is not. [`alike!`](crate::alike) says it of a struct.
+///
+/// # Safety
+/// Both types have the same size, the same alignment and the same fields in the same places, each alike in its turn. So what is
+/// valid as the one is valid as the other.
+pub unsafe trait Alike<B>: Rename<B> {}
+
+/// A value that can be taken for a `B`: an argument of a kernel.
+pub trait Rename<B> {
+    /// The value under its other name.
+    fn renamed(self) -> B;
+}
+
+/// A value of a type that has two names, under the other one.
+///
+/// # Safety
+/// `A` and `B` are the same type, as code finds out that is generic in one of them; or they are [`Alike`].
+#[inline(always)]
+pub unsafe fn same<A, B>(a: A) -> B {
+    assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
+    // SAFETY: by the caller; `a` is not dropped, so there is one of it.
+    unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
+}
+
+impl<'a, A: Alike<B>, B> Rename<&'a B> for &'a A {
+    #[inline(always)]
+    fn renamed(self) -> &'a B {
+        // SAFETY: what stands there is a B as well.
+        unsafe { &*core::ptr::from_ref(self).cast() }
+    }
+}
+
+impl<'a, A: Alike<B>, B> Rename<&'a mut B> for &'a mut A {
+    #[inline(always)]
+    fn renamed(self) -> &'a mut B {
+        // SAFETY: what stands there is a B as well, and each B that is written there is an A.
+        unsafe { &mut *core::ptr::from_mut(self).cast() }
+    }
+}
+
+impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
+    #[inline(always)]
+    fn renamed(self) -> &'a [B] {
+        // SAFETY: as for a reference to one; the size and hence the distance of entries are the same.
+        unsafe { &*(core::ptr::from_ref(self) as *const [B]) }
+    }
+}
+
+impl<'a, A: Alike<B>, B> Rename<&'a mut [B]> for &'a mut [A] {
+    #[inline(always)]
+    fn renamed(self) -> &'a mut [B] {
+        // SAFETY: as for a reference to one; the size and hence the distance of entries are the same.
+        unsafe { &mut *(core::ptr::from_mut(self) as *mut [B]) }
+    }
+}
+
+impl<A: Rename<B>, B> Rename<Option<B>> for Option<A> {
+    #[inline(always)]
+    fn renamed(self) -> Option<B> {
+        self.map(Rename::renamed)
+    }
+}
+
+impl<A: Rename<B>, B, const N: usize> Rename<[B; N]> for [A; N] {
+    #[inline(always)]
+    fn renamed(self) -> [B; N] {
+        self.map(Rename::renamed)
+    }
+}
+
+// SAFETY: the layout of an array is that of its entries, one after another.
+unsafe impl<A: Alike<B>, B, const N: usize> Alike<[B; N]> for [A; N] {}
+
+// SAFETY: `Fused` is a transparent wrapper.
+unsafe impl Alike<Fused> for f64 {}
+
+impl Rename<Fused> for f64 {
+    #[inline(always)]
+    fn renamed(self) -> Fused {
+        Fused(self)
+    }
+}
+
+// SAFETY: `Fused` is a transparent wrapper.
+unsafe impl Alike<f64> for Fused {}
+
+impl Rename<f64> for Fused {
+    #[inline(always)]
+    fn renamed(self) -> f64 {
+        self.0
+    }
+}
+
+/// Says of structs over a scalar that those over `f64` and over [`Fused`] are [`Alike`], with the names of their fields: those that
+/// depend on the scalar, then, behind `same`, those that do not. The compiler checks that there are no others, that each is alike
+/// or the same, and that each stands in the same place, as it does where the struct is `repr(C)`.
+///
+/// Of types that do not depend on a scalar it says that they are what they are.
+#[macro_export]
+#[doc(hidden)]
+macro_rules! alike {
+    ($($type:ty),+ $(,)?) => {$(
+        // SAFETY: it is the same type.
+        #[allow(unsafe_code)]
+        unsafe impl $crate::simd::alike::Alike<$type> for $type {}
+        impl $crate::simd::alike::Rename<$type> for $type {
+            #[inline(always)]
+            fn renamed(self) -> $type {
+                self
+            }
+        }
+    )+};
+    ($name:ident { $($field:ident),* $(,)? } $(same { $($same:ident),* $(,)? })?) => {
+        // SAFETY: the fields are alike or the same, and in the same places, or what follows would not compile.
+        #[allow(unsafe_code)]
+        unsafe impl $crate::simd::alike::Alike<$name<$crate::simd::Fused>> for $name<f64> {}
+        impl $crate::simd::alike::Rename<$name<$crate::simd::Fused>> for $name<f64> {
+            #[inline(always)]
+            fn renamed(self) -> $name<$crate::simd::Fused> {
+                // SAFETY: they are alike.
+                #[allow(unsafe_code)]
+                unsafe {
+                    $crate::simd::alike::same(self)
+                }
+            }
+        }
+        const _: () = {
+            type One = $name<f64>;
+            type Other = $name<$crate::simd::Fused>;
+            #[allow(dead_code)]
+            fn look(one: &One, other: &Other) {
+                fn alike<A: $crate::simd::alike::Alike<B>, B>(_: &A, _: &B) {}
+                fn same<T>(_: &T, _: &T) {}
+                let $name { $($field: _,)* $($($same: _,)*)? } = one;
+                $(alike(&one.$field, &other.$field);)*
+                $($(same(&one.$same, &other.$same);)*)?
+            }
+            assert!(size_of::<One>() == size_of::<Other>() && align_of::<One>() == align_of::<Other>());
+            $(assert!(core::mem::offset_of!(One, $field) == core::mem::offset_of!(Other, $field));)*
+            $($(assert!(core::mem::offset_of!(One, $same) == core::mem::offset_of!(Other, $same));)*)?
+        };
+    };
+}
+
+alike!(bool, usize, f64);
+alike!(Vec3 { x, y, z });
+alike!(Mat3 { x, y, z });
+alike!(Sym3 { xx, xy, yy, xz, yz, zz });
+alike!(Quaternion { vector, scalar });
+alike!(Motion { linear, angular });
+alike!(Force { linear, angular });
+alike!(Inertia { mass, mass_com, rotational });
+alike!(ArticulatedInertia { linear, coupling, rotational });
+alike!(Se3 { rotation, translation });
