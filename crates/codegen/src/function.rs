@@ -3,9 +3,8 @@
 use crate::expression::{Expression, Open};
 use crate::graph::{Id, Node};
 use crate::sums::with_constants_gathered;
-use condyle_spatial::Scalar;
+use condyle_spatial::{Dense, DenseMatrix, Scalar};
 use core::fmt;
-use nalgebra::DMatrix;
 
 /// An argument or a result of a function: some numbers with a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -121,7 +120,7 @@ impl Recorder {
     ///
     /// # Panics
     /// If the name is no identifier (ASCII letters, digits and `_`), or taken.
-    pub fn matrix(&mut self, name: &str, values: &DMatrix<Expression>, about: &str) {
+    pub fn matrix(&mut self, name: &str, values: &DenseMatrix<Expression, impl Dense<Expression>>, about: &str) {
         self.result(name, values.shape(), values.as_slice(), about);
     }
 

@@ -12,7 +12,7 @@ use condyle_dynamics::{
 };
 use condyle_model::inertial_parameters::to_inertia;
 use condyle_model::{Model, Vec3};
-use condyle_spatial::{Force, Inertia, Scalar};
+use condyle_spatial::{Force, Inertia, Matrix, Scalar};
 use nalgebra::DMatrix;
 
 /// The functions that [`functions`] knows.
@@ -147,7 +147,7 @@ fn about(name: &str, model: &Model) -> String {
 }
 
 /// The second derivatives of a weighted sum, of which those twice by the last argument are 0.
-fn hessian(r: &mut Recorder, [qq, vq, vv, xq]: [&DMatrix<Expression>; 4], last: &str) {
+fn hessian(r: &mut Recorder, [qq, vq, vv, xq]: [&Matrix<Expression>; 4], last: &str) {
     r.matrix("dqdq", qq, "derivative by q twice, symmetric");
     r.matrix("dvdq", vq, "derivative by v (rows) and q (columns)");
     r.matrix("dvdv", vv, "derivative by v twice, symmetric");

@@ -8,8 +8,8 @@ mod trees;
 use common::{Program, assert_equal, folder, is_there};
 use condyle_codegen::{FUNCTIONS, Function, Language, Settings, functions, record};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, Force, Model, ReferenceFrame, aba, aba_derivatives, aba_hessian,
-    centroidal_map_rate, constrained_dynamics, constrained_dynamics_derivatives, crba, forward_kinematics,
+    ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Force, Model, ReferenceFrame, aba, aba_derivatives,
+    aba_hessian, centroidal_map_rate, constrained_dynamics, constrained_dynamics_derivatives, crba, forward_kinematics,
     forward_velocities, gravity, impulse_dynamics, minv, nonlinear_effects, random_configuration, rnea,
     rnea_derivatives, rnea_hessian, robots,
 };
@@ -52,7 +52,7 @@ fn state(model: &Model, rng: &mut StdRng) -> [Vec<f64>; 4] {
     [q, v, x, lambda]
 }
 
-fn matrix(m: &DMatrix<f64>) -> Vec<f64> {
+fn matrix(m: &DenseMatrix<f64, impl Dense<f64>>) -> Vec<f64> {
     m.as_slice().to_vec()
 }
 

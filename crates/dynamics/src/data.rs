@@ -25,8 +25,8 @@ use crate::passes::statics;
 use crate::workspace::{Long, Short, Size};
 use alloc::boxed::Box;
 use condyle_model::Model;
-use condyle_spatial::Scalar;
-use condyle_spatial::gate::{in_use, is, renamed};
+use condyle_spatial::gate::{is, same};
+use condyle_spatial::{Scalar, alike};
 
 /// Scratch and results of every algorithm, for one model and one kind of scalar.
 ///
@@ -70,21 +70,26 @@ pub struct Data<S> {
     pub(crate) limbs: Option<Box<Scratch>>,
 }
 
+alike!(Data {
+    world, moving, rnea, crba, aba, minv, rnea_derivatives, aba_derivatives, rnea_hessian, aba_hessian,
+    constrained_dynamics, constrained_derivatives, impulse_dynamics, statics, coriolis, centroidal,
+    centroidal_derivatives, energy, all_terms, forward_dynamics, regressor,
+} same { size, tree, limbs });
+
 impl<S: Scalar> Data<S> {
     /// Allocates everything for a model.
     pub fn new<R: 'static>(model: &Model<R>) -> Self {
         if !S::COMPILED || !is::<R, f64>() {
             return Self::allocate(model);
         }
-        in_use(); // which allocates once, and so must not wait for the first call
         // SAFETY: R is f64, and S is the scalar of the data that is given back.
         unsafe {
             if is::<S, f64>() {
-                renamed(new_single(renamed(model)))
+                same(new_single(same(model)))
             } else if is::<S, Short>() {
-                renamed(new_short(renamed(model)))
+                same(new_short(same(model)))
             } else {
-                renamed(new_long(renamed(model)))
+                same(new_long(same(model)))
             }
         }
     }
@@ -185,11 +190,11 @@ impl<S: Scalar> Clone for Data<S> {
         // SAFETY: S is the scalar of the data that is given back.
         unsafe {
             if is::<S, f64>() {
-                renamed(clone_single(renamed(self)))
+                same(clone_single(same(self)))
             } else if is::<S, Short>() {
-                renamed(clone_short(renamed(self)))
+                same(clone_short(same(self)))
             } else {
-                renamed(clone_long(renamed(self)))
+                same(clone_long(same(self)))
             }
         }
     }

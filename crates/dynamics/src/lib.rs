@@ -94,7 +94,8 @@ pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};
 #[doc(hidden)]
 pub use condyle_model::{difference_jacobian_groups, integrate_jacobian_groups};
 pub use condyle_spatial::{
-    Act, Constant, Cross, Force, Inertia, Mat3, Motion, Quaternion, Scalar, Se3, Sym3, Vec3, level, lie,
+    Act, Constant, Cross, Dense, DenseMatrix, Force, Inertia, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Sym3,
+    Vec3, level, lie,
 };
 pub use constraints::constraint::{ConstraintKind, ContactConstraint, Target};
 pub use constraints::constraint_set::ConstraintSet;

@@ -2,11 +2,9 @@
 //!
 //! Each pass keeps a workspace of its own, defined in its file, in which each field says frame, shape and writer.
 
-use alloc::vec::Vec;
 use condyle_model::Model;
-use condyle_spatial::Scalar;
 use condyle_spatial::gate::{self, Witness};
-use nalgebra::DMatrix;
+use condyle_spatial::{Array, Matrix, Scalar, matrix};
 
 /// The promise of this crate, by which it names vectors.
 pub(crate) struct Gate;
@@ -52,13 +50,13 @@ impl Size {
 /// An array of n equal entries. It is not inlined, and makes the entry itself, as a workspace has dozens of arrays; entries are
 /// copied whole, where `vec!` would clone them number by number.
 #[inline(never)]
-pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Vec<T> {
+pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Array<T> {
     let entry = entry();
     (0..n).map(|_| entry).collect()
 }
 
 /// A matrix of zeros.
 #[inline(never)]
-pub(crate) fn zero_matrix<S: Scalar>(rows: usize, columns: usize) -> DMatrix<S> {
-    DMatrix::from_element(rows, columns, S::zero())
+pub(crate) fn zero_matrix<S: Scalar>(rows: usize, columns: usize) -> Matrix<S> {
+    matrix(rows, columns, S::zero())
 }

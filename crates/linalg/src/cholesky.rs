@@ -4,8 +4,7 @@
 
 use crate::axpy::{axpy, dot};
 use crate::check;
-use condyle_spatial::Scalar;
-use nalgebra::DMatrix;
+use condyle_spatial::{Dense, DenseMatrix, Matrix, Scalar, alike, matrix};
 
 /// L in place of the lower triangle of M, as long as it is to go on; says whether it is done.
 #[inline(always)]
@@ -75,8 +74,10 @@ fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
 #[repr(C)]
 pub struct Cholesky<S> {
     /// L, in the lower triangle. Shape: n × n. Written by: `factorize`.
-    L: DMatrix<S>,
+    L: Matrix<S>,
 }
+
+alike!(Cholesky { L });
 
 impl<S: Scalar> Cholesky<S> {
     /// The most rows: of doubles, the factor is then 128 MiB.
@@ -88,11 +89,11 @@ impl<S: Scalar> Cholesky<S> {
     /// If n is above [`MOST_ROWS`](Self::MOST_ROWS).
     pub fn new(n: usize) -> Self {
         assert!(n <= Self::MOST_ROWS, "n: expected at most {} rows, found {n}", Self::MOST_ROWS);
-        Self { L: DMatrix::from_element(n, n, S::zero()) }
+        Self { L: matrix(n, n, S::zero()) }
     }
 
     /// L, in the lower triangle; what stands above the diagonal has no meaning.
-    pub fn lower(&self) -> &DMatrix<S> {
+    pub fn lower(&self) -> &Matrix<S> {
         &self.L
     }
 
@@ -103,7 +104,7 @@ impl<S: Scalar> Cholesky<S> {
     /// # Panics
     /// If `M` is not n × n.
     #[inline(always)]
-    pub fn factorize(&mut self, M: &DMatrix<S>) {
+    pub fn factorize(&mut self, M: &DenseMatrix<S, impl Dense<S>>) {
         self.factorize_while(M, || true);
     }
 
@@ -111,7 +112,7 @@ impl<S: Scalar> Cholesky<S> {
     /// the factor is done.
     #[doc(hidden)]
     #[inline(always)]
-    pub fn factorize_while(&mut self, M: &DMatrix<S>, go_on: impl FnMut() -> bool) -> bool {
+    pub fn factorize_while(&mut self, M: &DenseMatrix<S, impl Dense<S>>, go_on: impl FnMut() -> bool) -> bool {
         let n = self.L.nrows();
         assert!(M.shape() == (n, n), "M: expected {n} × {n}, found {:?}", M.shape());
         self.L.copy_from(M);
@@ -137,7 +138,7 @@ impl<S: Scalar> Cholesky<S> {
     /// # Panics
     /// If `B` has not n rows.
     #[inline(always)]
-    pub fn solve_matrix(&self, B: &mut DMatrix<S>) {
+    pub fn solve_matrix(&self, B: &mut DenseMatrix<S, impl Dense<S>>) {
         check("B", B.nrows(), self.L.nrows());
         for column in B.as_mut_slice().chunks_exact_mut(self.L.nrows().max(1)) {
             solve(self.L.as_slice(), column);
@@ -151,7 +152,7 @@ impl<S: Scalar> Cholesky<S> {
     /// # Panics
     /// If `X` is not n × n.
     #[inline(always)]
-    pub fn inverse(&self, X: &mut DMatrix<S>) {
+    pub fn inverse(&self, X: &mut DenseMatrix<S, impl Dense<S>>) {
         self.inverse_while(X, || true);
     }
 
@@ -159,7 +160,7 @@ impl<S: Scalar> Cholesky<S> {
     /// done.
     #[doc(hidden)]
     #[inline(always)]
-    pub fn inverse_while(&self, X: &mut DMatrix<S>, mut go_on: impl FnMut() -> bool) -> bool {
+    pub fn inverse_while(&self, X: &mut DenseMatrix<S, impl Dense<S>>, mut go_on: impl FnMut() -> bool) -> bool {
         let n = self.L.nrows();
         assert!(X.shape() == (n, n), "X: expected {n} × {n}, found {:?}", X.shape());
         let (L, X) = (self.L.as_slice(), X.as_mut_slice());

@@ -1,7 +1,6 @@
 //! The inverse of a small symmetric matrix without a factor.
 
-use condyle_spatial::Scalar;
-use nalgebra::DMatrix;
+use condyle_spatial::{Dense, DenseMatrix, Scalar};
 
 /// X = M⁻¹ for at most `MOST` rows. In the order k = 0, 1, …, with the pivot d = 1/A_kk and the column c of it,
 ///
@@ -12,7 +11,10 @@ use nalgebra::DMatrix;
 /// of which the lower triangle is read: in lanes it is all that is computed, of a single number whole columns are, which
 /// are registers.
 #[inline(always)]
-pub fn gauss_jordan<S: Scalar, const MOST: usize>(M: &DMatrix<S>, X: &mut DMatrix<S>) {
+pub fn gauss_jordan<S: Scalar, const MOST: usize>(
+    M: &DenseMatrix<S, impl Dense<S>>,
+    X: &mut DenseMatrix<S, impl Dense<S>>,
+) {
     let n = X.nrows();
     assert!(M.nrows() == n && n <= MOST, "M: expected {n} × {n}, found {:?}", M.shape());
     let mut A = [[S::zero(); MOST]; MOST]; // column by column

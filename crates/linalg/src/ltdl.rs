@@ -9,9 +9,7 @@
 use crate::axpy::{axpy, dot};
 use crate::check;
 use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
-use alloc::vec::Vec;
-use condyle_spatial::Scalar;
-use nalgebra::DMatrix;
+use condyle_spatial::{Array, Dense, DenseMatrix, Scalar, alike};
 
 /// Rows are stored in steps of this many numbers, so that the innermost loop has no remainder. What stands behind a
 /// row's end has no meaning.
@@ -107,17 +105,19 @@ pub struct Ltdl<S> {
     tree: EliminationTree,
     /// Each place's row of L from the root on, then its D. Shape: nonzeros, each row in whole steps. Written by:
     /// `factorize`.
-    rows: Vec<S>,
+    rows: Array<S>,
     /// 1/D. Shape: nv. Written by: `factorize`.
-    D_inv: Vec<S>,
+    D_inv: Array<S>,
 }
+
+alike!(Ltdl { rows, D_inv } same { tree });
 
 impl<S: Scalar> Ltdl<S> {
     /// Finds the zeros of the matrices with the zeros of a tree, as a robot's model is one, and allocates the factor.
     pub fn new(tree: &(impl ColumnTree + ?Sized)) -> Self {
         let tree = EliminationTree::new(tree, step::<S>());
         let n = tree.order.len();
-        Self { rows: vec![S::zero(); tree.first[n]], D_inv: vec![S::zero(); n], tree }
+        Self { rows: vec![S::zero(); tree.first[n]].into(), D_inv: vec![S::zero(); n].into(), tree }
     }
 
     /// The order and the tree of the places.
@@ -176,7 +176,7 @@ impl<S: Scalar> Ltdl<S> {
     /// # Panics
     /// If `M` is not nv × nv.
     #[inline(always)]
-    pub fn factorize(&mut self, M: &DMatrix<S>) {
+    pub fn factorize(&mut self, M: &DenseMatrix<S, impl Dense<S>>) {
         self.factorize_while(M, || true);
     }
 
@@ -184,7 +184,7 @@ impl<S: Scalar> Ltdl<S> {
     /// the factor is done.
     #[doc(hidden)]
     #[inline(always)]
-    pub fn factorize_while(&mut self, M: &DMatrix<S>, mut go_on: impl FnMut() -> bool) -> bool {
+    pub fn factorize_while(&mut self, M: &DenseMatrix<S, impl Dense<S>>, mut go_on: impl FnMut() -> bool) -> bool {
         let nv = self.D_inv.len();
         assert!(M.shape() == (nv, nv), "M: expected {nv} × {nv}, found {:?}", M.shape());
         let Self { tree, rows, D_inv } = self;
@@ -276,7 +276,7 @@ impl<S: Scalar> Ltdl<S> {
     /// # Panics
     /// If `B` has not nv rows.
     #[inline(always)]
-    pub fn solve_matrix(&self, B: &mut DMatrix<S>) {
+    pub fn solve_matrix(&self, B: &mut DenseMatrix<S, impl Dense<S>>) {
         check("B", B.nrows(), self.D_inv.len());
         for column in B.as_mut_slice().chunks_exact_mut(self.D_inv.len().max(1)) {
             self.solve(column);
@@ -291,7 +291,7 @@ impl<S: Scalar> Ltdl<S> {
     /// # Panics
     /// If `X` is not nv × nv.
     #[inline(always)]
-    pub fn inverse(&self, X: &mut DMatrix<S>) {
+    pub fn inverse(&self, X: &mut DenseMatrix<S, impl Dense<S>>) {
         self.inverse_while(X, || true);
     }
 
@@ -299,7 +299,7 @@ impl<S: Scalar> Ltdl<S> {
     /// done.
     #[doc(hidden)]
     #[inline(always)]
-    pub fn inverse_while(&self, X: &mut DMatrix<S>, mut go_on: impl FnMut() -> bool) -> bool {
+    pub fn inverse_while(&self, X: &mut DenseMatrix<S, impl Dense<S>>, mut go_on: impl FnMut() -> bool) -> bool {
         let nv = self.D_inv.len();
         assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());
         let EliminationTree { swaps, parent, depth, first, .. } = &self.tree;

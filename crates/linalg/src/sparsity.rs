@@ -11,6 +11,8 @@ pub struct NonzeroRows {
     pub same_pattern: usize,
 }
 
+condyle_spatial::alike!(NonzeroRows);
+
 impl NonzeroRows {
     /// For all columns of a matrix, given the rows of each.
     pub fn of_columns(rows: Vec<Vec<usize>>) -> Vec<Self> {

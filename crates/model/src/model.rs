@@ -52,6 +52,8 @@ pub struct Model<R = f64> {
     pub(crate) singular: Vec<usize>,
 }
 
+condyle_spatial::alike!(Model);
+
 impl<R> Model<R> {
     /// The robot's name.
     #[inline]

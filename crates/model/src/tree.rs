@@ -57,6 +57,8 @@ pub struct Column {
     pub depth: usize,
 }
 
+condyle_spatial::alike!(Column);
+
 /// Coordinates of one joint, or of several joints side by side whose coordinates are vectors.
 #[derive(Clone, Debug)]
 pub(crate) struct Space {

@@ -142,7 +142,7 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
 }
 
 /// A square matrix that is symmetric up to rounding, so that its columns stand for its rows.
-pub(crate) struct Symmetric<'a, N>(pub(crate) &'a DMatrix<N>);
+pub(crate) struct Symmetric<'a, N>(pub(crate) &'a condyle::Matrix<N>);
 
 impl<N: Number> Array for Symmetric<'_, N> {
     type Number = N;

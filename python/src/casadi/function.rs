@@ -3,7 +3,8 @@
 use super::computation::Output;
 use crate::hyper_dual::Hyper;
 use condyle::{
-    ConstraintSet, ContactConstraint, Data, Error, Model, ReferenceFrame, RneaSecondDerivatives, Scalar, Vec3,
+    ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Error, Matrix, Model, ReferenceFrame,
+    RneaSecondDerivatives, Scalar, Vec3,
 };
 use nalgebra::DMatrix;
 
@@ -47,6 +48,11 @@ pub(super) struct Scratch<S> {
     /// A frame's Jacobian, 6 × nv, and zeros, nv numbers.
     J: DMatrix<S>,
     zeros: Vec<S>,
+}
+
+/// Writes the derivative of the results from a row on by one of the arguments.
+fn place<S: Scalar>(J: &mut DMatrix<S>, row: usize, argument: usize, block: &DenseMatrix<S, impl Dense<S>>) {
+    J.view_mut((row, argument * block.ncols()), block.shape()).copy_from(block);
 }
 
 impl Kind {
@@ -149,27 +155,24 @@ impl Kind {
         J: &mut DMatrix<S>,
     ) {
         let nv = model.nv();
-        let mut place = |row: usize, argument: usize, block: &DMatrix<S>| {
-            J.view_mut((row, argument * nv), block.shape()).copy_from(block);
-        };
         match self {
             Self::Rnea => {
                 let d = condyle::rnea_derivatives(model, data, &x[0], &x[1], &x[2], &[]);
-                place(0, 0, d.dtau_dq);
-                place(0, 1, d.dtau_dv);
-                place(0, 2, d.dtau_da);
+                place(J, 0, 0, d.dtau_dq);
+                place(J, 0, 1, d.dtau_dv);
+                place(J, 0, 2, d.dtau_da);
             }
             Self::Aba => {
                 let d = condyle::aba_derivatives(model, data, &x[0], &x[1], &x[2], &[]);
-                place(0, 0, d.da_dq);
-                place(0, 1, d.da_dv);
-                place(0, 2, d.da_dtau);
+                place(J, 0, 0, d.da_dq);
+                place(J, 0, 1, d.da_dv);
+                place(J, 0, 2, d.da_dtau);
             }
             Self::Crba => {
                 let tensors = tensors.as_mut().expect("made with the scratch");
                 condyle::rnea_second_derivatives(model, data, &x[0], zeros, zeros, &[], tensors);
                 for (i, dM_i) in tensors.dadq.iter().enumerate() {
-                    place(i * nv, 0, dM_i); // ∂M_ij/∂q_k, of a symmetric matrix
+                    place(J, i * nv, 0, dM_i); // ∂M_ij/∂q_k, of a symmetric matrix
                 }
             }
             Self::FramePlacement { frame } => {
@@ -188,28 +191,28 @@ impl Kind {
             Self::FrameVelocity { frame, reference } => {
                 let velocities = condyle::forward_velocities(model, data, &x[0], &x[1]);
                 velocities.frame_velocity_derivative(*frame, *reference, frame_jacobian);
-                place(0, 0, frame_jacobian);
+                place(J, 0, 0, frame_jacobian);
                 velocities.frame_jacobian(*frame, *reference, frame_jacobian);
-                place(0, 1, frame_jacobian);
+                place(J, 0, 1, frame_jacobian);
             }
             Self::Com => {
                 let d = condyle::centroidal_derivatives(model, data, &x[0], zeros, zeros);
-                place(0, 0, d.dcom_dq);
+                place(J, 0, 0, d.dcom_dq);
             }
             Self::CentroidalMomentum => {
                 let d = condyle::centroidal_derivatives(model, data, &x[0], &x[1], zeros);
-                place(0, 0, d.dh_dq);
-                place(0, 1, d.dh_dv);
+                place(J, 0, 0, d.dh_dq);
+                place(J, 0, 1, d.dh_dv);
             }
             Self::ConstrainedDynamics { .. } => {
                 let constraints = constraints.as_mut().expect("made with the scratch");
                 let d = condyle::constrained_dynamics_derivatives(model, data, constraints, &x[0], &x[1], &x[2], &[]);
-                place(0, 0, d.da_dq);
-                place(0, 1, d.da_dv);
-                place(0, 2, d.da_dtau);
-                place(nv, 0, d.dlambda_dq);
-                place(nv, 1, d.dlambda_dv);
-                place(nv, 2, d.dlambda_dtau);
+                place(J, 0, 0, d.da_dq);
+                place(J, 0, 1, d.da_dv);
+                place(J, 0, 2, d.da_dtau);
+                place(J, nv, 0, d.dlambda_dq);
+                place(J, nv, 1, d.dlambda_dv);
+                place(J, nv, 2, d.dlambda_dtau);
             }
         }
     }
@@ -226,7 +229,7 @@ impl Kind {
         H: &mut DMatrix<f64>,
     ) -> bool {
         let n = model.nv();
-        let mut write = |dqdq: &DMatrix<f64>, dvdq: &DMatrix<f64>, dvdv: &DMatrix<f64>, dudq: &DMatrix<f64>| {
+        let mut write = |dqdq: &Matrix<f64>, dvdq: &Matrix<f64>, dvdv: &Matrix<f64>, dudq: &Matrix<f64>| {
             H.fill(0.0);
             H.view_mut((0, 0), (n, n)).copy_from(dqdq);
             H.view_mut((n, 0), (n, n)).copy_from(dvdq);
@@ -235,7 +238,6 @@ impl Kind {
             H.view_mut((2 * n, 0), (n, n)).copy_from(dudq);
             H.view_mut((0, 2 * n), (n, n)).tr_copy_from(dudq);
         };
-        let mut place = |k: usize, block: &DMatrix<f64>| J.view_mut((0, k * n), (n, n)).copy_from(block);
         match self {
             Self::Rnea => {
                 let h = condyle::rnea_hessian(model, &mut s.data, &x[0], &x[1], &x[2], &[], lambda);
@@ -243,13 +245,16 @@ impl Kind {
                 [h.first.dtau_dq, h.first.dtau_dv, h.first.dtau_da]
                     .into_iter()
                     .enumerate()
-                    .for_each(|(k, b)| place(k, b));
+                    .for_each(|(k, block)| place(J, 0, k, block));
                 true
             }
             Self::Aba => {
                 let h = condyle::aba_hessian(model, &mut s.data, &x[0], &x[1], &x[2], &[], lambda);
                 write(h.dqdq, h.dvdq, h.dvdv, h.dtaudq);
-                [h.first.da_dq, h.first.da_dv, h.first.da_dtau].into_iter().enumerate().for_each(|(k, b)| place(k, b));
+                [h.first.da_dq, h.first.da_dv, h.first.da_dtau]
+                    .into_iter()
+                    .enumerate()
+                    .for_each(|(k, block)| place(J, 0, k, block));
                 true
             }
             _ => false,

@@ -3,7 +3,7 @@
 use super::identities::{SOLVES, inverted, spectrum};
 use super::ledger::Row;
 use crate::states::States;
-use condyle::{Data, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_derivatives};
+use condyle::{Data, Matrix, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_derivatives};
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
@@ -97,11 +97,11 @@ fn analytical(function: Function, model: &Model, data: &mut Data<f64>, [q, v, x]
     match function {
         Function::Rnea => {
             let d = rnea_derivatives(model, data, q, v, x, &[]);
-            [d.dtau_dq, d.dtau_dv, d.dtau_da].map(Clone::clone)
+            [d.dtau_dq, d.dtau_dv, d.dtau_da].map(Matrix::clone_owned)
         }
         Function::Aba => {
             let d = aba_derivatives(model, data, q, v, x, &[]);
-            [d.da_dq, d.da_dv, d.da_dtau].map(Clone::clone)
+            [d.da_dq, d.da_dv, d.da_dtau].map(Matrix::clone_owned)
         }
     }
 }

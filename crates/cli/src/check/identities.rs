@@ -6,9 +6,9 @@
 use super::ledger::Row;
 use crate::states::States;
 use condyle::{
-    Data, Joint, Model, aba, centroidal_map_rate, coriolis_matrix, crba, energy_derivatives, forward_accelerations,
-    forward_kinematics, forward_velocities, gravity, inertial_parameters, integrate, joint_torque_regressor, minv,
-    nonlinear_effects, rnea,
+    Data, Joint, Matrix, Model, aba, centroidal_map_rate, coriolis_matrix, crba, energy_derivatives,
+    forward_accelerations, forward_kinematics, forward_velocities, gravity, inertial_parameters, integrate,
+    joint_torque_regressor, minv, nonlinear_effects, rnea,
 };
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
@@ -41,7 +41,7 @@ pub(super) fn inverted(condition: f64) -> f64 {
 }
 
 /// Least eigenvalue and condition number of M.
-pub(super) fn spectrum(M: &DMatrix<f64>) -> (f64, f64) {
+pub(super) fn spectrum(M: &Matrix<f64>) -> (f64, f64) {
     let values = M.clone().symmetric_eigenvalues();
     (values.min(), if values.min() > 0.0 { values.max() / values.min() } else { f64::INFINITY })
 }

@@ -12,8 +12,7 @@
 
 use condyle_linalg::elimination_tree::NONE;
 use condyle_linalg::{Ltdl, check};
-use condyle_spatial::Scalar;
-use nalgebra::DMatrix;
+use condyle_spatial::{Dense, DenseMatrix, Scalar};
 use std::collections::BTreeMap;
 
 /// The rows of G, by the place k and the number of places before it that they go over.
@@ -112,7 +111,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
     ///
     /// # Panics
     /// If `X` is not nv × nv.
-    pub fn inverse(&mut self, X: &mut DMatrix<S>) {
+    pub fn inverse(&mut self, X: &mut DenseMatrix<S, impl Dense<S>>) {
         let (factor, n) = (self.factor, self.before.len());
         assert!(X.shape() == (n, n), "X: expected {n} × {n}, found {:?}", X.shape());
         let order = factor.order();

@@ -17,7 +17,7 @@ use condyle_linalg::tree_product::minus_products;
 use condyle_linalg::{Ltdl, check};
 use condyle_model::Model;
 use condyle_model::layout::Single;
-use condyle_spatial::{Constant, Force, Scalar, Vec3};
+use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 use nalgebra::{DMatrix, DVectorView};
 
 /// q̈ and its derivatives, as of [`condyle_dynamics::AbaDerivatives`].
@@ -81,7 +81,7 @@ pub fn aba<S: Scalar, R: Constant<S>>(
 pub fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> DMatrix<S> {
     match Inverse::of(model, || crba(model, q)) {
         Some(inverse) => inverse.Minv,
-        None => condyle_dynamics::minv(model, data, q).clone(),
+        None => condyle_dynamics::minv(model, data, q).clone_owned(),
     }
 }
 
@@ -99,16 +99,16 @@ pub fn aba_derivatives<S: Scalar, R: Constant<S>>(
     f_ext: &[Force<S>],
 ) -> ForwardDerivatives<S> {
     let mut a = free_effort(model, data, q, v, tau, f_ext);
-    let Some(inverse) = Inverse::of(model, || condyle_dynamics::crba(model, data, q).clone()) else {
+    let Some(inverse) = Inverse::of(model, || condyle_dynamics::crba(model, data, q).clone_owned()) else {
         let d = condyle_dynamics::aba_derivatives(model, data, q, v, tau, f_ext);
-        let [da_dq, da_dv, da_dtau] = [d.da_dq, d.da_dv, d.da_dtau].map(Clone::clone);
+        let [da_dq, da_dv, da_dtau] = [d.da_dq, d.da_dv, d.da_dtau].map(Matrix::clone_owned);
         return ForwardDerivatives { a: d.a.to_vec(), da_dq, da_dv, da_dtau };
     };
     inverse.solve(&mut a); // q̈ = M⁻¹ (τ − h)
     let d = rnea_derivatives(model, data, q, v, &a, f_ext);
     let floating = floating::<S, R>(model);
     let known = |numbers: usize| floating.iter().flat_map(|&(_, first)| first..first + numbers).collect::<Vec<_>>();
-    let [mut da_dq, mut da_dv] = inverse.minus_products(model, [(d.dtau_dq, &known(6)), (d.dtau_dv, &known(3))]); // ∂q̈ = −M⁻¹ ∂τ
+    let [mut da_dq, mut da_dv] = inverse.minus_products(model, [(d.dtau_dq, known(6)), (d.dtau_dv, known(3))]); // ∂q̈ = −M⁻¹ ∂τ
     for (body, first) in floating {
         let turned = forward_kinematics(model, data, q).body(body).rotation.transpose_mul(model.gravity().lift());
         let omega = Vec3::new(v[first + 3], v[first + 4], v[first + 5]);
@@ -184,11 +184,11 @@ impl<S: Scalar> Inverse<S> {
 
     /// −M⁻¹ B but for columns that are known, which stay zero; by the factor where it has so few entries that twice as many products
     /// and sums are fewer than nv².
-    fn minus_products<R>(&self, model: &Model<R>, B: [(&DMatrix<S>, &[usize]); 2]) -> [DMatrix<S>; 2] {
+    fn minus_products<R>(&self, model: &Model<R>, B: [(&Matrix<S>, Vec<usize>); 2]) -> [DMatrix<S>; 2] {
         let n = model.nv();
         let mut all = B.map(|(B, known)| {
-            let mut B = B.clone();
-            known.iter().for_each(|&j| B.column_mut(j).fill(S::zero()));
+            let mut B = B.clone_owned();
+            known.into_iter().for_each(|j| B.column_mut(j).fill(S::zero()));
             B
         });
         match &self.factor {

@@ -7,10 +7,10 @@ use crate::workspace::{filled, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::threads;
 use condyle_model::Model;
-use condyle_spatial::Force;
 use condyle_spatial::block::{Block, MOST, Real, Strided, flat_mut, gather, lanes, scatter_matrix};
 use condyle_spatial::simd::Kernel;
-use nalgebra::{DMatrix, DMatrixView, Dyn, MatrixView};
+use condyle_spatial::{Array, Force, Matrix};
+use nalgebra::{DMatrixView, Dyn, MatrixView};
 
 /// A matrix of one state, whose entries do not lie next to each other.
 pub type StateMatrix<'b, T> = MatrixView<'b, T, Dyn, Dyn, Dyn, Dyn>;
@@ -23,7 +23,7 @@ pub(super) struct Group<S: Block> {
     /// The most groups of as many states as there are lanes.
     groups: usize,
     /// The matrices of each group, of those kinds that passes have been asked for; none before. Written by: `keep`.
-    matrices: Vec<[DMatrix<S>; KINDS]>,
+    matrices: Vec<[Matrix<S>; KINDS]>,
 }
 
 /// The matrices of a group of states that stay in lanes, each nv × nv and each written by one pass alone, so that zeros stay
@@ -51,13 +51,13 @@ pub(super) const FORCES: usize = ARGUMENTS - 1;
 struct Worker<S: Block> {
     data: Data<S>,
     /// The arguments, a state in each lane. Shape: nq, nv, nv, nv. Written by: `one_by_one`.
-    numbers: [Vec<S>; FORCES],
+    numbers: [Array<S>; FORCES],
     /// Shape: bodies or none. Written by: `one_by_one`.
     f_ext: Vec<Force<S>>,
     /// Scratch of passes. Shape: 6 × nv.
-    six: [DMatrix<S>; 2],
+    six: [Matrix<S>; 2],
     /// Scratch of passes. Shape: nv × the greater one of nv and 10.
-    wide: Vec<S>,
+    wide: Array<S>,
 }
 
 impl<S: Block> Worker<S> {
@@ -86,11 +86,11 @@ pub(super) struct States<'w, S: Block> {
     pub f_ext: &'w [Force<S>],
     pub constraints: Option<&'w mut ConstraintSet<S>>,
     /// Scratch. Shape: 6 × nv.
-    pub six: &'w mut [DMatrix<S>; 2],
+    pub six: &'w mut [Matrix<S>; 2],
     /// Scratch. Shape: nv × the greater one of nv and 10.
     pub wide: &'w mut [S],
     /// The matrices that stay in lanes, if the pass has some.
-    pub kept: Option<&'w mut [DMatrix<S>; KINDS]>,
+    pub kept: Option<&'w mut [Matrix<S>; KINDS]>,
 }
 
 /// The work on a group of states: it calls a function of this crate, and puts its results to their places.
@@ -134,7 +134,7 @@ impl<T> Arguments<'_, T> {
 /// The places for the results of some states: vectors and matrices of each, and matrices that stay in lanes, if there are.
 struct Results<'a, S: Block> {
     numbers: Places<'a, S::Number>,
-    matrices: &'a mut [[DMatrix<S>; KINDS]],
+    matrices: &'a mut [[Matrix<S>; KINDS]],
 }
 
 impl<S: Block> Results<'_, S> {

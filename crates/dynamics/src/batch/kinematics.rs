@@ -7,13 +7,13 @@ use crate::calls::kinematics::{
     body_jacobian, forward_accelerations, forward_kinematics, forward_velocities, frame_jacobian,
 };
 use crate::passes::frames::ReferenceFrame;
+use condyle_spatial::Matrix;
 use condyle_spatial::block::Real;
-use nalgebra::DMatrix;
 
 /// The derivatives of an acceleration, in the matrices of a single call.
 struct AccelerationDerivatives<'s, S> {
-    da_dq: &'s DMatrix<S>,
-    da_dv: &'s DMatrix<S>,
+    da_dq: &'s Matrix<S>,
+    da_dv: &'s Matrix<S>,
 }
 
 results! {

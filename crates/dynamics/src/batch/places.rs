@@ -2,9 +2,8 @@
 
 use super::group::SYMMETRIC;
 use condyle_spatial::block::{Block, MOST, Strided, scatter, scatter_matrix};
-use condyle_spatial::{Force, Inertia, Motion, Scalar, Se3, Vec3};
+use condyle_spatial::{Force, Inertia, Matrix, Motion, Scalar, Se3, Vec3};
 use core::mem;
-use nalgebra::DMatrix;
 
 /// The most results of a function.
 pub(super) const MOST_RESULTS: usize = 12;
@@ -61,7 +60,7 @@ impl<T> Places<'_, T> {
     }
 
     /// Writes a matrix of each state of a kind that could have stayed in lanes, by rows.
-    pub(super) fn kind<S: Block<Number = T>>(&mut self, kind: usize, x: &DMatrix<S>) {
+    pub(super) fn kind<S: Block<Number = T>>(&mut self, kind: usize, x: &Matrix<S>) {
         // the columns of what is symmetric are its rows, one after the other
         let columns = if SYMMETRIC.contains(&kind) { x.len() } else { x.ncols() };
         self.columns(x.as_slice(), columns);
@@ -115,7 +114,7 @@ put! {
     Vec3<S>: x => numbers(&x.to_array());
     Motion<S>: x => numbers(&x.to_array());
     Force<S>: x => numbers(&x.to_array());
-    &DMatrix<S>: x => columns(x.as_slice(), x.ncols());
+    &Matrix<S>: x => columns(x.as_slice(), x.ncols());
     Inertia<S>: I => columns(&centroidal_matrix(I), 6);
 }
 

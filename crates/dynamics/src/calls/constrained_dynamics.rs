@@ -11,8 +11,7 @@ use crate::derivatives::rnea_derivatives;
 use crate::lanes::limbs::pass::Arguments;
 use crate::passes::kinematics::positions;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Force, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
 /// What [`constrained_dynamics`] gives.
 #[derive(Clone, Copy, Debug)]
@@ -114,15 +113,15 @@ pub struct ConstrainedEquations<'d, S> {
     /// The number of rows of J that depend on rows before them, up to rounding.
     pub redundant: S,
     /// M, nv × nv, armature included.
-    pub M: &'d DMatrix<S>,
+    pub M: &'d Matrix<S>,
     /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of τ when q moves to q ⊕ δ, per δ.
-    pub dtau_dq: &'d DMatrix<S>,
+    pub dtau_dq: &'d Matrix<S>,
     /// r_v = ∂h/∂v, nv × nv.
-    pub dtau_dv: &'d DMatrix<S>,
+    pub dtau_dv: &'d Matrix<S>,
     /// c_q = ∂(J q̈ + γ)/∂q in the tangent space, rows × nv.
-    pub dgamma_dq: &'d DMatrix<S>,
+    pub dgamma_dq: &'d Matrix<S>,
     /// c_v = ∂γ/∂v, rows × nv.
-    pub dgamma_dv: &'d DMatrix<S>,
+    pub dgamma_dv: &'d Matrix<S>,
 }
 
 /// [`constrained_dynamics`](crate::constrained_dynamics()) and the linear equations between changes of q, v, τ and of the
@@ -206,19 +205,19 @@ pub struct ConstrainedDerivatives<'d, S> {
     /// The number of rows of J that depend on rows before them, up to rounding.
     pub redundant: S,
     /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ when q moves to q ⊕ δ, per δ.
-    pub da_dq: &'d DMatrix<S>,
+    pub da_dq: &'d Matrix<S>,
     /// ∂q̈/∂v, nv × nv.
-    pub da_dv: &'d DMatrix<S>,
+    pub da_dv: &'d Matrix<S>,
     /// ∂q̈/∂τ, nv × nv, symmetric.
-    pub da_dtau: &'d DMatrix<S>,
+    pub da_dtau: &'d Matrix<S>,
     /// ∂λ/∂q in the tangent space, rows × nv.
-    pub dlambda_dq: &'d DMatrix<S>,
+    pub dlambda_dq: &'d Matrix<S>,
     /// ∂λ/∂v, rows × nv.
-    pub dlambda_dv: &'d DMatrix<S>,
+    pub dlambda_dv: &'d Matrix<S>,
     /// ∂λ/∂τ, rows × nv.
-    pub dlambda_dtau: &'d DMatrix<S>,
+    pub dlambda_dtau: &'d Matrix<S>,
     /// Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows: the inertia that the robot shows to its constraints.
-    pub inertia: &'d DMatrix<S>,
+    pub inertia: &'d Matrix<S>,
 }
 
 /// [`constrained_dynamics`](crate::constrained_dynamics()) and its derivatives with respect to q, v and τ, exact.

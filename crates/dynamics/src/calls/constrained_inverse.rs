@@ -12,8 +12,7 @@ use crate::passes::kinematics::{accelerations, positions, velocities};
 use crate::passes::rnea;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Force, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
 /// What [`constrained_inverse_dynamics`] gives; J is that of [`ConstraintSet::jacobian`].
 #[derive(Clone, Copy, Debug)]
@@ -75,15 +74,15 @@ pub struct ConstrainedInverseDerivatives<'d, S> {
     /// J q̈ + γ itself, as many numbers as there are rows.
     pub acceleration: &'d [S],
     /// ∂τ/∂q̈ = M, nv × nv, armature included.
-    pub M: &'d DMatrix<S>,
+    pub M: &'d Matrix<S>,
     /// ∂τ/∂q in the tangent space, nv × nv: the change of τ when q moves to q ⊕ δ, per δ.
-    pub dtau_dq: &'d DMatrix<S>,
+    pub dtau_dq: &'d Matrix<S>,
     /// ∂τ/∂v, nv × nv.
-    pub dtau_dv: &'d DMatrix<S>,
+    pub dtau_dv: &'d Matrix<S>,
     /// ∂(J q̈ + γ)/∂q in the tangent space, rows × nv.
-    pub dacceleration_dq: &'d DMatrix<S>,
+    pub dacceleration_dq: &'d Matrix<S>,
     /// ∂(J q̈ + γ)/∂v, rows × nv.
-    pub dacceleration_dv: &'d DMatrix<S>,
+    pub dacceleration_dv: &'d Matrix<S>,
 }
 
 /// [`constrained_inverse_dynamics`] and its derivatives with respect to q, v and q̈, exact; those with respect to λ are
@@ -134,11 +133,11 @@ pub fn constrained_inverse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct EquationsAt<'d, S> {
-    pub M: &'d DMatrix<S>,
-    pub dtau_dq: &'d DMatrix<S>,
-    pub dtau_dv: &'d DMatrix<S>,
-    pub dgamma_dq: &'d DMatrix<S>,
-    pub dgamma_dv: &'d DMatrix<S>,
+    pub M: &'d Matrix<S>,
+    pub dtau_dq: &'d Matrix<S>,
+    pub dtau_dv: &'d Matrix<S>,
+    pub dgamma_dq: &'d Matrix<S>,
+    pub dgamma_dv: &'d Matrix<S>,
 }
 
 /// [`constrained_inverse_dynamics_derivatives`] without the values: for the knots of an optimal control problem, whose rollout

@@ -16,8 +16,7 @@ use crate::passes::{minv, statics};
 use condyle_linalg::check;
 use condyle_linalg::tree_product::minus_products;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Force, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 
 /// ∂τ/∂q of [`static_torque`](crate::static_torque()), and without forces of [`gravity`](crate::gravity): exact, in O(n · depth).
 ///
@@ -40,7 +39,7 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     data: &'d mut Data<S>,
     q: &[S],
     f_ext: &[Force<S>],
-) -> &'d DMatrix<S> {
+) -> &'d Matrix<S> {
     check_forces(f_ext.len(), model.nodes().len());
     forward_kinematics(model, data, q);
     statics::run_derivative(model, &data.world, &mut data.statics, f_ext);
@@ -79,11 +78,11 @@ pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
 #[derive(Clone, Copy, Debug)]
 pub struct RneaDerivatives<'d, S, R = f64> {
     /// ∂τ/∂q in the tangent space: the change of τ when q moves to q ⊕ δ, per δ.
-    pub dtau_dq: &'d DMatrix<S>,
+    pub dtau_dq: &'d Matrix<S>,
     /// ∂τ/∂v.
-    pub dtau_dv: &'d DMatrix<S>,
+    pub dtau_dv: &'d Matrix<S>,
     /// ∂τ/∂a = M(q), armature included.
-    pub dtau_da: &'d DMatrix<S>,
+    pub dtau_da: &'d Matrix<S>,
     pub(crate) state: State<'d, S, R>,
 }
 
@@ -144,9 +143,9 @@ pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDeri
 #[derive(Clone, Copy, Debug)]
 pub struct CoriolisDerivatives<'d, S> {
     /// ∂(C v)/∂q.
-    pub dq: &'d DMatrix<S>,
+    pub dq: &'d Matrix<S>,
     /// ∂(C v)/∂v.
-    pub dv: &'d DMatrix<S>,
+    pub dv: &'d Matrix<S>,
 }
 
 /// The derivatives of C(q, v) v = h(q, v) − g(q), the Coriolis and centrifugal efforts, exact, in O(n · depth).
@@ -185,11 +184,11 @@ pub struct AbaDerivatives<'d, S, R = f64> {
     /// q̈ itself, nv numbers.
     pub a: &'d [S],
     /// ∂q̈/∂q in the tangent space: the change of q̈ when q moves to q ⊕ δ, per δ.
-    pub da_dq: &'d DMatrix<S>,
+    pub da_dq: &'d Matrix<S>,
     /// ∂q̈/∂v.
-    pub da_dv: &'d DMatrix<S>,
+    pub da_dv: &'d Matrix<S>,
     /// ∂q̈/∂τ = M(q)⁻¹.
-    pub da_dtau: &'d DMatrix<S>,
+    pub da_dtau: &'d Matrix<S>,
     pub(crate) state: State<'d, S, R>,
 }
 

@@ -5,17 +5,25 @@ use crate::lanes::limbs::LaneView;
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::World;
 use condyle_model::Model;
+use condyle_spatial::gate::{Fused, Rename};
 use condyle_spatial::{Constant, Inertia, Motion, Scalar, Se3, Vec3};
 
 /// The state at which inverse dynamics has been differentiated.
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
 pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
     pub world: &'d World<S>,
     pub pass: &'d Workspace<S>,
     /// The lanes in which the bodies stand, if they were not computed one by one.
     pub limbs: Option<LaneView<'d>>,
+}
+
+impl<'d> Rename<State<'d, Fused, f64>> for State<'d, f64, f64> {
+    #[inline(always)]
+    fn renamed(self) -> State<'d, Fused, f64> {
+        let Self { model, world, pass, limbs } = self;
+        State { model, world: world.renamed(), pass: pass.renamed(), limbs }
+    }
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {

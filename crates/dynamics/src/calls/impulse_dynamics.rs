@@ -10,8 +10,7 @@ use crate::derivatives::rnea_derivatives;
 use crate::passes::kinematics::positions;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Matrix, Scalar, Vec3};
 
 /// What [`impulse_dynamics`] gives.
 #[derive(Clone, Copy, Debug)]
@@ -110,15 +109,15 @@ pub struct ImpulseDerivatives<'d, S> {
     /// The number of rows of J that depend on rows before them, up to rounding.
     pub redundant: S,
     /// ∂v⁺/∂q in the tangent space, nv × nv: the change of v⁺ when q moves to q ⊕ δ, per δ.
-    pub dv_dq: &'d DMatrix<S>,
+    pub dv_dq: &'d Matrix<S>,
     /// ∂v⁺/∂v, nv × nv.
-    pub dv_dv: &'d DMatrix<S>,
+    pub dv_dv: &'d Matrix<S>,
     /// ∂Λ/∂q in the tangent space, rows × nv.
-    pub dlambda_dq: &'d DMatrix<S>,
+    pub dlambda_dq: &'d Matrix<S>,
     /// ∂Λ/∂v, rows × nv.
-    pub dlambda_dv: &'d DMatrix<S>,
+    pub dlambda_dv: &'d Matrix<S>,
     /// (J M⁻¹ Jᵀ)⁻¹, rows × rows: the inertia that the robot shows to its constraints.
-    pub inertia: &'d DMatrix<S>,
+    pub inertia: &'d Matrix<S>,
 }
 
 /// [`impulse_dynamics`] and its derivatives with respect to q and the velocity before the impact, exact.

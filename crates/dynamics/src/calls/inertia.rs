@@ -7,8 +7,7 @@ use crate::passes::kinematics::positions;
 use crate::passes::{aba, crba, minv};
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Matrix, Scalar};
 
 /// M(q), the joint-space inertia matrix: τ = M a + h, kinetic energy ½ vᵀ M v. In O(n · depth).
 ///
@@ -26,7 +25,7 @@ use nalgebra::DMatrix;
 ///
 /// # Panics
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
-pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
+pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {
     data.check(model);
     check("q", q.len(), model.nq());
     if run_limbs(Task::Crba, model, data, Arguments { q, v: &[], x: &[], f_ext: &[] }) {
@@ -55,7 +54,7 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
 /// # Panics
 /// If `q` has not nq numbers, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
-pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d DMatrix<S> {
+pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {
     data.check(model);
     model.check_regular();
     check("q", q.len(), model.nq());

@@ -7,8 +7,7 @@ use crate::lanes::limbs::pass::Arguments;
 use crate::passes::{coriolis, rnea, statics};
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Force, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
 /// RNEA with the limbs side by side where there are some, else body by body.
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
@@ -162,7 +161,7 @@ pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     data: &'d mut Data<S>,
     q: &[S],
     v: &[S],
-) -> &'d DMatrix<S> {
+) -> &'d Matrix<S> {
     forward_velocities(model, data, q, v);
     coriolis::run(model, &data.world, &data.moving, &mut data.coriolis);
     &data.coriolis.C

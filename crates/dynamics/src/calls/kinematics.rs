@@ -2,13 +2,12 @@
 
 use super::limbs::spread;
 use crate::data::Data;
-use crate::passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities};
+use crate::passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities, columns};
 use crate::passes::kinematics::{PlacementCache, accelerations, positions, velocities};
 use crate::passes::path_jacobian::path_jacobian;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Scalar, Se3, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Dense, DenseMatrix, Scalar, Se3, Vec3};
 
 impl<S: Scalar> Data<S> {
     /// The placements at the position of the last call on this data: they need not be computed again. There are none if it
@@ -86,10 +85,9 @@ pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     q: &[S],
     frame: usize,
     reference: ReferenceFrame,
-    J: &mut DMatrix<S>,
+    J: &mut DenseMatrix<S, impl Dense<S>>,
 ) {
-    by_columns(model, J);
-    frame_jacobian_strided(model, q, frame, reference, J.as_mut_slice(), [1, 6]);
+    frame_jacobian_strided(model, q, frame, reference, columns("J", J, model.nv()), [1, 6]);
 }
 
 /// [`frame_jacobian`] to where one row lies `strides[0]` numbers behind the one before, and one column `strides[1]`: for
@@ -124,10 +122,9 @@ pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     q: &[S],
     body: usize,
     reference: ReferenceFrame,
-    J: &mut DMatrix<S>,
+    J: &mut DenseMatrix<S, impl Dense<S>>,
 ) {
-    by_columns(model, J);
-    body_jacobian_strided(model, q, body, reference, J.as_mut_slice(), [1, 6]);
+    body_jacobian_strided(model, q, body, reference, columns("J", J, model.nv()), [1, 6]);
 }
 
 /// [`body_jacobian`] to where rows and columns lie as in [`frame_jacobian_strided`].
@@ -141,11 +138,6 @@ pub fn body_jacobian_strided<S: Scalar, R: Constant<S>>(
     strides: [usize; 2],
 ) {
     jacobian_on(model, q, body, Se3::identity(), reference, J, strides);
-}
-
-fn by_columns<S, R>(model: &Model<R>, J: &DMatrix<S>) {
-    let nv = model.nv();
-    assert!(J.shape() == (6, nv), "J: expected 6 × {nv}, found {:?}", J.shape());
 }
 
 fn jacobian_on<S: Scalar, R: Constant<S>>(

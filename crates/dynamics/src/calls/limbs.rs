@@ -10,7 +10,7 @@ use crate::passes::kinematics::{PlacementCache, World, place};
 use crate::passes::{aba, crba, rnea};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
-use condyle_spatial::gate::{Fused, Level, is, level, renamed};
+use condyle_spatial::gate::{Fused, Level, is, level, same};
 use condyle_spatial::register_kernel;
 use condyle_spatial::{Constant, Scalar};
 
@@ -126,7 +126,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
         return false; // joints that share a coordinate
     }
     // SAFETY: S and R are f64.
-    unsafe { enter(task, renamed(model), plan, renamed(data), arguments.fused()) }
+    unsafe { enter(task, same(model), plan, same(data), arguments.fused()) }
     true
 }
 

@@ -12,7 +12,7 @@ use crate::lanes::limbs::pass::{Arguments, Scratch, scatter};
 use crate::passes::aba;
 use crate::passes::kinematics::PlacementCache;
 use condyle_model::Model;
-use condyle_spatial::gate::{Fused, renamed};
+use condyle_spatial::gate::{Fused, Rename, same};
 use condyle_spatial::{Constant, Scalar};
 use condyle_spatial::{kernel, register_kernel};
 
@@ -90,8 +90,11 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     arguments: Arguments<'_, S>,
 ) -> bool {
     let Some(plan) = ready(model, data).filter(|_| constraints.limbs.is_some()) else { return false };
-    // SAFETY: S and R are f64, and `Fused` is the same.
-    unsafe { enter(renamed(model), plan, renamed(data), renamed(constraints), arguments.fused()) }
+    // SAFETY: S and R are f64.
+    unsafe {
+        let constraints = same::<_, &mut ConstraintSet<f64>>(constraints).renamed();
+        enter(same(model), plan, same(data), constraints, arguments.fused());
+    }
     true
 }
 

@@ -16,8 +16,7 @@ use super::differentiated::State;
 use crate::passes::regressor::{PARAMETERS, effort};
 use condyle_model::Model;
 use condyle_spatial::elementary::tanh;
-use condyle_spatial::{Act, Constant, Scalar, kernel};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Matrix, Scalar, alike, kernel};
 
 /// An input of the dynamics beside position, velocity, acceleration and effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +41,8 @@ pub enum Input {
     },
 }
 
+alike!(Input);
+
 impl Input {
     /// The number of numbers of the input, and of columns of a derivative with respect to it.
     ///
@@ -63,7 +64,7 @@ impl Input {
 /// Where entries of B go: to B, or with −M⁻¹ to −M⁻¹ B.
 struct Entries<'e, S> {
     out: &'e mut [S],
-    Minv: Option<&'e DMatrix<S>>,
+    Minv: Option<&'e Matrix<S>>,
     nv: usize,
 }
 
@@ -86,7 +87,7 @@ impl<S: Scalar> Entries<'_, S> {
 
 kernel! {
     /// B, or −M⁻¹ B.
-    fn write<S, R>(state: State<'_, S, R>, input: Input, Minv: Option<&DMatrix<S>>, out: &mut [S]) {
+    fn write<S, R>(state: State<'_, S, R>, input: Input, Minv: Option<&Matrix<S>>, out: &mut [S]) {
         out.fill(S::zero());
         let nv = state.model.nv();
         state.entries(input, &mut Entries { out, Minv, nv });
@@ -184,7 +185,7 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
     ///
     /// # Panics
     /// If `dtau` has not that shape, or the input names no moving body or a smoothing that is not positive.
-    pub fn with_respect_to(&self, input: Input, dtau: &mut DMatrix<S>) {
+    pub fn with_respect_to(&self, input: Input, dtau: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "dtau", dtau.shape());
         self.write_input(input, dtau.as_mut_slice());
     }
@@ -213,7 +214,7 @@ impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
     ///
     /// # Panics
     /// If `da` has not that shape, or the input names no moving body or a smoothing that is not positive.
-    pub fn with_respect_to(&self, input: Input, da: &mut DMatrix<S>) {
+    pub fn with_respect_to(&self, input: Input, da: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "da", da.shape());
         self.write_input(input, da.as_mut_slice());
     }

@@ -4,8 +4,7 @@ use super::kinematics::{forward_accelerations, forward_kinematics, forward_veloc
 use crate::data::Data;
 use crate::passes::regressor;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Constant, Matrix, Scalar};
 
 /// Y(q, v, a) with τ = Y π, in O(n · depth): inverse dynamics as a linear function of the inertias, armature apart.
 ///
@@ -33,7 +32,7 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
     q: &[S],
     v: &[S],
     a: &[S],
-) -> &'d DMatrix<S> {
+) -> &'d Matrix<S> {
     forward_accelerations(model, data, q, v, a);
     regressor::torque(model, &data.world, &data.moving, &mut data.regressor);
     &data.regressor.torque

@@ -5,11 +5,11 @@ use super::inverse_dynamics::check_arguments;
 use crate::data::Data;
 use crate::derivatives::{aba_hessian as aba, rnea_hessian as rnea};
 use crate::lanes::limbs::pass::Arguments;
-use crate::workspace::{filled, zero_matrix};
+use crate::workspace::filled;
 use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Force, Scalar};
+use condyle_spatial::{Array, Constant, Force, Matrix, Scalar};
 use nalgebra::DMatrix;
 
 /// The second derivatives of φ = λᵀ rnea(q, v, a), each a full nv × nv matrix; those by v and a, and by a twice, are zero.
@@ -18,13 +18,13 @@ use nalgebra::DMatrix;
 #[derive(Clone, Copy, Debug)]
 pub struct RneaHessian<'d, S, R = f64> {
     /// ∂²φ/∂q∂q, symmetric.
-    pub dqdq: &'d DMatrix<S>,
+    pub dqdq: &'d Matrix<S>,
     /// ∂²φ/∂v∂q: entry (j, k) is ∂²φ/∂v_j∂q_k.
-    pub dvdq: &'d DMatrix<S>,
+    pub dvdq: &'d Matrix<S>,
     /// ∂²φ/∂v∂v, symmetric.
-    pub dvdv: &'d DMatrix<S>,
+    pub dvdv: &'d Matrix<S>,
     /// ∂²φ/∂a∂q: entry (j, k) is ∂²φ/∂a_j∂q_k, the derivative of M λ by q.
-    pub dadq: &'d DMatrix<S>,
+    pub dadq: &'d Matrix<S>,
     /// The first derivatives of τ, which come with them.
     pub first: RneaDerivatives<'d, S, R>,
 }
@@ -82,13 +82,13 @@ pub struct RneaSecondDerivatives<S> {
     /// ∂²τ_i/∂a∂q for each i: entry (j, k) is ∂²τ_i/∂a_j∂q_k = ∂M_ij/∂q_k.
     pub dadq: Vec<DMatrix<S>>,
     /// The unit vectors. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
-    lambda: Vec<S>,
+    lambda: Array<S>,
 }
 
 impl<S: Scalar> RneaSecondDerivatives<S> {
     /// Memory for the tensors of a model.
     pub fn new<R>(model: &Model<R>) -> Self {
-        let zeros = || vec![zero_matrix(model.nv(), model.nv()); model.nv()];
+        let zeros = || vec![DMatrix::from_element(model.nv(), model.nv(), S::zero()); model.nv()];
         let lambda = filled(S::zero, model.nv());
         Self { dqdq: zeros(), dvdq: zeros(), dvdv: zeros(), dadq: zeros(), lambda }
     }
@@ -135,7 +135,7 @@ pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     data: &mut Data<S>,
     arguments: Arguments<'_, S>,
     lambda: &mut [S],
-    mut give: impl FnMut(usize, [&DMatrix<S>; 4]),
+    mut give: impl FnMut(usize, [&Matrix<S>; 4]),
 ) {
     check_arguments(model, data, "a", arguments);
     one_by_one(model, data, arguments);
@@ -155,13 +155,13 @@ pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
 #[derive(Clone, Copy, Debug)]
 pub struct AbaHessian<'d, S, R = f64> {
     /// ∂²ψ/∂q∂q, symmetric.
-    pub dqdq: &'d DMatrix<S>,
+    pub dqdq: &'d Matrix<S>,
     /// ∂²ψ/∂v∂q: entry (j, k) is ∂²ψ/∂v_j∂q_k.
-    pub dvdq: &'d DMatrix<S>,
+    pub dvdq: &'d Matrix<S>,
     /// ∂²ψ/∂v∂v, symmetric.
-    pub dvdv: &'d DMatrix<S>,
+    pub dvdv: &'d Matrix<S>,
     /// ∂²ψ/∂τ∂q: entry (j, k) is ∂²ψ/∂τ_j∂q_k, the derivative of M⁻¹ λ by q.
-    pub dtaudq: &'d DMatrix<S>,
+    pub dtaudq: &'d Matrix<S>,
     /// q̈ and its first derivatives, which come with them.
     pub first: AbaDerivatives<'d, S, R>,
 }

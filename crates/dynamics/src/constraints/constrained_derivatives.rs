@@ -15,29 +15,29 @@
 
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::tree_product::{minus_block_product, subtract_column};
 use condyle_spatial::kernel;
-use condyle_spatial::{Force, Scalar};
+use condyle_spatial::{Array, Force, Matrix, Scalar, alike};
 use core::ops::Range;
-use nalgebra::DMatrix;
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// All forces on each body, in its frame. Shape: bodies. Written by: `load`.
-    pub forces: Vec<Force<S>>,
+    pub forces: Array<Force<S>>,
     /// M⁻¹, then P. Shape: nv × nv. Written by: `finish`.
-    pub P: DMatrix<S>,
+    pub P: Matrix<S>,
     /// ∂(M q̈ + h − Jᵀ λ)/∂q. Shape: nv × nv. Written by: `differentiate`.
-    pub dtau_dq: DMatrix<S>,
+    pub dtau_dq: Matrix<S>,
     /// The derivative of q̈ or of the velocity. Shape: nv × nv. Written by: `constrained_dynamics_derivatives`,
     /// `impulse_dynamics_derivatives`.
-    pub da_dq: DMatrix<S>,
-    pub da_dv: DMatrix<S>,
+    pub da_dq: Matrix<S>,
+    pub da_dv: Matrix<S>,
 }
+
+alike!(Workspace { forces, P, dtau_dq, da_dq, da_dv });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
@@ -55,9 +55,9 @@ impl<S: Scalar> Workspace<S> {
 /// C −= A B in some columns, and some rows of C, where column j of B has zeros but in the rows `rows[j]`.
 #[inline(always)]
 fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
-    A: &DMatrix<S>,
-    B: &DMatrix<S>,
-    C: &mut DMatrix<S>,
+    A: &Matrix<S>,
+    B: &Matrix<S>,
+    C: &mut Matrix<S>,
     rows: &[R],
     [of_C, columns]: [&Range<usize>; 2],
 ) {
@@ -71,7 +71,7 @@ fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
 impl<S: Scalar> ConstraintSet<S> {
     /// Λ, J̄ and P of K⁻¹ of an island, for M⁻¹ in place of P, and J M⁻¹ Jᵀ that is factorised.
     #[inline(always)]
-    fn invert_island(&mut self, k: usize, P: &mut DMatrix<S>) {
+    fn invert_island(&mut self, k: usize, P: &mut Matrix<S>) {
         let Self { U, Jbar, dlambda_dtau, delassus, proximal, .. } = self;
         let (n, rows, island) = (self.nv, self.lambda.len(), &self.islands[k]);
         let Range { start, end } = island.coordinates;
@@ -114,7 +114,7 @@ impl<S: Scalar> ConstraintSet<S> {
 
 kernel! {
     /// The blocks of K⁻¹.
-    pub(crate) fn invert<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, P: &mut DMatrix<S>) {
+    pub(crate) fn invert<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, P: &mut Matrix<S>) {
         factor.inverse(P); // M⁻¹
         for k in 0..set.islands.len() {
             set.invert_island(k, P);
@@ -129,9 +129,11 @@ pub(crate) enum By {
     Velocity,
 }
 
+alike!(By);
+
 kernel! {
     /// The derivatives of acceleration and forces, for the blocks of K⁻¹, r, and c in the set, where they may differ from zero.
-    pub(crate) fn respond<S>(set: &mut ConstraintSet<S>, by: By, P: &DMatrix<S>, r: &DMatrix<S>, da: &mut DMatrix<S>) {
+    pub(crate) fn respond<S>(set: &mut ConstraintSet<S>, by: By, P: &Matrix<S>, r: &Matrix<S>, da: &mut Matrix<S>) {
         let ConstraintSet { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, .. } = set;
         let (c, dlambda) = match by {
             By::Position => (&set.dgamma_dq, &mut set.dlambda_dq),

@@ -17,35 +17,35 @@ use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::crba;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Inertia, Mat3, Motion, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Mat3, Matrix, Motion, Scalar, Vec3, alike};
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Velocity. Shape: bodies. Written by: `bias`.
-    pub v: Vec<Motion<S>>,
+    pub v: Array<Motion<S>>,
     /// Acceleration for q̈ = 0, with gravity as the world's. Shape: bodies. Written by: `bias`.
-    pub a: Vec<Motion<S>>,
+    pub a: Array<Motion<S>>,
     /// Iᶜ. Shape: bodies. Written by: `bias`, `inertia`.
-    pub IC: Vec<Inertia<S>>,
+    pub IC: Array<Inertia<S>>,
     /// Force through the joint for q̈ = 0. Shape: bodies. Written by: `bias`.
-    pub F: Vec<Force<S>>,
+    pub F: Array<Force<S>>,
     /// Shape: nv × nv. Written by: `bias`, `inertia`.
-    pub M: DMatrix<S>,
+    pub M: Matrix<S>,
     /// Its factor. Written by: `constrained_dynamics`, `impulse_dynamics`.
     pub factor: Ltdl<S>,
     /// τ − h. Shape: nv. Written by: `bias`, `constrained_dynamics`.
-    pub effort: Vec<S>,
+    pub effort: Array<S>,
     /// The acceleration, or the change of velocity. Shape: nv. Written by: `constrained_dynamics`, `impulse_dynamics`.
-    pub qdd: Vec<S>,
+    pub qdd: Array<S>,
 }
+
+alike!(Workspace { v, a, IC, F, M, factor, effort, qdd });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {

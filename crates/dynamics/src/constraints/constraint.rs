@@ -4,7 +4,7 @@ use crate::passes::frames::ReferenceFrame;
 use alloc::borrow::ToOwned;
 use condyle_model::Error;
 use condyle_model::Model;
-use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3};
+use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, alike};
 use core::any::Any;
 
 /// The motion that a constraint holds.
@@ -47,6 +47,8 @@ pub struct Target<S> {
     /// The wanted acceleration relative to the other frame, in the reference frame (m/s², rad/s²).
     pub acceleration: Motion<S>,
 }
+
+alike!(Target { placement, velocity, acceleration });
 
 impl<S: Scalar> Target<S> {
     /// Both frames in one place, at rest.

@@ -24,8 +24,7 @@ use crate::constraints::constraint::{ConstraintKind, Target};
 use crate::constraints::plan::Plan;
 use crate::passes::kinematics::World;
 use condyle_spatial::lie::{Quaternion, jlog6, log6};
-use condyle_spatial::{Act, Cross, Mat3, Motion, Scalar, Se3, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Cross, Mat3, Matrix, Motion, Scalar, Se3, Vec3};
 
 /// The poses of the two frames of a constraint and the motions of their bodies, in the world's frame.
 #[derive(Clone, Copy, Debug)]
@@ -219,8 +218,8 @@ impl<S: Scalar> FramePair<S> {
         target: &Target<S>,
         w: Columns<'_, S>,
         error: &[S],
-        dq: &mut DMatrix<S>,
-        dv: &mut DMatrix<S>,
+        dq: &mut Matrix<S>,
+        dv: &mut Matrix<S>,
     ) {
         match plan.kind {
             ConstraintKind::Rigid => self.rigid_derivatives(plan, target, w, error, dq, dv),
@@ -235,8 +234,8 @@ impl<S: Scalar> FramePair<S> {
         target: &Target<S>,
         w: Columns<'_, S>,
         error: &[S],
-        dq: &mut DMatrix<S>,
-        dv: &mut DMatrix<S>,
+        dq: &mut Matrix<S>,
+        dv: &mut Matrix<S>,
     ) {
         let (kp, kd) = (S::splat(plan.kp), S::splat(plan.kd));
         let [v1, v2] = self.v;
@@ -283,7 +282,7 @@ impl<S: Scalar> FramePair<S> {
     }
 
     #[inline(always)]
-    fn point_derivatives(&self, plan: &Plan, w: Columns<'_, S>, dq: &mut DMatrix<S>, dv: &mut DMatrix<S>) {
+    fn point_derivatives(&self, plan: &Plan, w: Columns<'_, S>, dq: &mut Matrix<S>, dv: &mut Matrix<S>) {
         let (kp, kd, two) = (S::splat(plan.kp), S::splat(plan.kd), S::splat(2.0));
         let points = self.points();
         let held = self.point(kp, kd);
@@ -328,7 +327,7 @@ impl<S: Scalar> FramePair<S> {
         S: &[Motion<S>],
         Psid: &[Motion<S>],
         value: &[S],
-        dq: &mut DMatrix<S>,
+        dq: &mut Matrix<S>,
     ) {
         let [v1, v2] = self.v;
         let (p1, p2) = (self.x1.translation, self.x2.translation);

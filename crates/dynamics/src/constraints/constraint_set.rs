@@ -5,15 +5,15 @@ use crate::constraints::constraint_lanes::ConstraintLanes;
 use crate::constraints::delassus::Delassus;
 use crate::constraints::islands::Island;
 use crate::constraints::plan::{Plan, Proximal, nonzero_rows, touching};
+use crate::workspace::{filled, zero_matrix};
 use alloc::borrow::ToOwned;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Error;
 use condyle_model::Model;
-use condyle_spatial::Scalar;
+use condyle_spatial::{Array, Dense, DenseMatrix, Matrix, Scalar, alike};
 use core::ops::Range;
-use nalgebra::DMatrix;
 
 /// Constraints of one model: contacts and loops, and the scratch and results of [`constrained_dynamics`] and its like.
 ///
@@ -40,7 +40,7 @@ pub struct ConstraintSet<S> {
     pub proximal: Proximal,
     pub(crate) plans: Vec<Plan>,
     pub(crate) islands: Vec<Island>,
-    pub(crate) targets: Vec<Target<S>>,
+    pub(crate) targets: Array<Target<S>>,
     pub(crate) nv: usize,
     /// The hash of the robot that it was made for: the frames and the axes of its joints are in it.
     geometry: u64,
@@ -49,28 +49,32 @@ pub struct ConstraintSet<S> {
     /// For each coordinate, the rows of J in which it may differ from zero.
     pub(crate) touching: Vec<Vec<usize>>,
     /// J on the places of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
-    pub(crate) J: Vec<S>,
+    pub(crate) J: Array<S>,
     /// γ: the constraints' accelerations for q̈ = 0, with all corrections. Shape: rows. Written by: `constraint_motion`.
-    pub(crate) gamma: Vec<S>,
+    pub(crate) gamma: Array<S>,
     pub(crate) delassus: Delassus<S>,
     /// The forces, or impulses. Shape: rows. Written by: the algorithms.
-    pub(crate) lambda: Vec<S>,
+    pub(crate) lambda: Array<S>,
     /// J q̈ + γ. Shape: rows. Written by: the algorithms.
-    pub(crate) error: Vec<S>,
+    pub(crate) error: Array<S>,
     /// The derivatives of the constraints' accelerations (velocities). Shape: rows × nv. Written by: the algorithms'
     /// derivatives.
-    pub(crate) dgamma_dq: DMatrix<S>,
-    pub(crate) dgamma_dv: DMatrix<S>,
+    pub(crate) dgamma_dq: Matrix<S>,
+    pub(crate) dgamma_dv: Matrix<S>,
     /// M⁻¹ Jᵀ, and M⁻¹ Jᵀ Λ. Shape: nv × rows. Written by: the algorithms' derivatives.
-    pub(crate) U: DMatrix<S>,
-    pub(crate) Jbar: DMatrix<S>,
+    pub(crate) U: Matrix<S>,
+    pub(crate) Jbar: Matrix<S>,
     /// The derivatives of the forces. Shape: rows × nv. Written by: the algorithms' derivatives.
-    pub(crate) dlambda_dq: DMatrix<S>,
-    pub(crate) dlambda_dv: DMatrix<S>,
-    pub(crate) dlambda_dtau: DMatrix<S>,
+    pub(crate) dlambda_dq: Matrix<S>,
+    pub(crate) dlambda_dv: Matrix<S>,
+    pub(crate) dlambda_dtau: Matrix<S>,
     /// The scratch of single calls on robots with limbs.
     pub(crate) limbs: Option<Box<ConstraintLanes>>,
 }
+
+alike!(ConstraintSet {
+    targets, J, gamma, delassus, lambda, error, dgamma_dq, dgamma_dv, U, Jbar, dlambda_dq, dlambda_dv, dlambda_dtau,
+} same { proximal, plans, islands, nv, geometry, nonzero_rows, touching, limbs });
 
 impl<S: Scalar> ConstraintSet<S> {
     /// Plans constraints of a model and allocates everything.
@@ -83,7 +87,7 @@ impl<S: Scalar> ConstraintSet<S> {
         let plans = Plan::of_constraints(model, constraints)?;
         let (rows, entries) = plans.last().map_or((0, 0), |last| (last.row + last.rows(), last.end()));
         let nv = model.nv();
-        let (o, wide, tall) = (S::zero(), DMatrix::from_element(rows, nv, S::zero()), (nv, rows));
+        let (o, wide, tall) = (S::zero(), zero_matrix(rows, nv), (nv, rows));
         Ok(Self {
             proximal: Proximal::default(),
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
@@ -92,15 +96,15 @@ impl<S: Scalar> ConstraintSet<S> {
             geometry: model.geometry_hash(),
             nonzero_rows: nonzero_rows(model, &plans),
             touching: (0..nv).map(|k| touching(&plans, k)).collect(),
-            J: vec![o; entries],
-            gamma: vec![o; rows],
+            J: filled(|| o, entries),
+            gamma: filled(|| o, rows),
             delassus: Delassus::new(rows, entries),
-            lambda: vec![o; rows],
-            error: vec![o; rows],
+            lambda: filled(|| o, rows),
+            error: filled(|| o, rows),
             dgamma_dq: wide.clone(),
             dgamma_dv: wide.clone(),
-            U: DMatrix::from_element(tall.0, tall.1, o),
-            Jbar: DMatrix::from_element(tall.0, tall.1, o),
+            U: zero_matrix(tall.0, tall.1),
+            Jbar: zero_matrix(tall.0, tall.1),
             dlambda_dq: wide.clone(),
             dlambda_dv: wide.clone(),
             dlambda_dtau: wide,
@@ -169,7 +173,7 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Panics
     /// If `J` is not rows × nv.
-    pub fn jacobian(&self, J: &mut DMatrix<S>) {
+    pub fn jacobian(&self, J: &mut DenseMatrix<S, impl Dense<S>>) {
         let shape = (self.rows(), self.nv);
         assert!(J.shape() == shape, "J: expected {} × {}, found {:?}", shape.0, shape.1, J.shape());
         J.fill(S::zero());

@@ -8,12 +8,11 @@
 
 use crate::constraints::islands::Island;
 use crate::constraints::plan::{Plan, Proximal};
-use alloc::vec::Vec;
+use crate::workspace::{filled, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::{axpy, dot};
-use condyle_spatial::Scalar;
+use condyle_spatial::{Array, Matrix, Scalar, alike};
 use core::ops::Range;
-use nalgebra::DMatrix;
 
 /// A pivot smaller than this many roundings of its diagonal entry is none.
 const ROUNDINGS: f64 = 1e3;
@@ -31,26 +30,28 @@ const STEP: usize = 8;
 #[repr(C)]
 pub(crate) struct Delassus<S> {
     /// J L⁻¹, and that times D⁻¹, on the places of each constraint. Shape: entries of all rows. Written by: `multiply`.
-    Y: Vec<S>,
-    Z: Vec<S>,
+    Y: Array<S>,
+    Z: Array<S>,
     /// The stride of the columns of `CE` and of the rows of `rows`: room for a row more, in whole steps.
     pub stride: usize,
     /// J M⁻¹ Jᵀ from the diagonal on, column by column; then C E. Shape: stride × rows, and a step. Written by: `multiply`,
     /// or in lanes by `limbs`; then by `decompose`.
-    pub CE: Vec<S>,
+    pub CE: Array<S>,
     /// C E row by row, up to the diagonal. Shape: as `CE`. Written by: `decompose`.
-    rows: Vec<S>,
+    rows: Array<S>,
     /// 1/E; 0 where there is no pivot. Shape: rows. Written by: `decompose`.
-    E_inv: Vec<S>,
+    E_inv: Array<S>,
     /// The number of rows without a pivot. Written by: `decompose`.
     pub redundant: S,
     /// The right-hand side, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
-    x: Vec<S>,
+    x: Array<S>,
     /// C⁻¹ b. Shape: rows. Written by: `substitute`.
-    y: Vec<S>,
+    y: Array<S>,
     /// Λ. Shape: rows × rows. Written by: `invert`.
-    pub inverse: DMatrix<S>,
+    pub inverse: Matrix<S>,
 }
+
+alike!(Delassus { Y, Z, CE, rows, E_inv, redundant, x, y, inverse } same { stride });
 
 /// The smallest number that changes 1 when added to it.
 #[inline(always)]
@@ -62,18 +63,18 @@ fn epsilon<S: Scalar>() -> S {
 impl<S: Scalar> Delassus<S> {
     pub(crate) fn new(rows: usize, entries: usize) -> Self {
         let (o, stride) = (S::zero(), (rows + 1).next_multiple_of(step::<S>()));
-        let square = vec![o; stride * rows + step::<S>()];
+        let square = filled(|| o, stride * rows + step::<S>());
         Self {
-            Y: vec![o; entries],
-            Z: vec![o; entries],
+            Y: filled(|| o, entries),
+            Z: filled(|| o, entries),
             stride,
             CE: square.clone(),
             rows: square,
-            E_inv: vec![o; rows],
+            E_inv: filled(|| o, rows),
             redundant: o,
-            x: vec![o; stride],
-            y: vec![o; rows],
-            inverse: DMatrix::from_element(rows, rows, o),
+            x: filled(|| o, stride),
+            y: filled(|| o, rows),
+            inverse: zero_matrix(rows, rows),
         }
     }
 

@@ -20,28 +20,28 @@ use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::islands::clear_rows;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled};
-use alloc::vec::Vec;
 use condyle_linalg::axpy::axpy;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Cross, Motion, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Array, Cross, Matrix, Motion, Scalar, alike};
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// v⁺. Shape: nv. Written by: `pass`.
-    pub v_after: Vec<S>,
+    pub v_after: Array<S>,
     /// w = v⁺ + ε v. Shape: nv. Written by: `pass`.
-    pub w: Vec<S>,
+    pub w: Array<S>,
     /// The bodies' velocities for w, in the world's frame. Shape: bodies. Written by: `spread`.
-    pub velocity: Vec<Motion<S>>,
+    pub velocity: Array<Motion<S>>,
     /// Ψ̇ for w. Shape: columns. Written by: `spread`.
-    pub Psid: Vec<Motion<S>>,
+    pub Psid: Array<Motion<S>>,
     /// Zeros. Shape: nv. Written by: nobody.
-    pub zero: Vec<S>,
+    pub zero: Array<S>,
 }
+
+alike!(Workspace { v_after, w, velocity, Psid, zero });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
@@ -101,7 +101,7 @@ kernel! {
 
 kernel! {
     /// The derivatives by the velocity before the impact: ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
-    pub(crate) fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut DMatrix<S>) {
+    pub(crate) fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut Matrix<S>) {
         let (n, rows) = (set.nv, set.lambda.len());
         let (Jbar, inertia) = (set.Jbar.as_slice(), set.delassus.inverse.as_slice());
         let (dv, dlambda) = (dv.as_mut_slice(), set.dlambda_dv.as_mut_slice());

@@ -10,9 +10,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 use condyle_linalg::elimination_tree::{EliminationTree, NONE};
 use condyle_model::Model;
-use condyle_spatial::Scalar;
+use condyle_spatial::{Matrix, Scalar};
 use core::ops::Range;
-use nalgebra::DMatrix;
 
 /// A part that is computed apart from all others.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -104,7 +103,7 @@ impl Island {
 
 /// Zeros in a matrix with a row for each row of J and a column for each coordinate, where there may be something else.
 #[inline(always)]
-pub(crate) fn clear_rows<S: Scalar>(islands: &[Island], matrix: &mut DMatrix<S>) {
+pub(crate) fn clear_rows<S: Scalar>(islands: &[Island], matrix: &mut Matrix<S>) {
     let rows = matrix.nrows();
     for island in islands {
         for j in island.coordinates.clone() {

@@ -21,8 +21,7 @@ use crate::passes::frames::Placements;
 use crate::passes::kinematics::World;
 use condyle_model::Model;
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Motion, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Cross, Force, Matrix, Motion, Scalar};
 
 impl<S: Scalar> ConstraintSet<S> {
     /// The force λ of constraint i along the axes of its frame.
@@ -72,7 +71,7 @@ kernel! {
 
 kernel! {
     /// r_q, from the derivative for forces that are fixed in their bodies, to which is added what is different.
-    pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &DMatrix<S>, r: &mut DMatrix<S>) {
+    pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &Matrix<S>, r: &mut Matrix<S>) {
         r.as_mut_slice().copy_from_slice(fixed.as_slice());
         for (i, plan) in set.plans.iter().enumerate() {
             if plan.bodies[1] > 0 {

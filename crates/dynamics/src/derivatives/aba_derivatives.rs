@@ -23,24 +23,25 @@ use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Model;
 use condyle_spatial::kernel;
-use condyle_spatial::{Constant, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Array, Constant, Matrix, Scalar, Vec3, alike};
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// The acceleration. Shape: nv. Written by: `aba_derivatives`.
-    pub a: Vec<S>,
+    pub a: Array<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
-    pub da_dq: DMatrix<S>,
+    pub da_dq: Matrix<S>,
     /// Shape: nv × nv. Written by: `aba_derivatives`.
-    pub da_dv: DMatrix<S>,
+    pub da_dv: Matrix<S>,
     /// The first coordinate of each body that floats. Written by: `new`.
     pub floating: Vec<usize>,
     /// The rows of ∂τ by which M⁻¹ is multiplied: none for linear coordinates of bodies that float. Written by: `new`.
     pub nonzero_rows: Vec<NonzeroRows>,
     pub solve: tree_solve::Workspace<S>,
 }
+
+alike!(Workspace { a, da_dq, da_dv, solve } same { floating, nonzero_rows });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {

@@ -14,12 +14,10 @@
 use crate::derivatives::aba_derivatives::{self};
 use crate::derivatives::rnea_hessian;
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::minus_product;
-use condyle_spatial::Scalar;
 use condyle_spatial::kernel;
-use nalgebra::DMatrix;
+use condyle_spatial::{Array, Matrix, Scalar, alike};
 
 /// Bᵀ, of a square matrix.
 #[inline(always)]
@@ -35,20 +33,22 @@ fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// μ = M⁻¹ λ. Shape: nv. Written by: `aba_hessian`.
-    pub mu: Vec<S>,
+    pub mu: Array<S>,
     /// A transpose. Shape: nv × nv. Written by: `run`.
-    pub transpose: Vec<S>,
+    pub transpose: Array<S>,
     /// A product. Shape: nv × nv. Written by: `run`.
-    pub product: Vec<S>,
+    pub product: Array<S>,
     /// Shape: nv × nv. Written by: `run`.
-    pub dqdq: DMatrix<S>,
+    pub dqdq: Matrix<S>,
     /// Shape: nv × nv. Written by: `run`.
-    pub dvdq: DMatrix<S>,
+    pub dvdq: Matrix<S>,
     /// Shape: nv × nv. Written by: `run`.
-    pub dvdv: DMatrix<S>,
+    pub dvdv: Matrix<S>,
     /// Shape: nv × nv. Written by: `run`.
-    pub dtaudq: DMatrix<S>,
+    pub dtaudq: Matrix<S>,
 }
+
+alike!(Workspace { mu, transpose, product, dqdq, dvdq, dvdv, dtaudq });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
@@ -67,7 +67,7 @@ impl<S: Scalar> Workspace<S> {
 
 kernel! {
     /// μ = M⁻¹ λ.
-    pub(crate) fn multiply<S>(Minv: &DMatrix<S>, lambda: &[S], mu: &mut [S]) {
+    pub(crate) fn multiply<S>(Minv: &Matrix<S>, lambda: &[S], mu: &mut [S]) {
         let n = mu.len();
         for i in 0..n {
             let row = &Minv.as_slice()[i * n..(i + 1) * n]; // symmetric: a row is a column
@@ -85,13 +85,13 @@ kernel! {
     pub(crate) fn run<S>(
         coupled: &[NonzeroRows],
         first: &aba_derivatives::Workspace<S>,
-        Minv: &DMatrix<S>,
+        Minv: &Matrix<S>,
         phi: &rnea_hessian::Workspace<S>,
         d: &mut Workspace<S>,
     ) {
         let Workspace { transpose, product, dqdq, dvdq, dvdv, dtaudq, .. } = d;
         let (n, G) = (coupled.len(), phi.dadq.as_slice());
-        let product = product.as_mut_slice();
+        let product = &mut product[..];
         transpose_to(first.da_dq.as_slice(), transpose, n);
         minus_product(transpose, G, product, coupled); // −(∂q̈/∂q)ᵀ G
         let (qq, vv) = (dqdq.as_mut_slice(), dvdv.as_mut_slice());

@@ -16,12 +16,10 @@ use crate::passes::centroidal::{about, add};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
 
 /// The derivatives of a column, about the world's origin.
 #[derive(Clone, Copy, Debug)]
@@ -33,29 +31,33 @@ struct Column<S> {
     F_a: Force<S>,
 }
 
+alike!(Column { h_q, F_q, F_v, F_a });
+
 /// In the world's frame, but for what is said to be about the centre of mass.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `pass`.
-    pub IC: Vec<Inertia<S>>,
+    pub IC: Array<Inertia<S>>,
     /// hᶜ and 2Bᶜ, likewise. Shape: bodies. Written by: `pass`.
-    pub BC: Vec<Coriolis<S>>,
+    pub BC: Array<Coriolis<S>>,
     /// Fᶜ, likewise. Shape: bodies. Written by: `pass`.
-    pub F: Vec<Force<S>>,
+    pub F: Array<Force<S>>,
     /// Shape: columns. Written by: `pass`.
-    columns: Vec<Column<S>>,
+    columns: Array<Column<S>>,
     /// About the centre of mass. Shape: 6 × nv. Written by: `shift`.
-    pub dh_dq: DMatrix<S>,
-    pub drate_dq: DMatrix<S>,
-    pub drate_dv: DMatrix<S>,
-    pub drate_da: DMatrix<S>,
+    pub dh_dq: Matrix<S>,
+    pub drate_dq: Matrix<S>,
+    pub drate_dv: Matrix<S>,
+    pub drate_da: Matrix<S>,
     /// Shape: 3 × nv. Written by: `shift`.
-    pub dcom_dq: DMatrix<S>,
-    pub dvcom_dq: DMatrix<S>,
-    pub dacom_dq: DMatrix<S>,
-    pub dacom_dv: DMatrix<S>,
+    pub dcom_dq: Matrix<S>,
+    pub dvcom_dq: Matrix<S>,
+    pub dacom_dq: Matrix<S>,
+    pub dacom_dv: Matrix<S>,
 }
+
+alike!(Workspace { IC, BC, F, columns, dh_dq, drate_dq, drate_dv, drate_da, dcom_dq, dvcom_dq, dacom_dq, dacom_dv });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
@@ -64,8 +66,8 @@ impl<S: Scalar> Workspace<S> {
         Self {
             IC: filled(Inertia::zero, size.bodies),
             BC: filled(Coriolis::zero, size.bodies),
-            F: vec![o; size.bodies],
-            columns: vec![Column { h_q: o, F_q: o, F_v: o, F_a: o }; size.columns],
+            F: filled(|| o, size.bodies),
+            columns: filled(|| Column { h_q: o, F_q: o, F_v: o, F_a: o }, size.columns),
             dh_dq: six.clone(),
             drate_dq: six.clone(),
             drate_dv: six.clone(),
@@ -161,23 +163,23 @@ fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalDerivatives<'d, S> {
     /// ∂hg/∂q, 6 × nv, linear rows first.
-    pub dh_dq: &'d DMatrix<S>,
+    pub dh_dq: &'d Matrix<S>,
     /// ∂hg/∂v = Ag, 6 × nv.
-    pub dh_dv: &'d DMatrix<S>,
+    pub dh_dv: &'d Matrix<S>,
     /// ∂dhg/∂q, 6 × nv.
-    pub drate_dq: &'d DMatrix<S>,
+    pub drate_dq: &'d Matrix<S>,
     /// ∂dhg/∂v, 6 × nv.
-    pub drate_dv: &'d DMatrix<S>,
+    pub drate_dv: &'d Matrix<S>,
     /// ∂dhg/∂a = Ag, 6 × nv.
-    pub drate_da: &'d DMatrix<S>,
+    pub drate_da: &'d Matrix<S>,
     /// ∂c/∂q = ∂ċ/∂v = ∂c̈/∂a, the Jacobian of the centre of mass, 3 × nv.
-    pub dcom_dq: &'d DMatrix<S>,
+    pub dcom_dq: &'d Matrix<S>,
     /// ∂ċ/∂q, 3 × nv.
-    pub dvcom_dq: &'d DMatrix<S>,
+    pub dvcom_dq: &'d Matrix<S>,
     /// ∂c̈/∂q, 3 × nv.
-    pub dacom_dq: &'d DMatrix<S>,
+    pub dacom_dq: &'d Matrix<S>,
     /// ∂c̈/∂v, 3 × nv.
-    pub dacom_dv: &'d DMatrix<S>,
+    pub dacom_dv: &'d Matrix<S>,
 }
 
 kernel! {

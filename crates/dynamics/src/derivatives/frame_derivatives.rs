@@ -14,10 +14,9 @@
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), section IV. A
 //! derivative costs O(depth + nv); nothing allocates.
 
-use crate::passes::frames::{Accelerations, ReferenceFrame, Velocities, add, clear};
+use crate::passes::frames::{Accelerations, ReferenceFrame, Velocities, add, columns};
 use condyle_model::layout::{Layout, Single};
-use condyle_spatial::{Act, Constant, Cross, Motion, Scalar, Se3, kernel};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Motion, Scalar, Se3, kernel};
 
 kernel! {
     /// ∂v/∂q of a frame at oXf on a body.
@@ -26,9 +25,9 @@ kernel! {
         body: usize,
         oXf: &Se3<S>,
         reference: ReferenceFrame,
-        dv_dq: &mut DMatrix<S>,
+        dv_dq: &mut [S],
     ) {
-        clear("dv_dq", dv_dq, of.model.nv());
+        dv_dq.fill(S::zero());
         let (l, oXr, v) = (Single::<S, R>::new(of.model), reference.pose(*oXf), of.moving.v[body]);
         let mut i = body;
         while i > 0 {
@@ -50,8 +49,13 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such body, or `dv_dq` is not 6 × nv.
     #[inline(always)]
-    pub fn body_velocity_derivative(&self, body: usize, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
-        velocity_derivative(*self, body, &self.body(body), reference, dv_dq);
+    pub fn body_velocity_derivative(
+        &self,
+        body: usize,
+        reference: ReferenceFrame,
+        dv_dq: &mut DenseMatrix<S, impl Dense<S>>,
+    ) {
+        velocity_derivative(*self, body, &self.body(body), reference, columns("dv_dq", dv_dq, self.model.nv()));
     }
 
     /// ∂v/∂q of the six numbers v of a [frame's velocity](Self::frame_velocity), 6 × nv, linear rows first. dv_dq is
@@ -70,8 +74,19 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or `dv_dq` is not 6 × nv.
     #[inline(always)]
-    pub fn frame_velocity_derivative(&self, frame: usize, reference: ReferenceFrame, dv_dq: &mut DMatrix<S>) {
-        velocity_derivative(*self, self.model.frames()[frame].body, &self.frame(frame), reference, dv_dq);
+    pub fn frame_velocity_derivative(
+        &self,
+        frame: usize,
+        reference: ReferenceFrame,
+        dv_dq: &mut DenseMatrix<S, impl Dense<S>>,
+    ) {
+        velocity_derivative(
+            *self,
+            self.model.frames()[frame].body,
+            &self.frame(frame),
+            reference,
+            columns("dv_dq", dv_dq, self.model.nv()),
+        );
     }
 }
 
@@ -91,11 +106,11 @@ kernel! {
         oXf: &Se3<S>,
         reference: ReferenceFrame,
         velocity: Option<&Motion<S>>,
-        da_dq: &mut DMatrix<S>,
-        da_dv: &mut DMatrix<S>,
+        da_dq: &mut [S],
+        da_dv: &mut [S],
     ) {
-        clear("da_dq", da_dq, of.model.nv());
-        clear("da_dv", da_dv, of.model.nv());
+        da_dq.fill(S::zero());
+        da_dv.fill(S::zero());
         let (l, mut i) = (Single::<S, R>::new(of.model), body);
         while i > 0 {
             let parent = of.model.nodes()[i].parent;
@@ -124,10 +139,10 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         &self,
         body: usize,
         reference: ReferenceFrame,
-        da_dq: &mut DMatrix<S>,
-        da_dv: &mut DMatrix<S>,
+        da_dq: &mut DenseMatrix<S, impl Dense<S>>,
+        da_dv: &mut DenseMatrix<S, impl Dense<S>>,
     ) {
-        acceleration_derivatives(*self, body, &self.body(body), reference, None, da_dq, da_dv);
+        self.differentiate(body, &self.body(body), reference, None, da_dq, da_dv);
     }
 
     /// ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's spatial acceleration](Self::frame_acceleration), each 6 × nv,
@@ -140,11 +155,11 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         &self,
         frame: usize,
         reference: ReferenceFrame,
-        da_dq: &mut DMatrix<S>,
-        da_dv: &mut DMatrix<S>,
+        da_dq: &mut DenseMatrix<S, impl Dense<S>>,
+        da_dv: &mut DenseMatrix<S, impl Dense<S>>,
     ) {
         let body = self.model.frames()[frame].body;
-        acceleration_derivatives(*self, body, &self.frame(frame), reference, None, da_dq, da_dv);
+        self.differentiate(body, &self.frame(frame), reference, None, da_dq, da_dv);
     }
 
     /// ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's classical acceleration](Self::frame_classical_acceleration),
@@ -171,11 +186,27 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         &self,
         frame: usize,
         reference: ReferenceFrame,
-        da_dq: &mut DMatrix<S>,
-        da_dv: &mut DMatrix<S>,
+        da_dq: &mut DenseMatrix<S, impl Dense<S>>,
+        da_dv: &mut DenseMatrix<S, impl Dense<S>>,
     ) {
         let (body, v) = (self.model.frames()[frame].body, self.frame_velocity(frame, reference));
-        acceleration_derivatives(*self, body, &self.frame(frame), reference, Some(&v), da_dq, da_dv);
+        self.differentiate(body, &self.frame(frame), reference, Some(&v), da_dq, da_dv);
+    }
+
+    /// ∂a/∂q and ∂a/∂v of a frame at oXf on a body, as for [`acceleration_derivatives`].
+    #[inline(always)]
+    fn differentiate(
+        &self,
+        body: usize,
+        oXf: &Se3<S>,
+        reference: ReferenceFrame,
+        velocity: Option<&Motion<S>>,
+        da_dq: &mut DenseMatrix<S, impl Dense<S>>,
+        da_dv: &mut DenseMatrix<S, impl Dense<S>>,
+    ) {
+        let nv = self.model.nv();
+        let (da_dq, da_dv) = (columns("da_dq", da_dq, nv), columns("da_dv", da_dv, nv));
+        acceleration_derivatives(*self, body, oXf, reference, velocity, da_dq, da_dv);
     }
 
     /// The derivatives of a body's motion by the coordinate of column c, whose joint sits on `parent`.

@@ -33,34 +33,34 @@ use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Motion, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, Vec3, alike};
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// w, the velocity at λ. Shape: bodies. Written by: `pass`.
-    pub w: Vec<Motion<S>>,
+    pub w: Array<Motion<S>>,
     /// W = w_λ × S. Shape: columns. Written by: `pass`.
-    pub W: Vec<Motion<S>>,
+    pub W: Array<Motion<S>>,
     /// P and D. Shape: bodies. Written by: `pass`.
-    pub PD: Vec<Coriolis<S>>,
+    pub PD: Array<Coriolis<S>>,
     /// Q, of which only the angular part is not zero. Shape: bodies. Written by: `pass`.
-    pub Q: Vec<Vec3<S>>,
+    pub Q: Array<Vec3<S>>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub dqdq: DMatrix<S>,
+    pub dqdq: Matrix<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub dvdq: DMatrix<S>,
+    pub dvdq: Matrix<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub dvdv: DMatrix<S>,
+    pub dvdv: Matrix<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub dadq: DMatrix<S>,
+    pub dadq: Matrix<S>,
 }
+
+alike!(Workspace { w, W, PD, Q, dqdq, dvdq, dvdv, dadq });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

@@ -10,7 +10,7 @@ use crate::selection::solve_by_tree;
 use crate::workspace::filled;
 use alloc::vec::Vec;
 use condyle_model::tree::Column;
-use condyle_spatial::Scalar;
+use condyle_spatial::{Array, Scalar, alike};
 
 /// The number of columns of B that go together.
 const SIDE: usize = 16;
@@ -38,12 +38,14 @@ pub(crate) struct Workspace<S> {
     /// Empty where this is not the way to take. Written by: `new`.
     paths: Vec<Path>,
     /// Efforts, then accelerations. Shape: columns × `SIDE`. Written by: `minus_solve`.
-    pub x: Vec<S>,
+    pub x: Array<S>,
     /// Bias forces. Shape: places × 6 × `SIDE`. Written by: `minus_solve`.
-    pub P: Vec<S>,
+    pub P: Array<S>,
     /// Accelerations. Shape: places × 6 × `SIDE`. Written by: `minus_solve`.
-    pub A: Vec<S>,
+    pub A: Array<S>,
 }
+
+alike!(Workspace { x, P, A } same { paths });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(columns: &[Column], nv: usize) -> Self {

@@ -7,35 +7,36 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, ArticulatedInertia, Cross, Force, Motion, Scalar, Vec3};
+use condyle_spatial::{Act, Array, ArticulatedInertia, Cross, Force, Motion, Scalar, Vec3, alike};
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Articulated inertia. Shape: levels. Written by: `factorize`, `inward`.
-    pub IA: Vec<ArticulatedInertia<S>>,
+    pub IA: Array<ArticulatedInertia<S>>,
     /// U = Iᴬ S of each column. Shape: columns. Written by: `factorize`, `inward`.
-    pub U: Vec<Force<S>>,
+    pub U: Array<Force<S>>,
     /// 1/D, D = Sᵀ U + armature. Shape: columns. Written by: `factorize`, `inward`.
-    pub D_inv: Vec<S>,
+    pub D_inv: Array<S>,
     /// Velocity; the world's stays 0. Shape: levels. Written by: `inward`.
-    pub v: Vec<Motion<S>>,
+    pub v: Array<Motion<S>>,
     /// Acceleration, with gravity as the world's. Shape: levels. Written by: `outward`.
-    pub a: Vec<Motion<S>>,
+    pub a: Array<Motion<S>>,
     /// v × v_J. Shape: bodies. Written by: `inward`.
-    pub c: Vec<Motion<S>>,
+    pub c: Array<Motion<S>>,
     /// Articulated bias force. Shape: levels. Written by: `inward`.
-    pub pA: Vec<Force<S>>,
+    pub pA: Array<Force<S>>,
     /// τ − Sᵀ pᴬ. Shape: columns. Written by: `inward`.
-    pub u: Vec<S>,
+    pub u: Array<S>,
     /// Joint accelerations. Shape: nv. Written by: `outward`.
-    pub qdd: Vec<S>,
+    pub qdd: Array<S>,
 }
+
+alike!(Workspace { IA, U, D_inv, v, a, c, pA, u, qdd });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

@@ -10,30 +10,31 @@ use crate::passes::energy::rotors;
 use crate::passes::frames::{ReferenceFrame, Velocities, classical};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
+use condyle_spatial::gate::{Fused, Rename};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
 
 /// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Acceleration for q̈ = 0, with gravity as the world's. Shape: bodies. Written by: `pass`.
-    pub a: Vec<Motion<S>>,
+    pub a: Array<Motion<S>>,
     /// Force through the joint for q̈ = 0. Shape: bodies. Written by: `pass`.
-    pub f: Vec<Force<S>>,
+    pub f: Array<Force<S>>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub M: DMatrix<S>,
+    pub M: Matrix<S>,
     /// Shape: nv. Written by: `pass`.
-    pub h: Vec<S>,
+    pub h: Array<S>,
     /// Twice that of the bodies, then the kinetic energy. Written by: `pass`, then by `run`.
     pub kinetic_energy: S,
     /// Written by: `run`.
     pub potential_energy: S,
 }
+
+alike!(Workspace { a, f, M, h, kinetic_energy, potential_energy });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
@@ -102,12 +103,11 @@ fn pass<L: Pairs>(
 
 /// The results of [`compute_all_terms`](crate::compute_all_terms()).
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
 pub struct AllTerms<'d, S, R = f64> {
     /// Placements and velocities of bodies and frames, and their Jacobians J and dJ/dt, on demand.
     pub kinematics: Velocities<'d, S, R>,
     /// M(q), the full symmetric nv × nv matrix, as of [`crba`](crate::crba).
-    pub M: &'d DMatrix<S>,
+    pub M: &'d Matrix<S>,
     /// h(q, v), nv numbers (N m, N), as of [`nonlinear_effects`](crate::nonlinear_effects).
     pub h: &'d [S],
     /// Momentum, its map and the map's rate, centre of mass and its Jacobian, as of
@@ -119,6 +119,21 @@ pub struct AllTerms<'d, S, R = f64> {
     pub potential_energy: S,
     /// Accelerations of the bodies for q̈ = 0, with gravity as the world's.
     pub(crate) a: &'d [Motion<S>],
+}
+
+impl<'d> Rename<AllTerms<'d, Fused>> for AllTerms<'d, f64> {
+    #[inline(always)]
+    fn renamed(self) -> AllTerms<'d, Fused> {
+        AllTerms {
+            kinematics: self.kinematics.renamed(),
+            M: self.M.renamed(),
+            h: self.h.renamed(),
+            centroidal: self.centroidal.renamed(),
+            kinetic_energy: self.kinetic_energy.renamed(),
+            potential_energy: self.potential_energy.renamed(),
+            a: self.a.renamed(),
+        }
+    }
 }
 
 answers! {

@@ -11,34 +11,35 @@ use crate::passes::coriolis::Coriolis;
 use crate::passes::frames::{Accelerations, Velocities};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
+use condyle_spatial::gate::{Fused, Rename};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Inertia, Scalar, Se3, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Scalar, Se3, Vec3, alike};
 
 /// In the world's frame, but for what is said to be about the centre of mass.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `map`, `map_rate`, all terms.
-    pub IC: Vec<Inertia<S>>,
+    pub IC: Array<Inertia<S>>,
     /// Iᶜ v and İᶜ, likewise. Shape: bodies. Written by: `map_rate`, all terms.
-    pub BC: Vec<Coriolis<S>>,
+    pub BC: Array<Coriolis<S>>,
     /// Iᶜ S. Shape: columns. Written by: `map`, `map_rate`, all terms.
-    pub F: Vec<Force<S>>,
+    pub F: Array<Force<S>>,
     /// İᶜ S + Iᶜ Ṡ. Shape: columns. Written by: `map_rate`, all terms.
-    pub dF: Vec<Force<S>>,
+    pub dF: Array<Force<S>>,
     /// About the centre of mass. Shape: 6 × nv. Written by: `shift_map`.
-    pub Ag: DMatrix<S>,
+    pub Ag: Matrix<S>,
     /// About the centre of mass. Shape: 6 × nv. Written by: `shift_rate`.
-    pub dAg: DMatrix<S>,
+    pub dAg: Matrix<S>,
     /// Shape: 3 × nv. Written by: `shift_map`.
-    pub Jcom: DMatrix<S>,
+    pub Jcom: Matrix<S>,
     /// Written by: `shift_map`, `shift_rate`.
     pub whole: Whole<S>,
 }
+
+alike!(Workspace { IC, BC, F, dF, Ag, dAg, Jcom, whole });
 
 /// The robot as if it were one body: of which its rate has the last two alone.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +50,8 @@ pub(crate) struct Whole<S> {
     pub hg: Force<S>,
     pub com_velocity: Vec3<S>,
 }
+
+alike!(Whole { Ig, com, hg, com_velocity });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {
@@ -119,7 +122,7 @@ fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S
 
 /// Adds a column to the coordinate that it follows.
 #[inline(always)]
-pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut DMatrix<S>, c: usize, f: Force<S>) {
+pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut Matrix<S>, c: usize, f: Force<S>) {
     let column = &model.columns()[c];
     let (f, at) = (f.scale(S::splat(column.ratio)).to_array(), 6 * column.coordinate);
     for (entry, &f) in matrix.as_mut_slice()[at..at + 6].iter_mut().zip(&f) {
@@ -174,23 +177,22 @@ pub(crate) fn shift_rate<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalMap<'d, S> {
     /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
-    pub Ag: &'d DMatrix<S>,
+    pub Ag: &'d Matrix<S>,
     /// The inertia of all moving bodies about their centre of mass, as if they were one.
     pub Ig: Inertia<S>,
     /// c, the centre of mass in the world's frame (m).
     pub com: Vec3<S>,
     /// The Jacobian of c, 3 × nv: ċ = Jcom v.
-    pub Jcom: &'d DMatrix<S>,
+    pub Jcom: &'d Matrix<S>,
 }
 
 /// hg = Ag(q) v, and what its rate dhg = Ag a + dAg v depends on. The axes are the world's.
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
 pub struct CentroidalMapRate<'d, S> {
     /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
-    pub Ag: &'d DMatrix<S>,
+    pub Ag: &'d Matrix<S>,
     /// dAg/dt, 6 × nv, along the velocity v.
-    pub dAg: &'d DMatrix<S>,
+    pub dAg: &'d Matrix<S>,
     /// The momentum about the centre of mass (kg m/s, kg m²/s).
     pub hg: Force<S>,
     /// The inertia of all moving bodies about their centre of mass, as if they were one.
@@ -200,7 +202,22 @@ pub struct CentroidalMapRate<'d, S> {
     /// ċ, its velocity (m/s).
     pub com_velocity: Vec3<S>,
     /// The Jacobian of c, 3 × nv: ċ = Jcom v.
-    pub Jcom: &'d DMatrix<S>,
+    pub Jcom: &'d Matrix<S>,
+}
+
+impl<'d> Rename<CentroidalMapRate<'d, Fused>> for CentroidalMapRate<'d, f64> {
+    #[inline(always)]
+    fn renamed(self) -> CentroidalMapRate<'d, Fused> {
+        CentroidalMapRate {
+            Ag: self.Ag.renamed(),
+            dAg: self.dAg.renamed(),
+            hg: self.hg.renamed(),
+            Ig: self.Ig.renamed(),
+            com: self.com.renamed(),
+            com_velocity: self.com_velocity.renamed(),
+            Jcom: self.Jcom.renamed(),
+        }
+    }
 }
 
 kernel! {

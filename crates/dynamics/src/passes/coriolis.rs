@@ -13,12 +13,10 @@
 
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Force, Inertia, Motion, Scalar, Sym3, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Force, Inertia, Matrix, Motion, Scalar, Sym3, Vec3, alike};
 
 /// The matrix 2B of a body or of all that a joint carries.
 #[derive(Clone, Copy, Debug)]
@@ -29,6 +27,8 @@ pub(crate) struct Coriolis<S> {
     /// Σ = dĪ/dt.
     pub rate: Sym3<S>,
 }
+
+alike!(Coriolis { momentum, rate });
 
 impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
     #[inline(always)]
@@ -85,12 +85,14 @@ impl<S: Scalar> Coriolis<S> {
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Iᶜ. Shape: bodies. Written by: `pass`.
-    pub IC: Vec<Inertia<S>>,
+    pub IC: Array<Inertia<S>>,
     /// 2Bᶜ. Shape: bodies. Written by: `pass`.
-    pub BC: Vec<Coriolis<S>>,
+    pub BC: Array<Coriolis<S>>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub C: DMatrix<S>,
+    pub C: Matrix<S>,
 }
+
+alike!(Workspace { IC, BC, C });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

@@ -5,21 +5,21 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Inertia, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Inertia, Matrix, Scalar, alike};
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Inertia of the body and all that it carries, in the world's frame. Shape: bodies. Written by: `pass`.
-    pub IC: Vec<Inertia<S>>,
+    pub IC: Array<Inertia<S>>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub M: DMatrix<S>,
+    pub M: Matrix<S>,
 }
+
+alike!(Workspace { IC, M });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

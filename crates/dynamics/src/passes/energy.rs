@@ -4,11 +4,10 @@ use crate::passes::answers::{Number, answers};
 use crate::passes::frames::{Placements, Velocities};
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Constant, Cross, Force, Inertia, Motion, Scalar};
+use condyle_spatial::{Act, Array, Constant, Cross, Force, Inertia, Motion, Scalar, alike};
 
 answers! {
     /// V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), 0 at the world's
@@ -67,16 +66,18 @@ pub(crate) fn rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]) -> S
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Inertia of all that a joint carries. Shape: bodies. Written by: `derivatives`.
-    pub IC: Vec<Inertia<S>>,
+    pub IC: Array<Inertia<S>>,
     /// Momentum of all that a joint carries. Shape: bodies. Written by: `derivatives`.
-    pub h: Vec<Force<S>>,
+    pub h: Array<Force<S>>,
     /// Shape: nv. Written by: `derivatives`.
-    pub dT_dq: Vec<S>,
+    pub dT_dq: Array<S>,
     /// Shape: nv. Written by: `derivatives`.
-    pub dT_dv: Vec<S>,
+    pub dT_dv: Array<S>,
     /// Shape: nv. Written by: `derivatives`.
-    pub dV_dq: Vec<S>,
+    pub dV_dq: Array<S>,
 }
+
+alike!(Workspace { IC, h, dT_dq, dT_dv, dV_dq });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

@@ -1,13 +1,11 @@
 //! Forward dynamics by the method that is fastest for the model.
 
 use crate::workspace::filled;
-use alloc::vec::Vec;
 use condyle_linalg::Cholesky;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
-use condyle_spatial::Scalar;
 use condyle_spatial::kernel;
-use nalgebra::DMatrix;
+use condyle_spatial::{Array, Matrix, Scalar, alike};
 
 /// A way to compute forward dynamics. All give the same numbers, up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,10 +26,12 @@ pub(crate) struct Workspace<S> {
     /// A factor of M. Written by: `forward_dynamics`.
     pub dense: Cholesky<S>,
     /// τ − h, then joint accelerations. Shape: nv. Written by: `forward_dynamics`.
-    pub qdd: Vec<S>,
+    pub qdd: Array<S>,
     /// Zeros. Shape: nv. Written by: nobody.
-    pub zero: Vec<S>,
+    pub zero: Array<S>,
 }
+
+alike!(Workspace { sparse, dense, qdd, zero });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(model: &Model<R>) -> Self {
@@ -53,7 +53,7 @@ fn subtract<S: Scalar>(tau: &[S], h: &[S], out: &mut [S]) {
 }
 
 kernel! {
-    pub(crate) fn run_dense<S>(d: &mut Workspace<S>, h: &[S], M: &DMatrix<S>, tau: &[S]) {
+    pub(crate) fn run_dense<S>(d: &mut Workspace<S>, h: &[S], M: &Matrix<S>, tau: &[S]) {
         let Workspace { dense, qdd, .. } = d;
         subtract(tau, h, qdd);
         dense.factorize(M);
@@ -62,7 +62,7 @@ kernel! {
 }
 
 kernel! {
-    pub(crate) fn run_sparse<S>(d: &mut Workspace<S>, h: &[S], M: &DMatrix<S>, tau: &[S]) {
+    pub(crate) fn run_sparse<S>(d: &mut Workspace<S>, h: &[S], M: &Matrix<S>, tau: &[S]) {
         let Workspace { sparse, qdd, .. } = d;
         subtract(tau, h, qdd);
         sparse.factorize(M);

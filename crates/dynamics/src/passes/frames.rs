@@ -13,9 +13,9 @@ use crate::passes::answers::answers;
 use crate::passes::kinematics::{Moving, World};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
-use condyle_spatial::{Act, Constant, Cross, Mat3, Motion, Scalar, Se3, Vec3, kernel};
+use condyle_spatial::gate::{Fused, Rename};
+use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Motion, Scalar, Se3, Vec3, alike, kernel};
 use core::ops::Deref;
-use nalgebra::DMatrix;
 
 /// The frame in which what is asked about a frame (or a body, whose frame is then meant) is expressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +29,8 @@ pub enum ReferenceFrame {
     /// The motion of the frame's origin, along the axes of the world.
     LocalWorldAligned,
 }
+
+alike!(ReferenceFrame);
 
 impl ReferenceFrame {
     /// oXr: its pose, for a frame at oXf.
@@ -54,7 +56,6 @@ impl ReferenceFrame {
 
 /// The placements of a robot at one position, as [`forward_kinematics`](crate::forward_kinematics) left them.
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
 pub struct Placements<'d, S, R = f64> {
     pub(crate) model: &'d Model<R>,
     pub(crate) world: &'d World<S>,
@@ -63,7 +64,6 @@ pub struct Placements<'d, S, R = f64> {
 /// The placements and velocities of a robot, as [`forward_velocities`](crate::forward_velocities) left them. It is a
 /// [`Placements`] too.
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
 pub struct Velocities<'d, S, R = f64> {
     pub(crate) placements: Placements<'d, S, R>,
     pub(crate) moving: &'d Moving<S>,
@@ -73,9 +73,29 @@ pub struct Velocities<'d, S, R = f64> {
 /// them. It is a
 /// [`Velocities`] and a [`Placements`] too.
 #[derive(Clone, Copy, Debug)]
-#[repr(C)]
 pub struct Accelerations<'d, S, R = f64> {
     pub(crate) velocities: Velocities<'d, S, R>,
+}
+
+impl<'d> Rename<Placements<'d, Fused>> for Placements<'d, f64> {
+    #[inline(always)]
+    fn renamed(self) -> Placements<'d, Fused> {
+        Placements { model: self.model, world: self.world.renamed() }
+    }
+}
+
+impl<'d> Rename<Velocities<'d, Fused>> for Velocities<'d, f64> {
+    #[inline(always)]
+    fn renamed(self) -> Velocities<'d, Fused> {
+        Velocities { placements: self.placements.renamed(), moving: self.moving.renamed() }
+    }
+}
+
+impl<'d> Rename<Accelerations<'d, Fused>> for Accelerations<'d, f64> {
+    #[inline(always)]
+    fn renamed(self) -> Accelerations<'d, Fused> {
+        Accelerations { velocities: self.velocities.renamed() }
+    }
 }
 
 impl<'d, S, R> Deref for Velocities<'d, S, R> {
@@ -96,19 +116,20 @@ impl<'d, S, R> Deref for Accelerations<'d, S, R> {
 
 /// Adds a column of a Jacobian to the coordinate that it follows.
 #[inline(always)]
-pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut DMatrix<S>, c: usize, s: Motion<S>) {
+pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut [S], c: usize, s: Motion<S>) {
     let column = &model.columns()[c];
     let s = s.scale(S::splat(column.ratio)).to_array();
-    for (row, &s) in s.iter().enumerate() {
-        J[(row, column.coordinate)] += s;
+    let J = &mut J[6 * column.coordinate..][..6];
+    for (J, &s) in J.iter_mut().zip(&s) {
+        *J += s;
     }
 }
 
-/// Fills a Jacobian with zeros, if it is 6 × nv.
-#[inline(always)]
-pub(crate) fn clear<S: Scalar>(name: &str, J: &mut DMatrix<S>, nv: usize) {
+/// The columns of a Jacobian, if it is 6 × nv.
+#[inline]
+pub(crate) fn columns<'a, S>(name: &str, J: &'a mut DenseMatrix<S, impl Dense<S>>, nv: usize) -> &'a mut [S] {
     assert!(J.shape() == (6, nv), "{name}: expected 6 × {nv}, found {:?}", J.shape());
-    J.as_mut_slice().fill(S::zero());
+    J.as_mut_slice()
 }
 
 /// The classical acceleration of the point at a frame's origin: v̇ + ω × v, of its spatial acceleration and velocity.
@@ -199,9 +220,9 @@ kernel! {
         body: usize,
         oXf: &Se3<S>,
         reference: ReferenceFrame,
-        J: &mut DMatrix<S>,
+        J: &mut [S],
     ) {
-        clear("J", J, of.model.nv());
+        J.fill(S::zero());
         let oXr = reference.pose(*oXf);
         for &c in Single::<S, R>::new(of.model).support(body) {
             add(of.model, J, c, oXr.act_inv(of.world.S[c])); // J = oXr⁻¹ S
@@ -216,9 +237,9 @@ kernel! {
         body: usize,
         oXf: &Se3<S>,
         reference: ReferenceFrame,
-        dJ: &mut DMatrix<S>,
+        dJ: &mut [S],
     ) {
-        clear("dJ", dJ, of.model.nv());
+        dJ.fill(S::zero());
         let (oXr, v_r) = (reference.pose(*oXf), reference.velocity(*oXf, of.moving.v[body]));
         for &c in Single::<S, R>::new(of.model).support(body) {
             let s = of.moving.dS[c] - v_r.cross(of.world.S[c]);
@@ -233,8 +254,8 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// # Panics
     /// If there is no such body, or `J` is not 6 × nv.
     #[inline(always)]
-    pub fn body_jacobian(&self, body: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
-        jacobian(*self, body, &self.body(body), reference, J);
+    pub fn body_jacobian(&self, body: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
+        jacobian(*self, body, &self.body(body), reference, columns("J", J, self.model.nv()));
     }
 
     /// The Jacobian J of a frame, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
@@ -242,8 +263,14 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or `J` is not 6 × nv.
     #[inline(always)]
-    pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DMatrix<S>) {
-        jacobian(*self, self.model.frames()[frame].body, &self.frame(frame), reference, J);
+    pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
+        jacobian(
+            *self,
+            self.model.frames()[frame].body,
+            &self.frame(frame),
+            reference,
+            columns("J", J, self.model.nv()),
+        );
     }
 }
 
@@ -254,8 +281,8 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such body, or `dJ` is not 6 × nv.
     #[inline(always)]
-    pub fn body_jacobian_rate(&self, body: usize, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
-        jacobian_rate(*self, body, &self.body(body), reference, dJ);
+    pub fn body_jacobian_rate(&self, body: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {
+        jacobian_rate(*self, body, &self.body(body), reference, columns("dJ", dJ, self.model.nv()));
     }
 
     /// The rate dJ/dt of a frame's Jacobian, 6 × nv, linear rows first. dJ is overwritten.
@@ -280,7 +307,13 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or `dJ` is not 6 × nv.
     #[inline(always)]
-    pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DMatrix<S>) {
-        jacobian_rate(*self, self.model.frames()[frame].body, &self.frame(frame), reference, dJ);
+    pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {
+        jacobian_rate(
+            *self,
+            self.model.frames()[frame].body,
+            &self.frame(frame),
+            reference,
+            columns("dJ", dJ, self.model.nv()),
+        );
     }
 }

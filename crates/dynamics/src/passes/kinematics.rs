@@ -2,13 +2,12 @@
 //! be asked is in `frames.rs`.
 
 use crate::workspace::{Size, filled};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Cross, Motion, Scalar, Se3};
+use condyle_spatial::{Array, Cross, Motion, Scalar, Se3, alike};
 
 /// The quantities that depend on the position alone, in the world's frame.
 #[derive(Clone, Debug)]
@@ -17,12 +16,14 @@ pub(crate) struct World<S> {
     /// Written by: `place`, and by `rnea`.
     pub sin_cos: JointSinCos<S>,
     /// oXi: the body's turned frame in the world. Shape: bodies. Written by: `place`.
-    pub oX: Vec<Se3<S>>,
+    pub oX: Array<Se3<S>>,
     /// S: what each degree of freedom moves the body by. Shape: columns. Written by: `place`.
-    pub S: Vec<Motion<S>>,
+    pub S: Array<Motion<S>>,
     /// The place of the last call's placements. Written by: `place`, by `rnea`, and by limbs.
     pub placed: PlacementCache,
 }
+
+alike!(World { sin_cos, oX, S } same { placed });
 
 /// The place of the bodies' placements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,14 +67,16 @@ pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut Wor
 #[repr(C)]
 pub(crate) struct Moving<S> {
     /// Velocity of the body; the world's stays 0. Shape: bodies. Written by: `advance`.
-    pub v: Vec<Motion<S>>,
+    pub v: Array<Motion<S>>,
     /// Ṡ = v × S: how fast each column of S turns with its body. Shape: columns. Written by: `advance`.
-    pub dS: Vec<Motion<S>>,
+    pub dS: Array<Motion<S>>,
     /// The velocity coordinates. Shape: nv. Written by: `advance`.
-    pub qd: Vec<S>,
+    pub qd: Array<S>,
     /// Spatial acceleration of the body, without gravity; the world's stays 0. Shape: bodies. Written by: `accelerate`.
-    pub a: Vec<Motion<S>>,
+    pub a: Array<Motion<S>>,
 }
+
+alike!(Moving { v, dS, qd, a });
 
 impl<S: Scalar> Moving<S> {
     pub(crate) fn new(size: Size) -> Self {

@@ -10,26 +10,24 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::gauss_jordan::gauss_jordan;
 use condyle_model::Model;
 use condyle_model::tree::Column;
-use condyle_spatial::Scalar;
 use condyle_spatial::kernel;
-use nalgebra::DMatrix;
+use condyle_spatial::{Array, Matrix, Scalar, alike};
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Bias force for each unit effort, one row for each of its six numbers. Shape: 6 × columns. Written by: `sweep`.
-    pub P: Vec<S>,
+    pub P: Array<S>,
     /// Acceleration for each unit effort: of the world, zero, then at each depth of the tree. Shape: (1 + depth) × 6 ×
     /// columns. Written by: `sweep`.
-    pub A: Vec<S>,
+    pub A: Array<S>,
     /// Shape: nv × nv. Written by: `minv`.
-    pub Minv: DMatrix<S>,
+    pub Minv: Matrix<S>,
     /// A factor of M. Written by: `from_matrix`.
     pub factor: Ltdl<S>,
     /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
@@ -37,6 +35,8 @@ pub(crate) struct Workspace<S> {
     /// Whether M is inverted without a factor. Written by: `new`.
     pub by_gauss_jordan: bool,
 }
+
+alike!(Workspace { P, A, Minv, factor } same { by_factor, by_gauss_jordan });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
@@ -105,7 +105,7 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
 
 kernel! {
     /// M⁻¹ from M.
-    pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &DMatrix<S>) {
+    pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &Matrix<S>) {
         if d.by_gauss_jordan {
             return gauss_jordan::<S, SHORT_CHAIN>(M, &mut d.Minv);
         }

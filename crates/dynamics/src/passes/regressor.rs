@@ -14,12 +14,10 @@
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Motion, Scalar};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, alike};
 
 /// The number of numbers that describe the inertia of a body.
 pub(crate) const PARAMETERS: usize = 10;
@@ -28,12 +26,14 @@ pub(crate) const PARAMETERS: usize = 10;
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Y. Shape: nv × 10 (bodies − 1). Written by: `joint_torque_regressor`.
-    pub torque: DMatrix<S>,
+    pub torque: Matrix<S>,
     /// Shape: 10 (bodies − 1). Written by: `kinetic_energy_regressor`.
-    pub kinetic: Vec<S>,
+    pub kinetic: Array<S>,
     /// Shape: 10 (bodies − 1). Written by: `potential_energy_regressor`.
-    pub potential: Vec<S>,
+    pub potential: Array<S>,
 }
+
+alike!(Workspace { torque, kinetic, potential });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

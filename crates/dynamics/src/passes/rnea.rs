@@ -20,32 +20,33 @@
 
 use crate::passes::kinematics::{PlacementCache, World};
 use crate::workspace::{Size, filled};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint};
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Force, Inertia, Mat3, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Array, Force, Inertia, Mat3, Scalar, Se3, Vec3, alike};
 
 /// Scratch in the bodies' turned frames.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// λXi. Shape: levels. Written by: `pass`.
-    pub X: Vec<Se3<S>>,
+    pub X: Array<Se3<S>>,
     /// The rotation of the body and the acceleration of its origin, with gravity as the world's. Shape: levels. Written by:
     /// `pass`.
-    pub motion: Vec<ClassicalMotion<S>>,
+    pub motion: Array<ClassicalMotion<S>>,
     /// K; the world's stays 0. Shape: levels. Written by: `pass`.
-    pub K: Vec<Mat3<S>>,
+    pub K: Array<Mat3<S>>,
     /// Force through the joint. Shape: levels. Written by: `pass`.
-    pub f: Vec<Force<S>>,
+    pub f: Array<Force<S>>,
     /// Joint efforts. Shape: nv. Written by: `pass`.
-    pub tau: Vec<S>,
+    pub tau: Array<S>,
     /// Zeros, for the accelerations and velocities that are not given. Shape: nv. Written by: nobody.
-    pub zero: Vec<S>,
+    pub zero: Array<S>,
 }
+
+alike!(Workspace { X, motion, K, f, tau, zero });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

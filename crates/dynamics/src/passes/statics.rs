@@ -10,26 +10,26 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
 
 /// In the world's frame.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
     /// Weight and external force of all that a joint carries. Shape: bodies. Written by: `pass`.
-    pub F: Vec<Force<S>>,
+    pub F: Array<Force<S>>,
     /// Joint efforts. Shape: nv. Written by: `pass`.
-    pub tau: Vec<S>,
+    pub tau: Array<S>,
     /// Inertia of all that a joint carries. Shape: bodies. Written by: `derivative`.
-    pub IC: Vec<Inertia<S>>,
+    pub IC: Array<Inertia<S>>,
     /// Shape: nv × nv. Written by: `derivative`.
-    pub dtau_dq: DMatrix<S>,
+    pub dtau_dq: Matrix<S>,
 }
+
+alike!(Workspace { F, tau, IC, dtau_dq });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

@@ -3,17 +3,16 @@
 use super::{Input, Status, acceleration};
 use crate::data::Data;
 use crate::workspace::filled;
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::integrate;
-use condyle_spatial::{Constant, Scalar};
+use condyle_spatial::{Array, Constant, Scalar};
 
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
     /// Efforts, the passive ones included. Shape: nv. Written by: `step`.
-    effort: Vec<S>,
+    effort: Array<S>,
     /// h v'. Shape: nv. Written by: `step`.
-    way: Vec<S>,
+    way: Array<S>,
 }
 
 impl<S: Scalar> Workspace<S> {

@@ -19,36 +19,35 @@
 
 use crate::passes::kinematics::World;
 use crate::workspace::filled;
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::Pairs;
-use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
 /// In the world's frame; matrices by columns.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
     /// Velocity. Shape: bodies. Written by: `pass`.
-    v: Vec<Motion<S>>,
+    v: Array<Motion<S>>,
     /// Iᶜ. Shape: bodies. Written by: `pass`.
-    IC: Vec<Inertia<S>>,
+    IC: Array<Inertia<S>>,
     /// hᶜ. Shape: bodies. Written by: `pass`.
-    hC: Vec<Force<S>>,
+    hC: Array<Force<S>>,
     /// Fᶜ. Shape: bodies. Written by: `pass`.
-    FC: Vec<Force<S>>,
+    FC: Array<Force<S>>,
     /// Ψ̇. Shape: columns. Written by: `pass`.
-    Psid: Vec<Motion<S>>,
+    Psid: Array<Motion<S>>,
     /// Ψ̈. Shape: columns. Written by: `pass`.
-    Psidd: Vec<Motion<S>>,
+    Psidd: Array<Motion<S>>,
     /// p = M v. Shape: nv. Written by: `pass`.
-    pub(super) p: Vec<S>,
+    pub(super) p: Array<S>,
     /// ∂L/∂q. Shape: nv. Written by: `pass`.
-    pub(super) L_q: Vec<S>,
+    pub(super) L_q: Array<S>,
     /// M = ∂p/∂v. Shape: nv × nv. Written by: `pass`.
-    pub(super) M: Vec<S>,
+    pub(super) M: Array<S>,
     /// ∂p/∂q, and its transpose ∂²L/∂q∂v. Shape: nv × nv. Written by: `pass`.
-    pub(super) p_q: Vec<S>,
+    pub(super) p_q: Array<S>,
     /// ∂²L/∂q∂q, row by row how ∂L/∂q changes. Shape: nv × nv. Written by: `pass`.
-    pub(super) L_qq: Vec<S>,
+    pub(super) L_qq: Array<S>,
 }
 
 impl<S: Scalar> Workspace<S> {

@@ -12,25 +12,24 @@
 use super::{Input, Status, acceleration, tangent};
 use crate::data::Data;
 use crate::workspace::filled;
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_model::joint::GroupJacobian;
-use condyle_spatial::{Constant, Scalar};
+use condyle_spatial::{Array, Constant, Scalar};
 
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
     /// Efforts, the passive ones included. Shape: nv. Written by: `step`.
-    effort: Vec<S>,
+    effort: Array<S>,
     /// The state of a stage: ξ, v. Shape: nv. Written by: `step`.
-    xi: Vec<S>,
-    v: Vec<S>,
+    xi: Array<S>,
+    v: Array<S>,
     /// Its rates. Shape: nv. Written by: `step`.
-    dxi: Vec<S>,
-    dv: Vec<S>,
+    dxi: Array<S>,
+    dv: Array<S>,
     /// The weighted sums of the rates. Shape: nv. Written by: `step`.
-    sum_xi: Vec<S>,
-    sum_v: Vec<S>,
+    sum_xi: Array<S>,
+    sum_v: Array<S>,
 }
 
 impl<S: Scalar> Workspace<S> {

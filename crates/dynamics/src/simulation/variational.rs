@@ -26,37 +26,36 @@ use crate::data::Data;
 use crate::passes::kinematics::place;
 use crate::passes::passive::{passive_torque, passive_torque_derivative};
 use crate::workspace::filled;
-use alloc::vec::Vec;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_model::joint::GroupJacobian::{Exp, Transport};
 use condyle_model::layout::Single;
-use condyle_spatial::{Constant, Scalar};
+use condyle_spatial::{Array, Constant, Scalar};
 
 /// Shape, where none is given: nv. Written by: `step`, where nothing else is said.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace<S> {
     /// p, the momentum before the step.
-    p: Vec<S>,
+    p: Array<S>,
     /// w, the velocity during the step.
-    w: Vec<S>,
+    w: Array<S>,
     /// −h w, h w/2 and −h w/2. Written by: `set_ways`.
-    minus_y: Vec<S>,
-    x: Vec<S>,
-    minus_x: Vec<S>,
+    minus_y: Array<S>,
+    x: Array<S>,
+    minus_x: Array<S>,
     /// f = ∂L/∂q + τ. Written by: `evaluate`.
-    f: Vec<S>,
+    f: Array<S>,
     /// The passive efforts of the joints, and their slope. Written by: `evaluate`.
-    passive: Vec<S>,
-    passive_slope: Vec<S>,
+    passive: Array<S>,
+    passive_slope: Array<S>,
     /// J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
-    carried: Vec<S>,
-    pushed: Vec<S>,
+    carried: Array<S>,
+    pushed: Array<S>,
     /// The residual of the equation, then Newton's step.
-    residual: Vec<S>,
+    residual: Array<S>,
     /// The slope of the equation, and its factor. Shape: nv × nv. Written by: `slope`.
-    slope: Vec<S>,
+    slope: Array<S>,
     /// Momenta, slopes of L and their derivatives at the midpoint. Written by: `evaluate`.
     lagrangian: lagrangian::Workspace<S>,
     /// The factor of M after the step.
@@ -281,7 +280,7 @@ mod tests {
         let (mut data, mut d) = (Data::new(&model), Workspace::new(&model));
         let f_ext = vec![force; model.bodies().len()];
         let mut q_m = q.clone();
-        (d.p, d.w) = (p.clone(), w.clone());
+        (d.p, d.w) = (p.clone().into(), w.clone().into());
         d.set_ways(H);
         integrate(&model, &q, &d.x, &mut q_m);
         evaluate(&model, &mut data, &mut d, Input { h: H, tau: &tau, f_ext: &f_ext, passive: None }, &q_m);
@@ -289,9 +288,9 @@ mod tests {
 
         let (mut data, mut dual) = (Data::<Dual64>::new(&model), Workspace::new(&model));
         let (f_ext, tau) = (vec![force.lift(); model.bodies().len()], lift(&tau));
-        dual.p = lift(&p);
+        dual.p = lift(&p).into();
         for k in 0..nv {
-            dual.w = lift(&w);
+            dual.w = lift(&w).into();
             dual.w[k].eps = 1.0;
             let (h, mut q_m) = (Dual64::from(H), lift(&q));
             dual.set_ways(h);

@@ -5,7 +5,7 @@ use crate::common;
 use common::contacts::cases;
 use common::{State, Worst, dual, eps, lift, lift_forces, moved, unit};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, Force, Model, Scalar, constrained_dynamics,
+    ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Force, Matrix, Model, Scalar, constrained_dynamics,
     constrained_dynamics_derivatives, constrained_dynamics_equations, constrained_equations_at,
     constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, crba, impulse_dynamics,
     impulse_dynamics_derivatives,
@@ -137,7 +137,7 @@ fn by_differences<A: Algorithm>(
     out
 }
 
-fn stack(above: &DMatrix<f64>, below: &DMatrix<f64>) -> DMatrix<f64> {
+fn stack(above: &Matrix<f64>, below: &DenseMatrix<f64, impl Dense<f64>>) -> DMatrix<f64> {
     let mut out = above.clone().resize_vertically(above.nrows() + below.nrows(), 0.0);
     out.rows_mut(above.nrows(), below.nrows()).copy_from(below);
     out
@@ -184,7 +184,7 @@ fn equations_of_constrained_dynamics() {
             let motion = (d.a.to_vec(), d.lambda.to_vec());
             let nothing = DMatrix::zeros(nv + rows, nv);
             let blocks = [stack(d.dtau_dq, d.dgamma_dq), stack(d.dtau_dv, d.dgamma_dv), nothing];
-            let matrices = [d.M, d.dtau_dq, d.dtau_dv, d.dgamma_dq, d.dgamma_dv].map(DMatrix::clone);
+            let matrices = [d.M, d.dtau_dq, d.dtau_dv, d.dgamma_dq, d.dgamma_dv].map(Matrix::clone);
             let mut K = DMatrix::zeros(nv + rows, nv + rows);
             K.view_mut((0, 0), (nv, nv)).copy_from(d.M);
             let mut J = DMatrix::zeros(rows, nv);

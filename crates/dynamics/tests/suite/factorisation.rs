@@ -17,7 +17,7 @@ const TREES: u64 = 30;
 
 fn inertia_matrix(model: &Model, seed: u64) -> DMatrix<f64> {
     let q = State::random(model, &mut rng(seed)).q;
-    crba(model, &mut Data::new(model), &q).clone()
+    crba(model, &mut Data::new(model), &q).clone_owned()
 }
 
 /// L and D in the order of the coordinates' places.

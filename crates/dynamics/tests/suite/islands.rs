@@ -2,7 +2,7 @@
 
 use crate::common::{Worst, normal, random_pose, rng};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Proximal, WORLD, constrained_dynamics,
+    ConstraintSet, ContactConstraint, Data, Matrix, Model, ModelBuilder, Proximal, WORLD, constrained_dynamics,
     constrained_dynamics_derivatives, constrained_dynamics_equations, impulse_dynamics, impulse_dynamics_derivatives,
     random_configuration, robots,
 };
@@ -73,7 +73,7 @@ fn pick(of: &[f64], at: &[usize]) -> Vec<f64> {
 }
 
 /// The entries of a matrix in some rows and columns; all others in these rows are zero.
-fn block(of: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> Vec<f64> {
+fn block(of: &Matrix<f64>, rows: &[usize], columns: &[usize]) -> Vec<f64> {
     let beside = |column: &usize| !columns.contains(column);
     let zeros = (0..of.ncols()).filter(beside).all(|column| rows.iter().all(|&row| of[(row, column)] == 0.0));
     assert!(zeros, "an entry of two robots");
@@ -178,7 +178,7 @@ fn the_order_of_constraints_changes_nothing() {
             order.extend(set.range(k));
         }
         let d = constrained_dynamics_derivatives(&whole, &mut data, &mut set, &q, &v, &tau, &[]);
-        let rows = |of: &DMatrix<f64>| DMatrix::from_fn(of.nrows(), of.ncols(), |i, j| of[(order[i], j)]);
+        let rows = |of: &Matrix<f64>| DMatrix::from_fn(of.nrows(), of.ncols(), |i, j| of[(order[i], j)]);
         let inertia = DMatrix::from_fn(order.len(), order.len(), |i, j| d.inertia[(order[i], order[j])]);
         let numbers: [Vec<f64>; 7] = [
             d.a.to_vec(),

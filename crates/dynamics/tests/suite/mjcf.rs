@@ -100,7 +100,7 @@ fn against_mujoco(name: &str) {
         let mut bias = rnea(&model, &mut work, &q, &v, &a, &[]).to_vec();
         to_mujoco(&mut bias);
         close("bias", &bias, &floats(&state["bias"]));
-        let mut M = crba(&model, &mut work, &q).clone();
+        let mut M = crba(&model, &mut work, &q).clone_owned();
         for _ in 0..2 {
             M.column_iter_mut().for_each(|mut c| to_mujoco(c.as_mut_slice()));
             M = M.transpose();

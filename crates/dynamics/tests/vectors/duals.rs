@@ -4,9 +4,8 @@ use crate::common::table::Input;
 use crate::common::{Worst, rng};
 use crate::{each_level, models};
 use condyle_dynamics::{
-    Data, Force, LaneJacobian, Model, Scalar, StateFunction, aba, aba_derivatives, rnea, rnea_derivatives,
+    Data, Force, LaneJacobian, Matrix, Model, Scalar, StateFunction, aba, aba_derivatives, rnea, rnea_derivatives,
 };
-use nalgebra::DMatrix;
 
 /// Two exact ways, some thousand roundings each; forward dynamics times the condition number of M.
 const EXACT: f64 = 1e-11;
@@ -34,7 +33,7 @@ impl StateFunction for Dynamics<'_> {
     }
 }
 
-fn beside<'m>(matrices: impl IntoIterator<Item = &'m DMatrix<f64>>) -> Vec<f64> {
+fn beside<'m>(matrices: impl IntoIterator<Item = &'m Matrix<f64>>) -> Vec<f64> {
     matrices.into_iter().flat_map(|matrix| matrix.iter().copied()).collect()
 }
 

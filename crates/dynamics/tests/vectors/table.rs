@@ -2,12 +2,12 @@
 
 use crate::common::table::Input;
 use condyle_dynamics::{
-    Batch, BatchConstraints, ConstraintSet, ContactConstraint, Data, Force, ForwardDynamicsMethod, Inertia, Matrices,
-    Model, Motion, Poses, Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, Vec3, aba, aba_derivatives,
-    aba_hessian, body_jacobian, centroidal_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms,
-    constrained_dynamics, constrained_dynamics_derivatives, constrained_dynamics_equations, coriolis_derivatives,
-    coriolis_matrix, crba, energy_derivatives, forward_accelerations, forward_dynamics, forward_kinematics,
-    forward_velocities, frame_jacobian, gravity, impulse_dynamics, impulse_dynamics_derivatives,
+    Batch, BatchConstraints, ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Force, ForwardDynamicsMethod,
+    Inertia, Matrices, Model, Motion, Poses, Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, Vec3, aba,
+    aba_derivatives, aba_hessian, body_jacobian, centroidal_derivatives, centroidal_map, centroidal_map_rate,
+    compute_all_terms, constrained_dynamics, constrained_dynamics_derivatives, constrained_dynamics_equations,
+    coriolis_derivatives, coriolis_matrix, crba, energy_derivatives, forward_accelerations, forward_dynamics,
+    forward_kinematics, forward_velocities, frame_jacobian, gravity, impulse_dynamics, impulse_dynamics_derivatives,
     joint_torque_regressor, kinetic_energy_regressor, minv, nonlinear_effects, passive_torque,
     passive_torque_derivative, potential_energy_regressor, rnea, rnea_derivatives, rnea_hessian,
     rnea_second_derivatives, static_torque, static_torque_derivative,
@@ -71,7 +71,7 @@ impl<T: Copy> Put<T> for &[T] {
 }
 
 /// By columns.
-impl<T: Scalar> Put<T> for &DMatrix<T> {
+impl<T: Scalar, Storage: Dense<T>> Put<T> for &DenseMatrix<T, Storage> {
     fn put(self, to: &mut Found<T>) {
         to.extend(self.iter().copied());
     }

@@ -2,8 +2,7 @@
 
 use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;
-use alloc::vec::Vec;
-use condyle_spatial::{Act, Force, Motion, Quaternion, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, alike};
 
 /// The sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. What stands behind the last body has no
 /// meaning.
@@ -11,16 +10,18 @@ use condyle_spatial::{Act, Force, Motion, Quaternion, Scalar, Se3, Vec3};
 #[repr(C)]
 pub struct JointSinCos<S> {
     /// Shape: bodies, in whole steps. Written by: `Joint::sin_cos`.
-    pub sin: Vec<S>,
+    pub sin: Array<S>,
     /// Shape: as sin. Written by: `Joint::sin_cos`.
-    pub cos: Vec<S>,
+    pub cos: Array<S>,
 }
+
+alike!(JointSinCos { sin, cos });
 
 impl<S: Scalar> JointSinCos<S> {
     /// Allocates room for some bodies, the world included.
     pub fn new(bodies: usize) -> Self {
         let n = bodies.next_multiple_of(4);
-        Self { sin: vec![S::zero(); n], cos: vec![S::zero(); n] }
+        Self { sin: vec![S::zero(); n].into(), cos: vec![S::zero(); n].into() }
     }
 }
 

@@ -53,6 +53,8 @@ impl<S: Scalar> ClassicalMotion<S> {
     }
 }
 
+condyle_spatial::alike!(ClassicalMotion { w, dw, a });
+
 impl<S: Scalar> JointMotion<S> {
     /// The motion with all its six numbers.
     #[inline(always)]

@@ -8,9 +8,7 @@ use crate::simd::kernel::{Kernel, short};
 use crate::simd::lanes::{Element, Lanes};
 use crate::simd::level::{Level, SHORT, VECTORS, assert_supported, level};
 use crate::simd::pack::Block;
-use alloc::vec::Vec;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
-use core::sync::atomic::{AtomicU8, Ordering};
 
 /// An `f64` whose products and sums are fused where those of lanes are (in WebAssembly they are not): what a lane is, alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,36 +29,6 @@ impl Fused {
         // SAFETY: as for `of`.
         unsafe { core::slice::from_raw_parts_mut(x.as_mut_ptr().cast(), x.len()) }
     }
-}
-
-/// Whether single numbers are fused: at each level above the baseline, unless a `Vec` of them were laid out otherwise than one
-/// of plain numbers, which [`renamed`](crate::simd::gate::renamed) relies on.
-#[inline]
-pub fn in_use() -> bool {
-    /// Whether they are laid out alike: 1 or 2 for no and yes, 0 until it is first asked for.
-    static ALIKE: AtomicU8 = AtomicU8::new(0);
-    #[cold]
-    fn compare() -> bool {
-        let alike = words(0.0_f64) == words(Fused(0.0));
-        ALIKE.store(1 + u8::from(alike), Ordering::Relaxed);
-        alike
-    }
-    level() > Level::Baseline
-        && match ALIKE.load(Ordering::Relaxed) {
-            0 => compare(),
-            alike => alike == 2,
-        }
-}
-
-/// The places of the pointer, the length and the capacity among the words of a `Vec`.
-fn words<T>(x: T) -> [Option<usize>; 3] {
-    const { assert!(size_of::<Vec<T>>() == size_of::<[usize; 3]>()) };
-    let mut vector = Vec::with_capacity(3);
-    vector.push(x);
-    // SAFETY: a `Vec` is three words and no padding, as just asserted.
-    let words: [usize; 3] = unsafe { core::ptr::from_ref(&vector).cast::<[usize; 3]>().read() };
-    let place = |word: usize| words.iter().position(|&other| other == word);
-    [place(vector.as_ptr().addr()), place(vector.len()), place(vector.capacity())]
 }
 
 impl Block for Fused {

@@ -6,7 +6,8 @@
 //! - for the scalars of every day, `f64` and its lanes, it is compiled in the crate that owns it, once, with the vector
 //!   instructions that the scalar is made of; whoever uses the library calls that code;
 //! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same
-//!   64 bits under another name;
+//!   64 bits under another name: arguments, workspaces included, are taken for the same over [`Fused`], which they are
+//!   [`Alike`];
 //! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
 //!
 //! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one
@@ -14,12 +15,12 @@
 //! kernels: it passes arguments in registers, where the two others pass them as one value in memory.
 #![allow(unsafe_code)]
 
-pub use crate::simd::fused::{Fused, in_use};
+pub use crate::simd::alike::{Alike, Rename, same};
+pub use crate::simd::fused::Fused;
 pub use crate::simd::kernel::Kernel;
 pub use crate::simd::level::{Level, level};
 pub use crate::simd::pack::{Real, Witness};
 use core::any::TypeId;
-use core::mem::ManuallyDrop;
 
 /// Four numbers at once, with AVX2, NEON or SIMD128.
 pub type Short<W> = <f64 as Real>::Short<W>;
@@ -30,25 +31,6 @@ pub type Long<W> = <f64 as Real>::Long<W>;
 #[inline(always)]
 pub fn is<A: 'static, B: 'static>() -> bool {
     TypeId::of::<A>() == TypeId::of::<B>()
-}
-
-/// An argument under another name of its type.
-///
-/// # Safety
-/// `A` and `B` are the same type, or the same but for `f64` in place of [`Fused`]: a transparent wrapper. Workspaces and the
-/// structs of spatial algebra are `repr(C)`, hence laid out alike; nalgebra's matrices are transparent and `repr(C)` structs
-/// over a `Vec`. That its three words stand in the same order whatever it holds is looked at before the first call; where they
-/// did not, numbers would stay as they are ([`in_use`]).
-///
-/// Why not one type from the start: workspaces keep vectors and nalgebra's matrices of the user's scalar, and calls give out
-/// borrows of them (`&DMatrix<f64>`), while a pass computes on the scalar whose vectors they are. Casts of plain slices,
-/// which need no such trust, would name each field of each workspace a second time, and could not make a matrix. A scalar
-/// of one name would have to ask at each product whether it is fused.
-#[inline(always)]
-pub unsafe fn renamed<A, B>(a: A) -> B {
-    assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
-    // SAFETY: by the caller; `a` is not dropped, so there is one of it.
-    unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
 /// Statements for vectors, where the processor may have some ([`VECTORS`](crate::simd::level::VECTORS)), else others: so that
@@ -102,7 +84,7 @@ macro_rules! kernel {
             $(assert!(is::<$R, f64>(), "the constants of a model for numbers are numbers");)?
             let f64 = is::<$S, f64>();
             $crate::if_vectors!({
-                use $crate::simd::gate::{Fused, in_use};
+                use $crate::simd::gate::{Fused, Level, level};
 
                 struct Gate;
                 // SAFETY: each scalar's code is entered through its door.
@@ -110,16 +92,16 @@ macro_rules! kernel {
                 type Short = $crate::simd::gate::Short<Gate>;
                 type Long = $crate::simd::gate::Long<Gate>;
 
-                let fused = f64 && in_use();
-                $crate::kernel!(@call Fused, fused || is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*));
+                let fused = f64 && level() > Level::Baseline;
+                $crate::kernel!(@call Fused, is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*), numbers if fused);
                 $crate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
                 $crate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
             } else {});
             $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
         }
     };
-    // the function compiled for one scalar, if it is the one
-    (@call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*)) => {
+    // the function compiled for one scalar, if it is the one; with a condition on which numbers are taken for it
+    (@call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*) $(, numbers if $fused:expr)?) => {
         let chosen = $chosen;
         {
             type $S = $scalar;
@@ -129,8 +111,25 @@ macro_rules! kernel {
                 $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
             if chosen {
-                // SAFETY: R is f64, and S is this scalar, or f64 in place of `Fused`.
-                return unsafe { compiled($($crate::simd::gate::renamed($arg)),*) };
+                // SAFETY: R is f64, and S is this scalar.
+                return unsafe { compiled($($crate::simd::gate::same($arg)),*) };
+            }
+            $crate::kernel!(@renamed ($($fused)?), $S $($R)?, ($($arg: $type),*));
+        }
+    };
+    (@renamed (), $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*)) => {};
+    (@renamed ($fused:expr), $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*)) => {
+        let fused = $fused;
+        {
+            type $S = f64;
+            $(type $R = f64;)?
+            #[inline(always)]
+            fn renamed($($arg: $type),*) {
+                compiled($($crate::simd::gate::Rename::renamed($arg)),*);
+            }
+            if fused {
+                // SAFETY: R and S are f64.
+                return unsafe { renamed($($crate::simd::gate::same($arg)),*) };
             }
         }
     };

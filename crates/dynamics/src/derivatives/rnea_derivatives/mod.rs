@@ -26,12 +26,10 @@ use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
 use crate::selection::pairs_by_rows;
 use crate::workspace::{Size, filled, zero_matrix};
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Cross, Force, Inertia, Motion, Scalar, Vec3};
-use nalgebra::DMatrix;
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
 use vectorized::Rows;
 
 /// The quantities of the bodies and of the columns of their joints, in the world's frame.
@@ -39,24 +37,26 @@ use vectorized::Rows;
 #[repr(C)]
 pub(crate) struct Bodies<S> {
     /// Velocity. Shape: bodies. Written by: `pass`.
-    pub v: Vec<Motion<S>>,
+    pub v: Array<Motion<S>>,
     /// Acceleration, with gravity as the world's. Shape: bodies. Written by: `pass`.
-    pub a: Vec<Motion<S>>,
+    pub a: Array<Motion<S>>,
     /// Iᶜ. Shape: bodies. Written by: `pass`.
-    pub IC: Vec<Inertia<S>>,
+    pub IC: Array<Inertia<S>>,
     /// 2Bᶜ. Shape: bodies. Written by: `pass`.
-    pub BC: Vec<Coriolis<S>>,
+    pub BC: Array<Coriolis<S>>,
     /// F. Shape: bodies. Written by: `pass`.
-    pub F: Vec<Force<S>>,
+    pub F: Array<Force<S>>,
     /// Ψ̇. Shape: columns. Written by: `pass`.
-    pub Psid: Vec<Motion<S>>,
+    pub Psid: Array<Motion<S>>,
     /// Ψ̈. Shape: columns. Written by: `pass`.
-    pub Psidd: Vec<Motion<S>>,
+    pub Psidd: Array<Motion<S>>,
     /// Ψ̇ + Ṡ. Shape: columns. Written by: `pass`.
-    pub PsidSd: Vec<Motion<S>>,
+    pub PsidSd: Array<Motion<S>>,
     /// Written by: `pass`, for `vectorized`.
     pub rows: Rows<S>,
 }
+
+alike!(Bodies { v, a, IC, BC, F, Psid, Psidd, PsidSd, rows });
 
 impl<S: Scalar> Bodies<S> {
     pub(crate) fn new(size: Size) -> Self {
@@ -79,17 +79,19 @@ impl<S: Scalar> Bodies<S> {
 pub(crate) struct Workspace<S> {
     pub bodies: Bodies<S>,
     /// The velocity and acceleration coordinates. Shape: nv. Written by: `rnea_derivatives`.
-    pub qd: Vec<S>,
-    pub qdd: Vec<S>,
+    pub qd: Array<S>,
+    pub qdd: Array<S>,
     /// No acceleration. Shape: nv. Written by: `new`.
-    pub still: Vec<S>,
+    pub still: Array<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub dtau_dq: DMatrix<S>,
+    pub dtau_dq: Matrix<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub dtau_dv: DMatrix<S>,
+    pub dtau_dv: Matrix<S>,
     /// Shape: nv × nv. Written by: `pass`.
-    pub dtau_da: DMatrix<S>,
+    pub dtau_da: Matrix<S>,
 }
+
+alike!(Workspace { bodies, qd, qdd, still, dtau_dq, dtau_dv, dtau_da });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(size: Size) -> Self {

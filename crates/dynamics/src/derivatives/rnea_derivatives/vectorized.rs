@@ -6,10 +6,10 @@
 
 use crate::derivatives::rnea_derivatives::{Bodies, Workspace};
 use crate::passes::kinematics::World;
-use alloc::vec::Vec;
+use crate::workspace::filled;
 use condyle_model::Model;
 use condyle_spatial::gate::Fused;
-use condyle_spatial::{Force, Scalar, Vec3};
+use condyle_spatial::{Array, Force, Scalar, Vec3, alike};
 use core::any::Any;
 
 /// The number of columns that go together.
@@ -23,12 +23,14 @@ const NUMBERS: usize = 6 + 3 + 6 + 6;
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Rows<S> {
-    sides: Vec<[[S; SIDE]; NUMBERS]>,
+    sides: Array<[[S; SIDE]; NUMBERS]>,
 }
+
+alike!(Rows { sides });
 
 impl<S: Scalar> Rows<S> {
     pub(crate) fn new(columns: usize) -> Self {
-        Self { sides: vec![[[S::zero(); SIDE]; NUMBERS]; columns.div_ceil(SIDE)] }
+        Self { sides: filled(|| [[S::zero(); SIDE]; NUMBERS], columns.div_ceil(SIDE)) }
     }
 
     /// Keeps what a column brings.

@@ -13,7 +13,6 @@
 //! what in γ is not the acceleration of a body. That algorithm's last pass then gives q̈ = M⁻¹ (τ − h + Jᵀ λ) with
 //! u + Yᵀ λ in place of u. It has limbs in its lanes; the forces have rows: those of one constraint as far as the root, from
 //! there on all of them.
-#![allow(unsafe_code)]
 
 use super::forces::Left;
 use super::lanes::Four;
@@ -26,7 +25,7 @@ use crate::constraints::plan::Plan as ConstraintPlan;
 use crate::workspace::Gate;
 use condyle_spatial::block::Block;
 use condyle_spatial::gate::Fused;
-use condyle_spatial::gate::renamed;
+use condyle_spatial::gate::Rename;
 use condyle_spatial::{Scalar, moves};
 
 /// xᵀ y of N vectors, in every lane.
@@ -66,8 +65,7 @@ impl ConstraintLanes {
                 set.delassus.clear(island);
             }
         }
-        // SAFETY: `Fused` is a transparent wrapper of `f64`.
-        let (G, stride): (&mut [f64], _) = (unsafe { renamed(&mut set.delassus.CE[..]) }, set.delassus.stride);
+        let (G, stride): (&mut [f64], _) = ((&mut set.delassus.CE[..]).renamed(), set.delassus.stride);
         if all.nv > 0 {
             all.multiply::<V, N>(set.lambda.len(), G, stride);
         }

@@ -9,31 +9,29 @@ use crate::passes::kinematics::World;
 use crate::passes::rnea;
 use crate::workspace::{Size, filled};
 use alloc::boxed::Box;
-use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::limbs::steps::Source;
 use condyle_spatial::block::lanes;
-use condyle_spatial::gate::Fused;
-use condyle_spatial::gate::{is, renamed};
+use condyle_spatial::gate::{Fused, Rename, is, same};
 use condyle_spatial::level::{Level, level};
-use condyle_spatial::{Force, Inertia, Scalar};
+use condyle_spatial::{Array, Force, Inertia, Scalar};
 
 /// What passes in lanes write.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
     /// The arguments. Shape: positions, coordinates, coordinates, steps of the plan. Written by: `load`.
-    pub q: Vec<Four>,
-    pub v: Vec<Four>,
-    pub x: Vec<Four>,
-    pub f_ext: Vec<Force<Four>>,
+    pub q: Array<Four>,
+    pub v: Array<Four>,
+    pub x: Array<Four>,
+    pub f_ext: Array<Force<Four>>,
     /// An argument, with a 0 for the lanes that have no joint. Shape: the larger of nq and nv, + 1.
     /// Written by: `gather`.
-    padded: Vec<Fused>,
+    padded: Array<Fused>,
     pub world: World<Four>,
     pub rnea: rnea::Workspace<Four>,
     pub aba: aba::Workspace<Four>,
     /// Composite inertias. Shape: steps. Written by: `crba::pass`.
-    pub IC: Vec<Inertia<Four>>,
+    pub IC: Array<Inertia<Four>>,
     pub bodies: rnea_derivatives::Bodies<Four>,
     pub inverted: inverse::Scratch,
 }
@@ -50,7 +48,7 @@ impl Scratch {
             v: zeros.clone(),
             x: zeros,
             f_ext: filled(Force::zero, steps),
-            padded: vec![Fused(0.0); model.nq().max(model.nv()) + 1],
+            padded: filled(|| Fused(0.0), model.nq().max(model.nv()) + 1),
             world: World::new(size),
             rnea: rnea::Workspace::new(size),
             aba: aba::Workspace::new(size),
@@ -89,8 +87,11 @@ impl<'a, S> Arguments<'a, S> {
     /// # Safety
     /// `S` is `f64`.
     pub(crate) unsafe fn fused(self) -> Arguments<'a> {
-        // SAFETY: `Fused` is a transparent wrapper, and a force is `repr(C)`.
-        unsafe { Arguments { q: renamed(self.q), v: renamed(self.v), x: renamed(self.x), f_ext: renamed(self.f_ext) } }
+        // SAFETY: by the caller.
+        let [q, v, x]: [&[f64]; 3] = unsafe { [same(self.q), same(self.v), same(self.x)] };
+        // SAFETY: as above.
+        let f_ext: &[Force<f64>] = unsafe { same(self.f_ext) };
+        Arguments { q: q.renamed(), v: v.renamed(), x: x.renamed(), f_ext: f_ext.renamed() }
     }
 }
 

@@ -22,6 +22,7 @@ use condyle_dynamics::{
     rnea_derivatives,
 };
 use condyle_spatial::block::{Block, gather_rows, scatter};
+use condyle_spatial::{Matrix, matrix};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -46,10 +47,10 @@ pub(crate) enum Pass<S> {
     None,
     Free,
     /// The constraints, and J. Shape: rows × nv.
-    Contact(Box<ConstraintSet<S>>, DMatrix<S>),
+    Contact(Box<ConstraintSet<S>>, Matrix<S>),
     Inverse,
     /// As [`Self::Contact`].
-    ContactInverse(Box<ConstraintSet<S>>, DMatrix<S>),
+    ContactInverse(Box<ConstraintSet<S>>, Matrix<S>),
 }
 
 /// The dynamics of as many knots as a scalar has lanes.
@@ -80,13 +81,13 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
             Law::Free => Pass::Free,
             Law::Contact(contacts, damping) => {
                 let set = Box::new(constraint_set(model, contacts, *damping).expect("was checked when it was given"));
-                let J = DMatrix::from_element(set.rows(), nv, S::zero());
+                let J = matrix(set.rows(), nv, S::zero());
                 Pass::Contact(set, J)
             }
             Law::Inverse => Pass::Inverse,
             Law::ContactInverse(contacts, _) => {
                 let set = Box::new(constraint_set(model, contacts, SHARED).expect("was checked when it was given"));
-                let J = DMatrix::from_element(set.rows(), nv, S::zero());
+                let J = matrix(set.rows(), nv, S::zero());
                 Pass::ContactInverse(set, J)
             }
         };
@@ -308,7 +309,7 @@ fn pack<'a, S: Block<Number = f64>>(count: usize, of: impl Fn(usize) -> &'a [f64
 
 /// Writes three matrices to the data of each knot.
 fn unpack_matrices<S: Block<Number = f64>>(
-    from: [&DMatrix<S>; 3],
+    from: [&Matrix<S>; 3],
     to: &mut [KnotData],
     part: impl Fn(&mut KnotData) -> &mut [DMatrix<f64>; 3],
 ) {

@@ -36,6 +36,8 @@ pub(crate) struct Tableau {
     pub rows: usize,
 }
 
+condyle_spatial::alike!(Tableau);
+
 impl Tableau {
     /// The distance from one row to the next.
     pub(crate) fn stride(self) -> usize {

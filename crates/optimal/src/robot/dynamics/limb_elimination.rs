@@ -17,9 +17,8 @@
 use super::kkt_elimination::{PREFERENCE, Tableau, own_coordinates};
 use crate::robot::contact::path;
 use condyle_dynamics::Model;
-use condyle_spatial::{Scalar, kernel};
+use condyle_spatial::{Matrix, Scalar, alike, kernel};
 use core::ops::Range;
-use nalgebra::DMatrix;
 
 /// How many rows are solved together: those of a point and of a sole, or of a base that moves freely.
 const SIZES: [usize; 2] = [3, 6];
@@ -47,6 +46,8 @@ struct Limb {
 pub(crate) struct LimbElimination {
     limbs: Vec<Limb>,
 }
+
+alike!(LimbElimination);
 
 impl LimbElimination {
     /// The limbs of a robot whose first `passive` coordinates are not driven, for contacts whose rows are moved by some
@@ -124,7 +125,7 @@ fn runs(columns: impl IntoIterator<Item = usize>) -> Vec<Range<usize>> {
 kernel! {
     /// Writes the rows of the equations of motion, [M · r_v r_q], into a tableau; M is symmetric.
     pub(crate) fn write_motion<S>(
-        tableau: Tableau, M: &DMatrix<S>, dtau_dv: &DMatrix<S>, dtau_dq: &DMatrix<S>, T: &mut [S],
+        tableau: Tableau, M: &Matrix<S>, dtau_dv: &Matrix<S>, dtau_dq: &Matrix<S>, T: &mut [S],
     ) {
         let (Tableau { nv, rows }, stride) = (tableau, tableau.stride());
         for (i, row) in T[rows * stride..].chunks_exact_mut(stride).enumerate() {
@@ -138,7 +139,7 @@ kernel! {
 kernel! {
     /// Writes the rows of the contacts but for J, [· μ1 c_v c_q], into a tableau.
     pub(crate) fn write_drift<S>(
-        tableau: Tableau, dgamma_dv: &DMatrix<S>, dgamma_dq: &DMatrix<S>, mu: f64, T: &mut [S],
+        tableau: Tableau, dgamma_dv: &Matrix<S>, dgamma_dq: &Matrix<S>, mu: f64, T: &mut [S],
     ) {
         let (Tableau { nv, rows }, stride) = (tableau, tableau.stride());
         for (r, row) in T[..rows * stride].chunks_exact_mut(stride).enumerate() {
@@ -152,7 +153,7 @@ kernel! {
 
 kernel! {
     /// Writes J and −Jᵀ into a tableau.
-    pub(crate) fn write_jacobian<S>(tableau: Tableau, J: &DMatrix<S>, T: &mut [S]) {
+    pub(crate) fn write_jacobian<S>(tableau: Tableau, J: &Matrix<S>, T: &mut [S]) {
         let (Tableau { nv, rows }, stride) = (tableau, tableau.stride());
         let (contacts, motion) = T.split_at_mut(rows * stride);
         for (r, row) in contacts.chunks_exact_mut(stride).enumerate() {
@@ -168,7 +169,7 @@ kernel! {
 
 /// Copies row i of a matrix.
 #[inline(always)]
-fn copy_row<S: Scalar>(to: &mut [S], from: &DMatrix<S>, i: usize) {
+fn copy_row<S: Scalar>(to: &mut [S], from: &Matrix<S>, i: usize) {
     for (to, column) in to.iter_mut().zip(from.as_slice().chunks_exact(from.nrows())) {
         *to = column[i];
     }

@@ -390,8 +390,11 @@ impl RobotDynamics {
                     }
                 }
                 hessian.uu.fill(0.0);
-                let (first, da_du) = (d.first, actuation.columns(d.first.da_dtau, da_du));
-                Some(Derivatives { a: first.a, da_dq: first.da_dq, da_dv: first.da_dv, da_du })
+                let [da_dq, da_dv, da_dtau] = &mut knot.da;
+                da_dq.copy_from(d.first.da_dq);
+                da_dv.copy_from(d.first.da_dv);
+                da_dtau.copy_from(d.first.da_dtau);
+                Some(Derivatives { a: d.first.a, da_dq, da_dv, da_du: actuation.columns(da_dtau, da_du) })
             }
             Pass::Inverse | Pass::ContactInverse(..) => {
                 knot.a.copy_from_slice(&u[..model.nv()]);

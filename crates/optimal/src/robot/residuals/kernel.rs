@@ -11,8 +11,7 @@ use condyle_dynamics::{
     forward_velocities,
 };
 use condyle_spatial::block::{Block, Strided, gather_rows};
-use condyle_spatial::{Force, Mat3, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie};
-use nalgebra::DMatrix;
+use condyle_spatial::{Force, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Vec3, kernel, lie, matrix};
 
 /// Some knots whose residuals look at the same.
 pub(crate) struct KnotGroup<'a> {
@@ -48,7 +47,7 @@ impl KnotGroup<'_> {
         list: usize,
         residual: &Residual,
         plan: &Plan,
-        [by_v, by_q]: [&DMatrix<S>; 2],
+        [by_v, by_q]: [&Matrix<S>; 2],
     ) {
         let (nv, width) = (by_q.ncols(), row_width(by_q.ncols(), residual));
         for (J, column) in [(by_v, 0), (by_q, width - nv)].into_iter().skip(usize::from(width == nv)) {
@@ -67,9 +66,9 @@ pub(crate) struct ResidualKernel<S> {
     t: [S; 12],
     r: [S; STRIDE],
     /// ∂r/∂v and ∂r/∂q. Shape: 6 × nv.
-    J: [DMatrix<S>; 2],
+    J: [Matrix<S>; 2],
     /// ∂c/∂q. Shape: 3 × nv.
-    Jcom: DMatrix<S>,
+    Jcom: Matrix<S>,
     /// Zeros. Shape: nv.
     zero: Vec<S>,
 }
@@ -77,7 +76,7 @@ pub(crate) struct ResidualKernel<S> {
 impl<S: Block<Number = f64>> ResidualKernel<S> {
     /// Scratch for a robot with nv coordinates.
     pub(crate) fn new(nv: usize) -> Self {
-        let wide = |rows| DMatrix::from_element(rows, nv, S::zero());
+        let wide = |rows| matrix(rows, nv, S::zero());
         Self {
             t: [S::zero(); 12],
             r: [S::zero(); STRIDE],
@@ -146,7 +145,7 @@ impl<S: Block<Number = f64>> ResidualKernel<S> {
 
 kernel! {
     /// Computes ∂c/∂q.
-    fn center_of_mass_jacobian<S>(model: &Model, data: &mut Data<S>, q: &[S], Jcom: &mut DMatrix<S>) {
+    fn center_of_mass_jacobian<S>(model: &Model, data: &mut Data<S>, q: &[S], Jcom: &mut Matrix<S>) {
         Jcom.as_mut_slice().copy_from_slice(centroidal_map(model, data, q).Jcom.as_slice());
     }
 }
@@ -154,7 +153,7 @@ kernel! {
 kernel! {
     /// Computes ∂h_G/∂v and ∂h_G/∂q.
     fn centroidal_momentum_derivatives<S>(
-        model: &Model, data: &mut Data<S>, q: &[S], v: &[S], zero: &[S], J: &mut [DMatrix<S>; 2],
+        model: &Model, data: &mut Data<S>, q: &[S], v: &[S], zero: &[S], J: &mut [Matrix<S>; 2],
     ) {
         let d = centroidal_derivatives(model, data, q, v, zero);
         J[0].as_mut_slice().copy_from_slice(d.dh_dv.as_slice());
@@ -181,7 +180,7 @@ kernel! {
     /// Computes log(refXo oXf), and its Jacobian Jlog J.
     fn frame_placement<S>(
         placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
-        J: &mut [DMatrix<S>; 2],
+        J: &mut [Matrix<S>; 2],
     ) {
         let X = Se3::new(rotation(t), vector(t, 0)).inverse() * placements.frame(frame);
         let twist = lie::log6(Quaternion::from_rotation(X.rotation), X.translation);
@@ -201,7 +200,7 @@ kernel! {
     /// Computes p − p_ref, and its Jacobian.
     fn frame_translation<S>(
         placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
-        J: &mut [DMatrix<S>; 2],
+        J: &mut [Matrix<S>; 2],
     ) {
         r[..3].copy_from_slice(&(placements.frame(frame).translation - vector(t, 0)).to_array());
         if slopes {
@@ -214,7 +213,7 @@ kernel! {
     /// Computes log(R_refᵀ R), and its Jacobian Jlog J.
     fn frame_rotation<S>(
         placements: Placements<'_, S>, frame: usize, t: &[S; 12], r: &mut [S; STRIDE], slopes: bool,
-        J: &mut [DMatrix<S>; 2],
+        J: &mut [Matrix<S>; 2],
     ) {
         let R = rotation(t).transpose() * placements.frame(frame).rotation;
         let angles = lie::log3(Quaternion::from_rotation(R));
@@ -234,7 +233,7 @@ kernel! {
     /// Computes v − v_ref, ∂v/∂q̇ and ∂v/∂q.
     fn frame_velocity<S>(
         velocities: Velocities<'_, S>, frame: usize, reference: ReferenceFrame, t: &[S; 12], r: &mut [S; STRIDE],
-        slopes: bool, J: &mut [DMatrix<S>; 2],
+        slopes: bool, J: &mut [Matrix<S>; 2],
     ) {
         let v = velocities.frame_velocity(frame, reference) - Motion::new(vector(t, 0), vector(t, 3));
         r[..6].copy_from_slice(&v.to_array());
