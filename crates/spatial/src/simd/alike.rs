@@ -110,6 +110,29 @@ impl Rename<f64> for Fused {
 /// or the same, and that each stands in the same place, as it does where the struct is `repr(C)`.
 ///
 /// Of types that do not depend on a scalar it says that they are what they are.
+///
+/// ```
+/// use condyle_spatial::{Array, Motion, alike};
+/// #[repr(C)]
+/// struct Workspace<S> { v: Array<Motion<S>>, tau: Array<S>, order: Vec<usize> }
+/// alike!(Workspace { v, tau } same { order });
+/// ```
+///
+/// A field whose layout would not be the same, or that is left out, does not compile:
+///
+/// ```compile_fail,E0277
+/// # use condyle_spatial::{Array, alike};
+/// #[repr(C)]
+/// struct Workspace<S> { tau: Vec<S> }
+/// alike!(Workspace { tau });
+/// ```
+///
+/// ```compile_fail,E0027
+/// # use condyle_spatial::{Array, alike};
+/// #[repr(C)]
+/// struct Workspace<S> { tau: Array<S>, order: Vec<usize> }
+/// alike!(Workspace { tau });
+/// ```
 #[macro_export]
 #[doc(hidden)]
 macro_rules! alike {
