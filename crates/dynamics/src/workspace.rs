@@ -1,6 +1,7 @@
 //! The arrays of which the workspaces of passes are made.
 //!
-//! Each pass keeps a workspace of its own, defined in its file, in which each field says frame, shape and writer.
+//! Each pass keeps a workspace of its own, defined in its file, in which each field says frame, shape and writer. It is made
+//! of arrays and matrices that are read under both names of `f64`, as the `alike!` behind it has the compiler check.
 
 use condyle_model::Model;
 use condyle_spatial::gate::{self, Witness};
