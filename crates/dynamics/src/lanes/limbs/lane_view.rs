@@ -48,17 +48,14 @@ impl<'d> LaneView<'d> {
     }
 }
 
-#[inline(always)]
 fn number<S: Scalar>(x: &Four, lane: usize) -> S {
     S::splat(lanes(core::slice::from_ref(x))[lane]) // out of memory: this runs with the instructions of any processor
 }
 
-#[inline(always)]
 fn vector<S: Scalar>(v: &Vec3<Four>, lane: usize) -> Vec3<S> {
     Vec3::new(number(&v.x, lane), number(&v.y, lane), number(&v.z, lane))
 }
 
-#[inline(always)]
 fn motion<S: Scalar>(m: &Motion<Four>, lane: usize) -> Motion<S> {
     Motion::new(vector(&m.linear, lane), vector(&m.angular, lane))
 }
