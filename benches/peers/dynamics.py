@@ -71,7 +71,9 @@ def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *
     for one in headers:
         include = Path(run(one, "-c", purelib).strip()) / "cmeel.prefix" / "include"
         folders += [include, include / "urdfdom_headers", include / "eigen3"]
-    compiler = next(c for c in ("clang++-19", "clang++", "g++") if shutil.which(c))
+    # CppAD's headers of this version are not valid for clang
+    compilers = ("g++",) if packages else ("clang++-19", "clang++", "g++")
+    compiler = next(c for c in compilers if shutil.which(c))
     flags = ["-std=c++17", "-march=native", "-DNDEBUG", "-w", "-DBOOST_MPL_LIMIT_LIST_SIZE=30"]
     flags += ["-DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", "-DBOOST_MPL_LIMIT_VECTOR_SIZE=30"]
     flags += ["-DBOOST_FUSION_INVOKE_MAX_ARITY=12"]
