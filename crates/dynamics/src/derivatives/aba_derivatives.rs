@@ -23,7 +23,8 @@ use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Model;
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Constant, Matrix, Scalar, Vec3, alike};
+use condyle_spatial::{Array, Matrix, Scalar, Vec3, alike};
+use core::any::Any;
 
 #[derive(Clone, Debug)]
 #[repr(C)]
@@ -56,10 +57,11 @@ impl<S: Scalar> Workspace<S> {
         Self { a: filled(S::zero, size.nv), da_dq: square.clone(), da_dv: square, floating, nonzero_rows, solve }
     }
 
-    /// Whether the bodies that float do so freely: whether their linear coordinates have no armature.
-    pub(crate) fn float_freely<R: Constant<S>>(&self, model: &Model<R>) -> bool {
-        let is_free = |&first: &usize| model.armature()[first..first + 3].iter().all(|&x| x.lift() == S::zero());
-        self.floating.iter().all(is_free)
+    /// Whether the bodies that float do so freely: whether their linear coordinates have no armature, which is seen of numbers.
+    pub(crate) fn float_freely<R: 'static>(&self, model: &Model<R>) -> bool {
+        let model = (model as &dyn Any).downcast_ref::<Model>();
+        let is_free = |model: &Model| self.floating.iter().all(|&first| model.armature()[first..first + 3] == [0.0; 3]);
+        model.is_some_and(is_free)
     }
 }
 
