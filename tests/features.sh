@@ -10,7 +10,7 @@ check() {
     shift 2
     combinations=("$needed")
     for feature in "$@"; do
-        others=$(printf '%s\n' "$@" | grep -vx "$feature" | paste -sd ,)
+        others=$(printf '%s\n' "$@" | awk -v out="$feature" '$0 != out' | paste -sd ,)
         combinations+=("$needed,$feature" "$needed,$others")
     done
     while read -r combination; do
@@ -31,6 +31,7 @@ check condyle "" loaders serde threads
 for crate in spatial model; do
     cargo test --locked --package "condyle-$crate" --no-default-features --features libm --lib
 done
+cargo test --locked --package condyle-spatial --no-default-features --features libm --test storage
 cargo test --locked --package condyle-model --no-default-features --features libm --test validate
 cargo test --locked --package condyle-linalg --no-default-features --features libm --tests
 cargo test --locked --package condyle-linalg --no-default-features --features std
