@@ -57,11 +57,11 @@ impl<S: Scalar> Workspace<S> {
         Self { a: filled(S::zero, size.nv), da_dq: square.clone(), da_dv: square, floating, nonzero_rows, solve }
     }
 
-    /// Whether the bodies that float do so freely: whether their linear coordinates have no armature, which is seen of numbers.
+    /// Whether there are bodies that float and all do so freely: their linear coordinates have no armature, which is seen of numbers.
     pub(crate) fn float_freely<R: 'static>(&self, model: &Model<R>) -> bool {
         let model = (model as &dyn Any).downcast_ref::<Model>();
         let is_free = |model: &Model| self.floating.iter().all(|&first| model.armature()[first..first + 3] == [0.0; 3]);
-        model.is_some_and(is_free)
+        !self.floating.is_empty() && model.is_some_and(is_free)
     }
 }
 
