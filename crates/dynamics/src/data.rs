@@ -28,53 +28,74 @@ use condyle_model::Model;
 use condyle_spatial::gate::{is, same};
 use condyle_spatial::{Scalar, alike};
 
-/// Scratch and results of every algorithm, for one model and one kind of scalar.
-///
-/// Each algorithm keeps its own workspace, which its file defines, and reads nothing that another left behind, so calls
-/// may come in any order. All memory is allocated here, none later. One `Data` for each thread.
-///
-/// ```
-/// use condyle_dynamics::{Data, robots};
-/// let arm = robots::arm7();
-/// let data = Data::<f64>::new(&arm);
-/// # let _ = data;
-/// ```
-#[derive(Debug)]
-#[repr(C)]
-pub struct Data<S> {
-    size: Size,
-    /// The hash of the tree that it was made for.
-    tree: u64,
-    pub(crate) world: World<S>,
-    pub(crate) moving: Moving<S>,
-    pub(crate) rnea: rnea::Workspace<S>,
-    pub(crate) crba: crba::Workspace<S>,
-    pub(crate) aba: aba::Workspace<S>,
-    pub(crate) minv: minv::Workspace<S>,
-    pub(crate) rnea_derivatives: rnea_derivatives::Workspace<S>,
-    pub(crate) aba_derivatives: aba_derivatives::Workspace<S>,
-    pub(crate) rnea_hessian: rnea_hessian::Workspace<S>,
-    pub(crate) aba_hessian: aba_hessian::Workspace<S>,
-    pub(crate) constrained_dynamics: constrained_dynamics::Workspace<S>,
-    pub(crate) constrained_derivatives: constrained_derivatives::Workspace<S>,
-    pub(crate) impulse_dynamics: impulse_dynamics::Workspace<S>,
-    pub(crate) statics: statics::Workspace<S>,
-    pub(crate) coriolis: coriolis::Workspace<S>,
-    pub(crate) centroidal: centroidal::Workspace<S>,
-    pub(crate) centroidal_derivatives: centroidal_derivatives::Workspace<S>,
-    pub(crate) energy: energy::Workspace<S>,
-    pub(crate) all_terms: all_terms::Workspace<S>,
-    pub(crate) forward_dynamics: factored_dynamics::Workspace<S>,
-    pub(crate) regressor: regressor::Workspace<S>,
-    /// The scratch of single calls on robots with limbs.
-    pub(crate) limbs: Option<Box<Scratch>>,
+/// [`Data`], of its workspaces with what each is made from: the struct, how it is made and copied, and the check that it may be
+/// read under both names of `f64` ([`alike!`]).
+macro_rules! data {
+    ($(#[$doc:meta])* ($size:ident, $model:ident) $($name:ident: $Workspace:ident $(:: $Inner:ident)? = ($($from:ident),*),)*) => {
+        $(#[$doc])*
+        #[derive(Debug)]
+        #[repr(C)]
+        pub struct Data<S> {
+            size: Size,
+            /// The hash of the tree that it was made for.
+            tree: u64,
+            $(pub(crate) $name: $Workspace $(:: $Inner)? <S>,)*
+            /// The scratch of single calls on robots with limbs.
+            pub(crate) limbs: Option<Box<Scratch>>,
+        }
+
+        alike!(Data { $($name),* } same { size, tree, limbs });
+
+        impl<S: Scalar> Data<S> {
+            fn allocate<R>($model: &Model<R>) -> Self {
+                let $size = Size::new($model);
+                $(let $name = $Workspace $(:: $Inner)? ::new($($from),*);)*
+                Self { size: $size, tree: $model.tree_hash(), $($name,)* limbs: Scratch::new::<S, R>($model) }
+            }
+
+            fn copy(&self) -> Self {
+                let Self { size, tree, $($name,)* limbs } = self;
+                Self { size: *size, tree: *tree, $($name: copied($name),)* limbs: copied(limbs) }
+            }
+        }
+    };
 }
 
-alike!(Data {
-    world, moving, rnea, crba, aba, minv, rnea_derivatives, aba_derivatives, rnea_hessian, aba_hessian,
-    constrained_dynamics, constrained_derivatives, impulse_dynamics, statics, coriolis, centroidal,
-    centroidal_derivatives, energy, all_terms, forward_dynamics, regressor,
-} same { size, tree, limbs });
+data! {
+    /// Scratch and results of every algorithm, for one model and one kind of scalar.
+    ///
+    /// Each algorithm keeps its own workspace, which its file defines, and reads nothing that another left behind, so calls
+    /// may come in any order. All memory is allocated here, none later. One `Data` for each thread.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, robots};
+    /// let arm = robots::arm7();
+    /// let data = Data::<f64>::new(&arm);
+    /// # let _ = data;
+    /// ```
+    (size, model)
+    world: World = (size),
+    moving: Moving = (size),
+    rnea: rnea::Workspace = (size),
+    crba: crba::Workspace = (size),
+    aba: aba::Workspace = (size),
+    minv: minv::Workspace = (size, model),
+    rnea_derivatives: rnea_derivatives::Workspace = (size),
+    aba_derivatives: aba_derivatives::Workspace = (size, model),
+    rnea_hessian: rnea_hessian::Workspace = (size),
+    aba_hessian: aba_hessian::Workspace = (size),
+    constrained_dynamics: constrained_dynamics::Workspace = (size, model),
+    constrained_derivatives: constrained_derivatives::Workspace = (size),
+    impulse_dynamics: impulse_dynamics::Workspace = (size),
+    statics: statics::Workspace = (size),
+    coriolis: coriolis::Workspace = (size),
+    centroidal: centroidal::Workspace = (size),
+    centroidal_derivatives: centroidal_derivatives::Workspace = (size),
+    energy: energy::Workspace = (size),
+    all_terms: all_terms::Workspace = (size),
+    forward_dynamics: factored_dynamics::Workspace = (size, model),
+    regressor: regressor::Workspace = (size),
+}
 
 impl<S: Scalar> Data<S> {
     /// Allocates everything for a model.
@@ -91,36 +112,6 @@ impl<S: Scalar> Data<S> {
             } else {
                 same(new_long(same(model)))
             }
-        }
-    }
-
-    fn allocate<R>(model: &Model<R>) -> Self {
-        let size = Size::new(model);
-        Self {
-            size,
-            tree: model.tree_hash(),
-            world: World::new(size),
-            moving: Moving::new(size),
-            rnea: rnea::Workspace::new(size),
-            crba: crba::Workspace::new(size),
-            aba: aba::Workspace::new(size),
-            minv: minv::Workspace::new(size, model),
-            rnea_derivatives: rnea_derivatives::Workspace::new(size),
-            aba_derivatives: aba_derivatives::Workspace::new(size, model),
-            rnea_hessian: rnea_hessian::Workspace::new(size),
-            aba_hessian: aba_hessian::Workspace::new(size),
-            constrained_dynamics: constrained_dynamics::Workspace::new(size, model),
-            constrained_derivatives: constrained_derivatives::Workspace::new(size),
-            impulse_dynamics: impulse_dynamics::Workspace::new(size),
-            statics: statics::Workspace::new(size),
-            coriolis: coriolis::Workspace::new(size),
-            centroidal: centroidal::Workspace::new(size),
-            centroidal_derivatives: centroidal_derivatives::Workspace::new(size),
-            energy: energy::Workspace::new(size),
-            all_terms: all_terms::Workspace::new(size),
-            forward_dynamics: factored_dynamics::Workspace::new(model),
-            regressor: regressor::Workspace::new(size),
-            limbs: Scratch::new::<S, R>(model),
         }
     }
 }
@@ -149,37 +140,6 @@ fn clone_long(data: &Data<Long>) -> Data<Long> {
 #[inline(never)]
 fn copied<W: Clone>(workspace: &W) -> W {
     workspace.clone()
-}
-
-impl<S: Scalar> Data<S> {
-    fn copy(&self) -> Self {
-        Self {
-            size: self.size,
-            tree: self.tree,
-            world: copied(&self.world),
-            moving: copied(&self.moving),
-            rnea: copied(&self.rnea),
-            crba: copied(&self.crba),
-            aba: copied(&self.aba),
-            minv: copied(&self.minv),
-            rnea_derivatives: copied(&self.rnea_derivatives),
-            aba_derivatives: copied(&self.aba_derivatives),
-            rnea_hessian: copied(&self.rnea_hessian),
-            aba_hessian: copied(&self.aba_hessian),
-            constrained_dynamics: copied(&self.constrained_dynamics),
-            constrained_derivatives: copied(&self.constrained_derivatives),
-            impulse_dynamics: copied(&self.impulse_dynamics),
-            statics: copied(&self.statics),
-            coriolis: copied(&self.coriolis),
-            centroidal: copied(&self.centroidal),
-            centroidal_derivatives: copied(&self.centroidal_derivatives),
-            energy: copied(&self.energy),
-            all_terms: copied(&self.all_terms),
-            forward_dynamics: copied(&self.forward_dynamics),
-            regressor: copied(&self.regressor),
-            limbs: copied(&self.limbs),
-        }
-    }
 }
 
 impl<S: Scalar> Clone for Data<S> {

@@ -1,7 +1,7 @@
 //! The arrays of which the workspaces of passes are made.
 //!
-//! Each pass keeps a workspace of its own, defined in its file, in which each field says frame, shape and writer. It is made
-//! of arrays and matrices that are read under both names of `f64`, as the `alike!` behind it has the compiler check.
+//! Each pass keeps a workspace of its own, defined in its file by `workspace!`, in which each field says frame, shape and
+//! writer. It is made of arrays and matrices that are read under both names of `f64`, as the compiler checks.
 
 use condyle_model::Model;
 use condyle_spatial::gate::{self, Witness};
@@ -61,3 +61,36 @@ pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Array<T> {
 pub(crate) fn zero_matrix<S: Scalar>(rows: usize, columns: usize) -> Matrix<S> {
     matrix(rows, columns, S::zero())
 }
+
+/// A workspace: of each field what it is, and what it is made with, from the sizes of a model and from what stands above it;
+/// behind `same`, those that do not depend on the scalar. Makes the struct, its `new`, and the check that it may be read
+/// under both names of `f64` ([`alike!`](condyle_spatial::alike)).
+macro_rules! workspace {
+    (
+        $(#[$doc:meta])*
+        $vis:vis struct $Workspace:ident<$S:ident>($size:ident $(, $model:ident: &Model<$R:ident>)?) {
+            $($(#[$field_doc:meta])* $field_vis:vis $field:ident: $Type:ty = $value:expr,)*
+        } $(same {
+            $($(#[$same_doc:meta])* $same_vis:vis $same:ident: $Same:ty = $same_value:expr,)*
+        })?
+    ) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug)]
+        #[repr(C)]
+        $vis struct $Workspace<$S> {
+            $($(#[$field_doc])* $field_vis $field: $Type,)*
+            $($($(#[$same_doc])* $same_vis $same: $Same,)*)?
+        }
+
+        condyle_spatial::alike!($Workspace { $($field),* } $(same { $($same),* })?);
+
+        impl<$S: condyle_spatial::Scalar> $Workspace<$S> {
+            pub(crate) fn new$(<$R>)?($size: crate::workspace::Size $(, $model: &Model<$R>)?) -> Self {
+                $(let $field: $Type = $value;)*
+                $($(let $same: $Same = $same_value;)*)?
+                Self { $($field,)* $($($same,)*)? }
+            }
+        }
+    };
+}
+pub(crate) use workspace;

@@ -114,7 +114,14 @@ fn folders_of_the_environment() {
     let (src, install) = (workspace.0.join("src"), workspace.0.join("install"));
     run(Some(src.clone()), None, "12");
     run(None, Some(install.clone()), "32");
-    run(Some(src), Some(install), "12");
+    run(Some(src.clone()), Some(install.clone()), "12");
+    // several folders, and some that have no name
+    let empty = workspace.0.join("nothing");
+    let several =
+        |first: &Path, second: &Path| Some(std::env::join_paths([first, Path::new(""), second]).unwrap().into());
+    run(several(&src, &install.join("share")), None, "12");
+    run(several(&install.join("share"), &src), None, "32");
+    run(several(&empty, &empty), several(&empty, &install), "32");
     let nowhere = "there are no folders to look in (`packages`, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH)";
     run(None, None, &format!("{dog}: no such file in a package `dog_description`; {nowhere}"));
 }

@@ -58,32 +58,3 @@ fn distance(a: &[char], b: &[char]) -> usize {
 pub(crate) fn near(nearest: &str) -> String {
     near_or(nearest, "")
 }
-
-#[cfg(test)]
-mod tests {
-    use super::distance;
-
-    /// All words of the letters a, b, c with at most five of them.
-    fn words() -> Vec<String> {
-        let mut words = vec![String::new()];
-        let mut from = 0;
-        for _ in 0..5 {
-            let to = words.len();
-            for i in from..to {
-                "abc".chars().for_each(|c| words.push(format!("{}{c}", words[i])));
-            }
-            from = to;
-        }
-        words
-    }
-
-    #[test]
-    fn distances_are_those_of_strsim() {
-        let words: Vec<(String, Vec<char>)> = words().into_iter().map(|w| (w.clone(), w.chars().collect())).collect();
-        for (a, letters_a) in &words {
-            for (b, letters_b) in &words {
-                assert_eq!(distance(letters_a, letters_b), strsim::osa_distance(a, b), "{a} {b}");
-            }
-        }
-    }
-}

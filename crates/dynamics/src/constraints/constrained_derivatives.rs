@@ -14,7 +14,7 @@
 //! programming for multi-phase rigid contact dynamics* (2018).
 
 use crate::constraints::constraint_set::ConstraintSet;
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::tree_product::{minus_block_product, subtract_column};
@@ -22,33 +22,18 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Array, Force, Matrix, Scalar, alike};
 use core::ops::Range;
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// All forces on each body, in its frame. Shape: bodies. Written by: `load`.
-    pub forces: Array<Force<S>>,
-    /// M⁻¹, then P. Shape: nv × nv. Written by: `finish`.
-    pub P: Matrix<S>,
-    /// ∂(M q̈ + h − Jᵀ λ)/∂q. Shape: nv × nv. Written by: `differentiate`.
-    pub dtau_dq: Matrix<S>,
-    /// The derivative of q̈ or of the velocity. Shape: nv × nv. Written by: `constrained_dynamics_derivatives`,
-    /// `impulse_dynamics_derivatives`.
-    pub da_dq: Matrix<S>,
-    pub da_dv: Matrix<S>,
-}
-
-alike!(Workspace { forces, P, dtau_dq, da_dq, da_dv });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        let square = zero_matrix(size.nv, size.nv);
-        Self {
-            forces: filled(Force::zero, size.bodies),
-            P: square.clone(),
-            dtau_dq: square.clone(),
-            da_dq: square.clone(),
-            da_dv: square,
-        }
+workspace! {
+    pub(crate) struct Workspace<S>(size) {
+        /// All forces on each body, in its frame. Written by: `load`.
+        pub forces: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// M⁻¹, then P. Written by: `finish`.
+        pub P: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// ∂(M q̈ + h − Jᵀ λ)/∂q. Written by: `differentiate`.
+        pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// The derivative of q̈ or of the velocity. Written by: `constrained_dynamics_derivatives`,
+        /// `impulse_dynamics_derivatives`.
+        pub da_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
+        pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 

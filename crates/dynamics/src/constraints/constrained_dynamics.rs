@@ -16,49 +16,32 @@ use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::crba;
 use crate::passes::kinematics::World;
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Force, Inertia, Mat3, Matrix, Motion, Scalar, Vec3, alike};
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Mat3, Matrix, Motion, Scalar, Vec3};
 
-/// In the world's frame.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Velocity. Shape: bodies. Written by: `bias`.
-    pub v: Array<Motion<S>>,
-    /// Acceleration for q̈ = 0, with gravity as the world's. Shape: bodies. Written by: `bias`.
-    pub a: Array<Motion<S>>,
-    /// Iᶜ. Shape: bodies. Written by: `bias`, `inertia`.
-    pub IC: Array<Inertia<S>>,
-    /// Force through the joint for q̈ = 0. Shape: bodies. Written by: `bias`.
-    pub F: Array<Force<S>>,
-    /// Shape: nv × nv. Written by: `bias`, `inertia`.
-    pub M: Matrix<S>,
-    /// Its factor. Written by: `constrained_dynamics`, `impulse_dynamics`.
-    pub factor: Ltdl<S>,
-    /// τ − h. Shape: nv. Written by: `bias`, `constrained_dynamics`.
-    pub effort: Array<S>,
-    /// The acceleration, or the change of velocity. Shape: nv. Written by: `constrained_dynamics`, `impulse_dynamics`.
-    pub qdd: Array<S>,
-}
-
-alike!(Workspace { v, a, IC, F, M, factor, effort, qdd });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
-        Self {
-            v: filled(Motion::zero, size.bodies),
-            a: filled(Motion::zero, size.bodies),
-            IC: filled(Inertia::zero, size.bodies),
-            F: filled(Force::zero, size.bodies),
-            M: zero_matrix(size.nv, size.nv),
-            factor: Ltdl::new(model),
-            effort: filled(S::zero, size.nv),
-            qdd: filled(S::zero, size.nv),
-        }
+workspace! {
+    /// In the world's frame.
+    pub(crate) struct Workspace<S>(size, model: &Model<R>) {
+        /// Velocity. Written by: `bias`.
+        pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Acceleration for q̈ = 0, with gravity as the world's. Written by: `bias`.
+        pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Iᶜ. Written by: `bias`, `inertia`.
+        pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// Force through the joint for q̈ = 0. Written by: `bias`.
+        pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// Written by: `bias`, `inertia`.
+        pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Its factor. Written by: `constrained_dynamics`, `impulse_dynamics`.
+        pub factor: Ltdl<S> = Ltdl::new(model),
+        /// τ − h. Written by: `bias`, `constrained_dynamics`.
+        pub effort: Array<S> = filled(S::zero, size.nv),
+        /// The acceleration, or the change of velocity. Written by: `constrained_dynamics`, `impulse_dynamics`.
+        pub qdd: Array<S> = filled(S::zero, size.nv),
     }
 }
 

@@ -144,6 +144,12 @@ impl<S: Scalar> ConstraintSet<S> {
         self.plans[k].row..self.plans[k].row + self.plans[k].rows()
     }
 
+    /// The islands: the coordinates and the rows of each part that is computed apart, as constraints that share no body are,
+    /// or only bodies that do not move. The coordinates are those of the model, in order; a tree that nothing holds has no rows.
+    pub fn islands(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
+        self.islands.iter().map(|island| (island.coordinates.clone(), island.rows.clone()))
+    }
+
     /// The target of constraint k, where it wants its frame to be, in each lane by itself.
     ///
     /// # Panics

@@ -19,39 +19,25 @@ use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::islands::clear_rows;
 use crate::passes::kinematics::World;
-use crate::workspace::{Size, filled};
+use crate::workspace::{filled, workspace};
 use condyle_linalg::axpy::axpy;
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Cross, Matrix, Motion, Scalar, alike};
+use condyle_spatial::{Array, Cross, Matrix, Motion, Scalar};
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// v⁺. Shape: nv. Written by: `pass`.
-    pub v_after: Array<S>,
-    /// w = v⁺ + ε v. Shape: nv. Written by: `pass`.
-    pub w: Array<S>,
-    /// The bodies' velocities for w, in the world's frame. Shape: bodies. Written by: `spread`.
-    pub velocity: Array<Motion<S>>,
-    /// Ψ̇ for w. Shape: columns. Written by: `spread`.
-    pub Psid: Array<Motion<S>>,
-    /// Zeros. Shape: nv. Written by: nobody.
-    pub zero: Array<S>,
-}
-
-alike!(Workspace { v_after, w, velocity, Psid, zero });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            v_after: filled(S::zero, size.nv),
-            w: filled(S::zero, size.nv),
-            velocity: filled(Motion::zero, size.bodies),
-            Psid: filled(Motion::zero, size.columns),
-            zero: filled(S::zero, size.nv),
-        }
+workspace! {
+    pub(crate) struct Workspace<S>(size) {
+        /// v⁺. Written by: `pass`.
+        pub v_after: Array<S> = filled(S::zero, size.nv),
+        /// w = v⁺ + ε v. Written by: `pass`.
+        pub w: Array<S> = filled(S::zero, size.nv),
+        /// The bodies' velocities for w, in the world's frame. Written by: `spread`.
+        pub velocity: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Ψ̇ for w. Written by: `spread`.
+        pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
+        /// Zeros. Written by: nobody.
+        pub zero: Array<S> = filled(S::zero, size.nv),
     }
 }
 

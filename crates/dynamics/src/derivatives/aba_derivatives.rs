@@ -18,45 +18,41 @@
 use crate::derivatives::tree_solve::{self, minus_solve};
 use crate::passes::aba::{self};
 use crate::passes::kinematics::World;
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Model;
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Matrix, Scalar, Vec3, alike};
+use condyle_spatial::{Array, Matrix, Scalar, Vec3};
 use core::any::Any;
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// The acceleration. Shape: nv. Written by: `aba_derivatives`.
-    pub a: Array<S>,
-    /// Shape: nv × nv. Written by: `aba_derivatives`.
-    pub da_dq: Matrix<S>,
-    /// Shape: nv × nv. Written by: `aba_derivatives`.
-    pub da_dv: Matrix<S>,
-    /// The first coordinate of each body that floats. Written by: `new`.
-    pub floating: Vec<usize>,
-    /// The rows of ∂τ by which M⁻¹ is multiplied: none for linear coordinates of bodies that float. Written by: `new`.
-    pub nonzero_rows: Vec<NonzeroRows>,
-    pub solve: tree_solve::Workspace<S>,
+workspace! {
+    pub(crate) struct Workspace<S>(size, model: &Model<R>) {
+        /// The acceleration. Written by: `aba_derivatives`.
+        pub a: Array<S> = filled(S::zero, size.nv),
+        /// Written by: `aba_derivatives`.
+        pub da_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `aba_derivatives`.
+        pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
+        pub solve: tree_solve::Workspace<S> = tree_solve::Workspace::new(model.columns(), size.nv),
+    } same {
+        /// The first coordinate of each body that floats. Written by: `new`.
+        pub floating: Vec<usize> = model.floating().map(|i| model.nodes()[i].idx_v).collect(),
+        /// The rows of ∂τ by which M⁻¹ is multiplied: none for linear coordinates of bodies that float. Written by: `new`.
+        pub nonzero_rows: Vec<NonzeroRows> = NonzeroRows::of_columns(rows_that_count(model, &floating)),
+    }
 }
 
-alike!(Workspace { a, da_dq, da_dv, solve } same { floating, nonzero_rows });
+/// The rows of each column of ∂τ that may differ from zero, without those of the linear coordinates of bodies that float.
+fn rows_that_count<R>(model: &Model<R>, floating: &[usize]) -> Vec<Vec<usize>> {
+    let mut rows: Vec<Vec<usize>> = model.nonzero_rows().iter().map(|column| column.rows.clone()).collect();
+    for &first in floating {
+        rows[first..first + 3].iter_mut().for_each(Vec::clear);
+    }
+    rows
+}
 
 impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
-        let square = zero_matrix(size.nv, size.nv);
-        let solve = tree_solve::Workspace::new(model.columns(), size.nv);
-        let floating: Vec<usize> = model.floating().map(|i| model.nodes()[i].idx_v).collect();
-        let mut rows: Vec<Vec<usize>> = model.nonzero_rows().iter().map(|column| column.rows.clone()).collect();
-        for &first in &floating {
-            rows[first..first + 3].iter_mut().for_each(Vec::clear);
-        }
-        let nonzero_rows = NonzeroRows::of_columns(rows);
-        Self { a: filled(S::zero, size.nv), da_dq: square.clone(), da_dv: square, floating, nonzero_rows, solve }
-    }
-
     /// Whether there are bodies that float and all do so freely: their linear coordinates have no armature, which is seen of numbers.
     pub(crate) fn float_freely<R: 'static>(&self, model: &Model<R>) -> bool {
         let model = (model as &dyn Any).downcast_ref::<Model>();

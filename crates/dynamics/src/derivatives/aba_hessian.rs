@@ -13,11 +13,11 @@
 
 use crate::derivatives::aba_derivatives::{self};
 use crate::derivatives::rnea_hessian;
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_linalg::tree_product::minus_product;
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Matrix, Scalar, alike};
+use condyle_spatial::{Array, Matrix, Scalar};
 
 /// Bᵀ, of a square matrix.
 #[inline(always)]
@@ -29,39 +29,22 @@ fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
     }
 }
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// μ = M⁻¹ λ. Shape: nv. Written by: `aba_hessian`.
-    pub mu: Array<S>,
-    /// A transpose. Shape: nv × nv. Written by: `run`.
-    pub transpose: Array<S>,
-    /// A product. Shape: nv × nv. Written by: `run`.
-    pub product: Array<S>,
-    /// Shape: nv × nv. Written by: `run`.
-    pub dqdq: Matrix<S>,
-    /// Shape: nv × nv. Written by: `run`.
-    pub dvdq: Matrix<S>,
-    /// Shape: nv × nv. Written by: `run`.
-    pub dvdv: Matrix<S>,
-    /// Shape: nv × nv. Written by: `run`.
-    pub dtaudq: Matrix<S>,
-}
-
-alike!(Workspace { mu, transpose, product, dqdq, dvdq, dvdv, dtaudq });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        let square = || zero_matrix(size.nv, size.nv);
-        Self {
-            mu: filled(S::zero, size.nv),
-            transpose: filled(S::zero, size.nv * size.nv),
-            product: filled(S::zero, size.nv * size.nv),
-            dqdq: square(),
-            dvdq: square(),
-            dvdv: square(),
-            dtaudq: square(),
-        }
+workspace! {
+    pub(crate) struct Workspace<S>(size) {
+        /// μ = M⁻¹ λ. Written by: `aba_hessian`.
+        pub mu: Array<S> = filled(S::zero, size.nv),
+        /// A transpose. Written by: `run`.
+        pub transpose: Array<S> = filled(S::zero, size.nv * size.nv),
+        /// A product. Written by: `run`.
+        pub product: Array<S> = filled(S::zero, size.nv * size.nv),
+        /// Written by: `run`.
+        pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `run`.
+        pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `run`.
+        pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `run`.
+        pub dtaudq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 

@@ -15,7 +15,7 @@
 use crate::passes::centroidal::{about, add};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::{Moving, World};
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
@@ -33,50 +33,34 @@ struct Column<S> {
 
 alike!(Column { h_q, F_q, F_v, F_a });
 
-/// In the world's frame, but for what is said to be about the centre of mass.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `pass`.
-    pub IC: Array<Inertia<S>>,
-    /// hᶜ and 2Bᶜ, likewise. Shape: bodies. Written by: `pass`.
-    pub BC: Array<Coriolis<S>>,
-    /// Fᶜ, likewise. Shape: bodies. Written by: `pass`.
-    pub F: Array<Force<S>>,
-    /// Shape: columns. Written by: `pass`.
-    columns: Array<Column<S>>,
-    /// About the centre of mass. Shape: 6 × nv. Written by: `shift`.
-    pub dh_dq: Matrix<S>,
-    pub drate_dq: Matrix<S>,
-    pub drate_dv: Matrix<S>,
-    pub drate_da: Matrix<S>,
-    /// Shape: 3 × nv. Written by: `shift`.
-    pub dcom_dq: Matrix<S>,
-    pub dvcom_dq: Matrix<S>,
-    pub dacom_dq: Matrix<S>,
-    pub dacom_dv: Matrix<S>,
+impl<S: Scalar> Column<S> {
+    fn zero() -> Self {
+        let o = Force::zero();
+        Self { h_q: o, F_q: o, F_v: o, F_a: o }
+    }
 }
 
-alike!(Workspace { IC, BC, F, columns, dh_dq, drate_dq, drate_dv, drate_da, dcom_dq, dvcom_dq, dacom_dq, dacom_dv });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        let rows = |n| zero_matrix(n, size.nv);
-        let (six, three, o) = (rows(6), rows(3), Force::zero());
-        Self {
-            IC: filled(Inertia::zero, size.bodies),
-            BC: filled(Coriolis::zero, size.bodies),
-            F: filled(|| o, size.bodies),
-            columns: filled(|| Column { h_q: o, F_q: o, F_v: o, F_a: o }, size.columns),
-            dh_dq: six.clone(),
-            drate_dq: six.clone(),
-            drate_dv: six.clone(),
-            drate_da: six,
-            dcom_dq: three.clone(),
-            dvcom_dq: three.clone(),
-            dacom_dq: three.clone(),
-            dacom_dv: three,
-        }
+workspace! {
+    /// In the world's frame, but for what is said to be about the centre of mass.
+    pub(crate) struct Workspace<S>(size) {
+        /// Iᶜ; of the world, that of all bodies that move. Written by: `pass`.
+        pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// hᶜ and 2Bᶜ, likewise. Written by: `pass`.
+        pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
+        /// Fᶜ, likewise. Written by: `pass`.
+        pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// Written by: `pass`.
+        columns: Array<Column<S>> = filled(Column::zero, size.columns),
+        /// About the centre of mass. Written by: `shift`.
+        pub dh_dq: Matrix<S> = zero_matrix(6, size.nv),
+        pub drate_dq: Matrix<S> = zero_matrix(6, size.nv),
+        pub drate_dv: Matrix<S> = zero_matrix(6, size.nv),
+        pub drate_da: Matrix<S> = zero_matrix(6, size.nv),
+        /// Written by: `shift`.
+        pub dcom_dq: Matrix<S> = zero_matrix(3, size.nv),
+        pub dvcom_dq: Matrix<S> = zero_matrix(3, size.nv),
+        pub dacom_dq: Matrix<S> = zero_matrix(3, size.nv),
+        pub dacom_dv: Matrix<S> = zero_matrix(3, size.nv),
     }
 }
 

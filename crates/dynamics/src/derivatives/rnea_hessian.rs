@@ -32,49 +32,31 @@
 use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, Vec3, alike};
+use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, Vec3};
 
-/// In the world's frame.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// w, the velocity at λ. Shape: bodies. Written by: `pass`.
-    pub w: Array<Motion<S>>,
-    /// W = w_λ × S. Shape: columns. Written by: `pass`.
-    pub W: Array<Motion<S>>,
-    /// P and D. Shape: bodies. Written by: `pass`.
-    pub PD: Array<Coriolis<S>>,
-    /// Q, of which only the angular part is not zero. Shape: bodies. Written by: `pass`.
-    pub Q: Array<Vec3<S>>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub dqdq: Matrix<S>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub dvdq: Matrix<S>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub dvdv: Matrix<S>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub dadq: Matrix<S>,
-}
-
-alike!(Workspace { w, W, PD, Q, dqdq, dvdq, dvdv, dadq });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        let square = zero_matrix(size.nv, size.nv);
-        Self {
-            w: filled(Motion::zero, size.bodies),
-            W: filled(Motion::zero, size.columns),
-            PD: filled(Coriolis::zero, size.bodies),
-            Q: filled(Vec3::zero, size.bodies),
-            dqdq: square.clone(),
-            dvdq: square.clone(),
-            dvdv: square.clone(),
-            dadq: square,
-        }
+workspace! {
+    /// In the world's frame.
+    pub(crate) struct Workspace<S>(size) {
+        /// w, the velocity at λ. Written by: `pass`.
+        pub w: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// W = w_λ × S. Written by: `pass`.
+        pub W: Array<Motion<S>> = filled(Motion::zero, size.columns),
+        /// P and D. Written by: `pass`.
+        pub PD: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
+        /// Q, of which only the angular part is not zero. Written by: `pass`.
+        pub Q: Array<Vec3<S>> = filled(Vec3::zero, size.bodies),
+        /// Written by: `pass`.
+        pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `pass`.
+        pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `pass`.
+        pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `pass`.
+        pub dadq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 

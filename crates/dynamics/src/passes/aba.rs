@@ -6,51 +6,33 @@
 //! matrix is inverted.
 
 use crate::passes::kinematics::World;
-use crate::workspace::{Size, filled};
+use crate::workspace::{filled, workspace};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, ArticulatedInertia, Cross, Force, Motion, Scalar, Vec3, alike};
+use condyle_spatial::{Act, Array, ArticulatedInertia, Cross, Force, Motion, Scalar, Vec3};
 
-/// In the world's frame.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Articulated inertia. Shape: levels. Written by: `factorize`, `inward`.
-    pub IA: Array<ArticulatedInertia<S>>,
-    /// U = Iᴬ S of each column. Shape: columns. Written by: `factorize`, `inward`.
-    pub U: Array<Force<S>>,
-    /// 1/D, D = Sᵀ U + armature. Shape: columns. Written by: `factorize`, `inward`.
-    pub D_inv: Array<S>,
-    /// Velocity; the world's stays 0. Shape: levels. Written by: `inward`.
-    pub v: Array<Motion<S>>,
-    /// Acceleration, with gravity as the world's. Shape: levels. Written by: `outward`.
-    pub a: Array<Motion<S>>,
-    /// v × v_J. Shape: bodies. Written by: `inward`.
-    pub c: Array<Motion<S>>,
-    /// Articulated bias force. Shape: levels. Written by: `inward`.
-    pub pA: Array<Force<S>>,
-    /// τ − Sᵀ pᴬ. Shape: columns. Written by: `inward`.
-    pub u: Array<S>,
-    /// Joint accelerations. Shape: nv. Written by: `outward`.
-    pub qdd: Array<S>,
-}
-
-alike!(Workspace { IA, U, D_inv, v, a, c, pA, u, qdd });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            IA: filled(ArticulatedInertia::zero, size.levels),
-            U: filled(Force::zero, size.columns),
-            D_inv: filled(S::zero, size.columns),
-            v: filled(Motion::zero, size.levels),
-            a: filled(Motion::zero, size.levels),
-            c: filled(Motion::zero, size.bodies),
-            pA: filled(Force::zero, size.levels),
-            u: filled(S::zero, size.columns),
-            qdd: filled(S::zero, size.nv),
-        }
+workspace! {
+    /// In the world's frame.
+    pub(crate) struct Workspace<S>(size) {
+        /// Articulated inertia. Written by: `factorize`, `inward`.
+        pub IA: Array<ArticulatedInertia<S>> = filled(ArticulatedInertia::zero, size.levels),
+        /// U = Iᴬ S of each column. Written by: `factorize`, `inward`.
+        pub U: Array<Force<S>> = filled(Force::zero, size.columns),
+        /// 1/D, D = Sᵀ U + armature. Written by: `factorize`, `inward`.
+        pub D_inv: Array<S> = filled(S::zero, size.columns),
+        /// Velocity; the world's stays 0. Written by: `inward`.
+        pub v: Array<Motion<S>> = filled(Motion::zero, size.levels),
+        /// Acceleration, with gravity as the world's. Written by: `outward`.
+        pub a: Array<Motion<S>> = filled(Motion::zero, size.levels),
+        /// v × v_J. Written by: `inward`.
+        pub c: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Articulated bias force. Written by: `inward`.
+        pub pA: Array<Force<S>> = filled(Force::zero, size.levels),
+        /// τ − Sᵀ pᴬ. Written by: `inward`.
+        pub u: Array<S> = filled(S::zero, size.columns),
+        /// Joint accelerations. Written by: `outward`.
+        pub qdd: Array<S> = filled(S::zero, size.nv),
     }
 }
 

@@ -9,43 +9,28 @@ use crate::passes::coriolis::Coriolis;
 use crate::passes::energy::rotors;
 use crate::passes::frames::{ReferenceFrame, Velocities, classical};
 use crate::passes::kinematics::{Moving, World};
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
 use condyle_spatial::gate::{Fused, Rename};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
-/// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Acceleration for q̈ = 0, with gravity as the world's. Shape: bodies. Written by: `pass`.
-    pub a: Array<Motion<S>>,
-    /// Force through the joint for q̈ = 0. Shape: bodies. Written by: `pass`.
-    pub f: Array<Force<S>>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub M: Matrix<S>,
-    /// Shape: nv. Written by: `pass`.
-    pub h: Array<S>,
-    /// Twice that of the bodies, then the kinetic energy. Written by: `pass`, then by `run`.
-    pub kinetic_energy: S,
-    /// Written by: `run`.
-    pub potential_energy: S,
-}
-
-alike!(Workspace { a, f, M, h, kinetic_energy, potential_energy });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            a: filled(Motion::zero, size.bodies),
-            f: filled(Force::zero, size.bodies),
-            M: zero_matrix(size.nv, size.nv),
-            h: filled(S::zero, size.nv),
-            kinetic_energy: S::zero(),
-            potential_energy: S::zero(),
-        }
+workspace! {
+    /// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
+    pub(crate) struct Workspace<S>(size) {
+        /// Acceleration for q̈ = 0, with gravity as the world's. Written by: `pass`.
+        pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Force through the joint for q̈ = 0. Written by: `pass`.
+        pub f: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// Written by: `pass`.
+        pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `pass`.
+        pub h: Array<S> = filled(S::zero, size.nv),
+        /// Twice that of the bodies, then the kinetic energy. Written by: `pass`, then by `run`.
+        pub kinetic_energy: S = S::zero(),
+        /// Written by: `run`.
+        pub potential_energy: S = S::zero(),
     }
 }
 

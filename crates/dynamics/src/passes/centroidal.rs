@@ -10,63 +10,46 @@ use crate::passes::answers::answers;
 use crate::passes::coriolis::Coriolis;
 use crate::passes::frames::{Accelerations, Velocities};
 use crate::passes::kinematics::{Moving, World};
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::gate::{Fused, Rename};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Scalar, Se3, Vec3, alike};
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Scalar, Se3, Vec3};
 
-/// In the world's frame, but for what is said to be about the centre of mass.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Iᶜ; of the world, that of all bodies that move. Shape: bodies. Written by: `map`, `map_rate`, all terms.
-    pub IC: Array<Inertia<S>>,
-    /// Iᶜ v and İᶜ, likewise. Shape: bodies. Written by: `map_rate`, all terms.
-    pub BC: Array<Coriolis<S>>,
-    /// Iᶜ S. Shape: columns. Written by: `map`, `map_rate`, all terms.
-    pub F: Array<Force<S>>,
-    /// İᶜ S + Iᶜ Ṡ. Shape: columns. Written by: `map_rate`, all terms.
-    pub dF: Array<Force<S>>,
-    /// About the centre of mass. Shape: 6 × nv. Written by: `shift_map`.
-    pub Ag: Matrix<S>,
-    /// About the centre of mass. Shape: 6 × nv. Written by: `shift_rate`.
-    pub dAg: Matrix<S>,
-    /// Shape: 3 × nv. Written by: `shift_map`.
-    pub Jcom: Matrix<S>,
-    /// Written by: `shift_map`, `shift_rate`.
-    pub whole: Whole<S>,
+workspace! {
+    /// In the world's frame, but for what is said to be about the centre of mass.
+    pub(crate) struct Workspace<S>(size) {
+        /// Iᶜ; of the world, that of all bodies that move. Written by: `map`, `map_rate`, all terms.
+        pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// Iᶜ v and İᶜ, likewise. Written by: `map_rate`, all terms.
+        pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
+        /// Iᶜ S. Written by: `map`, `map_rate`, all terms.
+        pub F: Array<Force<S>> = filled(Force::zero, size.columns),
+        /// İᶜ S + Iᶜ Ṡ. Written by: `map_rate`, all terms.
+        pub dF: Array<Force<S>> = filled(Force::zero, size.columns),
+        /// About the centre of mass. Written by: `shift_map`.
+        pub Ag: Matrix<S> = zero_matrix(6, size.nv),
+        /// About the centre of mass. Written by: `shift_rate`.
+        pub dAg: Matrix<S> = zero_matrix(6, size.nv),
+        /// Written by: `shift_map`.
+        pub Jcom: Matrix<S> = zero_matrix(3, size.nv),
+        /// Written by: `shift_map`, `shift_rate`.
+        pub whole: Whole<S> = Whole::new(size),
+    }
 }
 
-alike!(Workspace { IC, BC, F, dF, Ag, dAg, Jcom, whole });
-
-/// The robot as if it were one body: of which its rate has the last two alone.
-#[derive(Clone, Copy, Debug)]
-#[repr(C)]
-pub(crate) struct Whole<S> {
-    pub Ig: Inertia<S>,
-    pub com: Vec3<S>,
-    pub hg: Force<S>,
-    pub com_velocity: Vec3<S>,
+workspace! {
+    /// The robot as if it were one body: of which its rate has the last two alone.
+    pub(crate) struct Whole<S>(_size) {
+        pub Ig: Inertia<S> = Inertia::zero(),
+        pub com: Vec3<S> = Vec3::zero(),
+        pub hg: Force<S> = Force::zero(),
+        pub com_velocity: Vec3<S> = Vec3::zero(),
+    }
 }
-
-alike!(Whole { Ig, com, hg, com_velocity });
 
 impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            IC: filled(Inertia::zero, size.bodies),
-            BC: filled(Coriolis::zero, size.bodies),
-            F: filled(Force::zero, size.columns),
-            dF: filled(Force::zero, size.columns),
-            Ag: zero_matrix(6, size.nv),
-            dAg: zero_matrix(6, size.nv),
-            Jcom: zero_matrix(3, size.nv),
-            whole: Whole { Ig: Inertia::zero(), com: Vec3::zero(), hg: Force::zero(), com_velocity: Vec3::zero() },
-        }
-    }
-
     /// What `run_map` has left.
     pub(crate) fn map(&self) -> CentroidalMap<'_, S> {
         let Self { Ag, Jcom, whole: Whole { Ig, com, .. }, .. } = self;

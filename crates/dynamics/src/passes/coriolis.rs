@@ -12,7 +12,7 @@
 //! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
 use crate::passes::kinematics::{Moving, World};
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
@@ -80,27 +80,15 @@ impl<S: Scalar> Coriolis<S> {
     }
 }
 
-/// In the world's frame.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Iᶜ. Shape: bodies. Written by: `pass`.
-    pub IC: Array<Inertia<S>>,
-    /// 2Bᶜ. Shape: bodies. Written by: `pass`.
-    pub BC: Array<Coriolis<S>>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub C: Matrix<S>,
-}
-
-alike!(Workspace { IC, BC, C });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            IC: filled(Inertia::zero, size.bodies),
-            BC: filled(Coriolis::zero, size.bodies),
-            C: zero_matrix(size.nv, size.nv),
-        }
+workspace! {
+    /// In the world's frame.
+    pub(crate) struct Workspace<S>(size) {
+        /// Iᶜ. Written by: `pass`.
+        pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// 2Bᶜ. Written by: `pass`.
+        pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
+        /// Written by: `pass`.
+        pub C: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 

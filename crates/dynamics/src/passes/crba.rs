@@ -4,26 +4,18 @@
 //! a plain sum.
 
 use crate::passes::kinematics::World;
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Inertia, Matrix, Scalar, alike};
+use condyle_spatial::{Act, Array, Inertia, Matrix, Scalar};
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Inertia of the body and all that it carries, in the world's frame. Shape: bodies. Written by: `pass`.
-    pub IC: Array<Inertia<S>>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub M: Matrix<S>,
-}
-
-alike!(Workspace { IC, M });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self { IC: filled(Inertia::zero, size.bodies), M: zero_matrix(size.nv, size.nv) }
+workspace! {
+    pub(crate) struct Workspace<S>(size) {
+        /// Inertia of the body and all that it carries, in the world's frame. Written by: `pass`.
+        pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// Written by: `pass`.
+        pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 

@@ -3,11 +3,11 @@
 use crate::passes::answers::{Number, answers};
 use crate::passes::frames::{Placements, Velocities};
 use crate::passes::kinematics::{Moving, World};
-use crate::workspace::{Size, filled};
+use crate::workspace::{filled, workspace};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Constant, Cross, Force, Inertia, Motion, Scalar, alike};
+use condyle_spatial::{Act, Array, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 answers! {
     /// V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), 0 at the world's
@@ -61,34 +61,19 @@ pub(crate) fn rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]) -> S
     twice
 }
 
-/// In the world's frame.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Inertia of all that a joint carries. Shape: bodies. Written by: `derivatives`.
-    pub IC: Array<Inertia<S>>,
-    /// Momentum of all that a joint carries. Shape: bodies. Written by: `derivatives`.
-    pub h: Array<Force<S>>,
-    /// Shape: nv. Written by: `derivatives`.
-    pub dT_dq: Array<S>,
-    /// Shape: nv. Written by: `derivatives`.
-    pub dT_dv: Array<S>,
-    /// Shape: nv. Written by: `derivatives`.
-    pub dV_dq: Array<S>,
-}
-
-alike!(Workspace { IC, h, dT_dq, dT_dv, dV_dq });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        let zeros = || filled(S::zero, size.nv);
-        Self {
-            IC: filled(Inertia::zero, size.bodies),
-            h: filled(Force::zero, size.bodies),
-            dT_dq: zeros(),
-            dT_dv: zeros(),
-            dV_dq: zeros(),
-        }
+workspace! {
+    /// In the world's frame.
+    pub(crate) struct Workspace<S>(size) {
+        /// Inertia of all that a joint carries. Written by: `derivatives`.
+        pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// Momentum of all that a joint carries. Written by: `derivatives`.
+        pub h: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// Written by: `derivatives`.
+        pub dT_dq: Array<S> = filled(S::zero, size.nv),
+        /// Written by: `derivatives`.
+        pub dT_dv: Array<S> = filled(S::zero, size.nv),
+        /// Written by: `derivatives`.
+        pub dV_dq: Array<S> = filled(S::zero, size.nv),
     }
 }
 

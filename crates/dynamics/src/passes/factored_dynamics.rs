@@ -1,11 +1,11 @@
 //! Forward dynamics by the method that is fastest for the model.
 
-use crate::workspace::filled;
+use crate::workspace::{filled, workspace};
 use condyle_linalg::Cholesky;
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Matrix, Scalar, alike};
+use condyle_spatial::{Array, Matrix, Scalar};
 
 /// A way to compute forward dynamics. All give the same numbers, up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,29 +18,16 @@ pub enum ForwardDynamicsMethod {
     Sparse,
 }
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// A factor of M. Written by: `forward_dynamics`.
-    pub sparse: Ltdl<S>,
-    /// A factor of M. Written by: `forward_dynamics`.
-    pub dense: Cholesky<S>,
-    /// τ − h, then joint accelerations. Shape: nv. Written by: `forward_dynamics`.
-    pub qdd: Array<S>,
-    /// Zeros. Shape: nv. Written by: nobody.
-    pub zero: Array<S>,
-}
-
-alike!(Workspace { sparse, dense, qdd, zero });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new<R>(model: &Model<R>) -> Self {
-        Self {
-            sparse: Ltdl::new(model),
-            dense: Cholesky::new(model.nv()),
-            qdd: filled(S::zero, model.nv()),
-            zero: filled(S::zero, model.nv()),
-        }
+workspace! {
+    pub(crate) struct Workspace<S>(size, model: &Model<R>) {
+        /// A factor of M. Written by: `forward_dynamics`.
+        pub sparse: Ltdl<S> = Ltdl::new(model),
+        /// A factor of M. Written by: `forward_dynamics`.
+        pub dense: Cholesky<S> = Cholesky::new(size.nv),
+        /// τ − h, then joint accelerations. Written by: `forward_dynamics`.
+        pub qdd: Array<S> = filled(S::zero, size.nv),
+        /// Zeros. Written by: nobody.
+        pub zero: Array<S> = filled(S::zero, model.nv()),
     }
 }
 

@@ -1,29 +1,28 @@
 //! Kinematics, the placements and motions of all bodies: one pass from the root to the tips for all bodies. What can then
 //! be asked is in `frames.rs`.
 
-use crate::workspace::{Size, filled};
+use crate::workspace::{filled, workspace};
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Cross, Motion, Scalar, Se3, alike};
+use condyle_spatial::{Array, Cross, Motion, Scalar, Se3};
 
-/// The quantities that depend on the position alone, in the world's frame.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct World<S> {
-    /// Written by: `place`, and by `rnea`.
-    pub sin_cos: JointSinCos<S>,
-    /// oXi: the body's turned frame in the world. Shape: bodies. Written by: `place`.
-    pub oX: Array<Se3<S>>,
-    /// S: what each degree of freedom moves the body by. Shape: columns. Written by: `place`.
-    pub S: Array<Motion<S>>,
-    /// The place of the last call's placements. Written by: `place`, by `rnea`, and by limbs.
-    pub placed: PlacementCache,
+workspace! {
+    /// The quantities that depend on the position alone, in the world's frame.
+    pub(crate) struct World<S>(size) {
+        /// Written by: `place`, and by `rnea`.
+        pub sin_cos: JointSinCos<S> = JointSinCos::new(size.bodies),
+        /// oXi: the body's turned frame in the world. Written by: `place`.
+        pub oX: Array<Se3<S>> = filled(Se3::identity, size.bodies),
+        /// S: what each degree of freedom moves the body by. Written by: `place`.
+        pub S: Array<Motion<S>> = filled(Motion::zero, size.columns),
+    } same {
+        /// The place of the last call's placements. Written by: `place`, by `rnea`, and by limbs.
+        pub placed: PlacementCache = PlacementCache::Nowhere,
+    }
 }
-
-alike!(World { sin_cos, oX, S } same { placed });
 
 /// The place of the bodies' placements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,17 +33,6 @@ pub(crate) enum PlacementCache {
     Bodies,
     /// Placements in the steps of limbs side by side.
     Limbs,
-}
-
-impl<S: Scalar> World<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            sin_cos: JointSinCos::new(size.bodies),
-            oX: filled(Se3::identity, size.bodies),
-            S: filled(Motion::zero, size.columns),
-            placed: PlacementCache::Nowhere,
-        }
-    }
 }
 
 /// oXi = oXλ λXi, and the columns of S, for all bodies.
@@ -62,30 +50,17 @@ pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut Wor
     }
 }
 
-/// The motions of the bodies, in the world's frame: what depends on the velocity and the acceleration too.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Moving<S> {
-    /// Velocity of the body; the world's stays 0. Shape: bodies. Written by: `advance`.
-    pub v: Array<Motion<S>>,
-    /// Ṡ = v × S: how fast each column of S turns with its body. Shape: columns. Written by: `advance`.
-    pub dS: Array<Motion<S>>,
-    /// The velocity coordinates. Shape: nv. Written by: `advance`.
-    pub qd: Array<S>,
-    /// Spatial acceleration of the body, without gravity; the world's stays 0. Shape: bodies. Written by: `accelerate`.
-    pub a: Array<Motion<S>>,
-}
-
-alike!(Moving { v, dS, qd, a });
-
-impl<S: Scalar> Moving<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            v: filled(Motion::zero, size.bodies),
-            dS: filled(Motion::zero, size.columns),
-            qd: filled(S::zero, size.nv),
-            a: filled(Motion::zero, size.bodies),
-        }
+workspace! {
+    /// The motions of the bodies, in the world's frame: what depends on the velocity and the acceleration too.
+    pub(crate) struct Moving<S>(size) {
+        /// Velocity of the body; the world's stays 0. Written by: `advance`.
+        pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Ṡ = v × S: how fast each column of S turns with its body. Written by: `advance`.
+        pub dS: Array<Motion<S>> = filled(Motion::zero, size.columns),
+        /// The velocity coordinates. Written by: `advance`.
+        pub qd: Array<S> = filled(S::zero, size.nv),
+        /// Spatial acceleration of the body, without gravity; the world's stays 0. Written by: `accelerate`.
+        pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
     }
 }
 

@@ -9,46 +9,31 @@
 use crate::passes::aba;
 use crate::passes::kinematics::World;
 use crate::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::gauss_jordan::gauss_jordan;
 use condyle_model::Model;
 use condyle_model::tree::Column;
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Matrix, Scalar, alike};
+use condyle_spatial::{Array, Matrix, Scalar};
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Bias force for each unit effort, one row for each of its six numbers. Shape: 6 × columns. Written by: `sweep`.
-    pub P: Array<S>,
-    /// Acceleration for each unit effort: of the world, zero, then at each depth of the tree. Shape: (1 + depth) × 6 ×
-    /// columns. Written by: `sweep`.
-    pub A: Array<S>,
-    /// Shape: nv × nv. Written by: `minv`.
-    pub Minv: Matrix<S>,
-    /// A factor of M. Written by: `from_matrix`.
-    pub factor: Ltdl<S>,
-    /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
-    pub by_factor: bool,
-    /// Whether M is inverted without a factor. Written by: `new`.
-    pub by_gauss_jordan: bool,
-}
-
-alike!(Workspace { P, A, Minv, factor } same { by_factor, by_gauss_jordan });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new<R>(size: Size, model: &Model<R>) -> Self {
-        let factor = Ltdl::new(model);
-        Self {
-            by_factor: inverse_by_factor(model, factor.nonzeros()),
-            by_gauss_jordan: inverse_by_gauss_jordan(model),
-            factor,
-            P: filled(S::zero, 6 * size.columns),
-            A: filled(S::zero, (1 + size.depth) * 6 * size.columns),
-            Minv: zero_matrix(size.nv, size.nv),
-        }
+workspace! {
+    pub(crate) struct Workspace<S>(size, model: &Model<R>) {
+        /// Bias force for each unit effort, one row for each of its six numbers. Shape: 6 × columns. Written by: `sweep`.
+        pub P: Array<S> = filled(S::zero, 6 * size.columns),
+        /// Acceleration for each unit effort: of the world, zero, then at each depth of the tree. Shape: (1 + depth) × 6 ×
+        /// columns. Written by: `sweep`.
+        pub A: Array<S> = filled(S::zero, (1 + size.depth) * 6 * size.columns),
+        /// Written by: `minv`.
+        pub Minv: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// A factor of M. Written by: `from_matrix`.
+        pub factor: Ltdl<S> = Ltdl::new(model),
+    } same {
+        /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
+        pub by_factor: bool = inverse_by_factor(model, factor.nonzeros()),
+        /// Whether M is inverted without a factor. Written by: `new`.
+        pub by_gauss_jordan: bool = inverse_by_gauss_jordan(model),
     }
 }
 

@@ -13,36 +13,23 @@
 
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::{Moving, World};
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, alike};
+use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar};
 
 /// The number of numbers that describe the inertia of a body.
 pub(crate) const PARAMETERS: usize = 10;
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Y. Shape: nv × 10 (bodies − 1). Written by: `joint_torque_regressor`.
-    pub torque: Matrix<S>,
-    /// Shape: 10 (bodies − 1). Written by: `kinetic_energy_regressor`.
-    pub kinetic: Array<S>,
-    /// Shape: 10 (bodies − 1). Written by: `potential_energy_regressor`.
-    pub potential: Array<S>,
-}
-
-alike!(Workspace { torque, kinetic, potential });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        let parameters = PARAMETERS * (size.bodies - 1);
-        Self {
-            torque: zero_matrix(size.nv, parameters),
-            kinetic: filled(S::zero, parameters),
-            potential: filled(S::zero, parameters),
-        }
+workspace! {
+    pub(crate) struct Workspace<S>(size) {
+        /// Y. Written by: `joint_torque_regressor`.
+        pub torque: Matrix<S> = zero_matrix(size.nv, PARAMETERS * (size.bodies - 1)),
+        /// Written by: `kinetic_energy_regressor`.
+        pub kinetic: Array<S> = filled(S::zero, PARAMETERS * (size.bodies - 1)),
+        /// Written by: `potential_energy_regressor`.
+        pub potential: Array<S> = filled(S::zero, PARAMETERS * (size.bodies - 1)),
     }
 }
 

@@ -19,46 +19,31 @@
 //! its force then goes to the parent. The test `the_book_gives_the_same` runs the book's form beside it.
 
 use crate::passes::kinematics::{PlacementCache, World};
-use crate::workspace::{Size, filled};
+use crate::workspace::{filled, workspace};
 use condyle_model::Model;
 use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint};
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Force, Inertia, Mat3, Scalar, Se3, Vec3, alike};
+use condyle_spatial::{Act, Array, Force, Inertia, Mat3, Scalar, Se3, Vec3};
 
-/// Scratch in the bodies' turned frames.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// λXi. Shape: levels. Written by: `pass`.
-    pub X: Array<Se3<S>>,
-    /// The rotation of the body and the acceleration of its origin, with gravity as the world's. Shape: levels. Written by:
-    /// `pass`.
-    pub motion: Array<ClassicalMotion<S>>,
-    /// K; the world's stays 0. Shape: levels. Written by: `pass`.
-    pub K: Array<Mat3<S>>,
-    /// Force through the joint. Shape: levels. Written by: `pass`.
-    pub f: Array<Force<S>>,
-    /// Joint efforts. Shape: nv. Written by: `pass`.
-    pub tau: Array<S>,
-    /// Zeros, for the accelerations and velocities that are not given. Shape: nv. Written by: nobody.
-    pub zero: Array<S>,
-}
-
-alike!(Workspace { X, motion, K, f, tau, zero });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        let still = ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() };
-        Self {
-            X: filled(Se3::identity, size.levels),
-            motion: filled(|| still, size.levels),
-            K: filled(Mat3::zero, size.levels),
-            f: filled(Force::zero, size.levels),
-            tau: filled(S::zero, size.nv),
-            zero: filled(S::zero, size.nv),
-        }
+workspace! {
+    /// Scratch in the bodies' turned frames.
+    pub(crate) struct Workspace<S>(size) {
+        /// λXi. Written by: `pass`.
+        pub X: Array<Se3<S>> = filled(Se3::identity, size.levels),
+        /// The rotation of the body and the acceleration of its origin, with gravity as the world's. Written by:
+        /// `pass`.
+        pub motion: Array<ClassicalMotion<S>> =
+            filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.levels),
+        /// K; the world's stays 0. Written by: `pass`.
+        pub K: Array<Mat3<S>> = filled(Mat3::zero, size.levels),
+        /// Force through the joint. Written by: `pass`.
+        pub f: Array<Force<S>> = filled(Force::zero, size.levels),
+        /// Joint efforts. Written by: `pass`.
+        pub tau: Array<S> = filled(S::zero, size.nv),
+        /// Zeros, for the accelerations and velocities that are not given. Written by: nobody.
+        pub zero: Array<S> = filled(S::zero, size.nv),
     }
 }
 

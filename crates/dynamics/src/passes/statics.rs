@@ -9,36 +9,23 @@
 //! ```
 
 use crate::passes::kinematics::World;
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
-/// In the world's frame.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    /// Weight and external force of all that a joint carries. Shape: bodies. Written by: `pass`.
-    pub F: Array<Force<S>>,
-    /// Joint efforts. Shape: nv. Written by: `pass`.
-    pub tau: Array<S>,
-    /// Inertia of all that a joint carries. Shape: bodies. Written by: `derivative`.
-    pub IC: Array<Inertia<S>>,
-    /// Shape: nv × nv. Written by: `derivative`.
-    pub dtau_dq: Matrix<S>,
-}
-
-alike!(Workspace { F, tau, IC, dtau_dq });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            F: filled(Force::zero, size.bodies),
-            tau: filled(S::zero, size.nv),
-            IC: filled(Inertia::zero, size.bodies),
-            dtau_dq: zero_matrix(size.nv, size.nv),
-        }
+workspace! {
+    /// In the world's frame.
+    pub(crate) struct Workspace<S>(size) {
+        /// Weight and external force of all that a joint carries. Written by: `pass`.
+        pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// Joint efforts. Written by: `pass`.
+        pub tau: Array<S> = filled(S::zero, size.nv),
+        /// Inertia of all that a joint carries. Written by: `derivative`.
+        pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// Written by: `derivative`.
+        pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 

@@ -2,22 +2,17 @@
 
 use super::{Input, Status, acceleration};
 use crate::data::Data;
-use crate::workspace::filled;
+use crate::workspace::{filled, workspace};
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_spatial::{Array, Constant, Scalar};
 
-#[derive(Clone, Debug)]
-pub(super) struct Workspace<S> {
-    /// Efforts, the passive ones included. Shape: nv. Written by: `step`.
-    effort: Array<S>,
-    /// h v'. Shape: nv. Written by: `step`.
-    way: Array<S>,
-}
-
-impl<S: Scalar> Workspace<S> {
-    pub(super) fn new<R>(model: &Model<R>) -> Self {
-        Self { effort: filled(S::zero, model.nv()), way: filled(S::zero, model.nv()) }
+workspace! {
+    pub(super) struct Workspace<S>(size) {
+        /// Efforts, the passive ones included. Written by: `step`.
+        effort: Array<S> = filled(S::zero, size.nv),
+        /// h v'. Written by: `step`.
+        way: Array<S> = filled(S::zero, size.nv),
     }
 }
 

@@ -18,54 +18,35 @@
 //! ```
 
 use crate::passes::kinematics::World;
-use crate::workspace::filled;
-use condyle_model::Model;
+use crate::workspace::{filled, workspace};
 use condyle_model::layout::Pairs;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
-/// In the world's frame; matrices by columns.
-#[derive(Clone, Debug)]
-pub(super) struct Workspace<S> {
-    /// Velocity. Shape: bodies. Written by: `pass`.
-    v: Array<Motion<S>>,
-    /// Iᶜ. Shape: bodies. Written by: `pass`.
-    IC: Array<Inertia<S>>,
-    /// hᶜ. Shape: bodies. Written by: `pass`.
-    hC: Array<Force<S>>,
-    /// Fᶜ. Shape: bodies. Written by: `pass`.
-    FC: Array<Force<S>>,
-    /// Ψ̇. Shape: columns. Written by: `pass`.
-    Psid: Array<Motion<S>>,
-    /// Ψ̈. Shape: columns. Written by: `pass`.
-    Psidd: Array<Motion<S>>,
-    /// p = M v. Shape: nv. Written by: `pass`.
-    pub(super) p: Array<S>,
-    /// ∂L/∂q. Shape: nv. Written by: `pass`.
-    pub(super) L_q: Array<S>,
-    /// M = ∂p/∂v. Shape: nv × nv. Written by: `pass`.
-    pub(super) M: Array<S>,
-    /// ∂p/∂q, and its transpose ∂²L/∂q∂v. Shape: nv × nv. Written by: `pass`.
-    pub(super) p_q: Array<S>,
-    /// ∂²L/∂q∂q, row by row how ∂L/∂q changes. Shape: nv × nv. Written by: `pass`.
-    pub(super) L_qq: Array<S>,
-}
-
-impl<S: Scalar> Workspace<S> {
-    pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let (bodies, columns, nv) = (model.nodes().len(), model.columns().len(), model.nv());
-        Self {
-            v: filled(Motion::zero, bodies),
-            IC: filled(Inertia::zero, bodies),
-            hC: filled(Force::zero, bodies),
-            FC: filled(Force::zero, bodies),
-            Psid: filled(Motion::zero, columns),
-            Psidd: filled(Motion::zero, columns),
-            p: filled(S::zero, nv),
-            L_q: filled(S::zero, nv),
-            M: filled(S::zero, nv * nv),
-            p_q: filled(S::zero, nv * nv),
-            L_qq: filled(S::zero, nv * nv),
-        }
+workspace! {
+    /// In the world's frame; matrices by columns.
+    pub(super) struct Workspace<S>(size) {
+        /// Velocity. Written by: `pass`.
+        v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Iᶜ. Written by: `pass`.
+        IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// hᶜ. Written by: `pass`.
+        hC: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// Fᶜ. Written by: `pass`.
+        FC: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// Ψ̇. Written by: `pass`.
+        Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
+        /// Ψ̈. Written by: `pass`.
+        Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
+        /// p = M v. Written by: `pass`.
+        pub(super) p: Array<S> = filled(S::zero, size.nv),
+        /// ∂L/∂q. Written by: `pass`.
+        pub(super) L_q: Array<S> = filled(S::zero, size.nv),
+        /// M = ∂p/∂v. Written by: `pass`.
+        pub(super) M: Array<S> = filled(S::zero, size.nv * size.nv),
+        /// ∂p/∂q, and its transpose ∂²L/∂q∂v. Written by: `pass`.
+        pub(super) p_q: Array<S> = filled(S::zero, size.nv * size.nv),
+        /// ∂²L/∂q∂q, row by row how ∂L/∂q changes. Written by: `pass`.
+        pub(super) L_qq: Array<S> = filled(S::zero, size.nv * size.nv),
     }
 }
 

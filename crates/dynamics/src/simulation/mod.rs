@@ -24,6 +24,7 @@ mod variational;
 use crate::calls::forward_dynamics::aba;
 use crate::data::{Data, check_forces};
 use crate::passes::passive::passive_torque;
+use crate::workspace::Size;
 use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_model::Model;
@@ -151,7 +152,7 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     /// Allocates everything; the robot stands still at [`neutral`](crate::neutral), at time 0.
     pub fn new(model: &'m Model<R>, settings: Settings) -> Self {
         let q: Vec<S> = crate::neutral(model).into_iter().map(S::splat).collect();
-        let zero = vec![S::zero(); model.nv()];
+        let (size, zero) = (Size::new(model), vec![S::zero(); model.nv()]);
         Self {
             settings,
             model,
@@ -163,9 +164,9 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
             v_next: zero.clone(),
             tau: zero,
             f_ext: vec![Force::zero(); model.nodes().len()],
-            euler: euler::Workspace::new(model),
-            runge_kutta: runge_kutta::Workspace::new(model),
-            variational: variational::Workspace::new(model),
+            euler: euler::Workspace::new(size),
+            runge_kutta: runge_kutta::Workspace::new(size),
+            variational: variational::Workspace::new(size, model),
         }
     }
 

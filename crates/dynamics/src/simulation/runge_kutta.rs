@@ -11,39 +11,25 @@
 
 use super::{Input, Status, acceleration, tangent};
 use crate::data::Data;
-use crate::workspace::filled;
+use crate::workspace::{filled, workspace};
 use condyle_model::Model;
 use condyle_model::integrate;
 use condyle_model::joint::GroupJacobian;
 use condyle_spatial::{Array, Constant, Scalar};
 
-#[derive(Clone, Debug)]
-pub(super) struct Workspace<S> {
-    /// Efforts, the passive ones included. Shape: nv. Written by: `step`.
-    effort: Array<S>,
-    /// The state of a stage: ξ, v. Shape: nv. Written by: `step`.
-    xi: Array<S>,
-    v: Array<S>,
-    /// Its rates. Shape: nv. Written by: `step`.
-    dxi: Array<S>,
-    dv: Array<S>,
-    /// The weighted sums of the rates. Shape: nv. Written by: `step`.
-    sum_xi: Array<S>,
-    sum_v: Array<S>,
-}
-
-impl<S: Scalar> Workspace<S> {
-    pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = filled(S::zero, model.nv());
-        Self {
-            effort: zero.clone(),
-            xi: zero.clone(),
-            v: zero.clone(),
-            dxi: zero.clone(),
-            dv: zero.clone(),
-            sum_xi: zero.clone(),
-            sum_v: zero,
-        }
+workspace! {
+    pub(super) struct Workspace<S>(size) {
+        /// Efforts, the passive ones included. Written by: `step`.
+        effort: Array<S> = filled(S::zero, size.nv),
+        /// The state of a stage: ξ, v. Written by: `step`.
+        xi: Array<S> = filled(S::zero, size.nv),
+        v: Array<S> = filled(S::zero, size.nv),
+        /// Its rates. Written by: `step`.
+        dxi: Array<S> = filled(S::zero, size.nv),
+        dv: Array<S> = filled(S::zero, size.nv),
+        /// The weighted sums of the rates. Written by: `step`.
+        sum_xi: Array<S> = filled(S::zero, size.nv),
+        sum_v: Array<S> = filled(S::zero, size.nv),
     }
 }
 

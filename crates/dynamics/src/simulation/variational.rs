@@ -25,7 +25,7 @@ use crate::calls::inertia::crba;
 use crate::data::Data;
 use crate::passes::kinematics::place;
 use crate::passes::passive::{passive_torque, passive_torque_derivative};
-use crate::workspace::filled;
+use crate::workspace::{filled, workspace};
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
 use condyle_model::integrate;
@@ -33,56 +33,37 @@ use condyle_model::joint::GroupJacobian::{Exp, Transport};
 use condyle_model::layout::Single;
 use condyle_spatial::{Array, Constant, Scalar};
 
-/// Shape, where none is given: nv. Written by: `step`, where nothing else is said.
-#[derive(Clone, Debug)]
-pub(super) struct Workspace<S> {
-    /// p, the momentum before the step.
-    p: Array<S>,
-    /// w, the velocity during the step.
-    w: Array<S>,
-    /// −h w, h w/2 and −h w/2. Written by: `set_ways`.
-    minus_y: Array<S>,
-    x: Array<S>,
-    minus_x: Array<S>,
-    /// f = ∂L/∂q + τ. Written by: `evaluate`.
-    f: Array<S>,
-    /// The passive efforts of the joints, and their slope. Written by: `evaluate`.
-    passive: Array<S>,
-    passive_slope: Array<S>,
-    /// J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
-    carried: Array<S>,
-    pushed: Array<S>,
-    /// The residual of the equation, then Newton's step.
-    residual: Array<S>,
-    /// The slope of the equation, and its factor. Shape: nv × nv. Written by: `slope`.
-    slope: Array<S>,
-    /// Momenta, slopes of L and their derivatives at the midpoint. Written by: `evaluate`.
-    lagrangian: lagrangian::Workspace<S>,
-    /// The factor of M after the step.
-    M: Ltdl<S>,
+workspace! {
+    /// Written by: `step`, where nothing else is said.
+    pub(super) struct Workspace<S>(size, model: &Model<R>) {
+        /// p, the momentum before the step.
+        p: Array<S> = filled(S::zero, size.nv),
+        /// w, the velocity during the step.
+        w: Array<S> = filled(S::zero, size.nv),
+        /// −h w, h w/2 and −h w/2. Written by: `set_ways`.
+        minus_y: Array<S> = filled(S::zero, size.nv),
+        x: Array<S> = filled(S::zero, size.nv),
+        minus_x: Array<S> = filled(S::zero, size.nv),
+        /// f = ∂L/∂q + τ. Written by: `evaluate`.
+        f: Array<S> = filled(S::zero, size.nv),
+        /// The passive efforts of the joints, and their slope. Written by: `evaluate`.
+        passive: Array<S> = filled(S::zero, size.nv),
+        passive_slope: Array<S> = filled(S::zero, size.nv),
+        /// J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
+        carried: Array<S> = filled(S::zero, size.nv),
+        pushed: Array<S> = filled(S::zero, size.nv),
+        /// The residual of the equation, then Newton's step.
+        residual: Array<S> = filled(S::zero, size.nv),
+        /// The slope of the equation, and its factor. Written by: `slope`.
+        slope: Array<S> = filled(S::zero, size.nv * size.nv),
+        /// Momenta, slopes of L and their derivatives at the midpoint. Written by: `evaluate`.
+        lagrangian: lagrangian::Workspace<S> = lagrangian::Workspace::new(size),
+        /// The factor of M after the step.
+        M: Ltdl<S> = Ltdl::new(model),
+    }
 }
 
 impl<S: Scalar> Workspace<S> {
-    pub(super) fn new<R>(model: &Model<R>) -> Self {
-        let zero = filled(S::zero, model.nv());
-        Self {
-            p: zero.clone(),
-            w: zero.clone(),
-            minus_y: zero.clone(),
-            x: zero.clone(),
-            minus_x: zero.clone(),
-            f: zero.clone(),
-            passive: zero.clone(),
-            passive_slope: zero.clone(),
-            carried: zero.clone(),
-            pushed: zero.clone(),
-            residual: zero,
-            slope: filled(S::zero, model.nv() * model.nv()),
-            lagrangian: lagrangian::Workspace::new(model),
-            M: Ltdl::new(model),
-        }
-    }
-
     fn set_ways(&mut self, h: S) {
         let half = h * S::splat(0.5);
         for (k, &w) in self.w.iter().enumerate() {
@@ -231,6 +212,7 @@ mod tests {
     use crate::Vec3;
     use crate::WORLD;
     use crate::lie;
+    use crate::workspace::Size;
     use num_dual::Dual64;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
 
@@ -277,7 +259,7 @@ mod tests {
         let force = Force::new(Vec3::new(1.0, -2.0, 0.5), Vec3::new(0.3, 0.1, -0.7));
         let lift = |x: &[f64]| x.iter().map(|&x| Dual64::from(x)).collect::<Vec<_>>();
 
-        let (mut data, mut d) = (Data::new(&model), Workspace::new(&model));
+        let (mut data, mut d) = (Data::new(&model), Workspace::new(Size::new(&model), &model));
         let f_ext = vec![force; model.bodies().len()];
         let mut q_m = q.clone();
         (d.p, d.w) = (p.clone().into(), w.clone().into());
@@ -286,7 +268,7 @@ mod tests {
         evaluate(&model, &mut data, &mut d, Input { h: H, tau: &tau, f_ext: &f_ext, passive: None }, &q_m);
         slope(&model, &mut d, H);
 
-        let (mut data, mut dual) = (Data::<Dual64>::new(&model), Workspace::new(&model));
+        let (mut data, mut dual) = (Data::<Dual64>::new(&model), Workspace::new(Size::new(&model), &model));
         let (f_ext, tau) = (vec![force.lift(); model.bodies().len()], lift(&tau));
         dual.p = lift(&p).into();
         for k in 0..nv {
@@ -311,7 +293,7 @@ mod tests {
         let model = robot(&mut rng);
         let q = crate::random_configuration(&model, &mut rng);
         let v: Vec<f64> = (0..model.nv()).map(|_| rng.random_range(-1.0..1.0)).collect();
-        let (mut data, mut d) = (Data::new(&model), Workspace::new(&model));
+        let (mut data, mut d) = (Data::new(&model), Workspace::new(Size::new(&model), &model));
         let l = Single::new(&model);
         place(&l, &mut data.world, &q);
         super::lagrangian::pass(&l, &data.world, &mut d.lagrangian, &v, &[]);

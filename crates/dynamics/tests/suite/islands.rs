@@ -2,11 +2,12 @@
 
 use crate::common::{Worst, normal, random_pose, rng};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, Matrix, Model, ModelBuilder, Proximal, WORLD, constrained_dynamics,
+    ConstraintSet, ContactConstraint, Data, Matrix, Model, ModelBuilder, Proximal, Se3, WORLD, constrained_dynamics,
     constrained_dynamics_derivatives, constrained_dynamics_equations, impulse_dynamics, impulse_dynamics_derivatives,
     random_configuration, robots,
 };
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Sums of the same numbers in another order, times the condition numbers of M and of J M⁻¹ Jᵀ.
 const SAME: f64 = 1e-9;
@@ -215,4 +216,43 @@ fn a_robot_that_is_not_a_number_stays_alone() {
     for k in 0..whole.nv() {
         assert!(if at.contains(&k) { found[k].is_nan() } else { found[k] == clean[k] }, "coordinate {k}");
     }
+}
+
+/// Two arms, of seven coordinates each, and two quadrupeds, of eighteen.
+fn four() -> Model {
+    let mut builder = ModelBuilder::new("all");
+    for (name, robot) in
+        [("a", robots::arm7()), ("b", robots::arm7()), ("c", robots::quadruped()), ("d", robots::quadruped())]
+    {
+        builder.append(WORLD, Se3::identity(), &robot, name);
+    }
+    builder.build().unwrap()
+}
+
+/// The islands of some contacts, by names of frames, each with another one or none.
+fn islands(model: &Model, of: &[(&str, Option<&str>)]) -> Vec<(Range<usize>, Range<usize>)> {
+    let frame = |name: &str| model.frame(name).unwrap();
+    let contact = |(one, other): &(&str, Option<&str>)| ContactConstraint {
+        other: other.map(frame),
+        ..ContactConstraint::point(frame(one))
+    };
+    let constraints: Vec<_> = of.iter().map(contact).collect();
+    ConstraintSet::<f64>::new(model, &constraints).unwrap().islands().collect()
+}
+
+#[test]
+fn trees_and_what_ties_them() {
+    let model = &four();
+    assert_eq!(islands(model, &[]), [(0..7, 0..0), (7..14, 0..0), (14..32, 0..0), (32..50, 0..0)]);
+    // each by itself, whatever the order of the robots
+    let apart = [("cLF_foot", None), ("cRF_foot", None), ("atool", None), ("dLF_foot", None)];
+    assert_eq!(islands(model, &apart), [(0..7, 6..9), (7..14, 0..0), (14..32, 0..6), (32..50, 9..12)]);
+    // two that hold each other
+    assert_eq!(islands(model, &[("atool", Some("btool"))])[0], (0..14, 0..3));
+    // what stands between two that hold each other goes along, and so do rows between those of one
+    assert_eq!(islands(model, &[("atool", Some("cLF_foot"))]), [(0..32, 0..3), (32..50, 0..0)]);
+    let mixed = [("cLF_foot", None), ("dLF_foot", None), ("cRF_foot", None)];
+    assert_eq!(islands(model, &mixed), [(0..7, 0..0), (7..14, 0..0), (14..50, 0..9)]);
+    // a foot that holds on to its own trunk
+    assert_eq!(islands(model, &[("cLF_foot", Some("cRF_foot"))])[2], (14..32, 0..3));
 }

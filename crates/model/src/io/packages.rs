@@ -49,17 +49,3 @@ fn find(address: &str, folders: &[PathBuf]) -> Result<PathBuf, Error> {
     }
     Err(Error::Package { address: format!("{SCHEME}{address}"), package: package.to_owned(), looked })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::folders;
-    use std::path::PathBuf;
-
-    #[test]
-    fn the_most_particular_first() {
-        let list = |paths: &[&str]| Some(std::env::join_paths(paths).unwrap());
-        let found = folders(&[PathBuf::from("own")], list(&["a", "", "b"]), list(&["opt", "home"]));
-        assert_eq!(found, ["own", "a", "b", "opt/share", "home/share"].map(PathBuf::from));
-        assert!(folders(&[], None, None).is_empty());
-    }
-}

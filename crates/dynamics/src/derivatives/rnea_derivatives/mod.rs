@@ -25,86 +25,51 @@ mod vectorized;
 use crate::passes::coriolis::Coriolis;
 use crate::passes::kinematics::World;
 use crate::selection::pairs_by_rows;
-use crate::workspace::{Size, filled, zero_matrix};
+use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 use vectorized::Rows;
 
-/// The quantities of the bodies and of the columns of their joints, in the world's frame.
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Bodies<S> {
-    /// Velocity. Shape: bodies. Written by: `pass`.
-    pub v: Array<Motion<S>>,
-    /// Acceleration, with gravity as the world's. Shape: bodies. Written by: `pass`.
-    pub a: Array<Motion<S>>,
-    /// Iᶜ. Shape: bodies. Written by: `pass`.
-    pub IC: Array<Inertia<S>>,
-    /// 2Bᶜ. Shape: bodies. Written by: `pass`.
-    pub BC: Array<Coriolis<S>>,
-    /// F. Shape: bodies. Written by: `pass`.
-    pub F: Array<Force<S>>,
-    /// Ψ̇. Shape: columns. Written by: `pass`.
-    pub Psid: Array<Motion<S>>,
-    /// Ψ̈. Shape: columns. Written by: `pass`.
-    pub Psidd: Array<Motion<S>>,
-    /// Ψ̇ + Ṡ. Shape: columns. Written by: `pass`.
-    pub PsidSd: Array<Motion<S>>,
-    /// Written by: `pass`, for `vectorized`.
-    pub rows: Rows<S>,
-}
-
-alike!(Bodies { v, a, IC, BC, F, Psid, Psidd, PsidSd, rows });
-
-impl<S: Scalar> Bodies<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        Self {
-            v: filled(Motion::zero, size.bodies),
-            a: filled(Motion::zero, size.bodies),
-            IC: filled(Inertia::zero, size.bodies),
-            BC: filled(Coriolis::zero, size.bodies),
-            F: filled(Force::zero, size.bodies),
-            Psid: filled(Motion::zero, size.columns),
-            Psidd: filled(Motion::zero, size.columns),
-            PsidSd: filled(Motion::zero, size.columns),
-            rows: Rows::new(size.columns),
-        }
+workspace! {
+    /// The quantities of the bodies and of the columns of their joints, in the world's frame.
+    pub(crate) struct Bodies<S>(size) {
+        /// Velocity. Written by: `pass`.
+        pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Acceleration, with gravity as the world's. Written by: `pass`.
+        pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
+        /// Iᶜ. Written by: `pass`.
+        pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
+        /// 2Bᶜ. Written by: `pass`.
+        pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
+        /// F. Written by: `pass`.
+        pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
+        /// Ψ̇. Written by: `pass`.
+        pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
+        /// Ψ̈. Written by: `pass`.
+        pub Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
+        /// Ψ̇ + Ṡ. Written by: `pass`.
+        pub PsidSd: Array<Motion<S>> = filled(Motion::zero, size.columns),
+        /// Written by: `pass`, for `vectorized`.
+        pub rows: Rows<S> = Rows::new(size.columns),
     }
 }
 
-#[derive(Clone, Debug)]
-#[repr(C)]
-pub(crate) struct Workspace<S> {
-    pub bodies: Bodies<S>,
-    /// The velocity and acceleration coordinates. Shape: nv. Written by: `rnea_derivatives`.
-    pub qd: Array<S>,
-    pub qdd: Array<S>,
-    /// No acceleration. Shape: nv. Written by: `new`.
-    pub still: Array<S>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub dtau_dq: Matrix<S>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub dtau_dv: Matrix<S>,
-    /// Shape: nv × nv. Written by: `pass`.
-    pub dtau_da: Matrix<S>,
-}
-
-alike!(Workspace { bodies, qd, qdd, still, dtau_dq, dtau_dv, dtau_da });
-
-impl<S: Scalar> Workspace<S> {
-    pub(crate) fn new(size: Size) -> Self {
-        let square = zero_matrix(size.nv, size.nv);
-        Self {
-            bodies: Bodies::new(size),
-            qd: filled(S::zero, size.nv),
-            qdd: filled(S::zero, size.nv),
-            still: filled(S::zero, size.nv),
-            dtau_dq: square.clone(),
-            dtau_dv: square.clone(),
-            dtau_da: square,
-        }
+workspace! {
+    pub(crate) struct Workspace<S>(size) {
+        pub bodies: Bodies<S> = Bodies::new(size),
+        /// The velocity and acceleration coordinates. Written by: `rnea_derivatives`.
+        pub qd: Array<S> = filled(S::zero, size.nv),
+        pub qdd: Array<S> = filled(S::zero, size.nv),
+        /// No acceleration. Written by: `new`.
+        pub still: Array<S> = filled(S::zero, size.nv),
+        /// Written by: `pass`.
+        pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `pass`.
+        pub dtau_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
+        /// Written by: `pass`.
+        pub dtau_da: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 

@@ -1,0 +1,41 @@
+//! The nearest name in the error of one that is not there.
+
+use condyle_model::{Error, Inertia, Joint, ModelBuilder, Se3, WORLD};
+
+/// All words of some letters with at most so many of them, the shorter ones first.
+fn words(letters: &str, length: usize) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut from = 0;
+    for _ in 0..length {
+        let to = words.len();
+        for i in from..to {
+            letters.chars().for_each(|c| words.push(format!("{}{c}", words[i])));
+        }
+        from = to;
+    }
+    words.split_off(1)
+}
+
+/// It is the first of the nearest by the optimal string alignment distance, of those of which no more than half differs.
+#[test]
+fn nearest_names_are_those_of_strsim() {
+    let mut builder = ModelBuilder::new("words");
+    builder.body("arm", WORLD, Joint::Planar, Se3::identity(), Inertia::zero());
+    for word in words("abc", 4).iter().step_by(3) {
+        builder.frame(word, WORLD, Se3::identity());
+    }
+    let model = builder.build().expect("a body and its frames");
+    let mut far = 0;
+    for asked in words("abcd", 5) {
+        let Err(Error::UnknownFrame { nearest, .. }) = model.frame(&asked) else {
+            continue;
+        };
+        let distance = |name: &&str| strsim::osa_distance(name, &asked);
+        let names = model.frames().iter().map(|frame| frame.name.as_str());
+        let similar = names.filter(|name| 2 * distance(name) <= name.len().max(asked.len()));
+        let expected = similar.min_by_key(distance).unwrap_or_default();
+        far += usize::from(expected.is_empty());
+        assert_eq!(nearest, expected, "{asked}");
+    }
+    assert!(far > 0, "a word without similar ones was asked for");
+}
