@@ -1,10 +1,13 @@
 //! The derivatives of inverse and forward dynamics against dual numbers and against central differences.
+//!
+//! Forward dynamics undo inverse ones, rnea(q, v, q̈(q, v, τ)) = τ, so their derivatives follow from those of RNEA at q̈: dual
+//! numbers are sent through RNEA alone.
 
 use super::identities::{SOLVES, inverted, spectrum};
 use super::ledger::Row;
 use crate::states::States;
 use condyle::{Data, Matrix, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_derivatives};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use num_dual::Dual64;
 
 /// Both are exact but for rounding.
@@ -41,17 +44,25 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         Function::Aba => ["∂q̈/∂q", "∂q̈/∂v", "∂q̈/∂τ"],
     };
     let make = |function| {
-        let exact = match function {
-            Function::Rnea => "both exact but for rounding",
-            Function::Aba => SOLVES,
+        let (exact, relations) = match function {
+            Function::Rnea => ("both exact but for rounding", ["analytical = dual numbers"; 3]),
+            Function::Aba => (
+                SOLVES,
+                [
+                    "M ∂q̈/∂q = −∂τ/∂q by dual numbers",
+                    "M ∂q̈/∂v = −∂τ/∂v by dual numbers",
+                    "M ∂q̈/∂τ = 1, M by dual numbers",
+                ],
+            ),
         };
         let steps = "a step of 1e-6, or what steps of h and 2h differ by";
-        let dual = names(function).map(|name| Row::new(name, "analytical = dual numbers", exact));
-        let difference = names(function).map(|name| Row::new(name, "analytical = central differences", steps));
+        let names = names(function);
+        let dual = core::array::from_fn(|i| Row::new(names[i], relations[i], exact));
+        let difference = names.map(|name| Row::new(name, "analytical = central differences", steps));
         [dual, difference]
     };
     let (mut data, mut duals) = (Data::new(model), Data::<Dual64>::new(model));
-    let all = States::new(model, states, seed);
+    let (all, nv) = (States::new(model, states, seed), model.nv());
     let mut rows = Vec::new();
     for function in [Function::Rnea, Function::Aba] {
         let [mut dual, mut difference] = make(function);
@@ -63,13 +74,22 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
                 Function::Aba => ([q, v, tau], inverted(condition)),
             };
             let analytical = analytical(function, model, &mut data, state);
-            let parts = match function {
-                Function::Rnea => [0.0; 3],
-                Function::Aba => parts(model, &mut data, state, &analytical[2]),
+            let a = match function {
+                Function::Rnea => a.to_vec(),
+                Function::Aba => aba(model, &mut data, q, v, tau, &[]).to_vec(),
             };
-            for (i, by) in [By::Position, By::Velocity, By::Input].into_iter().enumerate() {
-                let expected = by_duals(function, by, model, &mut duals, state);
-                dual[i].compare(analytical[i].as_slice(), expected.as_slice(), parts[i], bound);
+            let variables = [By::Position, By::Velocity, By::Input];
+            let dtau = variables.map(|by| by_duals(by, model, &mut duals, [q, v, &a]));
+            for (i, by) in variables.into_iter().enumerate() {
+                match function {
+                    Function::Rnea => dual[i].compare(analytical[i].as_slice(), dtau[i].as_slice(), 0.0, bound),
+                    Function::Aba => {
+                        let M = &dtau[2];
+                        let (found, parts) = (M * &analytical[i], (M.abs() * analytical[i].abs()).amax());
+                        let expected = if i == 2 { DMatrix::identity(nv, nv) } else { -&dtau[i] };
+                        dual[i].compare(found.as_slice(), expected.as_slice(), parts, bound);
+                    }
+                }
                 let [expected, longer] =
                     [STEP, 2.0 * STEP].map(|h| by_differences(function, by, model, &mut data, state, h));
                 let uncertain = UNCERTAIN * (&longer - &expected).amax() / (1.0 + expected.amax());
@@ -80,17 +100,6 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         rows.extend(difference);
     }
     rows
-}
-
-/// The numbers of which ∂q̈/∂q = −M⁻¹ ∂τ/∂q (at q̈) and ∂q̈/∂v are the sums: |M⁻¹| |∂τ/∂q|, |M⁻¹| |∂τ/∂v|, and |M⁻¹| |M| |q̈|,
-/// whose terms cancel in ∂τ/∂q where a whole robot turns; M⁻¹ is ∂q̈/∂τ.
-fn parts(model: &Model, data: &mut Data<f64>, [q, v, tau]: State, M_inverse: &DMatrix<f64>) -> [f64; 3] {
-    let qdd = aba(model, data, q, v, tau, &[]).to_vec();
-    let d = rnea_derivatives(model, data, q, v, &qdd, &[]);
-    let [by_q, by_v] = [d.dtau_dq, d.dtau_dv].map(|d| (M_inverse.abs() * d.abs()).amax());
-    let M = crba(model, data, q).abs();
-    let inertial = (M_inverse.abs() * M * DVector::from_column_slice(&qdd).abs()).amax();
-    [by_q.max(inertial), by_v, 0.0]
 }
 
 fn analytical(function: Function, model: &Model, data: &mut Data<f64>, [q, v, x]: State) -> [DMatrix<f64>; 3] {
@@ -106,8 +115,8 @@ fn analytical(function: Function, model: &Model, data: &mut Data<f64>, [q, v, x]
     }
 }
 
-/// A column for each variable: the ε of f(q ⊕ ε δ, …).
-fn by_duals(function: Function, by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) -> DMatrix<f64> {
+/// Derivatives of RNEA, a column for each variable: the ε of rnea(q ⊕ ε δ, …).
+fn by_duals(by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) -> DMatrix<f64> {
     let nv = model.nv();
     let mut J = DMatrix::zeros(nv, nv);
     for k in 0..nv {
@@ -122,10 +131,7 @@ fn by_duals(function: Function, by: By, model: &Model, data: &mut Data<Dual64>, 
             By::Velocity => at[1][k].eps = 1.0,
             By::Input => at[2][k].eps = 1.0,
         }
-        let result = match function {
-            Function::Rnea => rnea(model, data, &at[0], &at[1], &at[2], &[]),
-            Function::Aba => aba(model, data, &at[0], &at[1], &at[2], &[]),
-        };
+        let result = rnea(model, data, &at[0], &at[1], &at[2], &[]);
         J.column_mut(k).iter_mut().zip(result).for_each(|(J, x)| *J = x.eps);
     }
     J
