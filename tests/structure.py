@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST_CIRCLE = 3
 LARGEST_FUNCTION = 64 * 1024
-LARGEST_PROGRAM = 5_200_000
+LARGEST_PROGRAM = 5_000_000
 
 Module = tuple[str, ...]
 

@@ -7,7 +7,7 @@
 use crate::algebra::motion::Motion;
 pub use crate::algebra::quaternion::Quaternion;
 use crate::algebra::se3::Se3;
-use crate::algebra::vector::{Mat3, Vec3};
+use crate::algebra::vector::{Mat3, Sym3, Vec3};
 use crate::scalar::Scalar;
 
 /// The entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, of t = θ²:
@@ -120,11 +120,14 @@ fn log3_near<S: Scalar>(n2: S, w: S) -> S {
     sum * w.recip()
 }
 
-/// 1/θ² − (cot(θ/2))/(2θ) of t = θ², the coefficient of w×² in the inverse Jacobians: (c₂ − c₃)/(4 c₁) at θ/2.
+/// 1/θ² − (cot(θ/2))/(2θ) of t = θ², the coefficient of w×² in the inverse Jacobians, and its derivative by t:
+/// a = (c₂ − c₃)/(4 c₁) at θ/2, and by cₖ' = (k cₖ₊₂ − cₖ₊₁)/2 there, a' = a²/2 − (c₃ − 3 c₄ + 3 c₅)/(32 c₁).
 #[inline(always)]
-fn inverse_coefficient<S: Scalar>(t: S) -> S {
+fn inverse_coefficient<S: Scalar>(t: S) -> [S; 2] {
     let c = stumpff(t * S::splat(0.25));
-    (c[2] - c[3]) * (c[1] * S::splat(4.0)).recip()
+    let r = (c[1] * S::splat(4.0)).recip();
+    let a = (c[2] - c[3]) * r;
+    [a, a * a * S::splat(0.5) - (c[3] - (c[4] - c[5]) * S::splat(3.0)) * r * S::splat(0.125)]
 }
 
 /// 1 + a w× + b w×².
@@ -146,7 +149,7 @@ pub fn jexp3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
 /// Its inverse, the right Jacobian of [`log3`]: 1 + w×/2 + (1/θ² − cot(θ/2)/(2θ)) w×².
 #[inline(always)]
 pub fn jlog3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
-    rotation_series(w, S::splat(0.5), inverse_coefficient(w.norm_squared()))
+    rotation_series(w, S::splat(0.5), inverse_coefficient(w.norm_squared())[0])
 }
 
 /// exp of a twist: the pose after moving with it for one unit of time.
@@ -162,7 +165,7 @@ pub fn exp6<S: Scalar>(m: Motion<S>) -> (Quaternion<S>, Vec3<S>) {
 #[inline(always)]
 pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<S> {
     let w = log3(rotation);
-    let V_inverse = rotation_series(w, S::splat(-0.5), inverse_coefficient(w.norm_squared()));
+    let V_inverse = rotation_series(w, S::splat(-0.5), inverse_coefficient(w.norm_squared())[0]);
     Motion { linear: V_inverse * translation, angular: w }
 }
 
@@ -212,29 +215,36 @@ impl<S: Scalar> core::ops::Mul for MotionMap<S> {
     }
 }
 
-/// The right Jacobian of [`exp6`].
-///
-/// Source: Barfoot and Furgale (2014), equations 100 and 102, for the twist turned round (right from left Jacobian).
+/// 1 + a w× + b w×² on the diagonal, and how it changes along v beside it, for the twist (v, w) and derivatives a', b' of the
+/// coefficients by |w|². With y = a v + 2 a' (v·w) w and x = b v + b' (v·w) w that is y× + w× x× + x× w×.
 #[inline(always)]
-pub fn jexp6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
-    let (v, w) = (-m.linear, -m.angular);
-    let t = w.norm_squared();
-    let c = stumpff(t);
-    let (V, W) = (v.skew(), w.skew());
-    let (WV, VW) = (W * V, V * W);
-    let WVW = WV * W;
-    let three = S::splat(3.0);
-    // Q = V/2 + c₃ (WV + VW + WVW) + c₄ (WWV + VWW − 3 WVW) + (c₄ − 3c₅)/2 (WVWW + WWVW)
-    let Q = V.scale(S::splat(0.5))
-        + (WV + VW + WVW).scale(c[3])
-        + (W * WV + VW * W - WVW.scale(three)).scale(c[4])
-        + (WVW * W + W * WVW).scale((c[4] - c[5] * three) * S::splat(0.5));
-    MotionMap { diagonal: rotation_series(w, c[2], c[3]), coupling: Q }
+fn series_map<S: Scalar>(
+    Motion { linear: v, angular: w }: Motion<S>,
+    [a, b]: [S; 2],
+    [da, db]: [S; 2],
+) -> MotionMap<S> {
+    let along = w.scale(v.dot(w));
+    let (y, x) = (v.scale(a) + along.scale(da + da), v.scale(b) + along.scale(db));
+    let twice = x.dot(w) * S::splat(-2.0);
+    // w× x× = x wᵀ − w·x 1
+    let coupling = Sym3::outer_sum(w, x).add_diagonal(twice).full() + y.skew();
+    MotionMap { diagonal: rotation_series(w, a, b), coupling }
 }
 
-/// Its inverse, the right Jacobian of [`log6`], at the twist m: [[J, −J Q J], [0, J]] with J = [`jlog3`].
+/// The right Jacobian of [`exp6`]: [[J, J'], [0, J]], where J = [`jexp3`] changes by J' along the linear part.
+///
+/// Source: Barfoot and Furgale (2014), equations 100 and 102, which the derivative of J along a vector sums up.
+#[inline(always)]
+pub fn jexp6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
+    let [_, _, c2, c3, c4, c5] = stumpff(m.angular.norm_squared());
+    let half = S::splat(0.5);
+    // cₖ' = (k cₖ₊₂ − cₖ₊₁)/2
+    series_map(m, [-c2, c3], [c3 * half - c4, c5 * S::splat(1.5) - c4 * half])
+}
+
+/// Its inverse, the right Jacobian of [`log6`], at the twist m: [[J, J'], [0, J]] with J = [`jlog3`], likewise.
 #[inline(always)]
 pub fn jlog6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
-    let J = jlog3(m.angular);
-    MotionMap { diagonal: J, coupling: -(J * jexp6(m).coupling * J) }
+    let [a, da] = inverse_coefficient(m.angular.norm_squared());
+    series_map(m, [S::splat(0.5), a], [S::zero(), da])
 }

@@ -5,7 +5,7 @@ use super::layout::{KinematicData, KnotLayout, Plan};
 use super::own::OwnResidual;
 use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
-use crate::lq::{Hessian, LqNode};
+use crate::lq::{Hessian, LARGEST_BLOCK, LqNode};
 use crate::robot::capabilities::Output;
 use crate::robot::knot::{KnotState, Sensitivities, add_matrix_row};
 use crate::robot::state::{groups, state_difference};
@@ -234,21 +234,27 @@ impl ResidualView<'_> {
         difference_jacobian_groups(model, &s.r[..nv], DifferenceArgument::To, &mut s.D);
         for group in &s.groups {
             let (start, size) = (group.start, group.len());
-            let mut D = [[0.0; 6]; 6]; // row by row
+            let mut D = [[0.0; LARGEST_BLOCK]; LARGEST_BLOCK]; // row by row, with zeros
             for i in 0..size {
                 for a in 0..size {
                     D[i][a] = s.D[(start + i, start + a)];
                 }
             }
+            let (mut g, mut H) = ([0.0; LARGEST_BLOCK], [[0.0; LARGEST_BLOCK]; LARGEST_BLOCK]);
             for i in 0..size {
                 let (d, dd) = (s.d[start + i], s.dd[start + i]);
-                for a in 0..size {
-                    node.q[start + a] += D[i][a] * d; // Dᵀ a′
-                    let column = &mut node.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
-                    for b in 0..size {
-                        column[b] += dd * (D[i][a] * D[i][b]); // Dᵀ a″ D
+                for a in 0..LARGEST_BLOCK {
+                    g[a] += D[i][a] * d; // Dᵀ a′
+                    let weighted = dd * D[i][a];
+                    for b in 0..LARGEST_BLOCK {
+                        H[a][b] += weighted * D[i][b]; // Dᵀ a″ D
                     }
                 }
+            }
+            for a in 0..size {
+                node.q[start + a] += g[a];
+                let column = &mut node.Q.as_mut_slice()[(start + a) * 2 * nv + start..][..size];
+                column.iter_mut().zip(&H[a]).for_each(|(Q, H)| *Q += H);
             }
         }
     }
