@@ -23,28 +23,25 @@ fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Prob
 }
 
 /// Time steps, weights of efforts and of the point. Which of them blow up depends on the last digit of sums, hence on the
-/// processor's vectors; some do on each.
-const RECKLESS: [(f64, f64, f64); 12] = [
-    (0.02, 1e-6, 1e2),
-    (0.02, 1e-6, 1e4),
-    (0.02, 1e-4, 1e2),
-    (0.02, 1e-4, 1e4),
-    (0.02, 1e-3, 1e4),
-    (0.05, 1e-6, 1e2),
-    (0.05, 1e-6, 1e4),
-    (0.05, 1e-4, 1e2),
-    (0.05, 1e-4, 1e4),
-    (0.05, 1e-3, 1e2),
-    (0.05, 1e-3, 1e4),
-    (0.05, 1e-2, 1e4),
-];
+/// processor's vectors; with so many, some do on each.
+fn reckless() -> impl Iterator<Item = (f64, f64, f64)> {
+    const EFFORTS: [f64; 7] = [1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2];
+    let weights = |dt| EFFORTS.into_iter().flat_map(move |effort| [1e2, 1e3, 1e4].map(|point| (dt, effort, point)));
+    [0.02, 0.05, 0.03, 0.04].into_iter().flat_map(weights)
+}
+
+/// So many blow-ups are looked at.
+const ENOUGH: usize = 4;
 
 /// Crocoddyl's rules accept a step into an iterate that costs 1e16 times as much, where nothing can be computed any more:
 /// the trace says so, but the solution is the iterate before it, and the next solve begins there.
 #[test]
 fn a_solve_that_blows_up_returns_its_best_iterate() {
     let mut blown_up = 0;
-    for (dt, effort, point) in RECKLESS {
+    for (dt, effort, point) in reckless() {
+        if blown_up == ENOUGH {
+            break;
+        }
         let run = |threads: usize| {
             let (mut problem, xs) = reckless_reach(dt, effort, point, None);
             let mut solver = Fddp::new(&problem);
@@ -63,7 +60,7 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
         let last = trace.last().unwrap();
         assert!(last.accepted && last.cost > 1e8 * (1.0 + trace[0].cost), "{last:?}");
         // the iterate before the blow-up: its cost and gap are in the trace, one record apart
-        assert!(solution.cost < 1e5, "{}", solution.cost);
+        assert!(solution.cost < trace[before].cost && solution.cost < 1e8 * (1.0 + trace[0].cost), "{}", solution.cost);
         assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
         let (mut nodes, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
         problem.calc(&solution.xs, &solution.us, &mut nodes, &mut numbers);
@@ -77,7 +74,7 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
         assert!(other.xs == solution.xs && other.us == solution.us && other.K == solution.K && other.k == solution.k);
         assert!(again.xs == next.xs && again.trace == next.trace);
     }
-    assert!(blown_up > 0);
+    assert_eq!(blown_up, ENOUGH);
 }
 
 /// The same with bounds on the controls, whose steps are quadratic programs: the solve accepts an iterate that costs more than
@@ -85,7 +82,10 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
 #[test]
 fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
     let mut blown_up = 0;
-    for (dt, effort, point) in RECKLESS {
+    for (dt, effort, point) in reckless() {
+        if blown_up == ENOUGH {
+            break;
+        }
         let (mut problem, xs) = reckless_reach(dt, effort, point, Some(1e6));
         let mut solver = Fddp::new(&problem);
         let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
@@ -96,7 +96,7 @@ fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
         blown_up += 1;
         assert!(last.accepted, "{last:?}");
         let most = solution.trace.iter().map(|i| i.gap).fold(0.0, f64::max);
-        assert!(solution.cost < last.cost && solution.gap < most, "{} {}", solution.cost, solution.gap);
+        assert!(solution.cost < last.cost && solution.gap <= most, "{} {}", solution.cost, solution.gap);
         assert!(solution.us.iter().all(|u| u.abs() <= 1e6));
         let (mut next, mut costs) = (vec![0.0; 50 * 14], vec![0.0; 51]);
         problem.calc(&solution.xs, &solution.us, &mut next, &mut costs);
@@ -105,13 +105,13 @@ fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
         let next = solver.resume(&mut problem).unwrap();
         assert!(next.trace[0].gap == solution.gap && next.gap <= solution.gap && next.cost.is_finite());
     }
-    assert!(blown_up > 0);
+    assert_eq!(blown_up, ENOUGH);
 }
 
 /// The feedback of a solution that a solve went back to is that of the sweep there.
 #[test]
 fn the_feedback_is_that_of_the_iterate() {
-    let mut blown_up = RECKLESS.into_iter().filter_map(|(dt, effort, point)| {
+    let mut blown_up = reckless().filter_map(|(dt, effort, point)| {
         let (mut problem, xs) = reckless_reach(dt, effort, point, None);
         let mut solver = Fddp::new(&problem);
         let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
@@ -137,7 +137,7 @@ fn the_feedback_is_that_of_the_iterate() {
 /// What blows up within the augmented Lagrangian leaves it its best iterate too, measured.
 #[test]
 fn a_constrained_solve_that_blows_up_says_how_far_its_best_iterate_is() {
-    let mut blown_up = RECKLESS.into_iter().filter_map(|(dt, effort, point)| {
+    let mut blown_up = reckless().filter_map(|(dt, effort, point)| {
         let (mut problem, xs) = reckless_reach(dt, effort, point, None);
         let mut solver = AugmentedLagrangian::new(&problem);
         let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
