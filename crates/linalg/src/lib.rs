@@ -31,6 +31,7 @@ mod ltdl;
 mod outer;
 mod product;
 mod registers;
+mod runs;
 mod small_elimination;
 #[doc(hidden)]
 pub mod sparsity;
@@ -55,6 +56,7 @@ pub use product::{
     product_of_upper_lower, product_with_upper, product_without_slack,
 };
 pub use registers::{Vector, Vectorized, at_level, at_narrow_level};
+pub use runs::Runs;
 pub use small_elimination::eliminate_sum;
 pub use tile::{SLACK, View};
 pub use vectors::{add_product_vector, add_scaled_product, copy, copy_scaled, dot, max_abs, transposed_product_vector};

@@ -20,7 +20,8 @@ use crate::lq::InverseDynamicsForm;
 use crate::robot::capabilities::Output;
 use crate::robot::knot::Sensitivities;
 use crate::robot::residuals::rows::Row;
-use condyle_linalg::{SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, max_abs, subtract_rows};
+use condyle_linalg::{Runs, SLACK, SparseRows, Vector, Vectorized, at_level, copy_scaled, max_abs, subtract_rows};
+use core::ops::Range;
 
 /// A pivot among the unknowns that are preferred may be so much smaller than the largest of all.
 pub(super) const PREFERENCE: f64 = 1e-2;
@@ -66,8 +67,8 @@ pub(crate) struct KktElimination {
     late: Vec<usize>,
     /// The place of each column of δa and δf: its unknown, if it is one, or else the row that was solved for it.
     place: Vec<Place>,
-    /// Runs of columns that are unknowns: the first column, the first unknown, how many.
-    runs: Vec<[usize; 3]>,
+    /// From the columns of δa, and of δf, to the unknowns that they are.
+    runs: [Runs; 2],
     /// The forces that are not unknowns, over (w, δv, δq).
     forces: SparseRows,
 }
@@ -101,7 +102,7 @@ impl KktElimination {
             pivots: Vec::with_capacity(rows + passive),
             late: Vec::with_capacity(rows + passive),
             place: vec![Place::Unknown(0); nv + rows],
-            runs: Vec::with_capacity(nv + rows),
+            runs: [Runs::with_capacity(nv), Runs::with_capacity(rows)],
             forces: SparseRows::default(),
         }
     }
@@ -230,26 +231,22 @@ impl Vectorized for Run<'_> {
 
         // the columns that are left are the unknowns
         let mut unknowns = 0;
-        e.runs.clear();
+        e.runs.iter_mut().for_each(Runs::clear);
         form.own.clear();
         for k in 0..nv + rows {
             if matches!(e.place[k], Place::Row(_)) {
                 continue;
             }
             e.place[k] = Place::Unknown(unknowns);
-            match e.runs.last_mut() {
-                Some([first, _, length]) if *first + *length == k && k != nv => *length += 1,
-                _ => e.runs.push([k, unknowns, 1]),
-            }
+            e.runs[usize::from(k >= nv)].push(k, unknowns);
             unknowns += 1;
         }
-        form.own.extend(e.runs.iter().filter(|run| run[0] < nv));
+        form.own.extend(e.runs[0].iter());
         let size = form.stride;
-        let m = nv - e.passive;
-        let gather = Gather { runs: &e.runs, nv, x: nv + rows, m };
+        let gather = Gather { runs: &e.runs, states: nv + rows..3 * nv + rows, m: nv - e.passive };
 
         // U; the dependent steps D; the dependent forces
-        form.efforts.resize(m, size);
+        form.efforts.resize(gather.m, size);
         for (row, to) in motion.chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
             gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
         }
@@ -277,27 +274,19 @@ impl Vectorized for Run<'_> {
 
 /// From the columns (δa, δf, δv, δq) to (w, δv, δq).
 struct Gather<'a> {
-    runs: &'a [[usize; 3]],
-    nv: usize,
-    /// The column where δv begins.
-    x: usize,
+    runs: &'a [Runs; 2],
+    /// The columns of (δv, δq).
+    states: Range<usize>,
     m: usize,
 }
 
 impl Gather<'_> {
-    /// Writes a row's unknowns, whole registers at a time: each run goes over what the one before it wrote too much.
+    /// Writes a row's unknowns and states: what one part writes too much, the next goes over.
     #[inline(always)]
     fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
-        for &[from, unknown, length] in self.runs {
-            let by = V::splat(if from < self.nv { by_a } else { by_f });
-            let (row, to) = (&row[from..][..length + SLACK], &mut to[unknown..][..length + SLACK]);
-            let mut i = 0;
-            while i < length {
-                V::load(&row[i..]).mul(by).store(&mut to[i..]);
-                i += V::N;
-            }
-        }
-        copy_scaled::<V>(&mut to[self.m..], &row[self.x..][..2 * self.nv], by_x);
+        self.runs[0].copy_scaled::<V>(row, by_a, to);
+        self.runs[1].copy_scaled::<V>(row, by_f, to);
+        copy_scaled::<V>(&mut to[self.m..], &row[self.states.clone()], by_x);
     }
 }
 
