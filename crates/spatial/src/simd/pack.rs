@@ -137,23 +137,25 @@ impl<S: Block> Kernel for Gather<'_, S> {
 /// # Safety
 /// There is a place for as many numbers as a vector has.
 #[inline(always)]
-unsafe fn write_tile<S: Block>(block: &mut [S; MOST], negative: bool, to: &mut [&mut [S::Number]], at: usize) {
-    let lanes = to.len();
+unsafe fn write_tile<S: Block>(mut tile: [S; MOST], negative: bool, to: &mut [&mut [S::Number]], at: usize) {
     if negative {
         for k in 0..S::LANES {
-            block[k] = -block[k];
+            tile[k] = -tile[k];
         }
     }
-    S::transpose(&mut block[..S::LANES]);
-    let mut write = |k: usize| {
-        debug_assert!(at + S::LANES <= to[k].len());
+    S::transpose(&mut tile[..S::LANES]);
+    let write = |to: &mut &mut [S::Number], x: S| {
+        debug_assert!(at + S::LANES <= to.len());
         // SAFETY: by the caller.
-        block[k].store(unsafe { to[k].get_unchecked_mut(at..at + S::LANES) });
+        x.store(unsafe { to.get_unchecked_mut(at..at + S::LANES) });
     };
-    if lanes == S::LANES {
-        (0..S::LANES).for_each(&mut write); // from registers
+    if to.len() == S::LANES {
+        for k in 0..S::LANES {
+            write(&mut to[k], tile[k]); // from registers
+        }
     } else {
-        (0..lanes).for_each(&mut write);
+        let in_memory = tile;
+        to.iter_mut().zip(in_memory).for_each(|(to, x)| write(to, x));
     }
 }
 
@@ -203,7 +205,7 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
                     block[k] = *unsafe { from.get_unchecked(i * down + tile[k]) };
                 }
                 // SAFETY: as above; the last entry has a place.
-                unsafe { write_tile(&mut block, negative, to, first) };
+                unsafe { write_tile(block, negative, to, first) };
                 if first + S::LANES >= n {
                     return;
                 }
@@ -229,23 +231,41 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             }
             return;
         }
-        for k in 0..S::LANES {
-            offsets[k] = k * along;
-        }
-        for i in 0..rows {
-            let mut j = 0;
-            loop {
-                for k in 0..S::LANES {
-                    // SAFETY: row i < rows, and column j + k < columns; the last entry is there.
-                    block[k] = *unsafe { from.get_unchecked(i * down + j * along + offsets[k]) };
-                }
-                // SAFETY: as above; there are as many columns as lanes, at least.
-                unsafe { write_tile(&mut block, negative, to, i * stride + j) };
-                if j + S::LANES >= columns {
-                    break;
-                }
-                j = (j + S::LANES).min(columns - S::LANES); // the last tile overlaps the one before
+        // SAFETY: the last entry is there and has a place, and there are as many columns as lanes, at least.
+        unsafe {
+            match along {
+                1 => write_rows::<S, true>(self.0, to, stride),
+                _ => write_rows::<S, false>(self.0, to, stride),
             }
+        }
+    }
+}
+
+/// Writes a matrix, with its columns side by side or not.
+///
+/// # Safety
+/// It is at least as wide as a vector, its last entry is there, and has a place.
+#[inline(always)]
+unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut [&mut [S::Number]], stride: usize) {
+    let Strided { vectors, strides: [down, along], shape: [rows, columns], negative } = of;
+    let (mut block, mut offsets) = ([S::zero(); MOST], [0; MOST]);
+    for k in 0..S::LANES {
+        offsets[k] = k * along;
+    }
+    for i in 0..rows {
+        let mut j = 0;
+        loop {
+            let first = i * down + j * if BESIDE { 1 } else { along };
+            for k in 0..S::LANES {
+                // SAFETY: row i < rows, and column j + k < columns.
+                block[k] = *unsafe { vectors.get_unchecked(first + if BESIDE { k } else { offsets[k] }) };
+            }
+            // SAFETY: likewise.
+            unsafe { write_tile(block, negative, to, i * stride + j) };
+            if j + S::LANES >= columns {
+                break;
+            }
+            j = (j + S::LANES).min(columns - S::LANES); // the last tile overlaps the one before
         }
     }
 }

@@ -293,8 +293,9 @@ fn solve<S: Scalar, const N: usize>(limb: &Limb, stride: usize, T: &mut [S], inv
         };
         let g: [S; N] = core::array::from_fn(|k| -row[solved[k]]);
         for run in columns {
-            let y: [&[S]; N] = core::array::from_fn(|k| &Y[k][run.clone()]);
-            for (j, x) in row[run.clone()].iter_mut().enumerate() {
+            let x = &mut row[run.clone()];
+            let y: [&[S]; N] = core::array::from_fn(|k| &Y[k][run.clone()][..x.len()]); // so no entry need be checked
+            for (j, x) in x.iter_mut().enumerate() {
                 for k in 0..N {
                     *x = g[k].mul_add(y[k][j], *x);
                 }
