@@ -284,9 +284,11 @@ fn group_blocks<S: Scalar, R>(model: &Model<R>, v: &[S], which: GroupJacobian, s
         let columns = map.columns();
         for (k, &column) in joint.axes().iter().enumerate() {
             let column = columns[column].scale(sign).to_array();
-            let to = &mut J.as_mut_slice()[(iv.start + k) * model.nv() + iv.start..];
-            for (to, &row) in to.iter_mut().zip(joint.axes()) {
-                *to = column[row];
+            let to = &mut J.as_mut_slice()[(iv.start + k) * model.nv() + iv.start..][..joint.axes().len()];
+            if let Ok(to) = <&mut [S; 6]>::try_from(&mut *to) {
+                *to = column; // all axes, in order
+            } else {
+                to.iter_mut().zip(joint.axes()).for_each(|(to, &row)| *to = column[row]);
             }
         }
     }

@@ -189,7 +189,8 @@ impl Vectorized for Run<'_> {
             if e.pivots[r] != usize::MAX {
                 continue;
             }
-            let row = &mut T[r * stride..][..stride];
+            let (before, rest) = T.split_at_mut(r * stride);
+            let (row, after) = rest.split_at_mut(stride);
             // what the entries of a row that depends on others are compared with: a contact's are of order one
             let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
             let Some(k) = e.choose(r, row, scale) else { return };
@@ -200,12 +201,12 @@ impl Vectorized for Run<'_> {
                 *x *= inverse;
             }
             row[k] = 1.0;
-            for i in 0..solved {
-                let factor = T[i * stride + k];
-                if factor != 0.0 && i != r {
-                    let rows = [i, r].map(|i| i * stride..(i + 1) * stride);
-                    let Ok([other, row]) = T.get_disjoint_mut(rows) else { unreachable!("two rows") };
-                    subtract_rows::<V, 1>(other, [row], [factor]);
+            for others in [before, after] {
+                for other in others.chunks_exact_mut(stride) {
+                    let factor = other[k];
+                    if factor != 0.0 {
+                        subtract_rows::<V, 1>(other, [row], [factor]);
+                    }
                 }
             }
             e.late.push(r);

@@ -296,9 +296,11 @@ fn solve<S: Scalar, const N: usize>(limb: &Limb, stride: usize, T: &mut [S], inv
             let x = &mut row[run.clone()];
             let y: [&[S]; N] = core::array::from_fn(|k| &Y[k][run.clone()][..x.len()]); // so no entry need be checked
             for (j, x) in x.iter_mut().enumerate() {
+                let mut sum = *x;
                 for k in 0..N {
-                    *x = g[k].mul_add(y[k][j], *x);
+                    sum = g[k].mul_add(y[k][j], sum);
                 }
+                *x = sum;
             }
         }
         solved.iter().for_each(|&c| row[c] = S::zero());
