@@ -50,6 +50,7 @@ functions: tuple[str, ...] = (
     "constrained_dynamics",
     "constrained_dynamics_derivatives",
     "impulse_dynamics",
+    "impulse_dynamics_derivatives",
 )
 """The functions that can be made."""
 
@@ -70,8 +71,9 @@ def source(
 
     language: 'c' or 'c-float'; 'c-4', 'c-8', 'c-float-4' or 'c-float-8' for vectors of states; 'c-casadi' for
     CasADi's `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: those of the function 'frames';
-    constraints: those of 'constrained_dynamics', its derivatives and 'impulse_dynamics'; external_forces: whether
-    dynamics takes them; inputs: what is an argument instead of a constant, of 'inertia', 'armature' and 'gravity'.
+    constraints: those of 'constrained_dynamics' and 'impulse_dynamics', and of their derivatives; external_forces:
+    whether dynamics takes them; inputs: what is an argument instead of a constant, of 'inertia', 'armature' and
+    'gravity'.
 
     >>> arm = condyle.robots.arm7()
     >>> list(condyle.codegen.source(arm, "rnea")), list(condyle.codegen.source(arm, "rnea", "rust"))

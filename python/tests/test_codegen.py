@@ -104,6 +104,21 @@ def test_constrained_dynamics(quadruped: Robot) -> None:
     near(found.lambda_, expected.lambda_)
 
 
+@needs_compiler
+def test_impulse_dynamics_derivatives(quadruped: Robot) -> None:
+    model, data, q, v, *_ = quadruped
+    feet = [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")]
+    compiled = condyle.codegen.compile(model, "impulse_dynamics_derivatives", constraints=feet)
+    assert compiled.inputs == {"q": 19, "v": 18, "restitution": 1}
+    assert compiled.outputs["dlambda_dq"] == (6, 18)
+    expected = condyle.impulse_dynamics_derivatives(model, data, condyle.ConstraintSet(model, feet), q, v, 0.3)
+    found = compiled(q, v, [0.3])
+    near(found.v_after, expected.v)
+    near(found.lambda_, expected.lambda_)
+    for name in ("dv_dq", "dv_dv", "dlambda_dq", "dlambda_dv"):
+        near(getattr(found, name), getattr(expected, name))
+
+
 def test_what_is_wrong_is_said(quadruped: Robot, tmp_path: Path) -> None:
     model = quadruped.model
     with pytest.raises(RuntimeError, match="`no-such-compiler` cannot be run"):

@@ -18,7 +18,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     robot: RobotArguments,
     /// rnea, aba, crba, minv, gravity, nonlinear_effects, rnea_derivatives, aba_derivatives, rnea_hessian,
-    /// aba_hessian, frames, centroidal, constrained_dynamics, constrained_dynamics_derivatives, impulse_dynamics
+    /// aba_hessian, frames, centroidal, constrained_dynamics, constrained_dynamics_derivatives, impulse_dynamics,
+    /// impulse_dynamics_derivatives
     #[arg(long, value_name = "NAMES", value_delimiter = ',', required = true)]
     functions: Vec<String>,
     /// c, c-float, c-4, c-8, c-float-4, c-float-8, c-casadi, rust, rust-float, cuda or cuda-float

@@ -7,8 +7,8 @@ use crate::function::{Function, Recorder, record};
 use crate::identifiers::identifiers;
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, ReferenceFrame, aba_hessian, centroidal_map_rate, constrained_dynamics,
-    constrained_dynamics_derivatives, forward_kinematics, forward_velocities, gravity, impulse_dynamics, neutral,
-    nonlinear_effects, rnea, rnea_derivatives, rnea_hessian,
+    constrained_dynamics_derivatives, forward_kinematics, forward_velocities, gravity, impulse_dynamics,
+    impulse_dynamics_derivatives, neutral, nonlinear_effects, rnea, rnea_derivatives, rnea_hessian,
 };
 use condyle_model::inertial_parameters::to_inertia;
 use condyle_model::{Model, Vec3};
@@ -16,7 +16,7 @@ use condyle_spatial::{Force, Inertia, Matrix, Scalar};
 use nalgebra::DMatrix;
 
 /// The functions that [`functions`] knows.
-pub const FUNCTIONS: [&str; 15] = [
+pub const FUNCTIONS: [&str; 16] = [
     "rnea",
     "aba",
     "crba",
@@ -32,10 +32,11 @@ pub const FUNCTIONS: [&str; 15] = [
     "constrained_dynamics",
     "constrained_dynamics_derivatives",
     "impulse_dynamics",
+    "impulse_dynamics_derivatives",
 ];
 
 /// Those that need M⁻¹.
-const INVERTING: [&str; 7] = [
+const INVERTING: [&str; 8] = [
     "aba",
     "minv",
     "aba_derivatives",
@@ -43,6 +44,7 @@ const INVERTING: [&str; 7] = [
     "constrained_dynamics",
     "constrained_dynamics_derivatives",
     "impulse_dynamics",
+    "impulse_dynamics_derivatives",
 ];
 
 /// What functions of a robot are made with.
@@ -50,7 +52,7 @@ const INVERTING: [&str; 7] = [
 pub struct Settings {
     /// The frames of `frames`, by name.
     pub frames: Vec<String>,
-    /// The constraints of `constrained_dynamics`, its derivatives and `impulse_dynamics`.
+    /// The constraints of `constrained_dynamics` and `impulse_dynamics`, and of their derivatives.
     pub constraints: Vec<ContactConstraint>,
     /// Whether dynamics and its derivatives take external forces on the bodies: `f_ext`, six numbers for each body but the
     /// world.
@@ -93,8 +95,7 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
         return Err(Error::Singular { name, joint: model.bodies()[i].joint_name.clone() });
     }
     let frames: Vec<usize> = settings.frames.iter().map(|name| model.frame(name)).collect::<Result<_, _>>()?;
-    let is_constrained =
-        matches!(name, "constrained_dynamics" | "constrained_dynamics_derivatives" | "impulse_dynamics");
+    let is_constrained = name.starts_with("constrained_dynamics") || name.starts_with("impulse_dynamics");
     ConstraintSet::<Expression>::check_all(model, &settings.constraints)?;
     if is_constrained && settings.constraints.is_empty() {
         return Err(Error::Missing { name, needs: "constraints" });
@@ -140,7 +141,10 @@ fn about(name: &str, model: &Model) -> String {
         "constrained_dynamics_derivatives" => {
             "Forward dynamics under constraints, J a + gamma = 0, and its derivatives"
         }
-        _ => "The velocity after an impact on the constraints, without restitution",
+        "impulse_dynamics" => {
+            "The velocity after an impact on the constraints, M (v_after - v) = J^T lambda, J v_after = -restitution J v"
+        }
+        _ => "The velocity after an impact on the constraints, J v_after = -restitution J v, and its derivatives",
     };
     let (nq, nv) = (model.nq(), model.nv());
     format!("{what}. Of the robot `{}`, nq = {nq}, nv = {nv}.", model.name().replace("*/", "* /").replace('\n', " "))
@@ -309,10 +313,24 @@ impl<'s> Robot<'s> {
     fn constrained(&mut self, r: &mut Recorder, name: &str) -> Result<(), Error> {
         let mut set = ConstraintSet::new(&self.model, &self.settings.constraints)?;
         let v = self.velocity(r);
-        if name == "impulse_dynamics" {
-            let after = impulse_dynamics(&self.model, &mut self.data, &mut set, &self.q, &v, Expression::zero());
-            r.output("v_after", after.v, "velocity after the impact");
-            r.output("lambda", after.lambda, "impulses of the constraints");
+        if name.starts_with("impulse_dynamics") {
+            let restitution = r.input("restitution", 1, "0 (the constraints hold) to 1 (nothing is lost)")[0];
+            let Self { model, data, q, .. } = self;
+            let impulse = |r: &mut Recorder, v: &[Expression], lambda: &[Expression]| {
+                r.output("v_after", v, "velocity after the impact");
+                r.output("lambda", lambda, "impulses of the constraints");
+            };
+            if name == "impulse_dynamics" {
+                let after = impulse_dynamics(model, data, &mut set, q, &v, restitution);
+                impulse(r, after.v, after.lambda);
+                return Ok(());
+            }
+            let d = impulse_dynamics_derivatives(model, data, &mut set, q, &v, restitution);
+            impulse(r, d.v, d.lambda);
+            r.matrix("dv_dq", d.dv_dq, "derivative of v_after by q");
+            r.matrix("dv_dv", d.dv_dv, "derivative of v_after by v");
+            r.matrix("dlambda_dq", d.dlambda_dq, "derivative of lambda by q");
+            r.matrix("dlambda_dv", d.dlambda_dv, "derivative of lambda by v");
             return Ok(());
         }
         let tau = self.input(r, "tau", "efforts");

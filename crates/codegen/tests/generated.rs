@@ -10,8 +10,8 @@ use condyle_codegen::{FUNCTIONS, Function, Language, Settings, functions, record
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Force, Model, ReferenceFrame, aba, aba_derivatives,
     aba_hessian, centroidal_map_rate, constrained_dynamics, constrained_dynamics_derivatives, crba, forward_kinematics,
-    forward_velocities, gravity, impulse_dynamics, minv, nonlinear_effects, random_configuration, rnea,
-    rnea_derivatives, rnea_hessian, robots,
+    forward_velocities, gravity, impulse_dynamics, impulse_dynamics_derivatives, minv, nonlinear_effects,
+    random_configuration, rnea, rnea_derivatives, rnea_hessian, robots,
 };
 use condyle_spatial::{Scalar, Vec3};
 use nalgebra::DMatrix;
@@ -22,6 +22,9 @@ use trees::Tree;
 
 /// Sums in another order: what is recorded is not what lanes compute.
 const ROUNDING: f64 = 1e-12;
+
+/// How much of the velocity an impact gives back.
+const RESTITUTION: f64 = 0.3;
 
 /// As above, where M⁻¹ or Λ stands in between: it amplifies roundings by its condition.
 const THROUGH_INVERSE: f64 = 1e-11;
@@ -119,8 +122,13 @@ fn expected(
             [&[d.a.to_vec(), d.lambda.to_vec()][..], &matrices].concat()
         }
         "impulse_dynamics" => {
-            let d = impulse_dynamics(model, data, &mut set, q, v, 0.0);
+            let d = impulse_dynamics(model, data, &mut set, q, v, RESTITUTION);
             vec![d.v.to_vec(), d.lambda.to_vec()]
+        }
+        "impulse_dynamics_derivatives" => {
+            let d = impulse_dynamics_derivatives(model, data, &mut set, q, v, RESTITUTION);
+            let matrices = [d.dv_dq, d.dv_dv, d.dlambda_dq, d.dlambda_dv].map(matrix);
+            [&[d.v.to_vec(), d.lambda.to_vec()][..], &matrices].concat()
         }
         _ => panic!("no such function: {name}"),
     }
@@ -133,7 +141,10 @@ fn bound(name: &str) -> f64 {
 
 /// The arguments of a function at a state.
 fn arguments(function: &Function, state: &[Vec<f64>; 4]) -> Vec<Vec<f64>> {
-    state[..function.inputs.len()].to_vec()
+    match function.name.starts_with("impulse_dynamics") {
+        true => vec![state[0].clone(), state[1].clone(), vec![RESTITUTION]],
+        false => state[..function.inputs.len()].to_vec(),
+    }
 }
 
 /// The functions that compilers are given for a robot: those of which the code is not long, and with `CONDYLE_ALL_CODE`, which

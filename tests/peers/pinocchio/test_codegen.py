@@ -9,6 +9,7 @@ import casadi
 import numpy as np
 import pinocchio
 import pytest
+from comparison import Pair
 from test_robots import NO_URDF, ROBOTS, SINGULAR, load
 
 import condyle
@@ -18,6 +19,8 @@ BOUND = 1e-10
 """Of what the peer computes in another order, relative to 1 + the largest number; as in comparison.py."""
 ROUNDING = 1e-12
 """Of what the library computes in another order, relative to 1 + the largest number."""
+WORST = 1e10
+"""The condition from which on nothing is compared: a contact that a robot cannot give way to."""
 MILD = 1e3
 """The condition of M up to which its inverse amplifies roundings within ROUNDING; beyond, as much as the condition."""
 
@@ -65,30 +68,79 @@ def test_beside_pinocchio(name: str, tmp_path: Path) -> None:
             assert np.abs(a - b).max() <= BOUND * (1.0 + np.abs(b).max()), (name, function)
 
 
-@pytest.mark.parametrize("name", [name for name in ROBOTS if name not in NO_URDF] if ALL else SOME)
-def test_beside_the_library(name: str, tmp_path: Path) -> None:
-    """Equal but for roundings, which the condition of M amplifies where its inverse is needed."""
-    pair = load(name)
+RESTITUTION = 0.3
+LARGEST = 25
+"""The coordinates up to which the longest functions are compiled: second derivatives and those that need M⁻¹."""
+
+
+def beside(pair: Pair, function: str, frame: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """The arguments of a function at a state, and what the library computes of them."""
     model, data, state = pair.ours, pair.data, pair.states(1)[0]
     q, v, x = state.q, state.v, state.a
-    names = ["rnea", "crba", "gravity", "nonlinear_effects", "rnea_derivatives", "centroidal"]
-    if name not in SINGULAR:
-        names += ["aba", "minv"]
-        names += ["aba_derivatives"] if model.nv < 25 else []
-    for function in names:
-        compiled = condyle.codegen.compile(model, function, cache=tmp_path)
-        result = compiled(*(q, v, x)[: len(compiled.inputs)])
-        if function == "centroidal":
-            terms = condyle.centroidal_map_rate(model, data, q, v)
-            expected = [terms.com, terms.com_velocity, terms.hg, terms.Jcom, terms.Ag, terms.dAg]
-        else:
-            told = getattr(condyle, function)(model, data, *(q, v, x)[: len(compiled.inputs)])
-            expected = list(told) if isinstance(told, tuple) else [told]
-        inverse = function in ("aba", "minv", "aba_derivatives")
-        condition = np.linalg.cond(condyle.crba(model, data, q)) if inverse else 1.0
-        bound = ROUNDING * max(1.0, condition / MILD)
+    told: object
+    if function == "frames":
+        axes = "local_world_aligned"
+        pose = condyle.frame_placement(model, data, q, frame)
+        velocity = condyle.frame_velocity(model, data, q, v, frame, axes)
+        J = condyle.frame_jacobian(model, data, q, frame, axes)
+        dJ = condyle.frame_jacobian_rate(model, data, q, v, frame, axes)
+        return [q, v], [pose[:3, :3], pose[:3, 3], velocity, J, dJ]
+    if function == "centroidal":
+        terms = condyle.centroidal_map_rate(model, data, q, v)
+        return [q, v], [terms.com, terms.com_velocity, terms.hg, terms.Jcom, terms.Ag, terms.dAg]
+    if function.startswith(("constrained", "impulse")):
+        impulse = function.startswith("impulse")
+        held = condyle.ConstraintSet(model, [condyle.ContactConstraint(frame, "point")])
+        last = np.array([RESTITUTION]) if impulse else x
+        d = getattr(condyle, function)(model, data, held, q, v, RESTITUTION if impulse else x)
+        fields = [name for name in d._fields if name not in ("residual", "redundant", "inertia")]
+        return [q, v, last], [getattr(d, name) for name in fields]
+    arguments = [q] if function in ("crba", "minv", "gravity") else [q, v]
+    if function not in ("crba", "minv", "gravity", "nonlinear_effects"):
+        arguments.append(x)
+    if function.endswith("hessian"):
+        arguments.append(v[::-1].copy())
+        told = getattr(condyle, function)(model, data, q, v, x, lambda_=arguments[3])[:4]
+    else:
+        told = getattr(condyle, function)(model, data, *arguments)
+    return arguments, list(told) if isinstance(told, tuple) else [told]
+
+
+def condition(pair: Pair, function: str, frame: str) -> float:
+    """How much the inverses that a function needs may amplify roundings; infinite where there is none."""
+    q = pair.states(1)[0].q
+    if not function.startswith(("aba", "minv", "constrained", "impulse")):
+        return 1.0
+    if pair.name in SINGULAR:
+        return np.inf
+    M = condyle.crba(pair.ours, pair.data, q)
+    if function.startswith(("aba", "minv")):
+        return float(np.linalg.cond(M))
+    J = condyle.frame_jacobian(pair.ours, pair.data, q, frame)[:3]
+    return float(np.linalg.cond(M) * np.linalg.cond(J @ np.linalg.solve(M, J.T)))
+
+
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name not in NO_URDF] if ALL else SOME)
+def test_beside_the_library(name: str, tmp_path: Path) -> None:
+    """Equal but for roundings, which inverses amplify by their condition; of the last frame, which a contact holds."""
+    pair = load(name)
+    model = pair.ours
+    frame = model.frames[-1].name
+    contact = [condyle.ContactConstraint(frame, "point")]
+    compiled = set()
+    for function in condyle.codegen.functions:
+        long = "hessian" in function or function in ("aba_derivatives", "constrained_dynamics_derivatives")
+        amplified = condition(pair, function, frame)
+        if amplified > WORST or (long and model.nv > LARGEST):
+            continue
+        of = condyle.codegen.compile(model, function, frames=[frame], constraints=contact, cache=tmp_path)
+        arguments, expected = beside(pair, function, frame)
+        result = of(*arguments)
+        bound = ROUNDING * max(1.0, amplified / MILD)
         for a, b in zip(list(result) if isinstance(result, tuple) else [result], expected, strict=True):
             assert np.abs(a - b).max() <= bound * (1.0 + np.abs(b).max()), (name, function)
+        compiled.add(function)
+    assert {"rnea", "crba", "gravity", "nonlinear_effects", "rnea_derivatives", "frames", "centroidal"} <= compiled
 
 
 def library(folder: Path) -> str:
