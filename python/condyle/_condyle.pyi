@@ -551,6 +551,7 @@ def _casadi_hold(
     model: Model,
     function: str,
     *,
+    states: ArrayLike,
     frame: str | int | None = None,
     reference: _Reference | None = None,
     constraints: Sequence[ContactConstraint] | None = None,
@@ -558,7 +559,10 @@ def _casadi_hold(
     """A slot of CasADi's interface that computes a function of a robot, held for the caller until `_casadi_release`.
 
     function: 'rnea', 'aba', 'crba', 'forward_kinematics', 'frame_velocity', 'com', 'centroidal_momentum' or
-    'constrained_dynamics'. Returns the name of its symbols.
+    'constrained_dynamics'.
+    states: how many at a time; arguments and results have the columns of each, one after the other.
+
+    Returns the name of its symbols.
     """
 
 def _casadi_hold_knot(of: Any, t: int | None) -> str:

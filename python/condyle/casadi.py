@@ -12,6 +12,14 @@ Each function computes with the library's own code: values, Jacobians with the z
 them, and the Hessian of λᵀf, in closed form for `rnea` and `aba` and by hyper-dual numbers for the others. They may be
 called from several threads at a time (`Function.map` with "thread").
 
+With `states=N` a function is one of N states, with a column for each, as `f.map(N)` is. But it is one call, also for
+the Jacobian and the Hessian, and `rnea` and `aba` compute several states in the lanes of a vector register: the
+functions of direct collocation, which knows the number of its points, take two to four times less time so.
+
+>>> many = condyle.casadi.rnea(arm, states=50)
+>>> many.size_in("q"), many.size_out("tau")
+((7, 50), (7, 50))
+
 A position q has nq numbers. Quaternions and the points of a circle of continuous joints are divided by their lengths
 first, so that derivatives by all nq numbers exist and are exact; of length 0 they give NaN. An optimisation holds their
 lengths at 1 by a constraint, or by integrating in the tangent space.
@@ -65,8 +73,8 @@ __all__ = [
 ]
 
 
-def _function(model: Model, function: str, **options: Any) -> "_casadi.Function":
-    return _external(_condyle._casadi_hold(model, function, **options))
+def _function(model: Model, function: str, states: int, **options: Any) -> "_casadi.Function":
+    return _external(_condyle._casadi_hold(model, function, states=states, **options))
 
 
 def _external(name: str) -> "_casadi.Function":
@@ -77,30 +85,30 @@ def _external(name: str) -> "_casadi.Function":
         _condyle._casadi_release(name)  # CasADi holds it now
 
 
-def rnea(model: Model) -> "_casadi.Function":
+def rnea(model: Model, states: int = 1) -> "_casadi.Function":
     """The efforts τ = M(q) a + h(q, v) that make a robot accelerate with a: (q, v, a) -> tau.
 
     >>> tau = condyle.casadi.rnea(condyle.robots.arm7())(0.3, 0, 0)
     >>> bool(abs(tau[0]) < 1e-9)  # gravity does not turn a vertical axis
     True
     """
-    return _function(model, "rnea")
+    return _function(model, "rnea", states)
 
 
-def aba(model: Model) -> "_casadi.Function":
+def aba(model: Model, states: int = 1) -> "_casadi.Function":
     """The accelerations a of a robot under efforts τ: (q, v, tau) -> a.
 
     Raises `ModelError` if the inertia matrix is singular.
     """
-    return _function(model, "aba")
+    return _function(model, "aba", states)
 
 
-def crba(model: Model) -> "_casadi.Function":
+def crba(model: Model, states: int = 1) -> "_casadi.Function":
     """The inertia matrix: q -> M, (nv, nv), with the zeros of the robot's tree."""
-    return _function(model, "crba")
+    return _function(model, "crba", states)
 
 
-def forward_kinematics(model: Model, frame: str | int) -> "_casadi.Function":
+def forward_kinematics(model: Model, frame: str | int, states: int = 1) -> "_casadi.Function":
     """The placement of a frame in the world's frame: q -> (position, rotation), 3 numbers (m) and (3, 3).
 
     >>> tool = condyle.casadi.forward_kinematics(condyle.robots.arm7(), "tool")
@@ -108,27 +116,30 @@ def forward_kinematics(model: Model, frame: str | int) -> "_casadi.Function":
     >>> bool(position[2] > 0.5)  # stretched upwards
     True
     """
-    return _function(model, "forward_kinematics", frame=frame)
+    return _function(model, "forward_kinematics", states, frame=frame)
 
 
 def frame_velocity(
-    model: Model, frame: str | int, reference: Literal["local", "world", "local_world_aligned"] = "local"
+    model: Model,
+    frame: str | int,
+    reference: Literal["local", "world", "local_world_aligned"] = "local",
+    states: int = 1,
 ) -> "_casadi.Function":
     """The velocity of a frame, linear numbers first: (q, v) -> velocity, 6 numbers (m/s, rad/s)."""
-    return _function(model, "frame_velocity", frame=frame, reference=reference)
+    return _function(model, "frame_velocity", states, frame=frame, reference=reference)
 
 
-def com(model: Model) -> "_casadi.Function":
+def com(model: Model, states: int = 1) -> "_casadi.Function":
     """The centre of mass of the moving bodies in the world's frame: q -> com, 3 numbers (m)."""
-    return _function(model, "com")
+    return _function(model, "com", states)
 
 
-def centroidal_momentum(model: Model) -> "_casadi.Function":
+def centroidal_momentum(model: Model, states: int = 1) -> "_casadi.Function":
     """The momentum about the centre of mass, linear numbers first: (q, v) -> momentum, 6 numbers (kg m/s, kg m²/s)."""
-    return _function(model, "centroidal_momentum")
+    return _function(model, "centroidal_momentum", states)
 
 
-def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint]) -> "_casadi.Function":
+def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint], states: int = 1) -> "_casadi.Function":
     """The accelerations under constraints and the forces that hold them: (q, v, tau) -> (a, forces).
 
     The constraints' targets stay as they are given. Raises `ModelError` as `ConstraintSet` does.
@@ -138,7 +149,7 @@ def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint])
     >>> condyle.casadi.constrained_dynamics(quadruped, stance).size_out(1)
     (6, 1)
     """
-    return _function(model, "constrained_dynamics", constraints=list(constraints))
+    return _function(model, "constrained_dynamics", states, constraints=list(constraints))
 
 
 _Knot = (

@@ -24,7 +24,7 @@ def transcribe(
 ) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
     """The motion from `start`, at rest, to rest with a frame at `target`.
 
-    inverse_dynamics: (q, v, a) -> τ. placement: q -> (position of the frame, …).
+    inverse_dynamics: (q, v, a) -> τ of all knots. placement: q -> (position of the frame, …).
     """
     n, limits, opti = model.nv, model.limits, casadi.Opti()
     q, v, a = opti.variable(n, KNOTS), opti.variable(n, KNOTS), opti.variable(n, KNOTS)
@@ -32,7 +32,7 @@ def transcribe(
     h = duration / (KNOTS - 1)
     for x, rate in ((q, v), (v, a)):  # the trapezoidal rule
         opti.subject_to(x[:, 1:] == x[:, :-1] + h / 2 * (rate[:, 1:] + rate[:, :-1]))
-    tau = inverse_dynamics.map(KNOTS)(q, v, a)
+    tau = inverse_dynamics(q, v, a)
     for x, lower, upper in (
         (q, limits.lower, limits.upper),
         (v, -limits.velocity, limits.velocity),
@@ -55,7 +55,8 @@ def transcribe(
 def main() -> None:
     arm, target = condyle.robots.arm7(), np.array([0.45, -0.3, 0.35])
     start = np.array([0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0])
-    inverse_dynamics, tool = condyle.casadi.rnea(arm), condyle.casadi.forward_kinematics(arm, "tool")
+    inverse_dynamics = condyle.casadi.rnea(arm, states=KNOTS)
+    tool = condyle.casadi.forward_kinematics(arm, "tool")
     opti, motion = transcribe(arm, inverse_dynamics, tool, start, target)
     opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes"})
     solution = opti.solve()

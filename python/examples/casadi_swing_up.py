@@ -14,6 +14,7 @@ import condyle
 import condyle.casadi
 
 INTERVALS, DURATION = 40, 3.0
+POINTS = 2 * INTERVALS + 1
 EFFORT = np.array([8.0, 4.0])  # N m; to hold the arm level takes 15 and 5
 
 
@@ -29,10 +30,10 @@ def two_links() -> condyle.Model:
 
 
 def transcribe(dynamics: casadi.Function) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
-    """The motion as an optimisation, by dynamics (q, v, τ) -> a; variables have a column for each point."""
-    opti, h, points = casadi.Opti(), DURATION / INTERVALS, 2 * INTERVALS + 1
-    q, v, tau = (opti.variable(2, points) for _ in range(3))
-    a = dynamics.map(points)(q, v, tau)
+    """The motion as an optimisation, by dynamics (q, v, τ) -> a of all points; variables have a column for each."""
+    opti, h = casadi.Opti(), DURATION / INTERVALS
+    q, v, tau = (opti.variable(2, POINTS) for _ in range(3))
+    a = dynamics(q, v, tau)
     begin, middle, end = slice(0, -1, 2), slice(1, None, 2), slice(2, None, 2)
     for x, rate in ((q, v), (v, a)):
         opti.subject_to(x[:, end] - x[:, begin] == h / 6 * (rate[:, begin] + 4 * rate[:, middle] + rate[:, end]))
@@ -44,16 +45,16 @@ def transcribe(dynamics: casadi.Function) -> tuple[casadi.Opti, dict[str, casadi
     opti.subject_to(v[:, -1] == 0)
     for k, limit in enumerate(EFFORT):
         opti.subject_to(opti.bounded(-limit, tau[k, :], limit))
-    weights = np.ones(points)  # Simpson's rule: 1, 4, 2, 4, …, 4, 1
+    weights = np.ones(POINTS)  # Simpson's rule: 1, 4, 2, 4, …, 4, 1
     weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
     opti.minimize(h / 6 * casadi.dot(casadi.repmat(casadi.DM(weights).T, 2, 1), tau**2))
-    opti.set_initial(q[0, :], np.linspace(0, np.pi, points))
+    opti.set_initial(q[0, :], np.linspace(0, np.pi, POINTS))
     return opti, {"q": q, "v": v, "tau": tau}
 
 
 def main() -> None:
     arm = two_links()
-    opti, motion = transcribe(condyle.casadi.aba(arm))
+    opti, motion = transcribe(condyle.casadi.aba(arm, states=POINTS))
     opti.solver("ipopt", {"print_time": False}, {"print_level": 0, "sb": "yes"})
     solution = opti.solve()
     q, v, tau = (solution.value(motion[name]) for name in ("q", "v", "tau"))

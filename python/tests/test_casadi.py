@@ -72,12 +72,14 @@ def contacts(robot: str) -> list[condyle.ContactConstraint]:
     return [condyle.ContactConstraint(tip, "point") for tip in TIPS[robot]]
 
 
-def function(name: str, robot: str) -> "casadi.Function":
+def function(name: str, robot: str, states: int = 1) -> "casadi.Function":
     """A function of `condyle.casadi`."""
     model, make = MODELS[robot], getattr(condyle.casadi, name)
     if name in ("forward_kinematics", "frame_velocity"):
-        return make(model, TIPS[robot][0])
-    return make(model, contacts(robot)) if name == "constrained_dynamics" else make(model)
+        return make(model, TIPS[robot][0], states=states)
+    if name == "constrained_dynamics":
+        return make(model, contacts(robot), states=states)
+    return make(model, states=states)
 
 
 def direct(name: str, robot: str, x: Arrays) -> Arrays:
@@ -97,11 +99,11 @@ def direct(name: str, robot: str, x: Arrays) -> Arrays:
             return [getattr(condyle, name)(model, data, *x)]
 
 
-def state(name: str, robot: str) -> Arrays:
+def state(name: str, robot: str, seed: int = 0) -> Arrays:
     """Random arguments, with quaternions of length 1."""
-    model, rng = MODELS[robot], np.random.default_rng(3)
+    model, rng = MODELS[robot], np.random.default_rng(3 + seed)
     arguments = function(name, robot).n_in()
-    return [condyle.random_configuration(model, seed=2), *rng.standard_normal((2, model.nv))][:arguments]
+    return [condyle.random_configuration(model, seed=2 + seed), *rng.standard_normal((2, model.nv))][:arguments]
 
 
 def stretched(name: str, robot: str) -> Arrays:
@@ -189,6 +191,50 @@ def test_zeros_of_the_tree() -> None:
     assert f.nnz_out(0) == np.count_nonzero(M)
     by_a = function("rnea", "quadruped").jacobian().sparsity_out(2)
     assert by_a.nnz() == np.count_nonzero(M)
+
+
+@each
+def test_many_states_are_a_map(name: str) -> None:
+    """The same results, derivatives and zeros as `Function.map`; of more states than are computed at a time."""
+    robot, states = "every joint", 37
+    one, many = function(name, robot), function(name, robot, states)
+    columns = [state(name, robot, k) for k in range(states)]
+    given = [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
+    expected, found = derived(one.map(states)), derived(many)
+    for x, y in zip(expected(*given), found(*given), strict=True):
+        assert x.sparsity() == y.sparsity()
+        assert close(np.array(y.nonzeros()), np.array(x.nonzeros()), ROUNDING)
+
+
+def derived(f: casadi.Function) -> casadi.Function:
+    """The results of a function, their Jacobians, a product with it, and the Hessian of their sum with weights."""
+    x = [casadi.MX.sym(f.name_in(k), f.size1_in(k), f.size2_in(k)) for k in range(f.n_in())]
+    y = f.call(x)
+    stacked = casadi.veccat(*y)
+    weighed = casadi.dot(np.cos(np.arange(stacked.numel())), stacked)
+    jacobians = [casadi.jacobian(stacked, part) for part in x]
+    hessian = casadi.jacobian(casadi.veccat(*(casadi.gradient(weighed, part) for part in x)), x[0])
+    return casadi.Function("derived", x, [*y, *jacobians, hessian])
+
+
+def test_where_a_tree_stands_moves_with_nothing_but_gravity() -> None:
+    """∂²/∂q₀∂v and ∂²/∂q₀∂τ are zero, and are no entries: as in a graph of expressions."""
+    arm = MODELS["arm"]
+    for name in ("rnea", "aba"):
+        hessian = function(name, "arm").reverse(1).jacobian()
+        blocks = {hessian.name_out(k): hessian.sparsity_out(k) for k in range(hessian.n_out())}
+        third = "a" if name == "rnea" else "tau"
+        for block in (blocks["jac_adj_q_v"], blocks[f"jac_adj_q_{third}"]):
+            assert block.row().count(0) == 0
+            assert block.nnz() == (arm.nv - 1) * arm.nv
+        assert blocks["jac_adj_q_q"].is_dense()
+    assert function("crba", "arm").jacobian().sparsity_out(0).colind()[1] == 0
+
+
+def test_numbers_of_states_are_checked() -> None:
+    for wrong in (0, -1, 1.5, "two", 1 << 40):
+        with pytest.raises(ValueError, match="states: expected a number from 1 to 65536, found "):
+            condyle.casadi.rnea(MODELS["arm"], states=wrong)  # type: ignore[arg-type]
 
 
 def test_many_threads() -> None:

@@ -4,6 +4,7 @@
 use super::chart::{Chart, Position};
 use super::computation::{Calls, Computation};
 use condyle::Error;
+use core::ops::Range;
 use nalgebra::DMatrix;
 use std::ffi::CString;
 use std::sync::{Mutex, PoisonError};
@@ -37,6 +38,23 @@ impl Port {
         (Self { name: CString::new(name).expect("names have no zeros"), sparsity }, places)
     }
 
+    /// The same for so many states: the columns of one after those of the other, in the same rows or each in rows of its own.
+    fn repeat(&mut self, states: usize, own_rows: bool) {
+        let number = |n: usize| i64::try_from(n).expect("CasADi counts that far");
+        let (rows, columns) = (self.sparsity[0], self.sparsity[1] as usize);
+        let (starts, entries) = self.sparsity[2..].split_at(columns + 1);
+        let mut all = vec![if own_rows { rows * number(states) } else { rows }, number(columns * states)];
+        for state in 0..states {
+            all.extend(starts[..columns].iter().map(|start| start + number(state * entries.len())));
+        }
+        all.push(number(states * entries.len()));
+        for state in 0..states {
+            let down = if own_rows { rows * number(state) } else { 0 };
+            all.extend(entries.iter().map(|row| row + down));
+        }
+        self.sparsity = all;
+    }
+
     fn full(name: &str, rows: usize, columns: usize) -> Self {
         Self::new(name, rows, columns, |_, _| true).0
     }
@@ -60,7 +78,7 @@ enum Source {
 pub(super) struct Output {
     pub(super) port: Port,
     source: Source,
-    /// For each entry, its number in the source.
+    /// For each entry of a state, its number in the source.
     from: Vec<usize>,
 }
 
@@ -71,13 +89,24 @@ pub(super) struct Description {
     pub(super) outputs: Vec<Output>,
 }
 
+impl Description {
+    /// The same for so many states. Jacobians have them in blocks on the diagonal.
+    fn of_many(mut self, states: usize, is_jacobian: bool) -> Self {
+        self.inputs.iter_mut().for_each(|port| port.repeat(states, false));
+        self.outputs.iter_mut().for_each(|output| output.port.repeat(states, is_jacobian));
+        self
+    }
+}
+
 /// A function that is bound to a slot.
 pub(super) struct Bound {
     computation: Box<dyn Computation>,
     /// What tells it from others.
     pub(super) key: Vec<u8>,
+    /// The number of states of each call, side by side.
+    states: usize,
     chart: Chart,
-    /// The sizes of the arguments, and how many numbers the results have.
+    /// The sizes of the arguments, and how many numbers the results have, for one state.
     sizes: Vec<usize>,
     ny: usize,
     /// The results' sizes and places: where each begins among all, and where its entries stand from there.
@@ -87,17 +116,17 @@ pub(super) struct Bound {
     free: Mutex<Vec<Work>>,
 }
 
-/// What a call computes in.
+/// What a call computes in: for as many states at a time as there are positions and matrices J and H.
 struct Work {
     calls: Box<dyn Calls>,
-    position: Position,
+    positions: Vec<Position>,
     x: Vec<Vec<f64>>,
     lambda: Vec<f64>,
     y: Vec<f64>,
     /// By tangent coordinates: J, Jᵀλ and the Hessian of λᵀf.
-    J: DMatrix<f64>,
+    J: Vec<DMatrix<f64>>,
     g: Vec<f64>,
-    H: DMatrix<f64>,
+    H: Vec<DMatrix<f64>>,
     /// By the coordinates that CasADi has: J, Jᵀλ, and the Hessian.
     Jx: DMatrix<f64>,
     gx: Vec<f64>,
@@ -108,7 +137,7 @@ struct Work {
 }
 
 impl Bound {
-    pub(super) fn new(computation: Box<dyn Computation>, key: Vec<u8>) -> Result<Self, Error> {
+    pub(super) fn new(computation: Box<dyn Computation>, states: usize, key: Vec<u8>) -> Result<Self, Error> {
         let (chart, outputs) = (computation.chart(), computation.outputs());
         let (arguments, sizes): (Vec<_>, Vec<_>) = computation.arguments().into_iter().unzip();
         let size = |argument: usize| sizes[argument];
@@ -195,9 +224,11 @@ impl Bound {
                 hessian.outputs.push(Output { port, source: Source::TransposedJacobian, from });
             }
         }
+        let [value, reverse] = [value, reverse].map(|of| of.of_many(states, false));
+        let [jacobian, hessian] = [jacobian, hessian].map(|of| of.of_many(states, true));
         let descriptions = [value, jacobian, reverse, hessian];
         let free = Mutex::new(Vec::new());
-        let bound = Self { computation, key, chart, sizes, ny, results, descriptions, free };
+        let bound = Self { computation, key, states, chart, sizes, ny, results, descriptions, free };
         let work = bound.work()?;
         bound.give_back(work);
         Ok(bound)
@@ -210,15 +241,17 @@ impl Bound {
         }
         let (nx, ny) = (self.sizes.iter().sum::<usize>(), self.ny);
         let tangents = nx - self.chart.nq + self.chart.nv;
+        let calls = self.computation.calls(self.states)?;
+        let most = calls.most();
         Ok(Work {
-            calls: self.computation.calls()?,
-            position: self.chart.position(),
-            x: self.sizes.iter().map(|&size| vec![0.0; size]).collect(),
-            lambda: vec![0.0; ny],
-            y: vec![0.0; ny],
-            J: DMatrix::zeros(ny, tangents),
+            calls,
+            positions: vec![self.chart.position(); most],
+            x: self.sizes.iter().map(|&size| vec![0.0; most * size]).collect(),
+            lambda: vec![0.0; most * ny],
+            y: vec![0.0; most * ny],
+            J: vec![DMatrix::zeros(ny, tangents); most],
             g: vec![0.0; tangents],
-            H: DMatrix::zeros(tangents, tangents),
+            H: vec![DMatrix::zeros(tangents, tangents); most],
             Jx: DMatrix::zeros(ny, nx),
             gx: vec![0.0; nx],
             Hx: DMatrix::zeros(nx, nx),
@@ -243,72 +276,118 @@ impl Bound {
         res: *const *mut f64,
     ) -> Result<(), Error> {
         let mut work = self.work()?;
-        let w = &mut work;
+        let most = work.J.len();
+        for first in (0..self.states).step_by(most) {
+            let some = first..self.states.min(first + most);
+            // SAFETY: by the caller.
+            unsafe { self.evaluate_some(function, some, &mut work, arg, res)? };
+        }
+        self.give_back(work);
+        Ok(())
+    }
+
+    /// Evaluates some states, as many as one call computes.
+    ///
+    /// # Safety
+    /// As for `evaluate`.
+    #[allow(unsafe_code)]
+    unsafe fn evaluate_some(
+        &self,
+        function: usize,
+        some: Range<usize>,
+        w: &mut Work,
+        arg: *const *const f64,
+        res: *const *mut f64,
+    ) -> Result<(), Error> {
+        let (n, all) = (some.len(), self.states);
         // SAFETY: by the caller.
         let input = |k: usize, count: usize| unsafe {
             let given = *arg.add(k);
-            (!given.is_null()).then(|| core::slice::from_raw_parts(given, count))
+            (!given.is_null())
+                .then(|| &core::slice::from_raw_parts(given, all * count)[some.start * count..][..n * count])
         };
-        for (k, x) in w.x.iter_mut().enumerate() {
-            match input(k, x.len()) {
+        for (k, (x, &size)) in w.x.iter_mut().zip(&self.sizes).enumerate() {
+            x.resize(n * size, 0.0);
+            match input(k, size) {
                 Some(given) => x.copy_from_slice(given),
                 None => x.fill(0.0),
             }
         }
         let x = &mut w.x;
         let Chart { nq, nv, .. } = self.chart;
-        self.chart.update(&x[0][..nq], &mut w.position);
-        x[0][..nq].copy_from_slice(&w.position.q);
-        let arguments = x.len();
+        let (size, arguments, is_flat) = (self.sizes[0], x.len(), self.chart.is_flat());
+        if !is_flat {
+            for (position, q) in w.positions.iter_mut().zip(x[0].chunks_exact_mut(size)) {
+                self.chart.update(&q[..nq], position);
+                q[..nq].copy_from_slice(&position.q);
+            }
+        }
+        let (ny, lambda) = (self.ny, &mut w.lambda[..n * self.ny]);
         if function >= REVERSE {
-            w.lambda.fill(0.0);
+            lambda.fill(0.0);
             for (k, (start, places)) in self.results.iter().enumerate() {
-                if let Some(seed) = input(arguments + self.results.len() + k, places.len()) {
-                    places.iter().zip(seed).for_each(|(place, &seed)| w.lambda[start + place] = seed);
+                let count = places.len();
+                let Some(seeds) = input(arguments + self.results.len() + k, count) else { continue };
+                for s in 0..n {
+                    let (lambda, seeds) = (&mut lambda[s * ny..][..ny], &seeds[s * count..][..count]);
+                    places.iter().zip(seeds).for_each(|(place, &seed)| lambda[start + place] = seed);
                 }
             }
         }
+        // SAFETY: by the caller.
+        let is_wanted = |k: usize| unsafe { !(*res.add(k)).is_null() };
+        let mut outputs = self.descriptions[function].outputs.iter().enumerate();
+        let wants_jacobian = outputs.any(|(k, o)| matches!(o.source, Source::TransposedJacobian) && is_wanted(k));
         match function {
-            VALUE => w.calls.value(x, &mut w.y),
-            HESSIAN => w.calls.hessian(x, &w.lambda, &mut w.J, &mut w.H)?,
-            _ => w.calls.jacobian(x, &mut w.J),
-        }
-        if function != VALUE {
-            self.by_coordinates(&w.position, &w.J, &mut w.Jx);
-        }
-        if function >= REVERSE {
-            for (g, column) in w.g.iter_mut().zip(w.J.column_iter()) {
-                *g = column.iter().zip(&w.lambda).map(|(x, l)| x * l).sum(); // Jᵀλ
+            VALUE => w.calls.value(x, &mut w.y[..n * ny]),
+            HESSIAN => {
+                let J = (wants_jacobian || !is_flat).then_some(&mut w.J[..n]);
+                w.calls.hessian(x, lambda, J, &mut w.H[..n])?;
             }
-            for (g, column) in w.gx.iter_mut().zip(w.Jx.column_iter()) {
-                *g = column.iter().zip(&w.lambda).map(|(x, l)| x * l).sum();
-            }
+            _ => w.calls.jacobian(x, &mut w.J[..n]),
         }
-        if function == HESSIAN {
-            self.by_coordinates(&w.position, &w.H, &mut w.half);
-            w.half.transpose_to(&mut w.turned); // (H T)ᵀ
-            self.by_coordinates(&w.position, &w.turned, &mut w.Hx); // Tᵀ H T, which is symmetric
-            self.chart.add_curvature(&w.position, &w.g[..nv], &mut w.Hx, 0);
-        }
-        for (k, output) in self.descriptions[function].outputs.iter().enumerate() {
-            // SAFETY: by the caller.
-            let to = unsafe {
-                let to = *res.add(k);
-                if to.is_null() {
-                    continue;
+        for s in 0..n {
+            let (lambda, J, H) = (&w.lambda[s * ny..][..ny], &w.J[s], &w.H[s]);
+            let times_lambda = |J: &DMatrix<f64>, g: &mut [f64]| {
+                for (g, column) in g.iter_mut().zip(J.column_iter()) {
+                    *g = column.iter().zip(lambda).map(|(x, l)| x * l).sum(); // Jᵀλ
                 }
-                core::slice::from_raw_parts_mut(to, output.from.len())
             };
-            let source = match output.source {
-                Source::Value => &w.y[..],
-                Source::Jacobian | Source::TransposedJacobian => w.Jx.as_slice(),
-                Source::Gradient => &w.gx,
-                Source::Hessian => w.Hx.as_slice(),
-                Source::Nothing => &[],
-            };
-            to.iter_mut().zip(&output.from).for_each(|(to, &from)| *to = source[from]);
+            if function != VALUE && !is_flat {
+                self.by_coordinates(&w.positions[s], J, &mut w.Jx);
+            }
+            let Jx = if is_flat { J } else { &w.Jx };
+            if function == REVERSE {
+                times_lambda(Jx, &mut w.gx);
+            }
+            if function == HESSIAN && !is_flat {
+                times_lambda(J, &mut w.g);
+                self.by_coordinates(&w.positions[s], H, &mut w.half);
+                w.half.transpose_to(&mut w.turned); // (H T)ᵀ
+                self.by_coordinates(&w.positions[s], &w.turned, &mut w.Hx); // Tᵀ H T, which is symmetric
+                self.chart.add_curvature(&w.positions[s], &w.g[..nv], &mut w.Hx, 0);
+            }
+            let Hx = if is_flat { H } else { &w.Hx };
+            for (k, output) in self.descriptions[function].outputs.iter().enumerate() {
+                let count = output.from.len();
+                // SAFETY: by the caller.
+                let to = unsafe {
+                    let to = *res.add(k);
+                    if to.is_null() {
+                        continue;
+                    }
+                    core::slice::from_raw_parts_mut(to.add((some.start + s) * count), count)
+                };
+                let source = match output.source {
+                    Source::Value => &w.y[s * ny..],
+                    Source::Jacobian | Source::TransposedJacobian => Jx.as_slice(),
+                    Source::Gradient => &w.gx,
+                    Source::Hessian => Hx.as_slice(),
+                    Source::Nothing => &[],
+                };
+                to.iter_mut().zip(&output.from).for_each(|(to, &from)| *to = source[from]);
+            }
         }
-        self.give_back(work);
         Ok(())
     }
 

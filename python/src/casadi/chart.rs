@@ -69,6 +69,11 @@ impl Chart {
         Self { groups: Vec::new(), nq: 0, nv: 0 }
     }
 
+    /// Whether there is neither a quaternion nor a point of a circle: then T is the identity, and q̂ is q.
+    pub(super) fn is_flat(&self) -> bool {
+        self.curved().next().is_none()
+    }
+
     pub(super) fn position(&self) -> Position {
         let groups = self.groups.len();
         Position { q: vec![0.0; self.nq], T: vec![Block::zeros(); groups], lengths: vec![1.0; groups] }

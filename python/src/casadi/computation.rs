@@ -1,4 +1,5 @@
-//! What a slot computes: results of arguments, and their derivatives by tangent vectors. Knows nothing of CasADi.
+//! What a slot computes: results of arguments, and their derivatives by tangent vectors, for a state or for several at a time.
+//! Knows nothing of CasADi.
 
 use super::chart::Chart;
 use condyle::Error;
@@ -36,24 +37,30 @@ pub(super) trait Computation: Send + Sync {
     /// Whether a second derivative of λᵀf by two tangent coordinates may differ from zero.
     fn curves(&self, i: usize, j: usize) -> bool;
 
-    /// What a call computes in; there are as many as calls at the same time.
-    fn calls(&self) -> Result<Box<dyn Calls>, Error>;
+    /// What a call for so many states computes in; there are as many as calls at the same time.
+    fn calls(&self, states: usize) -> Result<Box<dyn Calls>, Error>;
 }
 
-/// Calls of a function, one after the other.
+/// Calls of a function, one after the other, each for a state or for several of them: their arguments and results stand state
+/// after state, and there is a matrix for each.
 pub(super) trait Calls: Send {
+    /// The most states of a call.
+    fn most(&self) -> usize {
+        1
+    }
+
     /// All results, one after the other, each by columns.
     fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]);
 
     /// The first derivatives of all results by all tangent coordinates.
-    fn jacobian(&mut self, x: &[Vec<f64>], J: &mut DMatrix<f64>);
+    fn jacobian(&mut self, x: &[Vec<f64>], J: &mut [DMatrix<f64>]);
 
-    /// The first derivatives, and the Hessian of λᵀf by all tangent coordinates.
+    /// The Hessian of λᵀf by all tangent coordinates, and the first derivatives if they are wanted.
     fn hessian(
         &mut self,
         x: &[Vec<f64>],
         lambda: &[f64],
-        J: &mut DMatrix<f64>,
-        H: &mut DMatrix<f64>,
+        J: Option<&mut [DMatrix<f64>]>,
+        H: &mut [DMatrix<f64>],
     ) -> Result<(), Error>;
 }

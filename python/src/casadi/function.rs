@@ -217,15 +217,15 @@ impl Kind {
         }
     }
 
-    /// The Hessian of λᵀf by all tangent coordinates where the library has it in closed form, with the Jacobian. Returns
-    /// whether it has.
+    /// The Hessian of λᵀf by all tangent coordinates where the library has it in closed form, and the Jacobian if it is wanted.
+    /// Returns whether it has.
     pub(super) fn closed_hessian(
         &self,
         model: &Model,
         s: &mut Scratch<f64>,
         x: &[Vec<f64>],
         lambda: &[f64],
-        J: &mut DMatrix<f64>,
+        J: Option<&mut DMatrix<f64>>,
         H: &mut DMatrix<f64>,
     ) -> bool {
         let n = model.nv();
@@ -238,23 +238,22 @@ impl Kind {
             H.view_mut((2 * n, 0), (n, n)).copy_from(dudq);
             H.view_mut((0, 2 * n), (n, n)).tr_copy_from(dudq);
         };
+        let first = |blocks: [&Matrix<f64>; 3]| {
+            if let Some(J) = J {
+                blocks.into_iter().enumerate().for_each(|(k, block)| place(J, 0, k, block));
+            }
+        };
         match self {
             Self::Rnea => {
                 let h = condyle::rnea_hessian(model, &mut s.data, &x[0], &x[1], &x[2], &[], lambda);
                 write(h.dqdq, h.dvdq, h.dvdv, h.dadq);
-                [h.first.dtau_dq, h.first.dtau_dv, h.first.dtau_da]
-                    .into_iter()
-                    .enumerate()
-                    .for_each(|(k, block)| place(J, 0, k, block));
+                first([h.first.dtau_dq, h.first.dtau_dv, h.first.dtau_da]);
                 true
             }
             Self::Aba => {
                 let h = condyle::aba_hessian(model, &mut s.data, &x[0], &x[1], &x[2], &[], lambda);
                 write(h.dqdq, h.dvdq, h.dvdv, h.dtaudq);
-                [h.first.da_dq, h.first.da_dv, h.first.da_dtau]
-                    .into_iter()
-                    .enumerate()
-                    .for_each(|(k, block)| place(J, 0, k, block));
+                first([h.first.da_dq, h.first.da_dv, h.first.da_dtau]);
                 true
             }
             _ => false,

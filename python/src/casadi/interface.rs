@@ -112,10 +112,11 @@ impl Slot {
     }
 }
 
-/// Holds a slot that computes what has this key: one that does so already, or a free one, to which what `make` makes is
+/// Holds a slot that computes what has this key, for so many states at a time: one that does so already, or a free one, to which what `make` makes is
 /// bound. There is none if all are taken.
 pub(super) fn hold(
     key: Vec<u8>,
+    states: usize,
     make: impl FnOnce() -> Result<Box<dyn Computation>, Error>,
 ) -> Result<Option<String>, Error> {
     let name = |k: usize| Some(format!("condyle_{k}"));
@@ -126,7 +127,7 @@ pub(super) fn hold(
             return Ok(name(k));
         }
     }
-    let bound = Box::new(Bound::new(make()?, key)?);
+    let bound = Box::new(Bound::new(make()?, states, key)?);
     for (k, slot) in SLOT.iter().enumerate() {
         let mut users = slot.users();
         if !users.any() {

@@ -59,7 +59,7 @@ impl KnotFunction {
                 let numbers = nx - x.len();
                 x.extend((0..numbers).map(|_| rng.random_range(-1.0..1.0)));
                 let u = (0..nu).map(|_| rng.random_range(-1.0..1.0)).collect();
-                calls.jacobian(&[x, u, vec![0.0]], &mut J);
+                calls.jacobian(&[x, u, vec![0.0]], core::slice::from_mut(&mut J));
                 for (slopes, column) in slopes.chunks_exact_mut(nx.max(1)).zip(J.column_iter()) {
                     slopes.iter_mut().zip(column.iter()).for_each(|(slope, x)| *slope |= *x != 0.0);
                 }
@@ -106,7 +106,7 @@ impl Computation for KnotFunction {
         i.max(j) < self.tangents()
     }
 
-    fn calls(&self) -> Result<Box<dyn Calls>, Error> {
+    fn calls(&self, _: usize) -> Result<Box<dyn Calls>, Error> {
         let action = self.action.lock().unwrap_or_else(PoisonError::into_inner);
         let copy = action.fork().expect("was copied before");
         Ok(Box::new(KnotCalls::new(copy, self.chart.clone(), self.t, self.end)))
@@ -152,6 +152,17 @@ fn slope(node: &LqNode, j: usize) -> &[f64] {
     }
 }
 
+impl KnotCalls {
+    /// Fills the next state and the node.
+    fn differentiate(&mut self, x: &[Vec<f64>]) {
+        let (t, x, u) = self.read(x);
+        if !self.end {
+            self.action.calc(t, x, u, &mut self.next);
+        }
+        self.action.calc_diff(t, x, u, &mut self.node);
+    }
+}
+
 impl Calls for KnotCalls {
     fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]) {
         let (t, x, u) = self.read(x);
@@ -163,15 +174,11 @@ impl Calls for KnotCalls {
         }
     }
 
-    fn jacobian(&mut self, x: &[Vec<f64>], J: &mut DMatrix<f64>) {
-        let (t, x, u) = self.read(x);
-        let Self { action, chart, end, next, node, .. } = self;
-        if !*end {
-            action.calc(t, x, u, next);
-        }
-        action.calc_diff(t, x, u, node);
+    fn jacobian(&mut self, x: &[Vec<f64>], J: &mut [DMatrix<f64>]) {
+        self.differentiate(x);
+        let Self { chart, end, next, node, .. } = self;
         let (ndx, nq, nv) = (node.ndx(), chart.nq, chart.nv);
-        for (j, mut column) in J.columns_mut(0, ndx + node.nu()).column_iter_mut().enumerate() {
+        for (j, mut column) in J[0].columns_mut(0, ndx + node.nu()).column_iter_mut().enumerate() {
             let (cost, rows) = column.as_mut_slice().split_last_mut().expect("the cost is there");
             *cost = if j < ndx { node.q[j] } else { node.r[j - ndx] };
             if !*end {
@@ -186,10 +193,14 @@ impl Calls for KnotCalls {
         &mut self,
         x: &[Vec<f64>],
         lambda: &[f64],
-        J: &mut DMatrix<f64>,
-        H: &mut DMatrix<f64>,
+        J: Option<&mut [DMatrix<f64>]>,
+        H: &mut [DMatrix<f64>],
     ) -> Result<(), Error> {
-        self.jacobian(x, J);
+        match J {
+            Some(J) => self.jacobian(x, J),
+            None => self.differentiate(x),
+        }
+        let H = &mut H[0];
         let (t, x, u) = self.read(x);
         let Self { action, chart, end, next, mu, node, hessian, .. } = self;
         let n = node.ndx() + node.nu(); // after which stands t

@@ -1,7 +1,7 @@
 //! Functions of a robot for CasADi's `external`: exact values and derivatives without Python in the loop.
 //!
 //! `chart` has positions as CasADi sees them. `computation` says what a function is that can be computed; `function` and
-//! `robot` have those of a robot, `knot` those of an optimal control problem. `bound` has them by CasADi's numbers, and
+//! `robot` have those of a robot, `lanes` some of them for several states, `knot` those of an optimal control problem. `bound` has them by CasADi's numbers, and
 //! `interface` CasADi's C interface: numbered slots, each with the symbols of a function, its Jacobian, its reverse product
 //! and the Jacobian of that.
 
@@ -11,6 +11,7 @@ mod computation;
 mod function;
 mod interface;
 mod knot;
+mod lanes;
 mod robot;
 
 use crate::constrained::constraint;
@@ -28,17 +29,21 @@ use robot::RobotFunction;
 /// A slot of CasADi's interface that computes a function of a robot, held for the caller until `_casadi_release`.
 ///
 /// function: 'rnea', 'aba', 'crba', 'forward_kinematics', 'frame_velocity', 'com', 'centroidal_momentum' or
-/// 'constrained_dynamics'. Returns the name of its symbols.
+/// 'constrained_dynamics'.
+/// states: how many at a time; arguments and results have the columns of each, one after the other.
+///
+/// Returns the name of its symbols.
 #[pyfunction]
-#[pyo3(name = "_casadi_hold", signature = (model, function, *, frame=None, reference=None, constraints=None))]
+#[pyo3(name = "_casadi_hold", signature = (model, function, *, states, frame=None, reference=None, constraints=None))]
 pub(crate) fn casadi_hold(
     model: &Bound<'_, Model>,
     function: &str,
+    states: &Bound<'_, PyAny>,
     frame: Option<&Bound<'_, PyAny>>,
     reference: Option<&str>,
     constraints: Option<Vec<Bound<'_, PyAny>>>,
 ) -> PyResult<String> {
-    let robot = &model.get().inner;
+    let (robot, states) = (&model.get().inner, count_of_states(states)?);
     let frame = || match frame {
         Some(frame) => frame_index(robot, frame),
         None => Err(PyValueError::new_err("frame: expected the name of a frame")),
@@ -64,9 +69,18 @@ pub(crate) fn casadi_hold(
     if matches!(kind, Kind::Aba | Kind::ConstrainedDynamics { .. }) {
         crate::functions::regular(robot)?;
     }
-    let mut key = format!("{kind:?}").into_bytes();
+    let mut key = format!("{states} {kind:?}").into_bytes();
     key.extend(postcard::to_allocvec(&**robot).unwrap_or_default());
-    named(interface::hold(key, || Ok(Box::new(RobotFunction::new(robot, kind)?))).map_err(exception)?)
+    named(interface::hold(key, states, || Ok(Box::new(RobotFunction::new(robot, kind)?))).map_err(exception)?)
+}
+
+/// The number of states of a function, which is checked.
+fn count_of_states(given: &Bound<'_, PyAny>) -> PyResult<usize> {
+    const MOST: usize = 1 << 16;
+    match given.extract() {
+        Ok(states) if (1..=MOST).contains(&states) => Ok(states),
+        _ => Err(PyValueError::new_err(format!("states: expected a number from 1 to {MOST}, found {}", given.repr()?))),
+    }
 }
 
 /// A slot that computes the next state and the cost of knot t of an action or of a problem, likewise; without t, of the knot
@@ -85,7 +99,7 @@ pub(crate) fn casadi_hold_knot(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyRes
             return Err(ProblemError::new_err(what));
         }
     };
-    named(interface::hold(key, || Ok(knot)).map_err(exception)?)
+    named(interface::hold(key, 1, || Ok(knot)).map_err(exception)?)
 }
 
 /// The name of a slot, if there was one.

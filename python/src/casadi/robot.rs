@@ -3,6 +3,7 @@
 use super::chart::Chart;
 use super::computation::{Calls, Computation, Output};
 use super::function::{DualScratch, Kind, Pattern, Scratch};
+use super::lanes::Lanes;
 use condyle::{ConstraintSet, Error, Model};
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -15,6 +16,8 @@ pub(super) struct RobotFunction {
     results: usize,
     /// For each two coordinates whether they move a body in common, nv × nv.
     relation: Vec<bool>,
+    /// For each coordinate whether it moves whole trees: M and the Coriolis forces do not depend on it. Shape: nv.
+    moves_a_tree: Vec<bool>,
 }
 
 impl RobotFunction {
@@ -29,7 +32,13 @@ impl RobotFunction {
         for (j, rows) in model.nonzero_rows().iter().enumerate() {
             rows.rows.iter().for_each(|&i| (relation[i * nv + j], relation[j * nv + i]) = (true, true));
         }
-        Ok(Self { of: Arc::new((model.clone(), kind)), rows, results, relation })
+        let mut moves_a_tree = vec![false; nv];
+        if model.bodies().iter().all(|body| body.mimic.is_none()) {
+            for body in model.bodies().iter().skip(1).filter(|body| body.parent == 0) {
+                moves_a_tree[body.idx_v..body.idx_v + body.joint.nv()].fill(true);
+            }
+        }
+        Ok(Self { of: Arc::new((model.clone(), kind)), rows, results, relation, moves_a_tree })
     }
 
     fn related(&self, i: usize, j: usize) -> bool {
@@ -58,11 +67,22 @@ impl Computation for RobotFunction {
 
     fn depends(&self, row: usize, j: usize) -> bool {
         let nv = self.of.0.nv();
-        self.of.1.depends(row, j % nv, nv, |i, j| self.related(i, j))
+        let is_inertia = matches!(self.of.1, Kind::Crba);
+        !(is_inertia && self.moves_a_tree[j]) && self.of.1.depends(row, j % nv, nv, |i, j| self.related(i, j))
     }
 
     fn curves(&self, i: usize, j: usize) -> bool {
         let nv = self.of.0.nv();
+        // where a tree stands is nothing to M and c(q, v) v, only to g: τ = M(q) a + c(q, v) v + g(q)
+        let stands = |i: usize| i < nv && self.moves_a_tree[i];
+        let other_than_gravity = match self.of.1 {
+            Kind::Rnea | Kind::Aba => i >= nv || j >= nv,
+            Kind::Crba => true,
+            _ => false,
+        };
+        if other_than_gravity && (stands(i) || stands(j)) {
+            return false;
+        }
         match self.of.1.second_derivatives(i / nv, j / nv) {
             Pattern::Zero => false,
             Pattern::Full => true,
@@ -70,10 +90,11 @@ impl Computation for RobotFunction {
         }
     }
 
-    fn calls(&self) -> Result<Box<dyn Calls>, Error> {
+    fn calls(&self, states: usize) -> Result<Box<dyn Calls>, Error> {
         let (model, kind) = &*self.of;
         let scratch = kind.scratch(model)?;
-        Ok(Box::new(RobotCalls { of: self.of.clone(), results: self.results, scratch, dual: None }))
+        let lanes = Lanes::new(model, kind, states);
+        Ok(Box::new(RobotCalls { of: self.of.clone(), results: self.results, scratch, dual: None, lanes }))
     }
 }
 
@@ -83,30 +104,49 @@ struct RobotCalls {
     results: usize,
     scratch: Scratch<f64>,
     dual: Option<Box<DualScratch>>,
+    /// For several states at a time.
+    lanes: Option<Lanes>,
 }
 
 impl Calls for RobotCalls {
+    fn most(&self) -> usize {
+        self.lanes.as_ref().map_or(1, Lanes::most)
+    }
+
     fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]) {
+        if let Some(lanes) = &mut self.lanes {
+            return lanes.value(&self.of.0, x, y);
+        }
         self.of.1.value(&self.of.0, &mut self.scratch, x, y);
     }
 
-    fn jacobian(&mut self, x: &[Vec<f64>], J: &mut DMatrix<f64>) {
-        self.of.1.jacobian(&self.of.0, &mut self.scratch, x, J);
+    fn jacobian(&mut self, x: &[Vec<f64>], J: &mut [DMatrix<f64>]) {
+        if let Some(lanes) = &mut self.lanes {
+            return lanes.jacobian(&self.of.0, x, J);
+        }
+        self.of.1.jacobian(&self.of.0, &mut self.scratch, x, &mut J[0]);
     }
 
     fn hessian(
         &mut self,
         x: &[Vec<f64>],
         lambda: &[f64],
-        J: &mut DMatrix<f64>,
-        H: &mut DMatrix<f64>,
+        J: Option<&mut [DMatrix<f64>]>,
+        H: &mut [DMatrix<f64>],
     ) -> Result<(), Error> {
-        let Self { of, results, scratch, dual } = self;
+        let Self { of, results, scratch, dual, lanes } = self;
         let (model, kind) = &**of;
-        if kind.closed_hessian(model, scratch, x, lambda, J, H) {
+        if let Some(lanes) = lanes {
+            lanes.hessian(model, x, lambda, J, H);
             return Ok(());
         }
-        kind.jacobian(model, scratch, x, J);
+        let (mut J, H) = (J.map(|J| &mut J[0]), &mut H[0]);
+        if kind.closed_hessian(model, scratch, x, lambda, J.as_deref_mut(), H) {
+            return Ok(());
+        }
+        if let Some(J) = J {
+            kind.jacobian(model, scratch, x, J);
+        }
         let dual = match dual {
             Some(dual) => dual,
             None => dual.insert(Box::new(kind.dual_scratch(model, *results)?)),

@@ -1,0 +1,96 @@
+//! Inverse and forward dynamics with their derivatives for several states at a time, in the lanes of vector registers.
+
+use super::function::Kind;
+use condyle::{Batch, Matrices, Model};
+use nalgebra::DMatrix;
+
+/// The most states of a call: some registers full, whose matrices stay in the cache.
+const MOST: usize = 32;
+
+/// What several states are computed in.
+pub(super) struct Lanes {
+    batch: Batch,
+    /// Whether it is forward dynamics, else it is inverse dynamics.
+    forward: bool,
+}
+
+/// Writes a matrix of each state into those with a block for each two arguments: to the block from this row and column on.
+fn place(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: Matrices<'_, f64>) {
+    for (to, block) in to.iter_mut().zip(blocks.iter()) {
+        to.view_mut((row, column), block.shape()).copy_from(&block);
+    }
+}
+
+/// Writes the transpose of a matrix of each state likewise.
+fn place_transposed(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: Matrices<'_, f64>) {
+    for (to, block) in to.iter_mut().zip(blocks.iter()) {
+        to.view_mut((row, column), block.shape()).tr_copy_from(&block);
+    }
+}
+
+impl Lanes {
+    /// What a function of so many states is computed in: none if it is one state, or another function.
+    pub(super) fn new(model: &Model, kind: &Kind, states: usize) -> Option<Self> {
+        let forward = matches!(kind, Kind::Aba);
+        if states < 2 || !(forward || matches!(kind, Kind::Rnea)) {
+            return None;
+        }
+        Some(Self { batch: Batch::new(model, states.min(MOST), 1), forward })
+    }
+
+    /// The most states of a call.
+    pub(super) fn most(&self) -> usize {
+        self.batch.capacity()
+    }
+
+    /// All results, state after state.
+    pub(super) fn value(&mut self, model: &Model, x: &[Vec<f64>], y: &mut [f64]) {
+        let (q, v, third) = (&x[0], &x[1], &x[2]);
+        y.copy_from_slice(match self.forward {
+            true => self.batch.aba(model, q, v, third, &[]),
+            false => self.batch.rnea(model, q, v, third, &[]),
+        });
+    }
+
+    /// The first derivatives of each state's results by its tangent coordinates.
+    pub(super) fn jacobian(&mut self, model: &Model, x: &[Vec<f64>], J: &mut [DMatrix<f64>]) {
+        let (q, v, third, n) = (&x[0], &x[1], &x[2], model.nv());
+        let blocks = if self.forward {
+            let d = self.batch.aba_derivatives(model, q, v, third, &[]);
+            [d.da_dq, d.da_dv, d.da_dtau]
+        } else {
+            let d = self.batch.rnea_derivatives(model, q, v, third, &[]);
+            [d.dtau_dq, d.dtau_dv, d.dtau_da]
+        };
+        blocks.into_iter().enumerate().for_each(|(k, block)| place(J, 0, k * n, block));
+    }
+
+    /// The Hessian of each state's λᵀf, and the first derivatives if they are wanted.
+    pub(super) fn hessian(
+        &mut self,
+        model: &Model,
+        x: &[Vec<f64>],
+        lambda: &[f64],
+        J: Option<&mut [DMatrix<f64>]>,
+        H: &mut [DMatrix<f64>],
+    ) {
+        if let Some(J) = J {
+            self.jacobian(model, x, J);
+        }
+        let (q, v, third, n) = (&x[0], &x[1], &x[2], model.nv());
+        let [dqdq, dvdq, dvdv, dudq] = if self.forward {
+            let h = self.batch.aba_hessian(model, q, v, third, &[], lambda);
+            [h.dqdq, h.dvdq, h.dvdv, h.dtaudq]
+        } else {
+            let h = self.batch.rnea_hessian(model, q, v, third, &[], lambda);
+            [h.dqdq, h.dvdq, h.dvdv, h.dadq]
+        };
+        // the other blocks are zero, and nobody writes to them
+        place(H, 0, 0, dqdq);
+        place(H, n, 0, dvdq);
+        place_transposed(H, 0, n, dvdq);
+        place(H, n, n, dvdv);
+        place(H, 2 * n, 0, dudq);
+        place_transposed(H, 0, 2 * n, dudq);
+    }
+}
