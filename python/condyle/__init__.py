@@ -44,8 +44,7 @@ Derivatives of one's own function of the state are exact, by `HyperDual` numbers
 By theme; `help(condyle.rnea)` says more of each:
 
 Robots: `Model` (from URDF, MJCF, SDF), `ModelBuilder`, `Joint`, `Inertia`, `Mimic`, `BodyId`, `WORLD`, `Frame`,
-`Limits`,
-    `load` (by a robot's name), `robots`, `inertial_parameters`; `Data`, the scratch
+    `Limits`, `load` (by a robot's name), `robots`, `inertial_parameters`; `Data`, the scratch
 Dynamics: `rnea`, `aba`, `crba`, `minv`, `nonlinear_effects`, `gravity`, `static_torque`, `coriolis_matrix`,
     `forward_dynamics`, `compute_all_terms` (`AllTerms`), `passive_torque`; `DivideConquer` (`AssemblySize`)
 Derivatives of dynamics: `rnea_derivatives` (`RneaDerivatives`), `aba_derivatives` (`AbaDerivatives`),
@@ -74,8 +73,8 @@ Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
 Many solves: `sweep` (`Variations`), in this process or on a Ray cluster; `LEVEL`, of vector instructions
 Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `algebra`
-    (poses, motions, forces), `conventions` (other libraries' numbers), `casadi`, `pinocchio` (its spelling),
-    `crocoddyl` (its problems) and `viz` (pictures; all four imported by themselves)
+    (poses, motions, forces), `conventions` (other libraries' numbers); imported by themselves `casadi`, `pinocchio`
+    (its spelling), `crocoddyl` (its problems), `codegen` (straight-line C), `cuda` (kernels) and `viz` (pictures)
 """
 
 from . import algebra, conventions, inertial_parameters, optimal, robots, simulation, wholebody

@@ -1,6 +1,6 @@
 //! Dynamics under constraints: the library's types and functions one to one.
 
-use crate::arrays::{Give, array, class, named_tuples, pose, rotation, type_name};
+use crate::arrays::{Give, array, class, found_type, named_tuples, pose, rotation};
 use crate::data::{Holds, Scratch};
 use crate::exceptions::{ModelError, exception, within, wrong_word};
 use crate::functions::{Argument, Reference, functions, regular};
@@ -31,8 +31,8 @@ named_tuples! {
 /// A `ContactConstraint` of `condyle._types` as the library has it.
 pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::ContactConstraint> {
     if !given.is_instance(class!(given.py(), "ContactConstraint")?)? {
-        let found = type_name(given);
-        return Err(PyTypeError::new_err(format!("constraints: expected `ContactConstraint`s, found a {found}")));
+        let found = found_type(given);
+        return Err(PyTypeError::new_err(format!("constraints: expected `ContactConstraint`s, found {found}")));
     }
     let optional = |name: &str| given.getattr(name).map(|x| (!x.is_none()).then_some(x));
     let frame = frame_index(model, &given.getattr("frame")?)?;

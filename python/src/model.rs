@@ -1,13 +1,13 @@
 //! A robot as Python sees it.
 
-use crate::arrays::{Give, class, pose, read_only, three, type_name, vector};
+use crate::arrays::{Give, class, found_type, pose, read_only, three, vector};
 use crate::cached::{Attribute, Cached};
 use crate::exceptions::{ModelError, exception};
 use crate::inertial_parameters::{model_inertia, read_inertia};
 use crate::joint::{Joint, kind, root};
 use crate::tree::tree;
 use condyle::{FrameKind, MjcfOptions, SdfOptions, Se3, UrdfOptions, inertial_parameters};
-use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyAttributeError, PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyString};
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -74,7 +74,7 @@ pub(crate) fn members_of<'py>(
         let found = given.repr()?;
         return Err(wrong(format!("{found}; write [{found}]")));
     }
-    let members = given.try_iter().map_err(|_| wrong(format!("a {}", type_name(given))))?;
+    let members = given.try_iter().map_err(|_| wrong(found_type(given)))?;
     members.collect()
 }
 
@@ -85,7 +85,7 @@ fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize
         _ => format!("{expected}, found {found}: the model has none"),
     };
     let index: isize = given.extract().map_err(|_| {
-        let found = if given.is_none() { "None".to_owned() } else { format!("a {}", type_name(given)) };
+        let found = if given.is_none() { "None".to_owned() } else { found_type(given) };
         PyTypeError::new_err(wrong(found))
     })?;
     let inside = usize::try_from(index).ok().filter(|i| (least..count).contains(i));
@@ -644,6 +644,19 @@ impl Model {
     }
 
     /// The robot's name and size in one line.
+    /// Nothing can be set: a model never changes.
+    fn __setattr__(slf: &Bound<'_, Self>, name: &str, _value: &Bound<'_, PyAny>) -> PyResult<()> {
+        if !slf.hasattr(name)? {
+            return Err(PyAttributeError::new_err(format!("'condyle.Model' object has no attribute '{name}'")));
+        }
+        let other = match name {
+            "limits" | "gravity" | "armature" | "inertias" => format!("model.with_{name}(...)"),
+            "inertial_parameters" => "model.with_inertias(...)".to_owned(),
+            _ => "a ModelBuilder".to_owned(),
+        };
+        Err(PyAttributeError::new_err(format!("{name}: read-only: a model never changes; {other} makes another one")))
+    }
+
     fn __repr__(&self) -> String {
         let m = &self.inner;
         format!("<condyle.Model '{}': {} bodies, nq = {}, nv = {}>", m.name(), m.bodies().len() - 1, m.nq(), m.nv())

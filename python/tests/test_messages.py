@@ -1,6 +1,7 @@
 """What a user is told: each mistake by its argument, what was expected and what was found; and what help says."""
 
 import pickle
+import pkgutil
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -60,7 +61,7 @@ def test_none_is_no_array_and_no_frame() -> None:
 def test_one_name_where_a_list_is_expected() -> None:
     message = told(lambda: ARM.lock("joint1", Q), TypeError)
     assert message == "joints: expected a list of names or numbers of bodies, found 'joint1'; write ['joint1']"
-    assert told(lambda: ARM.lock(1, Q), TypeError).endswith("found a int")
+    assert told(lambda: ARM.lock(1, Q), TypeError).endswith("found an int")
     assert told(lambda: ARM.lock([1.5], Q), TypeError) == "joints: expected names or 1 to 7, found a float"
     assert ARM.lock(("joint1", 2), Q).nv == ARM.lock(iter(["joint1", 2]), Q).nv == 5
     touch = ContactConstraint("tool", "point")
@@ -128,6 +129,52 @@ def test_settings_that_are_not_there_are_told_those_that_are() -> None:
         numbers = {"regularisation_min": 1e-9, "regularisation_factor": 10.0}
         for name in names:  # each is one
             solver(problem, **{name: (words | numbers).get(name, 1)})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "text"),
+    [
+        ("tolerance", "x", "expected a number, found 'x'"),
+        ("max_iterations", -1, "expected a whole number, 0 or above, found -1"),
+        ("second_order", 2, "expected True or False, found 2"),
+    ],
+)
+def test_a_setting_of_another_type_is_named(name: str, value: object, text: str) -> None:
+    problem = Problem(np.zeros(14), [FreeDynamics(ARM, 0.1, [])], [0], FreeDynamics(ARM, None, []))
+    assert told(lambda: Fddp(problem, **{name: value}), ValueError) == f"settings: {name}: {text}"
+
+
+def test_functions_are_functions() -> None:
+    """Of actions, residuals and spaces of one's own: said when they are made, not in a solve."""
+    optimal, f = condyle.optimal, len
+    for make, name in (
+        (lambda: optimal.Action(2, 1, 3), "calc"),
+        (lambda: optimal.Action(2, 1, f, 3), "calc_diff"),
+        (lambda: optimal.Action(2, 1, f, space=(1, f, 3)), "space: difference"),
+        (lambda: optimal.DifferentialAction(1, 1, 3, 0.1), "calc"),
+        (lambda: optimal.Residual.own(2, 3), "calc"),
+        (lambda: optimal.Residual.own_cost(f, 3), "calc_diff"),
+    ):
+        assert told(make, TypeError) == f"{name}: expected a function, found 3"
+
+
+def test_attributes_of_a_model_are_not_set() -> None:
+    def set_to(name: str) -> Callable[[], None]:
+        return lambda: setattr(ARM, name, getattr(ARM, name, None))
+
+    for name in ("limits", "gravity", "armature"):
+        message = told(set_to(name), AttributeError)
+        assert message == f"{name}: read-only: a model never changes; model.with_{name}(...) makes another one"
+        assert callable(getattr(ARM, f"with_{name}"))
+    assert "a ModelBuilder makes another one" in told(set_to("joint_placements"), AttributeError)
+    assert told(set_to("colour"), AttributeError) == "'condyle.Model' object has no attribute 'colour'"
+
+
+def test_an_output_that_cannot_be_written() -> None:
+    out = np.zeros((7, 7))
+    out.setflags(write=False)
+    message = told(lambda: condyle.crba(ARM, DATA, Q, out=out), ValueError)
+    assert message == "out: expected a writable array, found a read-only one"
 
 
 def test_a_running_action_is_no_end() -> None:
@@ -244,6 +291,7 @@ def test_help_has_an_index_of_everything() -> None:
     text = condyle.__doc__ or ""
     index = text[text.index("By theme") :]
     named = set(re.findall(r"`(\w+)`", index))
-    missing = {name for name in condyle.__all__ if not name.startswith("_")} - named
+    modules = {module.name for module in pkgutil.iter_modules(condyle.__path__) if not module.name.startswith("_")}
+    missing = ({name for name in condyle.__all__ if not name.startswith("_")} | modules) - named
     assert not missing
-    assert {name for name in named if not hasattr(condyle, name)} <= {"casadi", "crocoddyl", "pinocchio"}
+    assert {name for name in named if not hasattr(condyle, name)} <= modules

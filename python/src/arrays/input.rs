@@ -204,6 +204,14 @@ fn list(shape: &[usize]) -> String {
 pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
     value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string())
 }
+
+/// What an argument is that is none of what was expected, with its article: an int, a float.
+pub(crate) fn found_type(value: &Bound<'_, PyAny>) -> String {
+    let name = type_name(value);
+    let article = if name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O']) { "an" } else { "a" };
+    format!("{article} {name}")
+}
+
 /// A pose that is given as a homogeneous 4 × 4 matrix.
 pub(crate) fn pose(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Se3<f64>> {
     let m = matrix(argument, value, [4, 4])?;

@@ -10,7 +10,7 @@ mod output;
 mod read_only;
 
 pub(crate) use input::{
-    Expected, Input, array, at_once, bounds, check_shape, matrix, numbers, pose, rotation, tensor, three, type_name,
+    Expected, Input, array, at_once, bounds, check_shape, found_type, matrix, numbers, pose, rotation, tensor, three,
     vector,
 };
 pub(crate) use output::{

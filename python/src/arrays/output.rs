@@ -4,7 +4,9 @@ use super::Number;
 use super::input::{check_shape, tuple, type_name};
 use condyle::{Force, Inertia, Mat3, Motion, Se3, Vec3};
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
-use numpy::{PyArray, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
+use numpy::{
+    BorrowError, PyArray, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
+};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -89,7 +91,12 @@ pub(crate) fn place<'py>(
 
 /// The numbers of an array, to be written.
 pub(crate) fn writable<'py>(array: &Bound<'py, PyArrayDyn<f64>>) -> PyResult<PyReadwriteArrayDyn<'py, f64>> {
-    array.try_readwrite().map_err(|error| PyValueError::new_err(format!("out: {error}")))
+    array.try_readwrite().map_err(|error| {
+        PyValueError::new_err(match error {
+            BorrowError::NotWriteable => "out: expected a writable array, found a read-only one".to_owned(),
+            BorrowError::AlreadyBorrowed | _ => format!("out: {error}"),
+        })
+    })
 }
 
 /// An array, as Python will see it.

@@ -197,7 +197,7 @@ impl Residual {
     #[staticmethod]
     #[pyo3(signature = (size, calc, calc_diff=None))]
     fn own(size: usize, calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> PyResult<Self> {
-        Ok(Self(Kind::Own(within("size", size, 0, MOST_SIZE)?, Functions::new(calc, calc_diff))))
+        Ok(Self(Kind::Own(within("size", size, 0, MOST_SIZE)?, Functions::new(calc, calc_diff)?)))
     }
 
     /// A cost that is written in Python, a number ℓ(t, x, u) of a knot t with a Hessian of its own, as a residual of one
@@ -213,8 +213,8 @@ impl Residual {
     /// >>> swing = Cost("swing", 2.0, Residual.own_cost(lambda t, x, u: 1.0 - np.cos(x[0])))
     #[staticmethod]
     #[pyo3(signature = (calc, calc_diff=None))]
-    fn own_cost(calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> Self {
-        Self(Kind::Number(Functions::new(calc, calc_diff)))
+    fn own_cost(calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> PyResult<Self> {
+        Ok(Self(Kind::Number(Functions::new(calc, calc_diff)?)))
     }
 
     /// The residual as the JSON of a problem has it.

@@ -2,7 +2,7 @@
 
 use super::evaluation::{controls, solution as give};
 use super::problem::{Problem, lock};
-use crate::arrays::{Give, class, matrix};
+use crate::arrays::{Give, class, found_type, matrix};
 use crate::exceptions::{problem_error, wrong_word};
 use crate::signals::{self, Interruptions, Signals};
 use condyle::optimal as rust;
@@ -18,7 +18,7 @@ macro_rules! set {
     ($settings:expr, $given:expr, { $($field:ident $(by $read:ident)?),* }) => {
         for (name, value) in $given.into_iter().flatten() {
             match name.extract::<String>()?.as_str() {
-                $(stringify!($field) => $settings.$field = set!(value $(, $read)?),)*
+                $(stringify!($field) => set!($settings.$field, value, stringify!($field) $(, $read)?),)*
                 other => {
                     let all = [$(stringify!($field)),*].join(", ");
                     let what = format!("settings: there is no setting '{other}'; there are {all}");
@@ -27,8 +27,35 @@ macro_rules! set {
             }
         }
     };
-    ($value:ident) => { $value.extract()? };
-    ($value:ident, $read:ident) => { $read(&$value)? };
+    ($field:expr, $value:ident, $name:expr) => {
+        match $value.extract() {
+            Ok(value) => $field = value,
+            Err(_) => return Err(wrong_setting($name, $field.expected(), &$value)),
+        }
+    };
+    ($field:expr, $value:ident, $name:expr, $read:ident) => { $field = $read(&$value)? };
+}
+
+/// What the values of a setting are.
+trait Setting {
+    fn expected(&self) -> &'static str;
+}
+
+macro_rules! settings {
+    ($($kind:ty: $expected:literal),*) => {$(
+        impl Setting for $kind {
+            fn expected(&self) -> &'static str {
+                $expected
+            }
+        }
+    )*};
+}
+settings!(bool: "True or False", usize: "a whole number, 0 or above", f64: "a number");
+
+/// The error of a setting of another type, or of a negative number.
+fn wrong_setting(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
+    let found = found.repr().map_or_else(|_| found_type(found), |found| found.to_string());
+    PyValueError::new_err(format!("settings: {name}: expected {expected}, found {found}"))
 }
 
 /// Sets the settings of FDDP that are given.

@@ -70,7 +70,7 @@ impl Action {
         batch: bool,
     ) -> PyResult<Self> {
         let (nx, nu) = (within("nx", nx, 0, MOST_SIZE)?, within("nu", nu, 0, MOST_SIZE)?);
-        let (space, functions) = (Space::new(nx, space)?, Functions::new(calc, calc_diff));
+        let (space, functions) = (Space::new(nx, space)?, Functions::new(calc, calc_diff)?);
         Ok(Self(Written { space, nu, functions, bounds: bounds(nu, lower, upper)?, batch, way: Way::default() }))
     }
 

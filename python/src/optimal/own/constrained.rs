@@ -49,7 +49,7 @@ impl ConstrainedAction {
     ) -> PyResult<Self> {
         within("size", size, 0, MOST_SIZE)?;
         let bounds = bounds(size, lower, upper)?.unwrap_or_else(|| [vec![0.0; size], vec![0.0; size]]);
-        Ok(Self { action, functions: Functions::new(calc, calc_diff), bounds })
+        Ok(Self { action, functions: Functions::new(calc, calc_diff)?, bounds })
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

@@ -101,7 +101,7 @@ impl DifferentialAction {
         }
         let step =
             dt.map(|dt| Ok::<_, PyErr>((crate::optimal::integrators::integrator(integrator)?, dt))).transpose()?;
-        let written = Written { nv, nu, functions: Functions::new(calc, calc_diff), space, way: Way::default() };
+        let written = Written { nv, nu, functions: Functions::new(calc, calc_diff)?, space, way: Way::default() };
         let (bounds, controls) = (bounds(nu, lower, upper)?, crate::optimal::integrators::polynomial(controls)?);
         let action = Self { written, bounds, step, controls, model: model.map(Bound::unbind) };
         action.boxed(&Fault::default())?;

@@ -2,7 +2,7 @@
 
 use numpy::PyArray1;
 use pyo3::call::PyCallArgs;
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyTypeError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -24,8 +24,23 @@ impl PartialEq for Functions {
 }
 
 impl Functions {
-    pub(in crate::optimal) fn new(first: Py<PyAny>, second: Option<Py<PyAny>>) -> Self {
-        Self(Arc::new(Mutex::new([Some(first), second])))
+    /// `calc`, and `calc_diff` if there is one.
+    pub(in crate::optimal) fn new(calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> PyResult<Self> {
+        Self::named(["calc", "calc_diff"], calc, calc_diff)
+    }
+
+    /// Functions that are arguments of these names.
+    pub(in crate::optimal) fn named(names: [&str; 2], first: Py<PyAny>, second: Option<Py<PyAny>>) -> PyResult<Self> {
+        Python::attach(|py| {
+            for (name, given) in names.into_iter().zip([Some(&first), second.as_ref()]) {
+                if let Some(given) = given.map(|given| given.bind(py)).filter(|given| !given.is_callable()) {
+                    let found = given.repr()?;
+                    return Err(PyTypeError::new_err(format!("{name}: expected a function, found {found}")));
+                }
+            }
+            Ok(())
+        })?;
+        Ok(Self(Arc::new(Mutex::new([Some(first), second]))))
     }
 
     /// Whether these are the same.

@@ -43,7 +43,7 @@ impl Space {
         Ok(Self::Own(
             nx,
             crate::exceptions::within("ndx", ndx, 0, super::MOST_SIZE)?,
-            Functions::new(integrate, Some(difference)),
+            Functions::named(["space: integrate", "space: difference"], integrate, Some(difference))?,
         ))
     }
 
