@@ -100,7 +100,7 @@ ARGUMENTS = {
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
-        Plan.contact _lend.address _lend.bits _lend.device""",
+        Plan.contact _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
         damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
@@ -109,6 +109,9 @@ ARGUMENTS = {
     "float | None": "DifferentialAction.dt FreeDynamics.dt",
     "bool": """_generate.external_forces batch frames mimic progress strict verbose weightless_meshes FrictionCone.inner
         Unicycle.terminal _lend.versioned""",
+    "list[tuple[int, Residual]]": " ".join(
+        f"{kind}Dynamics._from_parts.written" for kind in ("Contact", "ContactInverse", "Free", "Impulse", "Inverse")
+    ),
     "list[int]": "_lend.shape _lend.strides",
     "bytes": "_model_from_bytes.data",
     "object": "memo HyperDual.__eq__.value HyperDual.__ne__.value",

@@ -551,7 +551,7 @@ def _casadi_hold(
     model: Model,
     function: str,
     *,
-    states: ArrayLike,
+    states: int,
     frame: str | int | None = None,
     reference: _Reference | None = None,
     constraints: Sequence[ContactConstraint] | None = None,
@@ -2480,7 +2480,7 @@ class ContactDynamics:
         """The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers."""
 
     @staticmethod
-    def _from_json(model: Model, text: str) -> ContactDynamics: ...
+    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ContactDynamics: ...
 
 @final
 class ContactInverseDynamics:
@@ -2529,7 +2529,7 @@ class ContactInverseDynamics:
         """
 
     @staticmethod
-    def _from_json(model: Model, text: str) -> ContactInverseDynamics: ...
+    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ContactInverseDynamics: ...
 
 @final
 class Cost:
@@ -2713,7 +2713,7 @@ class FreeDynamics:
         """The efforts that hold the robot still at the state x, nu numbers."""
 
     @staticmethod
-    def _from_json(model: Model, text: str) -> FreeDynamics: ...
+    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> FreeDynamics: ...
 
 @final
 class FrictionCone:
@@ -2775,7 +2775,7 @@ class ImpulseDynamics:
         """No controls: an impact has none."""
 
     @staticmethod
-    def _from_json(model: Model, text: str) -> ImpulseDynamics: ...
+    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ImpulseDynamics: ...
 
 @final
 class InverseDynamics:
@@ -2804,7 +2804,7 @@ class InverseDynamics:
         """The accelerations that hold the robot still: nv zeros."""
 
     @staticmethod
-    def _from_json(model: Model, text: str) -> InverseDynamics: ...
+    def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> InverseDynamics: ...
 
 @final
 class Limit:

@@ -83,6 +83,34 @@ def test_all_others_pickle_or_are_under_way(name: str, item: type) -> None:
     assert own or issubclass(item, tuple | Exception) or item.__init__ is not object.__init__ or name in UNDER_WAY
 
 
+def power(t: int, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+    return x[7:] * u if len(u) else 0.0 * x[7:]
+
+
+def swing(t: int, x: np.ndarray, u: np.ndarray) -> float:
+    return 1.0 - np.cos(x[3])
+
+
+def test_residuals_of_ones_own_go_with_their_knots() -> None:
+    """In costs, in those of one knot, and in limits, between others: a copy solves to the same bits."""
+    ends, rest = np.full(7, np.inf), Cost("rest", 0.1, Residual.state(np.zeros(14)))
+    costs = [Cost("power", 1e-2, Residual.own(7, power)), rest, Cost("swing", 1.0, Residual.own_cost(swing))]
+    limits = [optimal.Limit("strong", Residual.own(7, power), -ends, ends)]
+    step = FreeDynamics(ARM, 0.05, costs, {1: [rest, costs[0]]}, limits=limits)
+    again = pickle.loads(pickle.dumps(step))
+    assert repr(again) == repr(step)
+    end, xs, us = FreeDynamics(ARM, None, [rest]), np.tile(np.r_[Q, ZERO], (4, 1)), np.full((3, 7), 0.5)
+    problems = [Problem(xs[0], [one], [0] * 3, end) for one in (step, again)]
+    problems += [pickle.loads(pickle.dumps(problems[1]))]
+    expected, *others = [optimal.Fddp(problem, max_iterations=5).solve(xs, us) for problem in problems]
+    assert expected.cost > 0
+    for found in others:
+        assert np.array_equal(found.xs, expected.xs)
+        assert found.cost == expected.cost
+    with pytest.raises(optimal.ProblemError, match="written in Python, which JSON has not"):
+        problems[0].to_json()
+
+
 @pytest.mark.parametrize(
     "thing", [condyle.Ltdl(ARM), condyle.Cholesky(3), simulation.Simulation(ARM), condyle.ModelBuilder("x")]
 )

@@ -2,7 +2,7 @@
 
 use super::costs::{Cost, Limit};
 use super::integrators;
-use super::robot_action::{Reduced, RobotAction};
+use super::robot_action::{Reduced, RobotAction, WrittenAt};
 use crate::arrays::{bounds, matrix};
 use crate::constrained::constraint;
 use crate::model::Model;
@@ -157,8 +157,8 @@ impl FreeDynamics {
     }
 
     #[staticmethod]
-    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_json(model, text)?))
+    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_parts(model, text, &written)?))
     }
 }
 
@@ -230,8 +230,8 @@ impl ContactDynamics {
     }
 
     #[staticmethod]
-    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_json(model, text)?))
+    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_parts(model, text, &written)?))
     }
 }
 
@@ -288,7 +288,7 @@ impl ImpulseDynamics {
     }
 
     #[staticmethod]
-    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_json(model, text)?))
+    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_parts(model, text, &written)?))
     }
 }

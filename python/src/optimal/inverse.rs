@@ -3,7 +3,7 @@
 use super::actions::{At, Limits, actuation, contacts, kept_at, knot};
 use super::costs::{Cost, Limit};
 use super::integrators;
-use super::robot_action::{Reduced, RobotAction};
+use super::robot_action::{Reduced, RobotAction, WrittenAt};
 use crate::arrays::bounds;
 use crate::model::Model;
 use condyle::optimal::robot::{self, Dynamics};
@@ -64,8 +64,8 @@ impl InverseDynamics {
     }
 
     #[staticmethod]
-    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_json(model, text)?))
+    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_parts(model, text, &written)?))
     }
 }
 
@@ -144,7 +144,7 @@ impl ContactInverseDynamics {
     }
 
     #[staticmethod]
-    fn _from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_json(model, text)?))
+    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
+        Ok(Self(RobotAction::from_parts(model, text, &written)?))
     }
 }

@@ -4,8 +4,8 @@ use super::actions::terms;
 use super::costs::Cost;
 use super::evaluation::{by_knot, controls, evaluate, gaps};
 use super::models::{boxed, residuals};
-use super::own::{Fault, faults};
-use super::robot_action::{Boxed, Described, change};
+use super::own::{Fault, faults, take_written};
+use super::robot_action::{Boxed, Described, WrittenAt, change, knot_of};
 use super::sweep::give;
 use crate::arrays::{matrix, numbers, output, vector};
 use crate::exceptions::{ProblemError, problem_error};
@@ -124,6 +124,9 @@ impl Problem {
             if !Arc::ptr_eq(other, robot) && bytes(other)? != bytes(robot)? {
                 return Err(wrong(k, "expected the robot of the first model, found another one"));
             }
+            if !take_written(&mut knot.clone()).is_empty() {
+                return Err(wrong(k, "it has a residual that is written in Python, which JSON has not"));
+            }
             knots.push(knot.clone());
         }
         let terminal = knots.pop().expect("the terminal one is there");
@@ -140,16 +143,17 @@ impl Problem {
         let mut robots: Vec<(&Arc<condyle::Model>, Bound<'py, Model>)> = Vec::new();
         let mut parts = Vec::new();
         for (object, described) in this.objects.iter().zip(&*described) {
-            let Some(Described { robot, knot }) = described.as_deref() else {
+            let Some(described) = described.as_deref() else {
                 parts.push(object.as_ref().map_or_else(|| py.None(), |object| object.clone_ref(py)));
                 continue;
             };
+            let robot = &described.robot;
             if !robots.iter().any(|(known, _)| Arc::ptr_eq(known, robot)) {
                 robots.push((robot, Bound::new(py, Model::from((**robot).clone()))?));
             }
             let model = robots.iter().find(|(known, _)| Arc::ptr_eq(known, robot)).map(|(_, model)| model.clone());
-            let text = serde_json::to_string(knot).map_err(|error| ProblemError::new_err(error.to_string()))?;
-            parts.push((model, text).into_pyobject(py)?.into_any().unbind());
+            let (text, written) = described.knot_parts(py)?;
+            parts.push((model, text, written).into_pyobject(py)?.into_any().unbind());
         }
         let problem = lock("problem", &this.inner)?;
         let arguments = (problem.x0().to_vec(), parts, problem.stages().to_vec());
@@ -159,12 +163,13 @@ impl Problem {
     #[staticmethod]
     fn _from_parts(x0: Vec<f64>, parts: Vec<Bound<'_, PyAny>>, stages: Vec<usize>) -> PyResult<Self> {
         let (fault, last) = (Fault::default(), parts.len().saturating_sub(1));
-        let (mut all, mut objects) = (Vec::new(), Vec::new());
+        let (mut all, mut objects, mut kept) = (Vec::new(), Vec::new(), Vec::new());
         for (k, part) in parts.iter().enumerate() {
-            if let Ok((model, text)) = part.extract::<(Bound<'_, Model>, String)>() {
-                let wrong = |error| ProblemError::new_err(format!("no knot: {error}"));
-                let knot = serde_json::from_str(&text).map_err(wrong)?;
-                all.push(Described { robot: model.get().inner.clone(), knot }.boxed()?);
+            if let Ok((model, text, written)) = part.extract::<(Bound<'_, Model>, String, WrittenAt<'_>)>() {
+                let robot = model.get().inner.clone();
+                let knot = knot_of(&robot, &text, &written)?;
+                kept.extend(written.into_iter().map(|(_, residual)| residual.into_any().unbind()));
+                all.push(Described { robot, knot }.boxed()?);
                 objects.push(None);
             } else {
                 all.push(boxed(part, k == last, &fault)?);
@@ -174,7 +179,7 @@ impl Problem {
         if all.is_empty() {
             return Err(ProblemError::new_err("parts: expected at least a terminal model"));
         }
-        Self::make(x0, all, stages, (objects, vec![]), fault)
+        Self::make(x0, all, stages, (objects, kept), fault)
     }
 
     /// The number of knots before the terminal one, N.

@@ -38,6 +38,13 @@ enum Kind {
     Number(Functions),
 }
 
+impl From<&OwnFunction> for Residual {
+    fn from(own: &OwnFunction) -> Self {
+        let functions = own.functions.clone();
+        Self(if own.number { Kind::Number(functions) } else { Kind::Own(own.size, functions) })
+    }
+}
+
 impl From<robot::Residual> for Residual {
     fn from(inner: robot::Residual) -> Self {
         Self(Kind::Given(inner))

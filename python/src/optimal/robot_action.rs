@@ -1,5 +1,7 @@
 //! A robot's action, and the same as data.
 
+use super::own::{put_written, take_written};
+use super::residuals::Residual;
 use crate::arrays::{Give, vector};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::model::Model;
@@ -92,25 +94,43 @@ impl<A: ActionModel + Clone> RobotAction<A> {
         format!("<condyle.optimal.{class} of '{robot}', {duration}, nu {}{contacts}{costs}{limits}>", self.action.nu())
     }
 
-    /// The parts of a pickle: the robot, and the knot as JSON.
+    /// The parts of a pickle: the robot, the knot as JSON, and what of it is written in Python.
     pub(super) fn reduce<'py>(&self, object: &Bound<'py, PyAny>) -> PyResult<Reduced<'py>> {
-        let text = serde_json::to_string(&self.described.knot)
-            .map_err(|error| ProblemError::new_err(format!("this action cannot be pickled: {error}")))?;
-        let class = object.get_type();
-        Ok((class.getattr("_from_json")?, (self.model.clone_ref(object.py()), text)))
+        let (text, written) = self.described.knot_parts(object.py())?;
+        Ok((object.get_type().getattr("_from_parts")?, (self.model.clone_ref(object.py()), text, written)))
     }
 
     /// The action of a pickle's parts.
-    pub(super) fn from_json(model: &Bound<'_, Model>, text: &str) -> PyResult<Self> {
-        let knot = serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("no action: {error}")))?;
-        Self::new(model, vec![], |_| Ok(knot))
+    pub(super) fn from_parts(model: &Bound<'_, Model>, text: &str, written: &WrittenAt<'_>) -> PyResult<Self> {
+        let kept = written.iter().map(|(_, residual)| residual.clone().into_any().unbind()).collect();
+        Self::new(model, kept, |robot| knot_of(robot, text, written))
     }
 }
 
 /// A function that makes an object, and its arguments.
-pub(super) type Reduced<'py> = (Bound<'py, PyAny>, (Py<Model>, String));
+pub(super) type Reduced<'py> = (Bound<'py, PyAny>, (Py<Model>, String, WrittenAt<'py>));
+
+/// The residuals of a knot that are written in Python, with their places.
+pub(super) type WrittenAt<'py> = Vec<(usize, Bound<'py, Residual>)>;
+
+/// A knot of a pickle's parts.
+pub(super) fn knot_of(robot: &Arc<condyle::Model>, text: &str, written: &WrittenAt<'_>) -> PyResult<Knot> {
+    let wrong = |error| ProblemError::new_err(format!("no knot: {error}"));
+    let mut knot = serde_json::from_str(text).map_err(wrong)?;
+    put_written(&mut knot, robot, written)?;
+    Ok(knot)
+}
 
 impl Described {
+    /// The knot as a pickle has it: JSON, and what is written in Python.
+    pub(super) fn knot_parts<'py>(&self, py: Python<'py>) -> PyResult<(String, WrittenAt<'py>)> {
+        let mut knot = self.knot.clone();
+        let written = take_written(&mut knot);
+        let text = serde_json::to_string(&knot).map_err(|error| ProblemError::new_err(error.to_string()))?;
+        let objects = written.into_iter().map(|(place, residual)| Ok((place, Bound::new(py, residual)?)));
+        Ok((text, objects.collect::<PyResult<_>>()?))
+    }
+
     /// The action that the data describe.
     pub(super) fn boxed(self) -> PyResult<Boxed> {
         Ok(Boxed { action: self.build()?, described: Some(Arc::new(self)) })
