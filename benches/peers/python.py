@@ -11,7 +11,11 @@ one core, in turn; a figure is the least of all rounds, since what else a machin
 - Pinocchio's spelling: the time of a call through `condyle.pinocchio`, that of ours, and their quotient;
 - attributes of a model: the time of an access;
 - batches of 1000 states, `out` reused: the time for each state, that of a loop of Pinocchio's calls, and what a batch
-  may cost: our library's own batch of as many states and 1.3 times what it takes to write the results once;
+  may cost: our library's own batch of as many states and 1.3 times what it takes to write the results once, which is
+  to fill them with a number. Our own batch leaves matrices in the lanes of registers, entry after entry for some
+  states; to NumPy they go by rows, state after state. A mere copy of one matrix from the cache to all places, the last
+  figure, takes 1.7 times as long as filling them for panda, by which the matrices of a batch would come to 1.03 of what
+  they may cost, and their transposition comes on top;
 - the whole: `import`, beyond NumPy's; a solve by FDDP, beyond what the solver itself measures.
 """
 
@@ -257,9 +261,11 @@ def measure(robot: Robot, program: Path | None, rounds: int) -> list[dict]:
     for name, (ours, theirs, out) in robot.batches().items():
         write = lambda out=out: [x.fill(1.0) for x in out]  # noqa: E731
         # one after the other, as our own library is timed: in turns each would begin with what others left in the cache
-        mine, other, writing = (least([call], rounds, 0.0)[0] / STATES for call in (ours, theirs, write))
+        ones = [np.ones(x.shape[1:]) for x in out]
+        copy = lambda out=out, ones=ones: [np.copyto(x, one) for x, one in zip(out, ones, strict=True)]  # noqa: E731
+        mine, other, writing, copying = (least([call], rounds, 0.0)[0] / STATES for call in (ours, theirs, write, copy))
         row = {"table": "batch", "robot": robot.name, "name": name, "ours_us": mine, "theirs_us": other}
-        rows.append(row | {"write_us": writing, "rust_us": rust.get(name, np.nan)})
+        rows.append(row | {"write_us": writing, "copy_us": copying, "rust_us": rust.get(name, np.nan)})
     return rows
 
 
@@ -280,7 +286,7 @@ def show(rows: list[dict]) -> None:
                 parts = f"{row['rust_us']:.3f} + {WRITES} · {row['write_us']:.3f}"
                 print(
                     f"{head}   a state, of a loop of Pinocchio's {row['ours_us'] / row['theirs_us']:.2f}; "
-                    f"of {parts} = {budget:.3f}: {row['ours_us'] / budget:.2f}"
+                    f"of {parts} = {budget:.3f}: {row['ours_us'] / budget:.2f}; a copy {row['copy_us']:.3f}"
                 )
 
 

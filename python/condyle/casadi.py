@@ -25,8 +25,9 @@ first, so that derivatives by all nq numbers exist and are exact; of length 0 th
 lengths at 1 by a constraint, or by integrating in the tangent space.
 
 A function lives in the process that made it. One that was saved or pickled, alone or inside another, and is loaded
-raises an error when it is called, with a line on the standard error: make it anew. There can be 64 at a time, each used
-by any number of expressions; the same function of the same robot counts once.
+raises an error when it is called, with a line on the standard error: make it anew. So does the one that it is a copy
+of, if that is in the same process: CasADi calls both by one name, and neither can be told from the other. There can be
+64 at a time, each used by any number of expressions; the same function of the same robot counts once.
 
 CasADi is an extra: `pip install condyle[casadi]`.
 """

@@ -281,6 +281,20 @@ def test_loaded_functions_are_refused(tmp_path: Path) -> None:
         assert "cannot be loaded or unpickled: make it anew" in loaded.stderr
 
 
+def test_a_copy_within_the_process_is_refused_until_it_is_dropped() -> None:
+    """Both then, as they cannot be told apart; one that is made anew computes again."""
+    robot = MODELS["arm"].with_gravity([0.0, 1.0, 0.0])
+    f = condyle.casadi.rnea(robot)
+    expected = np.array(f(0.3, 0, 0))
+    copy = casadi.Function.deserialize(f.serialize())
+    for one in (copy, f):
+        with pytest.raises(RuntimeError):
+            one(0.3, 0, 0)
+    del copy, f, one
+    gc.collect()
+    assert np.array_equal(np.array(condyle.casadi.rnea(robot)(0.3, 0, 0)), expected)
+
+
 def test_what_cannot_be() -> None:
     arm = MODELS["arm"]
     with pytest.raises(condyle.ModelError, match="nearest is `tool`"):
