@@ -181,7 +181,9 @@ unsafe fn evaluate(slot: usize, function: usize, arg: *const *const f64, res: *c
         Some(bound) if !SLOT[slot].was_loaded(function) => bound,
         _ => {
             // CasADi takes no message from here
-            eprintln!("condyle_{slot}: a function of condyle.casadi cannot be loaded or unpickled: make it anew, without the copy");
+            eprintln!(
+                "condyle_{slot}: a function of condyle.casadi cannot be loaded or unpickled: make it anew, without the copy"
+            );
             return 1;
         }
     };

@@ -8,9 +8,11 @@ use crate::functions::{Argument, Reference};
 use crate::model::{Model, frame_index};
 use condyle::optimal::robot;
 use condyle::{Force, Motion};
+use pyo3::exceptions::PyValueError;
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::any::Any;
 use std::sync::Arc;
 
 /// A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
@@ -307,6 +309,39 @@ impl Residual {
             _ => None,
         }
     }
+}
+
+/// The residuals of a knot's costs and limits, always in the same order.
+fn residuals_mut(knot: &mut robot::Knot) -> impl Iterator<Item = &mut robot::Residual> {
+    let costs = knot.costs.iter_mut().chain(knot.costs_at.values_mut().flatten());
+    let limits = knot.limits.iter_mut().chain(knot.limits_at.values_mut().flatten());
+    costs.map(|robot::Cost { residual, .. }| residual).chain(limits.map(|robot::Limit { residual, .. }| residual))
+}
+
+/// Takes those that are written in Python out of a knot, which then can be JSON: each with its place.
+pub(super) fn take_written(knot: &mut robot::Knot) -> Vec<(usize, Residual)> {
+    let take = |(place, residual): (usize, &mut robot::Residual)| {
+        let robot::Residual::Own(own) = residual else { return None };
+        let own: &dyn Any = &**own;
+        let written = Residual::from(own.downcast_ref::<OwnFunction>()?);
+        *residual = robot::Residual::ImpulseCenterOfMass; // until `put_written`
+        Some((place, written))
+    };
+    residuals_mut(knot).enumerate().filter_map(take).collect()
+}
+
+/// Puts them back to their places.
+pub(super) fn put_written(
+    knot: &mut robot::Knot,
+    model: &Arc<condyle::Model>,
+    written: &[(usize, Bound<'_, Residual>)],
+) -> PyResult<()> {
+    let mut all: Vec<_> = residuals_mut(knot).collect();
+    for (place, residual) in written {
+        let to = all.get_mut(*place).ok_or_else(|| PyValueError::new_err("written: expected a residual's place"))?;
+        **to = residual.get().of(model);
+    }
+    Ok(())
 }
 
 /// A frame, given by its name or number in a model, as a residual keeps it.

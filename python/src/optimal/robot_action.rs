@@ -1,7 +1,6 @@
 //! A robot's action, and the same as data.
 
-use super::own::{put_written, take_written};
-use super::residuals::Residual;
+use super::residuals::{Residual, put_written, take_written};
 use crate::arrays::{Give, vector};
 use crate::exceptions::{ProblemError, problem_error};
 use crate::model::Model;

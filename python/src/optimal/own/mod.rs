@@ -17,7 +17,7 @@ pub(crate) use differential::DifferentialAction;
 pub(super) use functions::{Fault, Functions};
 pub(super) use lqr::write;
 pub(crate) use lqr::{Lqr, Unicycle};
-pub(super) use residual::{OwnFunction, faults, put_written, take_written};
+pub(super) use residual::{OwnFunction, faults};
 pub(super) use space::Space;
 
 /// The most numbers of a state, a control or a constraint: of their matrices there is one for each knot.

@@ -5,14 +5,12 @@ use super::functions::{Fault, Functions, unless_failed};
 use super::lqr::write;
 use super::space::Space;
 use crate::arrays::{matrix, vector};
-use crate::optimal::residuals::Residual as Written;
 use condyle::optimal::robot::{Cost, Knot, Limit, Residual, ResidualFunction};
 use condyle::optimal::{Hessian, LqNode};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::any::Any;
-use std::sync::Arc;
 
 /// The step of central differences, about ε^⅓.
 const STEP: f64 = 6e-6;
@@ -43,39 +41,6 @@ pub(in crate::optimal) fn faults(knot: &Knot) -> Vec<Fault> {
         own.downcast_ref::<OwnFunction>().map(|own| own.fault.clone())
     };
     residuals.filter_map(fault).collect()
-}
-
-/// The residuals of a knot's costs and limits, always in the same order.
-fn residuals_mut(knot: &mut Knot) -> impl Iterator<Item = &mut Residual> {
-    let costs = knot.costs.iter_mut().chain(knot.costs_at.values_mut().flatten());
-    let limits = knot.limits.iter_mut().chain(knot.limits_at.values_mut().flatten());
-    costs.map(|Cost { residual, .. }| residual).chain(limits.map(|Limit { residual, .. }| residual))
-}
-
-/// Takes those that are written in Python out of a knot, which then can be JSON: each with its place.
-pub(in crate::optimal) fn take_written(knot: &mut Knot) -> Vec<(usize, Written)> {
-    let take = |(place, residual): (usize, &mut Residual)| {
-        let Residual::Own(own) = residual else { return None };
-        let own: &dyn Any = &**own;
-        let written = Written::from(own.downcast_ref::<OwnFunction>()?);
-        *residual = Residual::ImpulseCenterOfMass; // until `put_written`
-        Some((place, written))
-    };
-    residuals_mut(knot).enumerate().filter_map(take).collect()
-}
-
-/// Puts them back to their places.
-pub(in crate::optimal) fn put_written(
-    knot: &mut Knot,
-    model: &Arc<condyle::Model>,
-    written: &[(usize, Bound<'_, Written>)],
-) -> PyResult<()> {
-    let mut all: Vec<_> = residuals_mut(knot).collect();
-    for (place, residual) in written {
-        let to = all.get_mut(*place).ok_or_else(|| PyValueError::new_err("written: expected a residual's place"))?;
-        **to = residual.get().of(model);
-    }
-    Ok(())
 }
 
 impl OwnFunction {
