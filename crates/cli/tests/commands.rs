@@ -269,6 +269,7 @@ fn generate_writes_code() {
     for (flags, words) in [
         (["--functions", "abba"], "--functions: `abba` is none of"),
         (["--functions", "frames"], "--functions: frames: needs frames"),
+        (["--functions", "aba,rnea,aba"], "--functions: aba: named twice"),
         (["--functions", "aba,rnea,crba_"], "nearest is `crba`"),
     ] {
         let output = condyle(&[&["generate", "arm7", "--out", out], &flags[..]].concat());

@@ -10,6 +10,12 @@ pub enum Error {
         /// The name that was given.
         name: String,
     },
+    /// A function was named twice: compilers would find two of one name.
+    #[error("{name}: named twice")]
+    Twice {
+        /// The function.
+        name: String,
+    },
     /// A function that needs frames or constraints was given none.
     #[error("{name}: needs {needs}, of which there are none")]
     Missing {

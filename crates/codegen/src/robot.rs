@@ -78,13 +78,16 @@ pub struct Settings {
 /// ```
 ///
 /// # Errors
-/// [`Error::Function`] for an unknown name, [`Error::Missing`] if there are no frames or constraints for a function that needs
+/// [`Error::Function`] for an unknown name, [`Error::Twice`] for one that is there twice, [`Error::Missing`] if there are no frames or constraints for a function that needs
 /// some, [`Error::Singular`] if M is singular and a function needs its inverse, [`Error::Model`] for frames and constraints
 /// that the robot has not.
 ///
 /// # Panics
 /// If a recording is under way on this thread.
 pub fn functions(model: &Model, names: &[&str], settings: &Settings) -> Result<Vec<Function>, Error> {
+    if let Some((_, name)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+        return Err(Error::Twice { name: (*name).to_owned() });
+    }
     names.iter().map(|name| function(model, name, settings)).collect()
 }
 

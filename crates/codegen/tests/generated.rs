@@ -6,12 +6,12 @@ mod common;
 mod trees;
 
 use common::{Program, assert_equal, folder, is_there};
-use condyle_codegen::{FUNCTIONS, Function, Language, Settings, functions, record};
+use condyle_codegen::{Error, FUNCTIONS, Function, Language, Settings, functions, record};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Force, Model, ReferenceFrame, aba, aba_derivatives,
-    aba_hessian, centroidal_map_rate, constrained_dynamics, constrained_dynamics_derivatives, crba, forward_kinematics,
-    forward_velocities, gravity, impulse_dynamics, impulse_dynamics_derivatives, minv, nonlinear_effects,
-    random_configuration, rnea, rnea_derivatives, rnea_hessian, robots,
+    ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Force, Model, ModelBuilder, ReferenceFrame, aba,
+    aba_derivatives, aba_hessian, centroidal_map_rate, constrained_dynamics, constrained_dynamics_derivatives, crba,
+    forward_kinematics, forward_velocities, gravity, impulse_dynamics, impulse_dynamics_derivatives, minv,
+    nonlinear_effects, random_configuration, rnea, rnea_derivatives, rnea_hessian, robots,
 };
 use condyle_spatial::{Scalar, Vec3};
 use nalgebra::DMatrix;
@@ -341,6 +341,34 @@ fn floats_are_near() {
             }
         }
     }
+}
+
+/// What cannot move has functions without a number: compilers have nothing to say about them.
+#[test]
+fn robots_without_joints() {
+    let stone = ModelBuilder::new("stone").build().unwrap();
+    let names = ["rnea", "aba", "crba", "minv", "aba_derivatives", "aba_hessian", "centroidal"];
+    let all = functions(&stone, &names, &Settings::default()).unwrap();
+    let inputs: Vec<_> = all.iter().map(|f| vec![Vec::new(); f.inputs.len()]).collect();
+    let mut found = Vec::new();
+    if is_there("cc") {
+        found.push(Program::c(&folder("stone_c"), &all, Language::C, &["-O0"]).run(&inputs));
+    }
+    if is_there("rustc") {
+        found.push(Program::rust(&folder("stone_rust"), &all, false).run(&inputs));
+    }
+    for found in found {
+        assert!(found[..6].iter().flatten().all(Vec::is_empty));
+        assert_eq!(found[6].concat(), [0.0; 12]); // the centre of mass, its velocity, and the momentum
+    }
+}
+
+/// Two functions of one name would be one too many for a compiler.
+#[test]
+fn functions_are_named_once() {
+    let error = functions(&robots::arm7(), &["aba", "rnea", "aba"], &Settings::default()).unwrap_err();
+    assert!(matches!(&error, Error::Twice { name } if name == "aba"), "{error}");
+    assert_eq!(error.to_string(), "aba: named twice");
 }
 
 /// A user's own function: a cost with choices, angles and roots, and its Jacobian by dual numbers.

@@ -234,7 +234,7 @@ fn function(writer: &Writer<C>, name: &str) -> String {
         }
     }
     body.extend(writer.given_results());
-    body.extend(writer.unused_inputs().iter().map(|name| format!("(void){name};")));
+    body.extend(writer.unused_arrays().iter().map(|name| format!("(void){name};")));
     let _ = write!(text, "{} {{\n{}}}\n\n", signature(real, name, program), prefixed("    ", &body));
     text
 }

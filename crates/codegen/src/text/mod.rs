@@ -354,8 +354,8 @@ impl<'p, D: Dialect> Writer<'p, D> {
         given.map(|(k, &id)| format!("{} = {};", self.output(k), value(id))).collect()
     }
 
-    /// The inputs that nothing is computed from.
-    pub(crate) fn unused_inputs(&self) -> Vec<&'p str> {
+    /// The arrays that a function does not touch: inputs that nothing is computed from, and results without numbers.
+    pub(crate) fn unused_arrays(&self) -> Vec<&'p str> {
         let inputs = &self.program.function.inputs;
         let mut unused = vec![true; inputs.len()];
         for node in self.program.steps.nodes {
@@ -363,7 +363,9 @@ impl<'p, D: Dialect> Writer<'p, D> {
                 unused[self.inputs[*place as usize].0] = false;
             }
         }
-        inputs.iter().zip(unused).filter(|(_, unused)| *unused).map(|(array, _)| &*array.name).collect()
+        let unread = inputs.iter().zip(unused).filter(|(_, unused)| *unused).map(|(array, _)| array);
+        let empty = self.program.function.outputs.iter().filter(|array| array.len() == 0);
+        unread.chain(empty).map(|array| &*array.name).collect()
     }
 
     /// An angle that is known at once, as one expression.

@@ -125,7 +125,7 @@ fn function(writer: &Writer<Rust>) -> String {
         }
     }
     body.extend(writer.given_results());
-    body.extend(writer.unused_inputs().iter().map(|name| format!("let _ = {name};")));
+    body.extend(writer.unused_arrays().iter().map(|name| format!("let _ = {name};")));
     let parameters = parameters(
         real,
         &function.inputs.iter().collect::<Vec<_>>(),
