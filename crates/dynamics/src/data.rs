@@ -1,27 +1,13 @@
 //! All that algorithms write: scratch and results.
 #![allow(unsafe_code)]
 
-use crate::constraints::constrained_derivatives;
-use crate::constraints::constrained_dynamics;
-use crate::constraints::impulse_dynamics;
-use crate::derivatives::aba_derivatives;
-use crate::derivatives::aba_hessian;
-use crate::derivatives::centroidal_derivatives;
-use crate::derivatives::rnea_derivatives;
-use crate::derivatives::rnea_hessian;
+use crate::constraints::{constrained_derivatives, constrained_dynamics, impulse_dynamics};
+use crate::derivatives::{aba_derivatives, aba_hessian, centroidal_derivatives, rnea_derivatives, rnea_hessian};
 use crate::lanes::limbs::pass::Scratch;
-use crate::passes::aba;
-use crate::passes::all_terms;
-use crate::passes::centroidal;
-use crate::passes::coriolis;
-use crate::passes::crba;
-use crate::passes::energy;
-use crate::passes::factored_dynamics;
 use crate::passes::kinematics::{Moving, World};
-use crate::passes::minv;
-use crate::passes::regressor;
-use crate::passes::rnea;
-use crate::passes::statics;
+use crate::passes::{
+    aba, all_terms, centroidal, coriolis, crba, energy, factored_dynamics, minv, regressor, rnea, statics,
+};
 use crate::workspace::{Long, Short, Size};
 use alloc::boxed::Box;
 use condyle_model::Model;

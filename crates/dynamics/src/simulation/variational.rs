@@ -200,19 +200,8 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
 #[cfg(test)]
 mod tests {
     use super::{Input, Single, Workspace, evaluate, integrate, place, slope};
-    use crate::Data;
-    use crate::Force;
-    use crate::Inertia;
-    use crate::Joint;
-    use crate::Mimic;
-    use crate::Model;
-    use crate::ModelBuilder;
-    use crate::Se3;
-    use crate::Sym3;
-    use crate::Vec3;
-    use crate::WORLD;
-    use crate::lie;
     use crate::workspace::Size;
+    use crate::{Data, Force, Inertia, Joint, Mimic, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, lie};
     use num_dual::Dual64;
     use rand::{RngExt, SeedableRng, rngs::StdRng};
 
