@@ -78,9 +78,9 @@ pub struct Settings {
 /// ```
 ///
 /// # Errors
-/// [`Error::Function`] for an unknown name, [`Error::Twice`] for one that is there twice, [`Error::Missing`] if there are no frames or constraints for a function that needs
-/// some, [`Error::Singular`] if M is singular and a function needs its inverse, [`Error::Model`] for frames and constraints
-/// that the robot has not.
+/// [`Error::Function`] for an unknown name, [`Error::Twice`] for one that is there twice, [`Error::Missing`] if there are no
+/// frames or constraints for a function that needs some, [`Error::Singular`] if M is singular and a function needs its
+/// inverse, [`Error::Model`] for frames and constraints that the robot has not.
 ///
 /// # Panics
 /// If a recording is under way on this thread.

