@@ -252,6 +252,10 @@ unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut 
     for k in 0..S::LANES {
         offsets[k] = k * along;
     }
+    // Tiles of a long row begin at a line of the cache, the first one but for what it shares with the next: stores that touch two
+    // lines take longer. Rows that follow each other begin anywhere.
+    let beyond_line = to[0].as_ptr().addr() / size_of::<S::Number>() % S::LANES;
+    let mut shared = if rows == 1 && columns >= 2 * S::LANES { beyond_line } else { 0 };
     for i in 0..rows {
         let mut j = 0;
         loop {
@@ -265,7 +269,8 @@ unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut 
             if j + S::LANES >= columns {
                 break;
             }
-            j = (j + S::LANES).min(columns - S::LANES); // the last tile overlaps the one before
+            j = (j + S::LANES - shared).min(columns - S::LANES); // the last tile overlaps the one before
+            shared = 0;
         }
     }
 }
