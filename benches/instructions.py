@@ -33,8 +33,8 @@ def run(*command: str | Path, **options: object) -> str:
     return subprocess.run([str(c) for c in command], check=True, stdout=subprocess.PIPE, text=True, **options).stdout
 
 
-def build(bench: str = "instructions") -> Path:
-    command = ("cargo", "build", "--release", "--bench", bench, "--message-format=json", "--locked")
+def build(bench: str = "instructions", profile: str = "release") -> Path:
+    command = ("cargo", "build", "--profile", profile, "--bench", bench, "--message-format=json", "--locked")
     for line in run(*command, cwd=ROOT).splitlines():
         message = json.loads(line)
         if message.get("target", {}).get("name") == bench and message.get("executable"):

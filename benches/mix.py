@@ -1,0 +1,119 @@
+#!/usr/bin/env python3
+"""What the instructions of the algorithms are for, at the AVX2 level: arithmetic, vectors on their way, or integers.
+
+    python3 benches/mix.py [--lines] [ROBOT ...] [--of NAME ...]
+
+It runs the program of instructions.py under callgrind (of valgrind), once for each algorithm, and sorts the
+instructions that are executed by what objdump calls them:
+
+- arithmetic: sums, products, quotients and roots;
+- load, store: a vector's way from or to memory; stack: from or to the stack, where registers do not suffice;
+- move: shuffles, masks, copies between registers;
+- integer: indices, bounds, branches, calls;
+- C library: sines and cosines, and copies that are function calls.
+
+--lines builds the program with line tables, which takes a build of its own, and shows the lines that execute most, too.
+"""
+
+import argparse
+import collections
+import os
+import re
+import shutil
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from instructions import ITERATIONS, KNOTS, PHASES, ROBOTS, STATES, build, run
+
+KINDS = ["arithmetic", "load, store", "stack", "move", "integer", "C library"]
+ALGORITHMS = [
+    *("rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives", "batch_aba", "batch_aba_derivatives"),
+    *PHASES,
+]
+CODE = re.compile(r"^\s*([0-9a-f]+):\s+(\S+)\s*(.*)$", re.M)
+COST = re.compile(r"^0x([0-9a-f]+) \S+ (\d+)$")
+LINE = re.compile(r"crates/(?!core_arch)(\w+/src/\S+?:\d+)")
+SHOWN = 25
+"""The lines that are shown."""
+
+
+def kind(operation: str, operands: str) -> str:
+    if re.match(r"v(fn?m(add|sub)|add|sub|mul|div|sqrt|hadd)", operation):
+        return "arithmetic"
+    if not operation.startswith("v"):
+        return "integer"
+    if "(" in operands and re.match(r"v(mov|broadcast)", operation):
+        return "stack" if re.search(r"r[sb]p", operands) else "load, store"
+    return "move"
+
+
+def executed(program: Path, robot: str, function: str) -> collections.Counter[int]:
+    """How often each instruction is executed within a function, by its address."""
+    cost: collections.Counter[int] = collections.Counter()
+    with TemporaryDirectory() as folder:
+        profile = Path(folder) / "profile"
+        options = ("--dump-instr=yes", "--compress-pos=no", "--collect-atstart=no", f"--toggle-collect=*{function}")
+        command = (
+            "valgrind",
+            "--quiet",
+            "--tool=callgrind",
+            *options,
+            f"--callgrind-out-file={profile}",
+            program,
+            robot,
+        )
+        run(*command, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
+        inclusive = False  # the line after `calls` has the cost of what is called
+        for line in profile.read_text(encoding="utf-8").splitlines():
+            if found := COST.match(line):
+                cost[int(found[1], 16)] += 0 if inclusive else int(found[2])
+            inclusive = line.startswith("calls=")
+    return cost
+
+
+def lines(program: Path, cost: collections.Counter[int]) -> None:
+    """Prints the lines that execute most: the innermost ones but those of `spatial`, which is everywhere."""
+    addresses = "\n".join(map(hex, cost))
+    table = run("addr2line", "-a", "-i", "-e", program, input=addresses)
+    found: collections.Counter[str] = collections.Counter()
+    for entry in re.split(r"^0x", table, flags=re.M)[1:]:
+        address, *places = entry.splitlines()
+        ours = LINE.findall("\n".join(places))
+        own = [place for place in ours if not place.startswith("spatial/")] or ours or ["outside of our crates"]
+        found[own[0]] += cost[int(address, 16)]
+    for place, n in found.most_common(SHOWN):
+        print(f"    {n / cost.total():6.1%}  {place.replace('/src/', '/')}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--lines", action="store_true", help="show the lines that execute most")
+    parser.add_argument("--of", action="append", choices=ALGORITHMS, help="this algorithm alone; may be repeated")
+    parser.add_argument("robots", nargs="*", metavar="ROBOT", help=", ".join(ROBOTS))
+    options = parser.parse_args()
+    if missing := [tool for tool in ("valgrind", "objdump", "addr2line") if shutil.which(tool) is None]:
+        print(f"NOT RUN: there is no {missing[0]}")
+        return
+    program = build(profile="bench" if options.lines else "release")
+    code = {
+        int(at, 16): kind(name, operands)
+        for at, name, operands in CODE.findall(run("objdump", "-d", "--no-show-raw-insn", program))
+    }
+    print(f"{'':30} {'in all':>8} " + " ".join(f"{name:>11}" for name in KINDS))
+    for robot in options.robots or ROBOTS:
+        for algorithm in options.of or ALGORITHMS:
+            cost = executed(
+                program, robot, algorithm if algorithm in PHASES else f"instructions::measured::{algorithm}"
+            )
+            mix: collections.Counter[str] = collections.Counter()
+            for address, n in cost.items():
+                mix[code.get(address, "C library")] += n
+            per = KNOTS * ITERATIONS if algorithm in PHASES else STATES
+            shares = " ".join(f"{mix[name] / cost.total():11.0%}" for name in KINDS)
+            print(f"{robot:10} {PHASES.get(algorithm, algorithm):19} {cost.total() // per:8} {shares}", flush=True)
+            if options.lines:
+                lines(program, cost)
+
+
+if __name__ == "__main__":
+    main()
