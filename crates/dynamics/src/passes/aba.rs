@@ -104,14 +104,16 @@ pub(crate) fn inward<L: Layout>(
             vJ = S[column + k].scale_add(l.joint_velocity(qd, i, k), vJ); // v_J = S q̇
         }
         let vi = l.parent_on_stack(v, i) + vJ; // v_i = v_λ + v_J
+        let here = l.stack_index(i);
+        v[here] = vi; // what is stored as soon as it is known needs no place on the stack
+        c[i] = vi.cross(vJ); // c_i = v_i × v_J
         let I = oX[i].act(l.inertia(i));
+        IA[here] = ArticulatedInertia::from(I);
         let mut pi = vi.cross(I * vi); // p_i = v_i ×* I_i v_i
         if let Some(external) = l.force(f_ext, i) {
             pi -= oX[i].act(external);
         }
-        let here = l.stack_index(i);
-        (v[here], IA[here], pA[here]) = (vi, ArticulatedInertia::from(I), pi);
-        c[i] = vi.cross(vJ); // c_i = v_i × v_J
+        pA[here] = pi;
         for &j in l.closed_by(i) {
             let here = l.stack_index(j);
             let Ia = eliminate(l, S, U, D_inv, j, l.sum_lanes(j, IA[here]));

@@ -25,7 +25,7 @@ use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::joint::{ClassicalMotion, Joint};
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Force, Inertia, Mat3, Scalar, Se3, Vec3};
+use condyle_spatial::{Act, Array, Force, Inertia, Scalar, Se3, Vec3};
 
 workspace! {
     /// Scratch in the bodies' turned frames.
@@ -36,8 +36,6 @@ workspace! {
         /// `pass`.
         pub motion: Array<ClassicalMotion<S>> =
             filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.levels),
-        /// K; the world's stays 0. Written by: `pass`.
-        pub K: Array<Mat3<S>> = filled(Mat3::zero, size.levels),
         /// Force through the joint. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.levels),
         /// Joint efforts. Written by: `pass`.
@@ -58,30 +56,31 @@ pub(crate) fn pass<L: Layout>(
     qdd: &[L::S],
     f_ext: &[Force<L::S>],
 ) {
-    let Workspace { X, motion, K, f, tau, .. } = d;
-    let (X, motion, K, f, tau) = (&mut X[..], &mut motion[..], &mut K[..], &mut f[..], &mut tau[..]);
+    let Workspace { X, motion, f, tau, .. } = d;
+    let (X, motion, f, tau) = (&mut X[..], &mut motion[..], &mut f[..], &mut tau[..]);
     Joint::sin_cos(l, q, sin_cos);
     let (sin, cos) = (&sin_cos.sin[..], &sin_cos.cos[..]);
     motion[0].a = l.minus_gravity();
     tau.fill(L::S::zero());
     for i in l.bodies() {
+        let here = l.stack_index(i);
+        let Xi = Joint::placement_with(l, i, q, sin[i], cos[i]); // λXi = X_T X_J
+        X[here] = Xi; // what is stored as soon as it is known needs no place on the stack
+        let (parent, R, p) = (l.parent_on_stack(motion, i), Xi.rotation, Xi.translation);
+        let a = parent.w.cross_add(parent.w.cross(p), parent.dw.cross_add(p, parent.a)); // a_λ + K_λ p
+        let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
         let vJ = Joint::motion(l, i, qd); // v_J = S q̇
         let aJ = Joint::motion(l, i, qdd); // S q̈
-        let Inertia { mass, mass_com, rotational } = l.inertia(i);
-        let Xi = Joint::placement_with(l, i, q, sin[i], cos[i]); // λXi = X_T X_J
-        let (parent, R) = (l.parent_on_stack(motion, i), Xi.rotation);
-        let a = l.parent_on_stack(K, i).mul_add(Xi.translation, parent.a); // a_λ + K_λ p
-        let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
         let m = vJ.added_to(aJ, m);
-        let Ki = m.centripetal();
+        motion[here] = m;
         // Newton: f = m a + K h.  Euler: n = I ω̇ + ω × I ω + h × a
+        let Inertia { mass, mass_com, rotational } = l.inertia(i);
         let n = mass_com.cross_add(m.a, m.w.cross_add(rotational * m.w, rotational * m.dw));
-        let mut fi = Force::new(Ki.mul_add(mass_com, m.a.scale(mass)), n);
+        let mut fi = Force::new(m.centripetal().mul_add(mass_com, m.a.scale(mass)), n);
         if let Some(external) = l.force(f_ext, i) {
             fi -= external;
         }
-        let here = l.stack_index(i);
-        (X[here], motion[here], K[here], f[here]) = (Xi, m, Ki, fi);
+        f[here] = fi;
         for &j in l.closed_by(i) {
             let here = l.stack_index(j);
             let fj = l.sum_lanes(j, f[here]);

@@ -119,12 +119,14 @@ pub(crate) fn pass<L: Columns>(
             Psid[c] = dPsi;
         }
         let I = oX[i].act(l.inertia(i));
+        IC[i] = I;
         let B = Coriolis::of(I, vi);
+        BC[i] = B;
         let mut Fi = I * ai + vi.cross(B.momentum); // F = I a + v ×* I v
         if let Some(external) = l.force(f_ext, i) {
             Fi -= oX[i].act(external);
         }
-        (IC[i], BC[i], F[i]) = (I, B, Fi);
+        F[i] = Fi;
     }
     l.broadcast(Psid);
     l.broadcast(Psidd);
