@@ -54,8 +54,8 @@ pub trait Layout {
     /// Adds to the parent's entry on the stack.
     fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// The sum over the lanes in which body i stands: each may hold a part of what the body carries.
-    fn sum_lanes<T: Copy>(&self, i: usize, x: T) -> T;
+    /// Sums x up over the lanes in which body i stands: each may hold a part of what the body carries.
+    fn sum_lanes<T>(&self, i: usize, x: &mut T);
 
     /// The k-th number of the position of joint i.
     fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
@@ -195,9 +195,7 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
         onto[self.nodes[i].level - 1] += x;
     }
     #[inline(always)]
-    fn sum_lanes<T: Copy>(&self, _: usize, x: T) -> T {
-        x
-    }
+    fn sum_lanes<T>(&self, _: usize, _: &mut T) {}
 
     #[inline(always)]
     fn position(&self, q: &[S], i: usize, k: usize) -> S {

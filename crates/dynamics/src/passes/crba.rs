@@ -37,7 +37,7 @@ pub(crate) fn carry<L: Columns>(l: &L, World { S, .. }: &World<L::S>, IC: &mut [
     for i in l.bodies().rev() {
         let support = l.support(i);
         let (nv, first) = (l.joint(i).nv(), l.column(i));
-        IC[i] = l.sum_lanes(i, IC[i]);
+        l.sum_lanes(i, &mut IC[i]);
         for k in 0..nv {
             let F = IC[i] * S[first + k]; // F = Iᶜ S
             let (own, column) = (support.len() - nv + k, l.own_column(i, k));

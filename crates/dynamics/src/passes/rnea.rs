@@ -83,7 +83,8 @@ pub(crate) fn pass<L: Layout>(
         f[here] = fi;
         for &j in l.closed_by(i) {
             let here = l.stack_index(j);
-            let fj = l.sum_lanes(j, f[here]);
+            l.sum_lanes(j, &mut f[here]);
+            let fj = f[here];
             Joint::project(l, j, fj, tau); // τ_j = Sᵀ f_j
             l.add_to_parent_on_stack(f, j, X[here].act(fj)); // f_λ += λXj f_j
         }

@@ -138,8 +138,10 @@ pub(crate) fn pass<L: Columns>(
         let support = l.support(i);
         let nv = l.joint(i).nv();
         let (before, own) = support.split_at(support.len() - nv);
-        let (IC_i, BC_i, F_i) = (l.sum_lanes(i, IC[i]), l.sum_lanes(i, BC[i]), l.sum_lanes(i, F[i]));
-        (IC[i], BC[i], F[i]) = (IC_i, BC_i, F_i);
+        l.sum_lanes(i, &mut IC[i]);
+        l.sum_lanes(i, &mut BC[i]);
+        l.sum_lanes(i, &mut F[i]);
+        let (IC_i, BC_i, F_i) = (IC[i], BC[i], F[i]);
         let first = l.column(i);
         for k in 0..nv {
             let (s, column) = (first + k, l.own_column(i, k));

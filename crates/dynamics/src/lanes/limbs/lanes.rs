@@ -164,16 +164,15 @@ impl Layout for Limbs<'_> {
         self.add_to_parent(onto, i, x);
     }
     #[inline(always)]
-    fn sum_lanes<T: Copy>(&self, i: usize, mut x: T) -> T {
+    fn sum_lanes<T>(&self, i: usize, x: &mut T) {
         let [first, others @ ..] = &self.steps[i].bodies;
         if others.iter().all(|other| other == first) {
             // SAFETY: passes keep structs of vectors.
-            let numbers = unsafe { vectors(&mut x) };
+            let numbers = unsafe { vectors(x) };
             for k in 0..numbers.len() {
                 numbers[k] = sum::<Gate>(numbers[k]);
             }
         }
-        x
     }
 
     #[inline(always)]
