@@ -73,11 +73,14 @@ def source(
     CasADi's `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: those of the function 'frames';
     constraints: those of 'constrained_dynamics' and 'impulse_dynamics', and of their derivatives; external_forces:
     whether dynamics takes them; inputs: what is an argument instead of a constant, of 'inertia', 'armature' and
-    'gravity'.
+    'gravity'. In C functions begin with the name of their files, which is that of the robot, then '_float' and '_x4'
+    or '_x8' where the language has these.
 
     >>> arm = condyle.robots.arm7()
     >>> list(condyle.codegen.source(arm, "rnea")), list(condyle.codegen.source(arm, "rnea", "rust"))
     (['arm7.h', 'arm7.c'], ['arm7.rs'])
+    >>> list(condyle.codegen.source(arm, "rnea", "c-float-8"))
+    ['arm7_float_x8.h', 'arm7_float_x8.c']
     """
     given = [names] if isinstance(names, str) else list(names)
     _, files, _ = _condyle._generate(

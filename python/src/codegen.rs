@@ -58,7 +58,7 @@ pub(crate) fn generate(
         let all = functions(robot, &names, &settings)?;
         let name = identifier(robot.name());
         let files = written.text(&name, &all);
-        Ok((name, files, all))
+        Ok((written.stem(&name), files, all))
     });
     let (name, files, all) = match made {
         Ok(made) => made,

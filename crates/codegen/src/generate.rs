@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 
 /// Writes functions of a robot into files of a folder, which is made if it is not there; for programs and build scripts.
 ///
-/// The files and the functions in them have the robot's name, as an identifier: `panda.h` and `panda.c` with `panda_aba` and so on,
-/// or `panda.rs` with `aba`. Returns the paths of the files. The same robot gives the same text, and a file that has it already is
+/// The files and the functions in them have the robot's name, as an identifier, and that of the language
+/// ([`Language::stem`]): `panda.h` and `panda.c` with `panda_aba` and so on, `panda_float_x8.h` and `panda_float_x8.c` with
+/// `panda_float_x8_aba`, or `panda.rs` with `aba`. Returns the paths of the files. The same robot gives the same text, and a file that has it already is
 /// not written again.
 ///
 /// ```no_run

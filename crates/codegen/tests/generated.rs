@@ -5,8 +5,8 @@ mod common;
 #[path = "../../dynamics/tests/common/mod.rs"]
 mod trees;
 
-use common::{Program, assert_equal, folder, is_there};
-use condyle_codegen::{Error, FUNCTIONS, Function, Language, Settings, functions, record};
+use common::{Program, assert_equal, compile, folder, is_there};
+use condyle_codegen::{Error, FUNCTIONS, Function, Language, Settings, functions, generate, record};
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Force, Model, ModelBuilder, ReferenceFrame, aba,
     aba_derivatives, aba_hessian, centroidal_map_rate, constrained_dynamics, constrained_dynamics_derivatives, crba,
@@ -18,6 +18,7 @@ use nalgebra::DMatrix;
 use num_dual::Dual64;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
+use std::process::Command;
 use trees::Tree;
 
 /// Sums in another order: what is recorded is not what lanes compute.
@@ -341,6 +342,40 @@ fn floats_are_near() {
             }
         }
     }
+}
+
+/// Files of all languages of one robot lie in one folder, and a program has the functions of all that are C.
+#[test]
+fn languages_share_a_folder_and_a_program() {
+    let arm = robots::arm7();
+    let of = |name: &str| Language::named(name).unwrap();
+    let in_c = [("c", 1), ("c-float", 1), ("c-4", 4), ("c-8", 8), ("c-float-4", 4), ("c-float-8", 8)];
+    let named = in_c.iter().map(|(name, _)| *name).chain(["rust", "rust-float"]).map(of);
+    let folder = folder("together");
+    let paths: Vec<_> = named
+        .flat_map(|language| generate(&arm, &["gravity"], &Settings::default(), language, &folder).unwrap())
+        .collect();
+    let names: Vec<_> = paths.iter().map(|path| path.file_name().unwrap().to_str().unwrap().to_owned()).collect();
+    assert!(names.iter().enumerate().all(|(k, name)| !names[..k].contains(name)), "{names:?}");
+    if !is_there("cc") {
+        return;
+    }
+    let with = |end: &'static str| names.iter().filter(move |name| name.ends_with(end));
+    let mut main: String = with(".h").map(|header| format!("#include \"{header}\"\n")).collect();
+    main += "#include <stdio.h>\nstatic double x[56], y[56];\nstatic float xs[56], ys[56];\nint main(void) {\n";
+    main += "    for (int k = 0; k < 56; k++) x[k] = xs[k] = 0.5;\n";
+    for (name, lanes) in in_c {
+        let (stem, s) = (of(name).stem("arm7"), if name.contains("float") { "s" } else { "" });
+        main += &format!("    {stem}_gravity(x{s}, y{s}); printf(\"%.3f\\n\", y{s}[{lanes}]);\n");
+    }
+    std::fs::write(folder.join("main.c"), main + "    return 0;\n}\n").unwrap();
+    let mut cc = Command::new("cc");
+    cc.current_dir(&folder).args(["-std=gnu99", "-Wall", "-Wextra", "-Werror", "-O0", "main.c"]).args(with(".c"));
+    compile(cc.args(["-o", "main", "-lm"]));
+    let said = String::from_utf8(Command::new(folder.join("main")).output().unwrap().stdout).unwrap();
+    let second = gravity(&arm, &mut Data::new(&arm), &[0.5; 7])[1];
+    assert!(second.abs() > 1.0);
+    assert_eq!(said, format!("{second:.3}\n").repeat(6));
 }
 
 /// What cannot move has functions without a number: compilers have nothing to say about them.

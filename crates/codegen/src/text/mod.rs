@@ -103,13 +103,14 @@ impl Language {
     pub fn text(self, name: &str, functions: &[Function]) -> Vec<SourceFile> {
         assert!(crate::function::is_identifier(name), "name: `{name}` is not made of ASCII letters, digits and `_`");
         let programs: Vec<Program> = functions.iter().map(Program::new).collect();
+        let name = &self.stem(name);
         match self {
             Self::C => c::files(name, &programs, "double", 1),
             Self::CFloat => c::files(name, &programs, "float", 1),
-            Self::CFour => c::files(&format!("{name}_x4"), &programs, "double", 4),
-            Self::CEight => c::files(&format!("{name}_x8"), &programs, "double", 8),
-            Self::CFloatFour => c::files(&format!("{name}_x4"), &programs, "float", 4),
-            Self::CFloatEight => c::files(&format!("{name}_x8"), &programs, "float", 8),
+            Self::CFour => c::files(name, &programs, "double", 4),
+            Self::CEight => c::files(name, &programs, "double", 8),
+            Self::CFloatFour => c::files(name, &programs, "float", 4),
+            Self::CFloatEight => c::files(name, &programs, "float", 8),
             Self::CCasadi => {
                 let mut files = c::files(name, &programs, "double", 1);
                 files.push(casadi::file(name, &programs));
@@ -120,6 +121,26 @@ impl Language {
             Self::Cuda => cuda::files(name, &programs, "double"),
             Self::CudaFloat => cuda::files(name, &programs, "float"),
         }
+    }
+
+    /// The name of the files, with which functions in C and CUDA begin: that of the robot, then `_float` and `_x4` or `_x8`, so
+    /// that files of several languages lie in one folder, and their functions in one program. Kernels have no `_float`.
+    ///
+    /// ```
+    /// use condyle_codegen::Language;
+    /// assert_eq!(Language::C.stem("arm7"), "arm7");
+    /// assert_eq!(Language::CFloatEight.stem("arm7"), "arm7_float_x8");
+    /// ```
+    pub fn stem(self, name: &str) -> String {
+        let suffix = match self {
+            Self::C | Self::CCasadi | Self::Rust | Self::Cuda | Self::CudaFloat => "",
+            Self::CFloat | Self::RustFloat => "_float",
+            Self::CFour => "_x4",
+            Self::CEight => "_x8",
+            Self::CFloatFour => "_float_x4",
+            Self::CFloatEight => "_float_x8",
+        };
+        format!("{name}{suffix}")
     }
 }
 

@@ -97,7 +97,7 @@ impl Program {
             Language::CFloatEight => (true, 8),
             other => panic!("{other:?} is not run by these tests"),
         };
-        let name = if lanes > 1 { format!("robot_x{lanes}") } else { "robot".to_owned() };
+        let name = language.stem("robot");
         for file in language.text("robot", functions) {
             std::fs::write(folder.join(file.name), file.text).unwrap();
         }
@@ -118,7 +118,8 @@ impl Program {
         for file in language.text("robot", functions) {
             std::fs::write(folder.join(file.name), file.text).unwrap();
         }
-        let library = "#![no_std]\n#![deny(warnings)]\n#[path = \"robot.rs\"]\npub mod robot;\n";
+        let file = language.stem("robot");
+        let library = format!("#![no_std]\n#![deny(warnings)]\n#[path = \"{file}.rs\"]\npub mod robot;\n");
         std::fs::write(folder.join("library.rs"), library).unwrap();
         std::fs::write(folder.join("main.rs"), main_in_rust(functions, real)).unwrap();
         let rustc = || {
