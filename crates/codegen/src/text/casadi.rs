@@ -22,39 +22,68 @@ pub(crate) fn file(name: &str, programs: &[Program]) -> SourceFile {
         let casadi = format!("{name}_{}_casadi", function.name);
         let [inputs, outputs] = [&function.inputs, &function.outputs]
             .map(|arrays| arrays.iter().map(|array| (array.name.clone(), array.clone())).collect::<Vec<_>>());
+        let results = outputs.iter().map(|(o, array)| (o.clone(), Output::Result(array.clone()))).collect::<Vec<_>>();
         text += &format!("\n{}", comment(&description(program)));
-        text += &interface(&casadi, &inputs, &outputs, name, function);
+        text += &interface(&casadi, &inputs, &results, name, function);
         if let Some((derivatives, blocks)) = jacobian(function, programs) {
             let given = outputs.into_iter().map(|(o, array)| (format!("out_{o}"), array));
             text += &format!("\n{}", comment(&[format!("The Jacobian of {casadi}: each output by each input.")]));
-            text +=
-                &interface(&format!("jac_{casadi}"), &[inputs, given.collect()].concat(), &blocks, name, derivatives);
+            let inputs = [inputs, given.collect()].concat();
+            text += &interface(&format!("jac_{casadi}"), &inputs, &blocks, name, derivatives);
         }
     }
     SourceFile { name: format!("{name}_casadi.c"), text }
 }
 
+/// An array that CasADi asks for.
+enum Output {
+    /// A result of the function that is called.
+    Result(Array),
+    /// The derivative of a result y by the restitution e of an impact. y is affine in e, and what it is at e = -1, where nothing
+    /// happens, is known: v_after is v there, and impulses are 0. So dy/de = (y - y(-1)) / (1 + e).
+    ByRestitution(Array),
+}
+
+impl Output {
+    /// Its rows and columns.
+    fn shape(&self) -> (usize, usize) {
+        match self {
+            Self::Result(array) => (array.rows, array.columns),
+            Self::ByRestitution(y) => (y.len(), 1),
+        }
+    }
+}
+
+/// What a result is called where it is differentiated: `v_after` is what becomes of `v`, and goes by its name.
+fn differentiated(y: &Array) -> &str {
+    y.name.strip_suffix("_after").unwrap_or(&y.name)
+}
+
 /// The function that computes a function's derivatives, if it is there, and they are by the numbers of each argument (not so of
-/// positions with quaternions): `dy_dx` of `f_derivatives` for each output y and input x of `f`, as CasADi names and orders
-/// them.
-fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Function, Vec<(String, Array)>)> {
+/// positions with quaternions): `dy_dx` of `f_derivatives` for each output y (or `y_after`) and input x of `f`, as CasADi names
+/// and orders them. Those by the restitution of an impact need no result.
+fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Function, Vec<(String, Output)>)> {
     let name = format!("{}_derivatives", function.name);
     let derivatives = programs.iter().map(|program| program.function).find(|f| f.name == name)?;
     let mut blocks = Vec::new();
     for (y, x) in function.outputs.iter().flat_map(|y| function.inputs.iter().map(move |x| (y, x))) {
-        let block = derivatives.outputs.iter().find(|d| d.name == format!("d{}_d{}", y.name, x.name))?;
-        let fits = (block.rows, block.columns) == (y.len(), x.len());
-        blocks.push(fits.then(|| (format!("jac_{}_{}", y.name, x.name), block.clone()))?);
+        let name = format!("d{}_d{}", differentiated(y), x.name);
+        let block = match derivatives.outputs.iter().find(|d| d.name == name) {
+            Some(block) => Output::Result(block.clone()),
+            None if function.name == "impulse_dynamics" && x.name == "restitution" => Output::ByRestitution(y.clone()),
+            None => return None,
+        };
+        let fits = block.shape() == (y.len(), x.len());
+        blocks.push(fits.then(|| (format!("jac_{}_{}", y.name, x.name), block))?);
     }
     (derivatives.inputs == function.inputs).then_some((derivatives, blocks))
 }
 
-/// All that CasADi asks of one function, with such names of arrays; computed by a function that takes the first inputs, and of
-/// which the outputs are some results.
+/// All that CasADi asks of one function, with such names of arrays; computed by a function that takes the first inputs.
 fn interface(
     name: &str,
     inputs: &[(String, Array)],
-    outputs: &[(String, Array)],
+    outputs: &[(String, Output)],
     file: &str,
     function: &Function,
 ) -> String {
@@ -68,21 +97,34 @@ fn interface(
     let mut next = largest;
     let mut names: Vec<String> = (0..function.inputs.len()).map(|k| format!("arg[{k}] ? arg[{k}] : w")).collect();
     for result in &function.outputs {
-        let at = outputs.iter().position(|(_, array)| array.name == result.name);
+        let at = outputs.iter().position(|(_, o)| matches!(o, Output::Result(array) if array.name == result.name));
         names.push(at.map_or(format!("w + {next}"), |k| format!("res[{k}] ? res[{k}] : w + {next}")));
         next += result.len();
     }
     let (n_in, n_out) = (inputs.len(), outputs.len());
+    let _ = writeln!(text, "    {file}_{}({});", function.name, names.join(", "));
+    let arrays = || function.inputs.iter().chain(&function.outputs);
+    let place = |name: &str| arrays().position(|array| array.name == name).map(|k| format!("({})", names[k]));
+    for (at, (_, output)) in outputs.iter().enumerate() {
+        let Output::ByRestitution(y) = output else { continue };
+        let (Some(after), Some(e)) = (place(&y.name), place("restitution")) else { continue };
+        let change = match y.name.strip_suffix("_after").and_then(place) {
+            Some(before) => format!("({after}[k] - {before}[k])"),
+            None => format!("{after}[k]"),
+        };
+        let n = y.len();
+        let _ = writeln!(text, "    for (int k = 0; res[{at}] && k < {n}; k++) res[{at}][k] = {change} / (1 + *{e});");
+    }
     let _ = write!(
         text,
-        "    {file}_{}({});\n    return 0;\n}}\nEXPORT casadi_int {name}_n_in(void) {{ return {n_in}; }}\n\
-         EXPORT casadi_int {name}_n_out(void) {{ return {n_out}; }}\n",
-        function.name,
-        names.join(", ")
+        "    return 0;\n}}\nEXPORT casadi_int {name}_n_in(void) {{ return {n_in}; }}\n\
+         EXPORT casadi_int {name}_n_out(void) {{ return {n_out}; }}\n"
     );
-    for (which, arrays) in [("in", inputs), ("out", outputs)] {
+    let ins = inputs.iter().map(|(name, array)| (name, (array.rows, array.columns))).collect::<Vec<_>>();
+    let outs = outputs.iter().map(|(name, output)| (name, output.shape())).collect();
+    for (which, arrays) in [("in", ins), ("out", outs)] {
         let names: Vec<String> = arrays.iter().map(|(name, _)| format!("\"{name}\"")).collect();
-        let shapes: Vec<String> = arrays.iter().map(|(_, a)| format!("{{{}, {}, 1}}", a.rows, a.columns)).collect();
+        let shapes: Vec<String> = arrays.iter().map(|(_, (rows, cols))| format!("{{{rows}, {cols}, 1}}")).collect();
         let n = arrays.len();
         // an array of size 0 is no C: there is one more than is asked for
         let _ = write!(

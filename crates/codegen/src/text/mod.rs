@@ -39,7 +39,7 @@ pub enum Language {
     CFloatEight,
     /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
     /// `robot_aba_casadi` for `robot_aba`, with its Jacobian where `robot_aba_derivatives` is there too and the robot has no
-    /// quaternions and points on circles.
+    /// quaternions and points on circles; of impacts that has what their derivatives lack, columns by the restitution.
     CCasadi,
     /// A module of Rust on `f64` that needs no `std`.
     Rust,
