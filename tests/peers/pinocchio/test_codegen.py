@@ -1,15 +1,20 @@
 """Generated code on robots of example-robot-data, against Pinocchio and the library, and as CasADi's `external`."""
 
+import itertools
 import os
 import shutil
 import subprocess
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
 import casadi
 import numpy as np
 import pinocchio
 import pytest
 from comparison import Pair
+from generated import Library, compiler, lanes, missing
 from test_robots import NO_URDF, ROBOTS, SINGULAR, load
 
 import condyle
@@ -23,12 +28,20 @@ WORST = 1e10
 """The condition from which on nothing is compared: a contact that a robot cannot give way to."""
 MILD = 1e3
 """The condition of M up to which its inverse amplifies roundings within ROUNDING; beyond, as much as the condition."""
+SINGLE = float(np.finfo(np.float32).eps / np.finfo(np.float64).eps)
+"""How much coarser numbers of type float are, and how much more of ROUNDING they take."""
+WORST_SINGLE = 1e5
+"""The condition from which on results of floats are not compared: no two digits remain."""
 
 ALL = "CONDYLE_ALL_CODE" in os.environ
-"""Whether to compile for all robots, which takes minutes."""
+"""Whether to compile for all robots, which takes a quarter of an hour on two cores."""
 SOME = ["panda", "anymal", "solo12"]
+FEW = ["double_pendulum_continuous", "ur5", "borinot"]
+"""Those that all languages are compiled for: with a joint on a circle, an arm, and one that flies and has a limb."""
+LANGUAGES = ["c-casadi", "c-float", "c-4", "c-8", "rust"]
+BESIDES = {"c-float": ["c-float-4", "c-float-8"], "rust": ["rust-float"]}
+"""Of robots of up to `SMALL` coordinates, the languages that join what others have one by one."""
 
-compiler = os.environ.get("CC", "cc").split()[0]
 pytestmark = pytest.mark.skipif(shutil.which(compiler) is None, reason="there is no C compiler")
 
 
@@ -69,14 +82,21 @@ def test_beside_pinocchio(name: str, tmp_path: Path) -> None:
 
 
 RESTITUTION = 0.3
+SMALL = 9
+"""The coordinates up to which robots are compiled in all languages."""
 LARGEST = 25
 """The coordinates up to which the longest functions are compiled: second derivatives and those that need M⁻¹."""
+COMPLETE = {("talos", "c-casadi")}
+"""Larger ones for which all functions are compiled in some language."""
+
+Numbers = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""q, v, and what stands for a or τ."""
 
 
-def beside(pair: Pair, function: str, frame: str) -> tuple[list[np.ndarray], list[np.ndarray]]:
+def beside(pair: Pair, function: str, frame: str, numbers: Numbers) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """The arguments of a function at a state, and what the library computes of them."""
-    model, data, state = pair.ours, pair.data, pair.states(1)[0]
-    q, v, x = state.q, state.v, state.a
+    model, data = pair.ours, pair.data
+    q, v, x = numbers
     told: object
     if function == "frames":
         axes = "local_world_aligned"
@@ -106,9 +126,8 @@ def beside(pair: Pair, function: str, frame: str) -> tuple[list[np.ndarray], lis
     return arguments, list(told) if isinstance(told, tuple) else [told]
 
 
-def condition(pair: Pair, function: str, frame: str) -> float:
+def condition(pair: Pair, function: str, frame: str, q: np.ndarray) -> float:
     """How much the inverses that a function needs may amplify roundings; infinite where there is none."""
-    q = pair.states(1)[0].q
     if not function.startswith(("aba", "minv", "constrained", "impulse")):
         return 1.0
     if pair.name in SINGULAR:
@@ -120,29 +139,119 @@ def condition(pair: Pair, function: str, frame: str) -> float:
     return float(np.linalg.cond(M) * np.linalg.cond(J @ np.linalg.solve(M, J.T)))
 
 
-@pytest.mark.parametrize("name", [name for name in ROBOTS if name not in NO_URDF] if ALL else SOME)
-def test_beside_the_library(name: str, tmp_path: Path) -> None:
-    """Equal but for roundings, which inverses amplify by their condition; of a frame that a contact holds."""
-    pair = load(name)
-    model = pair.ours
-    q = pair.states(1)[0].q
+def chosen(pair: Pair, language: str) -> list[str]:
+    """The functions that are compiled for a robot in a language."""
+    # of impacts only in plain C, or they would take as long as all others together
+    plain = language in ("c", "c-casadi")
+    long = {"aba_derivatives", "constrained_dynamics_derivatives", "rnea_hessian", "aba_hessian"}
+    long |= set() if plain else {"impulse_dynamics_derivatives"}
+    every = pair.ours.nv <= LARGEST or (pair.name, language) in COMPLETE
+    return [function for function in condyle.codegen.functions if every or function not in long]
+
+
+def frame_of(pair: Pair) -> str:
+    """The frame that most joints move: it is asked for, and a contact holds it."""
+    model, q = pair.ours, pair.states(1)[0].q
     moved = [condyle.frame_jacobian(model, pair.data, q, k).any(axis=0).sum() for k in range(len(model.frames))]
-    frame = model.frames[int(np.argmax(moved))].name
-    contact = [condyle.ContactConstraint(frame, "point")]
-    compiled = set()
-    for function in condyle.codegen.functions:
-        long = "hessian" in function or function in ("aba_derivatives", "constrained_dynamics_derivatives")
-        amplified = condition(pair, function, frame)
-        if amplified > WORST or (long and model.nv > LARGEST):
+    return str(model.frames[int(np.argmax(moved))].name)
+
+
+Call = Callable[[str, Sequence[Sequence[np.ndarray]]], list[list[np.ndarray]]]
+"""The results of a function for the arguments of some states."""
+
+
+def compare(pair: Pair, language: str, compiled: Callable[[list[str], dict[str, Any]], Call]) -> Call:
+    """Checks that code is equal to the library but for roundings, which inverses amplify by their condition.
+
+    compiled: what makes the code, of functions with options. Returns the code.
+    """
+    single = "float" in language
+    rounding, worst = (ROUNDING * SINGLE, WORST_SINGLE) if single else (ROUNDING, WORST)
+    frame = frame_of(pair)
+    states: list[Numbers] = []
+    for state in pair.states(lanes(language)):
+        q, v, x = (np.float32(a).astype(float) if single else a for a in (state.q, state.v, state.a))
+        states.append((q, v, x))
+    conditions = {name: [condition(pair, name, frame, q) for q, _, _ in states] for name in chosen(pair, language)}
+    names = [name for name, of in conditions.items() if min(of) <= worst]
+    assert {"rnea", "crba", "gravity", "nonlinear_effects", "rnea_derivatives", "frames", "centroidal"} <= set(names)
+    call = compiled(names, {"frames": [frame], "constraints": [condyle.ContactConstraint(frame, "point")]})
+    for name in names:
+        arguments, expected = zip(*(beside(pair, name, frame, numbers) for numbers in states), strict=True)
+        for results, wanted, amplified in zip(call(name, arguments), expected, conditions[name], strict=True):
+            if amplified > worst:
+                continue
+            bound = rounding * max(1.0, amplified / MILD)
+            for a, b in zip(results, wanted, strict=True):
+                assert a.size == b.size, name
+                assert np.abs(a.reshape(b.shape) - b).max() <= bound * (1.0 + np.abs(b).max()), name
+    return call
+
+
+@pytest.mark.parametrize("name", SOME)
+def test_functions_one_by_one(name: str, tmp_path: Path) -> None:
+    """What `condyle.codegen.compile` makes is what the library computes."""
+    pair = load(name)
+
+    def call(names: list[str], options: dict[str, Any]) -> Call:
+        made = {name: condyle.codegen.compile(pair.ours, name, cache=tmp_path, **options) for name in names}
+
+        def one(function: str, states: Sequence[Sequence[np.ndarray]]) -> list[list[np.ndarray]]:
+            result = made[function](*states[0])
+            return [list(result) if isinstance(result, tuple) else [result]]
+
+        return one
+
+    compare(pair, "c", call)
+
+
+@pytest.fixture(scope="module")
+def folder() -> Iterator[Path]:
+    """A folder for libraries, which take a gigabyte for all robots: it is not kept."""
+    with TemporaryDirectory() as folder:
+        yield Path(folder)
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+@pytest.mark.parametrize("name", [name for name in ROBOTS if name not in NO_URDF] if ALL else FEW)
+def test_languages(name: str, language: str, folder: Path) -> None:
+    """What each language computes is what the library does, and CasADi gets that."""
+    if (lacks := missing(language)) is not None:
+        pytest.skip(f"there is no {lacks}")
+    pair = load(name)
+    for also in [language, *(BESIDES.get(language, []) if pair.ours.nv <= SMALL else [])]:
+
+        def call(names: list[str], options: dict[str, Any], language: str = also) -> Library:
+            return Library(pair.ours, names, language, folder, **options)
+
+        code = compare(pair, also, call)
+        if language == "c-casadi":
+            external(pair, code)
+
+
+def external(pair: Pair, code: Library) -> None:
+    """CasADi gets from each function what the code computes, and of its Jacobian what that of the derivatives does."""
+    state = pair.states(1)[0]
+    numbers = {"q": state.q, "v": state.v, "restitution": np.array([RESTITUTION]), "lambda": state.v[::-1].copy()}
+    for function, (inputs, outputs) in code.functions.items():
+        arguments = [numbers.get(name, state.a) for name, _, _ in inputs]
+        of = casadi.external(f"{code.stem}_{function}_casadi", str(code.path))
+        assert (of.name_in(), of.name_out()) == tuple([name for name, _, _ in arrays] for arrays in (inputs, outputs))
+        results = of.call(arguments)
+        for a, b in zip(results, code(function, [arguments])[0], strict=True):
+            assert (np.array(a).reshape(b.shape) == b).all(), function
+        derivatives = f"{function}_derivatives"
+        if derivatives not in code.functions or pair.ours.nq != pair.ours.nv:
             continue
-        of = condyle.codegen.compile(model, function, frames=[frame], constraints=contact, cache=tmp_path)
-        arguments, expected = beside(pair, function, frame)
-        result = of(*arguments)
-        bound = ROUNDING * max(1.0, amplified / MILD)
-        for a, b in zip(list(result) if isinstance(result, tuple) else [result], expected, strict=True):
-            assert np.abs(a - b).max() <= bound * (1.0 + np.abs(b).max()), (name, function)
-        compiled.add(function)
-    assert {"rnea", "crba", "gravity", "nonlinear_effects", "rnea_derivatives", "frames", "centroidal"} <= compiled
+        names = [name for name, _, _ in code.functions[derivatives][1]]
+        by_name = dict(zip(names, code(derivatives, [arguments])[0], strict=True))
+        jacobian = of.jacobian()
+        blocks = dict(zip(jacobian.name_out(), jacobian.call([*arguments, *results]), strict=True))
+        for (y, _, _), (x, _, _) in itertools.product(outputs, inputs):
+            block = np.array(blocks.pop(f"jac_{y}_{x}"))
+            if x != "restitution":
+                assert (block == by_name[f"d{y.removesuffix('_after')}_d{x}"].reshape(block.shape)).all(), (y, x)
+        assert not blocks
 
 
 def library(folder: Path) -> str:
@@ -200,6 +309,48 @@ def test_jacobians_of_externals(tmp_path: Path) -> None:
         value = np.array(f(*state)).ravel()
         chained = 2.0 * np.cos(2.0 * value)[:, None] * np.hstack(expected)
         assert np.abs(np.array(jacobian(*state)) - chained).max() <= BOUND * (1.0 + np.abs(chained).max())
+
+
+def test_jacobians_under_constraints(tmp_path: Path) -> None:
+    """Of accelerations, forces, velocities after an impact and impulses; by the restitution, too."""
+    pair = load("panda")
+    model, frame, state = pair.ours, frame_of(pair), pair.states(1)[0]
+    names = [f"{name}{end}" for name in ("constrained_dynamics", "impulse_dynamics") for end in ("", "_derivatives")]
+    contact = [condyle.ContactConstraint(frame, "point")]
+    code = Library(model, names, "c-casadi", tmp_path, constraints=contact)
+    bound = ROUNDING * max(1.0, condition(pair, "impulse", frame, state.q) / MILD)
+    for function in ("constrained_dynamics", "impulse_dynamics"):
+        of = casadi.external(f"{code.stem}_{function}_casadi", str(code.path))
+        arguments, (y, lambda_) = beside(pair, function, frame, (state.q, state.v, state.a))
+        _, d = beside(pair, f"{function}_derivatives", frame, (state.q, state.v, state.a))
+        rows = [d[2:5], d[5:8]] if function == "constrained_dynamics" else [d[2:4], d[4:6]]
+        expected = np.vstack([np.hstack(blocks) for blocks in rows])
+        # inside of an expression
+        x = [casadi.MX.sym(name, size) for name, size in zip(of.name_in(), map(len, arguments), strict=True)]
+        sines = casadi.sin(casadi.vertcat(*of.call(x)))
+        jacobian = casadi.Function("jacobian", x, [casadi.jacobian(sines, casadi.vertcat(*x))])
+        found = np.array(jacobian.call(arguments)[0])
+        chain = np.cos(np.concatenate([y, lambda_]))
+        chained = chain[:, None] * expected
+        assert np.abs(found[:, : chained.shape[1]] - chained).max() <= bound * (1.0 + np.abs(chained).max()), function
+        # central differences of the library's function, by what it has no derivatives too
+        step = 1e-6
+        for k, by in enumerate(np.cumsum([0, *map(len, arguments[:-1])])):
+            for j in range(len(arguments[k])):
+                sides = []
+                for sign in (1.0, -1.0):
+                    moved = [a.copy() for a in arguments]
+                    moved[k][j] += sign * step
+                    last = moved[2] if function == "constrained_dynamics" else float(moved[2][0])
+                    held = condyle.ConstraintSet(model, contact)
+                    there = getattr(condyle, function)(model, pair.data, held, moved[0], moved[1], last)
+                    sides.append(np.concatenate([there[0], there.lambda_]))
+                difference = chain * (sides[0] - sides[1]) / (2.0 * step)
+                assert np.abs(found[:, by + j] - difference).max() <= 1e-6 * (1.0 + np.abs(found).max()), (
+                    function,
+                    k,
+                    j,
+                )
 
 
 def test_positions_with_quaternions_have_no_jacobian() -> None:
