@@ -28,6 +28,12 @@ WORST = 1e10
 """The condition from which on nothing is compared: a contact that a robot cannot give way to."""
 MILD = 1e3
 """The condition of M up to which its inverse amplifies roundings within ROUNDING; beyond, as much as the condition."""
+APART = 2.0
+"""How often that at the states of vectors but the first: the code and the library may both be off, to different sides.
+
+Both are 4.4e-12 from what extended precision gives for solo12's aba_hessian at the seventh state, and 8.7e-12 from each
+other, where its condition allows 8.2e-12.
+"""
 SINGLE = float(np.finfo(np.float32).eps / np.finfo(np.float64).eps)
 """How much coarser numbers of type float are, and how much more of ROUNDING they take."""
 WORST_SINGLE = 1e5
@@ -178,10 +184,11 @@ def compare(pair: Pair, language: str, compiled: Callable[[list[str], dict[str, 
     call = compiled(names, {"frames": [frame], "constraints": [condyle.ContactConstraint(frame, "point")]})
     for name in names:
         arguments, expected = zip(*(beside(pair, name, frame, numbers) for numbers in states), strict=True)
-        for results, wanted, amplified in zip(call(name, arguments), expected, conditions[name], strict=True):
+        found = call(name, arguments)
+        for k, (results, wanted, amplified) in enumerate(zip(found, expected, conditions[name], strict=True)):
             if amplified > worst:
                 continue
-            bound = rounding * max(1.0, amplified / MILD)
+            bound = rounding * max(1.0, (APART if k > 0 else 1.0) * amplified / MILD)
             for a, b in zip(results, wanted, strict=True):
                 assert a.size == b.size, name
                 assert np.abs(a.reshape(b.shape) - b).max() <= bound * (1.0 + np.abs(b).max()), name
