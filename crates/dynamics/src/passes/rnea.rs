@@ -66,8 +66,8 @@ pub(crate) fn pass<L: Layout>(
         let here = l.stack_index(i);
         let Xi = Joint::placement_with(l, i, q, sin[i], cos[i]); // λXi = X_T X_J
         X[here] = Xi; // what is stored as soon as it is known needs no place on the stack
-        let (parent, R, p) = (l.parent_on_stack(motion, i), Xi.rotation, Xi.translation);
-        let a = parent.w.cross_add(parent.w.cross(p), parent.dw.cross_add(p, parent.a)); // a_λ + K_λ p
+        let (parent, R) = (l.parent_on_stack(motion, i), Xi.rotation);
+        let a = parent.centripetal().mul_add(Xi.translation, parent.a); // a_λ + K_λ p
         let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
         let vJ = Joint::motion(l, i, qd); // v_J = S q̇
         let aJ = Joint::motion(l, i, qdd); // S q̈
