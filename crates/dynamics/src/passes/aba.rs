@@ -36,7 +36,7 @@ workspace! {
     }
 }
 
-/// Eliminates the degrees of freedom of joint i: of Iᴬ remains Iᵃ, what the parent feels, in its place.
+/// Eliminates the degrees of freedom of joint i: of Iᴬ remains Iᵃ, what the parent feels.
 #[inline(always)]
 fn eliminate<L: Layout>(
     l: &L,
@@ -44,18 +44,18 @@ fn eliminate<L: Layout>(
     U: &mut [Force<L::S>],
     D_inv: &mut [L::S],
     i: usize,
-    IA: &mut ArticulatedInertia<L::S>,
-) {
+    mut Ia: ArticulatedInertia<L::S>,
+) -> ArticulatedInertia<L::S> {
     let column = l.column(i);
-    l.sum_lanes(i, IA);
+    l.sum_lanes(i, &mut Ia);
     for k in (0..l.joint(i).nv()).rev() {
         let (c, Sc) = (column + k, S[column + k]);
-        let Uc = *IA * Sc; // U = Iᴬ S
-        U[c] = Uc;
+        let Uc = Ia * Sc; // U = Iᴬ S
         let inverse = (Sc.dot(Uc) + l.armature(i, k)).recip(); // D = Sᵀ U
-        D_inv[c] = inverse;
-        *IA = IA.minus_outer(Uc, inverse); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
+        (U[c], D_inv[c]) = (Uc, inverse);
+        Ia = Ia.minus_outer(Uc, inverse); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
     }
+    Ia
 }
 
 /// U and D⁻¹ of all columns, which depend on q alone, for bodies that are placed.
@@ -66,9 +66,8 @@ pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::
     for i in l.bodies() {
         IA[l.stack_index(i)] = ArticulatedInertia::from(oX[i].act(l.inertia(i)));
         for &j in l.closed_by(i) {
-            let here = l.stack_index(j);
-            eliminate(l, S, U, D_inv, j, &mut IA[here]);
-            l.add_to_parent_on_stack(IA, j, IA[here]); // Iᴬ_λ += Iᵃ
+            let Ia = eliminate(l, S, U, D_inv, j, IA[l.stack_index(j)]);
+            l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
         }
     }
 }
@@ -118,7 +117,7 @@ pub(crate) fn inward<L: Layout>(
         pA[here] = pi;
         for &j in l.closed_by(i) {
             let here = l.stack_index(j);
-            eliminate(l, S, U, D_inv, j, &mut IA[here]);
+            let Ia = eliminate(l, S, U, D_inv, j, IA[here]);
             l.sum_lanes(j, &mut pA[here]);
             let mut pa = pA[here];
             let column = l.column(j);
@@ -128,8 +127,8 @@ pub(crate) fn inward<L: Layout>(
                 u[s] = us;
                 pa = U[s].scale_add(D_inv[s] * us, pa);
             }
-            l.add_to_parent_on_stack(pA, j, pa + IA[here] * c[j]); // pᴬ_λ += pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
-            l.add_to_parent_on_stack(IA, j, IA[here]); // Iᴬ_λ += Iᵃ
+            l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
+            l.add_to_parent_on_stack(pA, j, pa + Ia * c[j]); // pᴬ_λ += pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
         }
     }
 }
