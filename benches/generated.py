@@ -90,7 +90,7 @@ def measured(
     """A function as generated C: ns of a call, operations, KB of the program, s of the compiler; CppADCodeGen's ns if
     it has that function, and the ratio.
     """
-    stem, files, [(_, inputs, outputs, operations)] = condyle._condyle._generate(model, [function], "c")
+    stem, files, [(_, inputs, outputs, operations, _)] = condyle._condyle._generate(model, [function], "c")
     width = model.nq + 3 * model.nv
     starts = {"q": 0, "v": model.nq, "a": model.nq + model.nv, "tau": model.nq + 2 * model.nv}
     arguments, size = [f"x + {starts[name]}" for name, _, _ in inputs], 0

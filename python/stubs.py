@@ -40,6 +40,7 @@ ALIASES = {
     "_Integrator": 'Literal["semi_implicit_euler", "runge_kutta_4", "variational"]',
     "_Status": 'Literal["done", "not_converged", "not_finite"]',
     "_OfTwo": "Callable[[NDArray[Any], NDArray[Any]], Any]",
+    "_Shapes": "list[tuple[str, int, int]]",
     "_Space": "Model | tuple[int, _OfTwo, _OfTwo]",
     "_Scheme": 'Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]',
     "_Polynomial": 'Literal["constant", "linear", "quadratic"]',
@@ -100,7 +101,7 @@ ARGUMENTS = {
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
-        Plan.contact _lend.address _lend.bits _lend.device _casadi_hold.states""",
+        Plan.contact _generate.shares _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
         damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
@@ -185,8 +186,7 @@ ARGUMENTS = {
 # The type of a result or a property, by its name, `Class.name` or `function`. Unless said otherwise, what takes `out`
 # returns an array, a static method one of its class, and a method of a class that stands here the type of that class.
 RESULTS = {
-    "tuple[str, list[tuple[str, str]], "
-    "list[tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int]]]": "_generate",
+    "tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]": "_generate",
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static

@@ -221,6 +221,7 @@ _Method: TypeAlias = Literal["aba", "dense", "sparse"]
 _Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
 _Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
 _OfTwo: TypeAlias = Callable[[NDArray[Any], NDArray[Any]], Any]
+_Shapes: TypeAlias = list[tuple[str, int, int]]
 _Space: TypeAlias = Model | tuple[int, _OfTwo, _OfTwo]
 _Scheme: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_2", "runge_kutta_3", "runge_kutta_4"]
 _Polynomial: TypeAlias = Literal["constant", "linear", "quadratic"]
@@ -695,7 +696,8 @@ def _generate(
     constraints: list[ContactConstraint] = ...,
     external_forces: bool = False,
     inputs: list[str] = ...,
-) -> tuple[str, list[tuple[str, str]], list[tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int]]]:
+    shares: int | None = None,
+) -> tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]:
     """The code of functions of a robot: its name, its files, and its functions with their arguments and results."""
 
 def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:

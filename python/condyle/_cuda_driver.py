@@ -250,8 +250,8 @@ class Event:
 class Function:
     """A kernel that has been loaded; its module is unloaded with this object."""
 
-    def __init__(self, device: Device, symbol: str, image: bytes) -> None:
-        self.device = device
+    def __init__(self, device: Device, symbol: str, image: bytes, shares: int, *, always: bool) -> None:
+        self.device, self.shares = device, shares
         self._module, self._handle = c_void_p(), c_void_p()
         log = ctypes.create_string_buffer(_LOG)
         options = (c_int * 2)(_ERROR_LOG, _ERROR_LOG_BYTES)
@@ -264,6 +264,8 @@ class Function:
             blocks, threads = c_int(), c_int()
             driver.call("cuOccupancyMaxPotentialBlockSize", byref(blocks), byref(threads), self._handle, None, 0, 0)
             self.threads = max(32, threads.value)
+            at_a_time = blocks.value * self.threads
+            self._most_shared = sys.maxsize if always else at_a_time // shares
             self.registers, self.local_bytes = (self._attribute(a) for a in (_REGISTERS, _LOCAL_BYTES))
 
     def _attribute(self, attribute: int) -> int:
@@ -272,8 +274,12 @@ class Function:
         return value.value
 
     def launch(self, stream: int, n: int, addresses: Sequence[int]) -> None:
-        """Starts n threads; blocks are smaller than the best for many where these would leave multiprocessors idle."""
-        share = -(-n // self.device.multiprocessors)
+        """Starts a thread for each state, or for each share of one as long as all are on the device at a time.
+
+        Blocks are smaller than the best for many where these would leave multiprocessors idle.
+        """
+        rows = self.shares if n <= self._most_shared else 1
+        share = -(-rows * n // self.device.multiprocessors)
         threads = min(self.threads, -(-share // 32) * 32)
         states, values = c_int(n), (c_uint64 * len(addresses))(*addresses)
         first, size = ctypes.addressof(values), ctypes.sizeof(c_uint64)
@@ -281,7 +287,7 @@ class Function:
         parameters = (c_void_p * len(each))(*each)
         with self.device.current() as driver:
             driver.call(
-                "cuLaunchKernel", self._handle, -(-n // threads), 1, 1, threads, 1, 1, 0, stream, parameters, None
+                "cuLaunchKernel", self._handle, -(-n // threads), rows, 1, threads, 1, 1, 0, stream, parameters, None
             )
 
     def __del__(self) -> None:

@@ -66,6 +66,7 @@ def source(
     constraints: Sequence[ContactConstraint] = (),
     external_forces: bool = False,
     inputs: Sequence[str] = (),
+    shares: int | None = None,
 ) -> dict[str, str]:
     """The code of functions of a robot: the text of each file, by its name.
 
@@ -73,8 +74,9 @@ def source(
     CasADi's `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: those of the function 'frames';
     constraints: those of 'constrained_dynamics' and 'impulse_dynamics', and of their derivatives; external_forces:
     whether dynamics takes them; inputs: what is an argument instead of a constant, of 'inertia', 'armature' and
-    'gravity'. In C functions begin with the name of their files, which is that of the robot, then '_float' and '_x4'
-    or '_x8' where the language has these.
+    'gravity'. In C and CUDA functions begin with the name of their files, which is that of the robot, then '_float' and '_x4'
+    or '_x8' where the language has these. shares: how many threads compute a state in CUDA, as of
+    `condyle.cuda.compile`.
 
     >>> arm = condyle.robots.arm7()
     >>> list(condyle.codegen.source(arm, "rnea")), list(condyle.codegen.source(arm, "rnea", "rust"))
@@ -91,6 +93,7 @@ def source(
         constraints=list(constraints),
         external_forces=external_forces,
         inputs=list(inputs),
+        shares=shares,
     )
     return dict(files)
 
@@ -220,7 +223,7 @@ def _build(
     command: str,
     code: str,
     files: list[tuple[str, str]],
-    described: tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int],
+    described: tuple[str, list[tuple[str, int, int]], list[tuple[str, int, int]], int, int],
     library: Path,
     about: Path,
 ) -> None:
@@ -231,7 +234,7 @@ def _build(
     import subprocess
     import tempfile
 
-    name, inputs, outputs, _ = described
+    name, inputs, outputs, *_ = described
     parameters = [f"const double *{array}" for array, _, _ in inputs] + [f"double *{array}" for array, _, _ in outputs]
     each = [f"{array} + i * {rows * columns}" for array, rows, columns in (*inputs, *outputs)]
     loop = f"for (long i = 0; i < n; i++) {code}_{name}({', '.join(each)});"

@@ -8,7 +8,8 @@
     d = aba(q, v, tau)           # a named tuple of tensors; d.da_dq has the shape (7, 7, 100_000)
     aba(q, v, tau, out=d)        # into the same memory
 
-A thread computes one state. Numbers of one kind stand side by side: an argument of k numbers for n states is an array
+A thread computes one state, or some of its results where it would need more registers than it has and there are few
+states. Numbers of one kind stand side by side: an argument of k numbers for n states is an array
 of shape (k, n) in row order. Its transpose, of shape (n, k) and with strides (1, n), is taken as well, and where the
 first argument is such a one the results have the states along the first axis too. Nothing is copied: other layouts
 are refused, and so are other dtypes. Results are arrays of the library of the first argument.
@@ -135,6 +136,11 @@ class Kernel:
         return self._function.device.ordinal
 
     @property
+    def shares(self) -> int:
+        """The threads that can compute a state, each some of the results."""
+        return self._function.shares
+
+    @property
     def registers(self) -> int:
         """The registers of a thread."""
         return self._function.registers
@@ -242,6 +248,7 @@ def ptx(
     constraints: Sequence[ContactConstraint] = (),
     external_forces: bool = False,
     inputs: Sequence[str] = (),
+    shares: int | None = None,
 ) -> bytes:
     """A kernel in NVIDIA's intermediate language, for `compile` on a machine without NVIDIA's run-time compiler.
 
@@ -249,19 +256,24 @@ def ptx(
 
     Raises `RuntimeError` if there is no compiler or it fails.
     """
-    options = _options(frames, constraints, external_forces, inputs)
+    options = _options(frames, constraints, external_forces, inputs, shares)
     symbol, text, _ = _generated(model, name, dtype, options)
     return _cuda_driver.compiler().compile(symbol, text, f"compute_{capability[0]}{capability[1]}")
 
 
 def _options(
-    frames: Sequence[str], constraints: Sequence[ContactConstraint], external_forces: bool, inputs: Sequence[str]
+    frames: Sequence[str],
+    constraints: Sequence[ContactConstraint],
+    external_forces: bool,
+    inputs: Sequence[str],
+    shares: int | None,
 ) -> dict[str, Any]:
     return {
         "frames": list(frames),
         "constraints": list(constraints),
         "external_forces": external_forces,
         "inputs": list(inputs),
+        "shares": shares,
     }
 
 
@@ -275,23 +287,27 @@ def compile(  # noqa: A001
     constraints: Sequence[ContactConstraint] = (),
     external_forces: bool = False,
     inputs: Sequence[str] = (),
+    shares: int | None = None,
     ptx: bytes | None = None,
     cache: "str | os.PathLike[str] | None" = None,
 ) -> Kernel:
     """A function of a robot as a kernel, made by NVIDIA's run-time compiler, or read from the cache if it is there.
 
     name: one of `condyle.codegen.functions`, and frames, constraints, external_forces, inputs as there. dtype: the kind
-    of numbers that it computes with. ptx: what `ptx` made for the same model, name, dtype and options: the compiler is
-    not needed then. cache: a folder; by default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`.
+    of numbers that it computes with. shares: how many threads compute a state, each some of the results, at most one
+    for each limb and one for the trunk; by default as many as pay where one thread would need more registers than it
+    has, and only for so few states that all threads are on the device at a time. ptx: what `ptx` made for the same
+    model, name, dtype and options: the compiler is not needed then. cache: a folder; by default the environment
+    variable CONDYLE_CACHE, else `~/.cache/condyle`.
 
     Raises `RuntimeError` if there is no driver, no device or no compiler, or if it fails; `ValueError` if there is no
     such device; what `condyle.codegen.source` raises.
     """
-    options = _options(frames, constraints, external_forces, inputs)
-    symbol, text, (_, given, made, _) = _generated(model, name, dtype, options)
+    options = _options(frames, constraints, external_forces, inputs, shares)
+    symbol, text, (_, given, made, _, rows) = _generated(model, name, dtype, options)
     on = _cuda_driver.device(device)
     image = ptx if ptx is not None else _image(symbol, text, on, cache)
-    return Kernel(name, dtype, Function(on, symbol, image), given, made)
+    return Kernel(name, dtype, Function(on, symbol, image, rows, always=shares is not None), given, made)
 
 
 def _image(symbol: str, text: str, device: Device, cache: "str | os.PathLike[str] | None") -> bytes:

@@ -4,15 +4,16 @@ use crate::constrained::constraint;
 use crate::exceptions::{exception, wrong_word};
 use crate::functions::regular;
 use crate::model::Model;
-use condyle_codegen::{Array, Error, FUNCTIONS, Language, Settings, functions, identifier};
+use condyle_codegen::{Array, Error, FUNCTIONS, Function, Language, Settings, functions, identifier};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use std::num::NonZero;
 
 /// Names and shapes of arrays.
 type Arrays = Vec<(String, usize, usize)>;
 
-/// The name of the code, its files as (name, text), and its functions as (name, arguments, results, operations).
-type Generated = (String, Vec<(String, String)>, Vec<(String, Arrays, Arrays, usize)>);
+/// The name of the code, its files as (name, text), and its functions as (name, arguments, results, operations, shares).
+type Generated = (String, Vec<(String, String)>, Vec<(String, Arrays, Arrays, usize, usize)>);
 
 fn arrays(arrays: &[Array]) -> Arrays {
     arrays.iter().map(|a| (a.name.clone(), a.rows, a.columns)).collect()
@@ -22,7 +23,7 @@ fn arrays(arrays: &[Array]) -> Arrays {
 #[pyfunction]
 #[pyo3(
     name = "_generate",
-    signature = (model, names, language, *, frames=vec![], constraints=vec![], external_forces=false, inputs=vec![])
+    signature = (model, names, language, *, frames=vec![], constraints=vec![], external_forces=false, inputs=vec![], shares=None)
 )]
 pub(crate) fn generate(
     py: Python<'_>,
@@ -33,6 +34,7 @@ pub(crate) fn generate(
     constraints: Vec<Bound<'_, PyAny>>,
     external_forces: bool,
     inputs: Vec<String>,
+    shares: Option<usize>,
 ) -> PyResult<Generated> {
     let robot = &model.get().inner;
     let known = |name: &&String| !["inertia", "armature", "gravity"].contains(&&***name);
@@ -42,6 +44,14 @@ pub(crate) fn generate(
     let is_input = |name: &str| inputs.iter().any(|other| other == name);
     let expected = || Language::NAMES.map(|name| format!("'{name}'")).join(", ");
     let written = Language::named(language).ok_or_else(|| wrong_word("language", &expected(), language))?;
+    if let Some(number) = shares {
+        let has_shares = matches!(written, Language::Cuda | Language::CudaFloat);
+        let expected = if has_shares { "None or at least 1" } else { "None" };
+        if number == 0 || !has_shares {
+            let said = format!("shares: expected {expected} for '{language}', found {number}");
+            return Err(PyValueError::new_err(said));
+        }
+    }
     let settings = Settings {
         frames,
         constraints: constraints.iter().map(|given| constraint(robot, given)).collect::<PyResult<_>>()?,
@@ -49,6 +59,7 @@ pub(crate) fn generate(
         inertia_is_input: is_input("inertia"),
         armature_is_input: is_input("armature"),
         gravity_is_input: is_input("gravity"),
+        shares: shares.and_then(NonZero::new),
     };
     let names: Vec<&str> = names.iter().map(|name| &**name).collect();
     if let Some(other) = names.iter().find(|name| !FUNCTIONS.contains(name)) {
@@ -69,6 +80,8 @@ pub(crate) fn generate(
         Err(other) => return Err(PyValueError::new_err(other.to_string())),
     };
     let files = files.into_iter().map(|file| (file.name, file.text)).collect();
-    let all = all.iter().map(|f| (f.name.clone(), arrays(&f.inputs), arrays(&f.outputs), f.operations().total()));
-    Ok((name, files, all.collect()))
+    let about = |f: &Function| {
+        (f.name.clone(), arrays(&f.inputs), arrays(&f.outputs), f.operations().total(), f.shares(written))
+    };
+    Ok((name, files, all.iter().map(about).collect()))
 }

@@ -89,6 +89,12 @@ class Gpu:
         self.call("cuCtxPopCurrent_v2", None)
         self.context = context
 
+    def rows(self) -> int:
+        """The rows of blocks of the last launch."""
+        last = (ctypes.c_uint * 3)()
+        self.library.fake_launches(last)
+        return last[2]
+
     def call(self, name: str, *arguments: Any) -> None:
         status = getattr(self.library, name)(*arguments)
         assert status == 0, (name, status)

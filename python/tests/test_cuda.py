@@ -67,6 +67,26 @@ def test_single_precision(gpu: Gpu) -> None:
     near(found, expected(ARM, "rnea", *(x.astype(np.float64) for x in given))[0], SINGLE)
 
 
+def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -> None:
+    """As long as all threads are on the device at a time: eight blocks of 256."""
+    kernel = condyle.cuda.compile(quadruped.model, "rnea_derivatives")
+    assert kernel.shares > 2
+    assert condyle.cuda.compile(ARM, "rnea_derivatives").shares == 1
+    asked = condyle.cuda.compile(quadruped.model, "rnea_derivatives", shares=2)
+    ptx = condyle.cuda.ptx(quadruped.model, "rnea_derivatives", shares=1, capability=(7, 0))
+    alone = condyle.cuda.compile(quadruped.model, "rnea_derivatives", shares=1, ptx=ptx)
+    assert (asked.shares, alone.shares) == (2, 1)
+    most = 2048 // kernel.shares
+    for n in (1, most, most + 1, 1500):
+        given = states(quadruped.model, n)
+        wanted = expected(quadruped.model, "rnea_derivatives", *given)
+        for each, rows in ((kernel, kernel.shares if n <= most else 1), (asked, 2), (alone, 1)):
+            found = each(*(condyle.cuda.array(x) for x in given))
+            assert gpu.rows() == rows
+            for one, other in zip(found, wanted, strict=True):
+                near(one.numpy(), other)
+
+
 @pytest.mark.parametrize("is_versioned", [False, True])
 @pytest.mark.parametrize("transposed", [False, True])
 def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: bool) -> None:

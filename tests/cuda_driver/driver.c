@@ -27,7 +27,7 @@ typedef struct Context { int ordinal, retained; } Context;
 typedef struct Stream { Context *context; int alive, nonblocking, legacy; } Stream;
 typedef struct Event { Context *context; int alive; long op; } Event;
 typedef struct Module { Context *context; int alive; void *library; } Module;
-typedef void Thread(void **parameters, unsigned block, unsigned thread, unsigned threads);
+typedef void Thread(void **parameters, const unsigned *grid, const unsigned *block, unsigned thread, unsigned threads);
 typedef struct Function { Module *module; Thread *thread; int parameters; } Function;
 typedef struct Block { char *base; size_t size, mapped; Context *context; int alive; } Block;
 enum { LAUNCH, UPLOAD, DOWNLOAD, RECORD, WAIT };
@@ -39,7 +39,7 @@ typedef struct Op {
     Thread *thread;
     int parameters;
     void *values[PARAMETERS];
-    unsigned grid, block;
+    unsigned grid[2], block;
     char *to, *from;
     size_t size;
 } Op;
@@ -60,7 +60,7 @@ static long op_count;
 static long live[5]; /* memory, streams, events, modules, contexts */
 static char complaint[400], failing[64];
 static int failing_with;
-static unsigned last_launch[2];
+static unsigned last_launch[3];
 static long launches;
 
 static void complain(const char *format, ...) {
@@ -93,7 +93,8 @@ long fake_live(int kind) { return live[kind]; }
 const char *fake_complaint(void) { return complaint; }
 void fake_fail(const char *name, int code) { snprintf(failing, sizeof failing, "%s", name); failing_with = code; }
 void fake_devices(int count) { devices = count; }
-long fake_launches(unsigned *grid_and_block) { memcpy(grid_and_block, last_launch, sizeof last_launch); return launches; }
+/* Blocks, threads of a block, rows of blocks. */
+long fake_launches(unsigned *last) { memcpy(last, last_launch, sizeof last_launch); return launches; }
 long fake_pending(void) { long n = 0; for (long k = 0; k < op_count; k++) n += !ops[k]->done; return n; }
 
 static Block *block_of(const char *p, size_t size, Context *context) {
@@ -134,8 +135,9 @@ static int ordered(const Op *a, const Op *b) {
 static void execute(Op *op) {
     open_memory(1);
     if (op->kind == LAUNCH)
-        for (unsigned b = 0; b < op->grid; b++)
-            for (unsigned t = 0; t < op->block; t++) op->thread(op->values, b, t, op->block);
+        for (unsigned y = 0; y < op->grid[1]; y++)
+            for (unsigned x = 0; x < op->grid[0]; x++)
+                for (unsigned t = 0; t < op->block; t++) op->thread(op->values, op->grid, (unsigned[]){x, y}, t, op->block);
     if (op->kind == UPLOAD || op->kind == DOWNLOAD) memcpy(op->to, op->from, op->size);
     check_ends();
     open_memory(0);
@@ -351,7 +353,7 @@ CUresult cuLaunchKernel(Function *f, unsigned gx, unsigned gy, unsigned gz, unsi
     API("cuLaunchKernel", 1,
         Stream *stream = stream_of(handle);
         if (!stream || !f->module->alive || f->module->context != CONTEXT || stream->context != CONTEXT) REFUSE(INVALID_HANDLE)
-        if (gx == 0 || bx == 0 || bx > LARGEST || gy * gz * by * bz != 1 || shared || extra) REFUSE(INVALID_VALUE)
+        if (gx == 0 || gy == 0 || gy > 65535 || bx == 0 || bx > LARGEST || gz * by * bz != 1 || shared || extra) REFUSE(INVALID_VALUE)
         for (int p = 1; p < f->parameters; p++)
             if (!block_of(*(char **)parameters[p], 1, CONTEXT)) {
                 complain("parameter %d of a kernel is no memory of the device", p);
@@ -359,12 +361,12 @@ CUresult cuLaunchKernel(Function *f, unsigned gx, unsigned gy, unsigned gz, unsi
             }
         if (status != OK) break;
         Op *op = push(LAUNCH, stream);
-        op->thread = f->thread; op->parameters = f->parameters; op->grid = gx; op->block = bx;
+        op->thread = f->thread; op->parameters = f->parameters; op->grid[0] = gx; op->grid[1] = gy; op->block = bx;
         for (int p = 0; p < f->parameters; p++) {
             op->values[p] = calloc(1, sizeof(void *));
             memcpy(op->values[p], parameters[p], p == 0 ? sizeof(int) : sizeof(void *));
         }
-        last_launch[0] = gx; last_launch[1] = bx; launches++;);
+        last_launch[0] = gx; last_launch[1] = bx; last_launch[2] = gy; launches++;);
 }
 
 #define ERRORS(E) \

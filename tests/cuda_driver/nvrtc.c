@@ -21,8 +21,8 @@ static long live;
 
 static const char PREAMBLE[] =
     "#include <cmath>\n"
-    "struct Index { unsigned x; };\n"
-    "static thread_local Index blockIdx, threadIdx, blockDim;\n"
+    "struct Index { unsigned x, y; };\n"
+    "static thread_local Index gridDim, blockIdx, threadIdx, blockDim;\n"
     "#define __global__\n#define __device__ inline\n#define __noinline__ __attribute__((noinline))\n";
 
 __attribute__((destructor)) static void clean(void) {
@@ -63,8 +63,9 @@ static void add_kernels(FILE *file, const char *text) {
         p += strlen(HEAD);
         const char *open = strchr(p, '('), *end = strchr(p, ')');
         int name = (int)(open - p), count = 0;
-        fprintf(file, "extern \"C\" void fake_thread_%.*s(void **p, unsigned block, unsigned thread, unsigned threads) {\n", name, p);
-        fprintf(file, "    blockIdx.x = block, threadIdx.x = thread, blockDim.x = threads;\n    %.*s(", name, p);
+        fprintf(file, "extern \"C\" void fake_thread_%.*s(void **p, const unsigned *grid, const unsigned *block, unsigned thread, "
+                      "unsigned threads) {\n", name, p);
+        fprintf(file, "    gridDim = {grid[0], grid[1]}, blockIdx = {block[0], block[1]}, threadIdx.x = thread, blockDim.x = threads;\n    %.*s(", name, p);
         for (const char *a = open + 1; a < end; count++) {
             const char *comma = memchr(a, ',', end - a), *stop = comma ? comma : end, *last = stop;
             while (last[-1] != ' ' && last[-1] != '*') last--;

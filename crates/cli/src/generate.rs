@@ -5,6 +5,7 @@ use crate::robot::{self, RobotArguments, frames};
 use crate::terminal::say;
 use condyle::ContactConstraint;
 use condyle_codegen::{FUNCTIONS, Language, Settings, generate};
+use std::num::NonZero;
 use std::path::PathBuf;
 
 /// Write a robot's dynamics as straight-line code: C, Rust or CUDA, without branches or dependencies
@@ -13,6 +14,7 @@ use std::path::PathBuf;
   condyle generate panda.urdf --functions aba,aba_derivatives --out panda/
   condyle generate quadruped --functions rnea --language rust --out src/
   condyle generate quadruped --functions constrained_dynamics --contacts LF_foot,RH_foot --out .
+  condyle generate quadruped --functions rnea_derivatives --language cuda --shares 5 --out .
   condyle generate arm7 --functions rnea,frames --frames tool --inputs inertia,gravity --out .")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -43,6 +45,10 @@ pub(crate) struct Arguments {
     /// What is an argument instead of a constant: inertia, armature, gravity
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     inputs: Vec<String>,
+    /// How many threads compute a state in CUDA, each some of the results, at most one for each limb and the trunk [default: as
+    /// many as pay where one thread has too few registers, while there are few states]
+    #[arg(long, value_name = "N")]
+    shares: Option<NonZero<usize>>,
 }
 
 /// A name, if it is one of those that there are.
@@ -58,6 +64,10 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
         known("inputs", input, &["inertia", "armature", "gravity"])?;
     }
     let language = Language::named(known("language", &arguments.language, &Language::NAMES)?).unwrap_or_default();
+    if arguments.shares.is_some() && !matches!(language, Language::Cuda | Language::CudaFloat) {
+        let what = format!("only cuda and cuda-float have them, not {}", arguments.language);
+        return Err(Error::Option { option: "shares", what });
+    }
     let model = robot::load(&arguments.robot.robot, &arguments.robot.options)?.model;
     let points = frames(&model, &arguments.contacts)?.into_iter().map(ContactConstraint::point);
     let rigid = frames(&model, &arguments.rigid_contacts)?.into_iter().map(ContactConstraint::rigid);
@@ -69,6 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
         inertia_is_input: is_input("inertia"),
         armature_is_input: is_input("armature"),
         gravity_is_input: is_input("gravity"),
+        shares: arguments.shares,
     };
     let paths = generate(&model, &names, &settings, language, &arguments.out).map_err(|error| match error {
         condyle_codegen::Error::Model(error) => Error::Model(error),

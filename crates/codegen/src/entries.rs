@@ -1,7 +1,6 @@
 //! Entries of a result that follow one another and are alike: sums of products with the same common factors, as those of a product of
 //! matrices are. They are computed in a loop, for which compilers use vectors, and which is a fraction of the code.
 
-use crate::function::Array;
 use crate::graph::{Id, Node};
 use crate::step::{Entries, Step, Term};
 
@@ -12,11 +11,13 @@ const FEWEST: usize = 4;
 type Of = (bool, [Option<Id>; 2]);
 
 /// Puts loops in the place of steps.
-pub(crate) fn gather(steps: &mut Vec<Step>, results: &[Id], outputs: &[Array]) {
+///
+/// places: the array and the place in it of each result.
+pub(crate) fn gather(steps: &mut Vec<Step>, results: &[Id], places: &[(usize, usize)]) {
     let mut gatherer = Gatherer::new(steps, results);
     let (mut loops, mut start) = (Vec::new(), 0);
-    for array in outputs {
-        let end = start + array.len();
+    for run in places.chunk_by(|&(array, place), &next| next == (array, place + 1)) {
+        let end = start + run.len();
         while start < end {
             let found = gatherer.alike(&results[start..end], start);
             start += found.as_ref().map_or(1, |found| found.ids.len());

@@ -5,6 +5,7 @@ use crate::graph::{Id, Node};
 use crate::sums::with_constants_gathered;
 use condyle_spatial::{Dense, DenseMatrix, Scalar};
 use core::fmt;
+use core::num::NonZero;
 
 /// An argument or a result of a function: some numbers with a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,8 +43,14 @@ pub struct Function {
     pub outputs: Vec<Array>,
     /// The values that the outputs need, each after those that it is computed from.
     pub(crate) nodes: Vec<Node>,
-    /// The values of all outputs, one array after the other.
+    /// The values of all outputs, one array after the other; of a share those that it has.
     pub(crate) results: Vec<Id>,
+    /// The output and the place in it to which each of them goes.
+    pub(crate) places: Vec<(usize, usize)>,
+    /// The limb to which each of them belongs, 0 being the trunk; empty if that is not known. They are shared out by limbs.
+    pub(crate) limbs: Vec<usize>,
+    /// The number of shares that was asked for.
+    pub(crate) shares: Option<NonZero<usize>>,
 }
 
 /// What a function computes with, counted.
@@ -178,11 +185,21 @@ pub fn record(name: &str, about: &str, f: impl FnOnce(&mut Recorder)) -> Functio
     let (nodes, results) = needed(&open.finish().nodes, &results);
     let (nodes, results) = with_constants_gathered(&nodes, &results);
     let (nodes, results) = needed(&nodes, &results);
-    Function { name: name.to_owned(), about: about.to_owned(), inputs, outputs, nodes, results }
+    Function {
+        name: name.to_owned(),
+        about: about.to_owned(),
+        places: places(&outputs),
+        inputs,
+        outputs,
+        nodes,
+        results,
+        limbs: Vec::new(),
+        shares: None,
+    }
 }
 
 /// The values that some results need, in the order in which they were recorded, and the results among them.
-fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
+pub(crate) fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
     let mut is_needed = vec![false; all.len()];
     results.iter().for_each(|&id| is_needed[id as usize] = true);
     for (id, node) in all.iter().enumerate().rev() {
@@ -244,9 +261,9 @@ impl Function {
         let mut results = self.results.iter().map(|&id| x[id as usize]);
         self.outputs.iter().map(|array| results.by_ref().take(array.len()).collect()).collect()
     }
+}
 
-    /// The array and the place in it of each number of all of some arrays.
-    pub(crate) fn places(arrays: &[Array]) -> Vec<(usize, usize)> {
-        arrays.iter().enumerate().flat_map(|(k, array)| (0..array.len()).map(move |i| (k, i))).collect()
-    }
+/// The array and the place in it of each number of all of some arrays.
+pub(crate) fn places(arrays: &[Array]) -> Vec<(usize, usize)> {
+    arrays.iter().enumerate().flat_map(|(k, array)| (0..array.len()).map(move |i| (k, i))).collect()
 }

@@ -31,6 +31,7 @@ mod identifiers;
 mod order;
 mod program;
 mod robot;
+mod shares;
 mod step;
 mod steps;
 mod sums;

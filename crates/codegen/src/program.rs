@@ -36,6 +36,8 @@ pub(crate) struct Program<'f> {
     pub places: Vec<Place>,
     /// Whether a step takes each value.
     pub taken: Vec<bool>,
+    /// The most values that are under way at a time.
+    pub most_alive: usize,
     /// The numbers in the work space: the sines of all angles that are known at once, their cosines, then the rest.
     pub work: usize,
 }
@@ -44,7 +46,8 @@ impl<'f> Program<'f> {
     pub(crate) fn new(function: &'f Function) -> Self {
         let mut steps = Steps::new(function);
         order(&mut steps);
-        let parts = cut(&steps);
+        let alive = alive(&steps);
+        let parts = cut(&alive);
         let mut part_of = vec![usize::MAX; steps.values];
         for (p, part) in parts.iter().enumerate() {
             steps.all[part.clone()].iter().flat_map(Step::makes).for_each(|id| part_of[id as usize] = p);
@@ -52,7 +55,8 @@ impl<'f> Program<'f> {
         let (places, work) = place(&steps, &parts, &part_of);
         let mut taken = vec![false; steps.values];
         steps.all.iter().flat_map(Step::takes).for_each(|id| taken[id as usize] = true);
-        Self { function, steps, parts, part_of, places, taken, work }
+        let most_alive = alive.into_iter().max().unwrap_or(0);
+        Self { function, steps, parts, part_of, places, taken, most_alive, work }
     }
 
     /// The angles that are known at once.
@@ -70,11 +74,11 @@ fn last_uses(steps: &Steps) -> Vec<usize> {
     last
 }
 
-/// The parts: each ends where, within its bounds, the fewest values go on, which is where a limb ends.
-fn cut(steps: &Steps) -> Vec<Range<usize>> {
+/// How many values come from before each step and are needed by it or after it; last, behind the last step.
+fn alive(steps: &Steps) -> Vec<usize> {
     let n = steps.all.len();
     let last = last_uses(steps);
-    let mut change = vec![0_i64; n + 1];
+    let mut change = vec![0_isize; n + 1];
     for (k, step) in steps.all.iter().enumerate() {
         for id in step.makes().map(|id| id as usize) {
             if last[id] > k {
@@ -83,13 +87,17 @@ fn cut(steps: &Steps) -> Vec<Range<usize>> {
             }
         }
     }
-    // alive[k]: the values that come from before step k and are needed by it or after it
-    let mut alive = Vec::with_capacity(n + 1);
-    let mut now = 0;
-    for k in 0..=n {
-        now += change[k];
-        alive.push(now);
-    }
+    let mut now = 0_usize;
+    let next = |change| {
+        now = now.wrapping_add_signed(change);
+        now
+    };
+    change.into_iter().map(next).collect()
+}
+
+/// The parts: each ends where, within its bounds, the fewest values go on, which is where a limb ends.
+fn cut(alive: &[usize]) -> Vec<Range<usize>> {
+    let n = alive.len() - 1;
     let (mut parts, mut first) = (Vec::new(), 0);
     while n - first > LONGEST {
         let end = (first + SHORTEST..=first + LONGEST).min_by_key(|&k| (alive[k], usize::MAX - k)).unwrap_or(n);

@@ -5,6 +5,7 @@ use crate::expression::Expression;
 use crate::forms::{aba, aba_derivatives, crba, minv};
 use crate::function::{Function, Recorder, record};
 use crate::identifiers::identifiers;
+use crate::shares::limbs_of_results;
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, ReferenceFrame, aba_hessian, centroidal_map_rate, constrained_dynamics,
     constrained_dynamics_derivatives, forward_kinematics, forward_velocities, gravity, impulse_dynamics,
@@ -13,6 +14,7 @@ use condyle_dynamics::{
 use condyle_model::inertial_parameters::to_inertia;
 use condyle_model::{Model, Vec3};
 use condyle_spatial::{Force, Inertia, Matrix, Scalar};
+use core::num::NonZero;
 use nalgebra::DMatrix;
 
 /// The functions that [`functions`] knows.
@@ -64,6 +66,9 @@ pub struct Settings {
     pub armature_is_input: bool,
     /// Whether the acceleration of free fall is an argument instead of a constant: `gravity_vector`, three numbers.
     pub gravity_is_input: bool,
+    /// Among how many threads kernels of CUDA share out every state, at most one for each limb and one for the trunk. By default they
+    /// can do so where it pays ([`Function::shares`]), and do so as long as there are few states. Other languages do not.
+    pub shares: Option<NonZero<usize>>,
 }
 
 /// Functions of a robot, by the names in [`FUNCTIONS`], with the arguments and results that the library's have.
@@ -122,7 +127,8 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
             Ok(())
         });
     });
-    result.map(|()| function)
+    result?;
+    Ok(Function { limbs: limbs_of_results(model, &function), shares: settings.shares, ..function })
 }
 
 /// What a function computes, of which robot.

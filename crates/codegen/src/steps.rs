@@ -77,7 +77,7 @@ impl<'f> Steps<'f> {
         });
         let mut steps = Self { nodes, values: nodes.len(), all, angles, results: &function.results };
         steps.drop_unused();
-        entries::gather(&mut steps.all, &function.results, &function.outputs);
+        entries::gather(&mut steps.all, &function.results, &function.places);
         steps
     }
 

@@ -2,19 +2,25 @@
 #![allow(non_snake_case, unsafe_code)]
 
 mod common;
+#[path = "../../dynamics/tests/common/mod.rs"]
+mod trees;
 
 use common::{compile, folder, is_there};
 use condyle_codegen::cuda::{Compiler, Device, DeviceArray, Driver, Error, Kernels, Real, Stream};
-use condyle_codegen::{Array, Function, Settings, functions};
-use condyle_dynamics::{Data, Model, aba, aba_derivatives, crba, random_configuration, rnea, robots};
+use condyle_codegen::{Array, Function, Language, Settings, functions};
+use condyle_dynamics::{
+    Data, Model, aba, aba_derivatives, crba, minv, random_configuration, rnea, rnea_derivatives, robots,
+};
 use condyle_spatial::Scalar;
 use libloading::Library;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use std::ffi::{CStr, CString, c_char, c_int, c_long, c_uint};
+use std::ffi::{CStr, CString, c_char, c_int, c_long, c_uint, c_void};
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, MutexGuard, OnceLock};
+use trees::Tree;
 
 /// Sums in another order, amplified by M⁻¹; relative to the largest number.
 const ROUNDING: f64 = 1e-11;
@@ -83,9 +89,9 @@ impl Fake {
         }
     }
 
-    /// The blocks and threads of the last launch, and how many there have been.
-    fn launches(&self) -> ([c_uint; 2], c_long) {
-        let mut last = [0; 2];
+    /// The blocks, threads of a block and rows of blocks of the last launch, and how many there have been.
+    fn launches(&self) -> ([c_uint; 3], c_long) {
+        let mut last = [0; 3];
         // SAFETY: this is its type.
         unsafe {
             let launches = self.library.get::<unsafe extern "C" fn(*mut c_uint) -> c_long>(b"fake_launches\0").unwrap();
@@ -108,6 +114,11 @@ fn library<S: Scalar>(model: &Model, name: &str, [q, v, x]: &[Vec<S>; 3]) -> Vec
         "rnea" => vec![rnea(model, data, q, v, x, &[]).to_vec()],
         "aba" => vec![aba(model, data, q, v, x, &[]).to_vec()],
         "crba" => vec![crba(model, data, q).as_slice().to_vec()],
+        "minv" => vec![minv(model, data, q).as_slice().to_vec()],
+        "rnea_derivatives" => {
+            let d = rnea_derivatives(model, data, q, v, x, &[]);
+            [d.dtau_dq, d.dtau_dv, d.dtau_da].map(|m| m.as_slice().to_vec()).into()
+        }
         "aba_derivatives" => {
             let a = aba(model, data, q, v, x, &[]).to_vec();
             let d = aba_derivatives(model, data, q, v, x, &[]);
@@ -200,15 +211,169 @@ fn kernels_compute_what_the_library_computes() {
     fake.end();
 }
 
+/// Functions whose kernels have a number of shares, if there are limbs for as many.
+fn in_shares(model: &Model, names: &[&str], shares: usize) -> Vec<Function> {
+    functions(model, names, &Settings { shares: NonZero::new(shares), ..Settings::default() }).unwrap()
+}
+
+#[test]
+fn limbs_are_computed_by_threads_of_their_own() {
+    let Some(fake) = Fake::new() else { return };
+    let device = fake.driver.device(0).unwrap();
+    let names = ["rnea", "crba", "minv", "rnea_derivatives"];
+    // four legs; two legs, two arms and a head, and their trunks
+    for (model, number) in [(robots::quadruped(), 2), (robots::quadruped(), 5), (robots::humanoid(), 4)] {
+        let all = in_shares(&model, &names, number);
+        let double = device.compile::<f64>(&fake.compiler, "robot", &all).unwrap();
+        let single = device.compile::<f32>(&fake.compiler, "robot", &all).unwrap();
+        for name in names {
+            assert_eq!(double.kernel(name).unwrap().shares(), number);
+            for n in [1, 77, 2500] {
+                check(&device, &double, &model, name, &[n]);
+                assert_eq!(fake.launches().0[2] as usize, number);
+            }
+            check(&device, &single, &model, name, &[33]);
+            assert_eq!(fake.launches().0[2] as usize, number);
+        }
+    }
+    drop(device);
+    fake.end();
+}
+
+#[test]
+fn states_are_shared_out_while_they_are_few() {
+    let Some(fake) = Fake::new() else { return };
+    let (device, quadruped) = (fake.driver.device(0).unwrap(), robots::quadruped());
+    let kernels = device.compile::<f64>(&fake.compiler, "quadruped", &of(&quadruped, &["rnea_derivatives"])).unwrap();
+    let shares = kernels.kernel("rnea_derivatives").unwrap().shares();
+    assert_eq!(shares, of(&quadruped, &["rnea_derivatives"])[0].shares(Language::Cuda));
+    // eight blocks of 256 threads are on the device at a time
+    let most = 2048 / shares;
+    for (n, rows) in [(1, shares), (most, shares), (most + 1, 1), (3000, 1)] {
+        check(&device, &kernels, &quadruped, "rnea_derivatives", &[n]);
+        assert_eq!(fake.launches().0[2] as usize, rows, "{n} states");
+    }
+    drop((kernels, device));
+    fake.end();
+}
+
+#[test]
+fn shares_are_as_many_as_pay() {
+    let shares = |model: &Model, name: &str| {
+        let function = &of(model, &[name])[0];
+        [Language::Cuda, Language::CudaFloat, Language::C, Language::Rust].map(|language| function.shares(language))
+    };
+    // an arm has one limb; the trunk's efforts and all accelerations need what every limb does
+    assert_eq!(shares(&robots::arm7(), "aba_derivatives"), [1; 4]);
+    for model in [robots::quadruped(), robots::humanoid()] {
+        for name in ["rnea", "aba", "gravity", "nonlinear_effects"] {
+            assert_eq!(shares(&model, name), [1; 4], "{name}");
+        }
+        for name in ["rnea_derivatives", "aba_derivatives"] {
+            let [double, single, others @ ..] = shares(&model, name);
+            assert!(double > 2 && single > 2 && others == [1; 2], "{name}: {double}, {single}, {others:?}");
+        }
+    }
+    // what is asked for is had, as far as there are limbs
+    let asked = |model: &Model, name: &str, number| in_shares(model, &[name], number)[0].shares(Language::CudaFloat);
+    assert_eq!([1, 2, 3, 9].map(|number| asked(&robots::quadruped(), "rnea", number)), [1, 2, 3, 5]);
+    assert_eq!([1, 2, 9].map(|number| asked(&robots::arm7(), "aba_derivatives", number)), [1; 3]);
+}
+
+#[test]
+fn a_split_kernel_says_how_it_is_launched() {
+    let quadruped = robots::quadruped();
+    let text = |shares| {
+        Language::CudaFloat.text("robot", &in_shares(&quadruped, &["rnea_derivatives"], shares)).remove(0).text
+    };
+    let split = text(3);
+    assert!(
+        split.contains("// Shares: 3, of ") && split.contains("name<<<dim3((n + 127) / 128, shares), 128>>>(n, ...).")
+    );
+    assert!(
+        split.contains("share < 3;") && split.contains("_share2(int n, int i, ") && !split.contains("gridDim.y == 1")
+    );
+    assert_eq!(split, text(3), "the same functions give the same text");
+    let whole = text(1);
+    assert!(!whole.contains("hare") && !whole.contains("blockIdx.y"));
+    // as long as nothing is asked for, how it is launched decides
+    let as_pays = Language::CudaFloat.text("robot", &of(&quadruped, &["rnea_derivatives"])).remove(0).text;
+    assert!(as_pays.contains("if (gridDim.y == 1) return robot_rnea_derivatives_whole(n, i, q, v, a, "));
+}
+
+/// A launch that has fewer rows of blocks than there are shares computes all of them too.
+#[test]
+fn shares_without_a_row_of_their_own_are_not_left_out() {
+    let Some(fake) = Fake::new() else { return };
+    let quadruped = robots::quadruped();
+    let all = in_shares(&quadruped, &["crba"], 5);
+    let image = String::from_utf8(fake.compiler.ptx::<f64>("robot", &all, (7, 0)).unwrap()).unwrap();
+    let path = image.split_whitespace().nth(4).unwrap(); // after FAKE, PTX and 70
+    type Thread = unsafe extern "C" fn(*mut *mut c_void, *const c_uint, *const c_uint, c_uint, c_uint);
+    // SAFETY: it was made here.
+    let library = unsafe { Library::new(path) }.unwrap();
+    let q = random_configuration(&quadruped, &mut StdRng::seed_from_u64(1));
+    let expected = crba(&quadruped, &mut Data::new(&quadruped), &q).as_slice().to_vec();
+    for rows in [1, 2, 3, 5, 7] {
+        let (mut n, mut M) = (1 as c_int, vec![f64::NAN; expected.len()]);
+        let (mut from, mut to) = (q.as_ptr(), M.as_mut_ptr());
+        let mut parameters = [(&raw mut n).cast(), (&raw mut from).cast(), (&raw mut to).cast()];
+        for row in 0..rows {
+            // SAFETY: this is its type, and the arrays have as many numbers as it reads and writes.
+            unsafe {
+                let thread = library.get::<Thread>(b"fake_thread_robot_crba\0").unwrap();
+                thread(parameters.as_mut_ptr(), [1, rows].as_ptr(), [0, row].as_ptr(), 0, 1);
+            }
+        }
+        let scale = expected.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
+        assert!(M.iter().zip(&expected).all(|(x, y)| (x - y).abs() <= ROUNDING * scale), "{rows} rows");
+    }
+    drop(library);
+    fake.end();
+}
+
+/// Trees with every kind of joint, and joints that follow others.
+#[test]
+fn trees_of_any_form_are_shared_out() {
+    let Some(fake) = Fake::new() else { return };
+    let device = fake.driver.device(0).unwrap();
+    let mut split = 0;
+    for seed in 0..4 {
+        let rng = &mut trees::rng(seed);
+        let tree = if seed % 2 == 0 { Tree::random(rng) } else { Tree::random_with_mimics(rng) };
+        let model = tree.build();
+        for (number, names) in [(2, &["rnea", "crba"][..]), (20, &["rnea_derivatives"])] {
+            let all = in_shares(&model, names, number);
+            let kernels = device.compile::<f64>(&fake.compiler, "tree", &all).unwrap();
+            for function in &all {
+                let shares = kernels.kernel(&function.name).unwrap().shares();
+                assert!(shares <= number);
+                split += usize::from(shares > 1);
+                check(&device, &kernels, &model, &function.name, &[5]);
+            }
+        }
+    }
+    assert!(split > 9, "{split}");
+    drop(device);
+    fake.end();
+}
+
 #[test]
 fn blocks_keep_every_multiprocessor_busy() {
     let Some(fake) = Fake::new() else { return };
     let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
     let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["rnea"])).unwrap();
     // four multiprocessors, and at most 256 threads in a block
-    for (n, expected) in [(1, [1, 32]), (100, [4, 32]), (129, [3, 64]), (1024, [4, 256]), (3000, [12, 256])] {
+    for (n, [blocks, threads]) in [(1, [1, 32]), (100, [4, 32]), (129, [3, 64]), (1024, [4, 256]), (3000, [12, 256])] {
         check(&device, &kernels, &arm, "rnea", &[n]);
-        assert_eq!(fake.launches().0, expected, "{n} states");
+        assert_eq!(fake.launches().0, [blocks, threads, 1], "{n} states");
+    }
+    // rows of blocks fill them too
+    let quadruped = robots::quadruped();
+    let split = device.compile::<f64>(&fake.compiler, "quadruped", &in_shares(&quadruped, &["rnea"], 4)).unwrap();
+    for (n, [blocks, threads]) in [(1, [1, 32]), (30, [1, 32]), (100, [1, 128]), (129, [1, 160]), (3000, [12, 256])] {
+        check(&device, &split, &quadruped, "rnea", &[n]);
+        assert_eq!(fake.launches().0, [blocks, threads, 4], "{n} states");
     }
     let kernel = kernels.kernel("rnea").unwrap();
     assert_eq!((kernel.registers(), kernel.local_bytes()), (96, 64));

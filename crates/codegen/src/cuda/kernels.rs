@@ -116,13 +116,17 @@ impl<T: Real> Kernels<T> {
     }
 }
 
-/// A function of a robot on a GPU: a thread computes one state.
+/// A function of a robot on a GPU: a thread computes one state, or a share of one.
 pub struct Kernel<T: Real> {
     name: String,
     inputs: Vec<Array>,
     outputs: Vec<Array>,
     module: Arc<Module>,
     handle: Handle,
+    /// The threads that can compute a state, in as many rows of blocks.
+    shares: usize,
+    /// The states up to which they do.
+    most_shared: usize,
     /// As many threads in a block as keep the most warps on a multiprocessor.
     threads: usize,
     registers: usize,
@@ -145,7 +149,7 @@ impl<T: Real> fmt::Debug for Kernel<T> {
 impl<T: Real> Kernel<T> {
     fn new(module: &Arc<Module>, code: &str, function: &Function) -> Result<Self, Error> {
         let driver = &module.device.0.driver;
-        let symbol = CString::new(format!("{code}_{}", function.name)).expect("identifiers have no zeros");
+        let symbol = CString::new(format!("{}_{}", T::LANGUAGE.stem(code), function.name)).expect("identifiers have no zeros");
         let (mut handle, mut blocks, mut threads) = (null_mut(), 0, 0);
         call!(driver, cuModuleGetFunction(&raw mut handle, module.handle, symbol.as_ptr()))?;
         call!(driver, cuOccupancyMaxPotentialBlockSize(&raw mut blocks, &raw mut threads, handle, null(), 0, 0))?;
@@ -154,13 +158,18 @@ impl<T: Real> Kernel<T> {
             call!(driver, cuFuncGetAttribute(&raw mut value, attribute, handle))?;
             Ok::<_, Error>(usize::try_from(value).unwrap_or(0))
         };
+        let threads = usize::try_from(threads).unwrap_or(0).max(WARP);
+        let at_a_time = threads * usize::try_from(blocks).unwrap_or(0);
+        let shares = function.shares(T::LANGUAGE);
         Ok(Self {
             name: function.name.clone(),
             inputs: function.inputs.clone(),
             outputs: function.outputs.clone(),
             module: module.clone(),
             handle,
-            threads: usize::try_from(threads).unwrap_or(0).max(WARP),
+            shares,
+            most_shared: if function.shares.is_some() { usize::MAX } else { at_a_time / shares },
+            threads,
             registers: attribute(REGISTERS)?,
             local_bytes: attribute(LOCAL_BYTES)?,
             number: PhantomData,
@@ -175,6 +184,11 @@ impl<T: Real> Kernel<T> {
     /// The arrays that it fills.
     pub fn outputs(&self) -> &[Array] {
         &self.outputs
+    }
+
+    /// The threads that compute a state, each some of the results, where there are few states: [`Function::shares`].
+    pub fn shares(&self) -> usize {
+        self.shares
     }
 
     /// The registers of a thread.
@@ -223,16 +237,17 @@ impl<T: Real> Kernel<T> {
             inputs.iter().map(|a| a.address).chain(outputs.iter().map(|a| a.address)).collect();
         let mut parameters = vec![(&raw mut states).cast::<c_void>()];
         parameters.extend(addresses.iter_mut().map(|a| (&raw mut *a).cast()));
-        let threads = self.threads_for(n);
+        let rows = if n > self.most_shared { 1 } else { self.shares };
+        let threads = self.threads_for(rows * n);
         let blocks = n.div_ceil(threads) as c_uint;
-        let (_current, threads) = (device.0.current()?, threads as c_uint);
+        let (_current, rows, threads) = (device.0.current()?, rows as c_uint, threads as c_uint);
         call!(
             device.0.driver,
-            cuLaunchKernel(self.handle, blocks, 1, 1, threads, 1, 1, 0, stream.handle, parameters.as_ptr(), null())
+            cuLaunchKernel(self.handle, blocks, rows, 1, threads, 1, 1, 0, stream.handle, parameters.as_ptr(), null())
         )
     }
 
-    /// The threads of a block: fewer than the best for many states where these would leave multiprocessors idle.
+    /// The threads of a block, of n in all: fewer than the best for many where these would leave multiprocessors idle.
     fn threads_for(&self, n: usize) -> usize {
         let share = n.div_ceil(self.module.device.0.multiprocessors).next_multiple_of(WARP);
         share.min(self.threads)

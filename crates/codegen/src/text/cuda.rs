@@ -1,8 +1,9 @@
-//! CUDA: a thread for each state, the numbers of one kind side by side in memory.
+//! CUDA: a thread for each state or for each of its shares, the numbers of one kind side by side in memory.
 
-use super::{Dialect, SourceFile, Writer, description, heading, prefixed};
-use crate::function::Array;
+use super::{Dialect, SourceFile, Writer, description, heading, interface, prefixed};
+use crate::function::{Array, Function};
 use crate::program::Program;
+use crate::shares::split;
 use crate::text::c::C;
 use core::fmt::Write;
 
@@ -52,28 +53,82 @@ fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> St
 }
 
 /// The file.
-pub(crate) fn files(name: &str, programs: &[Program], real: &'static str) -> Vec<SourceFile> {
+pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, registers: usize) -> Vec<SourceFile> {
+    let shares: Vec<Vec<Function>> = programs.iter().map(|program| split(program, registers)).collect();
     let mut lines = heading(name, programs);
     lines.extend([
         String::new(),
         "A thread computes one of n states. Number k of an array of state i stands at [k * n + i].".to_owned(),
         "Launch with at least n threads: name<<<(n + 127) / 128, 128>>>(n, ...).".to_owned(),
     ]);
+    if shares.iter().any(|shares| !shares.is_empty()) {
+        lines.extend([
+            String::new(),
+            "Where a kernel says that it has shares, as many threads may compute a state, each some of the results, and what".to_owned(),
+            "several of them need each for itself: name<<<dim3((n + 127) / 128, shares), 128>>>(n, ...). That is for few states.".to_owned(),
+        ]);
+    }
     let mut text = format!("{}\n", prefixed("// ", &lines));
-    for program in programs {
-        text += &function(&Writer::new(program, Cuda(C { real, lanes: 1, name: name.to_owned() })), name);
+    for (program, shares) in programs.iter().zip(&shares) {
+        let shares: Vec<Program> = shares.iter().map(Program::new).collect();
+        let writer = |program| Writer::new(program, Cuda(C { real, lanes: 1, name: name.to_owned() }));
+        text += &kernel(&writer(program), &shares.iter().map(writer).collect::<Vec<_>>(), name);
     }
     vec![SourceFile { name: format!("{name}.cu"), text }]
 }
 
-/// A kernel with its parts.
-fn function(writer: &Writer<Cuda>, name: &str) -> String {
+/// A kernel with its parts, or with functions of its shares.
+fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
+    let (real, function) = (whole.dialect.0.real, whole.program.function);
+    let (inputs, outputs): (Vec<&Array>, Vec<&Array>) =
+        (function.inputs.iter().collect(), function.outputs.iter().collect());
+    let parameters = parameters(real, &inputs, false, &outputs);
+    let symbol = format!("{name}_{}", function.name);
+    let mut body =
+        ["const int i = blockIdx.x * blockDim.x + threadIdx.x;", "if (i >= n) return;"].map(str::to_owned).to_vec();
+    let (mut text, about) = if shares.is_empty() {
+        let (parts, lines) = computation(whole, name);
+        body.extend(lines);
+        (parts, description(whole.program))
+    } else {
+        let names: String = inputs.iter().chain(&outputs).map(|a| format!(", {}", a.name)).collect();
+        let device_function = |text: &mut String, writer: &Writer<Cuda>, symbol: &str| {
+            let (parts, lines) = computation(writer, name);
+            let head = format!("static __device__ __noinline__ void {symbol}(int n, int i{parameters})");
+            let _ = write!(text, "{parts}{head} {{\n{}}}\n\n", prefixed("    ", &lines));
+            format!("{symbol}(n, i{names});")
+        };
+        let mut text = String::new();
+        if function.shares.is_none() {
+            let call = device_function(&mut text, whole, &format!("{symbol}_whole"));
+            body.push(format!("if (gridDim.y == 1) return {call}"));
+        }
+        // shares that no row of blocks is there for are taken by those that are there
+        let count = shares.len();
+        body.push(format!("for (int share = blockIdx.y; share < {count}; share += gridDim.y) switch (share) {{"));
+        for (k, share) in shares.iter().enumerate() {
+            let call = device_function(&mut text, share, &format!("{symbol}_share{k}"));
+            body.push(format!("case {k}: {call} break;"));
+        }
+        body.push("}".to_owned());
+        let operations = |program: &Program| program.steps.operations().total().to_string();
+        let each: Vec<String> = shares.iter().map(|share| operations(share.program)).collect();
+        let mut about = interface(function);
+        let all = operations(whole.program);
+        about.push(format!("Shares: {count}, of {} operations; all results together take {all}.", each.join(", ")));
+        (text, about)
+    };
+    let head = format!("extern \"C\" __global__ void {symbol}(int n{parameters})");
+    let _ = write!(text, "{}{head} {{\n{}}}\n\n", prefixed("// ", &about), prefixed("    ", &body));
+    text
+}
+
+/// The parts of a program as functions, and the lines that call them, or compute all if there is one part.
+fn computation(writer: &Writer<Cuda>, name: &str) -> (String, Vec<String>) {
     let program = writer.program;
     let (real, function) = (writer.dialect.0.real, program.function);
     let (mut text, mut body) = (String::new(), Vec::new());
     let n = program.angles().len();
-    body.push("const int i = blockIdx.x * blockDim.x + threadIdx.x;".to_owned());
-    body.push("if (i >= n) return;".to_owned());
     if program.work > 0 {
         body.push(format!("{real} w[{}];", program.work));
     }
@@ -95,13 +150,5 @@ fn function(writer: &Writer<Cuda>, name: &str) -> String {
         }
     }
     body.extend(writer.given_results());
-    let inputs: Vec<&Array> = function.inputs.iter().collect();
-    let outputs: Vec<&Array> = function.outputs.iter().collect();
-    let head = format!(
-        "extern \"C\" __global__ void {name}_{}(int n{})",
-        function.name,
-        parameters(real, &inputs, false, &outputs)
-    );
-    let about = prefixed("// ", &description(program));
-    format!("{text}{about}{head} {{\n{}}}\n\n", prefixed("    ", &body))
+    (text, body)
 }

@@ -5,9 +5,10 @@ mod casadi;
 mod cuda;
 mod rust;
 
-use crate::function::{Array, Function};
+use crate::function::{Array, Function, places};
 use crate::graph::{Id, Node};
 use crate::program::{Place, Program};
+use crate::shares::split;
 use crate::step::{Angle, Entries, Step, Term};
 use core::fmt::Write;
 
@@ -45,7 +46,8 @@ pub enum Language {
     Rust,
     /// A module of Rust on `f32` that needs no `std`.
     RustFloat,
-    /// CUDA on numbers of type `double`: a thread for each state, the numbers of one kind side by side.
+    /// CUDA on numbers of type `double`: a thread for each state, or for each of its shares ([`Function::shares`]), the numbers of one
+    /// kind side by side.
     Cuda,
     /// CUDA on numbers of type `float`.
     CudaFloat,
@@ -85,6 +87,15 @@ impl Language {
         Self::NAMES.iter().position(|&known| known == name).map(|k| all[k])
     }
 
+    /// The registers of a GPU's thread that a number takes.
+    pub(crate) fn registers_of_number(self) -> Option<usize> {
+        match self {
+            Self::Cuda => Some(2),
+            Self::CudaFloat => Some(1),
+            _ => None,
+        }
+    }
+
     /// The files in which some functions are written down. The same functions give the same text.
     ///
     /// ```
@@ -104,6 +115,7 @@ impl Language {
         assert!(crate::function::is_identifier(name), "name: `{name}` is not made of ASCII letters, digits and `_`");
         let programs: Vec<Program> = functions.iter().map(Program::new).collect();
         let name = &self.stem(name);
+        let registers = self.registers_of_number().unwrap_or(1);
         match self {
             Self::C => c::files(name, &programs, "double", 1),
             Self::CFloat => c::files(name, &programs, "float", 1),
@@ -118,13 +130,13 @@ impl Language {
             }
             Self::Rust => rust::files(name, &programs, "f64"),
             Self::RustFloat => rust::files(name, &programs, "f32"),
-            Self::Cuda => cuda::files(name, &programs, "double"),
-            Self::CudaFloat => cuda::files(name, &programs, "float"),
+            Self::Cuda => cuda::files(name, &programs, "double", registers),
+            Self::CudaFloat => cuda::files(name, &programs, "float", registers),
         }
     }
 
     /// The name of the files, with which functions in C and CUDA begin: that of the robot, then `_float` and `_x4` or `_x8`, so
-    /// that files of several languages lie in one folder, and their functions in one program. Kernels have no `_float`.
+    /// that files of several languages lie in one folder, and their functions in one program.
     ///
     /// ```
     /// use condyle_codegen::Language;
@@ -133,14 +145,36 @@ impl Language {
     /// ```
     pub fn stem(self, name: &str) -> String {
         let suffix = match self {
-            Self::C | Self::CCasadi | Self::Rust | Self::Cuda | Self::CudaFloat => "",
-            Self::CFloat | Self::RustFloat => "_float",
+            Self::C | Self::CCasadi | Self::Rust | Self::Cuda => "",
+            Self::CFloat | Self::RustFloat | Self::CudaFloat => "_float",
             Self::CFour => "_x4",
             Self::CEight => "_x8",
             Self::CFloatFour => "_float_x4",
             Self::CFloatEight => "_float_x8",
         };
         format!("{name}{suffix}")
+    }
+}
+
+impl Function {
+    /// The number of threads among which its kernel can share out a state, in a language: 1 but in CUDA.
+    ///
+    /// Functions of a robot are split by limbs where one thread would have to keep more values than it has registers, and the largest
+    /// share is smaller by more than the sum of all is greater; or as [`Settings::shares`](crate::Settings::shares) says. A
+    /// kernel that is launched with so many rows of blocks (`blockIdx.y`) computes a share in each; with one row, a whole state in each
+    /// thread.
+    ///
+    /// ```
+    /// use condyle_codegen::{Language, Settings, functions};
+    /// use condyle_dynamics::robots;
+    /// let all = functions(&robots::quadruped(), &["rnea", "rnea_derivatives"], &Settings::default())?;
+    /// assert_eq!(all[0].shares(Language::Cuda), 1); // the trunk's efforts need what all limbs do
+    /// assert!(all[1].shares(Language::Cuda) > 1);
+    /// # Ok::<(), condyle_codegen::Error>(())
+    /// ```
+    pub fn shares(&self, language: Language) -> usize {
+        let shares = language.registers_of_number().map(|registers| split(&Program::new(self), registers));
+        shares.map_or(1, |shares| shares.len().max(1))
     }
 }
 
@@ -203,18 +237,17 @@ pub(crate) struct Writer<'p, D> {
     pub program: &'p Program<'p>,
     pub dialect: D,
     inputs: Vec<(usize, usize)>,
-    /// The places among all outputs that each value goes to.
+    /// The results that are each value.
     goes_to: Vec<Vec<usize>>,
-    outputs: Vec<(usize, usize)>,
+    outputs: &'p [(usize, usize)],
 }
 
 impl<'p, D: Dialect> Writer<'p, D> {
     pub(crate) fn new(program: &'p Program<'p>, dialect: D) -> Self {
         let mut goes_to = vec![Vec::new(); program.steps.values];
         program.steps.results.iter().enumerate().for_each(|(k, &id)| goes_to[id as usize].push(k));
-        let (inputs, outputs) = (&program.function.inputs, &program.function.outputs);
-        let (inputs, outputs) = (Function::places(inputs), Function::places(outputs));
-        Self { program, dialect, inputs, goes_to, outputs }
+        let function = program.function;
+        Self { program, dialect, inputs: places(&function.inputs), goes_to, outputs: &function.places }
     }
 
     /// A value as part p sees it.
@@ -423,9 +456,18 @@ impl<'p, D: Dialect> Writer<'p, D> {
     }
 }
 
-/// What a function takes and gives, line by line.
+/// What a function takes and gives, line by line, and what that takes.
 pub(crate) fn description(program: &Program) -> Vec<String> {
-    let function = program.function;
+    let mut lines = interface(program.function);
+    lines.push(format!("Operations: {}.", program.steps.operations()));
+    if program.work > 0 {
+        lines.push(format!("Stack: {} numbers beside the variables.", program.work));
+    }
+    lines
+}
+
+/// What a function takes and gives, line by line.
+pub(crate) fn interface(function: &Function) -> Vec<String> {
     let mut lines = vec![function.about.clone(), String::new()];
     for array in function.inputs.iter().chain(&function.outputs) {
         let shape = match array.columns {
@@ -435,10 +477,6 @@ pub(crate) fn description(program: &Program) -> Vec<String> {
         lines.push(format!("{}: {} ({shape})", array.name, array.about));
     }
     lines.push(String::new());
-    lines.push(format!("Operations: {}.", program.steps.operations()));
-    if program.work > 0 {
-        lines.push(format!("Stack: {} numbers beside the variables.", program.work));
-    }
     lines
 }
 

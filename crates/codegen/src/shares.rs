@@ -1,0 +1,178 @@
+//! Shares of a function: several threads compute one state, each some of the results, where one thread would need more registers
+//! than it has.
+//!
+//! Results are shared out by limbs. A limb is a subtree without forks that hangs on a body with several children, or on the world;
+//! what bears limbs is the trunk. To a limb belong the columns of its coordinates in matrices and their entries in vectors; all
+//! else is the trunk's. A value that stands in several places, as in a symmetric matrix, is computed once and belongs to the limb
+//! of the first of them, but to the trunk only if all are the trunk's.
+//!
+//! A share is the function without the results of the others, and without what only they need: a function like any other. So
+//! threads do not wait for each other, nor have memory in common; what several shares need, as the way along the trunk, each
+//! computes for itself. How much that is decides what a split is worth. With few states a GPU is not full, and a call takes as
+//! long as the largest share; with many states, as long as all shares together:
+//!
+//! ```text
+//! gain = whole / largest share        loss = sum of shares / whole        worth = gain / loss        in operations
+//! ```
+//!
+//! One begins with a share for each limb and merges, again and again, those two after which the worth is greatest; of all that one
+//! has had on this way, the whole function at its end, what is worth most is taken. That is the whole for efforts and accelerations,
+//! where the trunk needs what all limbs do; of derivatives there is a share for most limbs.
+//!
+//! As the loss is real, a kernel has the whole function beside its shares, and how it is launched decides: states are shared out
+//! as long as all threads are on the device at a time.
+
+use crate::function::{Function, needed};
+use crate::graph::{Id, Node};
+use crate::program::Program;
+use condyle_model::Model;
+use core::cmp::Reverse;
+use std::collections::{BTreeSet, HashMap};
+
+/// The registers of a thread that can be used for values, of 32 bits each.
+const REGISTERS: usize = 255;
+
+/// The limb of each result of a robot's function, as far as it is a column or an entry for a coordinate; else 0, the trunk.
+pub(crate) fn limbs_of_results(model: &Model, function: &Function) -> Vec<usize> {
+    let of_coordinate = limbs(model);
+    let own = |&(array, place): &(usize, usize)| {
+        let array = &function.outputs[array];
+        match (array.rows, array.columns) {
+            (rows, columns) if columns == model.nv() => of_coordinate[place / rows],
+            (rows, 1) if rows == model.nv() => of_coordinate[place],
+            _ => 0,
+        }
+    };
+    let mut of_result: Vec<usize> = function.places.iter().map(own).collect();
+    let mut of_value: HashMap<Id, usize> = HashMap::new();
+    for (&id, &limb) in function.results.iter().zip(&of_result) {
+        let first = of_value.entry(id).or_insert(limb);
+        *first = if *first == 0 { limb } else { *first };
+    }
+    for (limb, &id) in of_result.iter_mut().zip(&function.results) {
+        if is_operation(function.nodes[id as usize]) {
+            *limb = of_value[&id];
+        }
+    }
+    of_result
+}
+
+/// The limb of each coordinate of a robot; 0 is the trunk.
+fn limbs(model: &Model) -> Vec<usize> {
+    let nodes = model.nodes();
+    let mut children = vec![0; nodes.len()];
+    nodes.iter().skip(1).for_each(|node| children[node.parent] += 1);
+    // the trunk: from the forks to the world
+    let mut bears_limbs: Vec<bool> = children.iter().map(|&n| n > 1).collect();
+    for i in (1..nodes.len()).rev() {
+        bears_limbs[nodes[i].parent] |= bears_limbs[i];
+    }
+    let (mut of_body, mut of_coordinate, mut count) = (vec![0; nodes.len()], vec![0; model.nv()], 0);
+    for (i, node) in nodes.iter().enumerate().skip(1).filter(|&(i, _)| !bears_limbs[i]) {
+        if of_body[node.parent] == 0 {
+            count += 1;
+        }
+        of_body[i] = if of_body[node.parent] == 0 { count } else { of_body[node.parent] };
+        of_coordinate[node.idx_v..][..node.joint.nv()].fill(of_body[i]);
+    }
+    of_coordinate
+}
+
+/// Some limbs, and what their results need.
+#[derive(Clone)]
+struct Share {
+    limbs: Vec<usize>,
+    /// Of each value whether it is an operation of this share.
+    operations: Vec<bool>,
+    count: usize,
+}
+
+impl Share {
+    fn new(function: &Function, limb: usize) -> Self {
+        let mut is_needed = vec![false; function.nodes.len()];
+        let results = function.results.iter().zip(&function.limbs);
+        results.filter(|&(_, &of)| of == limb).for_each(|(&id, _)| is_needed[id as usize] = true);
+        for (id, node) in function.nodes.iter().enumerate().rev() {
+            if is_needed[id] {
+                node.operands().for_each(|id| is_needed[id as usize] = true);
+            }
+        }
+        let operations = is_needed.iter().zip(&function.nodes).map(|(&needed, &node)| needed && is_operation(node));
+        Self::of(vec![limb], operations.collect())
+    }
+
+    fn of(limbs: Vec<usize>, operations: Vec<bool>) -> Self {
+        let count = operations.iter().filter(|&&is_one| is_one).count();
+        Self { limbs, operations, count }
+    }
+
+    fn merged(&self, other: &Self) -> Self {
+        let operations = self.operations.iter().zip(&other.operations).map(|(a, b)| a | b).collect();
+        Self::of([&self.limbs[..], &other.limbs].concat(), operations)
+    }
+}
+
+/// Whether a value takes an operation: signs do not.
+fn is_operation(node: Node) -> bool {
+    !matches!(node, Node::Constant(_) | Node::Input(_) | Node::Neg(_) | Node::Minus(_))
+}
+
+/// The largest share times the sum of all: the least is best.
+fn cost(counts: impl Iterator<Item = usize> + Clone) -> u128 {
+    counts.clone().max().unwrap_or(0) as u128 * counts.sum::<usize>() as u128
+}
+
+/// The two shares after whose union the cost is least, and that cost.
+fn best_pair(shares: &[Share]) -> Option<(u128, [usize; 2])> {
+    let pairs = (0..shares.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+    let costs = pairs.map(|[a, b]| {
+        let others = shares.iter().enumerate().filter(move |&(k, _)| k != a && k != b).map(|(_, share)| share.count);
+        (cost(others.chain([shares[a].merged(&shares[b]).count])), [a, b])
+    });
+    costs.min()
+}
+
+/// The shares of a function on numbers of some registers each, the largest one first; none where it is not split.
+pub(crate) fn split(program: &Program, registers_of_number: usize) -> Vec<Function> {
+    let function = program.function;
+    let spills = registers_of_number * program.most_alive > REGISTERS;
+    if function.shares.map_or(!spills, |number| number.get() == 1) {
+        return Vec::new();
+    }
+    let limbs: BTreeSet<usize> = function.limbs.iter().copied().collect();
+    let mut shares: Vec<Share> = limbs.into_iter().map(|limb| Share::new(function, limb)).collect();
+    let mut best = shares.clone();
+    let mut least = cost(shares.iter().map(|share| share.count));
+    while let Some((cost, [a, b])) = best_pair(&shares) {
+        let other = shares.remove(b);
+        shares[a] = shares[a].merged(&other);
+        if function.shares.map_or(cost <= least, |number| best.len() > number.get()) {
+            (least, best) = (cost, shares.clone());
+        }
+    }
+    if best.len() < 2 {
+        return Vec::new();
+    }
+    best.sort_by_key(|share| Reverse(share.count));
+    best.iter().enumerate().map(|(k, share)| function.share(k, &share.limbs)).collect()
+}
+
+impl Function {
+    /// The function without the results of other limbs.
+    fn share(&self, k: usize, limbs: &[usize]) -> Self {
+        let kept = || (0..self.results.len()).filter(|&k| limbs.contains(&self.limbs[k]));
+        let results: Vec<Id> = kept().map(|k| self.results[k]).collect();
+        let (nodes, results) = needed(&self.nodes, &results);
+        Self {
+            name: format!("{}_share{k}", self.name),
+            about: self.about.clone(),
+            inputs: self.inputs.clone(),
+            outputs: self.outputs.clone(),
+            nodes,
+            results,
+            places: kept().map(|k| self.places[k]).collect(),
+            limbs: Vec::new(),
+            shares: None,
+        }
+    }
+}
