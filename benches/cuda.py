@@ -2,9 +2,11 @@
 """States a second of generated kernels on a GPU, for batches of many sizes, beside MJX and MuJoCo Warp.
 
     python benches/cuda.py [--robots panda anymal talos] [--functions rnea aba ...] [--batches 10 12 14 16 18 20]
+                           [--shares 1 0]
 
 Batches are powers of two. "Resident" is with all arrays on the device; "copied" also brings arguments there and results
-back. Each kernel is compared with the CPU first. MJX and MuJoCo Warp compute `forward`, which is forward dynamics and
+back. Shares are the threads among which a state is shared out, 0 being what a kernel chooses by the number of states.
+Each kernel is compared with the CPU first. MJX and MuJoCo Warp compute `forward`, which is forward dynamics and
 kinematics, in single precision, of the same robot without shapes; they are left out where they are not installed.
 Needs a GPU, NVIDIA's run-time compiler, the packages condyle and example-robot-data-loaders, and mujoco for the peers.
 Without a device it prints NOT RUN.
@@ -92,23 +94,24 @@ def ours(model: condyle.Model, kernel: condyle.cuda.Kernel, n: int) -> tuple[flo
     return rate(n, lambda: kernel(*given, out=out), wait), rate(n, copied, wait)
 
 
-def table(model: condyle.Model, robot: str, functions: "list[str]", batches: "list[int]") -> None:
-    for name in functions:
-        for dtype in ("float32", "float64"):
-            kernel = condyle.cuda.compile(model, name, dtype=dtype)
+def table(
+    model: condyle.Model, robot: str, functions: "list[str]", all_shares: "list[int]", batches: "list[int]"
+) -> None:
+    for name, dtype in ((name, dtype) for name in functions for dtype in ("float32", "float64")):
+        made = {shares: condyle.cuda.compile(model, name, dtype=dtype, shares=shares or None) for shares in all_shares}
+        for shares, kernel in made.items():
+            if kernel.shares == 1 and shares != next(iter(made)):
+                continue  # the same once more
             apart = error(model, kernel)
             if dtype == "float64" and not apart <= ROUNDING:
                 sys.exit(f"{robot}, {name}: {apart:.1e} from the CPU, {ROUNDING} are allowed")
+            about = f"{robot} | {name} | {dtype} | {shares} | {kernel.registers} | {kernel.local_bytes} | {apart:.0e}"
             for n in batches:
                 try:
                     resident, copied = (f"{x:.3g}" for x in ours(model, kernel, n))
                 except (RuntimeError, ValueError) as refused:  # too little memory, or too many states for a call
                     resident, copied = str(refused).split(",")[0], "–"
-                print(
-                    f"| {robot} | {name} | {dtype} | {kernel.registers} | {kernel.local_bytes} | {apart:.0e} | "
-                    f"{n} | {resident} | {copied} |",
-                    flush=True,
-                )
+                print(f"| {about} | {n} | {resident} | {copied} |", flush=True)
 
 
 def mujoco_model(path: Path, is_free: bool) -> Any:
@@ -158,7 +161,7 @@ def peers(robot: str, path: Path, is_free: bool, batches: "list[int]") -> None:
         for n in batches:
             try:
                 found = measured(mujoco_model(path, is_free), n)
-                print(f"| {robot} | {name} forward | float32 | | | | {n} | {found:.3g} | |", flush=True)
+                print(f"| {robot} | {name} forward | float32 | | | | | {n} | {found:.3g} | |", flush=True)
             except Exception as failed:
                 print(f"NOT RUN: {name}, {robot}, {n} states: {type(failed).__name__}: {failed}")
                 break
@@ -168,6 +171,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--robots", nargs="+", default=["panda", "anymal", "talos"], metavar="ROBOT")
     parser.add_argument("--functions", nargs="+", default=["rnea", "aba", "aba_derivatives"], metavar="FUNCTION")
+    parser.add_argument("--shares", nargs="+", type=int, default=[1, 0], metavar="N")
     parser.add_argument("--batches", nargs="+", type=int, default=[10, 12, 14, 16, 18, 20], metavar="POWER")
     options = parser.parse_args()
     try:
@@ -178,7 +182,18 @@ def main() -> None:
     from example_robot_data.robots_loader import ROBOTS, getModelPath
 
     print(f"{found[0]}; millions of states a second\n")
-    columns = ["robot", "function", "type", "registers", "bytes of stack", "error", "states", "resident", "copied"]
+    columns = [
+        "robot",
+        "function",
+        "type",
+        "shares",
+        "registers",
+        "bytes of stack",
+        "error",
+        "states",
+        "resident",
+        "copied",
+    ]
     print(f"| {' | '.join(columns)} |\n|{' --- |' * len(columns)}")
     for robot in options.robots:
         loader = ROBOTS[robot]
@@ -186,7 +201,7 @@ def main() -> None:
         path = Path(getModelPath(file)) / file
         model = condyle.Model.from_urdf(path, root_joint="free_flyer" if loader.free_flyer else None)
         batches = [1 << power for power in options.batches]
-        table(model, robot, options.functions, batches)
+        table(model, robot, options.functions, options.shares, batches)
         peers(robot, path, loader.free_flyer, batches)
 
 

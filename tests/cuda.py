@@ -1,11 +1,16 @@
 #!/usr/bin/env python3
 """Compiles generated CUDA for robots of several sizes, without a GPU, and prints what each kernel uses.
 
-    python tests/cuda.py [--install]
+    python tests/cuda.py [--install] [--shares [ROBOT ...]]
 
 It needs the installed package `condyle`, and NVIDIA's wheels with the run-time compiler and the assembler; --install
 puts them where this Python finds them. Without them it says NOT RUN. It fails if a kernel does not compile, or if an
 expected one is not in the result.
+
+With --shares it prints the table of docs/generated.md instead, of robots of example-robot-data: the instructions of a
+state, and the bytes that it reads from and writes to a thread's memory since registers do not suffice, in the machine
+code of kernels that are split among several threads; NVIDIA's disassembler counts them. Code runs straight through but
+for what large angles and quotients of tiny numbers take, which is counted once.
 """
 
 import argparse
@@ -14,12 +19,12 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import NamedTemporaryFile, TemporaryDirectory
 
 import condyle
 import condyle.cuda
 
-WHEELS = ["nvidia-cuda-nvrtc-cu12==12.9.86", "nvidia-cuda-nvcc-cu12==12.9.86"]
+WHEELS = ["nvidia-cuda-nvrtc-cu12==12.9.86", "nvidia-cuda-nvcc-cu12==12.9.86", "nvidia-cuda-nvdisasm==13.5.37"]
 CAPABILITY = (9, 0)
 """Hopper."""
 FUNCTIONS = {
@@ -28,10 +33,14 @@ FUNCTIONS = {
     "humanoid": ["rnea", "aba", "aba_derivatives"],
 }
 FRAMES = {"arm7": ["tool"], "quadruped": ["LF_foot", "RH_foot"], "humanoid": ["left_sole"]}
-USAGE = re.compile(
-    r"Function properties for (\w+)\s+(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads"
+SPLIT = ["rnea", "aba", "minv", "rnea_derivatives", "aba_derivatives"]
+SPILLS = re.compile(r"(\d+) bytes spill stores, (\d+) bytes spill loads")
+USED = re.compile(
+    r"Compiling entry function '(\w+)'.*?Used (\d+) registers(?:[^\n]*?(\d+) bytes cumulative stack)?", re.DOTALL
 )
-REGISTERS = re.compile(r"Compiling entry function '(\w+)'.*?Used (\d+) registers", re.DOTALL)
+LABEL = re.compile(r"^(?:\.text\.)?\$?([\w$]+):", re.MULTILINE)
+INSTRUCTION = re.compile(r"^\s+/\*[0-9a-f]{4,}\*/\s+(?:@!?\w+\s+)?([A-Z][A-Z0-9_.]*)")
+"""A line of machine code: the address, perhaps the condition, the operation."""
 
 
 def wheel(pattern: str) -> Path | None:
@@ -43,53 +52,105 @@ def wheel(pattern: str) -> Path | None:
     return None
 
 
-def resources(ptxas: Path, made: bytes) -> str:
-    """What the assembler says that kernels use."""
+def assembled(ptxas: Path, made: bytes) -> tuple[str, bytes]:
+    """What the assembler says that kernels use, and the machine code."""
     with TemporaryDirectory() as folder:
-        source = Path(folder) / "kernel.ptx"
+        source, cubin = Path(folder) / "kernel.ptx", Path(folder) / "kernel.cubin"
         source.write_bytes(made.rstrip(b"\0"))
-        call = [
-            ptxas,
-            "--verbose",
-            f"--gpu-name=sm_{CAPABILITY[0]}{CAPABILITY[1]}",
-            source,
-            "--output-file",
-            Path(folder) / "kernel.cubin",
-        ]
+        architecture = f"--gpu-name=sm_{CAPABILITY[0]}{CAPABILITY[1]}"
+        call = [ptxas, "--verbose", architecture, source, "--output-file", cubin]
         run = subprocess.run(call, capture_output=True, text=True, check=False)
-    if run.returncode != 0:
-        sys.exit(f"ptxas: {run.stderr}")
-    return run.stdout + run.stderr
+        if run.returncode != 0:
+            sys.exit(f"ptxas: {run.stderr}")
+        return run.stdout + run.stderr, cubin.read_bytes()
+
+
+def used(said: str, kernel: str) -> tuple[int, int, int]:
+    """The registers of a thread, and the bytes of its stack and of spills."""
+    found = {entry: (int(registers), int(stack or 0)) for entry, registers, stack in USED.findall(said)}
+    if kernel not in found:
+        sys.exit(f"{kernel}: it is not in what was compiled:\n{said}")
+    return *found[kernel], sum(int(x) for each in SPILLS.findall(said) for x in each)
+
+
+def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
+    """The instructions of each share, and the bytes that it moves between registers and the thread's memory."""
+    with NamedTemporaryFile(suffix=".cubin") as file:
+        file.write(cubin)
+        file.flush()
+        call = [nvdisasm, "--print-code", file.name]
+        text = subprocess.run(call, capture_output=True, text=True, check=True).stdout
+    counts: dict[str, list[int]] = {}
+    share = ""
+    for line in text.splitlines():
+        if (label := LABEL.match(line)) is not None:
+            share = (re.findall(r"_share(\d+)", label[1]) or [""])[-1]
+        if (found := INSTRUCTION.match(line)) is not None:
+            operation = found[1]
+            width = 16 if ".128" in operation else 8 if ".64" in operation else 4
+            sums = counts.setdefault(share, [0, 0])
+            sums[0] += 1
+            sums[1] += width if operation.startswith(("LDL", "STL")) else 0
+    if len(counts) > 1:
+        counts.pop("", None)  # what calls the shares
+    instructions, moved = zip(*counts.values(), strict=True)
+    return list(instructions), list(moved)
+
+
+def table(robots: list[str], ptxas: Path, nvdisasm: Path) -> None:
+    """What kernels take for each number of shares; in brackets the number that is taken by itself."""
+    from example_robot_data.robots_loader import ROBOTS, getModelPath
+
+    print("| robot, function, type | shares | registers | stack | instructions | bytes moved |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for robot in robots:
+        loader = ROBOTS[robot]
+        file = f"{loader.path}/{loader.urdf_subpath}/{loader.urdf_filename}"
+        root = "free_flyer" if loader.free_flyer else None
+        model = condyle.Model.from_urdf(Path(getModelPath(file)) / file, root_joint=root)
+        for name in SPLIT:
+            for dtype, language in (("float32", "cuda-float"), ("float64", "cuda")):
+                code, _, [(*_, best)] = condyle._condyle._generate(model, [name], language)
+                for shares in sorted({1, 2, best}):
+                    made = condyle.cuda.ptx(model, name, dtype=dtype, capability=CAPABILITY, shares=shares)
+                    said, cubin = assembled(ptxas, made)
+                    registers, stack, _ = used(said, f"{code}_{name}")
+                    each = [f"{max(x)}" if len(x) == 1 else f"{max(x)} of {sum(x)}" for x in counted(nvdisasm, cubin)]
+                    number = f"**{shares}**" if shares == best else f"{shares}"
+                    print(
+                        f"| {robot}, {name}, {dtype} | {number} | {registers} | {stack} | {each[0]} | {each[1]} |",
+                        flush=True,
+                    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--install", action="store_true", help="install NVIDIA's wheels first")
-    if parser.parse_args().install:
+    parser.add_argument("--shares", nargs="*", metavar="ROBOT", help="print the table of shares")
+    options = parser.parse_args()
+    if options.install:
         call = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *WHEELS]
         if subprocess.run(call, check=False).returncode != 0:
             print("NOT RUN: NVIDIA's compilers cannot be installed here")
             return
-    ptxas = wheel("cuda_nvcc/bin/ptxas")
-    if ptxas is None or wheel("cuda_nvrtc/lib/libnvrtc.so.*") is None:
+    ptxas, nvdisasm = wheel("cuda_nvcc/bin/ptxas"), wheel("cu1*/bin/nvdisasm")
+    if ptxas is None or nvdisasm is None or wheel("cuda_nvrtc/lib/libnvrtc.so.*") is None:
         print(f"NOT RUN: NVIDIA's compilers are not installed (pip install {' '.join(WHEELS)})")
         return
-    print("robot, kernel, type: registers, bytes of stack, of spills (stores, loads)")
+    if options.shares is not None:
+        table(options.shares or ["panda", "anymal", "talos"], ptxas, nvdisasm)
+        return
+    print("robot, kernel, type: registers, bytes of stack, of spills")
     for robot, names in FUNCTIONS.items():
         model = getattr(condyle.robots, robot)()
         frames = FRAMES[robot]
         contacts = [condyle.ContactConstraint(frame, "point") for frame in frames]
         for dtype, real in (("float64", "f64"), ("float32", "f32")):
             for name in names:
-                options = {"capability": CAPABILITY, "frames": frames, "constraints": contacts}
-                said = resources(ptxas, condyle.cuda.ptx(model, name, dtype=dtype, **options))
-                kernel = f"{robot}_{name}"
-                registers = {entry: int(count) for entry, count in REGISTERS.findall(said)}
-                used = {entry: numbers for entry, *numbers in USAGE.findall(said)}
-                if kernel not in registers or kernel not in used:
-                    sys.exit(f"{kernel}: it is not in what was compiled:\n{said}")
-                stack, stores, loads = used[kernel]
-                print(f"{robot}, {name}, {real}: {registers[kernel]}, {stack}, {stores} {loads}")
+                given = {"capability": CAPABILITY, "frames": frames, "constraints": contacts}
+                said, _ = assembled(ptxas, condyle.cuda.ptx(model, name, dtype=dtype, **given))
+                registers, stack, spills = used(said, f"{robot}_{name}")
+                print(f"{robot}, {name}, {real}: {registers}, {stack}, {spills}")
 
 
 if __name__ == "__main__":

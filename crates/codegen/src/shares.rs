@@ -69,10 +69,11 @@ fn limbs(model: &Model) -> Vec<usize> {
     }
     let (mut of_body, mut of_coordinate, mut count) = (vec![0; nodes.len()], vec![0; model.nv()], 0);
     for (i, node) in nodes.iter().enumerate().skip(1).filter(|&(i, _)| !bears_limbs[i]) {
-        if of_body[node.parent] == 0 {
-            count += 1;
+        of_body[i] = of_body[node.parent];
+        if of_body[i] == 0 {
+            count += 1; // one begins here
+            of_body[i] = count;
         }
-        of_body[i] = if of_body[node.parent] == 0 { count } else { of_body[node.parent] };
         of_coordinate[node.idx_v..][..node.joint.nv()].fill(of_body[i]);
     }
     of_coordinate

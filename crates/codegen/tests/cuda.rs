@@ -11,7 +11,7 @@ use condyle_codegen::{Array, Function, Language, Settings, functions};
 use condyle_dynamics::{
     Data, Model, aba, aba_derivatives, crba, minv, random_configuration, rnea, rnea_derivatives, robots,
 };
-use condyle_spatial::Scalar;
+use condyle_spatial::{Scalar, Se3};
 use libloading::Library;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -274,6 +274,12 @@ fn shares_are_as_many_as_pay() {
             assert!(double > 2 && single > 2 && others == [1; 2], "{name}: {double}, {single}, {others:?}");
         }
     }
+    // two arms in the world have nothing in common
+    let arm = robots::arm7();
+    let two = &of(&arm.append(0, Se3::identity(), &arm, "other_").unwrap(), &["aba_derivatives"])[0];
+    let text = Language::Cuda.text("robot", core::slice::from_ref(two)).remove(0).text;
+    let all = two.operations().total();
+    assert!(text.contains(&format!("// Shares: 2, of {0}, {0} operations; all results together take {all}.", all / 2)));
     // what is asked for is had, as far as there are limbs
     let asked = |model: &Model, name: &str, number| in_shares(model, &[name], number)[0].shares(Language::CudaFloat);
     assert_eq!([1, 2, 3, 9].map(|number| asked(&robots::quadruped(), "rnea", number)), [1, 2, 3, 5]);
