@@ -74,9 +74,9 @@ def source(
     CasADi's `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: those of the function 'frames';
     constraints: those of 'constrained_dynamics' and 'impulse_dynamics', and of their derivatives; external_forces:
     whether dynamics takes them; inputs: what is an argument instead of a constant, of 'inertia', 'armature' and
-    'gravity'. In C and CUDA functions begin with the name of their files, which is that of the robot, then '_float' and '_x4'
-    or '_x8' where the language has these. shares: how many threads compute a state in CUDA, as of
-    `condyle.cuda.compile`.
+    'gravity'. shares: how many threads compute a state in CUDA, as of `condyle.cuda.compile`. In C and CUDA functions
+    begin with the name of their files, which is that of the robot, then '_float' and '_x4' or '_x8' where the language
+    has these.
 
     >>> arm = condyle.robots.arm7()
     >>> list(condyle.codegen.source(arm, "rnea")), list(condyle.codegen.source(arm, "rnea", "rust"))
