@@ -149,7 +149,8 @@ impl<T: Real> fmt::Debug for Kernel<T> {
 impl<T: Real> Kernel<T> {
     fn new(module: &Arc<Module>, code: &str, function: &Function) -> Result<Self, Error> {
         let driver = &module.device.0.driver;
-        let symbol = CString::new(format!("{}_{}", T::LANGUAGE.stem(code), function.name)).expect("identifiers have no zeros");
+        let symbol =
+            CString::new(format!("{}_{}", T::LANGUAGE.stem(code), function.name)).expect("identifiers have no zeros");
         let (mut handle, mut blocks, mut threads) = (null_mut(), 0, 0);
         call!(driver, cuModuleGetFunction(&raw mut handle, module.handle, symbol.as_ptr()))?;
         call!(driver, cuOccupancyMaxPotentialBlockSize(&raw mut blocks, &raw mut threads, handle, null(), 0, 0))?;
