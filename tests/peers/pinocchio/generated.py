@@ -49,7 +49,7 @@ class Library:
     ) -> None:
         options = {"frames": list(frames), "constraints": list(constraints), "external_forces": False, "inputs": []}
         self.stem, files, described = condyle._condyle._generate(model, list(names), language, **options)
-        self.functions = {name: (inputs, outputs) for name, inputs, outputs, _ in described}
+        self.functions = {name: (inputs, outputs) for name, inputs, outputs, *_ in described}
         self.lanes = lanes(language)
         self.real = np.dtype(np.float32 if "float" in language else np.float64)
         key = hashlib.sha256(repr((compiler, language, files)).encode()).hexdigest()[:32]
