@@ -145,11 +145,11 @@ def main() -> None:
         model = getattr(condyle.robots, robot)()
         frames = FRAMES[robot]
         contacts = [condyle.ContactConstraint(frame, "point") for frame in frames]
-        for dtype, real in (("float64", "f64"), ("float32", "f32")):
+        for dtype, real, suffix in (("float64", "f64", ""), ("float32", "f32", "_float")):
             for name in names:
                 given = {"capability": CAPABILITY, "frames": frames, "constraints": contacts}
                 said, _ = assembled(ptxas, condyle.cuda.ptx(model, name, dtype=dtype, **given))
-                registers, stack, spills = used(said, f"{robot}_{name}")
+                registers, stack, spills = used(said, f"{robot}{suffix}_{name}")
                 print(f"{robot}, {name}, {real}: {registers}, {stack}, {spills}")
 
 

@@ -198,15 +198,21 @@ pub fn record(name: &str, about: &str, f: impl FnOnce(&mut Recorder)) -> Functio
     }
 }
 
-/// The values that some results need, in the order in which they were recorded, and the results among them.
-pub(crate) fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
+/// Of each value whether some results need it.
+pub(crate) fn is_needed(all: &[Node], results: impl Iterator<Item = Id>) -> Vec<bool> {
     let mut is_needed = vec![false; all.len()];
-    results.iter().for_each(|&id| is_needed[id as usize] = true);
+    results.for_each(|id| is_needed[id as usize] = true);
     for (id, node) in all.iter().enumerate().rev() {
         if is_needed[id] {
             node.operands().for_each(|id| is_needed[id as usize] = true);
         }
     }
+    is_needed
+}
+
+/// The values that some results need, in the order in which they were recorded, and the results among them.
+pub(crate) fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
+    let is_needed = is_needed(all, results.iter().copied());
     let (mut nodes, mut new) = (Vec::new(), vec![Id::MAX; all.len()]);
     for (id, node) in all.iter().enumerate() {
         if is_needed[id] {

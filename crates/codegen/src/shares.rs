@@ -22,7 +22,7 @@
 //! As the loss is real, a kernel has the whole function beside its shares, and how it is launched decides: states are shared out
 //! as long as all threads are on the device at a time.
 
-use crate::function::{Function, needed};
+use crate::function::{Function, is_needed, needed};
 use crate::graph::{Id, Node};
 use crate::program::Program;
 use condyle_model::Model;
@@ -90,14 +90,8 @@ struct Share {
 
 impl Share {
     fn new(function: &Function, limb: usize) -> Self {
-        let mut is_needed = vec![false; function.nodes.len()];
-        let results = function.results.iter().zip(&function.limbs);
-        results.filter(|&(_, &of)| of == limb).for_each(|(&id, _)| is_needed[id as usize] = true);
-        for (id, node) in function.nodes.iter().enumerate().rev() {
-            if is_needed[id] {
-                node.operands().for_each(|id| is_needed[id as usize] = true);
-            }
-        }
+        let results = function.results.iter().zip(&function.limbs).filter(|&(_, &of)| of == limb);
+        let is_needed = is_needed(&function.nodes, results.map(|(&id, _)| id));
         let operations = is_needed.iter().zip(&function.nodes).map(|(&needed, &node)| needed && is_operation(node));
         Self::of(vec![limb], operations.collect())
     }

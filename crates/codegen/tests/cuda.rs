@@ -304,7 +304,7 @@ fn a_split_kernel_says_how_it_is_launched() {
     assert!(!whole.contains("hare") && !whole.contains("blockIdx.y"));
     // as long as nothing is asked for, how it is launched decides
     let as_pays = Language::CudaFloat.text("robot", &of(&quadruped, &["rnea_derivatives"])).remove(0).text;
-    assert!(as_pays.contains("if (gridDim.y == 1) return robot_rnea_derivatives_whole(n, i, q, v, a, "));
+    assert!(as_pays.contains("if (gridDim.y == 1) return robot_float_rnea_derivatives_whole(n, i, q, v, a, "));
 }
 
 /// A launch that has fewer rows of blocks than there are shares computes all of them too.
