@@ -108,7 +108,7 @@ def test_nvidias_compiler_takes_the_code(monkeypatch: pytest.MonkeyPatch) -> Non
         pytest.skip(f"NOT RUN: {error}")
     monkeypatch.setattr(_cuda_driver, "compiler", lambda: compiler)
     ptx = condyle.cuda.ptx(ARM, "aba", dtype="float32", capability=(7, 5))
-    assert b".visible .entry arm7_aba(" in ptx
+    assert b".visible .entry arm7_float_aba(" in ptx
     assert compiler.architecture((9, 0)) == "sm_90"
     assert compiler.compile("arm7_aba", "__global__ void f() {}", "sm_90").startswith(b"\x7fELF")
     with pytest.raises(RuntimeError, match="arm7_aba: not compiled for compute_10: .*gpu-architecture"):
