@@ -204,11 +204,14 @@ fn class_of<'py>(py: Python<'py>, class: &str) -> PyResult<Bound<'py, PyType>> {
     Ok(types.bind(py).getattr(class)?.cast_into()?)
 }
 
-/// The number of states of a part, at most: it takes a millisecond or less, and its own price, a third of a microsecond, does not
-/// show. Each thread has two registers full at least.
-pub(crate) fn part_size(nv: usize, threads: usize) -> usize {
-    const NUMBERS: usize = 1 << 17;
-    (NUMBERS / (nv * nv).max(64)).next_multiple_of(16).max(16) * threads
+/// The most states of a part, for each thread.
+pub(crate) const MOST_STATES: usize = 2048;
+
+/// The number of states of a part with results of so many numbers a state: a thread takes a millisecond or less for it, so that
+/// its own price, a third of a microsecond, does not show, and has two registers full at least.
+fn part_size(numbers: usize) -> usize {
+    const NUMBERS: usize = 1 << 18;
+    (NUMBERS / numbers.max(1)).next_multiple_of(16).clamp(16, MOST_STATES)
 }
 
 /// An argument's numbers for some of all states.
@@ -240,7 +243,7 @@ pub(crate) fn run<'py>(
     let mut numbers = borrowed.iter_mut().map(|array| Ok(array.as_slice_mut()?)).collect::<PyResult<Vec<_>>>()?;
     let mut signals = Signals::new(signals::SHORT);
     py.detach(|| {
-        let step = batch.capacity();
+        let step = batch.capacity().min(part_size(sizes.iter().sum()) * batch.threads());
         for from in (0..states).step_by(step) {
             let some = from..states.min(from + step);
             let places = numbers.iter_mut().zip(&sizes).map(|(to, size)| &mut to[some.start * size..some.end * size]);

@@ -63,7 +63,7 @@ impl Data {
 impl Data {
     /// A batch with room for so many states, or for a part of them.
     pub(crate) fn batch(&mut self, model: &condyle::Model, states: usize) -> &mut condyle::Batch {
-        let states = states.min(batch::part_size(model.nv(), self.threads));
+        let states = states.min(batch::MOST_STATES * self.threads);
         let enough = self.batch.take().filter(|batch| batch.capacity() >= states);
         let threads = self.threads;
         self.batch.insert(enough.unwrap_or_else(|| Box::new(condyle::Batch::new(model, states, threads))))

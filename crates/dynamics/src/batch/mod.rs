@@ -145,6 +145,11 @@ impl<T: Real> Batch<T> {
         self.states
     }
 
+    /// The number of threads that it runs on.
+    pub fn threads(&self) -> usize {
+        each!(InLanes, &self.lanes, group => group.threads())
+    }
+
     /// The number of states that arguments are for: the first that has numbers says it, else the forces, else it is `full`.
     #[track_caller]
     fn count(&self, model: &Model, given: &[Given<'_, T>], full: usize) -> usize {
