@@ -28,9 +28,10 @@ from instructions import ITERATIONS, KNOTS, PHASES, ROBOTS, STATES, build, run
 KINDS = ["arithmetic", "load, store", "stack", "move", "integer", "C library"]
 ALGORITHMS = [
     *("rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives", "batch_aba", "batch_aba_derivatives"),
-    *PHASES,
+    *PHASES.values(),
 ]
 CODE = re.compile(r"^\s*([0-9a-f]+):\s+(\S+)\s*(.*)$", re.M)
+OBJECT = re.compile(r"^(c?)ob=(\(\d+\))(?: (.+))?$")
 COST = re.compile(r"^0x([0-9a-f]+) \S+ (\d+)$")
 LINE = re.compile(r"crates/(?!core_arch)(\w+/src/\S+?:\d+)")
 SHOWN = 25
@@ -48,25 +49,22 @@ def kind(operation: str, operands: str) -> str:
 
 
 def executed(program: Path, robot: str, function: str) -> collections.Counter[int]:
-    """How often each instruction is executed within a function, by its address."""
+    """How often each instruction is executed within a function, by its address: at 0 those of libraries."""
     cost: collections.Counter[int] = collections.Counter()
     with TemporaryDirectory() as folder:
         profile = Path(folder) / "profile"
         options = ("--dump-instr=yes", "--compress-pos=no", "--collect-atstart=no", f"--toggle-collect=*{function}")
-        command = (
-            "valgrind",
-            "--quiet",
-            "--tool=callgrind",
-            *options,
-            f"--callgrind-out-file={profile}",
-            program,
-            robot,
-        )
-        run(*command, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
-        inclusive = False  # the line after `calls` has the cost of what is called
+        command = ("valgrind", "--quiet", "--tool=callgrind", *options, f"--callgrind-out-file={profile}")
+        run(*command, program, robot, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
+        names: dict[str, str] = {}
+        ours = inclusive = False  # the line after `calls` has the cost of what is called
         for line in profile.read_text(encoding="utf-8").splitlines():
-            if found := COST.match(line):
-                cost[int(found[1], 16)] += 0 if inclusive else int(found[2])
+            if found := OBJECT.match(line):
+                called, number, name = found.groups()
+                name = names.setdefault(number, name)
+                ours = ours if called else Path(name).name == program.name
+            elif (found := COST.match(line)) and not inclusive:
+                cost[int(found[1], 16) if ours else 0] += int(found[2])
             inclusive = line.startswith("calls=")
     return cost
 
@@ -91,6 +89,8 @@ def main() -> None:
     parser.add_argument("--of", action="append", choices=ALGORITHMS, help="this algorithm alone; may be repeated")
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help=", ".join(ROBOTS))
     options = parser.parse_args()
+    if unknown := set(options.robots) - set(ROBOTS):
+        parser.error(f"no robot of these is called {unknown.pop()}: {', '.join(ROBOTS)}")
     if missing := [tool for tool in ("valgrind", "objdump", "addr2line") if shutil.which(tool) is None]:
         print(f"NOT RUN: there is no {missing[0]}")
         return
@@ -99,18 +99,18 @@ def main() -> None:
         int(at, 16): kind(name, operands)
         for at, name, operands in CODE.findall(run("objdump", "-d", "--no-show-raw-insn", program))
     }
+    functions = {name: f"instructions::measured::{name}" for name in ALGORITHMS}
+    functions |= {name: function for function, name in PHASES.items()}
     print(f"{'':30} {'in all':>8} " + " ".join(f"{name:>11}" for name in KINDS))
     for robot in options.robots or ROBOTS:
         for algorithm in options.of or ALGORITHMS:
-            cost = executed(
-                program, robot, algorithm if algorithm in PHASES else f"instructions::measured::{algorithm}"
-            )
+            cost = executed(program, robot, functions[algorithm])
             mix: collections.Counter[str] = collections.Counter()
             for address, n in cost.items():
                 mix[code.get(address, "C library")] += n
-            per = KNOTS * ITERATIONS if algorithm in PHASES else STATES
+            per = KNOTS * ITERATIONS if algorithm in PHASES.values() else STATES
             shares = " ".join(f"{mix[name] / cost.total():11.0%}" for name in KINDS)
-            print(f"{robot:10} {PHASES.get(algorithm, algorithm):19} {cost.total() // per:8} {shares}", flush=True)
+            print(f"{robot:10} {algorithm:19} {cost.total() // per:8} {shares}", flush=True)
             if options.lines:
                 lines(program, cost)
 
