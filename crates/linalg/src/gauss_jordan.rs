@@ -30,7 +30,7 @@ pub fn gauss_jordan<S: Scalar, const MOST: usize>(
         for i in 0..MOST {
             scaled[i] = c[i] * d;
         }
-        for j in 0..n {
+        for j in (0..k).chain(k + 1..n) {
             let (factor, rows) = (-scaled[j], if S::LANES == 1 { 0..MOST } else { j..n });
             for i in rows {
                 A[j][i] = c[i].mul_add(factor, A[j][i]);

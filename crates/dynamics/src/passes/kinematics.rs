@@ -42,10 +42,15 @@ pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut Wor
     Joint::sin_cos(l, q, sin_cos);
     let (oX, S, sin, cos) = (&mut oX[..], &mut S[..], &sin_cos.sin[..], &sin_cos.cos[..]);
     for i in l.bodies() {
-        oX[i] = l.parent(oX, i) * Joint::placement_with(l, i, q, sin[i], cos[i]); // oXi = oXλ λXi
+        let X = l.parent(oX, i) * Joint::placement_with(l, i, q, sin[i], cos[i]); // oXi = oXλ λXi
+        oX[i] = X;
         let (joint, column) = (l.joint(i), l.column(i));
-        for k in 0..joint.nv() {
-            S[column + k] = joint.column(&oX[i], k); // oXi S, in the world
+        if let Joint::Revolute { .. } | Joint::Continuous { .. } = joint {
+            S[column] = Motion::new(X.translation.cross(X.rotation.z), X.rotation.z);
+        } else {
+            for k in 0..joint.nv() {
+                S[column + k] = joint.column(&oX[i], k); // oXi S, in the world
+            }
         }
     }
 }
