@@ -51,7 +51,7 @@ fn eliminate<L: Layout>(
     for k in (0..l.joint(i).nv()).rev() {
         let (c, Sc) = (column + k, S[column + k]);
         let Uc = Ia * Sc; // U = Iᴬ S
-        let inverse = (Sc.dot(Uc) + l.armature(i, k)).recip(); // D = Sᵀ U
+        let inverse = (Sc.linear.dot(Uc.linear) + Sc.angular.dot_add(Uc.angular, l.armature(i, k))).recip(); // D = Sᵀ U
         (U[c], D_inv[c]) = (Uc, inverse);
         Ia = Ia.minus_outer(Uc, inverse); // Iᵃ = Iᴬ − U D⁻¹ Uᵀ
     }
@@ -145,7 +145,8 @@ pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>
         let column = l.column(i);
         for k in 0..l.joint(i).nv() {
             let s = column + k;
-            let x = D_inv[s] * (u[s] - ai.dot(U[s])); // q̈ = D⁻¹ (u − Uᵀ a')
+            let Us = U[s];
+            let x = D_inv[s] * ((u[s] - ai.linear.dot(Us.linear)) - ai.angular.dot(Us.angular)); // q̈ = D⁻¹ (u − Uᵀ a')
             l.add_joint_effort(qdd, i, k, x);
             ai = S[s].scale_add(x, ai); // a = a' + S q̈
         }
