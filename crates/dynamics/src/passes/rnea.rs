@@ -76,7 +76,7 @@ pub(crate) fn pass<L: Layout>(
         // Newton: f = m a + K h.  Euler: n = I ω̇ + ω × I ω + h × a
         let Inertia { mass, mass_com, rotational } = l.inertia(i);
         let n = mass_com.cross_add(m.a, m.w.cross_add(rotational * m.w, rotational * m.dw));
-        let mut fi = Force::new(m.centripetal().mul_add(mass_com, m.a.scale(mass)), n);
+        let mut fi = Force::new(m.a.scale_add(mass, m.centripetal() * mass_com), n);
         if let Some(external) = l.force(f_ext, i) {
             fi -= external;
         }
