@@ -3,7 +3,8 @@
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1; in the world's frame, where children are
 //! added to their parent without a change of coordinates. A joint of several degrees of freedom is a chain of joints
 //! of one, between bodies without mass: its columns are eliminated one after the other, the last one first, and no
-//! matrix is inverted.
+//! matrix is inverted. What the next body waits for, Sᵀ U on the way to the root and Uᵀ a' on the way back, is summed in
+//! two halves side by side.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace};

@@ -62,7 +62,7 @@ impl<S: Scalar> Act<Motion<S>> for Se3<S> {
     #[inline(always)]
     fn act(&self, m: Motion<S>) -> Motion<S> {
         let angular = self.rotation * m.angular;
-        Motion { linear: self.rotation.mul_add(m.linear, self.translation.cross(angular)), angular }
+        Motion { linear: self.translation.cross_add(angular, self.rotation * m.linear), angular }
     }
     /// [Rᵀ(v − p × ω); Rᵀ ω].
     #[inline(always)]
@@ -79,7 +79,7 @@ impl<S: Scalar> Act<Force<S>> for Se3<S> {
     #[inline(always)]
     fn act(&self, f: Force<S>) -> Force<S> {
         let linear = self.rotation * f.linear;
-        Force { linear, angular: self.rotation.mul_add(f.angular, self.translation.cross(linear)) }
+        Force { linear, angular: self.translation.cross_add(linear, self.rotation * f.angular) }
     }
     /// [Rᵀ f; Rᵀ(n − p × f)].
     #[inline(always)]
