@@ -9,7 +9,7 @@ use condyle_spatial::{Dense, DenseMatrix, Scalar};
 /// ```
 ///
 /// of which the lower triangle is read: in lanes it is all that is computed, of a single number whole columns are, which
-/// are registers.
+/// are registers, column k among them, so that the loop has no gap.
 #[inline(always)]
 pub fn gauss_jordan<S: Scalar, const MOST: usize>(
     M: &DenseMatrix<S, impl Dense<S>>,
@@ -30,7 +30,7 @@ pub fn gauss_jordan<S: Scalar, const MOST: usize>(
         for i in 0..MOST {
             scaled[i] = c[i] * d;
         }
-        for j in (0..k).chain(k + 1..n) {
+        for j in (0..n).filter(|&j| j != k || S::LANES == 1) {
             let (factor, rows) = (-scaled[j], if S::LANES == 1 { 0..MOST } else { j..n });
             for i in rows {
                 A[j][i] = c[i].mul_add(factor, A[j][i]);
