@@ -46,7 +46,7 @@ pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut Wor
         oX[i] = X;
         let (joint, column) = (l.joint(i), l.column(i));
         if let Joint::Revolute { .. } | Joint::Continuous { .. } = joint {
-            S[column] = Motion::new(X.translation.cross(X.rotation.z), X.rotation.z);
+            S[column] = Motion::new(X.translation.cross(X.rotation.z), X.rotation.z); // about z, from what is at hand
         } else {
             for k in 0..joint.nv() {
                 S[column + k] = joint.column(&oX[i], k); // oXi S, in the world
