@@ -3,7 +3,7 @@
 
     python3 tests/structure.py [--sizes]
 
-Fails if a circle has more than three modules, and with --sizes if the program has more than 5.2 MB of code or one of
+Fails if a circle has more than three modules, and with --sizes if the program has more than 5 MB of code or one of
 its functions more than 64 KB. A module and its children count as one where the child reaches up to its parent only.
 --sizes builds the program from nothing in a folder of its own (some minutes) and needs `nm` and `size`.
 """

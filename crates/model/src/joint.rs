@@ -259,8 +259,15 @@ impl Joint {
             2 => Motion::new(R.z, Vec3::zero()),
             3 => Motion::new(p.cross(R.x), R.x),
             4 => Motion::new(p.cross(R.y), R.y),
-            _ => Motion::new(p.cross(R.z), R.z),
+            _ => Self::column_about_z(oX),
         }
+    }
+
+    /// S of a joint that turns about z.
+    #[doc(hidden)]
+    #[inline(always)]
+    pub fn column_about_z<S: Scalar>(oX: &Se3<S>) -> Motion<S> {
+        Motion::new(oX.translation.cross(oX.rotation.z), oX.rotation.z)
     }
 }
 

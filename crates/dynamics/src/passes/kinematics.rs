@@ -46,10 +46,10 @@ pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut Wor
         oX[i] = X;
         let (joint, column) = (l.joint(i), l.column(i));
         if let Joint::Revolute { .. } | Joint::Continuous { .. } = joint {
-            S[column] = Motion::new(X.translation.cross(X.rotation.z), X.rotation.z); // about z, from what is at hand
+            S[column] = Joint::column_about_z(&X); // oXi S, while oXi is at hand
         } else {
             for k in 0..joint.nv() {
-                S[column + k] = joint.column(&oX[i], k); // oXi S, in the world
+                S[column + k] = joint.column(&oX[i], k);
             }
         }
     }
