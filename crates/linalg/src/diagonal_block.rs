@@ -18,6 +18,18 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         Self { L: [[0.0; COLUMNS]; COLUMNS], inverse: [0.0; COLUMNS], width }
     }
 
+    /// The block of `width` columns that L begins with.
+    #[inline(always)]
+    pub(crate) fn of(L: View<'_>, width: usize) -> Self {
+        let mut block = Self::new(width);
+        for j in 0..width {
+            let column = &L.data[j * L.stride..][..width];
+            block.L[j][j..width].copy_from_slice(&column[j..]);
+            block.inverse[j] = column[j].recip();
+        }
+        block
+    }
+
     /// Factorises the block of H that begins in row j0 of some columns of it, after a bᵀ over the j0 columns before them was
     /// subtracted; S registers hold COLUMNS rows. The entries above the diagonal lose their meaning.
     ///

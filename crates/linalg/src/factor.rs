@@ -38,6 +38,25 @@ compiled! {
         Ok(())
     }
 
+    /// As [`eliminate`] of rows G = [Gᵤ Gₓ] that are not below H, given what it left of H: G becomes [Y Gₓ − Y Xᵀ] for
+    /// Y = Gᵤ L⁻ᵀ. `shape` = [rows of G, columns, m]; `h` is [L; X], from column 0 on. Both have slack rows.
+    pub fn eliminate_rows<V, COLUMNS>(g: &mut [f64], stride: usize, shape: [usize; 3], h: View<'_>) {
+        let ([rows, size, m], mut j0) = (shape, 0);
+        while j0 < m {
+            let (done, columns) = g.split_at_mut(j0 * stride);
+            let block = DiagonalBlock::<COLUMNS>::of(h.at(j0, j0), COLUMNS.min(m - j0));
+            block.solve_rows::<V>(columns, stride, 0..rows, View { data: done, stride }, h.at(j0, 0), j0);
+            j0 += COLUMNS;
+        }
+        let mut j = m;
+        while j < size {
+            let (done, columns) = g.split_at_mut(j * stride);
+            let (width, done) = (COLUMNS.min(size - j), View { data: done, stride });
+            column_block::<V, COLUMNS>(columns, stride, 0..rows, 0, width, done, h.at(j, 0), m, Store::Subtract);
+            j += COLUMNS;
+        }
+    }
+
     /// x ← L⁻¹ x for the L of an H of which columns were eliminated, with the inverse of L's diagonal; x has slack.
     pub fn forward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
         let (m, mut j) = (inverse_diagonal.len(), 0);

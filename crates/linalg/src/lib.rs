@@ -48,7 +48,7 @@ pub use copy::{
     transpose_block, transpose_negated,
 };
 pub use elimination_tree::ColumnTree;
-pub use factor::{backward_solve, eliminate, forward_solve, solve_right};
+pub use factor::{backward_solve, eliminate, eliminate_rows, forward_solve, solve_right};
 pub use ltdl::Ltdl;
 pub use outer::{OuterProducts, SparseRows, block, mask, subtract_rows};
 pub use product::{

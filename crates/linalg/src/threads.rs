@@ -2,10 +2,12 @@
 
 #[cfg(not(feature = "threads"))]
 mod alone;
+mod parts;
 #[cfg(feature = "threads")]
 mod shared;
 
 #[cfg(not(feature = "threads"))]
-pub use alone::{join, threads};
+pub use alone::{join, pause, threads};
+pub use parts::Parts;
 #[cfg(feature = "threads")]
-pub use shared::{join, threads};
+pub use shared::{join, pause, threads};

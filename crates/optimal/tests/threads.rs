@@ -1,4 +1,4 @@
-//! Derivatives on several threads are those on one, to the last bit.
+//! What several threads find is what one finds, to the last bit.
 #![allow(non_snake_case)]
 
 mod common;
@@ -9,9 +9,11 @@ use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, Cost, FreeAcceleration, FreeDynamics, ImpulseDynamics, Integrator,
     Residual,
 };
-use condyle_optimal::{ActionModel, Error, Fddp, Lqr, NumDiff, Problem, Solution};
+use condyle_optimal::{ActionModel, Error, Fddp, LqNode, Lqr, NumDiff, Problem, Solution, Status, Unicycle};
 use rand::RngExt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// A gait of a quadruped of every kind of knot: stance, an impact, one by differences that cannot be copied, flight by
 /// Runge–Kutta and by Euler; in runs that are no multiples of lanes.
@@ -113,6 +115,80 @@ fn a_horizon_may_move() {
         assert!(solve(&mut several, xs.as_slice(), us.as_slice(), 4) == expected);
         one.shift(last).unwrap();
         several.shift(last).unwrap();
+    }
+}
+
+/// Where the first sweep fails, others follow, with more regularisation.
+#[test]
+fn a_sweep_that_fails_is_repeated() {
+    let mut random = random();
+    let mut node = random_node(&mut random, 4, 2);
+    node.R.fill_diagonal(-1.0);
+    let end = random_node(&mut random, 4, 0);
+    let (xs, us) = (random_matrix(&mut random, 4 * 21, 1), random_matrix(&mut random, 2 * 20, 1));
+    let solve = |threads: usize| {
+        let model = Box::new(Lqr::new(node.clone()));
+        let mut problem =
+            Problem::new(vec![0.5; 4], vec![model], vec![0; 20], Box::new(Lqr::new(end.clone()))).unwrap();
+        let mut solver = Fddp::new(&problem);
+        (solver.settings.max_iterations, solver.settings.threads) = (3, threads);
+        let mut solution = solver.solve(&mut problem, xs.as_slice(), us.as_slice()).unwrap().clone();
+        solution.timings = Default::default();
+        solution
+    };
+    let expected = solve(1);
+    assert!(expected.trace[0].regularisation > 1e-3, "{:?}", expected.trace);
+    assert!(solve(2) == expected && solve(4) == expected);
+}
+
+/// No time for a single phase: the solve ends before it, on any number of threads.
+#[test]
+fn a_budget_holds_on_several_threads() {
+    let (mut problem, xs, us) = gait();
+    let mut solver = Fddp::new(&problem);
+    (solver.settings.threads, solver.settings.max_iterations) = (3, 2);
+    solver.solve(&mut problem, &xs, &us).unwrap(); // how long phases last is known from here on
+    solver.settings.time_budget = Some(Duration::from_nanos(1));
+    let solution = solver.solve(&mut problem, &xs, &us).unwrap();
+    assert!(solution.status == Status::TimeLimit && solution.trace.is_empty());
+}
+
+/// A unicycle whose derivatives panic at one knot, on whichever thread it comes to.
+struct Fragile(Unicycle, usize);
+
+impl ActionModel for Fragile {
+    fn nx(&self) -> usize {
+        self.0.nx()
+    }
+    fn nu(&self) -> usize {
+        self.0.nu()
+    }
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        self.0.calc(t, x, u, next)
+    }
+    fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        assert_ne!(t, self.1, "on purpose");
+        self.0.calc_diff(t, x, u, node);
+    }
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        Some(Box::new(Self(self.0.clone(), self.1)))
+    }
+}
+
+/// A panic on one thread ends the solve, and no thread waits for what will not come.
+#[test]
+fn a_panic_reaches_the_caller() {
+    for fragile in [0, 17, 39] {
+        let model = Box::new(Fragile(Unicycle::default(), fragile));
+        let end = Box::new(Unicycle::default().at_the_end());
+        let mut problem = Problem::new(vec![1.0, 0.0, 0.0], vec![model], vec![0; 40], end).unwrap();
+        let mut solver = Fddp::new(&problem);
+        solver.settings.threads = 4;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+        let (xs, us) = ([1.0, 0.0, 0.0].repeat(41), vec![0.0; 80]);
+        let solve = || drop(pool.install(|| solver.solve(&mut problem, &xs, &us).map(|_| ())));
+        let message = catch_unwind(AssertUnwindSafe(solve)).unwrap_err();
+        assert!(message.downcast::<String>().unwrap().contains("on purpose"));
     }
 }
 

@@ -22,7 +22,7 @@ pub(crate) struct Row {
     pub knots: usize,
     /// On one thread.
     pub one: Times,
-    /// Derivatives and sweep on all threads; none where there is one.
+    /// On all threads; none where there is one.
     pub threads: Option<Times>,
     /// Whether the solver could go on all the time.
     pub finite: bool,
@@ -38,6 +38,8 @@ impl Row {
     }
 }
 
+/// The threads from which on a sweep in segments may be the faster one.
+const SEGMENTS_FROM: usize = 4;
 /// Seconds from knot to knot.
 const DT: f64 = 0.01;
 /// How far a new initial state is from the last one (rad, m, and per s).
@@ -62,25 +64,33 @@ impl Bench<'_> {
     pub(crate) fn iteration(&self, knots: usize, in_contact: bool) -> Result<Row, Error> {
         let cores = self.pool.current_num_threads();
         let mut damping = 0.0;
-        let mut one = self.times(knots, 1, in_contact, damping);
+        let mut one = self.times(knots, [1, 1], in_contact, damping);
         if in_contact && !matches!(one, Ok((_, true))) {
             damping = DAMPING;
-            one = self.times(knots, 1, in_contact, damping);
+            one = self.times(knots, [1, 1], in_contact, damping);
         }
         let (one, finite) = one?;
-        let threads = match cores {
-            1 => None,
-            _ => Some(self.pool.install(|| self.times(knots, cores, in_contact, damping))?.0),
-        };
+        let mut threads: Option<Times> = None;
+        let segments = [(2, 1), (SEGMENTS_FROM, cores)]; // a sweep beside the derivatives, or in segments
+        for (_, segments) in segments.into_iter().filter(|(least, _)| cores >= *least) {
+            let (times, _) = self.pool.install(|| self.times(knots, [cores, segments], in_contact, damping))?;
+            threads = threads.filter(|best| best.p99 <= times.p99).or(Some(times));
+        }
         Ok(Row { name: if in_contact { "in contact" } else { "free" }, knots, one, threads, finite })
     }
 
-    fn times(&self, knots: usize, threads: usize, in_contact: bool, damping: f64) -> Result<(Times, bool), Error> {
+    fn times(
+        &self,
+        knots: usize,
+        [threads, segments]: [usize; 2],
+        in_contact: bool,
+        damping: f64,
+    ) -> Result<(Times, bool), Error> {
         let (mut problem, us) = self.problem(knots, in_contact, damping)?;
         let (x0, nq) = (problem.x0().to_vec(), self.model.nq());
         let mut solver = Fddp::new(&problem);
         solver.settings.tolerance = 0.0; // it makes all iterations that it may
-        (solver.settings.threads, solver.settings.segments) = (threads, threads);
+        (solver.settings.threads, solver.settings.segments) = (threads, segments);
         solver.settings.max_iterations = 3;
         solver.solve(&mut problem, &x0.repeat(knots + 1), &us)?;
         solver.settings.max_iterations = 1;

@@ -10,3 +10,8 @@ pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     one();
     other();
 }
+
+/// Waits a little for another thread.
+pub fn pause() {
+    core::hint::spin_loop();
+}

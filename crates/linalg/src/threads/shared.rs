@@ -111,3 +111,11 @@ fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
         }
     }
 }
+
+/// Waits a little for another thread, and lets it have the processor if both need the same one.
+pub fn pause() {
+    for _ in 0..32 {
+        std::hint::spin_loop();
+    }
+    std::thread::yield_now();
+}

@@ -1,7 +1,7 @@
 //! Elimination and solves.
 
 use crate::at_each_level;
-use condyle_linalg::{SLACK, View, backward_solve, eliminate, forward_solve, solve_right};
+use condyle_linalg::{SLACK, View, backward_solve, eliminate, eliminate_rows, forward_solve, solve_right};
 use nalgebra::DMatrix;
 
 /// Entries of size one, sums of 30 of them: 1e-12 leaves room for rounding and nothing else.
@@ -48,6 +48,30 @@ fn elimination_and_solves_match_nalgebra_for_every_edge() {
                 for (i, j) in (0..n + 1).flat_map(|i| (0..m).map(move |j| (i, j))) {
                     assert!((gains[j * stride + m + i] - gain[(i, j)]).abs() < TOLERANCE * size as f64);
                 }
+            }
+        }
+    });
+}
+
+/// Rows that are eliminated for themselves come out as they do below the matrix.
+#[test]
+fn rows_apart_are_rows_below() {
+    at_each_level(|| {
+        for (m, n, more) in (0..14).flat_map(|m| (1..10).map(move |n| (m, n, 1 + (m + n) % 7))) {
+            let (size, rows) = (m + n, m + n + 1 + more);
+            let root = DMatrix::from_fn(rows, size, entry);
+            let full = &root * root.transpose() + DMatrix::identity(rows, rows) * 2.0;
+            let (stride, ldg) = (rows + SLACK, more + SLACK);
+            let (mut h, mut g) = (vec![0.0; stride * size], vec![0.0; ldg * size]);
+            for j in 0..size {
+                h[j * stride..][..rows].copy_from_slice(full.column(j).as_slice());
+                g[j * ldg..][..more].copy_from_slice(&full.column(j).as_slice()[size + 1..]);
+            }
+            eliminate(&mut h, stride, [rows, size, m]).unwrap();
+            eliminate_rows(&mut g, ldg, [more, size, m], View::new(&h, stride));
+            for (i, j) in (0..more).flat_map(|i| (0..size).map(move |j| (i, j))) {
+                let (found, expected) = (g[j * ldg + i], h[j * stride + size + 1 + i]);
+                assert!((found - expected).abs() < TOLERANCE, "entry ({i}, {j}) for {m}, {n}: {found}, {expected}");
             }
         }
     });

@@ -120,9 +120,9 @@ impl Fddp {
             self.update_gaps(problem);
             self.knows_motions = false;
             if !now.swept_best {
-                self.calc_diff(problem, best.feasible);
                 self.sweep.keep_values(false);
-                now.swept = self.sweep(problem, best.regularisation).is_ok();
+                let swept = self.calc_diff(problem, best.feasible, best.regularisation);
+                now.swept = swept.unwrap_or_else(|| self.sweep(problem, best.regularisation)).is_ok();
             }
         }
         let solution = &mut self.solution;

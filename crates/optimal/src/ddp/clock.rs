@@ -26,24 +26,28 @@ impl Clock {
         self.end = budget.and_then(|budget| begin.checked_add(budget));
     }
 
-    /// `Ok` if there is time for a phase and the observer wants to go on, else why not. A refusal halves what is expected of
-    /// the phase, so that one late phase does not stop all solves to come.
-    pub(super) fn allows(&mut self, phase: Phase, watch: &mut PacedObserver<'_>) -> Result<(), Status> {
+    /// `Ok` if there is time for phases that follow each other and the observer wants to go on, else why not. A refusal halves
+    /// what is expected of the phases, so that one late phase does not stop all solves to come.
+    pub(super) fn allows(&mut self, phases: &[Phase], watch: &mut PacedObserver<'_>) -> Result<(), Status> {
         let now = Instant::now();
         if watch.go_on(now).is_break() {
             return Err(Status::Interrupted);
         }
-        let expected = &mut self.last[phase as usize];
-        if self.end.is_none_or(|end| now + *expected <= end) {
+        let expected = phases.iter().map(|phase| self.last[*phase as usize]).sum();
+        if self.end.is_none_or(|end| now + expected <= end) {
             return Ok(());
         }
-        *expected /= 2;
+        phases.iter().for_each(|phase| self.last[*phase as usize] /= 2);
         Err(Status::TimeLimit)
     }
 
     /// A phase was run; returns its duration.
     pub(crate) fn ran(&mut self, phase: Phase, since: Instant) -> Duration {
-        let duration = since.elapsed();
+        self.lasted(phase, since.elapsed())
+    }
+
+    /// A phase was run, and took so long; returns that.
+    pub(super) fn lasted(&mut self, phase: Phase, duration: Duration) -> Duration {
         self.last[phase as usize] = duration;
         duration
     }

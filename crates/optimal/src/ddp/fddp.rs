@@ -9,10 +9,11 @@ use super::search::{Iterate, LineSearch, Search};
 use super::settings::{DdpMethod, Settings};
 use super::solution::{Iteration, Solution, Status, Timings};
 use crate::error::Error;
-use crate::lq::{LqNode, Sweep, SweepError};
-use crate::problem::Problem;
+use crate::lq::{Hessian, LqNode, Sweep, SweepError};
+use crate::problem::{ActionModel, Problem};
 use crate::time::Instant;
 use condyle_linalg::max_abs;
+use std::time::Duration;
 
 /// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`]), with the rules and constants of Crocoddyl
 /// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
@@ -248,18 +249,22 @@ impl Fddp {
             if search.accepted {
                 gap = self.update_gaps(problem);
             }
+            self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
+            let mut swept = None;
             if search.accepted || iteration == 0 {
-                if let Err(status) = self.clock.allows(Phase::CalcDiff, watch) {
+                let phases = [Phase::CalcDiff, Phase::Sweep];
+                if let Err(status) = self.clock.allows(&phases[..1 + usize::from(self.follows())], watch) {
                     return status;
                 }
-                self.calc_diff(problem, now.feasible);
+                swept = self.calc_diff(problem, now.feasible, now.regularisation);
             }
-            if let Err(status) = self.clock.allows(Phase::Sweep, watch) {
+            if swept.is_none()
+                && let Err(status) = self.clock.allows(&[Phase::Sweep], watch)
+            {
                 return status;
             }
             now.swept_best = false;
-            self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
-            while let Err(error) = self.sweep(problem, now.regularisation) {
+            while let Err(error) = swept.take().unwrap_or_else(|| self.sweep(problem, now.regularisation)) {
                 now.regularisation = self.increased(now.regularisation);
                 if now.regularisation == self.settings.regularisation_max {
                     return match error {
@@ -267,7 +272,7 @@ impl Fddp {
                         SweepError::NotFinite { .. } => Status::NotFinite,
                     };
                 }
-                if let Err(status) = self.clock.allows(Phase::Sweep, watch) {
+                if let Err(status) = self.clock.allows(&[Phase::Sweep], watch) {
                     return status;
                 }
             }
@@ -349,9 +354,15 @@ impl Fddp {
         max_abs(&self.gaps)
     }
 
-    /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on.
+    /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on. On several threads
+    /// the sweep follows the derivatives from knot to knot, if it can: then this returns its outcome.
     #[inline(never)] // `benches/instructions.py` counts it by its name
-    pub(super) fn calc_diff(&mut self, problem: &mut Problem, feasible: bool) {
+    pub(super) fn calc_diff(
+        &mut self,
+        problem: &mut Problem,
+        feasible: bool,
+        regularisation: f64,
+    ) -> Option<Result<(), SweepError>> {
         let clock = Instant::now();
         for node in &mut self.nodes {
             node.inverse_dynamics.wanted = self.inverse_dynamics;
@@ -362,27 +373,63 @@ impl Fddp {
             node.inverse_dynamics.motion.resize(size, 0.0);
             node.inverse_dynamics.motion.copy_from_slice(motion);
         }
-        let Solution { xs, us, .. } = &self.solution;
-        problem.calc_diff_on(self.settings.threads, xs, us, &mut self.nodes);
-        for (t, node) in self.nodes.iter_mut().enumerate() {
-            match self.gaps.get(self.solution.shape().dx(t + 1)) {
-                Some(gap) if !feasible => node.f.as_mut_slice().copy_from_slice(gap),
-                _ => node.f.fill(0.0),
-            }
-            match problem.action(t).bounds(t) {
-                Some((lower, upper)) if feasible => {
-                    for (i, u) in self.solution.us[self.solution.shape().u(t)].iter().enumerate() {
-                        node.lower[i] = lower[i] - u;
-                        node.upper[i] = upper[i] - u;
+        let follows = self.follows();
+        let Self { solution, gaps, nodes, sweep, settings, .. } = self;
+        let (Solution { xs, us, .. }, threads) = (&*solution, settings.threads);
+        let complete = |model: &dyn ActionModel, first: usize, nodes: &mut [LqNode]| {
+            for (t, node) in (first..).zip(nodes) {
+                match gaps.get(solution.shape().dx(t + 1)) {
+                    Some(gap) if !feasible => node.f.as_mut_slice().copy_from_slice(gap),
+                    _ => node.f.fill(0.0),
+                }
+                match model.bounds(t) {
+                    Some((lower, upper)) if feasible => {
+                        for (i, u) in us[solution.shape().u(t)].iter().enumerate() {
+                            node.lower[i] = lower[i] - u;
+                            node.upper[i] = upper[i] - u;
+                        }
+                    }
+                    _ => {
+                        node.lower.fill(f64::NEG_INFINITY);
+                        node.upper.fill(f64::INFINITY);
                     }
                 }
-                _ => {
-                    node.lower.fill(f64::NEG_INFINITY);
-                    node.upper.fill(f64::INFINITY);
-                }
             }
+        };
+        let (mut outcome, mut sweeping) = (Ok(()), Duration::ZERO);
+        if threads == 1 {
+            problem.calc_diff(xs, us, nodes);
+            for (t, node) in nodes.chunks_exact_mut(1).enumerate() {
+                complete(problem.action(t), t, node);
+            }
+        } else {
+            let horizon = problem.horizon();
+            let (step, knots, gains) = sweep.parts(threads);
+            problem.calc_diff_on([xs, us], nodes, knots, gains, |model, first, nodes, knots| {
+                complete(model, first, nodes);
+                if !(follows && outcome.is_ok()) {
+                    return;
+                }
+                let (clock, linear) = (Instant::now(), &mut |_: usize, _: &[f64], _: &mut Hessian| false);
+                outcome = match first == horizon {
+                    true => step.run(first, nodes, knots, regularisation, linear),
+                    false => step.back(first, nodes, knots, regularisation, linear),
+                };
+                sweeping += clock.elapsed();
+            });
         }
-        self.solution.timings.calc_diff += self.clock.ran(Phase::CalcDiff, clock);
+        let timings = &mut self.solution.timings;
+        timings.calc_diff += self.clock.lasted(Phase::CalcDiff, clock.elapsed() - sweeping);
+        if !follows {
+            return None;
+        }
+        timings.sweep += self.clock.lasted(Phase::Sweep, sweeping);
+        Some(outcome)
+    }
+
+    /// Whether the sweep follows the derivatives.
+    fn follows(&self) -> bool {
+        self.settings.threads > 1 && !self.settings.second_order && self.sweep.is_sequential()
     }
 
     #[inline(never)] // `benches/instructions.py` counts it by its name

@@ -111,7 +111,7 @@ impl LineSearch {
                 _ => count,
             };
             let width = most.min(self.trials.width()).min(count - tried);
-            if let Err(status) = iterate.clock.allows(Phase::Rollout, iterate.watch) {
+            if let Err(status) = iterate.clock.allows(&[Phase::Rollout], iterate.watch) {
                 search.stopped = Some(status);
                 return search;
             }

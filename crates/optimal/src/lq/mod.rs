@@ -3,6 +3,7 @@
 mod box_qp;
 mod conditional_value;
 mod forms;
+mod gains;
 mod inverse_dynamics_form;
 mod node;
 mod segments;
@@ -11,6 +12,7 @@ mod structure;
 mod sweep;
 mod workspace;
 
+pub(crate) use gains::Gains;
 pub(crate) use inverse_dynamics_form::InverseDynamicsForm;
 pub(crate) use node::DIVERGED;
 pub use node::{Hessian, LqKnot, LqNode};

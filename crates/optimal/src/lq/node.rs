@@ -132,6 +132,8 @@ pub struct LqKnot {
     pub Quu: DMatrix<f64>,
     /// Quᵀk and kᵀQuu k: what a full step is expected to change of the cost, to first and (twice) to second order.
     pub expected: [f64; 2],
+    /// Whether K, Qu and Quu hold what K and k follow from instead: see [`Gains`](super::gains::Gains).
+    pub(super) is_put_off: bool,
 }
 
 impl LqKnot {
@@ -145,6 +147,7 @@ impl LqKnot {
             Qu: DVector::zeros(nu),
             Quu: DMatrix::zeros(nu, nu),
             expected: [0.0; 2],
+            is_put_off: false,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Steps of the Riccati recursion.
 #![allow(non_snake_case)] // the names of the literature: H, L, X, Vxx
 
-use super::forms::{Controls, Curvature, Forms, InverseDynamics};
+use super::forms::{Controls, Curvature, Driven, Forms, InverseDynamics};
 use super::node::{Hessian, LqKnot, LqNode};
 use super::workspace::Workspace;
 
@@ -50,10 +50,12 @@ impl Sizes {
 
 /// A step of the recursion, with its workspace.
 #[derive(Debug, Clone)]
-pub(super) struct Step {
+pub(crate) struct Step {
     pub(super) work: Workspace,
     /// Whether Vxx is written to the knots.
     pub(super) keep: bool,
+    /// Whether gains are left to others, where a form allows it: see [`Gains`](super::gains::Gains).
+    pub(super) puts_off: bool,
     forms: Forms,
     controls: Controls,
     /// The curvature of the dynamics, one for each number of controls that nodes with curvature have.
@@ -68,8 +70,9 @@ impl Step {
         curved.sort_unstable();
         curved.dedup();
         Self {
-            work: Workspace::new(n, m, below),
+            work: Workspace::new(n, m, below.max(Driven::rows_below(n, m))),
             keep: true,
+            puts_off: false,
             forms: Forms::new(n, m, inverse_dynamics),
             controls: Controls::new(m),
             hessians: curved.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
@@ -77,7 +80,7 @@ impl Step {
     }
 
     /// Sweeps the end of a horizon, of which the first node is knot `first` and the last the terminal one.
-    pub(super) fn run(
+    pub(crate) fn run(
         &mut self,
         first: usize,
         nodes: &[LqNode],
@@ -92,7 +95,7 @@ impl Step {
     }
 
     /// Makes the steps at `nodes`, of which the first is knot `first`, from P, p of the knot after them.
-    pub(super) fn back(
+    pub(crate) fn back(
         &mut self,
         first: usize,
         nodes: &[LqNode],
@@ -117,7 +120,7 @@ impl Step {
         regularisation: f64,
         ask: &mut dyn FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
-        let Self { work, forms, controls, hessians, .. } = self;
+        let Self { work, forms, controls, hessians, puts_off, .. } = self;
         let form = forms.of_step(node, regularisation);
         work.move_by(node.f.as_slice());
         form.write(work, node, regularisation, &mut Curvature { knot: t, ask, hessians });
@@ -127,7 +130,9 @@ impl Step {
                 false => SweepError::NotFinite { knot: t },
             })?;
         work.take_value(work.stride(node.nu()), eliminated, form.turn(node.ndx()));
-        form.recover_gains(work, controls, node, knot);
+        if !(*puts_off && form.put_off_gains(work, node, knot)) {
+            form.recover_gains(work, controls, node, knot);
+        }
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! The backward sweep that solves a linear-quadratic problem.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
+use super::gains::Gains;
 use super::node::{Hessian, LqKnot, LqNode};
 use super::segments::Segments;
 use super::step::{Sizes, Step, SweepError};
@@ -64,6 +65,8 @@ pub struct Sweep {
     /// The number of segments that were asked for, and their workspaces, unless it is one.
     at_once: usize,
     segments: Option<Segments>,
+    /// See [`parts`](Self::parts).
+    gains: Vec<Gains>,
     sizes: Sizes,
 }
 
@@ -84,7 +87,7 @@ impl Sweep {
         });
         let (knots, sizes) = (knots.collect(), Sizes::of(nodes));
         let step = Step::new(sizes, 0, nodes.iter().map(LqNode::nu).collect());
-        Self { knots, step, at_once: 1, segments: None, sizes }
+        Self { knots, step, at_once: 1, segments: None, gains: Vec::new(), sizes }
     }
 
     /// Lets [`run`](Self::run) work on so many segments of the horizon at the same time, in the threads of rayon's pool in
@@ -166,7 +169,22 @@ impl Sweep {
         mut curvature: impl FnMut(usize, &[f64], &mut Hessian) -> bool,
     ) -> Result<(), SweepError> {
         self.check(nodes);
+        self.step.puts_off = false;
         self.step.run(0, nodes, &mut self.knots, regularisation, &mut curvature)
+    }
+
+    /// Whether a sweep can go from knot to knot as they are made: one that is not cut into segments.
+    pub(crate) fn is_sequential(&self) -> bool {
+        self.segments.is_none()
+    }
+
+    /// What a sweep as a sequence consists of: its steps, of which the first is [`Step::run`] at the terminal node and the
+    /// others [`Step::back`], what it finds, and scratch in which `threads` threads write the gains that the steps put off.
+    pub(crate) fn parts(&mut self, threads: usize) -> (&mut Step, &mut [LqKnot], &mut [Gains]) {
+        let Self { knots, step, gains, sizes, .. } = self;
+        gains.resize_with(threads, || Gains::new(sizes.n, sizes.m));
+        step.puts_off = true;
+        (step, knots, gains)
     }
 
     #[track_caller]

@@ -24,9 +24,8 @@ pub(crate) struct Workspace {
 }
 
 impl Workspace {
-    /// Room for knots with n states and at most m controls, and in H for `below` more rows, or as many as controls.
+    /// Room for knots with n states and at most m controls, and in H for `below` more rows.
     pub(crate) fn new(n: usize, m: usize, below: usize) -> Self {
-        let below = below.max(m);
         let stride = m + n + 1 + below + SLACK;
         Self {
             P: vec![0.0; (n + SLACK) * n],

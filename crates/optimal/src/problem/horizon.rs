@@ -5,7 +5,7 @@ use super::models::{Models, check};
 use super::shape::Shape;
 use super::threads::{Copies, Knots};
 use crate::error::{Error, assert_length};
-use crate::lq::LqNode;
+use crate::lq::{Gains, LqKnot, LqNode};
 use std::any::Any;
 use std::ops::{ControlFlow, Range};
 
@@ -289,23 +289,30 @@ impl Problem {
         self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
     }
 
-    /// [`calc_diff`](Self::calc_diff) on `threads` threads of the rayon pool in which it is called, else of the global one;
-    /// the same to the last bit. The knots of models without a copy ([`fork`](ActionModel::fork)) come last, on one thread.
+    /// [`calc_diff`](Self::calc_diff) on as many threads of the rayon pool in which it is called, else of the global one, as there
+    /// is scratch in `gains`; the same to the last bit. What is done is shown to `sweep` on the calling thread, from the last
+    /// knots to the first: the model and the number of the first of some knots, their nodes and, of `found`, what a sweep finds
+    /// there. The gains that it puts off are then written. Models without a copy ([`fork`](ActionModel::fork)) are asked on the
+    /// calling thread.
     ///
     /// # Panics
     /// If a length is wrong.
-    pub(crate) fn calc_diff_on(&mut self, threads: usize, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
-        if threads == 1 {
-            return self.calc_diff(xs, us, nodes);
-        }
+    pub(crate) fn calc_diff_on(
+        &mut self,
+        [xs, us]: [&[f64]; 2],
+        nodes: &mut [LqNode],
+        found: &mut [LqKnot],
+        gains: &mut [Gains],
+        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqNode], &mut [LqKnot]) + Send,
+    ) {
         self.begin_derivatives(xs, us, nodes);
         let Self { models, runs, copies, knots, shape, terminal, .. } = self;
-        let (nodes, end) = nodes.split_at_mut(shape.horizon());
-        let all = Knots { runs, knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
-        copies.calc_diff(threads, &mut models.actions, all, nodes, || {
-            let t = shape.horizon();
-            terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
-        });
+        let t = shape.horizon();
+        let ((nodes, end), (found, found_there)) = (nodes.split_at_mut(t), found.split_at_mut(t));
+        terminal.calc_diff_group(&knots[t..], &xs[shape.x(t)], &[], end);
+        sweep(&**terminal, t, end, found_there);
+        let all = Knots { knots, xs, us, nx: shape.nx, offsets: &shape.offsets };
+        copies.calc_diff(&mut models.actions, runs, all, nodes, found, gains, sweep);
     }
 
     /// Gives the copies of models, which threads have, the multipliers of their models.

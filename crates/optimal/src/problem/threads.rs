@@ -1,19 +1,35 @@
-//! The derivatives of a horizon on several threads, each with its own copies of the actions.
+//! The derivatives of a horizon on several threads, each with its own copies of the actions, and the sweep beside them.
+//!
+//! Groups of knots, as many as a model has lanes, go through three stages, from the end of the horizon to its beginning:
+//! their derivatives, by the thread that comes first; the sweep, by the calling thread, which computes derivatives itself
+//! while those that it needs are not there; and their gains, by a thread that has nothing else to do.
 
 use super::action::ActionModel;
-use crate::lq::LqNode;
-use condyle_linalg::threads;
+use crate::lq::{Gains, LqKnot, LqNode};
+use condyle_linalg::threads::{Parts, join, pause};
 use core::ops::Range;
+use core::sync::atomic::AtomicU8;
 
-/// Copies of actions for threads, and which thread computes which knots.
+/// The stages of a group.
+const DERIVE: u8 = 0;
+const SWEEP: u8 = 1;
+const FINISH: u8 = 2;
+
+/// A thread that so often found nothing to do leaves what is left to the one that sweeps, some milliseconds: so none waits
+/// for ever, whatever else shares the pool.
+const PATIENCE: usize = 4096;
+
+/// Copies of actions for threads, and the groups of knots that these compute.
 #[derive(Default)]
 pub(crate) struct Copies {
     /// The copy of each model, for each thread beside the first one.
     of: Vec<Vec<Option<Box<dyn ActionModel>>>>,
-    /// Whether a model has copies.
-    copied: Vec<bool>,
-    /// The first knot of each thread, and the end of the horizon.
+    /// The first knot of each group, and the end of the horizon.
     cuts: Vec<usize>,
+    /// The model of each group.
+    owners: Vec<usize>,
+    /// Scratch for [`Parts`].
+    states: Vec<AtomicU8>,
 }
 
 impl Copies {
@@ -39,41 +55,28 @@ impl Copies {
     /// Makes those that are missing of the models that can be copied, for `threads` threads in all.
     fn renew(&mut self, threads: usize, models: &[Box<dyn ActionModel>]) {
         self.of.resize_with(threads - 1, || models.iter().map(|_| None).collect());
-        self.copied.resize(models.len(), false);
         for copies in &mut self.of {
-            for ((copy, copied), model) in copies.iter_mut().zip(&mut self.copied).zip(models) {
+            for (copy, model) in copies.iter_mut().zip(models) {
                 if copy.is_none() {
                     *copy = model.fork();
                     copy.iter_mut().for_each(|copy| copy.reserve());
                 }
-                *copied = copy.is_some();
             }
         }
     }
 
-    /// Shares the groups of knots of the models with copies among `threads` threads: as many knots as a model has lanes,
-    /// counted from the start of a run, as one thread counts them.
-    fn share(&mut self, threads: usize, models: &[Box<dyn ActionModel>], runs: &[(usize, Range<usize>)]) {
-        let Self { copied, cuts, .. } = self;
-        let lanes = |model: usize| models[model].lanes().max(1);
-        let groups = |model: usize, run: &Range<usize>| usize::from(copied[model]) * run.len().div_ceil(lanes(model));
-        let total: usize = runs.iter().map(|(model, run)| groups(*model, run)).sum();
-        let horizon = runs.last().map_or(0, |(_, run)| run.end);
+    /// Finds the groups of knots: counted from the start of a run, as one thread counts them.
+    fn group(&mut self, models: &[Box<dyn ActionModel>], runs: &[(usize, Range<usize>)]) {
+        let Self { cuts, owners, .. } = self;
         cuts.clear();
-        cuts.push(0);
-        for thread in 1..threads {
-            let (mut group, mut cut) = (total * thread / threads, horizon);
-            for (model, run) in runs {
-                let here = groups(*model, run);
-                if group < here {
-                    cut = run.start + group * lanes(*model);
-                    break;
-                }
-                group -= here;
+        owners.clear();
+        for (model, run) in runs {
+            for knot in run.clone().step_by(models[*model].lanes().max(1)) {
+                cuts.push(knot);
+                owners.push(*model);
             }
-            cuts.push(cut);
         }
-        cuts.push(horizon);
+        cuts.push(runs.last().map_or(0, |(_, run)| run.end));
     }
 
     /// Gives copies the multipliers of their models.
@@ -96,44 +99,52 @@ impl Copies {
         }
     }
 
-    /// The derivatives at all knots on `threads` threads, the first of which also does `last`. The knots of models without a
-    /// copy come after the others, on one thread.
+    /// The derivatives at all knots on as many threads as there is scratch in `gains`. This one shows the groups to `sweep`,
+    /// from the last to the first, each with its model and the number of its first knot; the gains that are put off then are
+    /// written. Models without a copy are asked on this thread alone.
     pub(super) fn calc_diff(
         &mut self,
-        threads: usize,
         models: &mut [Box<dyn ActionModel>],
+        runs: &[(usize, Range<usize>)],
         knots: Knots<'_>,
         nodes: &mut [LqNode],
-        last: impl FnOnce() + Send,
+        found: &mut [LqKnot],
+        gains: &mut [Gains],
+        mut sweep: impl FnMut(&dyn ActionModel, usize, &mut [LqNode], &mut [LqKnot]) + Send,
     ) {
-        self.renew(threads, models);
-        self.share(threads, models, knots.runs);
-        let Self { of, copied, cuts } = self;
-        let (own, others) = nodes.split_at_mut(cuts[1]);
-        threads::join(
+        self.renew(gains.len(), models);
+        self.group(models, runs);
+        let Self { of, cuts, owners, states } = self;
+        let groups = Groups { parts: &Parts::new(nodes, found, cuts, states), owners, knots };
+        let (own, gains) = gains.split_at_mut(1);
+        join(
             || {
-                knots.visit(0..own.len(), own, |model, run, nodes| {
-                    if copied[model] {
-                        knots.derive(&mut *models[model], run, nodes);
+                let parts = groups.parts;
+                let mut tried = parts.count(); // this thread has tried to derive those from here on
+                for group in (0..parts.count()).rev() {
+                    while !parts.work(group, SWEEP, |first, nodes, found| {
+                        sweep(&*models[owners[group]], first, nodes, found);
+                    }) {
+                        if parts.is_abandoned() {
+                            return; // another thread panics, and so will this one
+                        } else if tried > 0 {
+                            tried -= 1;
+                            groups.derive(tried, &mut *models[owners[tried]]);
+                        } else {
+                            pause();
+                        }
                     }
-                });
-                last();
+                }
+                (0..parts.count()).for_each(|group| _ = groups.finish(group, &mut own[0]));
             },
-            || knots.spread(&cuts[1..], of, others),
+            || groups.spread(of, gains),
         );
-        knots.visit(0..nodes.len(), nodes, |model, run, nodes| {
-            if !copied[model] {
-                knots.derive(&mut *models[model], run, nodes);
-            }
-        });
     }
 }
 
 /// The knots before the terminal one, as all threads read them.
 #[derive(Clone, Copy)]
 pub(super) struct Knots<'a> {
-    /// Runs of knots with one model: (model, knots).
-    pub(super) runs: &'a [(usize, Range<usize>)],
     /// Their numbers.
     pub(super) knots: &'a [usize],
     /// The states, and the controls.
@@ -145,36 +156,51 @@ pub(super) struct Knots<'a> {
     pub(super) offsets: &'a [usize],
 }
 
-impl Knots<'_> {
-    /// The derivatives at consecutive knots of one model; `nodes` are theirs.
-    fn derive(self, model: &mut dyn ActionModel, knots: Range<usize>, nodes: &mut [LqNode]) {
-        let xs = &self.xs[knots.start * self.nx..knots.end * self.nx];
-        let us = &self.us[self.offsets[knots.start]..self.offsets[knots.end]];
-        model.calc_diff_group(&self.knots[knots], xs, us, nodes);
+/// The groups of knots, as all threads see them.
+#[derive(Clone, Copy)]
+struct Groups<'a> {
+    parts: &'a Parts<'a, LqNode, LqKnot>,
+    owners: &'a [usize],
+    knots: Knots<'a>,
+}
+
+impl Groups<'_> {
+    /// The derivatives at the knots of a group, by its model or a copy of it, unless somebody computes them.
+    fn derive(self, group: usize, model: &mut dyn ActionModel) {
+        let Knots { knots, xs, us, nx, offsets } = self.knots;
+        self.parts.work(group, DERIVE, |first, nodes, _| {
+            let end = first + nodes.len();
+            let (xs, us) = (&xs[first * nx..end * nx], &us[offsets[first]..offsets[end]]);
+            model.calc_diff_group(&knots[first..end], xs, us, nodes);
+        });
     }
 
-    /// Shows the runs in a part of the horizon, with their models; `nodes` are the part's.
-    fn visit(self, part: Range<usize>, nodes: &mut [LqNode], mut f: impl FnMut(usize, Range<usize>, &mut [LqNode])) {
-        for (model, run) in self.runs {
-            let knots = run.start.max(part.start)..run.end.min(part.end);
-            if !knots.is_empty() {
-                f(*model, knots.clone(), &mut nodes[knots.start - part.start..knots.end - part.start]);
+    /// Writes the gains of a group that were put off, if it has been swept and nobody does; says whether it did.
+    fn finish(self, group: usize, gains: &mut Gains) -> bool {
+        self.parts.work(group, FINISH, |_, nodes, found| gains.finish(nodes, found))
+    }
+
+    /// Lets each of some threads, by the copies that it has, work on groups until there are none left.
+    fn spread(self, copies: &mut [Vec<Option<Box<dyn ActionModel>>>], gains: &mut [Gains]) {
+        let ([copies], [gains]) = (&mut *copies, &mut *gains) else {
+            let half = copies.len() / 2;
+            let ((some, others), (first, second)) = (copies.split_at_mut(half), gains.split_at_mut(half));
+            return join(|| self.spread(some, first), || self.spread(others, second));
+        };
+        for group in (0..self.parts.count()).rev() {
+            if let Some(copy) = &mut copies[self.owners[group]] {
+                self.derive(group, &mut **copy);
             }
         }
-    }
-
-    /// The parts between `cuts`, by the copies that each has; `nodes` are theirs.
-    fn spread(self, cuts: &[usize], copies: &mut [Vec<Option<Box<dyn ActionModel>>>], nodes: &mut [LqNode]) {
-        if let [copies] = copies {
-            return self.visit(cuts[0]..cuts[1], nodes, |model, knots, nodes| {
-                if let Some(copy) = &mut copies[model] {
-                    self.derive(&mut **copy, knots, nodes);
+        for group in (0..self.parts.count()).rev() {
+            let mut patience = PATIENCE;
+            while !self.finish(group, gains) && self.parts.awaits(group, FINISH) {
+                if patience == 0 || self.parts.is_abandoned() {
+                    return;
                 }
-            });
+                patience -= 1;
+                pause();
+            }
         }
-        let half = copies.len() / 2;
-        let (some, others) = copies.split_at_mut(half);
-        let (first, second) = nodes.split_at_mut(cuts[half] - cuts[0]);
-        threads::join(|| self.spread(&cuts[..=half], some, first), || self.spread(&cuts[half..], others, second));
     }
 }

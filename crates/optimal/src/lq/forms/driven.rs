@@ -11,10 +11,11 @@
 //! The rows of U and G, scaled to be squares, are added to H in the tiles of the elimination.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, U
 
+use super::super::gains::take_gains;
 use super::super::inverse_dynamics_form::InverseDynamicsForm;
 use super::super::node::{LqKnot, LqNode};
 use super::super::workspace::Workspace;
-use super::{Controls, Curvature, Form, inverse_dynamics};
+use super::{Controls, Curvature, Form};
 use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_blocks, add_in_turn, at_narrow_level, copy_scaled, eliminate_sum,
     transpose_block,
@@ -27,14 +28,14 @@ const MOST_COSTS: usize = 16;
 
 /// The form, with its scratch.
 #[derive(Debug, Clone)]
-pub(super) struct Driven {
+pub(in crate::lq) struct Driven {
     /// The scaled rows of U and G over (w, δv, δq), each with its part of the gradient, and zeros. Shape: `stride` × MOST +
     /// MOST_COSTS, or none for larger robots.
     rows: Vec<f64>,
     stride: usize,
     /// The number of rows.
     count: usize,
-    /// See [`inverse_dynamics::recover_gains`].
+    /// See [`take_gains`].
     y: Vec<f64>,
 }
 
@@ -44,6 +45,11 @@ impl Driven {
         let nv = if n <= 2 * MOST { n / 2 } else { 0 };
         let stride = 4 * nv + 1 + 4 * SLACK;
         Self { rows: vec![0.0; stride * (nv + MOST_COSTS)], stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
+    }
+
+    /// The rows that the form has below H.
+    pub(in crate::lq) fn rows_below(n: usize, m: usize) -> usize {
+        if n <= 2 * MOST { m } else { 0 }
     }
 
     /// Whether the form is that of a node, when R gets so much on its diagonal.
@@ -74,7 +80,7 @@ impl Form for Driven {
         unreachable!("segments of a horizon take the form for all robots");
     }
 
-    /// As [`inverse_dynamics`], with the squares.
+    /// With the squares, and with U below H: [L ·; X Hₓₓ − X Xᵀ; yᵀ ·; Y K], as [`Gains`](super::super::gains::Gains) has it.
     fn eliminate(
         &self,
         work: &mut Workspace,
@@ -89,7 +95,9 @@ impl Form for Driven {
     }
 
     fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
-        inverse_dynamics::recover_gains(work, node, knot, &mut self.y);
+        let (all, ld) = (node.ndx() + node.nu(), work.stride(node.nu()));
+        let H = View::new(&work.H, ld);
+        take_gains(H.at(all + 1, 0), H.at(all, 0), node, knot, &mut self.y);
     }
 }
 

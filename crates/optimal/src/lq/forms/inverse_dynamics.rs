@@ -21,14 +21,15 @@
 //! those of the explicit form, since for any δx the map from w to δu is invertible.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
 
+use super::super::gains::Gains;
 use super::super::inverse_dynamics_form::InverseDynamicsForm;
 use super::super::node::{LqKnot, LqNode};
 use super::super::workspace::Workspace;
 use super::euler::Steps;
 use super::{Controls, Curvature, Form};
 use condyle_linalg::{
-    OuterProducts, SLACK, Vector, Vectorized, View, add_product, add_product_vector, at_narrow_level, copy_block,
-    copy_matrix, copy_scaled, eliminate, mask, transpose,
+    OuterProducts, SLACK, Vector, Vectorized, View, add_product, at_narrow_level, copy_block, copy_matrix, copy_scaled,
+    eliminate, mask,
 };
 
 /// The form, with its scratch.
@@ -39,10 +40,9 @@ pub(crate) struct InverseDynamics {
     products: OuterProducts,
     /// ½ Π_dd. Shape: dependent × dependent, with slack rows.
     half: Vec<f64>,
-    /// Scratch for k, with slack, and for −y.
-    y: Vec<f64>,
     /// Columns of dependent coordinates. Shape: n × dependent, with slack rows.
     below: Vec<f64>,
+    gains: Gains,
 }
 
 impl InverseDynamics {
@@ -61,7 +61,7 @@ impl InverseDynamics {
             steps: Steps::new(n),
             products: OuterProducts::with_capacity(numbers, products),
             half: Vec::with_capacity((dependent + SLACK) * dependent),
-            y: vec![0.0; 2 * m + SLACK],
+            gains: Gains::new(n, m),
             below: Vec::with_capacity((n + SLACK) * dependent),
         }
     }
@@ -126,7 +126,6 @@ impl Form for InverseDynamics {
         steps.add_positions_below(work, node, Theta);
     }
 
-    /// With the rows U below H: [L ·; X Hₓₓ − X Xᵀ; yᵀ ·; Y K] for Y = U_w L⁻ᵀ and K = U_x − Y Xᵀ, the gains.
     fn eliminate(
         &self,
         work: &mut Workspace,
@@ -134,35 +133,19 @@ impl Form for InverseDynamics {
         node: &LqNode,
         _: &mut LqKnot,
     ) -> Result<usize, (usize, f64)> {
-        let (n, m, ld, form) = (node.ndx(), node.nu(), work.stride(node.nu()), &node.inverse_dynamics);
-        transpose(&mut work.H[m + n + 1..], ld, View::new(&form.efforts.numbers, form.stride), [m + n, m]);
-        eliminate(&mut work.H, ld, [m + n + 1 + m, m + n, m])?;
+        let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
+        eliminate(&mut work.H, ld, [m + n + 1, m + n, m])?;
         Ok(m)
     }
 
     fn recover_gains(&mut self, work: &mut Workspace, _: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
-        recover_gains(work, node, knot, &mut self.y);
+        self.gains.write(View::new(&work.H, work.stride(node.nu())), node, knot);
     }
-}
 
-/// Writes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k,   from H after the elimination; y is
-/// scratch for twice the controls and slack.
-pub(super) fn recover_gains(work: &Workspace, node: &LqNode, knot: &mut LqKnot, y: &mut [f64]) {
-    let (n, m) = (node.ndx(), node.nu());
-    let (nv, ld, all, H) = (n / 2, work.stride(m), m + n, &work.H);
-    let [Y, by_v, by_q] = [0, m, m + nv].map(|column| View::new(&H[column * ld + all + 1..], ld));
-    let K = knot.K.as_mut_slice();
-    copy_matrix(K, m, by_q, [m, nv]);
-    copy_matrix(&mut K[nv * m..], m, by_v, [m, nv]);
-    let ((k, y), mut square) = (y.split_at_mut(m + SLACK), 0.0);
-    k.fill(0.0);
-    for j in 0..m {
-        y[j] = -H[j * ld + all];
-        square += y[j] * y[j];
+    fn put_off_gains(&self, work: &Workspace, node: &LqNode, knot: &mut LqKnot) -> bool {
+        Gains::put_off(View::new(&work.H, work.stride(node.nu())), node, knot);
+        true
     }
-    add_product_vector(k, m, Y, &y[..m]);
-    knot.k.as_mut_slice().copy_from_slice(&k[..m]);
-    knot.expected = [-square, square];
 }
 
 /// The part of H that is Π and N, and the rows of the outer products: those of Uᵀ (R + ϱ 1) U + Gᵀ a″ G, then D and

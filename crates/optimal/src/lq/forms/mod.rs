@@ -15,7 +15,7 @@ use super::node::{Hessian, LqKnot, LqNode};
 use super::workspace::Workspace;
 pub(super) use controls::Controls;
 use dense::Dense;
-use driven::Driven;
+pub(super) use driven::Driven;
 use euler::Euler;
 pub(super) use inverse_dynamics::InverseDynamics;
 
@@ -52,6 +52,11 @@ pub(super) trait Form {
     fn recover_gains(&mut self, work: &mut Workspace, controls: &mut Controls, node: &LqNode, knot: &mut LqKnot) {
         let turn = self.turn(node.ndx());
         controls.recover_gains(work, node, knot, turn);
+    }
+
+    /// Keeps in the knot what its gains follow from, for [`Gains::finish`](super::gains::Gains::finish); says whether it did.
+    fn put_off_gains(&self, _: &Workspace, _: &LqNode, _: &mut LqKnot) -> bool {
+        false
     }
 }
 
