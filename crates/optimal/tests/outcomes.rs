@@ -357,9 +357,11 @@ impl ActionModel for Noting {
     }
 }
 
-/// The first step length is tried alone, the next four side by side and then the others, at most as many as there are lanes.
+/// The first step length is tried alone, and the second one if the last search needed no shorter one; the next four side by
+/// side and then the others, at most as many as there are lanes.
 #[test]
 fn a_refused_step_is_followed_by_the_others_at_once() {
+    let alone = |lanes| if lanes == 1 { vec![1; 9] } else { vec![1, 4, 4] };
     for (lanes, after) in [(1, vec![1; 9]), (4, vec![4, 4, 1]), (8, vec![4, 5]), (16, vec![4, 5])] {
         let action = Cartpole { lanes, ..cartpole_action() };
         let noting = Noting { action, groups: vec![] };
@@ -368,16 +370,17 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
         let mut solver = Fddp::new(&problem);
         let solution = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap();
         // per line search: 1, and after a refusal as many of the groups as it took to find the step
-        let mut expected = vec![];
+        let (mut expected, mut last) = (vec![], 0.0);
         for iteration in &solution.trace {
             expected.push(1);
             let (mut tried, needed) = (1, 1 + (-iteration.step.log2()) as usize);
-            for group in &after {
+            for group in if last < 0.5 { after.clone() } else { alone(lanes) } {
                 if tried < needed {
-                    expected.push(*group);
+                    expected.push(group);
                     tried += group;
                 }
             }
+            last = iteration.step;
         }
         assert!(expected.len() > solution.trace.len());
         assert_eq!(problem.model_mut::<Noting>(0).unwrap().groups, expected, "{lanes} lanes");

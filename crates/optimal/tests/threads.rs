@@ -18,6 +18,11 @@ use std::time::Duration;
 /// A gait of a quadruped of every kind of knot: stance, an impact, one by differences that cannot be copied, flight by
 /// Runge–Kutta and by Euler; in runs that are no multiples of lanes.
 fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
+    gait_of(|impact| Box::new(NumDiff(impact)))
+}
+
+/// As [`gait`], with the impacts of the second kind that it is given.
+fn gait_of(impact_again: fn(ImpulseDynamics) -> Box<dyn ActionModel>) -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4)); // knees bent
@@ -41,7 +46,7 @@ fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
     let flying = FreeDynamics::running(model.clone(), 0.01, driven()).unwrap();
     let end = FreeDynamics::terminal(model.clone(), standing()).unwrap();
     let models: Vec<Box<dyn ActionModel>> =
-        vec![Box::new(stance), Box::new(impact.clone()), Box::new(NumDiff(impact)), Box::new(flight), Box::new(flying)];
+        vec![Box::new(stance), Box::new(impact.clone()), impact_again(impact), Box::new(flight), Box::new(flying)];
     let stages = [vec![2], vec![0; 19], vec![1], vec![3; 5], vec![4; 11], vec![2], vec![0; 9], vec![1, 1]].concat();
     let nus = stages.iter().map(|stage| if [1, 2].contains(stage) { 0 } else { 12 });
     let us = nus.flat_map(|nu| us[..nu].to_vec()).collect();
@@ -77,6 +82,28 @@ fn any_number_of_threads_finds_the_same_bits() {
         }
     }
     assert!(solve(&mut problem, &xs, &us, 1) == expected);
+}
+
+/// After a step that was shorter than 1 the next length is tried beside the first, by copies, which all models have here:
+/// once the first is good, once it is not.
+#[test]
+fn trials_beside_each_other_find_the_same_bits() {
+    let (mut problem, xs, us) = gait_of(|impact| Box::new(impact));
+    let mut solve = |threads: usize| {
+        let mut solver = Fddp::new(&problem);
+        (solver.settings.max_iterations, solver.settings.threads) = (10, threads);
+        let mut solution = solver.solve(&mut problem, &xs, &us).unwrap().clone();
+        solution.timings = Default::default();
+        solution
+    };
+    let expected = solve(1);
+    let after_short: Vec<_> = expected.trace.windows(2).filter(|pair| pair[0].step < 1.0).map(|pair| pair[1]).collect();
+    assert!(after_short.iter().any(|next| next.step == 1.0) && after_short.iter().any(|next| next.step < 1.0));
+    for (threads, size) in [(2, 1), (2, 2), (3, 3), (7, 2)] {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(size).build().unwrap();
+        assert!(pool.install(|| solve(threads)) == expected, "{threads} threads");
+    }
+    assert!(solve(2) == expected, "the global pool");
 }
 
 /// A model that was changed is copied anew.

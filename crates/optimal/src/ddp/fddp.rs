@@ -212,7 +212,7 @@ impl Fddp {
         self.solution.trace.reserve(self.settings.max_iterations.min(FORESEEN));
         let motion_size = if self.inverse_dynamics { problem.motion_size() } else { 0 };
         self.motions.resize(problem.horizon() * motion_size, 0.0);
-        self.line_search.start(self.settings.step_lengths, motion_size);
+        self.line_search.start(problem, self.settings.step_lengths, motion_size, self.settings.threads);
         let start = self.settings.regularisation_start;
         let mut progress = Progress {
             regularisation: start,

@@ -1,8 +1,9 @@
 //! Rollouts of several step lengths side by side.
 
 use crate::lq::{DIVERGED, LqKnot};
-use crate::problem::{Problem, Shape};
-use condyle_linalg::{View, add_scaled_product};
+use crate::problem::{Actors, Problem, Shape};
+use condyle_linalg::{View, add_scaled_product, dot};
+use core::ops::RangeInclusive;
 
 /// A sum that is rounded once, at the end: near an optimum costs differ in their last digits. (Neumaier, 1974.)
 #[derive(Debug, Clone, Copy, Default)]
@@ -52,6 +53,7 @@ pub(crate) struct Trials {
 }
 
 /// The trajectory that trials start from, and the direction.
+#[derive(Clone, Copy)]
 pub(crate) struct Nominal<'a> {
     pub(crate) xs: &'a [f64],
     pub(crate) us: &'a [f64],
@@ -104,15 +106,23 @@ impl Trials {
     ///
     /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
     ///
-    /// with uₜ moved into its bounds.
-    pub(crate) fn run(&mut self, problem: &mut Problem, nominal: &Nominal, steps: &[f64]) {
+    /// with uₜ moved into its bounds; on some knots, which follow those of the last call or begin the horizon.
+    pub(crate) fn run(
+        &mut self,
+        actors: &mut Actors<'_>,
+        nominal: &Nominal<'_>,
+        steps: &[f64],
+        knots: RangeInclusive<usize>,
+    ) {
         let Self { shape, xs, us, next, motions, costs, failed, knot_costs, knot, dx, unread, .. } = self;
         let size = self.motion_size;
         let (nx, horizon, count) = (shape.nx, shape.horizon(), steps.len());
-        self.count = count;
-        costs[..count].fill(Sum::default());
-        failed[..count].fill(false);
-        for t in 0..=horizon {
+        if *knots.start() == 0 {
+            self.count = count;
+            costs[..count].fill(Sum::default());
+            failed[..count].fill(false);
+        }
+        for t in knots {
             let nu = shape.nu(t);
             let (done, ahead) = next.split_at_mut(t * nx * count);
             let x_all = &mut xs[t * nx * count..][..nx * count];
@@ -125,8 +135,8 @@ impl Trials {
                     x.copy_from_slice(x_nominal); // a state that the action can be asked for
                     continue;
                 }
-                let action = problem.action(t);
-                let predicted = if t == 0 { problem.x0() } else { &done[((t - 1) * count + i) * nx..][..nx] };
+                let action = actors.action(t);
+                let predicted = if t == 0 { actors.x0() } else { &done[((t - 1) * count + i) * nx..][..nx] };
                 match nominal.gaps {
                     Some(gaps) if step != 1.0 => {
                         for (dx, f) in dx.iter_mut().zip(&gaps[shape.dx(t)]) {
@@ -149,7 +159,7 @@ impl Trials {
             }
             knot[..count].fill(t);
             let next_all = if t < horizon { &mut ahead[..nx * count] } else { &mut unread[..nx * count] };
-            let action = problem.action_mut(t);
+            let action = actors.action_mut(t);
             let (knot, costs_all) = (&knot[..count], &mut knot_costs[..count]);
             match size {
                 _ if t == horizon => action.calc_group(knot, x_all, u_all, next_all, costs_all),
@@ -173,8 +183,20 @@ impl Trials {
         (!self.failed[i]).then_some(self.costs[i].value())
     }
 
+    /// −Σ bᵀ (x ⊖ x_trial) for trial `i`, over the states x of all knots and vectors b, flat.
+    pub(crate) fn distance(&mut self, actors: &Actors<'_>, i: usize, xs: &[f64], b: &[f64]) -> f64 {
+        let mut dx = std::mem::take(&mut self.dx);
+        let mut sum = 0.0;
+        for t in 0..=self.shape.horizon() {
+            actors.action(t).difference(self.x(i, t), &xs[self.shape.x(t)], &mut dx);
+            sum -= dot(&b[self.shape.dx(t)], &dx);
+        }
+        self.dx = dx;
+        sum
+    }
+
     /// The state xₜ of trial `i`.
-    pub(crate) fn x(&self, i: usize, t: usize) -> &[f64] {
+    fn x(&self, i: usize, t: usize) -> &[f64] {
         &self.xs[(t * self.count + i) * self.shape.nx..][..self.shape.nx]
     }
 

@@ -7,13 +7,18 @@ use super::rollout::{Nominal, Trials};
 use super::settings::{DdpMethod, Settings};
 use super::solution::{Solution, Status};
 use crate::lq::LqKnot;
-use crate::problem::Problem;
+use crate::problem::{Actors, Problem};
 use crate::time::Instant;
+use condyle_linalg::threads::join;
 use condyle_linalg::{View, add_scaled_product, dot};
+use core::sync::atomic::{AtomicBool, Ordering};
 
-/// The number of step lengths that are tried side by side when the first one fails: one of the next few is mostly good, and
-/// each has a cost of its own beside dynamics in lanes.
+/// The number of step lengths that are tried side by side when 1 fails, unless ½ is likely to be good: one of them mostly is,
+/// and they take two to three times as long as one, whose limbs lie side by side.
 const SECOND: usize = 4;
+
+/// So many searches after one that needed a shorter step than 1 may need one too: mostly every second or third does.
+const WARY: usize = 3;
 
 /// The outcome of a line search: of the trial it accepted or else of the last that stayed finite.
 #[derive(Clone, Copy, Default)]
@@ -56,12 +61,14 @@ pub(super) struct Iterate<'a, 'o> {
 #[derive(Debug, Clone)]
 pub(super) struct LineSearch {
     trials: Trials,
+    /// The trial that another thread rolls out while this one tries the first step.
+    ahead: Option<Trials>,
+    /// How many searches to come try several lengths at once, if they may.
+    wary: usize,
     /// The step lengths, 1, ½, ¼, ….
     steps: Vec<f64>,
     /// Vxx f, (N + 1)·ndx.
     curved_gaps: Vec<f64>,
-    /// xₜ ⊖ a trial's xₜ.
-    dx: Vec<f64>,
     /// The expected improvement without the part that depends on the trial: dg, dq.
     expected: [f64; 2],
 }
@@ -72,9 +79,10 @@ impl LineSearch {
         let (horizon, ndx) = (problem.horizon(), problem.ndx());
         Self {
             trials: Trials::new(problem, problem.lanes()),
+            ahead: None,
+            wary: 0,
             steps: Vec::new(),
             curved_gaps: vec![0.0; (horizon + 1) * ndx],
-            dx: vec![0.0; ndx],
             expected: [0.0; 2],
         }
     }
@@ -82,60 +90,101 @@ impl LineSearch {
     /// Makes room for a problem of which only the numbers of controls changed.
     pub(super) fn reshape(&mut self, problem: &Problem) {
         self.trials.reshape(problem);
+        self.ahead.iter_mut().for_each(|ahead| ahead.reshape(problem));
     }
 
-    /// Begins a solve with `count` step lengths, in which so many numbers of each knot's motion are kept.
-    pub(super) fn start(&mut self, count: usize, motion_size: usize) {
+    /// Begins a solve of a problem with `count` step lengths, in which so many numbers of each knot's motion are kept, on so
+    /// many threads.
+    pub(super) fn start(&mut self, problem: &Problem, count: usize, motion_size: usize, threads: usize) {
+        if threads > 1 && self.ahead.is_none() {
+            self.ahead = Some(Trials::new(problem, self.trials.width()));
+        }
+        self.wary = 0;
         self.trials.keep_motions(motion_size);
+        self.ahead.iter_mut().for_each(|ahead| ahead.keep_motions(motion_size));
         self.steps.clear();
         self.steps.extend((0..count).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
     }
 
-    /// Tries α = 1, ½, ¼, … until a step is accepted, which becomes the iterate.
+    /// Tries α = 1, ½, ¼, … until a step is accepted, which becomes the iterate. On several threads, if a shorter step than 1
+    /// was needed lately, another one tries the next length beside the first.
     ///
     /// A trial that leaves all bounds keeps the expectation of the trial before it; the first one has that of the line
     /// search before, `last`, or in DDP, where it does not depend on the trial, that of this one.
     #[inline(never)] // `benches/instructions.py` counts it by its name
-    pub(super) fn run(&mut self, problem: &mut Problem, mut iterate: Iterate<'_, '_>, last: Search) -> Search {
+    pub(super) fn run(&mut self, problem: &mut Problem, iterate: Iterate<'_, '_>, last: Search) -> Search {
         self.expect(&iterate);
+        let Self { trials, ahead, wary, steps, curved_gaps, expected } = self;
+        let Iterate { solution, next, motions, value, best, knots, feasible, settings, clock, watch, .. } = iterate;
         let mut search = Search { accepted: false, left_best: false, ..last };
-        let gaps = iterate.settings.counts_gaps(iterate.feasible);
-        if iterate.settings.method == DdpMethod::Ddp {
-            [search.d1, search.d2] = self.expected;
+        if settings.method == DdpMethod::Ddp {
+            [search.d1, search.d2] = *expected;
         }
-        let (mut tried, count) = (0, self.steps.len());
-        while tried < count {
+        let gaps = settings.counts_gaps(feasible).then_some(iterate.gaps);
+        let curved_gaps = gaps.map(|_| &curved_gaps[..]);
+        let (horizon, lanes, count) = (problem.horizon(), trials.width(), steps.len());
+        let some_from = |tried: usize| {
             let most = match tried {
                 0 => 1,
-                1 => SECOND,
+                1 if last.step >= 0.5 => 1, // ½ will do: the last search took it, or 1
+                1 | 2 => SECOND,
                 _ => count,
             };
-            let width = most.min(self.trials.width()).min(count - tried);
-            if let Err(status) = iterate.clock.allows(&[Phase::Rollout], iterate.watch) {
+            tried..tried + most.min(lanes).min(count - tried)
+        };
+        let beside = *wary > 0 && settings.threads > 1 && count > 1;
+        let (mut tried, mut ready) = (0, false); // whether the next trials are in `ahead`, but for the terminal knot
+        while tried < count {
+            if !ready && let Err(status) = clock.allows(&[Phase::Rollout], watch) {
                 search.stopped = Some(status);
                 return search;
             }
-            self.roll_out(problem, &mut iterate, gaps, tried, width);
-            for i in 0..width {
-                search.step = self.steps[tried + i];
-                let Some(cost) = self.trials.cost(i) else { continue };
-                // d₁ = dg + dv,   d₂ = dq − 2 dv,   expected decrease α (d₁ + ½ α d₂)
-                let dv = if gaps { self.expect_of_trial(problem, iterate.solution, i) } else { 0.0 };
-                search.d1 = self.expected[0] + dv;
-                search.d2 = self.expected[1] - 2.0 * dv;
-                search.expected_decrease = search.step * (search.d1 + 0.5 * search.step * search.d2);
-                search.decrease = iterate.solution.cost - cost;
-                if search.is_good(iterate.settings, iterate.feasible) {
-                    search.left_best = iterate.best.leave(iterate.solution, iterate.next, iterate.value);
-                    let Solution { xs, us, .. } = iterate.solution;
-                    self.trials.copy_to(i, xs, us, iterate.next, iterate.motions);
-                    iterate.solution.cost = cost;
-                    search.accepted = true;
-                    return search;
+            let start = Instant::now();
+            let Solution { xs, us, cost, .. } = &*solution;
+            let nominal = Nominal { xs, us, gaps, knots };
+            let rule = Rule { settings, feasible, expected: *expected, curved_gaps, xs, cost: *cost };
+            let trying = some_from(tried);
+            let lengths = &steps[trying.clone()];
+            match (ahead.as_mut(), problem.two()) {
+                (Some(ahead), _) if ready => {
+                    std::mem::swap(trials, ahead);
+                    trials.run(&mut problem.actors(), &nominal, lengths, horizon..=horizon);
+                    ready = false;
                 }
+                (Some(ahead), Some([mut own, mut copies])) if beside && tried == 0 => {
+                    let (next, enough) = (&steps[some_from(1)], AtomicBool::new(false));
+                    join(
+                        || {
+                            trials.run(&mut own, &nominal, lengths, 0..=horizon);
+                            let good = rule.judge(&mut search.clone(), trials, 0, lengths[0], &own).is_some();
+                            enough.store(good, Ordering::Relaxed);
+                        },
+                        || {
+                            ready = (0..horizon).all(|t| {
+                                ahead.run(&mut copies, &nominal, next, t..=t);
+                                !enough.load(Ordering::Relaxed)
+                            });
+                        },
+                    );
+                }
+                _ => trials.run(&mut problem.actors(), &nominal, lengths, 0..=horizon),
             }
-            tried += width;
+            let actors = problem.actors();
+            let good = lengths
+                .iter()
+                .enumerate()
+                .find_map(|(i, step)| rule.judge(&mut search, trials, i, *step, &actors).map(|cost| (i, cost)));
+            solution.timings.rollout += clock.ran(Phase::Rollout, start);
+            if let Some((i, cost)) = good {
+                search.left_best = best.leave(solution, next, value);
+                trials.copy_to(i, &mut solution.xs, &mut solution.us, next, motions);
+                solution.cost = cost;
+                search.accepted = true;
+                break;
+            }
+            tried = trying.end;
         }
+        *wary = if search.step < 1.0 { WARY } else { wary.saturating_sub(1) };
         search
     }
 
@@ -158,33 +207,36 @@ impl LineSearch {
         }
         self.expected = [dg, dq];
     }
+}
 
-    /// dv = −Σ fᵀVxx (x ⊖ x_trial): what the trial's distance from the iterate adds while there are gaps.
-    fn expect_of_trial(&mut self, problem: &Problem, solution: &Solution, i: usize) -> f64 {
-        let shape = solution.shape();
-        let mut dv = 0.0;
-        for t in 0..=shape.horizon() {
-            problem.action(t).difference(self.trials.x(i, t), &solution.xs[shape.x(t)], &mut self.dx);
-            dv -= dot(&self.curved_gaps[shape.dx(t)], &self.dx);
-        }
-        dv
-    }
+/// The rule by which a trial is accepted, for one iterate.
+struct Rule<'a> {
+    settings: &'a Settings,
+    feasible: bool,
+    /// dg and dq.
+    expected: [f64; 2],
+    /// Vxx f, while gaps count.
+    curved_gaps: Option<&'a [f64]>,
+    /// The states and the cost of the iterate.
+    xs: &'a [f64],
+    cost: f64,
+}
 
-    /// The trials `from`, `from` + 1, … of the line search, side by side; with what is left of the `gaps`.
-    fn roll_out(
-        &mut self,
-        problem: &mut Problem,
-        iterate: &mut Iterate<'_, '_>,
-        gaps: bool,
-        from: usize,
-        width: usize,
-    ) {
-        let start = Instant::now();
-        let gaps = gaps.then_some(iterate.gaps);
-        let Solution { xs, us, .. } = &*iterate.solution;
-        let nominal = Nominal { xs, us, gaps, knots: iterate.knots };
-        self.trials.run(problem, &nominal, &self.steps[from..from + width]);
-        iterate.solution.timings.rollout += iterate.clock.ran(Phase::Rollout, start);
+impl Rule<'_> {
+    /// Writes to `search` what trial i, of step length α, promised and does; returns its cost if it is good.
+    ///
+    /// ```text
+    /// d₁ = dg + dv,   d₂ = dq − 2 dv,   dv = −Σ fᵀVxx (x ⊖ x_trial),   expected decrease α (d₁ + ½ α d₂)
+    /// ```
+    fn judge(&self, search: &mut Search, trials: &mut Trials, i: usize, step: f64, actors: &Actors<'_>) -> Option<f64> {
+        search.step = step;
+        let cost = trials.cost(i)?;
+        let dv = self.curved_gaps.map_or(0.0, |curved| trials.distance(actors, i, self.xs, curved));
+        search.d1 = self.expected[0] + dv;
+        search.d2 = self.expected[1] - 2.0 * dv;
+        search.expected_decrease = step * (search.d1 + 0.5 * step * search.d2);
+        search.decrease = self.cost - cost;
+        search.is_good(self.settings, self.feasible).then_some(cost)
     }
 }
 

@@ -39,17 +39,18 @@ pub struct Settings {
     pub tolerance: f64,
     /// The tolerance of problems with bounds on controls: the expected decrease does not see the bounds' multipliers.
     pub tolerance_bounded: f64,
-    /// A solve ends when this time is over: before derivatives, a sweep or a trial that would end later if it took as long
-    /// as the last of its kind. `None` for no limit. A solve that goes back to a better iterate may take a sweep longer.
+    /// A solve ends when this time is over: before derivatives, a sweep (on several threads: before both) or a trial that
+    /// would end later if it took as long as the last of its kind. `None` for no limit. A solve that goes back to a better iterate may take a sweep longer.
     pub time_budget: Option<Duration>,
     /// The number of segments of the horizon on which a sweep works at the same time: see [`Sweep::set_segments`]. It is
     /// not the number of threads, which are those of rayon's pool, and any number of them finds the same. At most 1024.
     ///
     /// [`Sweep::set_segments`]: crate::Sweep::set_segments
     pub segments: usize,
-    /// Threads on which derivatives are computed, of rayon's pool in which a solve is called, else of the global one. Any
-    /// number finds the same to the last bit. More than 1 need copies of the actions ([`fork`]), which are made when
-    /// there are none yet, or not of a model as it is now. At most 1024.
+    /// Threads that share an iteration, of rayon's pool in which a solve is called, else of the global one: derivatives, and
+    /// beside them the sweep, which stays on the calling thread, and the gains; and a second step length where the first is
+    /// often too long. Any number finds the same to the last bit. More than 1 need copies of the actions ([`fork`]), which are
+    /// made when there are none yet, or not of a model as it is now. At most 1024.
     ///
     /// [`fork`]: crate::ActionModel::fork
     pub threads: usize,

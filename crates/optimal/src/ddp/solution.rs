@@ -69,7 +69,7 @@ pub struct Iteration {
 pub struct Timings {
     /// Dynamics and cost of the warm start.
     pub calc: Duration,
-    /// Derivatives.
+    /// Derivatives; on several threads, as long as the sweep beside them waited or computed some itself.
     pub calc_diff: Duration,
     /// Backward sweeps, repeated ones included.
     pub sweep: Duration,

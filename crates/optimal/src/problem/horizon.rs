@@ -1,6 +1,7 @@
 //! The optimal control problem over a horizon of knots.
 
 use super::action::ActionModel;
+use super::actors::{Actions, Actors};
 use super::models::{Models, check};
 use super::shape::Shape;
 use super::threads::{Copies, Knots};
@@ -404,6 +405,23 @@ impl Problem {
     /// As [`action`](Self::action), to compute with.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
         self.stages.get(t).map_or(&mut *self.terminal, |&stage| self.models.of_mut(stage))
+    }
+
+    /// The actions of all knots.
+    pub(crate) fn actors(&mut self) -> Actors<'_> {
+        let Self { x0, models, stages, terminal, .. } = self;
+        let (actions, places) = models.parts();
+        Actors { x0, stages, places, actions: Actions::Own(actions, &mut **terminal) }
+    }
+
+    /// The actions of all knots, and copies of all but the terminal one, which compute the same on another thread; none if
+    /// there is an action without a copy, or none was made yet.
+    pub(crate) fn two(&mut self) -> Option<[Actors<'_>; 2]> {
+        let Self { x0, models, stages, terminal, copies, .. } = self;
+        let copies = copies.first().filter(|copies| copies.iter().all(Option::is_some))?;
+        let (actions, places) = models.parts();
+        let with = |actions| Actors { x0, stages, places, actions };
+        Some([with(Actions::Own(actions, &mut **terminal)), with(Actions::Copied(copies))])
     }
 
     /// Whether some knot's controls are bounded.

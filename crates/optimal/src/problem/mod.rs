@@ -1,6 +1,7 @@
 //! The optimal control problem: actions, horizons of them, and derivatives of what has none of its own.
 
 mod action;
+mod actors;
 mod autodiff;
 mod horizon;
 mod lqr;
@@ -13,6 +14,7 @@ mod unicycle;
 
 pub use action::ActionModel;
 pub(crate) use action::{differences, hold};
+pub(crate) use actors::Actors;
 pub use autodiff::{AutoDiff, GenericAction};
 pub use horizon::Problem;
 pub use lqr::Lqr;

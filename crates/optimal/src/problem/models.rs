@@ -46,6 +46,11 @@ impl Models {
         all
     }
 
+    /// The actions, and the action that stands for each model.
+    pub(crate) fn parts(&mut self) -> (&mut [Box<dyn ActionModel>], &[[usize; 2]]) {
+        (&mut self.actions, &self.places)
+    }
+
     /// The number of models.
     pub(crate) fn len(&self) -> usize {
         self.places.len()

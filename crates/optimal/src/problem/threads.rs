@@ -33,6 +33,11 @@ pub(crate) struct Copies {
 }
 
 impl Copies {
+    /// The copies that the first of the other threads has, as far as they were made.
+    pub(super) fn first(&mut self) -> Option<&mut [Option<Box<dyn ActionModel>>]> {
+        self.of.first_mut().map(Vec::as_mut_slice)
+    }
+
     /// Drops the copies of a model that may change.
     pub(crate) fn forget(&mut self, model: usize) {
         for copy in self.of.iter_mut().filter_map(|copies| copies.get_mut(model)) {
