@@ -3,10 +3,10 @@
 
     .venv/crocoddyl/bin/python benches/peers/ocp_threads.py [--threads 2] [--rounds 15] [NAME ...]
 
-Three ways, in turn, round after round, on the problems of `ocp_problems.py`: one thread; derivatives on several; and
-besides them the sweep in as many segments. Figures are medians over the rounds of milliseconds in an iteration and, in
-brackets, of the quotient with one thread. Segments change the iterates by rounding only; each way's own iterations are
-counted. Needs as many cores as threads.
+Three ways, in turn, round after round, on the problems of `ocp_problems.py`: one thread; several, with the sweep
+beside the derivatives; and with the sweep in as many segments. Figures are medians over the rounds of milliseconds in
+an iteration and, in brackets, of the quotient with one thread. Segments change the iterates by rounding only; each
+way's own iterations are counted. Needs as many cores as threads.
 """
 
 import argparse
@@ -23,8 +23,8 @@ PHASES = ("total", "derivatives", "sweep", "rollout")
 
 def ways(threads):
     yield "one thread", {}
-    yield f"derivatives on {threads}", {"threads": threads}
-    yield f"and {threads} segments", {"threads": threads, "segments": threads}
+    yield f"{threads} threads", {"threads": threads}
+    yield f"{threads} segments", {"threads": threads, "segments": threads}
 
 
 def solver(spec, robot, settings):

@@ -44,7 +44,6 @@ impl Gains {
         copy_matrix(knot.Quu.as_mut_slice(), m, left, [m, m]);
         copy_matrix(knot.K.as_mut_slice(), n, left.at(m, 0), [n, m]);
         copy_matrix(knot.Qu.as_mut_slice(), 1, left.at(m + n, 0), [1, m]);
-        knot.is_put_off = true;
     }
 
     /// Writes the gains of those knots of which they were put off.
