@@ -106,6 +106,32 @@ fn trials_beside_each_other_find_the_same_bits() {
     assert!(solve(2) == expected, "the global pool");
 }
 
+/// A solver may turn to another problem of the same dimensions, also from one without a robot to one with knots in
+/// inverse-dynamics form.
+#[test]
+fn a_solver_turns_to_another_problem() {
+    let (arm, x0) = (Arc::new(robots::arm7()), [0.1; 14]);
+    let quadratic = |name: &str, residual| Cost::new(name, 1.0, residual, Activation::Quadratic);
+    let state = || quadratic("state", Residual::State { reference: vec![0.0; 14] });
+    let costs = vec![state(), quadratic("effort", Residual::Control { reference: vec![0.0; 7] })];
+    let knot = FreeDynamics::running(arm.clone(), 0.01, costs).unwrap();
+    let end = FreeDynamics::terminal(arm, vec![state()]).unwrap();
+    let mut robot = Problem::new(x0.to_vec(), vec![Box::new(knot)], vec![0; 9], Box::new(end)).unwrap();
+    let mut random = random();
+    let [node, end] = [7, 0].map(|nu| Box::new(Lqr::new(random_node(&mut random, 14, nu))));
+    let other = Problem::new(x0.to_vec(), vec![node], vec![0; 9], end).unwrap();
+    let mut solve = |made_for: Option<&Problem>, threads: usize| {
+        let mut solver = Fddp::new(made_for.unwrap_or(&robot));
+        solver.settings.threads = threads;
+        let mut solution = solver.solve(&mut robot, &x0.repeat(10), &[0.0; 63]).unwrap().clone();
+        solution.timings = Default::default();
+        solution
+    };
+    let expected = solve(None, 1);
+    assert_eq!(expected.status, Status::Converged);
+    assert!(solve(Some(&other), 1) == expected && solve(Some(&other), 2) == expected);
+}
+
 /// A model that was changed is copied anew.
 #[test]
 fn copies_follow_their_models() {

@@ -203,6 +203,9 @@ impl Fddp {
         }
         self.settings.check()?;
         self.solution.shape().check(problem.shape())?;
+        if self.nodes[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.nodes) {
+            self.sweep = Sweep::new(&self.nodes); // the problem that the solver was made for had no such form
+        }
         let bounded = problem.check_bounds()?;
         self.inverse_dynamics = self.settings.inverse_dynamics_form && !bounded && !self.settings.second_order;
         let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };

@@ -40,7 +40,8 @@ pub struct Settings {
     /// The tolerance of problems with bounds on controls: the expected decrease does not see the bounds' multipliers.
     pub tolerance_bounded: f64,
     /// A solve ends when this time is over: before derivatives, a sweep (on several threads: before both) or a trial that
-    /// would end later if it took as long as the last of its kind. `None` for no limit. A solve that goes back to a better iterate may take a sweep longer.
+    /// would end later if it took as long as the last of its kind. `None` for no limit. A solve that goes back to a better
+    /// iterate may take a sweep longer.
     pub time_budget: Option<Duration>,
     /// The number of segments of the horizon on which a sweep works at the same time: see [`Sweep::set_segments`]. It is
     /// not the number of threads, which are those of rayon's pool, and any number of them finds the same. At most 1024.

@@ -23,10 +23,14 @@ pub(crate) struct Gains {
 }
 
 impl Gains {
-    /// Scratch for n states and at most m controls.
+    /// Scratch for knots of n states and at most m controls.
     pub(super) fn new(n: usize, m: usize) -> Self {
-        let left = vec![0.0; (m + n + 1 + SLACK) * m];
-        Self { rows: vec![0.0; (m + SLACK) * (m + n)], left, y: vec![0.0; 2 * m + SLACK] }
+        Self { rows: vec![0.0; (m + SLACK) * (m + n)], left: Vec::new(), y: vec![0.0; 2 * m + SLACK] }
+    }
+
+    /// The same, with room for gains that were put off.
+    pub(super) fn to_finish(n: usize, m: usize) -> Self {
+        Self { left: vec![0.0; (m + n + 1 + SLACK) * m], ..Self::new(n, m) }
     }
 
     /// Writes the gains of a knot, from [L; X; yᵀ].

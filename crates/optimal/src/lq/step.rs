@@ -46,6 +46,11 @@ impl Sizes {
             inverse_dynamics: InverseDynamics::room(nodes),
         }
     }
+
+    /// The most controls of knots in inverse-dynamics form: 0 if there is no such knot.
+    pub(super) fn solved_controls(self) -> usize {
+        if self.inverse_dynamics[0] > 0 { self.m } else { 0 }
+    }
 }
 
 /// A step of the recursion, with its workspace.
@@ -73,7 +78,7 @@ impl Step {
             work: Workspace::new(n, m, below.max(Driven::rows_below(n, m))),
             keep: true,
             puts_off: false,
-            forms: Forms::new(n, m, inverse_dynamics),
+            forms: Forms::new(n, sizes.solved_controls(), inverse_dynamics),
             controls: Controls::new(m),
             hessians: curved.into_iter().map(|nu| Hessian::zeros(n, nu)).collect(),
         }

@@ -182,7 +182,7 @@ impl Sweep {
     /// others [`Step::back`], what it finds, and scratch in which `threads` threads write the gains that the steps put off.
     pub(crate) fn parts(&mut self, threads: usize) -> (&mut Step, &mut [LqKnot], &mut [Gains]) {
         let Self { knots, step, gains, sizes, .. } = self;
-        gains.resize_with(threads, || Gains::new(sizes.n, sizes.m));
+        gains.resize_with(threads, || Gains::to_finish(sizes.n, sizes.solved_controls()));
         step.puts_off = true;
         (step, knots, gains)
     }

@@ -381,16 +381,18 @@ impl Problem {
         self.models.actions.iter().map(|model| model.motion_size()).max().unwrap_or(0)
     }
 
-    /// Makes room in nodes for the equations of inverse dynamics, wherever in the horizon their actions come to serve.
-    pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) {
+    /// Makes room in nodes for the equations of inverse dynamics, wherever in the horizon their actions come to serve; says
+    /// whether one has them.
+    pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) -> bool {
         let sizes = self.models.actions.iter().filter_map(|model| model.inverse_dynamics_form());
-        let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return };
+        let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return false };
         let (nv, horizon, motion) = (self.ndx() / 2, self.horizon(), self.motion_size());
         for node in &mut nodes[..horizon] {
             let nu = node.nu();
             node.inverse_dynamics.reserve(nv, nu, most);
             node.inverse_dynamics.motion.resize(motion, 0.0);
         }
+        true
     }
 
     pub(crate) fn shape(&self) -> &Shape {

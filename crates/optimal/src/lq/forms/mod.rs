@@ -70,7 +70,7 @@ pub(super) struct Forms {
 }
 
 impl Forms {
-    /// Room for n states, at most m controls, and for inverse dynamics as of [`InverseDynamics::room`].
+    /// Room for n states, and for inverse dynamics with at most m controls as of [`InverseDynamics::room`].
     pub(super) fn new(n: usize, m: usize, room: [usize; 3]) -> Self {
         let (euler, inverse_dynamics) = (Euler::new(n), InverseDynamics::new(room, n, m));
         Self { dense: Dense, euler, inverse_dynamics, driven: Driven::new(n) }
