@@ -2611,8 +2611,8 @@ class Fddp:
         `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
         `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
         there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
-        `threads`: the number of threads on which derivatives of a robot are computed, 1 unless given, at most 1024. The
-        results are the same to the last bit.
+        `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep beside
+        them), 1 unless given, at most 1024. The results are the same to the last bit.
         `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`, `accept`,
         `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
         `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of
