@@ -135,7 +135,7 @@ impl Step {
                 false => SweepError::NotFinite { knot: t },
             })?;
         work.take_value(work.stride(node.nu()), eliminated, form.turn(node.ndx()));
-        knot.is_put_off = *puts_off && form.put_off_gains(work, node, knot);
+        knot.is_put_off = *puts_off && node.nu() > 0 && form.put_off_gains(work, node, knot);
         if !knot.is_put_off {
             form.recover_gains(work, controls, node, knot);
         }
