@@ -244,29 +244,28 @@ impl Vectorized for Run<'_> {
         }
         form.own.extend(e.runs[0].iter());
         let size = form.stride;
-        let gather = Gather { runs: &e.runs, states: nv + rows..3 * nv + rows, m: nv - e.passive };
+        let gather = Gather { runs: &e.runs, states: nv + rows..3 * nv + rows, m: nv - e.passive, stride, size };
 
         // U; the dependent steps D; the dependent forces
         form.efforts.resize(gather.m, size);
-        for (row, to) in motion.chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
-            gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
-        }
+        gather.rows::<V>(&motion[..gather.m * stride], [1.0 / dt, 1.0, 1.0], &mut form.efforts.numbers);
         form.dependent.clear();
         form.dependent.extend(e.pivots.iter().copied().filter(|k| *k < nv));
         form.steps.resize(form.dependent.len(), size);
         e.forces.resize(solved - form.dependent.len(), size);
-        let (mut step, mut force) = (0, 0);
-        for (r, &k) in e.pivots.iter().enumerate() {
-            let row = &T[r * stride..][..stride];
-            if k < nv {
-                gather.row::<V>(row, [-1.0, -dt, -dt], &mut form.steps.numbers[step * size..][..size]);
-                e.place[k] = Place::Row(step);
-                step += 1;
-            } else {
-                gather.row::<V>(row, [-1.0 / dt, -1.0, -1.0], &mut e.forces.numbers[force * size..][..size]);
-                e.place[k] = Place::Row(force);
-                force += 1;
+        let (mut T, mut written) = (&*T, [0, 0]); // steps, forces
+        for alike in e.pivots.chunk_by(|one, other| (*one < nv) == (*other < nv)) {
+            let (some, rest) = T.split_at(alike.len() * stride);
+            let (of, to, by) = match alike[0] < nv {
+                true => (0, &mut form.steps, [-1.0, -dt, -dt]),
+                false => (1, &mut e.forces, [-1.0 / dt, -1.0, -1.0]),
+            };
+            let first = written[of];
+            gather.rows::<V>(some, by, &mut to.numbers[first * size..][..alike.len() * size]);
+            for (i, &k) in alike.iter().enumerate() {
+                e.place[k] = Place::Row(first + i);
             }
+            (T, written[of]) = (rest, first + alike.len());
         }
         form.steps.mark(size);
         *done = true;
@@ -279,15 +278,21 @@ struct Gather<'a> {
     /// The columns of (δv, δq).
     states: Range<usize>,
     m: usize,
+    /// From one row to the next, before and after.
+    stride: usize,
+    size: usize,
 }
 
 impl Gather<'_> {
-    /// Writes a row's unknowns and states: what one part writes too much, the next goes over.
+    /// Writes the unknowns and states of some rows: what one part writes too much, the next goes over.
     #[inline(always)]
-    fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
-        self.runs[0].copy_scaled::<V>(row, by_a, to);
-        self.runs[1].copy_scaled::<V>(row, by_f, to);
-        copy_scaled::<V>(&mut to[self.m..], &row[self.states.clone()], by_x);
+    fn rows<V: Vector>(&self, rows: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
+        let Self { runs, states, m, stride, size } = self;
+        runs[0].copy_scaled::<V>(rows, *stride, by_a, to, *size);
+        runs[1].copy_scaled::<V>(rows, *stride, by_f, to, *size);
+        for (row, to) in rows.chunks_exact(*stride).zip(to.chunks_exact_mut(*size)) {
+            copy_scaled::<V>(&mut to[*m..], &row[states.clone()], by_x);
+        }
     }
 }
 
