@@ -47,10 +47,10 @@ pub fn mask(row: &[f64]) -> u64 {
     mask | u64::from(any(&last)) << (fours.len() >> wide)
 }
 
-/// Whether one of four numbers is not zero: one that has a bit beside its sign, as a NaN has.
+/// Whether one of four numbers is not zero, as a NaN is not.
 #[inline(always)]
 fn any(x: &[f64; 4]) -> bool {
-    (x[0].to_bits() | x[1].to_bits() | x[2].to_bits() | x[3].to_bits()) << 1 != 0
+    (x[0] != 0.0) | (x[1] != 0.0) | (x[2] != 0.0) | (x[3] != 0.0)
 }
 
 /// y −= Σ aᵢ xᵢ in whole registers: less than one at the end, if there is less, stays.

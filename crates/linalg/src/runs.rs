@@ -41,29 +41,23 @@ impl Runs {
         self.runs.iter().copied()
     }
 
-    /// Writes a times the numbers of some rows, `stride` apart, to their places in as many rows that are `to_stride` apart,
-    /// whole registers at a time: what is behind a run may change, up to [`SLACK`] numbers, and the run after it goes over
-    /// that.
+    /// Writes a times the numbers of a row to their places, whole registers at a time: what is behind a run may change, up to
+    /// [`SLACK`] numbers, and the run after it goes over that.
     ///
     /// # Panics
-    /// If a row has not all places and slack behind them, or the rows are not as many.
+    /// If one of the rows has not all places and slack behind them.
     #[inline(always)]
-    pub fn copy_scaled<V: Vector>(&self, rows: &[f64], stride: usize, a: f64, to: &mut [f64], to_stride: usize) {
-        let count = rows.len() / stride;
-        assert!(self.ends[0] + SLACK <= stride && self.ends[1] + SLACK <= to_stride, "rows without slack");
-        assert!(to.len() == count * to_stride, "as many rows");
+    pub fn copy_scaled<V: Vector>(&self, row: &[f64], a: f64, to: &mut [f64]) {
+        assert!(self.ends[0] + SLACK <= row.len() && self.ends[1] + SLACK <= to.len(), "rows without slack");
         let a = V::splat(a);
         for &[from, place, length] in &self.runs {
             let mut i = 0;
             while i < length {
-                for k in 0..count {
-                    let (from, place) = (k * stride + from + i, k * to_stride + place + i);
-                    // SAFETY: there are `count` rows, and i is in the run, which ends `SLACK` numbers before its rows do; a
-                    // register has no more than these and one.
-                    unsafe {
-                        let x = V::load(rows.get_unchecked(from..from + V::N));
-                        x.mul(a).store(to.get_unchecked_mut(place..place + V::N));
-                    }
+                // SAFETY: i is in the run, which ends `SLACK` numbers before its rows do, and a register has no more than these
+                // and one.
+                unsafe {
+                    let x = V::load(row.get_unchecked(from + i..from + i + V::N));
+                    x.mul(a).store(to.get_unchecked_mut(place + i..place + i + V::N));
                 }
                 i += V::N;
             }

@@ -7,7 +7,7 @@
 
 use super::kkt_elimination::Tableau;
 use super::limb_elimination::{
-    LimbElimination, invert_limbs, restore, solve_limbs, write_drift, write_jacobian, write_motion,
+    LimbElimination, invert_blocks, restore, solve_blocks, write_drift, write_jacobian, write_motion,
 };
 use crate::robot::actuation::Actuation;
 use crate::robot::contact::{Contact, SHARED, constraint_set};
@@ -95,13 +95,13 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
         let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
         let lambda = zeros(rows);
-        let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Arc::default());
+        let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Default::default());
         Self { data, pass, surplus, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
     /// Makes room for the equations of knots in inverse-dynamics form.
-    pub(crate) fn reserve(&mut self, tableau: Tableau, limbs: &Arc<LimbElimination>) {
-        self.linear = LinearEquations::new(tableau, limbs.clone());
+    pub(crate) fn reserve(&mut self, tableau: Tableau, stages: [Arc<LimbElimination>; 2]) {
+        self.linear = LinearEquations::new(tableau, stages);
     }
 
     /// Computes the dynamics of some knots at their states, where the data of each holds what its controls drive; and what
@@ -190,7 +190,13 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         self.visited = true;
     }
 
-    /// The equations that accelerations and forces satisfy, which are known, with the limbs solved.
+    /// The equations of some knots at their states, for the accelerations and forces that the data of each holds.
+    pub(crate) fn run_equations_at(&mut self, model: &Model, xs: &[f64], to: &mut [KnotData]) {
+        self.pack(model, xs, to);
+        self.run_equations(model, to);
+    }
+
+    /// The equations that accelerations and forces satisfy, which are known, with the limbs and the base solved.
     fn run_equations(&mut self, model: &Model, to: &mut [KnotData]) {
         let Self { data, pass, q, v, a, lambda, linear, .. } = self;
         pack(to.len(), |k| &to[k].a, a);
@@ -210,7 +216,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
                 write_motion(linear.size, d.dtau_da, d.dtau_dv, d.dtau_dq, &mut linear.tableau);
             }
         }
-        linear.solve_limbs(to);
+        linear.solve(to);
         self.visited = true;
     }
 
@@ -266,36 +272,45 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
 #[derive(Debug)]
 struct LinearEquations<S> {
     size: Tableau,
-    limbs: Arc<LimbElimination>,
+    /// What is solved, one after the other: the limbs, and the base.
+    stages: [Arc<LimbElimination>; 2],
     tableau: Vec<S>,
-    /// The tableau as it was written.
+    /// The tableau before a stage.
     before: Vec<S>,
-    /// B⁻¹ of each limb.
+    /// B⁻¹ of each block of a stage, and Y of one.
     inverses: Vec<S>,
+    Y: Vec<S>,
 }
 
 impl<S: Block<Number = f64>> LinearEquations<S> {
-    fn new(size: Tableau, limbs: Arc<LimbElimination>) -> Self {
-        let (tableau, inverses) = (vec![S::zero(); size.len()], vec![S::zero(); limbs.room()]);
-        Self { size, limbs, before: tableau.clone(), tableau, inverses }
+    fn new(size: Tableau, stages: [Arc<LimbElimination>; 2]) -> Self {
+        let most = |room: fn(&LimbElimination) -> usize| stages.iter().map(|stage| room(stage)).max().unwrap_or(0);
+        let zeros = |n| vec![S::zero(); n];
+        let (inverses, Y) = (zeros(most(LimbElimination::room)), zeros(most(LimbElimination::columns)));
+        Self { size, stages, tableau: zeros(size.len()), before: zeros(size.len()), inverses, Y }
     }
 
-    /// Solves the limbs of the knots where that can be, and writes the equations to the data of each.
-    fn solve_limbs(&mut self, to: &mut [KnotData]) {
-        let Self { size, limbs, tableau, before, inverses } = self;
-        let (mut regular, mut each) = (S::zero(), [0.0; WIDEST]);
-        invert_limbs(limbs, *size, tableau, inverses, &mut regular);
-        scatter(core::slice::from_ref(&regular), to.len(), &mut each);
-        for (to, regular) in to.iter_mut().zip(each) {
-            to.limbs_solved = regular == 1.0;
-        }
-        let all = to.iter().all(|to| to.limbs_solved);
-        if !all {
-            before.copy_from_slice(tableau);
-        }
-        solve_limbs(limbs, *size, tableau, inverses);
-        if !all {
-            restore(regular, before, tableau);
+    /// Solves the limbs and the base of the knots where that can be, and writes the equations to the data of each.
+    fn solve(&mut self, to: &mut [KnotData]) {
+        let Self { size, stages, tableau, before, inverses, Y } = self;
+        let mut solvable = S::one();
+        to.iter_mut().for_each(|to| to.stages = 0);
+        for stage in stages {
+            let (mut regular, mut each) = (S::zero(), [0.0; WIDEST]);
+            invert_blocks(stage, *size, tableau, inverses, &mut regular);
+            solvable = solvable * regular;
+            scatter(core::slice::from_ref(&solvable), to.len(), &mut each);
+            for (to, solvable) in to.iter_mut().zip(each) {
+                to.stages += usize::from(solvable == 1.0);
+            }
+            let all = each[..to.len()].iter().all(|each| *each == 1.0);
+            if !all {
+                before.copy_from_slice(tableau);
+            }
+            solve_blocks(stage, *size, tableau, inverses, Y);
+            if !all {
+                restore(solvable, before, tableau);
+            }
         }
         unpack(tableau, to, |to| &mut to.equations);
     }

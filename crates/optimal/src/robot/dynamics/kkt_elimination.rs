@@ -11,11 +11,10 @@
 //! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those that
 //! it may best do without. A contact's rows prefer joints that move no other contact; where these are close to singular
 //! (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are redundant is there
-//! no pivot, and the knot stays explicit. What the limbs in contact do is mostly solved before, for several knots side by
-//! side: see [`limb_elimination`](super::limb_elimination).
+//! no pivot, and the knot stays explicit. What the limbs in contact do, and then the base, is mostly solved before, for several
+//! knots side by side: see [`limb_elimination`](super::limb_elimination).
 #![allow(non_snake_case)] // J, M, T, U, D
 
-use super::limb_elimination::LimbElimination;
 use crate::lq::InverseDynamicsForm;
 use crate::robot::capabilities::Output;
 use crate::robot::knot::Sensitivities;
@@ -59,13 +58,15 @@ pub(crate) struct KktElimination {
     passive: usize,
     /// The coordinates that each contact's row prefers.
     preferred: Vec<Vec<usize>>,
-    /// The rows that limbs were solved for, each with its column.
-    limbs: Vec<(usize, usize)>,
+    /// The rows that are solved before, those of the limbs and those of the base, each with its column.
+    before: [Vec<(usize, usize)>; 2],
     /// The column that each row was solved for.
     pivots: Vec<usize>,
     /// The rows that are solved here.
     late: Vec<usize>,
-    /// The place of each column of δa and δf: its unknown, if it is one, or else the row that was solved for it.
+    /// The pivots for which places and runs were found.
+    laid_out: Vec<usize>,
+    /// The place of each column of δa and δf: its unknown, if it is one, or else the row of D or of forces for it.
     place: Vec<Place>,
     /// From the columns of δa, and of δf, to the unknowns that they are.
     runs: [Runs; 2],
@@ -88,23 +89,39 @@ pub(super) fn own_coordinates(moved_by: &[Vec<usize>], r: usize, passive: usize)
 impl KktElimination {
     /// The elimination for contacts whose rows are moved by some coordinates each, of a robot whose first `passive`
     /// coordinates are not driven.
-    pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>], limbs: &LimbElimination) -> Self {
+    pub(crate) fn new(nv: usize, passive: usize, moved_by: &[Vec<usize>]) -> Self {
         let rows = moved_by.len();
         let preferred = (0..rows).map(|r| {
             let own = own_coordinates(moved_by, r, passive);
             if own.is_empty() { moved_by[r].iter().copied().filter(|k| *k >= passive).collect() } else { own }
         });
-        Self {
+        let numbers = || Vec::with_capacity(rows + passive);
+        let mut elimination = Self {
             tableau: Tableau { nv, rows },
             passive,
             preferred: preferred.collect(),
-            limbs: limbs.solved().collect(),
-            pivots: Vec::with_capacity(rows + passive),
-            late: Vec::with_capacity(rows + passive),
+            before: Default::default(),
+            pivots: numbers(),
+            late: numbers(),
+            laid_out: numbers(),
             place: vec![Place::Unknown(0); nv + rows],
             runs: [Runs::with_capacity(nv), Runs::with_capacity(rows)],
             forces: SparseRows::default(),
-        }
+        };
+        elimination.lay_out();
+        elimination
+    }
+
+    /// What is solved before, from now on: see [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
+    pub(crate) fn follow(&mut self, before: [Vec<(usize, usize)>; 2]) {
+        self.before = before;
+    }
+
+    /// The columns that the rows of the base are best solved for in a tableau whose limbs are solved.
+    pub(crate) fn base_pivots(&mut self, tableau: &mut [f64]) -> Option<Vec<usize>> {
+        let (mut form, Tableau { nv, rows }) = (InverseDynamicsForm::default(), self.tableau);
+        form.reserve(nv, nv - self.passive, [self.most_dependent(), 0]);
+        self.run(tableau, 1, 1.0, &mut form).then(|| self.pivots[rows..].to_vec())
     }
 
     /// The most coordinates that are not unknowns.
@@ -112,11 +129,11 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau of which the limbs are solved or are not; says whether there were
-    /// pivots. Overwrites the tableau.
-    pub(crate) fn run(&mut self, tableau: &mut [f64], limbs: bool, dt: f64, form: &mut InverseDynamicsForm) -> bool {
+    /// Writes U and D for steps of Δt, from a tableau of which no stage, the limbs, or the base as well are solved; says
+    /// whether there were pivots. Overwrites the tableau.
+    pub(crate) fn run(&mut self, tableau: &mut [f64], stages: usize, dt: f64, form: &mut InverseDynamicsForm) -> bool {
         let mut done = false;
-        at_level(Run { elimination: self, T: tableau, limbs, dt, form, done: &mut done });
+        at_level(Run { elimination: self, T: tableau, stages, dt, form, done: &mut done });
         done
     }
 
@@ -155,47 +172,35 @@ impl KktElimination {
     }
 }
 
-struct Run<'a> {
-    elimination: &'a mut KktElimination,
-    T: &'a mut [f64],
-    limbs: bool,
-    dt: f64,
-    form: &'a mut InverseDynamicsForm,
-    done: &'a mut bool,
-}
-
 /// How many rows are subtracted at once: as many as those of a base that moves freely.
 const TOGETHER: usize = 6;
 
-impl Vectorized for Run<'_> {
+impl KktElimination {
+    /// Solves the rows that have no pivot yet; says whether all have one now.
     #[inline(always)]
-    fn run<V: Vector>(self) {
-        let Self { elimination: e, T, limbs, dt, form, done } = self;
-        let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
-        let solved = rows + e.passive;
+    fn eliminate<V: Vector>(&mut self, T: &mut [f64], motion: &mut [f64]) -> bool {
+        let (Tableau { nv, rows }, stride) = (self.tableau, self.tableau.stride());
         let mut force_scale = 0.0_f64;
-        for r in rows..solved {
-            force_scale = force_scale.max(max_abs(&T[r * stride + nv..][..rows]));
+        for row in T.chunks_exact(stride).skip(rows) {
+            force_scale = force_scale.max(max_abs(&row[nv..][..rows]));
         }
-        e.place.fill(Place::Unknown(0));
-        e.pivots.clear();
-        e.pivots.resize(solved, usize::MAX);
-        for &(r, k) in e.limbs.iter().filter(|_| limbs) {
-            (e.place[k], e.pivots[r]) = (Place::Row(r), k);
+        self.laid_out.clear(); // what follows writes to the places
+        self.place.fill(Place::Unknown(0));
+        for (r, &k) in self.pivots.iter().enumerate().filter(|(_, k)| **k != usize::MAX) {
+            self.place[k] = Place::Row(r);
         }
-        e.late.clear();
-        let (T, motion) = T.split_at_mut(solved * stride);
-        for r in 0..solved {
-            if e.pivots[r] != usize::MAX {
+        self.late.clear();
+        for r in 0..self.pivots.len() {
+            if self.pivots[r] != usize::MAX {
                 continue;
             }
             let (before, rest) = T.split_at_mut(r * stride);
             let (row, after) = rest.split_at_mut(stride);
             // what the entries of a row that depends on others are compared with: a contact's are of order one
             let scale = if r < rows { [1.0, 1.0] } else { [max_abs(&row[..nv]), force_scale] };
-            let Some(k) = e.choose(r, row, scale) else { return };
-            e.place[k] = Place::Row(r);
-            e.pivots[r] = k;
+            let Some(k) = self.choose(r, row, scale) else { return false };
+            self.place[k] = Place::Row(r);
+            self.pivots[r] = k;
             let inverse = row[k].recip();
             for x in row.iter_mut() {
                 *x *= inverse;
@@ -209,13 +214,13 @@ impl Vectorized for Run<'_> {
                     }
                 }
             }
-            e.late.push(r);
+            self.late.push(r);
         }
         // what the rows were solved for goes out of the joints' rows, several at once
-        for other in motion.chunks_exact_mut(stride).take(if e.late.is_empty() { 0 } else { nv }) {
+        for other in motion.chunks_exact_mut(stride) {
             let (mut x, mut a, mut count) = ([&T[..stride]; TOGETHER], [0.0; TOGETHER], 0);
-            for &r in &e.late {
-                let factor = other[e.pivots[r]];
+            for &r in &self.late {
+                let factor = other[self.pivots[r]];
                 if factor == 0.0 {
                     continue;
                 }
@@ -229,43 +234,77 @@ impl Vectorized for Run<'_> {
                 subtract_rows::<V, TOGETHER>(other, x, a);
             }
         }
+        true
+    }
 
-        // the columns that are left are the unknowns
-        let mut unknowns = 0;
-        e.runs.iter_mut().for_each(Runs::clear);
-        form.own.clear();
-        for k in 0..nv + rows {
-            if matches!(e.place[k], Place::Row(_)) {
-                continue;
-            }
-            e.place[k] = Place::Unknown(unknowns);
-            e.runs[usize::from(k >= nv)].push(k, unknowns);
-            unknowns += 1;
+    /// Finds the place of each column: the columns without a row are the unknowns.
+    fn lay_out(&mut self) {
+        let Self { tableau: Tableau { nv, rows }, pivots, place, runs, .. } = self;
+        runs.iter_mut().for_each(Runs::clear);
+        place.fill(Place::Unknown(0));
+        let (mut solved, mut unknowns) = ([0, 0], 0);
+        for &k in &*pivots {
+            let count = &mut solved[usize::from(k >= *nv)];
+            place[k] = Place::Row(*count);
+            *count += 1;
         }
-        form.own.extend(e.runs[0].iter());
+        for k in 0..*nv + *rows {
+            if let Place::Unknown(place) = &mut place[k] {
+                *place = unknowns;
+                runs[usize::from(k >= *nv)].push(k, unknowns);
+                unknowns += 1;
+            }
+        }
+        self.laid_out.clone_from(pivots);
+    }
+}
+
+struct Run<'a> {
+    elimination: &'a mut KktElimination,
+    T: &'a mut [f64],
+    stages: usize,
+    dt: f64,
+    form: &'a mut InverseDynamicsForm,
+    done: &'a mut bool,
+}
+
+impl Vectorized for Run<'_> {
+    #[inline(always)]
+    fn run<V: Vector>(self) {
+        let Self { elimination: e, T, stages, dt, form, done } = self;
+        let (Tableau { nv, rows }, stride) = (e.tableau, e.tableau.stride());
+        let solved = rows + e.passive;
+        e.pivots.clear();
+        e.pivots.resize(solved, usize::MAX);
+        e.before[..stages].iter().flatten().for_each(|(r, k)| e.pivots[*r] = *k);
+        let (T, motion) = T.split_at_mut(solved * stride);
+        if e.pivots.contains(&usize::MAX) && !e.eliminate::<V>(T, motion) {
+            return;
+        }
+        if e.pivots != e.laid_out {
+            e.lay_out();
+        }
         let size = form.stride;
-        let gather = Gather { runs: &e.runs, states: nv + rows..3 * nv + rows, m: nv - e.passive, stride, size };
+        let gather = Gather { runs: &e.runs, states: nv + rows..3 * nv + rows, m: nv - e.passive };
 
         // U; the dependent steps D; the dependent forces
+        form.own.clear();
+        form.own.extend(e.runs[0].iter());
         form.efforts.resize(gather.m, size);
-        gather.rows::<V>(&motion[..gather.m * stride], [1.0 / dt, 1.0, 1.0], &mut form.efforts.numbers);
+        for (row, to) in motion.chunks_exact(stride).zip(form.efforts.numbers.chunks_exact_mut(size)) {
+            gather.row::<V>(row, [1.0 / dt, 1.0, 1.0], to);
+        }
         form.dependent.clear();
         form.dependent.extend(e.pivots.iter().copied().filter(|k| *k < nv));
         form.steps.resize(form.dependent.len(), size);
         e.forces.resize(solved - form.dependent.len(), size);
-        let (mut T, mut written) = (&*T, [0, 0]); // steps, forces
-        for alike in e.pivots.chunk_by(|one, other| (*one < nv) == (*other < nv)) {
-            let (some, rest) = T.split_at(alike.len() * stride);
-            let (of, to, by) = match alike[0] < nv {
-                true => (0, &mut form.steps, [-1.0, -dt, -dt]),
-                false => (1, &mut e.forces, [-1.0 / dt, -1.0, -1.0]),
+        let [mut steps, mut forces] = [&mut form.steps, &mut e.forces].map(|to| to.numbers.chunks_exact_mut(size));
+        for (row, &k) in T.chunks_exact(stride).zip(&e.pivots) {
+            let (to, by) = match k < nv {
+                true => (&mut steps, [-1.0, -dt, -dt]),
+                false => (&mut forces, [-1.0 / dt, -1.0, -1.0]),
             };
-            let first = written[of];
-            gather.rows::<V>(some, by, &mut to.numbers[first * size..][..alike.len() * size]);
-            for (i, &k) in alike.iter().enumerate() {
-                e.place[k] = Place::Row(first + i);
-            }
-            (T, written[of]) = (rest, first + alike.len());
+            gather.row::<V>(row, by, to.next().expect("a row for each pivot"));
         }
         form.steps.mark(size);
         *done = true;
@@ -278,21 +317,15 @@ struct Gather<'a> {
     /// The columns of (δv, δq).
     states: Range<usize>,
     m: usize,
-    /// From one row to the next, before and after.
-    stride: usize,
-    size: usize,
 }
 
 impl Gather<'_> {
-    /// Writes the unknowns and states of some rows: what one part writes too much, the next goes over.
+    /// Writes a row's unknowns and states: what one part writes too much, the next goes over.
     #[inline(always)]
-    fn rows<V: Vector>(&self, rows: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
-        let Self { runs, states, m, stride, size } = self;
-        runs[0].copy_scaled::<V>(rows, *stride, by_a, to, *size);
-        runs[1].copy_scaled::<V>(rows, *stride, by_f, to, *size);
-        for (row, to) in rows.chunks_exact(*stride).zip(to.chunks_exact_mut(*size)) {
-            copy_scaled::<V>(&mut to[*m..], &row[states.clone()], by_x);
-        }
+    fn row<V: Vector>(&self, row: &[f64], [by_a, by_f, by_x]: [f64; 3], to: &mut [f64]) {
+        self.runs[0].copy_scaled::<V>(row, by_a, to);
+        self.runs[1].copy_scaled::<V>(row, by_f, to);
+        copy_scaled::<V>(&mut to[self.m..], &row[self.states.clone()], by_x);
     }
 }
 

@@ -8,10 +8,11 @@
 //! Y = B⁻¹ J,     M_i ← M_i − M_il Y     for each row i of the equations that the limb is in
 //! ```
 //!
-//! Which rows and columns these are depends on the robot and its contacts only, so it is found once; the numbers are worked
-//! on for as many knots as a vector has lanes. A robot that touches nothing is solved for its base's accelerations in the
-//! same way. Where B is close to singular in some knot (a straight knee), that knot keeps the equations as they were, and
-//! its pivots are chosen one by one.
+//! Then the base's rows are solved for forces, and for accelerations where the contacts' forces cannot do all, in the same way.
+//! Which rows and columns all these are depends on the robot and its contacts only, so it is found once (what the base is
+//! solved for at some posture); the numbers are worked on for as many knots as a vector has lanes. A robot that touches nothing
+//! is solved for its base's accelerations. Where B is close to singular in some knot (a straight knee), that knot keeps the
+//! equations as they were, and its pivots are chosen one by one.
 #![allow(non_snake_case)] // B, J, M, T, Y
 
 use super::kkt_elimination::{PREFERENCE, Tableau, own_coordinates};
@@ -19,81 +20,149 @@ use crate::robot::contact::path;
 use condyle_dynamics::Model;
 use condyle_spatial::{Matrix, Scalar, alike, kernel};
 use core::ops::Range;
+use std::sync::Arc;
 
 /// How many rows are solved together: those of a point and of a sole, or of a base that moves freely.
 const SIZES: [usize; 2] = [3, 6];
 const MOST: usize = SIZES[1];
-/// B of a base is positive definite: a pivot so much smaller than its row's largest entry is rounding.
+/// B of a base that touches nothing is positive definite: a pivot so much smaller than its row's largest entry is rounding.
 const DEFINITE: f64 = 1e-9;
+/// The columns of a base in contact are those of another posture: fewer digits are lost than there are to lose.
+const OF_ANOTHER: f64 = 1e-3;
 
-/// Some rows of the tableau that are solved for as many coordinates.
+/// Some rows of the tableau that are solved for as many columns.
 #[derive(Clone, Debug, PartialEq)]
-struct Limb {
+struct Block {
     /// The rows.
     rows: Range<usize>,
-    /// The coordinates.
+    /// The columns: of coordinates, or of forces.
     solved: Vec<usize>,
     /// The other columns in which the rows have entries, in runs.
     columns: Vec<Range<usize>>,
-    /// The other rows in which the coordinates have entries.
+    /// The other rows in which the solved columns have entries.
     others: Vec<usize>,
+    /// The columns, of both kinds, in which a row's largest entry is looked for.
+    compared: Vec<usize>,
     /// The least pivot of B, over the row's largest entry.
     least: f64,
 }
 
-/// The limbs of a robot in contact, and where their entries are.
+/// Where a tableau has entries.
+#[derive(Debug)]
+struct Pattern {
+    width: usize,
+    has: Vec<bool>,
+}
+
+impl Pattern {
+    /// The entries for contacts whose rows are moved by some coordinates each, with damping or without.
+    fn new(model: &Model, tableau: Tableau, moved_by: &[Vec<usize>], damped: bool) -> Self {
+        let (Tableau { nv, rows }, coupled) = (tableau, coupled(model));
+        let width = 3 * nv + rows;
+        let mut pattern = Self { width, has: vec![false; (nv + rows) * width] };
+        for (r, moved) in moved_by.iter().enumerate() {
+            for &k in moved {
+                for column in [k, nv + rows + k, 2 * nv + rows + k] {
+                    pattern.has[r * width + column] = true; // J, c_v, c_q
+                }
+                pattern.has[(rows + k) * width + nv + r] = true; // −Jᵀ
+            }
+            pattern.has[r * width + nv + r] |= damped;
+        }
+        for (i, j) in (0..nv).flat_map(|i| (0..nv).map(move |j| (i, j))).filter(|(i, j)| coupled[i * nv + j]) {
+            for column in [j, nv + rows + j, 2 * nv + rows + j] {
+                pattern.has[(rows + i) * width + column] = true; // M, r_v, r_q
+            }
+        }
+        pattern
+    }
+
+    /// Some rows, solved for as many columns; the entries are those afterwards.
+    fn solve(&mut self, rows: Range<usize>, solved: Vec<usize>, compared: Range<usize>, least: f64) -> Block {
+        let Self { width, has } = self;
+        let mut all = vec![false; *width];
+        for row in has.chunks_exact(*width).skip(rows.start).take(rows.len()) {
+            all.iter_mut().zip(row).for_each(|(all, has)| *all |= has);
+        }
+        solved.iter().for_each(|&k| all[k] = false);
+        let mut others = Vec::new();
+        for (i, row) in has.chunks_exact_mut(*width).enumerate() {
+            let own = rows.contains(&i);
+            if !own && !solved.iter().any(|&k| row[k]) {
+                continue;
+            }
+            row.iter_mut().zip(&all).for_each(|(has, all)| *has |= all);
+            solved.iter().for_each(|&k| row[k] = false);
+            if own {
+                row[solved[i - rows.start]] = true; // 1
+            } else {
+                others.push(i);
+            }
+        }
+        let columns = runs((0..*width).filter(|&k| all[k]));
+        let compared = compared.filter(|&k| all[k]).chain(solved.iter().copied()).collect();
+        Block { rows, solved, columns, others, compared, least }
+    }
+}
+
+/// The rows of a robot in contact that are solved side by side, and where their entries are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct LimbElimination {
-    limbs: Vec<Limb>,
+    blocks: Vec<Block>,
 }
 
 alike!(LimbElimination);
 
 impl LimbElimination {
     /// The limbs of a robot whose first `passive` coordinates are not driven, for contacts whose rows are moved by some
-    /// coordinates each, with damping or without.
-    pub(crate) fn new(model: &Model, passive: usize, moved_by: &[Vec<usize>], damped: bool) -> Self {
+    /// coordinates each, with damping or without; and then the base, for columns that are found for the limbs.
+    pub(crate) fn new(
+        model: &Model,
+        passive: usize,
+        moved_by: &[Vec<usize>],
+        damped: bool,
+        base: impl FnOnce(&Arc<Self>) -> Option<Vec<usize>>,
+    ) -> [Arc<Self>; 2] {
         let (nv, rows) = (model.nv(), moved_by.len());
-        let coupled = coupled(model);
-        // M's rows that a set of coordinates has entries in
-        let in_motion = |solved: &[usize], but: &Range<usize>| -> Vec<usize> {
-            let rows = (0..nv).filter(|&i| solved.iter().any(|&j| coupled[i * nv + j])).map(|i| rows + i);
-            rows.filter(|row| !but.contains(row)).collect()
-        };
-        let mut limbs = Vec::new();
-        if rows == 0 && SIZES.contains(&passive) {
-            let (base, solved) = (0..passive, (0..passive).collect::<Vec<_>>());
-            let others = in_motion(&solved, &base);
-            limbs.push(Limb { columns: runs(passive..3 * nv), others, rows: base, solved, least: DEFINITE });
-        }
-        let mut first = 0;
+        let mut pattern = Pattern::new(model, Tableau { nv, rows }, moved_by, damped);
+        let (mut limbs, mut first) = (Vec::new(), 0);
         while first < rows {
             let moved = &moved_by[first];
             let count = moved_by[first..].iter().take_while(|other| *other == moved).count();
             let twins = moved_by.iter().filter(|other| *other == moved).count();
             let solved = own_coordinates(moved_by, first, passive);
             if solved.len() == count && twins == count && SIZES.contains(&count) {
-                let range = first..first + count;
-                let held = moved.iter().copied().filter(|k| !solved.contains(k));
-                let forces = range.clone().filter(|_| damped).map(|r| nv + r);
-                let states = moved.iter().map(|k| nv + rows + k).chain(moved.iter().map(|k| 2 * nv + rows + k));
-                let columns = runs(held.chain(forces).chain(states));
-                let others = in_motion(&solved, &range);
-                limbs.push(Limb { rows: range, solved, columns, others, least: PREFERENCE });
+                limbs.push(pattern.solve(first..first + count, solved, 0..nv, PREFERENCE));
             }
             first += count;
         }
-        Self { limbs }
+        let all = limbs.iter().map(|limb: &Block| limb.rows.len()).sum::<usize>() == rows;
+        let limbs = Arc::new(Self { blocks: limbs });
+        let base = if !all || !SIZES.contains(&passive) {
+            None
+        } else if rows == 0 {
+            Some(((0..passive).collect(), 0..nv, DEFINITE))
+        } else {
+            base(&limbs).map(|solved| (solved, nv..nv + rows, OF_ANOTHER))
+        };
+        let base = base.map(|(solved, compared, least)| pattern.solve(rows..rows + passive, solved, compared, least));
+        [limbs, Arc::new(Self { blocks: base.into_iter().collect() })]
     }
 
     /// The column that each row of a tableau was solved for, if it was.
-    pub(crate) fn solved(&self) -> impl Iterator<Item = (usize, usize)> {
-        self.limbs.iter().flat_map(|limb| limb.rows.clone().zip(limb.solved.iter().copied()))
+    pub(crate) fn solved(&self) -> Vec<(usize, usize)> {
+        self.blocks.iter().flat_map(|block| block.rows.clone().zip(block.solved.iter().copied())).collect()
     }
 
     /// Room for the inverses B⁻¹.
     pub(crate) fn room(&self) -> usize {
-        self.limbs.iter().map(|limb| limb.rows.len() * limb.rows.len()).sum()
+        self.blocks.iter().map(|block| block.rows.len() * block.rows.len()).sum()
+    }
+
+    /// Room for one block's Y.
+    pub(crate) fn columns(&self) -> usize {
+        let count = |block: &Block| block.columns.iter().map(ExactSizeIterator::len).sum::<usize>();
+        self.blocks.iter().map(|block| block.rows.len() * count(block)).max().unwrap_or(0)
     }
 }
 
@@ -176,25 +245,22 @@ fn copy_row<S: Scalar>(to: &mut [S], from: &Matrix<S>, i: usize) {
 }
 
 kernel! {
-    /// Computes each limb's B⁻¹, by Gauss and Jordan with the rows exchanged in each knot as it needs; `regular` is 1 for
+    /// Computes each block's B⁻¹, by Gauss and Jordan with the rows exchanged in each knot as it needs; `regular` is 1 for
     /// the knots of which all pivots are large enough, 0 for the others.
-    pub(crate) fn invert_limbs<S>(
+    pub(crate) fn invert_blocks<S>(
         elimination: &LimbElimination, tableau: Tableau, T: &[S], inverses: &mut [S], regular: &mut S,
     ) {
-        let (nv, stride) = (tableau.nv, tableau.stride());
+        let stride = tableau.stride();
         *regular = S::one();
         let mut rest = inverses;
-        for Limb { rows, solved, columns, least, .. } in &elimination.limbs {
+        for Block { rows, solved, compared, least, .. } in &elimination.blocks {
             let n = rows.len();
             // [B D], with the rows scaled by D
             let mut W = [[S::zero(); 2 * MOST]; MOST];
             for (k, r) in rows.clone().enumerate() {
-                let row = &T[r * stride..][..nv];
+                let row = &T[r * stride..][..stride];
                 let mut largest = S::zero();
-                for &c in solved {
-                    largest = larger(largest, row[c]);
-                }
-                for c in columns.iter().flat_map(Range::clone).take_while(|c| *c < nv) {
+                for &c in compared {
                     largest = larger(largest, row[c]);
                 }
                 let scale = largest.recip();
@@ -247,37 +313,38 @@ kernel! {
 }
 
 kernel! {
-    /// Solves the rows of each limb for its coordinates, and puts these into the equations of motion.
-    pub(crate) fn solve_limbs<S>(elimination: &LimbElimination, tableau: Tableau, T: &mut [S], inverses: &[S]) {
+    /// Solves the rows of each block for its columns, and puts these into the other rows.
+    pub(crate) fn solve_blocks<S>(
+        elimination: &LimbElimination, tableau: Tableau, T: &mut [S], inverses: &[S], Y: &mut [S],
+    ) {
         let mut rest = inverses;
-        for limb in &elimination.limbs {
-            let n = limb.rows.len();
+        for block in &elimination.blocks {
+            let n = block.rows.len();
             let (inverse, others) = rest.split_at(n * n);
             match n == MOST {
-                true => solve::<S, 6>(limb, tableau.stride(), T, inverse),
-                false => solve::<S, 3>(limb, tableau.stride(), T, inverse),
+                true => solve::<S, 6>(block, tableau.stride(), T, inverse, Y),
+                false => solve::<S, 3>(block, tableau.stride(), T, inverse, Y),
             }
             rest = others;
         }
     }
 }
 
-/// Solves N rows.
+/// Solves N rows. Y is kept column by column as well, as the other rows take it.
 #[inline(always)]
-fn solve<S: Scalar, const N: usize>(limb: &Limb, stride: usize, T: &mut [S], inverse: &[S]) {
-    let Limb { rows, solved, columns, others, .. } = limb;
+fn solve<S: Scalar, const N: usize>(block: &Block, stride: usize, T: &mut [S], inverse: &[S], Y: &mut [S]) {
+    let Block { rows, solved, columns, others, .. } = block;
     let (before, rest) = T.split_at_mut(rows.start * stride);
     let (own, after) = rest.split_at_mut(N * stride);
-    for run in columns {
-        for c in run.clone() {
-            let x: [S; N] = core::array::from_fn(|k| own[k * stride + c]);
-            for i in 0..N {
-                let mut sum = inverse[i * N] * x[0];
-                for k in 1..N {
-                    sum = inverse[i * N + k].mul_add(x[k], sum);
-                }
-                own[i * stride + c] = sum;
+    let Y = Y.as_chunks_mut::<N>().0;
+    for (c, y) in columns.iter().flat_map(Range::clone).zip(&mut *Y) {
+        let x: [S; N] = core::array::from_fn(|k| own[k * stride + c]);
+        for i in 0..N {
+            let mut sum = inverse[i * N] * x[0];
+            for k in 1..N {
+                sum = inverse[i * N + k].mul_add(x[k], sum);
             }
+            (own[i * stride + c], y[i]) = (sum, sum);
         }
     }
     for (i, row) in own.chunks_exact_mut(stride).enumerate() {
@@ -285,23 +352,22 @@ fn solve<S: Scalar, const N: usize>(limb: &Limb, stride: usize, T: &mut [S], inv
             row[c] = S::splat(if i == k { 1.0 } else { 0.0 });
         }
     }
-    let Y: [&[S]; N] = core::array::from_fn(|k| &own[k * stride..][..stride]);
     for &i in others {
         let row = match i < rows.start {
             true => &mut before[i * stride..][..stride],
             false => &mut after[(i - rows.end) * stride..][..stride],
         };
-        let g: [S; N] = core::array::from_fn(|k| -row[solved[k]]);
+        let (g, mut Y): ([S; N], _) = (core::array::from_fn(|k| -row[solved[k]]), &*Y);
         for run in columns {
-            let x = &mut row[run.clone()];
-            let y: [&[S]; N] = core::array::from_fn(|k| &Y[k][run.clone()][..x.len()]); // so no entry need be checked
-            for (j, x) in x.iter_mut().enumerate() {
+            let (some, rest) = Y.split_at(run.len());
+            for (x, y) in row[run.clone()].iter_mut().zip(some) {
                 let mut sum = *x;
                 for k in 0..N {
-                    sum = g[k].mul_add(y[k][j], sum);
+                    sum = g[k].mul_add(y[k], sum);
                 }
                 *x = sum;
             }
+            Y = rest;
         }
         solved.iter().for_each(|&c| row[c] = S::zero());
     }

@@ -19,7 +19,8 @@ use crate::robot::on_demand::OnDemand;
 use crate::robot::state::{GroupHessian, groups};
 use condyle_dynamics::level::{Level, level};
 use condyle_dynamics::{
-    Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics, gravity, integrate_jacobian_groups,
+    Data, IntegrateArgument, Model, aba_hessian, constrained_inverse_dynamics, gravity, integrate,
+    integrate_jacobian_groups, neutral,
 };
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Real, Witness};
@@ -37,6 +38,8 @@ unsafe impl Witness for Gate {}
 type Short = <f64 as Real>::Short<Gate>;
 type Long = <f64 as Real>::Long<Gate>;
 
+/// So many postures are tried to find one that is not singular.
+const POSTURES: usize = 8;
 /// Fewer knots than this are computed one by one.
 const WORTHWHILE: usize = 3;
 
@@ -97,6 +100,31 @@ fn lanes(law: &Law) -> usize {
     }
 }
 
+impl VectorBatches {
+    /// Makes room for the equations of knots in inverse-dynamics form, in the widest lanes: they are for derivatives.
+    fn reserve(&mut self, tableau: Tableau, stages: [Arc<LimbElimination>; 2]) {
+        match &mut self.long {
+            Some(long) => long.reserve(tableau, stages),
+            None => self.short.reserve(tableau, stages),
+        }
+    }
+
+    /// The equations of a knot at some posture in which the limbs can be solved.
+    fn some_equations(&mut self, model: &Model, at: &KnotData) -> Option<Vec<f64>> {
+        (0..POSTURES).find_map(|posture| {
+            let bend: Vec<f64> = (0..model.nv()).map(|k| 0.5 * ((1 + posture + k) as f64).sin()).collect();
+            let (mut at, mut x) = (at.clone(), vec![0.0; model.nq() + model.nv()]);
+            integrate(model, &neutral(model), &bend, &mut x[..model.nq()]);
+            let to = core::slice::from_mut(&mut at);
+            match &mut self.long {
+                Some(long) => long.run_equations_at(model, &x, to),
+                None => self.short.run_equations_at(model, &x, to),
+            }
+            (at.stages > 0).then_some(at.equations)
+        })
+    }
+}
+
 impl Work {
     #[inline(never)]
     fn new(
@@ -122,14 +150,17 @@ impl Work {
         let mut data = KnotData::new(nv, capabilities, given);
         let elimination = form.zip(vectors.as_mut()).map(|((moved_by, passive), vectors)| {
             let damped = matches!(law, Law::Contact(_, damping) if *damping != 0.0);
-            let limbs = Arc::new(LimbElimination::new(model, passive, &moved_by, damped));
             let tableau = Tableau { nv, rows: capabilities.rows() };
             data.equations.resize(tableau.len(), 0.0);
-            match &mut vectors.long {
-                Some(long) => long.reserve(tableau, &limbs), // derivatives take the widest
-                None => vectors.short.reserve(tableau, &limbs),
-            }
-            KktElimination::new(nv, passive, &moved_by, &limbs)
+            let mut elimination = KktElimination::new(nv, passive, &moved_by);
+            let stages = LimbElimination::new(model, passive, &moved_by, damped, |limbs| {
+                elimination.follow([limbs.solved(), Vec::new()]);
+                vectors.reserve(tableau, [limbs.clone(), Arc::default()]);
+                elimination.base_pivots(&mut vectors.some_equations(model, &data)?)
+            });
+            elimination.follow(stages.each_ref().map(|stage| stage.solved()));
+            vectors.reserve(tableau, stages);
+            elimination
         });
         Self {
             single: KnotBatch::new(model, law),
@@ -152,8 +183,8 @@ impl Work {
     ) -> bool {
         let Self { data, elimination: Some(elimination), .. } = self else { return false };
         let form = &mut node.inverse_dynamics;
-        let KnotData { equations, limbs_solved, .. } = &mut data[lane];
-        if !elimination.run(equations, *limbs_solved, scale, form) {
+        let KnotData { equations, stages, .. } = &mut data[lane];
+        if !elimination.run(equations, *stages, scale, form) {
             return false;
         }
         form.active = true;
