@@ -293,23 +293,21 @@ impl<S: Block<Number = f64>> LinearEquations<S> {
     /// Solves the limbs and the base of the knots where that can be, and writes the equations to the data of each.
     fn solve(&mut self, to: &mut [KnotData]) {
         let Self { size, stages, tableau, before, inverses, Y } = self;
-        let mut solvable = S::one();
+        let mut singular = S::zero();
         to.iter_mut().for_each(|to| to.stages = 0);
         for stage in stages {
-            let (mut regular, mut each) = (S::zero(), [0.0; WIDEST]);
-            invert_blocks(stage, *size, tableau, inverses, &mut regular);
-            solvable = solvable * regular;
-            scatter(core::slice::from_ref(&solvable), to.len(), &mut each);
-            for (to, solvable) in to.iter_mut().zip(each) {
-                to.stages += usize::from(solvable == 1.0);
-            }
-            let all = each[..to.len()].iter().all(|each| *each == 1.0);
+            let mut each = [0.0; WIDEST];
+            invert_blocks(stage, *size, tableau, inverses, &mut singular);
+            scatter(core::slice::from_ref(&singular), to.len(), &mut each);
+            let each = &each[..to.len()];
+            to.iter_mut().zip(each).for_each(|(to, singular)| to.stages += usize::from(*singular == 0.0));
+            let all = each.iter().all(|singular| *singular == 0.0);
             if !all {
                 before.copy_from_slice(tableau);
             }
             solve_blocks(stage, *size, tableau, inverses, Y);
             if !all {
-                restore(solvable, before, tableau);
+                restore(singular, before, tableau);
             }
         }
         unpack(tableau, to, |to| &mut to.equations);

@@ -1,4 +1,4 @@
-//! The equations of several knots in contact, solved side by side for what each contact's own limb does.
+//! The equations of several knots in contact, solved side by side for what each contact's own limb does, and for what holds the base.
 //!
 //! In the tableau of [`kkt_elimination`](super::kkt_elimination) the rows of a contact hold the base, what stands between it
 //! and the limb, and the limb, whose joints move no other contact. Where these are as many as the rows, with B their block,
@@ -27,8 +27,9 @@ const SIZES: [usize; 2] = [3, 6];
 const MOST: usize = SIZES[1];
 /// B of a base that touches nothing is positive definite: a pivot so much smaller than its row's largest entry is rounding.
 const DEFINITE: f64 = 1e-9;
-/// The columns of a base in contact are those of another posture: fewer digits are lost than there are to lose.
-const OF_ANOTHER: f64 = 1e-3;
+/// The columns for a base in contact were chosen at another posture: a pivot that is so much smaller than its row's largest entry
+/// takes more digits than one that is chosen for the knot.
+const CHOSEN_ELSEWHERE: f64 = 1e-3;
 
 /// Some rows of the tableau that are solved for as many columns.
 #[derive(Clone, Debug, PartialEq)]
@@ -143,7 +144,7 @@ impl LimbElimination {
         } else if rows == 0 {
             Some(((0..passive).collect(), 0..nv, DEFINITE))
         } else {
-            base(&limbs).map(|solved| (solved, nv..nv + rows, OF_ANOTHER))
+            base(&limbs).map(|solved| (solved, nv..nv + rows, CHOSEN_ELSEWHERE))
         };
         let base = base.map(|(solved, compared, least)| pattern.solve(rows..rows + passive, solved, compared, least));
         [limbs, Arc::new(Self { blocks: base.into_iter().collect() })]
@@ -245,13 +246,12 @@ fn copy_row<S: Scalar>(to: &mut [S], from: &Matrix<S>, i: usize) {
 }
 
 kernel! {
-    /// Computes each block's B⁻¹, by Gauss and Jordan with the rows exchanged in each knot as it needs; `regular` is 1 for
-    /// the knots of which all pivots are large enough, 0 for the others.
+    /// Computes each block's B⁻¹, by Gauss and Jordan with the rows exchanged in each knot as it needs; `singular` becomes
+    /// 1 for the knots of which a pivot is too small.
     pub(crate) fn invert_blocks<S>(
-        elimination: &LimbElimination, tableau: Tableau, T: &[S], inverses: &mut [S], regular: &mut S,
+        elimination: &LimbElimination, tableau: Tableau, T: &[S], inverses: &mut [S], singular: &mut S,
     ) {
         let stride = tableau.stride();
-        *regular = S::one();
         let mut rest = inverses;
         for Block { rows, solved, compared, least, .. } in &elimination.blocks {
             let n = rows.len();
@@ -279,7 +279,7 @@ kernel! {
                     }
                 }
                 // a NaN is not large enough
-                *regular = S::select(S::splat(*least).lt(W[k][k].abs()), *regular, S::zero());
+                *singular = S::select(S::splat(*least).lt(W[k][k].abs()), *singular, S::one());
                 let inverse = W[k][k].recip();
                 for j in k + 1..2 * n {
                     W[k][j] = W[k][j] * inverse;
@@ -303,11 +303,11 @@ kernel! {
 }
 
 kernel! {
-    /// Restores the tableau of the knots that are not regular.
-    pub(crate) fn restore<S>(regular: S, before: &[S], T: &mut [S]) {
-        let keep = S::zero().lt(regular);
+    /// Restores the tableau of the knots that are singular.
+    pub(crate) fn restore<S>(singular: S, before: &[S], T: &mut [S]) {
+        let singular = S::zero().lt(singular);
         for (to, before) in T.iter_mut().zip(before) {
-            *to = S::select(keep, *to, *before);
+            *to = S::select(singular, *before, *to);
         }
     }
 }
