@@ -29,7 +29,7 @@ pub(crate) struct KnotData {
     pub dcontact_acceleration: [DMatrix<f64>; 3],
     /// The equations of motion differentiated, row by row: a [`Tableau`](super::dynamics::kkt_elimination::Tableau).
     pub equations: Vec<f64>,
-    /// How many stages are solved in it: none, the limbs, the base as well.
+    /// How many stages are solved in it: none, the limbs, the base as well; those that the robot has.
     pub stages: usize,
     pub residuals: ResidualData,
 }

@@ -95,12 +95,12 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
         let (q, v, tau, a) = (zeros(model.nq()), zeros(nv), zeros(nv), zeros(nv));
         let rows = if let Pass::Contact(set, _) | Pass::ContactInverse(set, _) = &pass { set.rows() } else { 0 };
         let lambda = zeros(rows);
-        let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Default::default());
+        let linear = LinearEquations::new(Tableau { nv: 0, rows: 0 }, Vec::new());
         Self { data, pass, surplus, residuals, q, v, tau, a, lambda, linear, visited: false }
     }
 
     /// Makes room for the equations of knots in inverse-dynamics form.
-    pub(crate) fn reserve(&mut self, tableau: Tableau, stages: [Arc<LimbElimination>; 2]) {
+    pub(crate) fn reserve(&mut self, tableau: Tableau, stages: Vec<Arc<LimbElimination>>) {
         self.linear = LinearEquations::new(tableau, stages);
     }
 
@@ -273,7 +273,7 @@ impl<S: Block<Number = f64>> KnotBatch<S> {
 struct LinearEquations<S> {
     size: Tableau,
     /// What is solved, one after the other: the limbs, and the base.
-    stages: [Arc<LimbElimination>; 2],
+    stages: Vec<Arc<LimbElimination>>,
     tableau: Vec<S>,
     /// The tableau before a stage.
     before: Vec<S>,
@@ -283,7 +283,7 @@ struct LinearEquations<S> {
 }
 
 impl<S: Block<Number = f64>> LinearEquations<S> {
-    fn new(size: Tableau, stages: [Arc<LimbElimination>; 2]) -> Self {
+    fn new(size: Tableau, stages: Vec<Arc<LimbElimination>>) -> Self {
         let most = |room: fn(&LimbElimination) -> usize| stages.iter().map(|stage| room(stage)).max().unwrap_or(0);
         let zeros = |n| vec![S::zero(); n];
         let (inverses, Y) = (zeros(most(LimbElimination::room)), zeros(most(LimbElimination::columns)));

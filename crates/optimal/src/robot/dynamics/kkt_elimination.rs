@@ -58,8 +58,8 @@ pub(crate) struct KktElimination {
     passive: usize,
     /// The coordinates that each contact's row prefers.
     preferred: Vec<Vec<usize>>,
-    /// The rows that are solved before, those of the limbs and those of the base, each with its column.
-    before: [Vec<(usize, usize)>; 2],
+    /// The rows that are solved before, stage after stage, each with its column.
+    before: Vec<Vec<(usize, usize)>>,
     /// The column that each row was solved for.
     pivots: Vec<usize>,
     /// The rows that are solved here.
@@ -100,7 +100,7 @@ impl KktElimination {
             tableau: Tableau { nv, rows },
             passive,
             preferred: preferred.collect(),
-            before: Default::default(),
+            before: Vec::new(),
             pivots: numbers(),
             late: numbers(),
             laid_out: numbers(),
@@ -113,7 +113,7 @@ impl KktElimination {
     }
 
     /// What is solved before, from now on: see [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
-    pub(crate) fn follow(&mut self, before: [Vec<(usize, usize)>; 2]) {
+    pub(crate) fn follow(&mut self, before: Vec<Vec<(usize, usize)>>) {
         self.before = before;
     }
 
@@ -129,8 +129,8 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau of which no stage, the limbs, or the base as well are solved; says
-    /// whether there were pivots. Overwrites the tableau.
+    /// Writes U and D for steps of Δt, from a tableau of which so many stages are solved; says whether there were pivots.
+    /// Overwrites the tableau.
     pub(crate) fn run(&mut self, tableau: &mut [f64], stages: usize, dt: f64, form: &mut InverseDynamicsForm) -> bool {
         let mut done = false;
         at_level(Run { elimination: self, T: tableau, stages, dt, form, done: &mut done });

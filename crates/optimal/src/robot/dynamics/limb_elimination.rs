@@ -1,4 +1,4 @@
-//! The equations of several knots in contact, solved side by side for what each contact's own limb does, and for what holds the base.
+//! The equations of several knots in contact, solved side by side for what each contact's own limb does, then for the base.
 //!
 //! In the tableau of [`kkt_elimination`](super::kkt_elimination) the rows of a contact hold the base, what stands between it
 //! and the limb, and the limb, whose joints move no other contact. Where these are as many as the rows, with B their block,
@@ -106,8 +106,8 @@ impl Pattern {
     }
 }
 
-/// The rows of a robot in contact that are solved side by side, and where their entries are.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Rows of a robot in contact that are solved one block after the other, and where their entries are.
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LimbElimination {
     blocks: Vec<Block>,
 }
@@ -116,14 +116,15 @@ alike!(LimbElimination);
 
 impl LimbElimination {
     /// The limbs of a robot whose first `passive` coordinates are not driven, for contacts whose rows are moved by some
-    /// coordinates each, with damping or without; and then the base, for columns that are found for the limbs.
+    /// coordinates each, with damping or without; and then the base, for columns that are found for the limbs. What has no
+    /// blocks is left out.
     pub(crate) fn new(
         model: &Model,
         passive: usize,
         moved_by: &[Vec<usize>],
         damped: bool,
         base: impl FnOnce(&Arc<Self>) -> Option<Vec<usize>>,
-    ) -> [Arc<Self>; 2] {
+    ) -> Vec<Arc<Self>> {
         let (nv, rows) = (model.nv(), moved_by.len());
         let mut pattern = Pattern::new(model, Tableau { nv, rows }, moved_by, damped);
         let (mut limbs, mut first) = (Vec::new(), 0);
@@ -147,7 +148,8 @@ impl LimbElimination {
             base(&limbs).map(|solved| (solved, nv..nv + rows, CHOSEN_ELSEWHERE))
         };
         let base = base.map(|(solved, compared, least)| pattern.solve(rows..rows + passive, solved, compared, least));
-        [limbs, Arc::new(Self { blocks: base.into_iter().collect() })]
+        let base = Arc::new(Self { blocks: base.into_iter().collect() });
+        [limbs, base].into_iter().filter(|stage| !stage.blocks.is_empty()).collect()
     }
 
     /// The column that each row of a tableau was solved for, if it was.
@@ -344,7 +346,7 @@ fn solve<S: Scalar, const N: usize>(block: &Block, stride: usize, T: &mut [S], i
             for k in 1..N {
                 sum = inverse[i * N + k].mul_add(x[k], sum);
             }
-            (own[i * stride + c], y[i]) = (sum, sum);
+            (own[i * stride + c], y[i]) = (sum, sum); // Y = B⁻¹ J
         }
     }
     for (i, row) in own.chunks_exact_mut(stride).enumerate() {
@@ -365,7 +367,7 @@ fn solve<S: Scalar, const N: usize>(block: &Block, stride: usize, T: &mut [S], i
                 for k in 0..N {
                     sum = g[k].mul_add(y[k], sum);
                 }
-                *x = sum;
+                *x = sum; // M_i − M_il Y
             }
             Y = rest;
         }

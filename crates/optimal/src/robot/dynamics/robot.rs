@@ -102,7 +102,7 @@ fn lanes(law: &Law) -> usize {
 
 impl VectorBatches {
     /// Makes room for the equations of knots in inverse-dynamics form, in the widest lanes: they are for derivatives.
-    fn reserve(&mut self, tableau: Tableau, stages: [Arc<LimbElimination>; 2]) {
+    fn reserve(&mut self, tableau: Tableau, stages: Vec<Arc<LimbElimination>>) {
         match &mut self.long {
             Some(long) => long.reserve(tableau, stages),
             None => self.short.reserve(tableau, stages),
@@ -154,11 +154,11 @@ impl Work {
             data.equations.resize(tableau.len(), 0.0);
             let mut elimination = KktElimination::new(nv, passive, &moved_by);
             let stages = LimbElimination::new(model, passive, &moved_by, damped, |limbs| {
-                elimination.follow([limbs.solved(), Vec::new()]);
-                vectors.reserve(tableau, [limbs.clone(), Arc::default()]);
+                elimination.follow(vec![limbs.solved()]);
+                vectors.reserve(tableau, vec![limbs.clone()]);
                 elimination.base_pivots(&mut vectors.some_equations(model, &data)?)
             });
-            elimination.follow(stages.each_ref().map(|stage| stage.solved()));
+            elimination.follow(stages.iter().map(|stage| stage.solved()).collect());
             vectors.reserve(tableau, stages);
             elimination
         });
