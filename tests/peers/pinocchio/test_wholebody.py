@@ -21,8 +21,9 @@ AGREEMENT = 1e-6
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The programs of ticks of robots that stand, walk and trot while they are pushed, with our solutions."""
     folder = tmp_path_factory.mktemp("programs")
-    command = ["cargo", "bench", "--quiet", "--locked", "--profile", "dev", "--bench", "wholebody_peers", "--"]
-    command += ["--ticks", "1600", "--window", "320", "--replays", "0", "--export", str(folder)]
+    # of the workspace, with whose features all that it needs is already compiled
+    command = ["cargo", "bench", "--quiet", "--locked", "--workspace", "--profile", "dev", "--bench", "wholebody_peers"]
+    command += ["--", "--ticks", "1600", "--window", "320", "--replays", "0", "--export", str(folder)]
     subprocess.run([*command, "humanoid", "quadruped"], cwd=ROOT, check=True)
     return folder
 

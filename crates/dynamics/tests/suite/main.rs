@@ -1,11 +1,14 @@
 //! One program for most tests, since each program compiles the generic algorithms again. On their own stand those that
-//! count allocations, look at the environment or choose the instructions to run on.
+//! look at the environment or choose the instructions to run on.
 #![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../../../../tests/common/counting.rs"]
+mod counting;
 
 mod accelerations;
+mod allocations;
 mod book;
 mod centroidal;
 mod closed_forms;
@@ -17,6 +20,7 @@ mod derivatives;
 mod divide_conquer;
 mod energy;
 mod factorisation;
+mod forward_dynamics;
 mod guarantees;
 mod identities;
 mod inertial_parameters;
@@ -31,6 +35,7 @@ mod passive;
 mod regressor;
 mod sdf;
 mod second_order;
+mod simulation;
 mod urdf;
 mod urdf_errors;
 mod validity;

@@ -1,18 +1,13 @@
 //! Integrators: their order, and what they conserve.
-#![allow(non_snake_case)]
 
-mod common;
-#[path = "../../../tests/common/counting.rs"]
-mod counting;
-
-use common::{State, Tree, lift, moved, normal, relative, rng};
+use crate::common::{self, State, Tree, lift, moved, normal, relative, rng};
+use crate::counting::allocations;
 use condyle_dynamics::simulation::{Integrator, Settings, Simulation, Status};
 use condyle_dynamics::{
     Act, Data, Force, Inertia, Joint, JointOptions, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, difference,
     forward_kinematics, forward_velocities, joint_torque_regressor, kinetic_energy_regressor, lie, neutral,
     passive_torque, potential_energy_regressor, robots,
 };
-use counting::allocations;
 use num_dual::Dual64;
 
 const ALL: [(Integrator, f64); 3] =

@@ -1,13 +1,8 @@
 //! All ways of forward dynamics are one.
-#![allow(non_snake_case)]
 
-mod common;
-#[path = "../../../tests/common/counting.rs"]
-mod counting;
-
-use common::{State, Worst, all_models, lift, lift_forces, rng};
+use crate::common::{self, State, Worst, all_models, lift, lift_forces, rng};
+use crate::counting::allocations;
 use condyle_dynamics::{Cholesky, Data, DivideConquer, ForwardDynamicsMethod, Ltdl, aba, crba, forward_dynamics};
-use counting::allocations;
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 

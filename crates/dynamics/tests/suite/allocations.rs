@@ -1,14 +1,9 @@
 //! Nothing is allocated once a `Data` exists, by any function that a control loop calls.
-#![allow(non_snake_case)]
 
-mod common;
-#[path = "../../../tests/common/counting.rs"]
-mod counting;
-
-use common::table::{Input, Output, functions};
-use common::{all_models, rng};
+use crate::common::table::{Input, Output, functions};
+use crate::common::{all_models, rng};
+use crate::counting::allocations;
 use condyle_dynamics::{Data, Scalar};
-use counting::allocations;
 use num_dual::Dual64;
 
 /// On the three robots, on a tree of every joint type, and on one with joints that follow; from the first call on.
