@@ -157,7 +157,7 @@ fn for_compilers(robot: &str) -> Vec<&'static str> {
         "arm" | "quadruped" if is_all => FUNCTIONS.to_vec(),
         "humanoid" if is_all => [&short[..], &["minv", "rnea_derivatives", "aba_derivatives"]].concat(),
         "arm" => FUNCTIONS.into_iter().filter(|&name| name != "aba_hessian").collect(),
-        "quadruped" => [&short[..], &["minv", "rnea_derivatives", "constrained_dynamics", "impulse_dynamics"]].concat(),
+        "quadruped" => [&short[..], &["minv", "impulse_dynamics"]].concat(),
         _ => short[..4].to_vec(),
     }
 }

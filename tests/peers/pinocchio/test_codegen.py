@@ -41,7 +41,7 @@ WORST_SINGLE = 1e5
 
 ALL = "CONDYLE_ALL_CODE" in os.environ
 """Whether to compile for all robots, which takes a quarter of an hour on two cores."""
-SOME = ["panda", "anymal", "solo12"]
+SOME = ["panda", "solo12", *(["anymal"] if ALL else [])]
 FEW = ["double_pendulum_continuous", "ur5", "borinot"]
 """Those that all languages are compiled for: with a joint on a circle, an arm, and one that flies and has a limb."""
 LANGUAGES = ["c-casadi", "c-float", "c-4", "c-8", "rust"]
