@@ -13,7 +13,7 @@ sanitized() {
     local name=$1 runtime=$2
     shift 2
     if ! compgen -G "$root/lib/rustlib/$host/lib/librustc*_rt.$runtime.a" >/dev/null; then
-        echo "NOT RUN: the compiler has no sanitizer of ${name}s for $host"
+        echo "NOT RUN: the compiler has no sanitizer '$name' for $host"
         return
     fi
     # which are not stable

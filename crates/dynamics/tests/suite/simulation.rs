@@ -65,6 +65,14 @@ fn observed_order(coarse: f64, fine: f64) -> f64 {
     (coarse / fine).log2()
 }
 
+/// The error falls by the order of the method from steps of dt to half of them.
+fn check_order(what: &str, order: f64, dt: f64, error: impl Fn(f64) -> f64) {
+    let (coarse, fine) = (error(dt), error(dt / 2.0));
+    let observed = observed_order(coarse, fine);
+    println!("{what}: order {observed:.3}, error {fine:.1e} at h = {}", dt / 2.0);
+    assert!((observed - order).abs() < ORDER, "{what}: {observed}");
+}
+
 /// The free symmetric body in closed form: with L = I ω the attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
 #[test]
 fn order_on_a_free_body() {
@@ -86,10 +94,7 @@ fn order_on_a_free_body() {
             distance(&model, (&q, &v), (&expected_q, &expected_v))
         };
         let dt = if integrator == Integrator::SemiImplicitEuler { 1e-3 } else { 0.02 };
-        let (coarse, fine) = (error(dt), error(dt / 2.0));
-        let observed = observed_order(coarse, fine);
-        println!("{integrator:?}: order {observed:.3} on a free body, error {fine:.1e} at h = {}", dt / 2.0);
-        assert!((observed - order).abs() < ORDER, "{integrator:?}: {observed}");
+        check_order(&format!("{integrator:?} on a free body"), order, dt, error);
     }
 }
 
@@ -122,10 +127,7 @@ fn order_on_trees() {
                 Integrator::RungeKutta4 => 4e-3,
                 _ => 1e-3,
             };
-            let (coarse, fine) = (error(dt), error(dt / 2.0));
-            let observed = observed_order(coarse, fine);
-            println!("{integrator:?}: order {observed:.3} on a tree, error {fine:.1e} at h = {}", dt / 2.0);
-            assert!((observed - order).abs() < ORDER, "{integrator:?}: {observed}");
+            check_order(&format!("{integrator:?} on a tree"), order, dt, error);
         }
     }
 }
