@@ -27,16 +27,24 @@ export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}/arm # to run beside oth
 export CARGO_PROFILE_DEV_DEBUG=false
 export CONDYLE_EMULATED=1 # fewer cases of what takes minutes
 
+packages=(spatial linalg dynamics ${CONDYLE_FULL:+optimal})
+
 # All programs of one build, so that what they share is compiled once. $1, …: which of them, and `--` with the names of tests.
 run() {
-    "${cargo[@]}" test --locked --target $target --package condyle-spatial --package condyle-linalg \
-        --package condyle-dynamics --package condyle-optimal "$@"
+    "${cargo[@]}" test --locked --target $target "${packages[@]/#/--package=condyle-}" "$@"
 }
 
-# registers and packers; dense kernels; batches and limbs, but for how much memory they take; sweeps; then knots side by side
-run --test vectors --test sin_cos --test kernels --test tree --test lqr -- --skip memory_by_state
-run --test contacts -- --skip derivatives_ # which are differences of thousands of calls
+# registers and packers; dense kernels; batches and limbs, but for how much memory they take; in `./test full` sweeps too
+run --test vectors --test sin_cos --test kernels --test tree ${CONDYLE_FULL:+--test lqr} -- --skip memory_by_state
+checked=vectors
+if [ -n "${CONDYLE_FULL:-}" ]; then
+    # knots side by side, but for derivatives that are differences of thousands of calls
+    run --test contacts -- --skip derivatives_
+    checked=contacts
+fi
 
 # a vector instruction that was not inlined shows in any program that has kernels
-program=$(run --test contacts --no-run --message-format=json | sed -nE 's/.*"executable":"([^"]+)".*/\1/p')
-"${PYTHON:-python3}" tests/symbols.py "$program"
+programs=$(run --test $checked --no-run --message-format=json | sed -nE 's/.*"executable":"([^"]+)".*/\1/p')
+for program in ${programs:?}; do
+    "${PYTHON:-python3}" tests/symbols.py "$program"
+done

@@ -28,9 +28,7 @@ check condyle-wholebody "" loaders threads
 check condyle-codegen "" cuda
 check condyle "" loaders serde threads
 
-for crate in spatial model; do
-    cargo test --locked --package "condyle-$crate" --no-default-features --features libm --lib
-done
+cargo test --locked --package condyle-model --no-default-features --features libm --lib
 cargo test --locked --package condyle-spatial --no-default-features --features libm --test storage
 cargo test --locked --package condyle-model --no-default-features --features libm --test validate
 cargo test --locked --package condyle-linalg --no-default-features --features libm --tests

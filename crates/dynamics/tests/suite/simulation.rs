@@ -198,6 +198,28 @@ fn variational_steps_are_symmetric() {
     }
 }
 
+/// Newton's method doubles the digits that are right in each iteration, as it does only with the exact slope of its equation.
+#[test]
+fn variational_steps_converge_quadratically() {
+    let trees = (0..8).map(|seed| Tree::random_with_mimics(&mut rng(seed)).build());
+    let damped = double_pendulum(&JointOptions { damping: 5.0, ..JointOptions::default() });
+    for (seed, model) in trees.chain([damped]).enumerate() {
+        let State { q, v, tau, f_ext, .. } = State::random(&model, &mut rng(seed as u64));
+        let iterations = |tolerance: f64| {
+            let takes = |&max_iterations: &usize| {
+                let variational = settings(Integrator::Variational, 0.1);
+                let settings = Settings { passive: Some(1.0), tolerance, max_iterations, ..variational };
+                let mut simulation = Simulation::new(&model, settings);
+                simulation.set_state(&q, &v);
+                simulation.step(&tau, &f_ext).is_done()
+            };
+            (1..50).find(takes).expect("it converges")
+        };
+        let (half, all) = (iterations(1e-6), iterations(1e-12));
+        assert!(all <= half + 1, "{half} iterations to 1e-6, {all} to 1e-12, on\n{model}");
+    }
+}
+
 /// Neither back nor nowhere.
 #[test]
 fn time_runs_forwards() {
