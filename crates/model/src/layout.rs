@@ -13,6 +13,7 @@
 //! [`set_row`](Columns::set_row) and its like Gᵀ · G, and no algorithm knows more.
 
 use crate::joint::Joint;
+use crate::joint::kinematics::Turns;
 use crate::model::Model;
 use crate::tree::{Node, Tree};
 use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3, Vec3};
@@ -28,6 +29,8 @@ pub trait Layout {
     fn bodies(&self) -> Range<usize>;
     /// The kind of joint that carries body i, its axis turned to z.
     fn joint(&self, i: usize) -> Joint;
+    /// The joints that turn about z.
+    fn turns(&self) -> &Turns;
     /// X_T: the joint's frame in the parent's.
     fn placement(&self, i: usize) -> Se3<Self::S>;
     /// The body's inertia in its frame.
@@ -115,6 +118,7 @@ pub struct Single<'m, S, R> {
     /// What passes ask for in each step is at hand, and not to be looked up in the model again after every store.
     nodes: &'m [Node<R>],
     closed: &'m [usize],
+    turns: &'m Turns,
     support: &'m [usize],
     armature: &'m [R],
     tree: &'m Tree<R>,
@@ -129,9 +133,9 @@ impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
     #[inline(always)]
     pub fn new(model: &'m Model<R>) -> Self {
         let Model { tree, armature, gravity, .. } = model;
-        let Tree { nodes, closed, support, nv, .. } = tree;
+        let Tree { nodes, closed, turns, support, nv, .. } = tree;
         let (nv, has_mimic) = (*nv, tree.has_mimic());
-        Self { nodes, closed, support, armature, tree, gravity, nv, has_mimic, scalar: PhantomData }
+        Self { nodes, closed, turns, support, armature, tree, gravity, nv, has_mimic, scalar: PhantomData }
     }
 }
 
@@ -145,6 +149,10 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     #[inline(always)]
     fn joint(&self, i: usize) -> Joint {
         self.nodes[i].joint
+    }
+    #[inline(always)]
+    fn turns(&self) -> &Turns {
+        self.turns
     }
     #[inline(always)]
     fn placement(&self, i: usize) -> Se3<S> {

@@ -11,6 +11,7 @@ pub mod column_map;
 pub mod schedule;
 pub mod steps;
 
+use crate::joint::kinematics::Turns;
 use crate::tree::Tree;
 use alloc::vec::Vec;
 use column_map::ColumnMap;
@@ -28,6 +29,8 @@ pub struct Plan {
     pub steps: Vec<Step>,
     /// All steps but the world, the last first.
     pub closed: Vec<usize>,
+    /// The steps that turn about z.
+    pub turns: Turns,
     /// The places from which the numbers in lanes come.
     pub state: StateMap,
     /// The places of columns and of the entries of matrices.
@@ -43,7 +46,8 @@ impl Plan {
         let schedule = Schedule::new(&tree.nodes)?;
         let (mut steps, state) = steps::new(tree, &schedule);
         let columns = ColumnMap::new(tree, &schedule, &mut steps);
-        Some(Self { closed: (1..steps.len()).rev().collect(), schedule, steps, state, columns })
+        let turns = Turns::of(steps[1..].iter().map(|step| (step.joint, step.idx_q, false)));
+        Some(Self { closed: (1..steps.len()).rev().collect(), schedule, steps, turns, state, columns })
     }
 
     /// The step and lane of a body.

@@ -4,6 +4,7 @@
 //! coordinate, so several columns may have the same one.
 
 use crate::body::Body;
+use crate::joint::kinematics::Turns;
 use crate::joint::{Joint, Mimic};
 use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
@@ -80,6 +81,7 @@ pub(crate) struct Tree<R> {
     pub support: Vec<usize>,
     /// The bodies, children before parents.
     pub closed: Vec<usize>,
+    pub turns: Turns,
     /// The coordinates in which efforts are needed to move one of them: those before and after it in the tree, and itself.
     /// Shape: nv.
     pub nonzero_rows: Vec<NonzeroRows>,
@@ -107,12 +109,14 @@ impl Tree<f64> {
             columns: Vec::new(),
             support: Vec::new(),
             closed: Vec::new(),
+            turns: Turns::default(),
             nonzero_rows: Vec::new(),
             spaces: Vec::new(),
             hash: 0,
         };
         tree.add_nodes(bodies);
         tree.close_subtrees();
+        tree.turns = Turns::of(tree.nodes[1..].iter().map(|n| (n.joint, n.idx_q, n.mimic.is_some())));
         tree.add_nonzero_rows();
         tree.add_spaces();
         let structure = tree.columns.iter().flat_map(|c| [c.coordinate, c.parent.map_or(0, |p| p + 1)]);
@@ -271,6 +275,7 @@ impl<R> Tree<R> {
             columns: self.columns.clone(),
             support: self.support.clone(),
             closed: self.closed.clone(),
+            turns: self.turns.clone(),
             nonzero_rows: self.nonzero_rows.clone(),
             spaces: self.spaces.clone(),
             hash: self.hash,

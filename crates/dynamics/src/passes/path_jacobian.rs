@@ -11,11 +11,12 @@
 use super::frames::ReferenceFrame;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
+use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Motion, Scalar, Se3, Vec3, kernel};
 
 /// The number of joints whose sines and cosines are computed at once.
-const AT_ONCE: usize = 4;
+const AT_ONCE: usize = 8;
 
 kernel! {
     /// J of a frame at iXf on a body, in O(depth); the strides are the distances from one row of J to the next, and from one
@@ -41,7 +42,8 @@ kernel! {
                 i = model.nodes()[i].parent;
             }
             let (mut sin, mut cos) = ([S::zero(); AT_ONCE], [S::one(); AT_ONCE]);
-            Joint::sin_cos_of(&l, some[..n].iter().copied().enumerate(), q, &mut sin, &mut cos);
+            let of = ..n.next_multiple_of(JointSinCos::<S>::STEP);
+            Joint::sin_cos_of(&l, some[..n].iter().copied().enumerate(), q, &mut sin[of], &mut cos[of]);
             for (k, &i) in some[..n].iter().enumerate() {
                 let joint = l.joint(i);
                 for k in 0..joint.nv() {

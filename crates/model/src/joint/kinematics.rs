@@ -2,10 +2,11 @@
 
 use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;
+use alloc::vec::Vec;
 use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, alike};
 
-/// The sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. What stands behind the last body has no
-/// meaning.
+/// The sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. What stands at other bodies, and behind the
+/// last one, has no meaning.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct JointSinCos<S> {
@@ -18,19 +19,72 @@ pub struct JointSinCos<S> {
 alike!(JointSinCos { sin, cos });
 
 impl<S: Scalar> JointSinCos<S> {
+    /// As many as are computed at once: two vectors.
+    pub const STEP: usize = if S::LANES == 1 { 8 } else { 2 };
+
     /// Allocates room for some bodies, the world included.
     pub fn new(bodies: usize) -> Self {
-        let n = bodies.next_multiple_of(4);
+        let n = bodies.next_multiple_of(Self::STEP);
         Self { sin: vec![S::zero(); n].into(), cos: vec![S::zero(); n].into() }
+    }
+}
+
+/// The joints that turn about z, found once, so that no pass looks at each.
+#[derive(Clone, Debug, Default)]
+pub struct Turns {
+    /// Joints whose angles stand in q. Of some that follow each other, as their angles do: the first joint, the place of its
+    /// angle, and how many.
+    runs: Vec<[usize; 3]>,
+    /// Joints whose angles are computed from those of others.
+    followers: Vec<usize>,
+    /// Joints whose cosines and sines stand in q.
+    circles: Vec<usize>,
+}
+
+impl Turns {
+    /// Those among some joints, from that of body 1 on, each with the place of its position in q and whether it follows
+    /// another one.
+    pub(crate) fn of(joints: impl Iterator<Item = (Joint, usize, bool)>) -> Self {
+        let mut turns = Self::default();
+        for (k, (joint, idx_q, follows)) in joints.enumerate() {
+            let i = k + 1;
+            match joint {
+                Joint::Revolute { .. } | Joint::Helical { .. } if follows => turns.followers.push(i),
+                Joint::Revolute { .. } | Joint::Helical { .. } => match turns.runs.last_mut() {
+                    Some([first, at, count]) if (*first + *count, *at + *count) == (i, idx_q) => *count += 1,
+                    _ => turns.runs.push([i, idx_q, 1]),
+                },
+                Joint::Continuous { .. } | Joint::Planar => turns.circles.push(i),
+                _ => {}
+            }
+        }
+        turns
     }
 }
 
 #[doc(hidden)]
 impl Joint {
-    /// The sine and cosine of the angle by which each joint turns about z (0 and 1 where it does not), all of them at once.
+    /// The sine and cosine of the angle by which each joint turns about z, all of them at once.
     #[inline(always)]
     pub fn sin_cos<L: Layout>(l: &L, q: &[L::S], JointSinCos { sin, cos }: &mut JointSinCos<L::S>) {
-        Self::sin_cos_of(l, l.bodies().zip(l.bodies()), q, &mut sin[..], &mut cos[..]);
+        let (Turns { runs, followers, circles }, sin, cos) = (l.turns(), &mut sin[..], &mut cos[..]);
+        for &[first, at, count] in runs {
+            sin[first..first + count].copy_from_slice(&q[at..at + count]);
+        }
+        for &i in followers {
+            sin[i] = l.position(q, i, 0);
+        }
+        L::S::sin_cos_of_all(sin, cos);
+        for &i in circles {
+            (sin[i], cos[i]) = Self::sin_cos_in(l, i, q);
+        }
+    }
+
+    /// The sine and cosine that stand in q.
+    #[inline(always)]
+    fn sin_cos_in<L: Layout>(l: &L, i: usize, q: &[L::S]) -> (L::S, L::S) {
+        let at = if let Self::Planar = l.joint(i) { 2 } else { 0 };
+        (l.position(q, i, at + 1), l.position(q, i, at))
     }
 
     /// The same of some joints, each with the place at which its sine and cosine go.
@@ -49,10 +103,8 @@ impl Joint {
         }
         L::S::sin_cos_of_all(sin, cos);
         for (k, i) in joints {
-            match l.joint(i) {
-                Self::Continuous { .. } => (cos[k], sin[k]) = (l.position(q, i, 0), l.position(q, i, 1)),
-                Self::Planar => (cos[k], sin[k]) = (l.position(q, i, 2), l.position(q, i, 3)),
-                _ => {}
+            if let Self::Continuous { .. } | Self::Planar = l.joint(i) {
+                (sin[k], cos[k]) = Self::sin_cos_in(l, i, q);
             }
         }
     }
@@ -62,8 +114,7 @@ impl Joint {
     pub fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
         let (sin, cos) = match l.joint(i) {
             Self::Revolute { .. } | Self::Helical { .. } => l.position(q, i, 0).sin_cos(),
-            Self::Continuous { .. } => (l.position(q, i, 1), l.position(q, i, 0)),
-            Self::Planar => (l.position(q, i, 3), l.position(q, i, 2)),
+            Self::Continuous { .. } | Self::Planar => Self::sin_cos_in(l, i, q),
             _ => (L::S::zero(), L::S::one()),
         };
         Self::placement_with(l, i, q, sin, cos)

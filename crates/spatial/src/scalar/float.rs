@@ -35,7 +35,8 @@ macro_rules! impl_float {
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
                 if $float::abs(self) <= Self::LARGEST as $float {
-                    return Self::near(self);
+                    let ([sin], [cos]) = Self::near([self]);
+                    return (sin, cos);
                 }
                 self.far()
             }

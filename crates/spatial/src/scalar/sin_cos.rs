@@ -49,35 +49,43 @@ const SINGLE: Precision<3> = Precision {
     cos: [2.443_315_711_809_948e-5, -1.388_731_625_493_765e-3, 4.166_664_568_298_827e-2],
 };
 
-/// The polynomial of z with these coefficients, the highest power's first.
+/// The polynomial of each z with these coefficients, the highest power's first.
 #[inline(always)]
-fn polynomial<S: Scalar, const T: usize>(c: &[f64; T], z: S) -> S {
-    let mut sum = S::splat(c[0]);
+fn polynomial<S: Scalar, const T: usize, const N: usize>(c: &[f64; T], z: [S; N]) -> [S; N] {
+    let mut sum = [S::splat(c[0]); N];
     for &c in &c[1..] {
-        sum = sum.mul_add(z, S::splat(c));
+        for k in 0..N {
+            sum[k] = sum[k].mul_add(z[k], S::splat(c));
+        }
     }
     sum
 }
 
 #[inline(always)]
-fn reduced<S: Scalar, const T: usize>(x: S, of: &Precision<T>) -> (S, S) {
-    let magic = S::splat(of.magic);
-    let n = (x * S::splat(core::f64::consts::FRAC_2_PI) + magic) - magic; // rounded
-    let mut r = x;
-    for part in of.parts {
-        r = n.mul_add(S::splat(-part), r); // r = x − n π/2
+fn reduced<S: Scalar, const T: usize, const N: usize>(x: [S; N], of: &Precision<T>) -> ([S; N], [S; N]) {
+    let (one, magic, to_quadrants) = (S::one(), S::splat(of.magic), S::splat(core::f64::consts::FRAC_2_PI));
+    let (mut n, mut r, mut z) = (x, x, x);
+    for k in 0..N {
+        n[k] = (x[k] * to_quadrants + magic) - magic; // rounded
+        for part in of.parts {
+            r[k] = n[k].mul_add(S::splat(-part), r[k]); // r = x − n π/2
+        }
+        z[k] = r[k] * r[k];
     }
-    let z = r * r;
-    let sin = (polynomial(&of.sin, z) * z).mul_add(r, r); // r + r³ P(r²)
-    let cos = (polynomial(&of.cos, z) * z).mul_add(z, z.mul_add(S::splat(-0.5), S::one())); // 1 − r²/2 + r⁴ Q(r²)
-    // the quadrant, n modulo 4, between −2 and 2: (sin, cos), (cos, −sin), (−sin, −cos), (−cos, sin) for 0, 1, ±2, −1
-    let quadrant = n - ((n * S::splat(0.25) + magic) - magic) * S::splat(4.0);
-    let odd = (quadrant.abs() - S::one()).abs().lt(S::splat(0.5));
-    let (s, c) = (S::select(odd, cos, sin), S::select(odd, sin, cos));
-    let (half, past) = (S::splat(0.5), S::splat(1.5));
-    let sin_is_minus = S::or(quadrant.lt(-half), past.lt(quadrant));
-    let cos_is_minus = S::or(half.lt(quadrant), quadrant.lt(-past));
-    (S::select(sin_is_minus, -s, s), S::select(cos_is_minus, -c, c))
+    let (mut sin, mut cos) = (polynomial(&of.sin, z), polynomial(&of.cos, z));
+    for k in 0..N {
+        let (r, z) = (r[k], z[k]);
+        let s = (sin[k] * z).mul_add(r, r); // r + r³ P(r²)
+        let c = (cos[k] * z).mul_add(z, z.mul_add(S::splat(-0.5), one)); // 1 − r²/2 + r⁴ Q(r²)
+        // the quadrant m, n modulo 4, between −2 and 2
+        let m = (n[k].mul_add(S::splat(0.25), magic) - magic).mul_add(S::splat(-4.0), n[k]);
+        // cos m π/2 and sin m π/2, of which one is 0 and one is ±1: sums with them are not rounded
+        let along = one - m.abs();
+        let across = m.mul_add(along, m);
+        sin[k] = across.mul_add(c, along * s);
+        cos[k] = along.mul_add(c, -(across * s));
+    }
+    (sin, cos)
 }
 
 macro_rules! number {
@@ -87,7 +95,7 @@ macro_rules! number {
             const LARGEST: f64 = $largest;
 
             #[inline(always)]
-            fn near<S: Scalar>(x: S) -> (S, S) {
+            fn near<S: Scalar, const N: usize>(x: [S; N]) -> ([S; N], [S; N]) {
                 reduced(x, &$precision)
             }
             #[inline(always)]

@@ -99,20 +99,25 @@ impl Scalar for Fused {
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         if self.0.abs() <= f64::LARGEST {
-            return f64::near(self);
+            let ([sin], [cos]) = f64::near([self]);
+            return (sin, cos);
         }
         let (sin, cos) = self.0.far();
         (Self(sin), Self(cos))
     }
-    /// Four at a time: where there are lanes, there are vectors of four.
+    /// Two vectors of four at a time: where there are lanes, there are these.
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
         assert_supported(SHORT);
-        let (angles, others) = angles.as_chunks_mut::<4>();
-        let (cosines, other_cosines) = cosines.as_chunks_mut::<4>();
+        let (angles, others) = angles.as_chunks_mut::<8>();
+        let (cosines, other_cosines) = cosines.as_chunks_mut::<8>();
         for (x, y) in angles.iter_mut().zip(cosines) {
-            let (sin, cos) = Lanes::<f64, 4>::from_fused(x).sin_cos();
-            (*x, *y) = (sin.to_fused(), cos.to_fused());
+            let ((x, _), (y, _)) = (x.as_chunks_mut::<4>(), y.as_chunks_mut::<4>());
+            let both = [Lanes::from_fused(&x[0]), Lanes::from_fused(&x[1])];
+            let (sin, cos) = Lanes::<f64, 4>::sines_and_cosines(both);
+            for k in 0..2 {
+                (x[k], y[k]) = (sin[k].to_fused(), cos[k].to_fused());
+            }
         }
         for (sin, cos) in others.iter_mut().zip(other_cosines) {
             (*sin, *cos) = sin.sin_cos();

@@ -6,6 +6,7 @@ use crate::workspace::{Gate, Short};
 use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
+use condyle_model::joint::kinematics::Turns;
 use condyle_model::layout::{Columns, Layout};
 use condyle_model::limbs::column_map::{ColumnMap, LaneColumn, Pair, Predecessor};
 use condyle_model::limbs::steps::{Parents, Source, Step};
@@ -25,6 +26,7 @@ pub(crate) struct Limbs<'a> {
     copies: &'a [Vec<(usize, Move)>],
     predecessors: &'a [Predecessor],
     closed: &'a [usize],
+    turns: &'a Turns,
     coordinates: &'a [Source],
     pub armature: &'a [f64],
     pub gravity: Vec3<f64>,
@@ -98,6 +100,10 @@ impl Layout for Limbs<'_> {
     #[inline(always)]
     fn joint(&self, i: usize) -> Joint {
         self.steps[i].joint
+    }
+    #[inline(always)]
+    fn turns(&self) -> &Turns {
+        self.turns
     }
     #[inline(always)]
     fn placement(&self, i: usize) -> Se3<Four> {
@@ -199,11 +205,11 @@ impl Layout for Limbs<'_> {
 impl<'a> Limbs<'a> {
     #[inline(always)]
     pub(crate) fn new(plan: &'a Plan, model: &'a Model) -> Self {
-        let Plan { steps, closed, state, columns, .. } = plan;
+        let Plan { steps, closed, turns, state, columns, .. } = plan;
         let ColumnMap { support, pairs, copies, predecessors, .. } = columns;
         let (armature, gravity) = (model.armature(), *model.gravity());
         let coordinates = &state.coordinates;
-        Self { steps, support, pairs, copies, predecessors, closed, coordinates, armature, gravity }
+        Self { steps, support, pairs, copies, predecessors, closed, turns, coordinates, armature, gravity }
     }
 
     /// What stands at the predecessor of an entry of the support.

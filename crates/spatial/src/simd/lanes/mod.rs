@@ -170,6 +170,23 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
         // SAFETY: these are transparent wrappers.
         T::Register::transpose(unsafe { &mut *core::ptr::from_mut(rows).cast() });
     }
+    /// (sin x, cos x) of some vectors.
+    #[inline(always)]
+    pub(crate) fn sines_and_cosines<const K: usize>(x: [Self; K]) -> ([Self; K], [Self; K]) {
+        let largest = Self::splat(T::LARGEST);
+        let mut beyond = largest.lt(x[0].abs());
+        for k in 1..K {
+            beyond = Self::or(beyond, largest.lt(x[k].abs()));
+        }
+        let (mut sin, mut cos) = T::near(x);
+        if Self::any(beyond) {
+            for k in 0..K {
+                let ((s, c), beyond) = (x[k].each(T::far), largest.lt(x[k].abs()));
+                (sin[k], cos[k]) = (Self::select(beyond, s, sin[k]), Self::select(beyond, c, cos[k]));
+            }
+        }
+        (sin, cos)
+    }
     /// Each lane alone, by a function of one number.
     #[inline(always)]
     fn each(self, f: fn(T) -> (T, T)) -> (Self, Self) {
@@ -238,13 +255,20 @@ impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
     }
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        let beyond = Self::splat(T::LARGEST).lt(self.abs());
-        if T::Register::any(beyond) {
-            let (sin, cos) = self.each(T::far);
-            let (s, c) = T::near(self);
-            return (Self::select(beyond, sin, s), Self::select(beyond, cos, c));
+        let ([sin], [cos]) = Self::sines_and_cosines([self]);
+        (sin, cos)
+    }
+    /// Two at a time.
+    #[inline(always)]
+    fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
+        let (angles, others) = angles.as_chunks_mut::<2>();
+        let (cosines, other_cosines) = cosines.as_chunks_mut::<2>();
+        for (x, y) in angles.iter_mut().zip(cosines) {
+            (*x, *y) = Self::sines_and_cosines(*x);
         }
-        T::near(self)
+        for (sin, cos) in others.iter_mut().zip(other_cosines) {
+            (*sin, *cos) = sin.sin_cos();
+        }
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
