@@ -8,19 +8,20 @@ use alloc::vec::Vec;
 use condyle_spatial::moves::Move;
 use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
 
-/// Four bodies as a pass sees them.
+/// Four bodies as a pass sees them; what is in lanes comes first, so that no vector crosses a line of the cache.
 #[derive(Clone, Debug)]
+#[repr(C, align(64))]
 pub struct Step {
-    /// The kind of their joints.
-    pub joint: Joint,
-    /// The bodies, 0 in a lane without one.
-    pub bodies: [usize; LANES],
     /// X_T, between turned frames.
     pub placement: Se3<[f64; LANES]>,
     /// The inertia in the turned frame.
     pub inertia: Inertia<[f64; LANES]>,
     /// bRz: the turned frame in the body's.
     pub axis_rotation: Mat3<[f64; LANES]>,
+    /// The kind of their joints.
+    pub joint: Joint,
+    /// The bodies, 0 in a lane without one.
+    pub bodies: [usize; LANES],
     /// The place at which the positions of their joints begin among those in lanes.
     pub idx_q: usize,
     /// The place at which the velocities of their joints begin among those in lanes.
