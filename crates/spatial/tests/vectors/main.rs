@@ -95,6 +95,35 @@ impl<S: Block<Number: Number>> Operations<S> {
     }
 }
 
+/// Sines and cosines of an odd number of vectors: the bits of each vector alone, and of single numbers but for rounding. Large
+/// angles stand beside small ones.
+struct Sines<S>(PhantomData<S>);
+
+impl<S: Block<Number: Number>> Kernel for Sines<S> {
+    fn run(self) {
+        let numbers = S::Number::some();
+        let angles: Vec<S> = numbers.chunks_exact(S::LANES).map(S::load).collect();
+        let count = (angles.len() - 1) | 1;
+        let (mut sin, mut cos) = (angles[..count].to_vec(), angles[..count].to_vec());
+        S::sin_cos_of_all(&mut sin, &mut cos);
+        let rounding = S::Number::splat(if size_of::<S::Number>() == 8 { 5e-16 } else { 5e-7 });
+        for (k, angles) in numbers.chunks_exact(S::LANES).take(count).enumerate() {
+            let (sin_alone, cos_alone) = S::load(angles).sin_cos();
+            for (all, alone, is_sin) in [(sin[k], sin_alone, true), (cos[k], cos_alone, false)] {
+                let (mut found, mut expected) = (angles.to_vec(), angles.to_vec());
+                all.store(&mut found);
+                alone.store(&mut expected);
+                for (lane, &x) in angles.iter().enumerate() {
+                    let (found, expected) = (found[lane], expected[lane]);
+                    let single = if is_sin { x.sin_cos().0 } else { x.sin_cos().1 };
+                    let is_near = (found - single).abs().lt(rounding) || found.bits() == single.bits();
+                    assert!(found.bits() == expected.bits() && is_near, "of {x:?}: {found:?} {expected:?} {single:?}");
+                }
+            }
+        }
+    }
+}
+
 /// Between lanes: each of four numbers to each lane, and all together.
 struct Moves;
 
@@ -119,6 +148,7 @@ impl Kernel for Moves {
 fn each_lane_is_a_number() {
     fn operations<S: Block<Number: Number>>() {
         S::enter(Operations::<S>(PhantomData));
+        S::enter(Sines::<S>(PhantomData));
     }
     for level in Level::ALL {
         match level {
