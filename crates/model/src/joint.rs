@@ -8,6 +8,7 @@
 mod group;
 pub mod kinematics;
 mod motion;
+pub mod turns;
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;

@@ -13,7 +13,7 @@
 //! [`set_row`](Columns::set_row) and its like Gᵀ · G, and no algorithm knows more.
 
 use crate::joint::Joint;
-use crate::joint::kinematics::Turns;
+use crate::joint::turns::Turns;
 use crate::model::Model;
 use crate::tree::{Node, Tree};
 use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3, Vec3};

@@ -11,7 +11,7 @@ pub mod column_map;
 pub mod schedule;
 pub mod steps;
 
-use crate::joint::kinematics::Turns;
+use crate::joint::turns::Turns;
 use crate::tree::Tree;
 use alloc::vec::Vec;
 use column_map::ColumnMap;

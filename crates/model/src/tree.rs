@@ -4,7 +4,7 @@
 //! coordinate, so several columns may have the same one.
 
 use crate::body::Body;
-use crate::joint::kinematics::Turns;
+use crate::joint::turns::Turns;
 use crate::joint::{Joint, Mimic};
 use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;

@@ -1,8 +1,8 @@
 //! Kinematics of joints: the placement and the motion of a body, and the efforts that a force exerts.
 
+use super::turns::Turns;
 use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;
-use alloc::vec::Vec;
 use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, alike};
 
 /// The sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. What stands at other bodies, and behind the
@@ -29,39 +29,6 @@ impl<S: Scalar> JointSinCos<S> {
     }
 }
 
-/// The joints that turn about z, found once, so that no pass looks at each.
-#[derive(Clone, Debug, Default)]
-pub struct Turns {
-    /// Joints whose angles stand in q. Of some that follow each other, as their angles do: the first joint, the place of its
-    /// angle, and how many.
-    runs: Vec<[usize; 3]>,
-    /// Joints whose angles are computed from those of others.
-    followers: Vec<usize>,
-    /// Joints whose cosines and sines stand in q.
-    circles: Vec<usize>,
-}
-
-impl Turns {
-    /// Those among some joints, from that of body 1 on, each with the place of its position in q and whether it follows
-    /// another one.
-    pub(crate) fn of(joints: impl Iterator<Item = (Joint, usize, bool)>) -> Self {
-        let mut turns = Self::default();
-        for (k, (joint, idx_q, follows)) in joints.enumerate() {
-            let i = k + 1;
-            match joint {
-                Joint::Revolute { .. } | Joint::Helical { .. } if follows => turns.followers.push(i),
-                Joint::Revolute { .. } | Joint::Helical { .. } => match turns.runs.last_mut() {
-                    Some([first, at, count]) if (*first + *count, *at + *count) == (i, idx_q) => *count += 1,
-                    _ => turns.runs.push([i, idx_q, 1]),
-                },
-                Joint::Continuous { .. } | Joint::Planar => turns.circles.push(i),
-                _ => {}
-            }
-        }
-        turns
-    }
-}
-
 #[doc(hidden)]
 impl Joint {
     /// The sine and cosine of the angle by which each joint turns about z, all of them at once.
@@ -78,13 +45,6 @@ impl Joint {
         for &i in circles {
             (sin[i], cos[i]) = Self::sin_cos_in(l, i, q);
         }
-    }
-
-    /// The sine and cosine that stand in q.
-    #[inline(always)]
-    fn sin_cos_in<L: Layout>(l: &L, i: usize, q: &[L::S]) -> (L::S, L::S) {
-        let at = if let Self::Planar = l.joint(i) { 2 } else { 0 };
-        (l.position(q, i, at + 1), l.position(q, i, at))
     }
 
     /// The same of some joints, each with the place at which its sine and cosine go.
@@ -107,6 +67,13 @@ impl Joint {
                 (sin[k], cos[k]) = Self::sin_cos_in(l, i, q);
             }
         }
+    }
+
+    /// The sine and cosine that stand in q.
+    #[inline(always)]
+    fn sin_cos_in<L: Layout>(l: &L, i: usize, q: &[L::S]) -> (L::S, L::S) {
+        let at = if let Self::Planar = l.joint(i) { 2 } else { 0 };
+        (l.position(q, i, at + 1), l.position(q, i, at))
     }
 
     /// λXi = X_T X_J(q), for joint i of a pass.

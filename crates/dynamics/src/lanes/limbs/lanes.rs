@@ -6,7 +6,7 @@ use crate::workspace::{Gate, Short};
 use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
-use condyle_model::joint::kinematics::Turns;
+use condyle_model::joint::turns::Turns;
 use condyle_model::layout::{Columns, Layout};
 use condyle_model::limbs::column_map::{ColumnMap, LaneColumn, Pair, Predecessor};
 use condyle_model::limbs::steps::{Parents, Source, Step};
