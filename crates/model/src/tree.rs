@@ -81,6 +81,7 @@ pub(crate) struct Tree<R> {
     pub support: Vec<usize>,
     /// The bodies, children before parents.
     pub closed: Vec<usize>,
+    /// The joints that turn about z.
     pub turns: Turns,
     /// The coordinates in which efforts are needed to move one of them: those before and after it in the tree, and itself.
     /// Shape: nv.

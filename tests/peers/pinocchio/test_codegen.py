@@ -52,7 +52,10 @@ CASES = [
     if ALL or not (name == "borinot" and language == "c-float")
     if ALL or language != "c-8" or name == FEW[0] or condyle.LEVEL == "avx512"
 ]
-"""Where vectors have four numbers, compilers take a minute for eight lanes of a robot: then one will do."""
+"""Where vectors have four numbers, compilers take a minute for eight lanes of a robot: then one will do.
+
+The three kinds of floats are left to the two smaller ones.
+"""
 BESIDES = {"c-float": ["c-float-4", "c-float-8"], "rust": ["rust-float"]}
 """Of robots of up to `SMALL` coordinates, the languages that join what others have one by one."""
 

@@ -43,7 +43,7 @@ kernel! {
             }
             let (mut sin, mut cos) = ([S::zero(); AT_ONCE], [S::one(); AT_ONCE]);
             let of = ..n.next_multiple_of(JointSinCos::<S>::STEP);
-            Joint::sin_cos_of(&l, some[..n].iter().copied().enumerate(), q, &mut sin[of], &mut cos[of]);
+            Joint::sin_cos_of(&l, &some[..n], q, &mut sin[of], &mut cos[of]);
             for (k, &i) in some[..n].iter().enumerate() {
                 let joint = l.joint(i);
                 for k in 0..joint.nv() {

@@ -47,22 +47,16 @@ impl Joint {
         }
     }
 
-    /// The same of some joints, each with the place at which its sine and cosine go.
+    /// The same of some joints, in their order.
     #[inline(always)]
-    pub fn sin_cos_of<L: Layout>(
-        l: &L,
-        joints: impl Iterator<Item = (usize, usize)> + Clone,
-        q: &[L::S],
-        sin: &mut [L::S],
-        cos: &mut [L::S],
-    ) {
-        for (k, i) in joints.clone() {
+    pub fn sin_cos_of<L: Layout>(l: &L, joints: &[usize], q: &[L::S], sin: &mut [L::S], cos: &mut [L::S]) {
+        for (k, &i) in joints.iter().enumerate() {
             if let Self::Revolute { .. } | Self::Helical { .. } = l.joint(i) {
                 sin[k] = l.position(q, i, 0);
             }
         }
         L::S::sin_cos_of_all(sin, cos);
-        for (k, i) in joints {
+        for (k, &i) in joints.iter().enumerate() {
             if let Self::Continuous { .. } | Self::Planar = l.joint(i) {
                 (sin[k], cos[k]) = Self::sin_cos_in(l, i, q);
             }
