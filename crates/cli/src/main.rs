@@ -12,7 +12,6 @@ mod generate;
 mod inspect;
 mod limits;
 mod lines;
-mod meshes;
 mod motion;
 mod page;
 mod plan;

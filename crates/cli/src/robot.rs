@@ -1,8 +1,8 @@
 //! The robot of a command: a file of any kind, or one that comes along.
 
 use crate::error::{Error, nearest};
-use crate::meshes::Places;
 use condyle::{Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, robots};
+use condyle_meshes::Places;
 use std::path::{Path, PathBuf};
 
 /// The robots that come along, by name.

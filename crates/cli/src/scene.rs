@@ -1,9 +1,9 @@
 //! What the page draws: the shapes and meshes of a robot's file, or bones between the joints where it has none.
 
-use crate::meshes::{Meshes, mjcf};
 use crate::robot::{Format, Robot};
 use crate::visuals::{self, Geometry};
 use condyle::{Act, Data, Model, Quaternion, Se3, Vec3, forward_kinematics};
+use condyle_meshes::{Drawn, Meshes, mjcf};
 use serde::Serialize;
 use std::collections::HashMap;
 
@@ -113,7 +113,7 @@ fn shapes_of_mjcf(model: &Model, text: &str, meshes: &mut Meshes) -> HashMap<usi
 
 /// The parts of a mesh. The colours that its own file gives come first, as RViz has them.
 fn parts(meshes: &mut Meshes, file: &str, scale: &[f64], pose: [f64; 7], color: Option<&str>) -> Vec<Shape> {
-    let shape = |drawn: crate::meshes::Drawn| Shape {
+    let shape = |drawn: Drawn| Shape {
         kind: "mesh",
         size: scale.to_vec(),
         color: drawn.color.map(|own| hex(&own)).or(color.map(str::to_owned)),

@@ -4,7 +4,7 @@ use std::path::{Component, Path, PathBuf};
 
 /// Where files are looked for.
 #[derive(Clone, Default)]
-pub(crate) struct Places {
+pub struct Places {
     /// The folder of the robot's file; none for a robot that comes along.
     pub folder: Option<PathBuf>,
     /// Folders with packages in them.
@@ -14,7 +14,7 @@ pub(crate) struct Places {
 impl Places {
     /// The file of a path, a `package://`, `model://` or `file://` address. A package may be in --packages, ROS_PACKAGE_PATH,
     /// AMENT_PREFIX_PATH, or be a folder around the robot's file or beside such a folder.
-    pub(crate) fn find(&self, address: &str) -> Result<PathBuf, String> {
+    pub fn find(&self, address: &str) -> Result<PathBuf, String> {
         let inside = ["package://", "model://"].iter().find_map(|scheme| address.strip_prefix(scheme));
         let Some(inside) = inside else { return self.plain(address.strip_prefix("file://").unwrap_or(address)) };
         let (package, path) = inside.split_once('/').unwrap_or((inside, ""));

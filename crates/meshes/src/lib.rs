@@ -1,17 +1,26 @@
-//! The meshes that a page shows: found, read, made small, and written into it.
+//! The meshes that a page shows: found, read, made small, and written for it.
 //!
-//! A page has at most [`MOST`] triangles, whatever its robot's files have: edges collapse in the largest parts first. Their
+//! A page has at most 60 000 triangles, whatever its robot's files have: edges collapse in the largest parts first. Their
 //! points have 16 bits along each side of their box. What cannot be found or read is left out with a note: nothing needs it.
+//!
+//! ```
+//! use condyle_meshes::{Meshes, Places};
+//!
+//! let mut meshes = Meshes::new(Places { folder: Some("robot/urdf".into()), packages: vec![] });
+//! let drawn = meshes.get("package://robot/meshes/hip.dae"); // its parts, with the colours of their materials
+//! assert!(drawn.is_empty() && meshes.note().unwrap().starts_with("1 of 1 meshes are left out: no `package://"));
+//! assert!(meshes.written().is_empty()); // what goes into a page, by the parts' numbers
+//! ```
 
 mod dae;
 mod find;
-pub(crate) mod mjcf;
+pub mod mjcf;
 mod obj;
 mod part;
 mod simplify;
 mod stl;
 
-pub(crate) use find::Places;
+pub use find::Places;
 use part::Part;
 use serde_json::{Value, json};
 use std::collections::HashMap;
@@ -29,7 +38,7 @@ const LARGEST_SUM: u64 = 512 << 20;
 
 /// Meshes on their way into a page.
 #[derive(Default)]
-pub(crate) struct Meshes {
+pub struct Meshes {
     places: Places,
     parts: Vec<Part>,
     /// The numbers of a file's parts; nothing where it could not be read.
@@ -41,18 +50,21 @@ pub(crate) struct Meshes {
 }
 
 /// A part of a mesh, by its number; with the colour that its file gives it.
-pub(crate) struct Drawn {
+pub struct Drawn {
+    /// Its number in what is [written](Meshes::written).
     pub part: usize,
+    /// Red, green and blue from 0 to 1.
     pub color: Option<[f64; 3]>,
 }
 
 impl Meshes {
-    pub(crate) fn new(places: Places) -> Self {
+    /// None yet; their files are looked for in these places.
+    pub fn new(places: Places) -> Self {
         Self { places, ..Self::default() }
     }
 
     /// What is to be drawn for a mesh; nothing where its file is missing or wrong.
-    pub(crate) fn get(&mut self, address: &str) -> Vec<Drawn> {
+    pub fn get(&mut self, address: &str) -> Vec<Drawn> {
         self.wanted += 1;
         let parts = match self.load(address) {
             Ok(parts) => parts,
@@ -92,14 +104,14 @@ impl Meshes {
     }
 
     /// One line on what is left out, if anything is.
-    pub(crate) fn note(&self) -> Option<String> {
+    pub fn note(&self) -> Option<String> {
         let (what, count) = self.missing.as_ref()?;
         Some(format!("{count} of {} meshes are left out: {what}", self.wanted))
     }
 
     /// All parts, small enough for a page: points and triangles as base64 of 16-bit numbers; a point is
     /// `low + side n / 65535`.
-    pub(crate) fn written(self) -> Vec<Value> {
+    pub fn written(self) -> Vec<Value> {
         let most = level(self.parts.iter().map(|part| part.triangles.len()).collect());
         let small = |part: Part| {
             if part.triangles.len() > most { simplify::simplify(&part, most.max(FEWEST)) } else { part }

@@ -2,7 +2,7 @@
 //! simplification using quadric error metrics", SIGGRAPH 1997), after points that coincide have been made one.
 
 use super::part::Part;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap, HashSet};
 
@@ -76,32 +76,38 @@ pub(super) fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     (limits(f64::min, f64::INFINITY), limits(f64::max, f64::NEG_INFINITY))
 }
 
-/// The sum of squared distances from planes: xᵀ A x + 2 bᵀ x + c.
+/// The sum of squared distances from planes, (x, 1)ᵀ Q (x, 1): the upper half of Q, row by row.
 #[derive(Clone)]
-struct Quadric {
-    A: Matrix3<f64>,
-    b: Vector3<f64>,
-    c: f64,
-}
+struct Quadric([f64; 10]);
 
 impl Quadric {
-    const ZERO: Self =
-        Self { A: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), b: Vector3::new(0.0, 0.0, 0.0), c: 0.0 };
+    const ZERO: Self = Self([0.0; 10]);
 
     /// A plane through a point, with its unit normal.
     fn add_plane(&mut self, normal: Vector3<f64>, point: Vector3<f64>, weight: f64) {
-        let d = -normal.dot(&point);
-        self.A += weight * normal * normal.transpose();
-        self.b += weight * d * normal;
-        self.c += weight * d * d;
+        let [x, y, z, w] = [normal.x, normal.y, normal.z, -normal.dot(&point)];
+        let products = [x * x, x * y, x * z, x * w, y * y, y * z, y * w, z * z, z * w, w * w];
+        *self = self.plus(&Self(products.map(|product| weight * product)));
     }
 
     fn plus(&self, other: &Self) -> Self {
-        Self { A: self.A + other.A, b: self.b + other.b, c: self.c + other.c }
+        Self(core::array::from_fn(|k| self.0[k] + other.0[k]))
     }
 
     fn at(&self, x: Vector3<f64>) -> f64 {
-        (x.dot(&(self.A * x)) + 2.0 * self.b.dot(&x) + self.c).max(0.0)
+        let [xx, xy, xz, xw, yy, yz, yw, zz, zw, ww] = self.0;
+        let [x, y, z] = x.into();
+        let slopes = [xx * x + 2.0 * (xy * y + xz * z + xw), yy * y + 2.0 * (yz * z + yw), zz * z + 2.0 * zw];
+        (slopes[0] * x + slopes[1] * y + slopes[2] * z + ww).max(0.0)
+    }
+
+    /// The point where it is least, by cofactors; it is far away or not finite where there is none.
+    fn least(&self) -> Vector3<f64> {
+        let [xx, xy, xz, xw, yy, yz, yw, zz, zw, _] = self.0;
+        let [a, b, c] = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
+        let [d, e, f] = [xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy];
+        let scale = -1.0 / (xx * a + xy * b + xz * c);
+        Vector3::new(a * xw + b * yw + c * zw, b * xw + d * yw + e * zw, c * xw + e * yw + f * zw) * scale
     }
 }
 
@@ -182,9 +188,8 @@ impl Surface {
         let quadric = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
         let middle = 0.5 * (p + q);
-        let solved = quadric.A.try_inverse().map(|inverse| -(inverse * quadric.b));
         // A flat part has no best point, or one far away.
-        let near = solved.filter(|x| (x - middle).norm() <= (p - q).norm());
+        let near = Some(quadric.least()).filter(|x| (x - middle).norm() <= (p - q).norm());
         let cost = |x: Vector3<f64>| (quadric.at(x), x);
         let ends = [middle, p, q]
             .into_iter()
@@ -267,7 +272,7 @@ fn edge(a: u32, b: u32) -> [u32; 2] {
 #[cfg(test)]
 mod tests {
     use super::{bounds, simplify};
-    use crate::meshes::part::Part;
+    use crate::part::Part;
 
     /// A sphere of radius 1 as a soup of triangles.
     fn sphere(n: usize) -> Part {

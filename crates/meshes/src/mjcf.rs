@@ -7,11 +7,14 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// A mesh in a body's frame.
-pub(crate) struct Visual {
+pub struct Visual {
     /// The name of the body; none for the world.
     pub body: Option<String>,
+    /// The address of its file, as [`crate::Meshes::get`] takes it.
     pub file: String,
+    /// Along its axes.
     pub scale: [f64; 3],
+    /// Of the mesh in the body; m.
     pub pose: Isometry3<f64>,
     /// Red, green, blue and opacity from 0 to 1.
     pub color: Option<[f64; 4]>,
@@ -35,7 +38,7 @@ struct File<'a> {
 }
 
 /// The meshes of an MJCF; what is in files that it includes is left out.
-pub(crate) fn visuals(text: &str) -> Vec<Visual> {
+pub fn visuals(text: &str) -> Vec<Visual> {
     let Ok(document) = Document::parse(text) else { return Vec::new() };
     let root = document.root_element();
     let all = |section, tag| {
