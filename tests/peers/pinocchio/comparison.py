@@ -4,7 +4,7 @@ import inspect
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -175,11 +175,17 @@ def ours_of(state: State) -> Callable[..., np.ndarray]:
         return others[name]
 
     def call(function: Callable[..., Any], *args: Any) -> Any:
-        names = list(inspect.signature(function).parameters)[2:]
+        names = arguments_of(function)
         many = (together(n, x) if isinstance(x, np.ndarray) else x for n, x in zip(names, args, strict=False))
         return of_state(function(model, data, *many))
 
     return call
+
+
+@cache
+def arguments_of(function: Callable[..., Any]) -> list[str]:
+    """The names of what a function takes beside model and data; to read its signature takes longer than most calls."""
+    return list(inspect.signature(function).parameters)[2:]
 
 
 def of_state(results: Any) -> Any:

@@ -3,6 +3,7 @@
 //! It is for matrices M + O(h) near a positive definite M: those have positive definite symmetric parts, for which
 //! elimination in the given order is stable (Golub and Van Loan, *Matrix Computations*, section 4.3.2).
 
+use condyle_linalg::axpy::axpy;
 use condyle_spatial::Scalar;
 
 /// L (its diagonal of ones left out) and U in place of A.
@@ -11,10 +12,8 @@ pub(super) fn factorize<S: Scalar>(A: &mut [S], n: usize) {
         let (left, rest) = A.split_at_mut(j * n);
         let column = &mut rest[..n];
         for k in 0..j {
-            let x = column[k];
-            for i in k + 1..n {
-                column[i] -= left[k * n + i] * x; // A_ij − Σ L_ik U_kj
-            }
+            let (x, L) = (column[k], &left[k * n..][..n]);
+            axpy(-x, &L[k + 1..], &mut column[k + 1..]); // A_ij − Σ L_ik U_kj
         }
         let r = column[j].recip();
         for x in &mut column[j + 1..] {
@@ -27,16 +26,13 @@ pub(super) fn factorize<S: Scalar>(A: &mut [S], n: usize) {
 pub(super) fn solve<S: Scalar>(LU: &[S], b: &mut [S]) {
     let n = b.len();
     for j in 0..n {
-        let x = b[j];
-        for i in j + 1..n {
-            b[i] -= LU[j * n + i] * x;
-        }
+        let (x, column) = (b[j], &LU[j * n..][..n]);
+        axpy(-x, &column[j + 1..], &mut b[j + 1..]);
     }
     for j in (0..n).rev() {
-        b[j] = b[j] / LU[j * n + j];
+        let column = &LU[j * n..][..n];
+        b[j] = b[j] / column[j];
         let x = b[j];
-        for i in 0..j {
-            b[i] -= LU[j * n + i] * x;
-        }
+        axpy(-x, &column[..j], &mut b[..j]);
     }
 }
