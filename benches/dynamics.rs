@@ -1,8 +1,11 @@
-//! The rigid-body algorithms and their derivatives, one call on one state: `cargo bench --bench dynamics`.
+//! The rigid-body algorithms, their derivatives, and what the equations of motion are made of, one call on one state:
+//! `cargo bench --bench dynamics`.
 
 use condyle::{
-    Data, Model, aba, aba_derivatives, crba, joint_torque_regressor, kinetic_energy_regressor, minv,
-    potential_energy_regressor, random_configuration, rnea, rnea_derivatives, robots,
+    Data, Model, aba, aba_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms, coriolis_matrix, crba,
+    forward_accelerations, forward_kinematics, forward_velocities, joint_torque_regressor, kinetic_energy_regressor,
+    minv, nonlinear_effects, potential_energy_regressor, random_configuration, rnea, rnea_derivatives, robots,
+    static_torque,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;
@@ -30,9 +33,18 @@ fn states(model: &Model) -> Vec<State> {
         .collect()
 }
 
+/// What `compute_all_terms` gives, from the functions that give one of the terms.
+fn apart(model: &Model, data: &mut Data<f64>, s: &State) {
+    black_box(crba(model, data, &s.q));
+    black_box(nonlinear_effects(model, data, &s.q, &s.v));
+    black_box(centroidal_map_rate(model, data, &s.q, &s.v));
+    let velocities = forward_velocities(model, data, &s.q, &s.v);
+    black_box((velocities.kinetic_energy(), velocities.potential_energy()));
+}
+
 fn algorithms(c: &mut Criterion) {
     type Algorithm = fn(&Model, &mut Data<f64>, &State);
-    let algorithms: [(&str, Algorithm); 8] = [
+    let algorithms: [(&str, Algorithm); 17] = [
         ("rnea", |m, d, s| _ = black_box(rnea(m, d, &s.q, &s.v, &s.x, &[]))),
         ("crba", |m, d, s| _ = black_box(crba(m, d, &s.q))),
         ("aba", |m, d, s| _ = black_box(aba(m, d, &s.q, &s.v, &s.x, &[]))),
@@ -44,6 +56,15 @@ fn algorithms(c: &mut Criterion) {
             black_box(kinetic_energy_regressor(m, d, &s.q, &s.v));
             black_box(potential_energy_regressor(m, d, &s.q));
         }),
+        ("forward_kinematics", |m, d, s| _ = black_box(forward_kinematics(m, d, &s.q))),
+        ("forward_velocities", |m, d, s| _ = black_box(forward_velocities(m, d, &s.q, &s.v))),
+        ("forward_accelerations", |m, d, s| _ = black_box(forward_accelerations(m, d, &s.q, &s.v, &s.x))),
+        ("static_torque", |m, d, s| _ = black_box(static_torque(m, d, &s.q, &[]))),
+        ("coriolis_matrix", |m, d, s| _ = black_box(coriolis_matrix(m, d, &s.q, &s.v))),
+        ("centroidal_map", |m, d, s| _ = black_box(centroidal_map(m, d, &s.q))),
+        ("centroidal_map_rate", |m, d, s| _ = black_box(centroidal_map_rate(m, d, &s.q, &s.v))),
+        ("all terms together", |m, d, s| _ = black_box(compute_all_terms(m, d, &s.q, &s.v))),
+        ("all terms apart", apart),
     ];
     let robots = [("arm7", robots::arm7()), ("quadruped", robots::quadruped()), ("humanoid", robots::humanoid())];
     for (name, algorithm) in algorithms {

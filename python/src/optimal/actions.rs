@@ -2,7 +2,7 @@
 
 use super::costs::{Cost, Limit};
 use super::integrators;
-use super::robot_action::{Reduced, RobotAction, WrittenAt};
+use super::robot_action::{Reduced, RobotAction, WrittenAt, methods};
 use crate::arrays::{bounds, matrix};
 use crate::constrained::constraint;
 use crate::model::Model;
@@ -103,8 +103,10 @@ pub(super) fn knot(
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct FreeDynamics(pub(super) RobotAction<robot::FreeDynamics>);
 
-#[pymethods]
-impl FreeDynamics {
+methods! {
+    /// The efforts that hold the robot still at the state x, nu numbers.
+    FreeDynamics::quasi_static;
+
     #[new]
     #[pyo3(signature = (
         model, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None, upper=None,
@@ -138,28 +140,6 @@ impl FreeDynamics {
             Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?, controls))
         })?))
     }
-
-    /// The efforts that hold the robot still at the state x, nu numbers.
-    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.hold(x)
-    }
-
-    fn __repr__(&self) -> String {
-        self.0.repr("FreeDynamics")
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.0.traverse(&visit)
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
-        slf.get().0.reduce(slf)
-    }
-
-    #[staticmethod]
-    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_parts(model, text, &written)?))
-    }
 }
 
 /// A knot of a robot in contact: M q̈ + h = S u + Jᵀλ, J q̈ + γ = 0; otherwise as `FreeDynamics`.
@@ -181,8 +161,10 @@ impl FreeDynamics {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct ContactDynamics(pub(super) RobotAction<robot::ContactDynamics>);
 
-#[pymethods]
-impl ContactDynamics {
+methods! {
+    /// The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers.
+    ContactDynamics::quasi_static;
+
     #[new]
     #[pyo3(signature = (
         model, contacts, dt, costs, damping=0.0, costs_at=None, actuation=None, integrator="semi_implicit_euler",
@@ -211,28 +193,6 @@ impl ContactDynamics {
             Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?, controls))
         })?))
     }
-
-    /// The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers.
-    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.hold(x)
-    }
-
-    fn __repr__(&self) -> String {
-        self.0.repr("ContactDynamics")
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.0.traverse(&visit)
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
-        slf.get().0.reduce(slf)
-    }
-
-    #[staticmethod]
-    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_parts(model, text, &written)?))
-    }
 }
 
 /// A knot at which contacts set in: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w a(r).
@@ -250,8 +210,10 @@ impl ContactDynamics {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct ImpulseDynamics(pub(super) RobotAction<robot::ImpulseDynamics>);
 
-#[pymethods]
-impl ImpulseDynamics {
+methods! {
+    /// No controls: an impact has none.
+    ImpulseDynamics::quasi_static;
+
     #[new]
     #[pyo3(signature = (model, contacts, costs, restitution=0.0, damping=0.0, limits=None))]
     fn new(
@@ -268,27 +230,5 @@ impl ImpulseDynamics {
             let dynamics = Dynamics::Impulse { contacts, restitution, damping };
             Ok(knot(model, dynamics, (&costs, None), (limits, None), None, ControlPolynomial::Constant))
         })?))
-    }
-
-    /// No controls: an impact has none.
-    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.hold(x)
-    }
-
-    fn __repr__(&self) -> String {
-        self.0.repr("ImpulseDynamics")
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.0.traverse(&visit)
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
-        slf.get().0.reduce(slf)
-    }
-
-    #[staticmethod]
-    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_parts(model, text, &written)?))
     }
 }

@@ -3,7 +3,7 @@
 use super::actions::{At, Limits, actuation, contacts, kept_at, knot};
 use super::costs::{Cost, Limit};
 use super::integrators;
-use super::robot_action::{Reduced, RobotAction, WrittenAt};
+use super::robot_action::{Reduced, RobotAction, WrittenAt, methods};
 use crate::arrays::bounds;
 use crate::model::Model;
 use condyle::optimal::robot::{self, Dynamics};
@@ -22,8 +22,10 @@ use pyo3::types::PyDict;
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct InverseDynamics(pub(super) RobotAction<robot::InverseDynamics>);
 
-#[pymethods]
-impl InverseDynamics {
+methods! {
+    /// The accelerations that hold the robot still: nv zeros.
+    InverseDynamics::quasi_static;
+
     #[new]
     #[pyo3(signature = (
         model, dt, costs, integrator="semi_implicit_euler", lower=None, upper=None, limits=None, controls="constant"
@@ -44,28 +46,6 @@ impl InverseDynamics {
             let bounds = bounds(model.nv(), lower, upper)?;
             Ok(knot(model, Dynamics::Inverse { integrator, dt }, (&costs, None), (limits, None), bounds, controls))
         })?))
-    }
-
-    /// The accelerations that hold the robot still: nv zeros.
-    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.hold(x)
-    }
-
-    fn __repr__(&self) -> String {
-        self.0.repr("InverseDynamics")
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.0.traverse(&visit)
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
-        slf.get().0.reduce(slf)
-    }
-
-    #[staticmethod]
-    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_parts(model, text, &written)?))
     }
 }
 
@@ -94,8 +74,11 @@ impl InverseDynamics {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct ContactInverseDynamics(pub(super) RobotAction<robot::ContactInverseDynamics>);
 
-#[pymethods]
-impl ContactInverseDynamics {
+methods! {
+    /// No accelerations, and the forces among the smallest efforts and forces that hold the robot still at the state x:
+    /// nv zeros and λ.
+    ContactInverseDynamics::quasi_static;
+
     #[new]
     #[pyo3(signature = (
         model, contacts, dt, costs, costs_at=None, actuation=None, integrator="semi_implicit_euler", lower=None,
@@ -123,28 +106,5 @@ impl ContactInverseDynamics {
             let dynamics = Dynamics::ContactInverse { contacts, actuation, integrator, dt };
             Ok(knot(model, dynamics, (&costs, costs_at), (limits, limits_at), bounds(nu, lower, upper)?, controls))
         })?))
-    }
-
-    /// No accelerations, and the forces among the smallest efforts and forces that hold the robot still at the state x:
-    /// nv zeros and λ.
-    fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.hold(x)
-    }
-
-    fn __repr__(&self) -> String {
-        self.0.repr("ContactInverseDynamics")
-    }
-
-    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        self.0.traverse(&visit)
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
-        slf.get().0.reduce(slf)
-    }
-
-    #[staticmethod]
-    fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
-        Ok(Self(RobotAction::from_parts(model, text, &written)?))
     }
 }

@@ -202,3 +202,36 @@ macro_rules! change {
     };
 }
 pub(super) use change;
+
+/// The methods of a class that is a [`RobotAction`]: what its `quasi_static` gives, its own, and those that all have.
+macro_rules! methods {
+    ($(#[doc = $gives:literal])+ $class:ident::quasi_static; $($own:tt)*) => {
+        #[pymethods]
+        impl $class {
+            $($own)*
+
+            $(#[doc = $gives])+
+            fn quasi_static<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+                self.0.hold(x)
+            }
+
+            fn __repr__(&self) -> String {
+                self.0.repr(stringify!($class))
+            }
+
+            fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+                self.0.traverse(&visit)
+            }
+
+            fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Reduced<'py>> {
+                slf.get().0.reduce(slf)
+            }
+
+            #[staticmethod]
+            fn _from_parts(model: &Bound<'_, Model>, text: &str, written: WrittenAt<'_>) -> PyResult<Self> {
+                Ok(Self(RobotAction::from_parts(model, text, &written)?))
+            }
+        }
+    };
+}
+pub(super) use methods;
