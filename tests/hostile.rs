@@ -56,6 +56,21 @@ fn srdf() {
 }
 
 #[test]
+fn stl() {
+    run(Kind::Stl, 2_500);
+}
+
+#[test]
+fn obj() {
+    run(Kind::Obj, 2_500);
+}
+
+#[test]
+fn dae() {
+    run(Kind::Dae, 2_500);
+}
+
+#[test]
 fn models() {
     run(Kind::Model, 2_500);
 }

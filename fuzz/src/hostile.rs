@@ -10,6 +10,7 @@ use condyle::{
     ContactConstraint, Data, Joint, MjcfOptions, Model, SdfOptions, Se3, UrdfOptions, aba, crba, neutral,
     random_configuration, rnea, robots,
 };
+use condyle_meshes::{Format, Meshes};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
@@ -32,6 +33,12 @@ pub enum Kind {
     Pickle,
     /// An SRDF.
     Srdf,
+    /// A mesh as STL.
+    Stl,
+    /// A mesh as OBJ.
+    Obj,
+    /// A mesh as DAE.
+    Dae,
 }
 
 macro_rules! file {
@@ -40,10 +47,16 @@ macro_rules! file {
     };
 }
 
+macro_rules! mesh {
+    ($name:literal) => {
+        include_str!(concat!("../../crates/cli/tests/boxes/", $name))
+    };
+}
+
 impl Kind {
     /// The seeds: all good.
     pub fn seeds(self) -> Vec<Vec<u8>> {
-        static SEEDS: [OnceLock<Vec<Vec<u8>>>; 7] = [const { OnceLock::new() }; 7];
+        static SEEDS: [OnceLock<Vec<Vec<u8>>>; 10] = [const { OnceLock::new() }; 10];
         SEEDS[self as usize].get_or_init(|| self.new_seeds()).clone()
     }
 
@@ -59,7 +72,8 @@ impl Kind {
             Self::Mjcf => {
                 let defaults = file!("arm_defaults.xml").replace("<mujoco>", "").replace("</mujoco>", "");
                 let arm = file!("arm.xml").replace("<include file=\"arm_defaults.xml\"/>", &defaults);
-                vec![arm, file!("quadruped.xml").to_owned(), file!("gripper.xml").to_owned()]
+                let others = [file!("quadruped.xml"), file!("gripper.xml"), mesh!("boxes.xml")];
+                [arm].into_iter().chain(others.map(str::to_owned)).collect()
             }
             Self::Sdf => vec![file!("linkage.sdf").to_owned()],
             Self::Srdf => vec![file!("quadruped.srdf").to_owned()],
@@ -69,6 +83,9 @@ impl Kind {
             Self::Problem => {
                 problems().iter().map(|p| serde_json::to_string(p).expect("is made of numbers and words")).collect()
             }
+            Self::Stl => return vec![mesh!("box.stl").into(), binary_stl()],
+            Self::Obj => vec![mesh!("box.obj").to_owned()],
+            Self::Dae => vec![mesh!("box.dae").to_owned()],
             Self::Pickle => return models().iter().map(|m| postcard::to_allocvec(m).expect("has room")).collect(),
         };
         texts.into_iter().map(String::into_bytes).collect()
@@ -89,6 +106,8 @@ impl Kind {
                 Model::from_urdf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
             }
             Self::Mjcf => {
+                let poses = condyle_meshes::mjcf::visuals(&text).into_iter().map(|visual| visual.pose.to_homogeneous());
+                assert!(poses.flat_map(|pose| pose.as_slice().to_vec()).all(f64::is_finite), "a mesh is nowhere");
                 let options = MjcfOptions { mimic: some, weightless_meshes: other, ..MjcfOptions::default() };
                 Model::from_mjcf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
             }
@@ -100,6 +119,9 @@ impl Kind {
                 let positions = robots::quadruped().reference_configurations_str(&text, some);
                 positions.map(|all| use_positions(&all)).map_err(|e| e.to_string())
             }
+            Self::Stl => use_mesh(Format::Stl, input),
+            Self::Obj => use_mesh(Format::Obj, input),
+            Self::Dae => use_mesh(Format::Dae, input),
             Self::Model => serde_json::from_str(&text).map(|model: Model| use_model(&model)).map_err(|e| e.to_string()),
             Self::Pickle => {
                 postcard::from_bytes(input).map(|model: Model| use_model(&model)).map_err(|e| e.to_string())
@@ -198,11 +220,44 @@ fn use_problem(data: &RobotProblem) -> Result<(), String> {
     Ok(())
 }
 
+/// A mesh in a page: corners that there are, points in their box.
+fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
+    let mut meshes = Meshes::default();
+    let drawn = meshes.add(format, bytes, &|_| Some(mesh!("box.mtl").to_owned()))?;
+    assert!(drawn.iter().flat_map(|part| part.color).flatten().all(f64::is_finite));
+    let parts = meshes.written();
+    assert!(!parts.is_empty() && parts.len() == drawn.len());
+    for part in parts {
+        let numbers = |key: &str| part[key].as_array().into_iter().flatten().filter_map(Value::as_f64).count();
+        let length = |key: &str| part[key].as_str().map_or(0, |text| text.trim_end_matches('=').len() * 3 / 4);
+        assert!([numbers("low"), numbers("side")] == [3, 3], "a box that is not finite");
+        assert!(length("points") >= 18 && length("triangles") >= 6, "nothing to see");
+    }
+    Ok(())
+}
+
+/// Two triangles as a binary STL.
+fn binary_stl() -> Vec<u8> {
+    let mut bytes = vec![b' '; 80];
+    bytes.extend(2_u32.to_le_bytes());
+    for corners in
+        [[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]]
+    {
+        bytes.extend([0; 12]);
+        bytes.extend(corners.iter().flatten().flat_map(|x: &f32| x.to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
 /// An input with one to four things changed.
 pub fn mutated(kind: Kind, input: &[u8], seeds: &[Vec<u8>], rng: &mut StdRng) -> Vec<u8> {
     let mut bytes = input.to_vec();
     for _ in 0..rng.random_range(1..5) {
         bytes = match (kind, rng.random_range(0..10)) {
+            _ if std::str::from_utf8(&bytes).is_err() => {
+                mutate_bytes(bytes, &seeds[rng.random_range(0..seeds.len())], rng)
+            }
             (Kind::Pickle, _) | (_, 0) => mutate_bytes(bytes, &seeds[rng.random_range(0..seeds.len())], rng),
             (Kind::Model | Kind::Problem, 1..=6) => mutate_value(&bytes, rng),
             (_, 1 | 2) => mutate_tokens(&String::from_utf8_lossy(&bytes), rng).into(),

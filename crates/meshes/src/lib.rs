@@ -24,6 +24,7 @@ pub use find::Places;
 use part::Part;
 use serde_json::{Value, json};
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// The most triangles of a page, and of one of its parts, whose corners have numbers of 16 bits.
@@ -42,7 +43,7 @@ pub struct Meshes {
     places: Places,
     parts: Vec<Part>,
     /// The numbers of a file's parts; nothing where it could not be read.
-    files: HashMap<PathBuf, Vec<usize>>,
+    files: HashMap<PathBuf, Range<usize>>,
     read: u64,
     wanted: usize,
     /// Why meshes are left out: the first of the reasons, and how many they are.
@@ -70,37 +71,80 @@ impl Meshes {
             Ok(parts) => parts,
             Err(what) => {
                 self.missing.get_or_insert((what, 0)).1 += 1;
-                Vec::new()
+                0..0
             }
         };
-        parts.into_iter().map(|part| Drawn { part, color: self.parts[part].color }).collect()
+        self.drawn(parts)
     }
 
-    fn load(&mut self, address: &str) -> Result<Vec<usize>, String> {
+    /// What is to be drawn for a mesh that is in memory; `library` gives the text of a file of materials by its name.
+    ///
+    /// # Errors
+    /// What is wrong with it, with the line if it is an OBJ or an STL of text.
+    pub fn add(
+        &mut self,
+        format: Format,
+        bytes: &[u8],
+        library: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<Vec<Drawn>, String> {
+        let parts = self.keep(format, bytes, library)?;
+        Ok(self.drawn(parts))
+    }
+
+    fn drawn(&self, parts: Range<usize>) -> Vec<Drawn> {
+        parts.map(|part| Drawn { part, color: self.parts[part].color }).collect()
+    }
+
+    fn load(&mut self, address: &str) -> Result<Range<usize>, String> {
         let found = self.places.find(address)?;
         let path = found.canonicalize().unwrap_or(found);
         if let Some(parts) = self.files.get(&path) {
             return if parts.is_empty() { Err(format!("`{address}` shows nothing")) } else { Ok(parts.clone()) };
         }
-        self.files.insert(path.clone(), Vec::new());
-        let named = |what: String| format!("`{}`: {what}", path.display());
-        self.read += std::fs::metadata(&path).map_or(0, |about| about.len());
-        if self.read > LARGEST_SUM {
-            return Err(named(format!("all meshes together have more than {LARGEST_SUM} bytes")));
+        self.files.insert(path.clone(), 0..0);
+        let parts = self.load_from(&path).map_err(|what| format!("`{}`: {what}", path.display()))?;
+        self.files.insert(path, parts.clone());
+        Ok(parts)
+    }
+
+    fn load_from(&mut self, path: &Path) -> Result<Range<usize>, String> {
+        let about = std::fs::metadata(path).map_err(|error| error.to_string())?;
+        if !about.is_file() || about.len() > LARGEST {
+            return Err(format!("is no regular file of at most {LARGEST} bytes"));
         }
-        let parts = read(&path).map_err(named)?;
-        if self.parts.len() + parts.len() > MOST_PARTS {
-            return Err(named(format!("all meshes together have more than {MOST_PARTS} parts")));
+        self.read += about.len();
+        if self.read > LARGEST_SUM {
+            return Err(format!("all meshes together have more than {LARGEST_SUM} bytes"));
+        }
+        let format = Format::of(path).ok_or("is no STL, DAE or OBJ")?;
+        let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
+        self.keep(format, &bytes, &|name| {
+            let file = path.parent()?.join(name);
+            let about = std::fs::metadata(&file).ok()?;
+            (about.is_file() && about.len() < LARGEST)
+                .then(|| std::fs::read(file).ok())?
+                .map(|b| String::from_utf8_lossy(&b).into_owned())
+        })
+    }
+
+    /// Keeps the parts of a mesh that have triangles, made small.
+    fn keep(
+        &mut self,
+        format: Format,
+        bytes: &[u8],
+        library: &dyn Fn(&str) -> Option<String>,
+    ) -> Result<Range<usize>, String> {
+        let parts = format.read(bytes, library)?;
+        let first = self.parts.len();
+        if first + parts.len() > MOST_PARTS {
+            return Err(format!("all meshes together have more than {MOST_PARTS} parts"));
         }
         let parts = parts.iter().map(|part| simplify::simplify(part, MOST_OF_PART));
-        let first = self.parts.len();
         self.parts.extend(parts.filter(|part| !part.triangles.is_empty()));
-        let numbers: Vec<usize> = (first..self.parts.len()).collect();
-        if numbers.is_empty() {
-            return Err(named("has no triangle".to_owned()));
+        if self.parts.len() == first {
+            return Err("has no triangle".to_owned());
         }
-        self.files.insert(path, numbers.clone());
-        Ok(numbers)
+        Ok(first..self.parts.len())
     }
 
     /// One line on what is left out, if anything is.
@@ -134,37 +178,41 @@ fn level(mut counts: Vec<usize>) -> usize {
     MOST
 }
 
-/// The parts of a file, by its ending.
-fn read(path: &Path) -> Result<Vec<Part>, String> {
-    let about = std::fs::metadata(path).map_err(|error| error.to_string())?;
-    if !about.is_file() || about.len() > LARGEST {
-        return Err(format!("is no regular file of at most {LARGEST} bytes"));
-    }
-    let kind = path.extension().and_then(|kind| kind.to_str()).unwrap_or_default().to_lowercase();
-    if !matches!(&*kind, "stl" | "dae" | "obj") {
-        return Err("is no STL, DAE or OBJ".to_owned());
-    }
-    let bytes = std::fs::read(path).map_err(|error| error.to_string())?;
-    if kind == "stl" {
-        return check(stl::read(&bytes)?);
-    }
-    let text = String::from_utf8_lossy(&bytes);
-    let text = text.trim_start_matches('\u{feff}');
-    let library = |name: &str| {
-        let file = path.parent()?.join(name);
-        let about = std::fs::metadata(&file).ok()?;
-        (about.is_file() && about.len() < LARGEST)
-            .then(|| std::fs::read(file).ok())?
-            .map(|b| String::from_utf8_lossy(&b).into_owned())
-    };
-    check(if kind == "dae" { dae::read(text)? } else { obj::read(text, &library)? })
+/// A kind of file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Triangles, binary or as text.
+    Stl,
+    /// Wavefront's, with its files of materials.
+    Obj,
+    /// COLLADA.
+    Dae,
 }
 
-/// Refuses points that are no numbers.
-fn check(parts: Vec<Part>) -> Result<Vec<Part>, String> {
-    match parts.iter().flat_map(|part| &part.points).flatten().all(|x| x.abs() < 1e30) {
-        true => Ok(parts),
-        false => Err("has a coordinate that is not finite".to_owned()),
+impl Format {
+    /// The format that a file's ending says it has.
+    fn of(path: &Path) -> Option<Self> {
+        match &*path.extension()?.to_str()?.to_lowercase() {
+            "stl" => Some(Self::Stl),
+            "obj" => Some(Self::Obj),
+            "dae" => Some(Self::Dae),
+            _ => None,
+        }
+    }
+
+    /// The parts of a file, whose points are numbers.
+    fn read(self, bytes: &[u8], library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
+        let text = String::from_utf8_lossy(if self == Self::Stl { b"" } else { bytes });
+        let text = text.trim_start_matches('\u{feff}');
+        let parts = match self {
+            Self::Stl => stl::read(bytes)?,
+            Self::Obj => obj::read(text, library)?,
+            Self::Dae => dae::read(text)?,
+        };
+        match parts.iter().flat_map(|part| &part.points).flatten().all(|x| x.abs() < 1e30) {
+            true => Ok(parts),
+            false => Err("has a coordinate that is not finite".to_owned()),
+        }
     }
 }
 

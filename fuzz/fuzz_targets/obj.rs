@@ -1,0 +1,4 @@
+//! Meshes from OBJ.
+#![no_main]
+
+condyle_fuzz::target!(condyle_fuzz::Kind::Obj);

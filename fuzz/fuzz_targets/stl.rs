@@ -1,0 +1,4 @@
+//! Meshes from STL.
+#![no_main]
+
+condyle_fuzz::target!(condyle_fuzz::Kind::Stl);
