@@ -12,7 +12,7 @@ pub struct Places {
 }
 
 impl Places {
-    /// The file of a path, a `package://`, `model://` or `file://` address. A package may be in --packages, ROS_PACKAGE_PATH,
+    /// The file of a path, a `package://`, `model://` or `file://` address. A package may be in `packages`, ROS_PACKAGE_PATH,
     /// AMENT_PREFIX_PATH, or be a folder around the robot's file or beside such a folder.
     pub fn find(&self, address: &str) -> Result<PathBuf, String> {
         let inside = ["package://", "model://"].iter().find_map(|scheme| address.strip_prefix(scheme));
