@@ -220,7 +220,7 @@ fn use_problem(data: &RobotProblem) -> Result<(), String> {
     Ok(())
 }
 
-/// A mesh in a page: corners that there are, points in their box.
+/// A mesh in a page: its triangles have corners that there are, in boxes that are finite.
 fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
     let mut meshes = Meshes::default();
     let drawn = meshes.add(format, bytes, &|_| Some(mesh!("box.mtl").to_owned()))?;
@@ -229,11 +229,29 @@ fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
     assert!(!parts.is_empty() && parts.len() == drawn.len());
     for part in parts {
         let numbers = |key: &str| part[key].as_array().into_iter().flatten().filter_map(Value::as_f64).count();
-        let length = |key: &str| part[key].as_str().map_or(0, |text| text.trim_end_matches('=').len() * 3 / 4);
         assert!([numbers("low"), numbers("side")] == [3, 3], "a box that is not finite");
-        assert!(length("points") >= 18 && length("triangles") >= 6, "nothing to see");
+        let [points, corners] = ["points", "triangles"].map(|key| from_base64(part[key].as_str().expect("is a text")));
+        assert!(!corners.is_empty() && [corners.len() % 3, points.len() % 3] == [0, 0], "parts of a triangle");
+        assert!(corners.iter().all(|&corner| usize::from(corner) < points.len() / 3), "a corner that is not there");
     }
     Ok(())
+}
+
+/// Numbers of 16 bits, each with its lower byte first.
+fn from_base64(text: &str) -> Vec<u16> {
+    let value = |letter: u8| match letter {
+        b'A'..=b'Z' => letter - b'A',
+        b'a'..=b'z' => letter - b'a' + 26,
+        b'0'..=b'9' => letter - b'0' + 52,
+        b'+' => 62,
+        _ => 63,
+    };
+    let letters: Vec<u32> = text.trim_end_matches('=').bytes().map(|letter| value(letter).into()).collect();
+    let bytes = letters.chunks(4).flat_map(|four| {
+        let bits = four.iter().zip([18, 12, 6, 0]).map(|(value, place)| value << place).sum::<u32>();
+        bits.to_be_bytes()[1..four.len()].to_vec()
+    });
+    bytes.collect::<Vec<u8>>().chunks(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect()
 }
 
 /// Two triangles as a binary STL.

@@ -202,12 +202,12 @@ impl Format {
 
     /// The parts of a file, whose points are numbers.
     fn read(self, bytes: &[u8], library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
-        let text = String::from_utf8_lossy(if self == Self::Stl { b"" } else { bytes });
-        let text = text.trim_start_matches('\u{feff}');
+        // without the mark of byte order that some editors put first
+        let text = || String::from_utf8_lossy(bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes));
         let parts = match self {
             Self::Stl => stl::read(bytes)?,
-            Self::Obj => obj::read(text, library)?,
-            Self::Dae => dae::read(text)?,
+            Self::Obj => obj::read(&text(), library)?,
+            Self::Dae => dae::read(&text())?,
         };
         match parts.iter().flat_map(|part| &part.points).flatten().all(|x| x.abs() < 1e30) {
             true => Ok(parts),
