@@ -38,7 +38,7 @@ ALIASES = {
     ' | tuple[Literal["force", "inertia"], str | int] | tuple[Literal["friction"], float]',
     "_Method": 'Literal["aba", "dense", "sparse"]',
     "_Integrator": 'Literal["semi_implicit_euler", "runge_kutta_4", "variational"]',
-    "_Status": 'Literal["done", "not_converged", "not_finite"]',
+    "_Status": 'Literal["done", "not_converged", "contacts_not_converged", "not_finite"]',
     "_OfTwo": "Callable[[NDArray[Any], NDArray[Any]], Any]",
     "_Shapes": "list[tuple[str, int, int]]",
     "_Space": "Model | tuple[int, _OfTwo, _OfTwo]",
