@@ -1,5 +1,6 @@
 """The results of functions that are more than an array, and some arguments: named tuples."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np

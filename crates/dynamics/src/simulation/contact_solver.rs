@@ -21,6 +21,7 @@
 //! forces at rest do not wander.
 
 use alloc::vec::Vec;
+use condyle_spatial::Scalar;
 
 /// Least and greatest share of the largest entry on the diagonal of G that Newton's step adds to it. The least is small beside
 /// what contacts feel of each other, and large beside rounding.
@@ -265,7 +266,7 @@ impl Problem<'_> {
 
 /// ‖x‖.
 fn length([x, y]: [f64; 2]) -> f64 {
-    (x * x + y * y).sqrt()
+    Scalar::sqrt(x * x + y * y)
 }
 
 fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
@@ -274,11 +275,11 @@ fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
 
 /// x of A x = b, for a positive definite A, by Cholesky's factor.
 fn solve3(A: [[f64; 3]; 3], b: [f64; 3]) -> [f64; 3] {
-    let a = A[0][0].sqrt();
+    let a = Scalar::sqrt(A[0][0]);
     let (l1, l2) = (A[1][0] / a, A[2][0] / a);
-    let c = (A[1][1] - l1 * l1).sqrt();
+    let c = Scalar::sqrt(A[1][1] - l1 * l1);
     let l3 = (A[2][1] - l2 * l1) / c;
-    let d = (A[2][2] - l2 * l2 - l3 * l3).sqrt();
+    let d = Scalar::sqrt(A[2][2] - l2 * l2 - l3 * l3);
     let y0 = b[0] / a;
     let y1 = (b[1] - l1 * y0) / c;
     let y2 = (b[2] - l2 * y0 - l3 * y1) / d;

@@ -6,6 +6,10 @@ use condyle_spatial::Vec3;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+/// Distance from 1 to which rounding takes the length of a vector that was divided by it. Such a normal stays as it is, to the
+/// last bit.
+const UNIT: f64 = 1e-15;
+
 /// Point of a robot that may touch the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -128,7 +132,9 @@ impl Ground {
         if !(length.is_normal() && length.is_finite()) {
             return wrong(format!("normal ({x}, {y}, {z}) is no direction"));
         }
-        self.normal /= length;
+        if (length - 1.0).abs() > UNIT {
+            self.normal /= length;
+        }
         if !self.height.is_finite() {
             return wrong(format!("height is {} m, expected a finite number", self.height));
         }
