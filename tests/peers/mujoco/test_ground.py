@@ -3,7 +3,6 @@
 import mujoco
 import numpy as np
 import pytest
-
 from world import Array, World
 
 import condyle
