@@ -39,8 +39,8 @@ pub trait Element<const N: usize>: Number {
     type Register: Register<Self, N>;
 }
 
-/// N numbers in a vector register, or in two of them. It stands only in code that runs where the processor has the
-/// instructions, see the head of the file.
+/// N numbers in one vector register or in two. They are used only in code that is compiled for their level and runs where the
+/// processor has it.
 pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     /// The outcome of a comparison.
     type Mask: Copy;
@@ -111,7 +111,7 @@ macro_rules! instructions {
         #[inline(always)]
         #[allow(unused_unsafe)]
         fn $name($($x: $type),*) $(-> $out)? {
-            // SAFETY: the level is supported, see the head of `lanes.rs`.
+            // SAFETY: the level is supported: only code that was entered through `Scalar::enter` has these numbers.
             unsafe { $body }
         }
     )*};
