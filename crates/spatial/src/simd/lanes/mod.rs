@@ -133,6 +133,7 @@ macro_rules! register_operators {
 register_operators!(Add add, Sub sub, Mul mul, Div div);
 operators!(Lanes<T, N>, T: Element<N>, const N: usize);
 
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> Neg for Lanes<T, N> {
     type Output = Self;
     #[inline(always)]
@@ -141,12 +142,14 @@ impl<T: Element<N>, const N: usize> Neg for Lanes<T, N> {
     }
 }
 
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> PartialEq for Lanes<T, N> {
     fn eq(&self, o: &Self) -> bool {
         self.to_array() == o.to_array()
     }
 }
 
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> fmt::Debug for Lanes<T, N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.to_array().fmt(f)
@@ -199,11 +202,12 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
     }
 }
 
-/// The constants of nobody: because of it an array alone does not say that it becomes lanes, whose type not everybody may name
-/// ([`Witness`](crate::simd::pack::Witness)).
+/// Second target of [`Constant`] for `[T; N]`. It stops type inference from selecting the lane type, which only a
+/// [`Witness`](crate::simd::pack::Witness) may name.
 #[derive(Clone, Copy)]
 pub struct Unused<T, const N: usize>([T; N]);
 
+#[doc(hidden)]
 impl<T: Number, const N: usize> Constant<Unused<T, N>> for [T; N] {
     fn lift(self) -> Unused<T, N> {
         Unused(self)
@@ -214,6 +218,7 @@ impl<T: Number, const N: usize> Constant<Unused<T, N>> for [T; N] {
 }
 
 /// A constant of its own in each lane.
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
     #[inline(always)]
     fn lift(self) -> Lanes<T, N> {
@@ -224,6 +229,7 @@ impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
     }
 }
 
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
     type Mask = <T::Register as Register<T, N>>::Mask;
     const LANES: usize = N;
