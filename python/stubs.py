@@ -236,7 +236,8 @@ RESULTS = {
     "Command": "WholeBodyController.command WholeBodyController.step",
     "Optimality": "WholeBodyController.optimality",
     "None": """
-        Simulation.__setstate__ _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
+        _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
+        Simulation.__setstate__
         AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
         Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track check""",

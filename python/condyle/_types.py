@@ -607,8 +607,8 @@ class Ground(NamedTuple):
     """
 
     points: Sequence[str | int | tuple[str | int, ArrayLike]]
-    """The points that may touch: a list of frames, each for its origin, or of pairs of a frame and the corners of a sole
-    in it, (n, 3) (m)."""
+    """The points that may touch: a list of frames, each for its origin, or of pairs of a frame and the corners of a
+    sole in it, (n, 3) (m)."""
     normal: ArrayLike = (0.0, 0.0, 1.0)
     """The direction out of the ground, in the world's frame; need not be a unit vector."""
     height: float = 0.0
