@@ -320,6 +320,20 @@ fn robots_stand() {
     assert_eq!(simulation.run(2000, passive), Status::Done);
     assert!(relative(simulation.q(), &q) < 1e-6, "{:?} {q:?}", simulation.q());
     assert!((push(&simulation).z / (statue.total_mass() * G) - 1.0).abs() < 1e-6);
+
+    // with all its joints, held by their laws
+    let mut q = neutral(&humanoid);
+    let frames = soles.map(|frame| humanoid.frame(&statue.frames()[frame].name).unwrap());
+    let ground = frames.into_iter().fold(Ground::default(), |ground, frame| ground.with_sole(frame, &sole));
+    q[2] -= forward_kinematics(&humanoid, &mut Data::new(&humanoid), &q).frame(frames[0]).translation.z;
+    let mut simulation = on(&humanoid, ground, &q, &vec![0.0; humanoid.nv()]);
+    let mut hold = posture(&humanoid, &q);
+    for _ in 0..1000 {
+        assert_eq!(simulation.run(1, &mut hold), Status::Done);
+    }
+    let (z, lifted) = (simulation.q()[2], push(&simulation).z / (humanoid.total_mass() * G));
+    println!("humanoid: sinks {:.1e} m, lifted {lifted}", q[2] - z);
+    assert!((lifted - 1.0).abs() < 0.05 && (q[2] - z).abs() < 0.05);
 }
 
 /// What is below the ground at the start is taken out gently: depth does not become speed.
