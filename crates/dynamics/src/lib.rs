@@ -50,9 +50,9 @@ pub use batch::derivatives::{
     BatchAbaDerivatives, BatchAbaHessian, BatchCentroidalDerivatives, BatchCoriolisDerivatives, BatchEnergyDerivatives,
     BatchRneaDerivatives, BatchRneaHessian,
 };
-pub use batch::group::StateMatrix;
 pub use batch::kinematics::BatchAccelerationDerivatives;
 pub use batch::results::{Matrices, Poses};
+pub use batch::state_matrix::StateMatrix;
 pub use batch::{Batch, BatchNumber, BatchWriter};
 pub use calls::centroidal::{centroidal_map, centroidal_map_rate, compute_all_terms};
 pub use calls::constrained_dynamics::{

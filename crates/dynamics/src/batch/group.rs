@@ -1,6 +1,7 @@
 //! The work of a batch: groups of states, a lane for each, spread over threads.
 
 use super::places::Places;
+use super::state_matrix::StateMatrix;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::data::Data;
 use crate::workspace::{filled, zero_matrix};
@@ -10,10 +11,6 @@ use condyle_model::Model;
 use condyle_spatial::block::{Block, MOST, Real, Strided, flat_mut, gather, lanes, scatter_matrix};
 use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Array, Force, Matrix};
-use nalgebra::{DMatrixView, Dyn, MatrixView};
-
-/// A matrix of one state, whose entries do not lie next to each other.
-pub type StateMatrix<'b, T> = MatrixView<'b, T, Dyn, Dyn, Dyn, Dyn>;
 
 /// Groups of as many states as a scalar has lanes, and who computes them.
 #[derive(Debug)]
@@ -221,6 +218,7 @@ impl<S: Block> Group<S> {
     }
 
     /// Panics unless this was made for a model of the same tree.
+    #[track_caller]
     pub(super) fn check(&self, model: &Model) {
         self.workers[0].data.check(model);
     }
@@ -261,7 +259,7 @@ impl<S: Block> Group<S> {
         let matrix = &self.matrices[k / S::LANES][kind];
         let n = matrix.nrows();
         let lane = lanes(matrix.as_slice()).get(k % S::LANES..).unwrap_or_default();
-        DMatrixView::from_slice_with_strides(lane, n, n, S::LANES, S::LANES * n)
+        StateMatrix::new(lane, [n, n], [S::LANES, S::LANES * n])
     }
 
     /// The matrices of the first states, as many as there is room for, each by rows.

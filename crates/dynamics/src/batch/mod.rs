@@ -28,6 +28,8 @@ pub(crate) mod group;
 pub(crate) mod kinematics;
 mod places;
 pub(crate) mod results;
+pub(crate) mod state_matrix;
+mod state_matrix_operators;
 mod table;
 
 use crate::workspace::Gate;
@@ -104,6 +106,7 @@ impl<T: Real> Batch<T> {
     /// # Panics
     /// If `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
     /// [`MOST_STATES`](Self::MOST_STATES).
+    #[track_caller]
     pub fn new(model: &Model, states: usize, threads: usize) -> Self
     where
         T: BatchNumber,
