@@ -163,6 +163,7 @@ impl Model {
     ///
     /// # Panics
     /// If `q` has not nq numbers.
+    #[track_caller]
     pub fn check_position(&self, q: &[f64]) -> Result<(), Error> {
         condyle_linalg::check("q", q.len(), self.nq());
         for body in self.bodies.iter().skip(1).filter(|body| body.mimic.is_none()) {

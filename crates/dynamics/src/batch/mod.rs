@@ -40,7 +40,7 @@ use condyle_model::Model;
 use condyle_spatial::block::Real;
 use condyle_spatial::level::{Level, level};
 use constraints::{BatchConstraints, Sets};
-use group::{ARGUMENTS, Arguments, FORCES, Group, Pass, enter};
+use group::{ARGUMENTS, Arguments, FORCES, Group, MINV, Pass, enter};
 use places::{MOST_RESULTS, Places};
 use results::{Last, Shape};
 use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
@@ -198,6 +198,10 @@ impl<T: Real> Batch<T> {
         if let Some(constraints) = &constraints {
             constraints.check(model);
             assert!(constraints.fits(self), "constraints: made for another batch");
+        }
+        let inverse = P::KINDS.contains(&MINV) || given.iter().any(|one| one.name == "tau");
+        if inverse || constraints.is_some() {
+            model.check_regular(); // before the lanes are entered, so that the panic names the caller's line
         }
         let rows = constraints.as_ref().map_or(0, |constraints| constraints.rows());
         let size = |&size: &usize| match size {

@@ -191,6 +191,7 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     ///
     /// # Panics
     /// If an argument has the wrong length.
+    #[track_caller]
     pub fn set_state(&mut self, q: &[S], v: &[S]) {
         check("q", q.len(), self.model.nq());
         check("v", v.len(), self.model.nv());
@@ -216,6 +217,7 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     /// # Panics
     /// If an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt` is not above
     /// 0 or not finite.
+    #[track_caller]
     pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
         check("tau", tau.len(), self.model.nv());
         check_forces(f_ext.len(), self.model.nodes().len());
@@ -248,6 +250,7 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     ///
     /// # Panics
     /// As [`step`](Self::step).
+    #[track_caller]
     pub fn run(&mut self, steps: usize, mut control: impl FnMut(&mut Control<S>)) -> Status {
         let (mut tau, mut f_ext) = (core::mem::take(&mut self.tau), core::mem::take(&mut self.f_ext));
         let mut status = Status::Done;

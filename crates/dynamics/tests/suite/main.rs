@@ -31,6 +31,7 @@ mod mimic;
 mod mjcf;
 mod model_files;
 mod motion_derivatives;
+mod panics;
 mod passive;
 mod regressor;
 mod sdf;
