@@ -135,7 +135,7 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut
 /// What `pass` has left, body by body or in the limbs' lanes.
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
-    let in_limbs = data.world.placed == PlacementCache::Limbs;
+    let in_limbs = matches!(data.world.placed, PlacementCache::Limbs(_));
     let limbs = data.limbs.as_ref().zip(model.limbs()).filter(|_| in_limbs);
     let limbs = limbs.map(|(scratch, plan)| LaneView::new(plan, scratch));
     let state = State { model, world: &data.world, pass: d, limbs };

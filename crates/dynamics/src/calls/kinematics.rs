@@ -13,6 +13,8 @@ impl<S: Scalar> Data<S> {
     /// Returns the placements at the position of the last call on this data, without computing them again. Returns `None` if
     /// the call did without them, as [`rnea`](crate::rnea()) does.
     ///
+    /// The model must have the joints and frames of the model of that call. Inertias and gravity may differ.
+    ///
     /// ```
     /// use condyle_dynamics::{Data, aba, forward_kinematics, robots};
     /// let arm = robots::arm7();
@@ -24,15 +26,31 @@ impl<S: Scalar> Data<S> {
     /// ```
     ///
     /// # Panics
-    /// If this was made for a model of another tree.
+    /// If this was made for a model of another tree, or the last call was for a model with joints or frames elsewhere.
     #[track_caller]
     pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
         self.check(model);
-        if self.world.placed == PlacementCache::Limbs {
+        let (PlacementCache::Bodies(geometry) | PlacementCache::Limbs(geometry)) = self.world.placed else {
+            return None;
+        };
+        if geometry != model.geometry_hash() {
+            wrong_geometry(model.name());
+        }
+        if let PlacementCache::Limbs(_) = self.world.placed {
             spread(model, self);
         }
-        (self.world.placed == PlacementCache::Bodies).then_some(Placements { model, world: &self.world })
+        matches!(self.world.placed, PlacementCache::Bodies(_)).then_some(Placements { model, world: &self.world })
     }
+}
+
+/// Reports placements of another robot.
+#[cold]
+#[inline(never)]
+#[track_caller]
+fn wrong_geometry(name: &str) -> ! {
+    panic!(
+        "data: its placements are those of another robot than `{name}`, with the same tree but joints or frames elsewhere"
+    );
 }
 
 /// Places all bodies: oXi = oXλ λXi(q), in O(n).
