@@ -26,13 +26,13 @@ use core::ops::Range;
 /// assert!(d.residual.iter().all(|&x| x < 1e-9));
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct BatchConstraints<T: Real = f64> {
     pub(super) sets: Sets<T>,
 }
 
 /// A set for each thread, with as many lanes as the groups of the batch have.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Sets<T: Real> {
     Single(Vec<ConstraintSet<T>>),
     Short(Vec<ConstraintSet<T::Short<Gate>>>),

@@ -13,7 +13,7 @@ use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Array, Force, Matrix};
 
 /// Groups of as many states as a scalar has lanes, and who computes them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Group<S: Block> {
     /// The workers, one for each thread.
     workers: Vec<Worker<S>>,
@@ -67,6 +67,16 @@ impl<S: Block> Worker<S> {
             six: [zero_matrix(6, nv), zero_matrix(6, nv)],
             wide: filled(S::zero, nv * nv.max(10)),
         }
+    }
+}
+
+impl<S: Block> Clone for Worker<S> {
+    /// A copy with as much room for forces, so that it does not allocate later either.
+    fn clone(&self) -> Self {
+        let Self { data, numbers, f_ext, six, wide } = self;
+        let mut forces = Vec::with_capacity(f_ext.capacity());
+        forces.extend_from_slice(f_ext);
+        Self { data: data.clone(), numbers: numbers.clone(), f_ext: forces, six: six.clone(), wide: wide.clone() }
     }
 }
 

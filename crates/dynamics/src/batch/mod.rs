@@ -68,7 +68,7 @@ use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 /// let mut data = Data::new(&arm);
 /// assert_eq!(tau[63..70], *rnea(&arm, &mut data, &q[63..70], &v[63..70], &a[63..70], &[])); // the tenth
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Batch<T: Real = f64> {
     states: usize,
     lanes: InLanes<T>,
@@ -87,7 +87,7 @@ impl BatchNumber for f64 {}
 impl BatchNumber for f32 {}
 
 /// Groups of as many states as the vectors of the level have lanes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
     Short(Group<T::Short<Gate>>),
