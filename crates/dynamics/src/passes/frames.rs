@@ -78,6 +78,7 @@ pub struct Accelerations<'d, S, R = f64> {
     pub(crate) velocities: Velocities<'d, S, R>,
 }
 
+#[doc(hidden)]
 impl<'d> Rename<Placements<'d, Fused>> for Placements<'d, f64> {
     #[inline(always)]
     fn renamed(self) -> Placements<'d, Fused> {
@@ -85,6 +86,7 @@ impl<'d> Rename<Placements<'d, Fused>> for Placements<'d, f64> {
     }
 }
 
+#[doc(hidden)]
 impl<'d> Rename<Velocities<'d, Fused>> for Velocities<'d, f64> {
     #[inline(always)]
     fn renamed(self) -> Velocities<'d, Fused> {
@@ -92,6 +94,7 @@ impl<'d> Rename<Velocities<'d, Fused>> for Velocities<'d, f64> {
     }
 }
 
+#[doc(hidden)]
 impl<'d> Rename<Accelerations<'d, Fused>> for Accelerations<'d, f64> {
     #[inline(always)]
     fn renamed(self) -> Accelerations<'d, Fused> {

@@ -37,6 +37,7 @@ mod regressor;
 mod sdf;
 mod second_order;
 mod simulation;
+mod single_calls_f32;
 mod urdf;
 mod urdf_errors;
 mod validity;
