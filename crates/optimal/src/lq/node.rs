@@ -53,6 +53,7 @@ impl LqNode {
     ///
     /// # Panics
     /// If a number is above [`MOST_SIZE`](Self::MOST_SIZE).
+    #[track_caller]
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         let most = Self::MOST_SIZE;
         assert!(ndx <= most && nu <= most, "expected at most {most} states and controls, found {ndx} and {nu}");
@@ -166,6 +167,7 @@ pub struct Hessian {
 
 impl Hessian {
     /// Zeros for ndx states and nu controls.
+    #[track_caller]
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         Self { xx: DMatrix::zeros(ndx, ndx), xu: DMatrix::zeros(ndx, nu), uu: DMatrix::zeros(nu, nu) }
     }
