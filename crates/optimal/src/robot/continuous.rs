@@ -44,7 +44,7 @@ use nalgebra::DMatrix;
 /// assert!((next[0] - 0.1_f64.cos()).abs() < 1e-7);
 /// # Ok::<(), condyle_optimal::Error>(())
 /// ```
-pub trait ContinuousModel: Send + 'static {
+pub trait ContinuousModel: Send + Sync + 'static {
     /// The number of entries of a position q.
     fn nq(&self) -> usize;
 
