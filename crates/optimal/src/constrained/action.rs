@@ -4,6 +4,7 @@ use super::path_constraint::{self, PathConstraint};
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use crate::problem::{ActionModel, Bounded, Multipliers, Visit};
+use core::fmt;
 use nalgebra::DMatrix;
 use std::any::Any;
 
@@ -95,6 +96,13 @@ impl Constrained {
                 }
             }
         }
+    }
+}
+
+impl fmt::Debug for Constrained {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (nx, nu, constraints) = (self.nx(), self.nu(), self.g.len());
+        f.debug_struct("Constrained").field("nx", &nx).field("nu", &nu).field("constraints", &constraints).finish()
     }
 }
 

@@ -46,8 +46,8 @@ pub trait GenericConstraint: Any + Clone + Send + Sync {
 /// }
 ///
 /// let (mut gx, mut gu) = (DMatrix::zeros(1, 3), DMatrix::zeros(1, 2));
-/// AutoDiffConstraint::new(Distance).calc_diff(0, &[3.0, 4.0, 0.0], &[0.0; 2], &mut gx, &mut gu);
-/// assert_eq!(gx, DMatrix::from_row_slice(1, 3, &[0.6, 0.8, 0.0]));
+/// AutoDiffConstraint::new(Distance).calc_diff(0, &[0.0, 4.0, 0.0], &[0.0; 2], &mut gx, &mut gu);
+/// assert_eq!(gx, DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]));
 /// ```
 #[derive(Clone, Debug)]
 pub struct AutoDiffConstraint<C> {

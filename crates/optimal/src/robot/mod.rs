@@ -7,6 +7,10 @@
 //!   [`InverseDynamics`] the accelerations are the controls, in [`ContactInverseDynamics`] the forces of contacts too. An
 //!   [`Actuation`] drives the robot, an [`Integrator`] steps through the time of a knot, and a [`ControlPolynomial`] says how
 //!   the controls go through it.
+//! - A residual of your own is a [`GenericResidual`], written once for any scalar and differentiated exactly
+//!   ([`OwnResidual::autodiff`]), or a [`ResidualFunction`] with its Jacobian. Costs and limits take both.
+//! - [`Problem::motion`](crate::Problem::motion) gives the accelerations, efforts and contact forces of a solution;
+//!   [`Problem::cost_mut`](crate::Problem::cost_mut) gives a cost by its name, to change its [`Target`] or weight.
 //! - A [`RobotProblem`] is a problem as data, in a file for example.
 //! - A [`ContinuousModel`] of your own makes a knot in the same way, with [`Integrated`].
 //!

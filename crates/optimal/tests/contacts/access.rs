@@ -182,6 +182,46 @@ fn what_is_no_target_is_refused_and_changes_nothing() {
     assert_eq!(problem.cost_mut(0, "turn").unwrap().target(), Some(Target::Rotation(turned)));
 }
 
+/// An action of a user's own around another one.
+struct Wrapper(Box<dyn ActionModel>);
+
+impl ActionModel for Wrapper {
+    fn nx(&self) -> usize {
+        self.0.nx()
+    }
+    fn ndx(&self) -> usize {
+        self.0.ndx()
+    }
+    fn nu(&self) -> usize {
+        self.0.nu()
+    }
+    fn inner_mut(&mut self) -> Option<&mut dyn ActionModel> {
+        Some(&mut *self.0)
+    }
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        self.0.calc(t, x, u, next)
+    }
+    fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
+        self.0.outputs(t, x, u, show);
+        show("something else", &[1.0; 5]);
+    }
+}
+
+#[test]
+fn an_action_of_a_users_own_shows_the_robot_that_it_wraps() {
+    let model = Arc::new(robots::quadruped());
+    let contacts = feet(&model, ReferenceFrame::Local);
+    let rest = plain("rest", Residual::State { reference: inverse::standing(&model) });
+    let knot = ContactDynamics::running(model.clone(), &contacts, DT, vec![rest]).unwrap();
+    let end = Box::new(FreeDynamics::terminal(model.clone(), vec![]).unwrap());
+    let (x0, wrapped) = (inverse::standing(&model), Box::new(Wrapper(Box::new(knot.clone()))));
+    let mut problem = Problem::new(x0.clone(), vec![wrapped], vec![0; 2], end.clone()).unwrap();
+    let mut plain = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 2], end).unwrap();
+    assert_eq!(problem.motion_at(1, &x0, &[1.0; 12]), plain.motion_at(1, &x0, &[1.0; 12]));
+    assert_eq!(problem.cost_mut(0, "rest").unwrap().get().weight, 1.0);
+    assert_eq!(problem.try_clone().unwrap_err(), Error::NoCopy { model: Some(0) });
+}
+
 fn solve(problem: &mut Problem) -> Solution {
     let xs = problem.x0().repeat(problem.horizon() + 1);
     let us = problem.quasi_static(&xs).unwrap();

@@ -15,7 +15,8 @@ pub trait GenericResidual: Any + Send + Sync {
     /// The number of entries of r.
     fn size(&self) -> usize;
 
-    /// The arguments on which r depends: all by default. Columns of the others are zero and are not computed.
+    /// The arguments on which r depends, which must not change: all by default. Columns of the others are zero and are not
+    /// computed, so that fewer arguments take less time.
     fn inputs(&self) -> Inputs {
         Inputs::ALL
     }

@@ -34,7 +34,8 @@ pub trait ResidualFunction: Any + Send + Sync {
     /// The number of entries of r.
     fn size(&self) -> usize;
 
-    /// The arguments on which r depends: all by default. Of the others, the columns of the Jacobian are not read.
+    /// The arguments on which r depends, which must not change: all by default. Of the others, the columns of the Jacobian
+    /// are not read.
     fn inputs(&self) -> Inputs {
         Inputs::ALL
     }
