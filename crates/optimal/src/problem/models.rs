@@ -84,12 +84,12 @@ impl Models {
     /// [`Error::NoCopy`] for an action that has none.
     pub(crate) fn try_clone(&self) -> Result<Self, Error> {
         let model = |k: usize| self.places.iter().position(|place| place[0] == k);
-        let copy = |(k, action): (usize, &Box<dyn ActionModel>)| {
+        let mut actions = Vec::with_capacity(self.actions.len());
+        for (k, action) in self.actions.iter().enumerate() {
             let mut copy = action.fork().ok_or(Error::NoCopy { model: model(k) })?;
             copy.reserve();
-            Ok(copy)
-        };
-        let actions = self.actions.iter().enumerate().map(copy).collect::<Result<_, _>>()?;
+            actions.push(copy);
+        }
         Ok(Self { actions, places: self.places.clone() })
     }
 }

@@ -113,13 +113,13 @@ struct Differentiated<F> {
     model: Arc<Model>,
     function: F,
     /// Scratch that no thread uses at present.
-    idle: Mutex<Vec<Box<Scratch>>>,
+    idle: Mutex<Vec<Scratch>>,
 }
 
 /// The workspaces of one thread, for knots with nu controls.
 struct Scratch {
     nu: usize,
-    data: Data<f64>,
+    data: Box<Data<f64>>,
     /// (q, v, u). Written by: `calc_diff`.
     state: Vec<f64>,
     jacobian: LaneJacobian,
@@ -134,7 +134,7 @@ impl Scratch {
         let parts = [(positions, 0..nv), (velocities, nv..2 * nv), (controls, 2 * nv..2 * nv + nu)];
         let columns = parts.into_iter().filter(|(wanted, _)| *wanted).flat_map(|(_, columns)| columns).collect();
         let jacobian = LaneJacobian::new(model, n, size);
-        Self { nu, data: Data::new(model), state: vec![0.0; n], jacobian, columns }
+        Self { nu, data: Box::new(Data::new(model)), state: vec![0.0; n], jacobian, columns }
     }
 }
 
@@ -144,7 +144,7 @@ impl<F: GenericResidual> Differentiated<F> {
         let mut idle = self.idle.lock().unwrap_or_else(PoisonError::into_inner);
         let found = idle.iter().position(|scratch| scratch.nu == nu).map(|k| idle.swap_remove(k));
         drop(idle);
-        let make = || Box::new(Scratch::new(&self.model, nu, self.function.size(), self.function.inputs()));
+        let make = || Scratch::new(&self.model, nu, self.function.size(), self.function.inputs());
         let mut scratch = found.unwrap_or_else(make);
         let result = f(&mut scratch);
         self.idle.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
