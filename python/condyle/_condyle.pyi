@@ -29,6 +29,8 @@ from ._types import (
     EnergyDerivatives,
     Evaluation,
     Frame,
+    Ground,
+    GroundContacts,
     Impulse,
     ImpulseDerivatives,
     Iteration,
@@ -114,6 +116,8 @@ __all__ = [
     "body_classical_acceleration",
     "body_jacobian",
     "body_jacobian_rate",
+    "body_point_jacobian",
+    "body_point_velocity",
     "body_velocity",
     "body_velocity_derivative",
     "centerOfMass",
@@ -153,6 +157,8 @@ __all__ = [
     "frame_jacobian",
     "frame_jacobian_rate",
     "frame_placement",
+    "frame_point_jacobian",
+    "frame_point_velocity",
     "frame_velocity",
     "frame_velocity_derivative",
     "framesForwardKinematics",
@@ -219,7 +225,7 @@ _Input: TypeAlias = (
 )
 _Method: TypeAlias = Literal["aba", "dense", "sparse"]
 _Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
-_Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_Status: TypeAlias = Literal["done", "not_converged", "contacts_not_converged", "not_finite"]
 _OfTwo: TypeAlias = Callable[[NDArray[Any], NDArray[Any]], Any]
 _Shapes: TypeAlias = list[tuple[str, int, int]]
 _Space: TypeAlias = Model | tuple[int, _OfTwo, _OfTwo]
@@ -1715,6 +1721,23 @@ def body_jacobian_rate(
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
+def body_point_jacobian(
+    model: Model, data: Data, q: ArrayLike, body: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
+
+    q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+    """
+
+def body_point_velocity(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, body: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of the body's own
+    frame.
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+    """
+
 def body_velocity(
     model: Model,
     data: Data,
@@ -1822,6 +1845,29 @@ def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, ou
     >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
     >>> bool(tool[2, 3] > 0.5)  # stretched upwards
     True
+    """
+
+def frame_point_jacobian(
+    model: Model, data: Data, q: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a point of a frame, (3, nv): its velocity along the axes of the world is J v (m/s).
+
+    q: nq numbers; frame: its name or number; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
+    the world and S the columns of the joints before it.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
+    >>> J = condyle.frame_point_jacobian(arm, data, q, "tool", tip)
+    >>> np.allclose(J @ v, condyle.frame_point_velocity(arm, data, q, v, "tool", tip))
+    True
+    """
+
+def frame_point_velocity(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+
+    q: nq numbers; v: nv; frame: its name or number; point: in the frame, 3 numbers (m).
     """
 
 def frame_velocity(
@@ -2138,6 +2184,22 @@ class Model:
         >>> heavier = arm.with_inertias(twice)
         >>> heavier.total_mass == 2.0 * arm.total_mass
         True
+        """
+
+    def with_frame(self, name: str, parent: str | int | None, placement: ArrayLike | None = None) -> Model:
+        """The same robot with one more frame of the user's, the last one of `frames`. All other numbers stay as they are.
+
+        name: the new frame's name; parent: the name or number of the frame on which it is put, or the name of a body; None is
+        the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the identity.
+
+        Raises `ModelError` if the parent does not exist, the placement is no rotation and translation, or the user has a frame
+        of this name already.
+
+        >>> tip = np.eye(4)
+        >>> tip[2, 3] = 0.1
+        >>> arm = condyle.robots.arm7().with_frame("tip", "tool", tip)
+        >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.3] * 7, "tip").shape
+        (6, 7)
         """
 
     def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
@@ -3253,9 +3315,13 @@ class Simulation:
     passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
         none of either.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
-    max_iterations: it gives up after so many iterations.
+    max_iterations: Newton's method gives up after this number of iterations.
+    ground: a `Ground` on which the robot stands, slides and lands, with 'semi_implicit_euler' only; None for none.
 
-    Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
+    A simulation can be copied and pickled, and the copy goes on with the same bits.
+
+    Raises `ModelError` if M is singular or the ground cannot be, `ValueError` if dt is not above 0 or not finite, or
+    tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
@@ -3276,7 +3342,16 @@ class Simulation:
         passive: float | None = None,
         tolerance: float = 1e-09,
         max_iterations: int = 20,
+        ground: Ground | None = None,
     ) -> Simulation: ...
+    @property
+    def contacts(self) -> GroundContacts:
+        """The contacts of the ground's points in the last step, as `GroundContacts`."""
+
+    @property
+    def ground(self) -> Ground | None:
+        """The ground on which the robot stands, as a `Ground` of single points; None if there is none."""
+
     @property
     def q(self) -> _Array:
         """The position, nq numbers."""
@@ -3292,16 +3367,23 @@ class Simulation:
     def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
         """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
 
-        Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+        Raises `ModelError` if a number of q is not finite or a rotation in it does not have the length 1 (up to 1e-3),
         `ValueError` if one of v is not finite.
         """
 
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
         """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
-        tolerance (a shorter step helps); or 'not_finite', and then the step was not taken.
+        tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses break the laws of contact by
+        more than the ground's tolerance, and then the step was taken; or 'not_finite', and then it was not.
 
         tau: nv numbers (N m, N); f_ext: as for `rnea`.
         """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The parts of a pickle: what the constructor takes, and the state."""
+
+    def __setstate__(self, state: tuple[float, list[float], list[float], list[float]]) -> None:
+        """The state of a pickle."""
 
     def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
         """A number of steps, with a control law that is called before each of them. Returns the status of the last step,

@@ -305,6 +305,9 @@ shared! {
     Real<S>: &'a Bound<'py, PyAny> => S { |name, given, _| S::read_one(name, given),
         dual if |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
+    /// A point: three numbers that belong to no state.
+    Point<S>: &'a Bound<'py, PyAny> => condyle::Vec3<f64> { |name, given, _| crate::arrays::three(name, given) }
+
     /// A number that belongs to no state.
     Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given), at once if |_| true }
 
