@@ -96,6 +96,14 @@ pub enum Error {
         /// The fault, with the numbers.
         what: String,
     },
+    /// A velocity is none of the robot's.
+    #[error("joint `{joint}`: {what}")]
+    Velocity {
+        /// The joint's name.
+        joint: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
     /// A list in a model's file is too short or too long.
     #[error("{name}: expected {expected} entries, found {found}")]
     Length {

@@ -60,6 +60,7 @@ pub mod limbs;
 mod magnitude;
 mod model;
 mod names;
+mod position;
 mod real;
 #[cfg(feature = "loaders")]
 pub mod robots;
@@ -82,3 +83,5 @@ pub use error::{Error, Warning};
 pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};
 pub use joint::{Joint, Mimic};
 pub use model::Model;
+#[doc(hidden)]
+pub use position::{PositionFault, ROTATION_ROUNDING};
