@@ -1,12 +1,16 @@
 #![doc = include_str!("../README.md")]
-#![doc = include_str!("guide.md")]
+#![cfg_attr(all(feature = "optimal", feature = "wholebody"), doc = include_str!("guide.md"))]
 
 pub mod conventions;
+#[cfg(all(feature = "optimal", feature = "wholebody"))]
 mod plan;
 
 pub use condyle_dynamics::*;
+#[cfg(feature = "optimal")]
 pub use condyle_optimal as optimal;
+#[cfg(feature = "wholebody")]
 pub use condyle_wholebody as wholebody;
+#[cfg(all(feature = "optimal", feature = "wholebody"))]
 pub use plan::plan_of;
 
 /// The Rust blocks of the book, as doctests.

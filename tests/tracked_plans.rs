@@ -1,5 +1,6 @@
 //! The trot and the walk of the examples, planned by FDDP, are tracked by whole-body control: on ground of our own constrained
 //! dynamics, each command solved, its forces within their cones, and the optimum of its program.
+#![cfg(all(feature = "loaders", feature = "optimal", feature = "wholebody"))]
 
 #[path = "../examples/support/ground.rs"]
 mod ground;

@@ -28,6 +28,10 @@
 //! - Memory is fixed by [`WholeBodyController::new`].
 //! - A wrong description is an [`Error`] of `new`; a wrong length panics.
 //!
+//! # Features
+//! On by default: `loaders` (files of robots, and embedded ones) and `threads` (those of rayon). Off by default: `clarabel`, a second
+//! solver for comparison, with its dependencies: `Backend::Clarabel` exists with it.
+//!
 //! Sources: Sentis and Khatib (2005), operational tasks under contact; Herzog et al. (2016), inverse dynamics as a
 //! program in (q̈, f); Lobo et al. (1998), friction as a second-order cone; Baumgarte (1972), drift; Caron, Pham and
 //! Nakamura (2015), the wrench of a sole.
@@ -46,6 +50,7 @@ pub mod inspection;
 mod kinematics;
 mod least_squares;
 mod levels;
+#[cfg(feature = "clarabel")]
 mod lifted;
 mod limits;
 mod memory;

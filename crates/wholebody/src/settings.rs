@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::task::Gains;
 use condyle_dynamics::Model;
+use std::fmt;
 
 /// How the friction cone is described.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,14 +19,25 @@ pub enum Friction {
     },
 }
 
-/// Which solver.
+/// Solver of the cone programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Backend {
-    /// clarabel, the reference.
+    /// clarabel, the reference. It exists with the feature `clarabel`, which is off by default.
+    #[cfg(feature = "clarabel")]
     Clarabel,
     /// Our own dense interior point method, warm-started from the last tick.
     InteriorPoint,
+}
+
+impl fmt::Display for Backend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            #[cfg(feature = "clarabel")]
+            Self::Clarabel => "clarabel",
+            Self::InteriorPoint => "interior point",
+        })
+    }
 }
 
 /// In which unknowns the program is solved; the solution is the same.
