@@ -138,7 +138,7 @@ mod _condyle {
         nonLinearEffects, updateFramePlacements,
     };
     #[pymodule_export]
-    use wholebody::{FrictionContact, Plan, Task, WholeBodyController};
+    use wholebody::{FrictionContact, Plan, Task, WholeBodyController, check_pose, check_rotations};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

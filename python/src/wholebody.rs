@@ -10,4 +10,5 @@ mod tasks;
 pub(crate) use contacts::FrictionContact;
 pub(crate) use controller::WholeBodyController;
 pub(crate) use plan::Plan;
+pub(crate) use references::{check_pose, check_rotations};
 pub(crate) use tasks::Task;

@@ -38,7 +38,7 @@ use std::sync::Mutex;
 /// settings: `Settings`; None for the default ones.
 ///
 /// Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
-/// without its contact, and for any number outside of its range.
+/// without its contact, for any number outside of its range, and for an effort limit that is 0, of the model or the settings.
 ///
 /// >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
 /// >>> robot = condyle.robots.quadruped()
@@ -83,7 +83,7 @@ impl WholeBodyController {
         let mut controller =
             rust::WholeBodyController::new(robot, &contacts, &tasks, settings.clone()).map_err(controller_error)?;
         let q = condyle::neutral(robot);
-        let references = controller.hold(&q);
+        let references = controller.hold(&q).map_err(controller_error)?;
         let inner = Mutex::new(Inner { controller, references, q, v: vec![0.0; robot.nv()] });
         Ok(Self { model: model.clone().unbind(), settings, contacts: contacts.len(), inner })
     }
@@ -102,10 +102,12 @@ impl WholeBodyController {
     /// the weight shared by the contacts in equal parts.
     ///
     /// q: nq numbers.
+    ///
+    /// Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
     fn hold<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut inner = lock("controller", &self.inner)?;
         let q = vector("q", q, inner.q.len())?;
-        references::give(py, &inner.controller.hold(&q))
+        references::give(py, &self.model.get().inner, &inner.controller.hold(&q).map_err(controller_error)?)
     }
 
     /// Sets references to those of a plan at a time: joints, and where they bring centre of mass, momentum and frames;
@@ -129,7 +131,8 @@ impl WholeBodyController {
     }
 
     /// The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
-    /// Other threads run meanwhile.
+    /// A number that is not finite is the status 'not_finite'; a quaternion, a pair (cos, sin) or a reference's rotation that is none
+    /// is 'invalid_state', with the joint or the frame in the reason. Other threads run meanwhile.
     ///
     /// q: nq numbers; v: nv.
     /// references: `References` of this controller.
@@ -146,7 +149,8 @@ impl WholeBodyController {
         position.copy_from_slice(&q);
         velocity.copy_from_slice(&v);
         references::read(references, numbers)?;
-        give(py, py.detach(|| controller.step(position, velocity, numbers)))
+        py.detach(|| _ = controller.step(position, velocity, numbers));
+        give(py, controller)
     }
 
     /// How far the step at this state, for these references, is from the optimum of its program of the first priority:
@@ -176,7 +180,7 @@ impl WholeBodyController {
     /// The last `Command`; before the first step zeros.
     #[getter]
     fn command<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give(py, lock("controller", &self.inner)?.controller.command())
+        give(py, &lock("controller", &self.inner)?.controller)
     }
 
     fn __repr__(&self) -> String {
@@ -185,25 +189,27 @@ impl WholeBodyController {
     }
 }
 
-/// A command as Python sees it.
-fn give<'py>(py: Python<'py>, command: &rust::Command) -> PyResult<Bound<'py, PyAny>> {
+/// The command of a controller as Python sees it.
+fn give<'py>(py: Python<'py>, controller: &rust::WholeBodyController) -> PyResult<Bound<'py, PyAny>> {
+    let command = controller.command();
     let status = match command.status {
         Status::Solved => "solved",
         Status::Infeasible => "infeasible",
         Status::IterationLimit => "iteration_limit",
         Status::TimeLimit => "time_limit",
         Status::NotFinite { .. } => "not_finite",
+        Status::InvalidState(_) => "invalid_state",
         _ => "numerical_error",
     };
     let source = match command.source {
         CommandSource::Solution => "solution",
         CommandSource::LastSolution => "last_solution",
-        CommandSource::GravityCompensation => "gravity_compensation",
+        _ => "gravity_compensation",
     };
     let forces: Vec<[f64; 6]> = command.forces.iter().map(|force| force.to_array()).collect();
     let members = [
         status.into_pyobject(py)?.into_any(),
-        command.status.to_string().into_pyobject(py)?.into_any(),
+        controller.reason().into_pyobject(py)?.into_any(),
         source.into_pyobject(py)?.into_any(),
         command.tau.give(py, None)?,
         command.a.give(py, None)?,
