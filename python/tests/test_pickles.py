@@ -19,7 +19,7 @@ PROBLEM = Problem(np.zeros(14), [STEP], [0] * 3, FreeDynamics(ARM, None, []))
 
 # What is a computation under way: factors, a simulation's robot in its middle, a robot that is being built.
 UNDER_WAY = {
-    "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Simulation", "Sweep", "WholeBodyController",
+    "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Simulation", "Sweep",
 }  # fmt: skip
 
 

@@ -3,6 +3,8 @@
 //! Of min ½ ‖R x − b‖² over a convex set all minimisers have the same R x; the equality R x = R x* therefore describes them
 //! all. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014), section 2.
 
+use crate::basis::Elimination;
+use crate::carried::Reader;
 use crate::condense::{Condenser, Known};
 #[cfg(feature = "clarabel")]
 use crate::cone_program::Clarabel;
@@ -176,6 +178,17 @@ impl Given {
             #[cfg(feature = "clarabel")]
             Given::Lifted(Lifted { program }) => program,
         }
+    }
+
+    /// The elimination whose pivots are tried first at the next tick.
+    pub(crate) fn elimination(&self) -> Option<&Elimination> {
+        if let Given::Condensed(condenser, _) = self { Some(&condenser.elimination) } else { None }
+    }
+
+    /// Reads these pivots; `None` if they are none.
+    pub(crate) fn read_elimination(&mut self, from: &mut Reader<'_>) -> Option<()> {
+        let Given::Condensed(condenser, _) = self else { return Some(()) };
+        condenser.elimination.read(&mut condenser.basis, from)
     }
 
     /// Writes what the solver gets.

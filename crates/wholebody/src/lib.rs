@@ -39,6 +39,7 @@
 #![allow(non_snake_case)]
 
 mod basis;
+mod carried;
 mod command;
 mod condense;
 mod cone_program;

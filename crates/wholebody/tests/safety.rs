@@ -1,6 +1,8 @@
 //! Whatever happens there is a command: finite, within the torque limits, its status said.
 #![allow(non_snake_case)]
 
+#[path = "safety/clones.rs"]
+mod clones;
 mod common;
 #[path = "safety/invalid.rs"]
 mod invalid;

@@ -4,8 +4,8 @@ use super::contacts::FrictionContact;
 use super::plan::Plan;
 use super::tasks::Task;
 use super::{references, settings};
-use crate::arrays::{Give, class, vector};
-use crate::exceptions::controller_error;
+use crate::arrays::{self, Give, class, vector};
+use crate::exceptions::{ControllerError, controller_error};
 use crate::model::Model;
 use crate::optimal::lock;
 use condyle::wholebody as rust;
@@ -40,6 +40,9 @@ use std::sync::Mutex;
 /// Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
 /// without its contact, for any number outside of its range, and for an effort limit that is 0, of the model or the settings.
 ///
+/// A controller can be copied and pickled: the copy continues with the same bits; with the back end 'clarabel', whose solvers are
+/// built again, with the same solution up to its tolerance.
+///
 /// >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
 /// >>> robot = condyle.robots.quadruped()
 /// >>> feet = [FrictionContact.point(f"{leg}_foot", 0.7) for leg in ("LF", "LH", "RF", "RH")]
@@ -54,7 +57,8 @@ use std::sync::Mutex;
 pub(crate) struct WholeBodyController {
     model: Py<Model>,
     settings: rust::Settings,
-    contacts: usize,
+    contacts: Vec<rust::FrictionContact>,
+    tasks: Vec<rust::Task>,
     inner: Mutex<Inner>,
 }
 
@@ -85,7 +89,7 @@ impl WholeBodyController {
         let q = condyle::neutral(robot);
         let references = controller.hold(&q).map_err(controller_error)?;
         let inner = Mutex::new(Inner { controller, references, q, v: vec![0.0; robot.nv()] });
-        Ok(Self { model: model.clone().unbind(), settings, contacts: contacts.len(), inner })
+        Ok(Self { model: model.clone().unbind(), settings, contacts, tasks, inner })
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
@@ -119,8 +123,8 @@ impl WholeBodyController {
     fn track(&self, plan: &Bound<'_, Plan>, t: f64, references: &Bound<'_, PyAny>) -> PyResult<()> {
         let plan = plan.get();
         plan.made_for.check("plan", self.model.get())?;
-        if plan.contacts != self.contacts {
-            let (expected, found) = (self.contacts, plan.contacts);
+        if plan.contacts != self.contacts.len() {
+            let (expected, found) = (self.contacts.len(), plan.contacts);
             return Err(PyValueError::new_err(format!("plan: expected {expected} contacts, found {found}")));
         }
         let mut inner = lock("controller", &self.inner)?;
@@ -183,10 +187,38 @@ impl WholeBodyController {
         give(py, &lock("controller", &self.inner)?.controller)
     }
 
+    /// The parts of a pickle: what makes one like it, and the numbers that it carries from one tick to the next.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let contacts: Vec<_> = self.contacts.iter().cloned().map(FrictionContact).collect();
+        let tasks: Vec<_> = self.tasks.iter().cloned().map(Task).collect();
+        let numbers = lock("controller", &self.inner)?.controller.carried().give(py, None)?;
+        let make = py.import("condyle._condyle")?.getattr("_controller_from_numbers")?;
+        let arguments = (self.model.clone_ref(py), contacts, tasks, settings::give(py, &self.settings)?, numbers);
+        Ok((make, arguments.into_pyobject(py)?.into_any()))
+    }
+
     fn __repr__(&self) -> String {
         let name = self.model.get().inner.name();
-        format!("<condyle.wholebody.WholeBodyController of '{name}', {} contacts>", self.contacts)
+        format!("<condyle.wholebody.WholeBodyController of '{name}', {} contacts>", self.contacts.len())
     }
+}
+
+/// The controller that a pickle holds. The model, which is one of its parts, checks the version.
+#[pyfunction]
+#[pyo3(name = "_controller_from_numbers")]
+pub(crate) fn controller_from_numbers(
+    model: &Bound<'_, Model>,
+    contacts: Vec<PyRef<'_, FrictionContact>>,
+    tasks: Vec<PyRef<'_, Task>>,
+    settings: &Bound<'_, PyAny>,
+    numbers: &Bound<'_, PyAny>,
+) -> PyResult<WholeBodyController> {
+    let made = WholeBodyController::new(model, contacts, tasks, Some(settings))?;
+    let numbers = arrays::numbers("numbers", numbers)?;
+    if !lock("controller", &made.inner)?.controller.restore(&numbers) {
+        return Err(ControllerError::new_err("the pickle is damaged: its numbers are not those of such a controller"));
+    }
+    Ok(made)
 }
 
 /// The command of a controller as Python sees it.
