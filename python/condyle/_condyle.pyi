@@ -100,6 +100,9 @@ __all__ = [
     "_casadi_hold",
     "_casadi_hold_knot",
     "_casadi_release",
+    "_check_pose",
+    "_check_rotations",
+    "_controller_from_numbers",
     "_generate",
     "_lend",
     "_model_from_bytes",
@@ -768,6 +771,8 @@ def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
     stays as it is unless it is `out`.
 
     q: nq numbers.
+
+    Raises `ModelError` for a quaternion or a pair whose length is 0 or not finite.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q = condyle.neutral(quadruped)
@@ -3645,7 +3650,8 @@ class Plan:
     gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None if there are none.
     fade: the time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s).
 
-    Raises `ControllerError` for numbers that are not finite and times that run backwards.
+    Raises `ControllerError` for numbers that are not finite, for times that run backwards, and for states whose quaternions or
+    pairs (cos, sin) do not have length 1.
 
     >>> from condyle.wholebody import Plan
     >>> robot = condyle.robots.quadruped()
@@ -3679,7 +3685,8 @@ class Plan:
 
         t: the time (s); q: nq numbers; v: nv.
 
-        Raises `ValueError` if the plan has no controls.
+        Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose quaternions or pairs
+        (cos, sin) do not have length 1.
         """
 
 @final
@@ -3842,7 +3849,10 @@ class WholeBodyController:
     settings: `Settings`; None for the default ones.
 
     Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
-    without its contact, and for any number outside of its range.
+    without its contact, for any number outside of its range, and for an effort limit that is 0, of the model or the settings.
+
+    A controller can be copied and pickled: the copy continues with the same bits; with the back end 'clarabel', whose solvers are
+    built again, with the same solution up to its tolerance.
 
     >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
     >>> robot = condyle.robots.quadruped()
@@ -3872,6 +3882,8 @@ class WholeBodyController:
         the weight shared by the contacts in equal parts.
 
         q: nq numbers.
+
+        Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
         """
 
     def track(self, plan: Plan, t: float, references: References) -> None:
@@ -3885,7 +3897,8 @@ class WholeBodyController:
 
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
         """The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
-        Other threads run meanwhile.
+        A number that is not finite is the status 'not_finite'; a quaternion, a pair (cos, sin) or a reference's rotation that is none
+        is 'invalid_state', with the joint or the frame in the reason. Other threads run meanwhile.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.
@@ -3899,3 +3912,14 @@ class WholeBodyController:
         q: nq numbers; v: nv.
         references: `References` of this controller.
         """
+
+def _check_pose(name: str, pose: ArrayLike) -> None:
+    """Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is one."""
+
+def _check_rotations(name: str, q: ArrayLike, rotations: Sequence[tuple[str, int, int]]) -> None:
+    """Raises `ValueError` unless all rotations of a position have length 1; each is given by its joint and its range."""
+
+def _controller_from_numbers(
+    model: Model, contacts: Sequence[FrictionContact], tasks: Sequence[Task], settings: Settings, numbers: ArrayLike
+) -> WholeBodyController:
+    """The controller that a pickle holds. The model, which is one of its parts, checks the version."""

@@ -92,7 +92,9 @@ pub use condyle_model::{
 #[cfg(feature = "loaders")]
 pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};
 #[doc(hidden)]
-pub use condyle_model::{difference_jacobian_groups, integrate_jacobian_groups};
+pub use condyle_model::{
+    PositionFault, ROTATION_ROUNDING, difference_jacobian_groups, integrate_jacobian_groups, unit_fault,
+};
 pub use condyle_spatial::{
     Act, Constant, Cross, Dense, DenseMatrix, Force, Inertia, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Sym3,
     Vec3, level, lie,

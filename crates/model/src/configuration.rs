@@ -149,7 +149,8 @@ pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mu
     sum.sqrt()
 }
 
-/// Brings quaternions and (cos, sin) pairs in q back to length 1, in place.
+/// Brings quaternions and (cos, sin) pairs in q back to length 1, in place. The result of one of length 0, or with a number that
+/// is not finite, is not finite.
 ///
 /// q: nq numbers. Allocates nothing.
 ///
