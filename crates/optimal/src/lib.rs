@@ -75,7 +75,9 @@ mod read;
 pub mod robot;
 mod time;
 
-pub use constrained::{AugmentedLagrangian, Constrained, ConstraintSettings, Outcome, PathConstraint};
+pub use constrained::{
+    AugmentedLagrangian, Constrained, ConstraintSettings, Outcome, PathConstraint, Violation, ViolationKind,
+};
 pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
 pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};

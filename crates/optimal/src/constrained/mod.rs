@@ -4,9 +4,12 @@ mod action;
 mod augmented;
 mod multipliers;
 mod path_constraint;
+mod restart;
 mod settings;
+mod violation;
 
 pub use action::Constrained;
 pub use augmented::{AugmentedLagrangian, Outcome};
 pub use path_constraint::PathConstraint;
 pub use settings::ConstraintSettings;
+pub use violation::{Violation, ViolationKind};

@@ -97,6 +97,19 @@ pub struct Fddp {
     inverse_dynamics: bool,
     /// Whether there is a trajectory to go on from.
     started: bool,
+    /// Whether the trajectory was given or found since the last [`shift`](Self::shift): a shift without a step in between
+    /// copies its end.
+    pub(super) renewed: bool,
+}
+
+/// The rules of a solve that its caller sets, besides the settings.
+#[derive(Clone, Copy)]
+pub(crate) struct Rules {
+    /// Whether the first iteration runs whatever the time.
+    pub(crate) guaranteed: bool,
+    /// Whether a bounded problem counts as feasible from the start if the warm start has no gaps. Crocoddyl's rule is no: the
+    /// bounds then only cut trials off until the first full step.
+    pub(crate) trusts_start: bool,
 }
 
 /// The iterations for which there is room in the trace when a solve begins; with more it grows.
@@ -109,10 +122,22 @@ pub(super) struct Progress {
     /// Whether the iterate before the last accepted step was feasible.
     pub(super) was_feasible: bool,
     pub(super) tolerance: f64,
+    /// Whether all controls of the iterate are within their bounds: those of a trial are, a warm start need not be.
+    pub(super) bounded: bool,
+    /// The number of accepted steps.
+    pub(super) steps: usize,
     /// Whether there are gains of this solve.
     pub(super) swept: bool,
     /// Whether they are those of the best iterate, which the last step left.
     pub(super) swept_best: bool,
+}
+
+impl Progress {
+    /// The value of an iterate with this gap and cost.
+    pub(super) fn value(&self, gap: f64, cost: f64) -> Value {
+        let Self { feasible, bounded, steps, regularisation, .. } = *self;
+        Value { gap, cost, feasible, bounded, steps, regularisation }
+    }
 }
 
 impl Fddp {
@@ -136,6 +161,7 @@ impl Fddp {
             clock: Clock::default(),
             inverse_dynamics: false,
             started: false,
+            renewed: false,
         }
     }
 
@@ -146,7 +172,7 @@ impl Fddp {
     /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see
     /// [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]), &mut Unobserved)
+        self.run(problem, Some([xs, us]), &mut Unobserved, self.rules())
     }
 
     /// As [`solve`](Self::solve), and shows each iteration as it ends to `observer`, who may end the solve.
@@ -160,7 +186,7 @@ impl Fddp {
         us: &[f64],
         mut observer: impl Observer,
     ) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]), &mut observer)
+        self.run(problem, Some([xs, us]), &mut observer, self.rules())
     }
 
     /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
@@ -169,7 +195,7 @@ impl Fddp {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
-        self.run(problem, None, &mut Unobserved)
+        self.run(problem, None, &mut Unobserved, self.rules())
     }
 
     /// As [`resume`](Self::resume), and shows each iteration as it ends to `observer`, who may end the solve.
@@ -177,15 +203,21 @@ impl Fddp {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
-        self.run(problem, None, &mut observer)
+        self.run(problem, None, &mut observer, self.rules())
     }
 
-    /// A solve, from a warm start or the trajectory of the last one.
+    /// The rules of a solve by itself, which are Crocoddyl's.
+    fn rules(&self) -> Rules {
+        Rules { guaranteed: self.settings.time_budget != Some(Duration::ZERO), trusts_start: false }
+    }
+
+    /// Solves from a warm start or the trajectory of the last solve.
     pub(crate) fn run(
         &mut self,
         problem: &mut Problem,
         warm_start: Option<[&[f64]; 2]>,
         observer: &mut dyn Observer,
+        rules: Rules,
     ) -> Result<&Solution, Error> {
         let begin = Instant::now();
         if let Some([xs, us]) = warm_start {
@@ -197,7 +229,7 @@ impl Fddp {
             }
             self.solution.xs.copy_from_slice(xs);
             self.solution.us.copy_from_slice(us);
-            self.started = true;
+            (self.started, self.renewed) = (true, true);
         } else if !self.started {
             return Err(Error::NothingToResume);
         }
@@ -209,6 +241,9 @@ impl Fddp {
         let bounded = problem.check_bounds()?;
         self.inverse_dynamics = self.settings.inverse_dynamics_form && !bounded && !self.settings.second_order;
         let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };
+        if bounded && self.settings.project_warm_start {
+            self.solution.project(problem, 0..problem.horizon());
+        }
 
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
@@ -222,16 +257,19 @@ impl Fddp {
             feasible: false,
             was_feasible: false,
             tolerance,
+            bounded: !bounded || self.solution.is_bounded(problem),
+            steps: 0,
             swept: false,
             swept_best: false,
         };
         self.sweep.set_segments(self.settings.segments);
         self.sweep.forget();
         self.best.start();
-        self.clock.start(begin, self.settings.time_budget);
-        let status = self.iterate(problem, &mut progress, &mut PacedObserver::new(observer, begin));
+        self.clock.start(begin, self.settings.time_budget, rules.guaranteed);
+        let trusts_start = bounded && rules.trusts_start;
+        let status = self.iterate(problem, &mut progress, trusts_start, &mut PacedObserver::new(observer, begin));
         self.finish(problem, &mut progress, status);
-        self.solution.timings.total = begin.elapsed();
+        self.solution.timings.end(begin.elapsed(), self.settings.time_budget);
         Ok(&self.solution)
     }
 
@@ -240,10 +278,17 @@ impl Fddp {
         &self.solution
     }
 
-    /// The iterations, until one of the reasons to stop.
-    fn iterate(&mut self, problem: &mut Problem, now: &mut Progress, watch: &mut PacedObserver<'_>) -> Status {
+    /// Iterates until one of the reasons to stop. A start without gaps is feasible if it is trusted.
+    fn iterate(
+        &mut self,
+        problem: &mut Problem,
+        now: &mut Progress,
+        trusts_start: bool,
+        watch: &mut PacedObserver<'_>,
+    ) -> Status {
         self.calc(problem);
         let mut gap = self.update_gaps(problem);
+        now.feasible = trusts_start && gap == 0.0;
         if !(self.solution.cost.is_finite() && gap.is_finite()) {
             return Status::NotFinite;
         }
@@ -282,7 +327,7 @@ impl Fddp {
             now.swept = true;
             let Self { line_search, solution, next, motions, gaps, best, sweep, settings, clock, .. } = self;
             let (knots, feasible) = (sweep.knots(), now.feasible);
-            let value = Value { gap, cost: solution.cost, feasible, regularisation: now.regularisation };
+            let value = now.value(gap, solution.cost);
             let iterate =
                 Iterate { solution, next, motions, value, best, gaps, knots, feasible, settings, clock, watch };
             search = line_search.run(problem, iterate, search);
@@ -290,6 +335,7 @@ impl Fddp {
                 return status;
             }
             if search.accepted {
+                (now.bounded, now.steps) = (true, now.steps + 1);
                 now.swept_best = search.left_best;
                 now.was_feasible = now.feasible;
                 now.feasible |= search.step == 1.0 || self.settings.method == DdpMethod::Ddp;
@@ -316,6 +362,7 @@ impl Fddp {
                 accepted: search.accepted,
             };
             self.solution.trace.push(record);
+            self.clock.end_guarantee();
             let verdict = watch.iteration(&record);
             if now.regularisation == self.settings.regularisation_max {
                 return Status::RegularisationLimit;
@@ -355,6 +402,14 @@ impl Fddp {
             }
         }
         max_abs(&self.gaps)
+    }
+
+    /// The entry of the tangent space with the largest gap of the last iterate: knot, entry and size.
+    pub(crate) fn largest_gap(&self) -> Option<(usize, usize, f64)> {
+        let ndx = self.solution.shape().ndx;
+        let sizes = self.gaps.iter().map(|gap| if gap.is_nan() { f64::INFINITY } else { gap.abs() });
+        let (i, size) = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (size > 0.0).then_some((i / ndx, i % ndx, size))
     }
 
     /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on. On several threads

@@ -10,7 +10,9 @@ mod settings;
 mod shift;
 mod solution;
 
+pub(crate) use clock::Recent;
 pub use fddp::Fddp;
+pub(crate) use fddp::Rules;
 pub(crate) use observer::Unobserved;
 pub use observer::{Observer, Verdict};
 pub use settings::{DdpMethod, Settings};
