@@ -119,11 +119,12 @@ pub(super) fn solution<'py>(
         rust::Status::TimeLimit => "time_limit",
         rust::Status::RegularisationLimit => "regularisation_limit",
         rust::Status::Interrupted => "interrupted",
+        rust::Status::ConstraintsViolated => "constraints_violated",
         rust::Status::Infeasible => "infeasible",
         _ => "not_finite",
     };
     let t = &s.timings;
-    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total].map(|phase| phase.as_secs_f64());
+    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total, t.overrun].map(|phase| phase.as_secs_f64());
     let timings = class!(py, "Timings")?.call1(PyTuple::new(py, timings)?)?;
     let solution = class!(py, "Solution")?.call1((
         output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
