@@ -145,7 +145,6 @@ fn a_constrained_solve_that_blows_up_says_how_far_its_best_iterate_is() {
     let mut blown_up = reckless().filter_map(|(dt, effort, point)| {
         let (mut problem, xs) = reckless_reach(dt, effort, point, None);
         let mut solver = AugmentedLagrangian::new(&problem);
-        solver.settings.restart = false;
         let solution = solver.solve(&mut problem, &xs, &[0.0; 350]).unwrap().clone();
         (solution.status == Status::NotFinite).then_some((problem, solver, solution))
     });

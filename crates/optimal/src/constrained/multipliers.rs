@@ -65,6 +65,13 @@ impl Problem {
         self.share_multipliers();
     }
 
+    /// Whether some knot has a constraint.
+    pub(crate) fn has_constraints(&mut self) -> bool {
+        let mut any = false;
+        (0..=self.horizon()).for_each(|t| self.action_mut(t).constraints(t, &mut |bounded| any |= bounded.count > 0));
+        any
+    }
+
     /// The penalty 1/μ.
     pub(crate) fn set_penalty(&mut self, mu: f64) {
         for t in 0..=self.horizon() {

@@ -17,7 +17,8 @@ struct Attempt {
 impl AugmentedLagrangian {
     /// Makes a second attempt after one that is lost, from x̂₀ at all knots and the controls that hold it still, with
     /// multipliers of zero. Returns the status of the better attempt, whose solution and outcome remain: a converged one,
-    /// else the one with the smaller violation. Does nothing if the first attempt started there, or no time is left.
+    /// else the one with the smaller violation. Does nothing if the first attempt started there, no time is left, or there is
+    /// neither a constraint nor a bound, where the solve is that of [`Fddp`](crate::Fddp).
     pub(super) fn restart(
         &mut self,
         problem: &mut Problem,
@@ -26,7 +27,8 @@ impl AugmentedLagrangian {
         observer: &mut dyn Observer,
         begin: Instant,
     ) -> Result<Status, Error> {
-        if self.inner.time_budget.is_some_and(|budget| begin.elapsed() >= budget) {
+        let is_late = self.inner.time_budget.is_some_and(|budget| begin.elapsed() >= budget);
+        if is_late || !(problem.check_bounds()? || problem.has_constraints()) {
             return Ok(status);
         }
         problem.multipliers(&mut self.outcome.multipliers);

@@ -21,7 +21,8 @@ pub struct ConstraintSettings {
     pub penalty_factor: f64,
     /// Whether a solve that ends as not finite, or with violated constraints at the largest penalty, begins once more: from
     /// x̂₀ at all knots, and the controls that hold it still ([`quasi_static`](crate::Problem::quasi_static)). The better
-    /// result counts. A rollout that diverges, or saturated controls, are such warm starts. Allocates; `resume` never does it.
+    /// result counts. A rollout that diverges, or saturated controls, are such warm starts. Allocates. Never done by `resume`,
+    /// nor in a problem without constraints and bounds.
     pub restart: bool,
 }
 

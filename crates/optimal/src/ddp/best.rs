@@ -1,7 +1,8 @@
 //! The best iterate of a solve, to go back to at the end when the last one is worse.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
-use super::fddp::{Fddp, Progress};
+use super::fddp::Fddp;
+use super::iterations::Progress;
 use super::solution::{Solution, Status};
 use crate::problem::Problem;
 

@@ -1,13 +1,14 @@
 //! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
-use super::best::{Best, Value};
+use super::best::Best;
 use super::clock::{Clock, Phase};
+use super::iterations::Progress;
 use super::observer::{Observer, PacedObserver, Unobserved};
 use super::rollout::Sum;
-use super::search::{Iterate, LineSearch, Search};
-use super::settings::{DdpMethod, Settings};
-use super::solution::{Iteration, Solution, Status, Timings};
+use super::search::LineSearch;
+use super::settings::Settings;
+use super::solution::{Solution, Timings};
 use crate::error::Error;
 use crate::lq::{Hessian, LqNode, Sweep, SweepError};
 use crate::problem::{ActionModel, Problem};
@@ -84,15 +85,15 @@ pub struct Fddp {
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
     pub(super) next: Vec<f64>,
     /// The accelerations and forces of the iterate, N equal parts, for nodes in inverse-dynamics form.
-    motions: Vec<f64>,
+    pub(super) motions: Vec<f64>,
     /// Whether they are those of the iterate.
     pub(super) knows_motions: bool,
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
-    gaps: Vec<f64>,
+    pub(super) gaps: Vec<f64>,
     /// The best iterate, which the solution becomes if the last one is worse.
     pub(super) best: Best,
-    clock: Clock,
+    pub(super) clock: Clock,
     /// Whether knots may come as equations of inverse dynamics.
     inverse_dynamics: bool,
     /// Whether there is a trajectory to go on from.
@@ -114,31 +115,6 @@ pub(crate) struct Rules {
 
 /// The iterations for which there is room in the trace when a solve begins; with more it grows.
 const FORESEEN: usize = 10_000;
-
-/// The state that goes from one iteration to the next.
-pub(super) struct Progress {
-    pub(super) regularisation: f64,
-    pub(super) feasible: bool,
-    /// Whether the iterate before the last accepted step was feasible.
-    pub(super) was_feasible: bool,
-    pub(super) tolerance: f64,
-    /// Whether all controls of the iterate are within their bounds: those of a trial are, a warm start need not be.
-    pub(super) bounded: bool,
-    /// The number of accepted steps.
-    pub(super) steps: usize,
-    /// Whether there are gains of this solve.
-    pub(super) swept: bool,
-    /// Whether they are those of the best iterate, which the last step left.
-    pub(super) swept_best: bool,
-}
-
-impl Progress {
-    /// The value of an iterate with this gap and cost.
-    pub(super) fn value(&self, gap: f64, cost: f64) -> Value {
-        let Self { feasible, bounded, steps, regularisation, .. } = *self;
-        Value { gap, cost, feasible, bounded, steps, regularisation }
-    }
-}
 
 impl Fddp {
     /// A solver with the default settings and the workspace for problems with the dimensions of `problem`.
@@ -278,107 +254,8 @@ impl Fddp {
         &self.solution
     }
 
-    /// Iterates until one of the reasons to stop. A start without gaps is feasible if it is trusted.
-    fn iterate(
-        &mut self,
-        problem: &mut Problem,
-        now: &mut Progress,
-        trusts_start: bool,
-        watch: &mut PacedObserver<'_>,
-    ) -> Status {
-        self.calc(problem);
-        let mut gap = self.update_gaps(problem);
-        now.feasible = trusts_start && gap == 0.0;
-        if !(self.solution.cost.is_finite() && gap.is_finite()) {
-            return Status::NotFinite;
-        }
-        let mut search = Search::default();
-        for iteration in 0..self.settings.max_iterations {
-            if search.accepted {
-                gap = self.update_gaps(problem);
-            }
-            self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
-            let mut swept = None;
-            if search.accepted || iteration == 0 {
-                let phases = [Phase::CalcDiff, Phase::Sweep];
-                if let Err(status) = self.clock.allows(&phases[..1 + usize::from(self.follows())], watch) {
-                    return status;
-                }
-                swept = self.calc_diff(problem, now.feasible, now.regularisation);
-            }
-            if swept.is_none()
-                && let Err(status) = self.clock.allows(&[Phase::Sweep], watch)
-            {
-                return status;
-            }
-            now.swept_best = false;
-            while let Err(error) = swept.take().unwrap_or_else(|| self.sweep(problem, now.regularisation)) {
-                now.regularisation = self.increased(now.regularisation);
-                if now.regularisation == self.settings.regularisation_max {
-                    return match error {
-                        SweepError::NotPositive { .. } => Status::RegularisationLimit,
-                        SweepError::NotFinite { .. } => Status::NotFinite,
-                    };
-                }
-                if let Err(status) = self.clock.allows(&[Phase::Sweep], watch) {
-                    return status;
-                }
-            }
-            now.swept = true;
-            let Self { line_search, solution, next, motions, gaps, best, sweep, settings, clock, .. } = self;
-            let (knots, feasible) = (sweep.knots(), now.feasible);
-            let value = now.value(gap, solution.cost);
-            let iterate =
-                Iterate { solution, next, motions, value, best, gaps, knots, feasible, settings, clock, watch };
-            search = line_search.run(problem, iterate, search);
-            if let Some(status) = search.stopped {
-                return status;
-            }
-            if search.accepted {
-                (now.bounded, now.steps) = (true, now.steps + 1);
-                now.swept_best = search.left_best;
-                now.was_feasible = now.feasible;
-                now.feasible |= search.step == 1.0 || self.settings.method == DdpMethod::Ddp;
-            }
-            if search.step > self.settings.regularisation_decrease_above {
-                now.regularisation = self.decreased(now.regularisation);
-            }
-            if search.step <= self.settings.regularisation_increase_below {
-                now.regularisation = self.increased(now.regularisation);
-            }
-            let stop = (search.d1 + 0.5 * search.d2).abs(); // the expected decrease for α = 1
-            let record = Iteration {
-                iteration,
-                cost: self.solution.cost,
-                gap,
-                stop,
-                step: search.step,
-                regularisation: now.regularisation,
-                d1: search.d1,
-                d2: search.d2,
-                decrease: search.decrease,
-                expected_decrease: search.expected_decrease,
-                feasible: now.feasible,
-                accepted: search.accepted,
-            };
-            self.solution.trace.push(record);
-            self.clock.end_guarantee();
-            let verdict = watch.iteration(&record);
-            if now.regularisation == self.settings.regularisation_max {
-                return Status::RegularisationLimit;
-            }
-            if now.was_feasible && stop < now.tolerance {
-                return Status::Converged;
-            }
-            if verdict.is_break() {
-                return Status::Interrupted;
-            }
-        }
-        Status::MaxIterations
-    }
-
     /// Dynamics and cost of the warm start.
-    fn calc(&mut self, problem: &mut Problem) {
+    pub(super) fn calc(&mut self, problem: &mut Problem) {
         let clock = Instant::now();
         let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
         problem.calc_with_motion(xs, us, next, costs, motions);
@@ -486,7 +363,7 @@ impl Fddp {
     }
 
     /// Whether the sweep follows the derivatives.
-    fn follows(&self) -> bool {
+    pub(super) fn follows(&self) -> bool {
         self.settings.threads > 1 && !self.settings.second_order && self.sweep.is_sequential()
     }
 
@@ -505,13 +382,5 @@ impl Fddp {
         };
         self.solution.timings.sweep += self.clock.ran(Phase::Sweep, clock);
         result
-    }
-
-    fn increased(&self, regularisation: f64) -> f64 {
-        (regularisation * self.settings.regularisation_factor).min(self.settings.regularisation_max)
-    }
-
-    fn decreased(&self, regularisation: f64) -> f64 {
-        (regularisation / self.settings.regularisation_factor).max(self.settings.regularisation_min)
     }
 }

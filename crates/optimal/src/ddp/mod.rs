@@ -3,6 +3,7 @@
 mod best;
 mod clock;
 mod fddp;
+mod iterations;
 mod observer;
 mod rollout;
 mod search;
