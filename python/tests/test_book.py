@@ -47,6 +47,43 @@ def test_structure() -> None:
     assert BOOK.faults() == []
 
 
+def test_figures_of_the_readme() -> None:
+    """Chapters that quote the tables of the README have the same figures."""
+    pages = {name: " ".join((ROOT / "docs" / name).read_text().split()) for name in BOOK.chapters()}
+    one_call, batch = ({}, {})
+    for heading, table in (("one call: ratio (ours in µs)", one_call), ("per state of a batch", batch)):
+        for line in (ROOT / "README.md").read_text().partition(f"| {heading}")[2].splitlines()[2:]:
+            if not line.startswith("|"):
+                break
+            name, *robots = (cell.strip() for cell in line.strip("|").split("|"))
+            ratios, ours = zip(*(cell.rstrip(")").split(" (") for cell in robots), strict=True)
+            table[name] = dict(zip(("panda", "anymal", "talos"), zip(ratios, ours, strict=True), strict=True))
+    ours = {name: robots["talos"][1] for name, robots in one_call.items()}
+    rnea, derivatives = ours["rnea"], ours["rnea_derivatives"]
+    many = batch["rnea"]["talos"][1]
+    panda = [one_call[name]["panda"][1] for name in ("rnea", "crba")]
+    quoted = {
+        "derivatives.md": [
+            f"RNEA takes {rnea} µs, its derivatives by hand {derivatives} µs. "
+            f"That is {float(derivatives) / float(rnea):.1f} times RNEA",
+        ],
+        "exercises.md": [
+            f"RNEA takes {rnea} µs a call, so 38 calls take {38 * float(rnea):.0f} µs",
+            f"In a batch RNEA takes {many} µs, so 38 states take {38 * float(many):.0f} µs",
+            f"CRBA takes {ours['crba']} µs",
+            f"7 calls of {panda[0]} µs against {panda[1]} µs, a factor of {7 * float(panda[0]) / float(panda[1]):.0f}",
+        ],
+        "lanes.md": [
+            "costs {} to {} of Pinocchio's single call for RNEA, and our own single call costs {} to {}.".format(
+                *(f(of["rnea"][robot][0] for robot in of["rnea"]) for of in (batch, one_call) for f in (min, max))
+            ),
+        ],
+    }
+    for name, sentences in quoted.items():
+        for sentence in sentences:
+            assert sentence in pages[name], f"{name}: the README's tables give: {sentence}"
+
+
 def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What a block prints is compared, and what is missing is said."""
     monkeypatch.setattr(BOOK, "BOOK", tmp_path / "docs")

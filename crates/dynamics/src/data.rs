@@ -86,13 +86,15 @@ data! {
 impl<S: Scalar> Data<S> {
     /// Allocates everything for a model.
     pub fn new<R: 'static>(model: &Model<R>) -> Self {
-        if !S::COMPILED || !is::<R, f64>() {
+        if !is::<R, f64>() || !(S::COMPILED || is::<S, f32>()) {
             return Self::allocate(model);
         }
         // SAFETY: R is f64, and S is the scalar of the data that is given back.
         unsafe {
             if is::<S, f64>() {
                 same(new_single(same(model)))
+            } else if is::<S, f32>() {
+                same(new_single_f32(same(model)))
             } else if is::<S, Short>() {
                 same(new_short(same(model)))
             } else {
@@ -102,8 +104,11 @@ impl<S: Scalar> Data<S> {
     }
 }
 
-/// What this crate compiles of [`Data::new`] and of `clone`, for whoever uses it.
+/// Constructors of [`Data`] and their copies, compiled in this crate.
 fn new_single(model: &Model) -> Data<f64> {
+    Data::allocate(model)
+}
+fn new_single_f32(model: &Model) -> Data<f32> {
     Data::allocate(model)
 }
 fn new_short(model: &Model) -> Data<Short> {
@@ -113,6 +118,9 @@ fn new_long(model: &Model) -> Data<Long> {
     Data::allocate(model)
 }
 fn clone_single(data: &Data<f64>) -> Data<f64> {
+    data.copy()
+}
+fn clone_single_f32(data: &Data<f32>) -> Data<f32> {
     data.copy()
 }
 fn clone_short(data: &Data<Short>) -> Data<Short> {
@@ -130,13 +138,15 @@ fn copied<W: Clone>(workspace: &W) -> W {
 
 impl<S: Scalar> Clone for Data<S> {
     fn clone(&self) -> Self {
-        if !S::COMPILED {
+        if !(S::COMPILED || is::<S, f32>()) {
             return self.copy();
         }
         // SAFETY: S is the scalar of the data that is given back.
         unsafe {
             if is::<S, f64>() {
                 same(clone_single(same(self)))
+            } else if is::<S, f32>() {
+                same(clone_single_f32(same(self)))
             } else if is::<S, Short>() {
                 same(clone_short(same(self)))
             } else {

@@ -106,6 +106,11 @@ pub use derivatives::centroidal_derivatives::CentroidalDerivatives;
 pub use differentiate::{LaneJacobian, StateFunction, gradient, hessian, jacobian};
 pub use divide_conquer::DivideConquer;
 pub use divide_conquer::assembly::AssemblySize;
+/// Versions of the crates whose types are part of the public interface.
+#[cfg(feature = "std")]
+pub use num_dual;
+pub use {nalgebra, rand};
+
 pub use passes::all_terms::AllTerms;
 pub use passes::centroidal::{CentroidalMap, CentroidalMapRate};
 pub use passes::energy::EnergyDerivatives;

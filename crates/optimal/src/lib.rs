@@ -81,6 +81,7 @@ pub use constrained::{
 pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
 pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};
+pub use nalgebra;
 pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem, Unicycle};
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;

@@ -135,8 +135,10 @@ impl<'a, T> IntoIterator for &'a mut Array<T> {
 
 // SAFETY: it is `repr(C)`, of a thin pointer, a number and nothing. Who drops it as an array of B drops entries that are alike,
 // from memory of the same layout.
+#[doc(hidden)]
 unsafe impl<A: Alike<B>, B> Alike<Array<B>> for Array<A> {}
 
+#[doc(hidden)]
 impl<A: Alike<B>, B> Rename<Array<B>> for Array<A> {
     #[inline(always)]
     fn renamed(self) -> Array<B> {
@@ -188,8 +190,10 @@ pub struct MatrixStorage<T> {
 alike!(MatrixStorage { numbers } same { rows, columns });
 
 // SAFETY: nalgebra's matrix is `repr(C)`, of a storage and nothing else, as is looked at below.
+#[doc(hidden)]
 unsafe impl Alike<Matrix<Fused>> for Matrix<f64> {}
 
+#[doc(hidden)]
 impl Rename<Matrix<Fused>> for Matrix<f64> {
     #[inline(always)]
     fn renamed(self) -> Matrix<Fused> {

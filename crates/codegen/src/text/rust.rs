@@ -96,8 +96,9 @@ fn section(of: &str) -> String {
     format!("\n{}", rest.split("// end\n").next().unwrap_or_default())
 }
 
-/// What compilers and linters are not to say about code that nobody wrote.
-const ALLOWED: &str = "#[allow(clippy::all, clippy::pedantic, non_snake_case, unused_parens)]\n";
+/// Lints that are silenced in generated code. A module may use some of its functions only, and may be private.
+const ALLOWED: &str = "#[allow(clippy::all, clippy::pedantic, clippy::nursery, dead_code, non_snake_case, \
+                       unreachable_pub, unused_parens)]\n";
 
 /// A function with its parts.
 fn function(writer: &Writer<Rust>) -> String {

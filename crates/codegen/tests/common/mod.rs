@@ -112,7 +112,8 @@ impl Program {
         Self { path: folder.join("main"), functions: functions.to_vec(), is_float, lanes }
     }
 
-    /// Code in Rust by `rustc`, as a library without `std`, without a warning.
+    /// Compiles Rust by `rustc` as a library without `std`, without a warning. Also checks it as a private module of which
+    /// nothing is used, with lints that are off by default.
     pub(crate) fn rust(folder: &Path, functions: &[Function], is_float: bool) -> Self {
         let (language, real) = if is_float { (Language::RustFloat, "f32") } else { (Language::Rust, "f64") };
         for file in language.text("robot", functions) {
@@ -121,12 +122,16 @@ impl Program {
         let file = language.stem("robot");
         let library = format!("#![no_std]\n#![deny(warnings)]\n#[path = \"{file}.rs\"]\npub mod robot;\n");
         std::fs::write(folder.join("library.rs"), library).unwrap();
+        let lints = "warnings, unused, nonstandard_style, rust_2018_idioms, unreachable_pub, unused_qualifications";
+        let unused = format!("#![no_std]\n#![deny({lints})]\n#[path = \"{file}.rs\"]\nmod robot;\n");
+        std::fs::write(folder.join("unused.rs"), unused).unwrap();
         std::fs::write(folder.join("main.rs"), main_in_rust(functions, real)).unwrap();
         let rustc = || {
             let mut command = Command::new("rustc");
             command.current_dir(folder).args(["--edition", "2021", "-C", "opt-level=0", "-C", "debuginfo=0"]);
             command
         };
+        compile(rustc().args(["--crate-type", "lib", "--emit", "metadata", "unused.rs"]));
         compile(rustc().args(["--crate-type", "lib", "--crate-name", "robot", "library.rs"]));
         compile(rustc().args(["--extern", "robot=librobot.rlib", "main.rs"]));
         Self { path: folder.join("main"), functions: functions.to_vec(), is_float, lanes: 1 }

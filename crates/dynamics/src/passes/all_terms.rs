@@ -106,6 +106,7 @@ pub struct AllTerms<'d, S, R = f64> {
     pub(crate) a: &'d [Motion<S>],
 }
 
+#[doc(hidden)]
 impl<'d> Rename<AllTerms<'d, Fused>> for AllTerms<'d, f64> {
     #[inline(always)]
     fn renamed(self) -> AllTerms<'d, Fused> {

@@ -188,6 +188,7 @@ pub struct CentroidalMapRate<'d, S> {
     pub Jcom: &'d Matrix<S>,
 }
 
+#[doc(hidden)]
 impl<'d> Rename<CentroidalMapRate<'d, Fused>> for CentroidalMapRate<'d, f64> {
     #[inline(always)]
     fn renamed(self) -> CentroidalMapRate<'d, Fused> {

@@ -77,6 +77,7 @@ pub struct Accelerations<'d, S, R = f64> {
     pub(crate) velocities: Velocities<'d, S, R>,
 }
 
+#[doc(hidden)]
 impl<'d> Rename<Placements<'d, Fused>> for Placements<'d, f64> {
     #[inline(always)]
     fn renamed(self) -> Placements<'d, Fused> {
@@ -84,6 +85,7 @@ impl<'d> Rename<Placements<'d, Fused>> for Placements<'d, f64> {
     }
 }
 
+#[doc(hidden)]
 impl<'d> Rename<Velocities<'d, Fused>> for Velocities<'d, f64> {
     #[inline(always)]
     fn renamed(self) -> Velocities<'d, Fused> {
@@ -91,6 +93,7 @@ impl<'d> Rename<Velocities<'d, Fused>> for Velocities<'d, f64> {
     }
 }
 
+#[doc(hidden)]
 impl<'d> Rename<Accelerations<'d, Fused>> for Accelerations<'d, f64> {
     #[inline(always)]
     fn renamed(self) -> Accelerations<'d, Fused> {

@@ -19,7 +19,9 @@ use condyle_spatial::{Scalar, kernel};
 /// τ = −d v − f tanh(v/ε): the efforts of damping and smoothed friction, in O(n).
 ///
 /// v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv (N m, N), overwritten.
-/// They always take power: vᵀ τ ≤ 0. Allocates nothing. The smoothing and its price: see the head of the file.
+/// They always take power: vᵀ τ ≤ 0. The smoothed law is right to 1 % from |v| = 2.65 ε on. At rest a joint creeps instead of
+/// sticking: a load below f moves it with less than ε artanh(load/f). An explicit integrator needs steps shorter than 2 ε m/f,
+/// with m the inertia that the joint feels. Allocates nothing.
 ///
 /// ```
 /// use condyle_dynamics::{Joint, JointOptions, ModelBuilder, Inertia, Se3, Sym3, Vec3, WORLD, passive_torque};

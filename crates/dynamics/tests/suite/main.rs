@@ -36,6 +36,7 @@ mod regressor;
 mod sdf;
 mod second_order;
 mod simulation;
+mod single_calls_f32;
 mod urdf;
 mod urdf_errors;
 mod validity;

@@ -69,6 +69,7 @@ impl<S: Scalar> Neg for LaneDual<S> {
 
 operators!(LaneDual<S>, S: Scalar);
 
+#[doc(hidden)]
 impl<S: Scalar> Scalar for LaneDual<S> {
     type Mask = S::Mask;
     const LANES: usize = S::LANES;
@@ -139,6 +140,7 @@ impl<S: Scalar> Scalar for LaneDual<S> {
     }
 }
 
+#[doc(hidden)]
 impl<S: Scalar> Constant<LaneDual<S>> for LaneDual<S> {
     #[inline(always)]
     fn lift(self) -> Self {

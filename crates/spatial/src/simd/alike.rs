@@ -36,6 +36,7 @@ pub unsafe fn same<A, B>(a: A) -> B {
     unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
+#[doc(hidden)]
 impl<'a, A: Alike<B>, B> Rename<&'a B> for &'a A {
     #[inline(always)]
     fn renamed(self) -> &'a B {
@@ -44,6 +45,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a B> for &'a A {
     }
 }
 
+#[doc(hidden)]
 impl<'a, A: Alike<B>, B> Rename<&'a mut B> for &'a mut A {
     #[inline(always)]
     fn renamed(self) -> &'a mut B {
@@ -52,6 +54,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a mut B> for &'a mut A {
     }
 }
 
+#[doc(hidden)]
 impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
     #[inline(always)]
     fn renamed(self) -> &'a [B] {
@@ -60,6 +63,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
     }
 }
 
+#[doc(hidden)]
 impl<'a, A: Alike<B>, B> Rename<&'a mut [B]> for &'a mut [A] {
     #[inline(always)]
     fn renamed(self) -> &'a mut [B] {
@@ -68,6 +72,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a mut [B]> for &'a mut [A] {
     }
 }
 
+#[doc(hidden)]
 impl<A: Rename<B>, B> Rename<Option<B>> for Option<A> {
     #[inline(always)]
     fn renamed(self) -> Option<B> {
@@ -75,6 +80,7 @@ impl<A: Rename<B>, B> Rename<Option<B>> for Option<A> {
     }
 }
 
+#[doc(hidden)]
 impl<A: Rename<B>, B, const N: usize> Rename<[B; N]> for [A; N] {
     #[inline(always)]
     fn renamed(self) -> [B; N] {
@@ -83,11 +89,14 @@ impl<A: Rename<B>, B, const N: usize> Rename<[B; N]> for [A; N] {
 }
 
 // SAFETY: the layout of an array is that of its entries, one after another.
+#[doc(hidden)]
 unsafe impl<A: Alike<B>, B, const N: usize> Alike<[B; N]> for [A; N] {}
 
 // SAFETY: `Fused` is a transparent wrapper.
+#[doc(hidden)]
 unsafe impl Alike<Fused> for f64 {}
 
+#[doc(hidden)]
 impl Rename<Fused> for f64 {
     #[inline(always)]
     fn renamed(self) -> Fused {
@@ -96,8 +105,10 @@ impl Rename<Fused> for f64 {
 }
 
 // SAFETY: `Fused` is a transparent wrapper.
+#[doc(hidden)]
 unsafe impl Alike<f64> for Fused {}
 
+#[doc(hidden)]
 impl Rename<f64> for Fused {
     #[inline(always)]
     fn renamed(self) -> f64 {
@@ -138,8 +149,10 @@ impl Rename<f64> for Fused {
 macro_rules! alike {
     ($($type:ty),+ $(,)?) => {$(
         // SAFETY: it is the same type.
+        #[doc(hidden)]
         #[allow(unsafe_code)]
         unsafe impl $crate::simd::alike::Alike<$type> for $type {}
+        #[doc(hidden)]
         impl $crate::simd::alike::Rename<$type> for $type {
             #[inline(always)]
             fn renamed(self) -> $type {
@@ -149,8 +162,10 @@ macro_rules! alike {
     )+};
     ($name:ident { $($field:ident),* $(,)? } $(same { $($same:ident),* $(,)? })?) => {
         // SAFETY: the fields are alike or the same, and in the same places, or what follows would not compile.
+        #[doc(hidden)]
         #[allow(unsafe_code)]
         unsafe impl $crate::simd::alike::Alike<$name<$crate::simd::Fused>> for $name<f64> {}
+        #[doc(hidden)]
         impl $crate::simd::alike::Rename<$name<$crate::simd::Fused>> for $name<f64> {
             #[inline(always)]
             fn renamed(self) -> $name<$crate::simd::Fused> {

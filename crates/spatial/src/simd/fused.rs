@@ -31,6 +31,7 @@ impl Fused {
     }
 }
 
+#[doc(hidden)]
 impl Block for Fused {
     type Number = f64;
     #[inline(always)]
@@ -59,6 +60,7 @@ macro_rules! fused_operators {
 fused_operators!(Add add, Sub sub, Mul mul, Div div);
 operators!(Fused);
 
+#[doc(hidden)]
 impl Neg for Fused {
     type Output = Self;
     #[inline(always)]
@@ -67,6 +69,7 @@ impl Neg for Fused {
     }
 }
 
+#[doc(hidden)]
 impl Scalar for Fused {
     type Mask = bool;
     const LANES: usize = 1;

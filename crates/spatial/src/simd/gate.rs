@@ -8,7 +8,8 @@
 //! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same
 //!   64 bits under another name: arguments, workspaces included, are taken for the same over [`Fused`], which they are
 //!   [`Alike`];
-//! - for all other scalars (dual numbers, `f32`, a user's own) it is compiled where it is used.
+//! - a single `f32` is compiled there too, without vector instructions, so that debug builds of users do not slow it down;
+//! - for all other scalars (dual numbers, lanes of `f32`, a user's own) it is compiled where it is used.
 //!
 //! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one
 //! state, and [`level_function!`](crate::level_function) for small functions that are called often, such as the tiles of dense
@@ -78,6 +79,7 @@ macro_rules! kernel {
                 }
             }
 
+            $crate::kernel!(@call f32, is::<$S, f32>() $(&& is::<$R, f64>())?, $S $($R)?, ($($arg: $type),*));
             if !$S::COMPILED {
                 return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }

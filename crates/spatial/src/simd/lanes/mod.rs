@@ -39,8 +39,8 @@ pub trait Element<const N: usize>: Number {
     type Register: Register<Self, N>;
 }
 
-/// N numbers in a vector register, or in two of them. It stands only in code that runs where the processor has the
-/// instructions, see the head of the file.
+/// N numbers in one vector register or in two. They are used only in code that is compiled for their level and runs where the
+/// processor has it.
 pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     /// The outcome of a comparison.
     type Mask: Copy;
@@ -111,7 +111,7 @@ macro_rules! instructions {
         #[inline(always)]
         #[allow(unused_unsafe)]
         fn $name($($x: $type),*) $(-> $out)? {
-            // SAFETY: the level is supported, see the head of `lanes.rs`.
+            // SAFETY: the level is supported: only code that was entered through `Scalar::enter` has these numbers.
             unsafe { $body }
         }
     )*};
@@ -133,6 +133,7 @@ macro_rules! register_operators {
 register_operators!(Add add, Sub sub, Mul mul, Div div);
 operators!(Lanes<T, N>, T: Element<N>, const N: usize);
 
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> Neg for Lanes<T, N> {
     type Output = Self;
     #[inline(always)]
@@ -141,12 +142,14 @@ impl<T: Element<N>, const N: usize> Neg for Lanes<T, N> {
     }
 }
 
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> PartialEq for Lanes<T, N> {
     fn eq(&self, o: &Self) -> bool {
         self.to_array() == o.to_array()
     }
 }
 
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> fmt::Debug for Lanes<T, N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.to_array().fmt(f)
@@ -199,11 +202,12 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
     }
 }
 
-/// The constants of nobody: because of it an array alone does not say that it becomes lanes, whose type not everybody may name
-/// ([`Witness`](crate::simd::pack::Witness)).
+/// Second target of [`Constant`] for `[T; N]`. It stops type inference from selecting the lane type, which only a
+/// [`Witness`](crate::simd::pack::Witness) may name.
 #[derive(Clone, Copy)]
 pub struct Unused<T, const N: usize>([T; N]);
 
+#[doc(hidden)]
 impl<T: Number, const N: usize> Constant<Unused<T, N>> for [T; N] {
     fn lift(self) -> Unused<T, N> {
         Unused(self)
@@ -214,6 +218,7 @@ impl<T: Number, const N: usize> Constant<Unused<T, N>> for [T; N] {
 }
 
 /// A constant of its own in each lane.
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
     #[inline(always)]
     fn lift(self) -> Lanes<T, N> {
@@ -224,6 +229,7 @@ impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
     }
 }
 
+#[doc(hidden)]
 impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
     type Mask = <T::Register as Register<T, N>>::Mask;
     const LANES: usize = N;
