@@ -2387,10 +2387,12 @@ class AugmentedLagrangian:
     y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 
     `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
-    ended as "infeasible" or "not_finite"; `shift` moves them on. A solution is "converged" when the residuals of
-    `outcome` are below the tolerances, and "infeasible" if the penalty reached its limit and the limits do not hold.
-    Its cost contains the terms of the limits, that of `outcome` does not; its trace and gains are those of the last
-    inner solve.
+    ended as "not_finite" or with violated limits at the largest penalty; `shift` moves them on. A solution is "converged"
+    when the residuals of `outcome` are below the tolerances. It is "constraints_violated" if the penalty reached its limit
+    and the limits do not hold, which proves nothing: another warm start may find a solution. It is "infeasible" if the
+    initial state itself violates a limit of knot 0 that no control can change. `outcome.worst` names the knot, the limit
+    and the amount. The cost of the solution contains the terms of the limits, that of `outcome` does not; its trace and
+    gains are those of the last inner solve. Controls of a warm start that are outside of their bounds are moved into them.
 
     problem: the problem to solve; all memory is made for its shape, once.
     inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
@@ -2401,6 +2403,8 @@ class AugmentedLagrangian:
         `max_solves`: the number of inner solves at most.
         `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
         factor by which it rises.
+        `restart`: whether a `solve` that is not finite, or violates limits at the largest penalty, begins once more, from the
+        initial state held still at all knots (default: yes). The better result counts.
 
     >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()
@@ -2458,6 +2462,8 @@ class AugmentedLagrangian:
     ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
+        With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+
         callback, verbose, progress: as of `solve`.
 
         Raises `ProblemError` as `solve`, and if there is no solution yet.
@@ -2470,7 +2476,9 @@ class AugmentedLagrangian:
         with it.
 
         `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-        last one is served by a model of the problem, with those that it has for all knots.
+        last one is served by a model of the problem, with those that it has for all knots. The last state follows
+        from the last control, which is repeated. At a second shift without a step of a solve in between the last
+        state is repeated too, as a rollout by repeated controls would diverge.
 
         last: the index of that model.
 
@@ -2675,7 +2683,11 @@ class Fddp:
         `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
         `inverse_dynamics_form`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
         (default: yes): the same steps in less time.
-        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
+        `project_warm_start`: whether controls of a warm start that are outside of their bounds are moved into them, in `solve`
+        and in `resume` (default: yes). Crocoddyl keeps them, so its iterates need False.
+        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit". The first iteration
+        always runs, unless the budget is 0. A later phase runs if the median of its last five durations fits. A solve that
+        takes longer tells by how much in `timings.overrun`.
         `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
         there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
         `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep beside
@@ -2722,6 +2734,8 @@ class Fddp:
     ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
+        With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+
         callback, verbose, progress: as of `solve`.
 
         Raises `ProblemError` as `solve`, and if there is no solution yet.
@@ -2734,7 +2748,9 @@ class Fddp:
         with it.
 
         `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-        last one is served by a model of the problem, with those that it has for all knots.
+        last one is served by a model of the problem, with those that it has for all knots. The last state follows
+        from the last control, which is repeated. At a second shift without a step of a solve in between the last
+        state is repeated too, as a rollout by repeated controls would diverge.
 
         last: the index of that model.
 
