@@ -3,7 +3,7 @@
 use super::contact::Contact;
 use super::dynamics::knots::knot_of;
 use crate::{Problem, Solution};
-use condyle_dynamics::{ConstraintKind, Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
+use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
 
 /// The accelerations, efforts and forces at a knot, at its beginning.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,13 +51,12 @@ impl ContactForce {
     /// The force of a contact from the numbers of its rows, at a pose of its frame with the axes R.
     fn new(Contact { name, constraint }: &Contact, rows: &[f64], R: Mat3<f64>) -> Self {
         let axes = constraint.axes;
-        let along = match constraint.kind {
-            ConstraintKind::Line => Force::new(axes * Vec3::new(0.0, 0.0, rows[0]), Vec3::zero()),
-            ConstraintKind::Plane => Force::new(axes * Vec3::new(rows[0], 0.0, rows[1]), Vec3::zero()),
-            ConstraintKind::Point => Force::new(Vec3::new(rows[0], rows[1], rows[2]), Vec3::zero()),
-            ConstraintKind::Rigid => {
-                Force::new(Vec3::new(rows[0], rows[1], rows[2]), Vec3::new(rows[3], rows[4], rows[5]))
-            }
+        let along = match *rows {
+            [n] => Force::new(axes * Vec3::new(0.0, 0.0, n), Vec3::zero()),
+            [t, n] => Force::new(axes * Vec3::new(t, 0.0, n), Vec3::zero()),
+            [x, y, z] => Force::new(Vec3::new(x, y, z), Vec3::zero()),
+            [x, y, z, l, m, n] => Force::new(Vec3::new(x, y, z), Vec3::new(l, m, n)),
+            _ => unreachable!("a contact has 1, 2, 3 or 6 rows, found {}", rows.len()),
         };
         let turned = |R: Mat3<f64>| Force::new(R * along.linear, R * along.angular);
         let (force, local) = match constraint.reference {
