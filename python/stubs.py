@@ -80,7 +80,8 @@ ARGUMENTS = {
     "ArrayLike": """
         A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement point
         q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
-        Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints""",
+        Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints
+        _check_pose.pose _controller_from_numbers.numbers""",
     "ArrayLike | None": "Model.append.placement ModelBuilder.append.placement ModelBuilder.merge.placement",
     "Model": "model",
     "Data": "data",
@@ -174,9 +175,10 @@ ARGUMENTS = {
     "_Axes | None": "Task.axes",
     "Gains": "Task.gains",
     "Sequence[bool]": "mask",
-    "Sequence[FrictionContact]": "WholeBodyController.contacts",
+    "Sequence[FrictionContact]": "WholeBodyController.contacts _controller_from_numbers.contacts",
     "Sequence[Task]": "tasks",
-    "Settings": "WholeBodyController.settings",
+    "Settings": "WholeBodyController.settings _controller_from_numbers.settings",
+    "Sequence[tuple[str, int, int]]": "rotations",
     "Plan": "plan",
     "References": "references",
     "Any": "_borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model",
@@ -240,7 +242,9 @@ RESULTS = {
         Simulation.__setstate__
         AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
-        Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track check""",
+        Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
+        _check_pose _check_rotations check""",
+    "WholeBodyController": "_controller_from_numbers",
     "slice": "ConstraintSet.range",
     "list[int]": "Ltdl.order Model.idx_qs Model.idx_vs Model.nqs Model.nvs Model.parents Model.singular_joints",
     "list[str]": "Model.body_names Model.joint_types Model.names Model.warnings",

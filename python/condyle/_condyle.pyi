@@ -100,6 +100,9 @@ __all__ = [
     "_casadi_hold",
     "_casadi_hold_knot",
     "_casadi_release",
+    "_check_pose",
+    "_check_rotations",
+    "_controller_from_numbers",
     "_generate",
     "_lend",
     "_model_from_bytes",
@@ -768,6 +771,8 @@ def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
     stays as it is unless it is `out`.
 
     q: nq numbers.
+
+    Raises `ModelError` for a quaternion or a pair whose length is 0 or not finite.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q = condyle.neutral(quadruped)
@@ -2382,10 +2387,12 @@ class AugmentedLagrangian:
     y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 
     `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
-    ended as "infeasible" or "not_finite"; `shift` moves them on. A solution is "converged" when the residuals of
-    `outcome` are below the tolerances, and "infeasible" if the penalty reached its limit and the limits do not hold.
-    Its cost contains the terms of the limits, that of `outcome` does not; its trace and gains are those of the last
-    inner solve.
+    ended as "not_finite" or with violated limits at the largest penalty; `shift` moves them on. A solution is "converged"
+    when the residuals of `outcome` are below the tolerances. It is "constraints_violated" if the penalty reached its limit
+    and the limits do not hold, which proves nothing: another warm start may find a solution. It is "infeasible" if the
+    initial state itself violates a limit of knot 0 that no control can change. `outcome.worst` names the knot, the limit
+    and the amount. The cost of the solution contains the terms of the limits, that of `outcome` does not; its trace and
+    gains are those of the last inner solve. Controls of a warm start that are outside of their bounds are moved into them.
 
     problem: the problem to solve; all memory is made for its shape, once.
     inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
@@ -2396,6 +2403,8 @@ class AugmentedLagrangian:
         `max_solves`: the number of inner solves at most.
         `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
         factor by which it rises.
+        `restart`: whether a `solve` that is not finite, or violates limits at the largest penalty, begins once more, from the
+        initial state held still at all knots (default: yes). The better result counts.
 
     >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()
@@ -2453,6 +2462,8 @@ class AugmentedLagrangian:
     ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
+        With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+
         callback, verbose, progress: as of `solve`.
 
         Raises `ProblemError` as `solve`, and if there is no solution yet.
@@ -2465,7 +2476,9 @@ class AugmentedLagrangian:
         with it.
 
         `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-        last one is served by a model of the problem, with those that it has for all knots.
+        last one is served by a model of the problem, with those that it has for all knots. The last state follows
+        from the last control, which is repeated. At a second shift without a step of a solve in between the last
+        state is repeated too, as a rollout by repeated controls would diverge.
 
         last: the index of that model.
 
@@ -2670,7 +2683,11 @@ class Fddp:
         `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
         `inverse_dynamics_form`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
         (default: yes): the same steps in less time.
-        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
+        `project_warm_start`: whether controls of a warm start that are outside of their bounds are moved into them, in `solve`
+        and in `resume` (default: yes). Crocoddyl keeps them, so its iterates need False.
+        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit". The first iteration
+        always runs, unless the budget is 0. A later phase runs if the median of its last five durations fits. A solve that
+        takes longer tells by how much in `timings.overrun`.
         `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
         there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
         `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep beside
@@ -2717,6 +2734,8 @@ class Fddp:
     ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
+        With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+
         callback, verbose, progress: as of `solve`.
 
         Raises `ProblemError` as `solve`, and if there is no solution yet.
@@ -2729,7 +2748,9 @@ class Fddp:
         with it.
 
         `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-        last one is served by a model of the problem, with those that it has for all knots.
+        last one is served by a model of the problem, with those that it has for all knots. The last state follows
+        from the last control, which is repeated. At a second shift without a step of a solve in between the last
+        state is repeated too, as a rollout by repeated controls would diverge.
 
         last: the index of that model.
 
@@ -3645,7 +3666,8 @@ class Plan:
     gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None if there are none.
     fade: the time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s).
 
-    Raises `ControllerError` for numbers that are not finite and times that run backwards.
+    Raises `ControllerError` for numbers that are not finite, for times that run backwards, and for states whose quaternions or
+    pairs (cos, sin) do not have length 1.
 
     >>> from condyle.wholebody import Plan
     >>> robot = condyle.robots.quadruped()
@@ -3679,7 +3701,8 @@ class Plan:
 
         t: the time (s); q: nq numbers; v: nv.
 
-        Raises `ValueError` if the plan has no controls.
+        Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose quaternions or pairs
+        (cos, sin) do not have length 1.
         """
 
 @final
@@ -3842,7 +3865,10 @@ class WholeBodyController:
     settings: `Settings`; None for the default ones.
 
     Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
-    without its contact, and for any number outside of its range.
+    without its contact, for any number outside of its range, and for an effort limit that is 0, of the model or the settings.
+
+    A controller can be copied and pickled: the copy continues with the same bits; with the back end 'clarabel', whose solvers are
+    built again, with the same solution up to its tolerance.
 
     >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
     >>> robot = condyle.robots.quadruped()
@@ -3872,6 +3898,8 @@ class WholeBodyController:
         the weight shared by the contacts in equal parts.
 
         q: nq numbers.
+
+        Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
         """
 
     def track(self, plan: Plan, t: float, references: References) -> None:
@@ -3885,7 +3913,8 @@ class WholeBodyController:
 
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
         """The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
-        Other threads run meanwhile.
+        A number that is not finite is the status 'not_finite'; a quaternion, a pair (cos, sin) or a reference's rotation that is none
+        is 'invalid_state', with the joint or the frame in the reason. Other threads run meanwhile.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.
@@ -3899,3 +3928,14 @@ class WholeBodyController:
         q: nq numbers; v: nv.
         references: `References` of this controller.
         """
+
+def _check_pose(name: str, pose: ArrayLike) -> None:
+    """Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is one."""
+
+def _check_rotations(name: str, q: ArrayLike, rotations: Sequence[tuple[str, int, int]]) -> None:
+    """Raises `ValueError` unless all rotations of a position have length 1; each is given by its joint and its range."""
+
+def _controller_from_numbers(
+    model: Model, contacts: Sequence[FrictionContact], tasks: Sequence[Task], settings: Settings, numbers: ArrayLike
+) -> WholeBodyController:
+    """The controller that a pickle holds. The model, which is one of its parts, checks the version."""

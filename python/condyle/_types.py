@@ -438,6 +438,9 @@ class Timings(NamedTuple):
     """Trial rollouts of the line searches, accepted or not."""
     total: float
     """The whole solve."""
+    overrun: float = 0.0
+    """The time beyond `time_budget`: above zero where the budget is shorter than an iteration, or something delayed the
+    solve. A budget of 0 asks for no iteration, and is never overrun."""
 
 
 class Evaluation(NamedTuple):
@@ -480,10 +483,15 @@ class _Solution(NamedTuple):
         "time_limit",
         "interrupted",
         "regularisation_limit",
+        "constraints_violated",
         "infeasible",
         "not_finite",
     ]
-    """The end of the solve in a word."""
+    """The end of the solve in a word.
+
+    "constraints_violated": the penalty reached its limit and limits do not hold; no proof that no solution exists.
+    "infeasible": a proof, in `outcome.worst`: the initial state violates a limit of knot 0 that no control can change.
+    """
     trace: list[Iteration]
     """A record per iteration."""
     timings: Timings
@@ -562,6 +570,23 @@ class SweepResult(NamedTuple):
     """Their Hessians, (N + 1, ndx, ndx)."""
 
 
+class Violation(NamedTuple):
+    """A row of a limit, or of the dynamics, that does not hold at the end of a solve."""
+
+    kind: Literal["constraint", "gap"]
+    """A limit or constraint of a knot, or a gap of the dynamics."""
+    knot: int
+    """The knot, 0 … N."""
+    row: int
+    """The index in `multipliers[knot]`, or of a gap the entry of the tangent vector."""
+    name: str | None
+    """The name of the limit, None for a constraint of a `ConstrainedAction` and for a gap."""
+    entry: int
+    """The row within the limit of that name, else `row`."""
+    amount: float
+    """The distance from the bound, or of a gap its size; infinite if it is not a number."""
+
+
 class Outcome(NamedTuple):
     """The state of the limits after a solve of `AugmentedLagrangian`, beside its `Solution`."""
 
@@ -579,6 +604,8 @@ class Outcome(NamedTuple):
     """The number of inner solves."""
     iterations: int
     """The number of iterations of all of them."""
+    worst: Violation | None = None
+    """The largest violation; None if all limits hold exactly."""
 
 
 class Control(NamedTuple):

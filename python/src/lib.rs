@@ -139,7 +139,9 @@ mod _condyle {
         nonLinearEffects, updateFramePlacements,
     };
     #[pymodule_export]
-    use wholebody::{FrictionContact, Plan, Task, WholeBodyController};
+    use wholebody::{
+        FrictionContact, Plan, Task, WholeBodyController, check_pose, check_rotations, controller_from_numbers,
+    };
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

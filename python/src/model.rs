@@ -723,7 +723,10 @@ impl Model {
 }
 
 /// Named positions as Python sees them.
-fn positions(py: Python<'_>, read: Result<Vec<(String, Vec<f64>)>, condyle::Error>) -> PyResult<Bound<'_, PyDict>> {
+fn positions(
+    py: Python<'_>,
+    read: Result<Vec<(String, Vec<f64>)>, condyle::ModelError>,
+) -> PyResult<Bound<'_, PyDict>> {
     let positions = PyDict::new(py);
     for (name, q) in read.map_err(exception)? {
         positions.set_item(name, q.give(py, None)?)?;

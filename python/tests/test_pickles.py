@@ -19,7 +19,7 @@ PROBLEM = Problem(np.zeros(14), [STEP], [0] * 3, FreeDynamics(ARM, None, []))
 
 # Computations under way: factors, a robot that is being built.
 UNDER_WAY = {
-    "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Sweep", "WholeBodyController",
+    "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Sweep",
 }  # fmt: skip
 
 

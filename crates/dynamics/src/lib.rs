@@ -50,9 +50,9 @@ pub use batch::derivatives::{
     BatchAbaDerivatives, BatchAbaHessian, BatchCentroidalDerivatives, BatchCoriolisDerivatives, BatchEnergyDerivatives,
     BatchRneaDerivatives, BatchRneaHessian,
 };
-pub use batch::group::StateMatrix;
 pub use batch::kinematics::BatchAccelerationDerivatives;
 pub use batch::results::{Matrices, Poses};
+pub use batch::state_matrix::StateMatrix;
 pub use batch::{Batch, BatchNumber, BatchWriter};
 pub use calls::centroidal::{centroidal_map, centroidal_map_rate, compute_all_terms};
 pub use calls::constrained_dynamics::{
@@ -92,7 +92,9 @@ pub use condyle_model::{
 #[cfg(feature = "loaders")]
 pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};
 #[doc(hidden)]
-pub use condyle_model::{difference_jacobian_groups, integrate_jacobian_groups};
+pub use condyle_model::{
+    PositionFault, ROTATION_ROUNDING, difference_jacobian_groups, integrate_jacobian_groups, unit_fault,
+};
 pub use condyle_spatial::{
     Act, Constant, Cross, Dense, DenseMatrix, Force, Inertia, Mat3, Matrix, Motion, Quaternion, Scalar, Se3, Sym3,
     Vec3, level, lie,

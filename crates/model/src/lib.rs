@@ -86,4 +86,4 @@ pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};
 pub use joint::{Joint, Mimic};
 pub use model::Model;
 #[doc(hidden)]
-pub use position::{PositionFault, ROTATION_ROUNDING};
+pub use position::{PositionFault, ROTATION_ROUNDING, unit_fault};

@@ -128,6 +128,32 @@ impl Model {
         self.position_parts().find_map(|(body, _, unit)| unit_fault(body, unit?, q))
     }
 
+    /// Checks that [`normalize`](crate::normalize) can bring all rotations of a position to length 1: none has length 0 or one that
+    /// is not finite, up to the range of numbers.
+    ///
+    /// # Errors
+    /// [`Error::Position`].
+    #[doc(hidden)]
+    pub fn check_normalizable(&self, q: &[f64]) -> Result<(), Error> {
+        for (body, _, unit) in self.position_parts() {
+            let Some(unit) = unit else { continue };
+            let (first, end) = (unit.start, unit.end);
+            let squares = q[unit].iter().map(|x| x * x).sum::<f64>();
+            if !squares.is_normal() {
+                let length = Scalar::sqrt(squares);
+                let what = format!("its rotation, q[{first}..{end}], has the length {length} and cannot be normalized");
+                return Err(Error::Position { joint: self.joint_of(body), what });
+            }
+        }
+        Ok(())
+    }
+
+    /// Each rotation of a position that must have length 1: the joint's name, and the range in q.
+    #[doc(hidden)]
+    pub fn rotations(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
+        self.position_parts().filter_map(|(body, _, unit)| Some((self.bodies[body].joint_name.as_str(), unit?)))
+    }
+
     /// The name of the joint that moves a body.
     fn joint_of(&self, body: usize) -> String {
         self.bodies[body].joint_name.clone()
@@ -143,8 +169,9 @@ impl Model {
     }
 }
 
-/// The fault of a rotation, if it does not have length 1.
-fn unit_fault(body: usize, unit: Range<usize>, q: &[f64]) -> Option<PositionFault> {
+/// The fault of a rotation in a range of q, if it does not have length 1.
+#[doc(hidden)]
+pub fn unit_fault(body: usize, unit: Range<usize>, q: &[f64]) -> Option<PositionFault> {
     let value = Scalar::sqrt(q[unit.clone()].iter().map(|x| x * x).sum::<f64>());
     // a NaN is a fault too
     let valid = (value - 1.0).abs() <= UNIT_ROUNDING;

@@ -312,6 +312,7 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     ///
     /// # Panics
     /// As [`step`](Self::step).
+    #[track_caller]
     pub fn run(&mut self, steps: usize, mut control: impl FnMut(&mut Control<S>)) -> Status {
         let (mut tau, mut f_ext) = (core::mem::take(&mut self.tau), core::mem::take(&mut self.f_ext));
         let mut status = Status::Done;

@@ -32,6 +32,7 @@ mod mimic;
 mod mjcf;
 mod model_files;
 mod motion_derivatives;
+mod panics;
 mod passive;
 mod points;
 mod regressor;
