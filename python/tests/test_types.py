@@ -92,10 +92,10 @@ def conforms(value: Any, kind: Any) -> bool:
     origin, parts = typing.get_origin(kind), typing.get_args(kind)
     if kind is Any or kind is None:
         return kind is Any or value is None
-    if origin in (typing.Union, types.UnionType):
-        return any(conforms(value, part) for part in parts)
     if kind == ArrayLike:
         return isinstance(value, np.ndarray)
+    if origin in (typing.Union, types.UnionType):
+        return any(conforms(value, part) for part in parts)
     if origin is Sequence:
         return isinstance(value, list) and all(conforms(item, parts[0]) for item in value)
     if origin is typing.Literal:
