@@ -374,7 +374,7 @@ pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
             o.numbers.extend_from_slice(&o.q);
         }),
         ("transport", |m, _, i, o| {
-            o.square.column_iter_mut().for_each(|mut column| column.copy_from_slice(&i.x));
+            o.square.column_iter_mut().for_each(|mut to| to.iter_mut().zip(&i.x).for_each(|(to, &x)| *to = x));
             transport(m, &i.v, &mut o.square);
             o.numbers.extend_from_slice(o.square.as_slice());
         }),

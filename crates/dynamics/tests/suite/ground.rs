@@ -5,7 +5,7 @@ use crate::counting::allocations;
 use condyle_dynamics::simulation::{Control, Ground, GroundContact, Integrator, Settings, Simulation, Status};
 use condyle_dynamics::{
     Act, Data, FrameParent, Inertia, Joint, Model, ModelBuilder, Quaternion, Se3, Sym3, Vec3, WORLD, crba,
-    forward_kinematics, forward_velocities, gravity, lie, neutral, robots,
+    forward_kinematics, forward_velocities, gravity, lie, minv, neutral, robots,
 };
 
 const G: f64 = 9.81;
@@ -266,10 +266,15 @@ fn placed(model: &Model, q: &[f64]) -> Se3<f64> {
     forward_kinematics(model, &mut Data::new(model), q).body(1)
 }
 
-/// Holds a posture: as stiff as the inertia of each joint lets an explicit integrator be, plus the weight of the limbs.
-fn posture(model: &Model, q0: &[f64]) -> impl FnMut(&mut Control<'_, f64>) {
+/// Holds a posture: as stiff as the inertia of each joint lets an explicit integrator be, plus the weight of the limbs. What a
+/// joint feels is M_kk where it carries a light limb, and 1/(M⁻¹)_kk where both of its sides are heavy.
+fn posture(model: &Model, q0: &[f64], heavy: bool) -> impl FnMut(&mut Control<'_, f64>) + use<> {
     let (mut data, q0) = (Data::new(model), q0.to_vec());
-    let inertia: Vec<f64> = crba(model, &mut data, &q0).diagonal().iter().copied().collect();
+    let inertia: Vec<f64> = if heavy {
+        minv(model, &mut data, &q0).diagonal().iter().map(|x| 1.0 / x).collect()
+    } else {
+        crba(model, &mut data, &q0).diagonal().iter().copied().collect()
+    };
     let weight = gravity(model, &mut data, &q0).to_vec();
     move |now| {
         for k in 6..now.tau.len() {
@@ -299,7 +304,7 @@ fn quadruped() -> (Model, Vec<f64>, Ground) {
 fn robots_stand() {
     let (model, q, ground) = quadruped();
     let mut simulation = on(&model, ground, &q, &[0.0; 18]);
-    let mut hold = posture(&model, &q);
+    let mut hold = posture(&model, &q, false);
     assert_eq!(simulation.run(3000, &mut hold), Status::Done);
     let (weight, there) = (model.total_mass() * G, simulation.q().to_vec());
     assert!((push(&simulation).z / weight - 1.0).abs() < 1e-6, "{:?}", push(&simulation));
@@ -327,7 +332,7 @@ fn robots_stand() {
     let ground = frames.into_iter().fold(Ground::default(), |ground, frame| ground.with_sole(frame, &sole));
     q[2] -= forward_kinematics(&humanoid, &mut Data::new(&humanoid), &q).frame(frames[0]).translation.z;
     let mut simulation = on(&humanoid, ground, &q, &vec![0.0; humanoid.nv()]);
-    let mut hold = posture(&humanoid, &q);
+    let mut hold = posture(&humanoid, &q, true);
     for _ in 0..1000 {
         assert_eq!(simulation.run(1, &mut hold), Status::Done);
     }
@@ -354,7 +359,7 @@ fn depth_does_not_become_speed() {
 fn contacts_are_part_of_the_state() {
     let (model, q, ground) = quadruped();
     let mut simulation = on(&model, ground.clone(), &q, &[0.1; 18]);
-    let mut hold = posture(&model, &q);
+    let mut hold = posture(&model, &q, false);
     assert!(simulation.run(200, &mut hold).is_done());
     let state = simulation.state();
     assert_eq!(state.impulses.len(), 12);
@@ -378,7 +383,7 @@ fn steps_do_not_allocate() {
     let (model, mut q, ground) = quadruped();
     q[2] += 0.02;
     let mut simulation = on(&model, ground, &q, &[0.0; 18]);
-    let mut hold = posture(&model, &q);
+    let mut hold = posture(&model, &q, false);
     for _ in 0..200 {
         let count = allocations(|| assert!(simulation.run(1, &mut hold).is_done()));
         assert_eq!(count, 0);
