@@ -20,6 +20,9 @@ const HERE: &str = "tests/suite/panics.rs";
 /// The functions without an argument that could have a wrong length.
 const WITHOUT_LENGTHS: &[&str] = &["log-Cholesky parameters"];
 
+/// The arguments that rows of the table copy to a matrix of nalgebra's, which panics itself.
+const COPIED: &[(&str, &str)] = &[("transport", "x")];
+
 /// Every function of the table with each argument too short by one number.
 fn wrong_lengths<S: Scalar>() {
     for model in [robots::arm7(), robots::quadruped()] {
@@ -27,6 +30,9 @@ fn wrong_lengths<S: Scalar>() {
         for (name, function) in functions::<S>() {
             let mut panics = 0;
             for argument in ["q", "q1", "v", "x", "f_ext"] {
+                if COPIED.contains(&(name, argument)) {
+                    continue;
+                }
                 let mut input = right.clone();
                 match argument {
                     "q" => drop(input.q.pop()),
