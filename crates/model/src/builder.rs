@@ -27,6 +27,7 @@ const MAX_DEGREES: usize = 4096;
 /// The most coordinates that a model may have whose joints follow others: its inertia matrix is factored as a dense one.
 const MAX_SHARED: usize = 1024;
 
+#[derive(Clone, Debug)]
 struct Draft {
     body: Body,
     options: JointOptions,
@@ -51,6 +52,7 @@ struct Draft {
 /// assert_eq!(model.nv(), 2);
 /// # Ok::<(), condyle_model::Error>(())
 /// ```
+#[derive(Clone, Debug)]
 pub struct ModelBuilder {
     name: String,
     drafts: Vec<Draft>,

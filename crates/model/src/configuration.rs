@@ -6,6 +6,7 @@ use crate::tree::Space;
 use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_spatial::Scalar;
+use condyle_spatial::simd::Kernel;
 use nalgebra::DMatrix;
 
 /// The greatest distance from zero (rad, m) of a random position in a coordinate that has no limits.
@@ -73,8 +74,24 @@ pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
     check("out", out.len(), model.nq());
-    for space in &model.tree.spaces {
-        space.joint.integrate(&q[space.q.clone()], &v[space.v.clone()], &mut out[space.q.clone()]);
+    S::enter(Integrate { model, q, v, out });
+}
+
+/// q ⊕ v, compiled for the level of its scalar.
+struct Integrate<'a, S, R> {
+    model: &'a Model<R>,
+    q: &'a [S],
+    v: &'a [S],
+    out: &'a mut [S],
+}
+
+impl<S: Scalar, R> Kernel for Integrate<'_, S, R> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { model, q, v, out } = self;
+        for space in &model.tree.spaces {
+            space.joint.integrate(&q[space.q.clone()], &v[space.v.clone()], &mut out[space.q.clone()]);
+        }
     }
 }
 
@@ -132,7 +149,8 @@ pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mu
     sum.sqrt()
 }
 
-/// Brings quaternions and (cos, sin) pairs in q back to length 1, in place.
+/// Brings quaternions and (cos, sin) pairs in q back to length 1, in place. The result of one of length 0, or with a number that
+/// is not finite, is not finite.
 ///
 /// q: nq numbers. Allocates nothing.
 ///
