@@ -55,7 +55,8 @@ Second derivatives: `rnea_hessian` (`RneaHessian`), `aba_hessian` (`AbaHessian`)
 Derivatives of one's own functions: `gradient`, `jacobian`, `hessian`, `HyperDual`
 Bodies and frames: `forward_kinematics`, `frame_placement`, `frame_jacobian`, `frame_velocity`, `frame_acceleration`,
     `frame_classical_acceleration`, `frame_jacobian_rate`, `body_jacobian`, `body_velocity`, `body_acceleration`,
-    `body_classical_acceleration`, `body_jacobian_rate`; by q, v and a: `frame_velocity_derivative`,
+    `body_classical_acceleration`, `body_jacobian_rate`; of points: `frame_point_jacobian`, `frame_point_velocity`,
+    `body_point_jacobian`, `body_point_velocity`; by q, v and a: `frame_velocity_derivative`,
     `frame_acceleration_derivatives`, `frame_classical_acceleration_derivatives`, `body_velocity_derivative`,
     `body_acceleration_derivatives`
 Positions: `neutral`, `random_configuration`, `integrate`, `difference`, `interpolate`, `distance`, `normalize`,

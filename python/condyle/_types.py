@@ -657,7 +657,7 @@ class GroundContacts(NamedTuple):
     """The points in the world at the beginning of the step (m), (n, 3)."""
     force: _Array
     """The forces on the robot along the axes of the world, mean values over the step (N), (n, 3)."""
-    touches: NDArray[np.bool]
+    touches: NDArray[np.bool_]
     """Whether the ground pushed a point, (n,)."""
 
 

@@ -15,6 +15,7 @@ True
 A `Ground` lets a robot stand, slide, land and lift off:
 
 >>> quadruped = condyle.robots.quadruped()
+>>> from condyle.simulation import Ground
 >>> ground = Ground(["LF_foot", "RF_foot", "LH_foot", "RH_foot"], friction=0.8)
 >>> simulation = Simulation(quadruped, ground=ground)
 >>> q = condyle.neutral(quadruped)

@@ -159,7 +159,7 @@ def test_a_robot_lands_and_stands(quadruped: Robot) -> None:
     assert simulation.run(2000, stiff) == "done"
     contacts = simulation.contacts
     assert contacts.touches.all()
-    assert contacts.touches.dtype == np.bool
+    assert contacts.touches.dtype == np.bool_
     assert contacts.position.shape == contacts.force.shape == (4, 3)
     assert abs(contacts.position[:, 2]).max() < 1e-6
     np.testing.assert_allclose(contacts.force[:, 2].sum(), 9.81 * model.total_mass, rtol=1e-3)

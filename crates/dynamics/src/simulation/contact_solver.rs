@@ -1,51 +1,58 @@
-//! Unilateral contacts with Coulomb friction at the level of velocities: the impulses λ of m points for which
+//! Impulses λ of m unilateral contacts with Coulomb friction, at the level of velocities:
 //!
 //! ```text
 //! u = G λ + b        0 ≤ λ_n ⊥ u_n ≥ 0        ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t/‖u_t‖ where u_t ≠ 0
 //! ```
 //!
-//! G is the Delassus matrix J M⁻¹ Jᵀ and b the velocity of the points without contact, plus what the gaps add to its normal
-//! part. Three rows a point: two along the ground, then the normal one. This is Coulomb's law with its disc, neither a pyramid
-//! nor a convex relaxation. λ solves it where it is the fixed point of
+//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity of the points without contact, plus the terms of the gaps in its
+//! normal rows. Each point has three rows: two along the ground, then the normal one. The friction cone is Coulomb's disc,
+//! neither a pyramid nor a convex relaxation. λ is a solution if and only if it is a fixed point of
 //!
 //! ```text
 //! λ_n ← max(0, λ_n − u_n/g_n)        λ_t ← P(λ_t − u_t/g_t),  P the projection on the disc of radius μ λ_n
 //! ```
 //!
-//! for any g_n, g_t > 0 (Alart and Curnier 1991). The distance from it, times g, is the residual: a velocity. Two methods take
-//! turns. Newton's method on the fixed point squares the error once it knows which points stick, slide and are open; a step
-//! that does not make the residual smaller is not taken. Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998)
-//! find that out from anywhere. Where contacts are redundant G is singular, and the impulses are not unique: Newton's method
-//! adds ε to the diagonal of G for the step alone, so it takes the step that changes the impulses least, and its fixed point
-//! stays that of G (the proximal point algorithm, Rockafellar 1976). The first guess is the last instant's impulses, so that
-//! forces at rest do not wander.
+//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the distance from the fixed point times g, a velocity. Two
+//! methods take turns:
+//!
+//! - Newton's method on the fixed point. It squares the error once it knows which points stick, slide and are open. A few
+//!   steps are discarded if they do not reduce the residual.
+//! - Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998). They find these sets from any first guess.
+//!
+//! Where contacts are redundant, G is singular and the impulses are not unique. Newton's method then adds ε to the diagonal
+//! of G in its slope, not in u. So it takes the step that changes the impulses least, and the fixed point stays the same (the
+//! proximal point algorithm, Rockafellar 1976). The first guess is the impulses of the last step, so that forces at rest stay
+//! as they are.
 
 use alloc::vec::Vec;
 use condyle_spatial::Scalar;
 
-/// Least and greatest share of the largest entry on the diagonal of G that Newton's step adds to it. The least is small beside
-/// what contacts feel of each other, and large beside rounding.
+/// Least and greatest ε, as a share of the largest entry on the diagonal of G. The least is small compared with the coupling of
+/// contacts, and large compared with rounding.
 const PROXIMAL: [f64; 2] = [1e-8, 1.0];
-/// Factor by which that share grows where a step is not taken, and shrinks where it is.
+/// Least g, as a share of the same entry: the joints may hold a point in some directions, and its rows of G are then 0.
+const LEAST: f64 = 1e-12;
+/// Factor by which ε grows after discarded steps, and shrinks after accepted ones.
 const DAMPING: f64 = 30.0;
-/// Number of projections for a point that slides, in a sweep.
-const ALONE: usize = 4;
-/// Number of sweeps after a step of Newton's method that is not taken. A step costs about as much (24 rows).
-const SWEEPS: usize = 12;
-/// Number of steps of Newton's method in which the residual must have become smaller.
+/// Number of steps of Newton's method within which the residual must shrink; chosen because the sets of points settle in two or
+/// three steps, during which the residual may grow (random contacts: 4 fails four times less often than 1).
 const BURST: usize = 4;
-/// Largest share of the residual that they may leave.
+/// Largest share of the residual that accepted steps may leave.
 const PROGRESS: f64 = 0.7;
-
-/// Share of the tolerance below which the first guess stays as it is. Above it, it is improved though it would do: at rest, an
-/// error that one step leaves to the next makes the forces ripple.
+/// Number of sweeps after discarded steps; they cost about as much as one step with 8 points.
+const SWEEPS: usize = 12;
+/// Number of projections per sweep for a point that slides.
+const ALONE: usize = 4;
+/// Share of the tolerance below which the first guess is kept. A worse guess is improved even if it meets the tolerance:
+/// otherwise the error of one step makes the forces of the next one ripple.
 const POLISHED: f64 = 1e-4;
 
 /// Outcome of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
+    /// The residual is within the tolerance.
     Solved,
-    /// The residual (m/s) after the largest number of iterations.
+    /// Residual (m/s) after the maximum number of iterations.
     NotSolved(f64),
 }
 
@@ -84,12 +91,12 @@ impl ContactSolver {
         }
     }
 
-    /// λ of the first `points` points, with friction μ, to a residual of `tolerance` (m/s). One iteration is a step of
-    /// Newton's method, with the sweeps that follow it if it is not taken. λ is inside its cones in any case.
+    /// Solves for λ of the first `points` points, with friction μ, to a residual of `tolerance` (m/s). One iteration is a burst
+    /// of Newton's method, and the sweeps if its steps are discarded. λ is inside its cones in any case.
     pub(super) fn solve(&mut self, points: usize, friction: f64, tolerance: f64, max_iterations: usize) -> Outcome {
         let n = 3 * points;
         let Self { G, b, impulses, velocities, candidate, candidate_velocities, slope, step } = self;
-        let problem = Problem { G: &G[..n * n], b: &b[..n], n, friction };
+        let problem = Problem::new(&G[..n * n], &b[..n], friction);
         let (x, u, y, w) =
             (&mut impulses[..n], &mut velocities[..n], &mut candidate[..n], &mut candidate_velocities[..n]);
         problem.project(x);
@@ -100,9 +107,10 @@ impl ContactSolver {
             if residual <= tolerance && polished {
                 break;
             }
-            polished = residual <= tolerance; // it then makes one step more, which squares the error
-            (y.copy_from_slice(x), w.copy_from_slice(u));
-            let shorter = (0..BURST).any(|_| {
+            polished = residual <= tolerance; // one more step then squares the error
+            y.copy_from_slice(x);
+            w.copy_from_slice(u);
+            let smaller = (0..BURST).any(|_| {
                 problem.newton(proximal, y, w, &mut slope[..n * n], &mut step[..n]);
                 y.iter_mut().zip(&step[..n]).for_each(|(y, d)| *y += d);
                 problem.project(y);
@@ -114,8 +122,9 @@ impl ContactSolver {
                 }
                 better
             });
-            if shorter {
-                (x.copy_from_slice(y), u.copy_from_slice(w));
+            if smaller {
+                x.copy_from_slice(y);
+                u.copy_from_slice(w);
                 proximal = (proximal / DAMPING).max(PROXIMAL[0]);
                 continue;
             }
@@ -139,16 +148,25 @@ struct Problem<'a> {
     b: &'a [f64],
     n: usize,
     friction: f64,
+    /// The largest entry on the diagonal of G, or 1 if nothing can move.
+    scale: f64,
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    fn new(G: &'a [f64], b: &'a [f64], friction: f64) -> Self {
+        let n = b.len();
+        let largest = (0..n).fold(0.0, |largest: f64, i| largest.max(G[i * n + i]));
+        Self { G, b, n, friction, scale: if largest > 0.0 { largest } else { 1.0 } }
+    }
+
     fn entry(&self, i: usize, j: usize) -> f64 {
         self.G[j * self.n + i]
     }
 
     /// g_t and g_n of the point whose rows begin at r: bounds of the eigenvalues of its blocks.
     fn stiffness(&self, r: usize) -> (f64, f64) {
-        (self.entry(r, r) + self.entry(r + 1, r + 1), self.entry(r + 2, r + 2))
+        let least = LEAST * self.scale;
+        ((self.entry(r, r) + self.entry(r + 1, r + 1)).max(least), self.entry(r + 2, r + 2).max(least))
     }
 
     /// Row i of G λ + b.
@@ -189,7 +207,8 @@ impl Problem<'_> {
     /// slides is brought nearer to it.
     fn sweep(&self, x: &mut [f64]) {
         for r in (0..self.n).step_by(3) {
-            let block = [0, 1, 2].map(|i| [0, 1, 2].map(|j| self.entry(r + i, r + j)));
+            let mut block = [0, 1, 2].map(|i| [0, 1, 2].map(|j| self.entry(r + i, r + j)));
+            (0..3).for_each(|i| block[i][i] += LEAST * self.scale);
             let own = [x[r], x[r + 1], x[r + 2]];
             let w = [0, 1, 2].map(|i| self.velocity(r + i, x) - dot(block[i], own)); // u without its own impulse
             x[r..r + 3].copy_from_slice(&self.alone(block, w, own, self.stiffness(r)));
@@ -223,7 +242,7 @@ impl Problem<'_> {
     ///   dF_t = dλ_t − μ e dλ_n − μ λ_n/‖z‖ (1 − e eᵀ)(dλ_t − du_t/g_t).
     fn newton(&self, proximal: f64, x: &[f64], u: &[f64], A: &mut [f64], d: &mut [f64]) {
         let n = self.n;
-        let epsilon = proximal * (0..n).fold(0.0, |largest: f64, i| largest.max(self.entry(i, i)));
+        let epsilon = proximal * self.scale;
         let G = |i: usize, j: usize| self.entry(i, j) + if i == j { epsilon } else { 0.0 };
         for r in (0..n).step_by(3) {
             let (g_t, g_n) = self.stiffness(r);

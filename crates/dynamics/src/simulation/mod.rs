@@ -285,7 +285,7 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         let status = match integrator {
             Integrator::SemiImplicitEuler => {
                 euler::velocity(model, data, &mut self.euler, input, state, v);
-                let status = on_ground(self.ground.as_deref_mut(), model, data, dt, (&self.q, &self.v), v);
+                let status = on_ground(self.ground.as_deref_mut(), (model, data), dt, (&self.q, &self.v), v);
                 let correction = self.ground.as_ref().map_or(&[][..], |ground| &ground.correction);
                 euler::position(model, &mut self.euler, input.h, (state.0, v, correction), q);
                 status
@@ -330,24 +330,22 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     }
 }
 
-/// Numbers that are doubles, as such.
-fn doubles<S: Scalar>(x: &Vec<S>) -> Option<&[f64]> {
-    (x as &dyn Any).downcast_ref::<Vec<f64>>().map(Vec::as_slice)
+/// The numbers of a vector of doubles.
+fn doubles(x: &dyn Any) -> Option<&[f64]> {
+    x.downcast_ref::<Vec<f64>>().map(Vec::as_slice)
 }
 
-/// The velocity after a step becomes the one with contacts. Only simulations of `f64` have a ground.
-fn on_ground<S: Scalar, R: 'static>(
+/// Turns the velocity after a step without contacts into the velocity with them. Only simulations of `f64` have a ground.
+fn on_ground(
     ground: Option<&mut contacts::Contacts>,
-    model: &Model<R>,
-    data: &mut Data<S>,
+    (model, data): (&dyn Any, &mut dyn Any),
     h: f64,
-    (q, v): (&Vec<S>, &Vec<S>),
-    v_next: &mut Vec<S>,
+    (q, v): (&dyn Any, &dyn Any),
+    v_next: &mut dyn Any,
 ) -> Status {
     let Some(ground) = ground else { return Status::Done };
-    let model = (model as &dyn Any).downcast_ref::<Model>();
-    let (data, v_next) = (data as &mut dyn Any, v_next as &mut dyn Any);
-    match (model, data.downcast_mut::<Data<f64>>(), doubles(q), doubles(v), v_next.downcast_mut::<Vec<f64>>()) {
+    let (model, data, v_next) = (model.downcast_ref(), data.downcast_mut(), v_next.downcast_mut::<Vec<f64>>());
+    match (model, data, doubles(q), doubles(v), v_next) {
         (Some(model), Some(data), Some(q), Some(v), Some(v_next)) => ground.advance(model, data, h, (q, v), v_next),
         _ => unreachable!("`set_ground` is a function of simulations of f64"),
     }

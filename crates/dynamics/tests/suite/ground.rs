@@ -171,6 +171,40 @@ fn falls_lands_and_lifts_off() {
     }
 }
 
+/// A point that its joints hold in some directions lands and stands like a free one: on a vertical rail, and on a pendulum.
+#[test]
+fn joints_may_hold_directions() {
+    let z = Vec3::new(0.0, 0.0, 1.0);
+    let weight = Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.01));
+    let mut builder = ModelBuilder::new("lift");
+    let cage = builder.body("cage", WORLD, Joint::Prismatic { axis: z }, Se3::identity(), weight);
+    builder.frame("floor", cage, Se3::identity());
+    let lift = builder.build().unwrap();
+    let mut simulation = on(&lift, Ground::at_frames([0]), &[0.3], &[0.0]);
+    assert!(simulation.run(1000, passive).is_done());
+    assert!(simulation.q()[0].abs() < 1e-7 && simulation.v()[0].abs() < 1e-9);
+    assert!((push(&simulation) - z * (MASS * G)).norm() < 1e-6);
+
+    let mut builder = ModelBuilder::new("pendulum");
+    let hinge = Se3 { translation: z, ..Se3::identity() };
+    let rod = builder.body("rod", WORLD, Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) }, hinge, weight);
+    builder.frame("tip", rod, Se3 { translation: Vec3::new(2.0, 0.0, 0.0), ..Se3::identity() });
+    let pendulum = builder.build().unwrap();
+    let mut heavy = on(&pendulum, Ground { friction: 0.3, ..Ground::at_frames([0]) }, &[0.0], &[0.0]);
+    assert!(heavy.run(500, |now| now.tau[0] = 3.0).is_done()); // turns down, until the tip touches at 30°
+    assert!((heavy.q()[0] - f64::asin(0.5)).abs() < 1e-6 && heavy.v()[0].abs() < 1e-9);
+    assert!(heavy.contacts()[0].touches);
+    // a rail along the ground: the point can only slide, and nothing pushes it
+    let mut builder = ModelBuilder::new("cart");
+    let cart =
+        builder.body("cart", WORLD, Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) }, Se3::identity(), weight);
+    builder.frame("wheel", cart, Se3::identity());
+    let cart = builder.build().unwrap();
+    let mut simulation = on(&cart, Ground::at_frames([0]), &[0.0], &[1.0]);
+    assert!(simulation.run(100, passive).is_done());
+    assert_eq!(simulation.v()[0], 1.0);
+}
+
 /// A ball rebounds to e² of its height, and comes to rest instead of shaking.
 #[test]
 fn restitution_rebounds() {
@@ -286,6 +320,20 @@ fn robots_stand() {
     assert_eq!(simulation.run(2000, passive), Status::Done);
     assert!(relative(simulation.q(), &q) < 1e-6, "{:?} {q:?}", simulation.q());
     assert!((push(&simulation).z / (statue.total_mass() * G) - 1.0).abs() < 1e-6);
+
+    // with all its joints, held by their laws
+    let mut q = neutral(&humanoid);
+    let frames = soles.map(|frame| humanoid.frame(&statue.frames()[frame].name).unwrap());
+    let ground = frames.into_iter().fold(Ground::default(), |ground, frame| ground.with_sole(frame, &sole));
+    q[2] -= forward_kinematics(&humanoid, &mut Data::new(&humanoid), &q).frame(frames[0]).translation.z;
+    let mut simulation = on(&humanoid, ground, &q, &vec![0.0; humanoid.nv()]);
+    let mut hold = posture(&humanoid, &q);
+    for _ in 0..1000 {
+        assert_eq!(simulation.run(1, &mut hold), Status::Done);
+    }
+    let (z, lifted) = (simulation.q()[2], push(&simulation).z / (humanoid.total_mass() * G));
+    println!("humanoid: sinks {:.1e} m, lifted {lifted}", q[2] - z);
+    assert!((lifted - 1.0).abs() < 0.05 && (q[2] - z).abs() < 0.05);
 }
 
 /// What is below the ground at the start is taken out gently: depth does not become speed.

@@ -8,7 +8,8 @@ use crate::scalar::Scalar;
 use core::iter::Sum;
 use core::ops::{Div, DivAssign, Index, IndexMut, Mul, MulAssign};
 
-/// Product with a scalar on either side, and quotient by one, for a struct that has `scale`.
+/// Product with a scalar and quotient by one, for a struct that has `scale`. A number on the left is an `f64`, so that literals
+/// need no type.
 macro_rules! impl_scalar_product {
     ($type:ident) => {
         impl<S: Scalar> Mul<S> for $type<S> {
@@ -44,14 +45,6 @@ macro_rules! impl_scalar_product {
             /// Each component times the number.
             #[inline(always)]
             fn mul(self, x: $type<f64>) -> $type<f64> {
-                x.scale(self)
-            }
-        }
-        impl Mul<$type<f32>> for f32 {
-            type Output = $type<f32>;
-            /// Each component times the number.
-            #[inline(always)]
-            fn mul(self, x: $type<f32>) -> $type<f32> {
                 x.scale(self)
             }
         }
