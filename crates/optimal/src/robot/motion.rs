@@ -2,8 +2,9 @@
 
 use super::contact::Contact;
 use super::dynamics::knots::knot_of;
+use super::residuals::residual::held;
 use crate::{Problem, Solution};
-use condyle_dynamics::{ConstraintKind, Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
+use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, forward_kinematics};
 
 /// The accelerations, efforts and forces at a knot, at its beginning.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -50,15 +51,11 @@ impl KnotMotion {
 impl ContactForce {
     /// The force of a contact from the numbers of its rows, at a pose of its frame with the axes R.
     fn new(Contact { name, constraint }: &Contact, rows: &[f64], R: Mat3<f64>) -> Self {
-        let axes = constraint.axes;
-        let along = match constraint.kind {
-            ConstraintKind::Line => Force::new(axes * Vec3::new(0.0, 0.0, rows[0]), Vec3::zero()),
-            ConstraintKind::Plane => Force::new(axes * Vec3::new(rows[0], 0.0, rows[1]), Vec3::zero()),
-            ConstraintKind::Point => Force::new(Vec3::new(rows[0], rows[1], rows[2]), Vec3::zero()),
-            ConstraintKind::Rigid => {
-                Force::new(Vec3::new(rows[0], rows[1], rows[2]), Vec3::new(rows[3], rows[4], rows[5]))
-            }
-        };
+        let mut wrench = [0.0; 6];
+        held(rows.len()).iter().zip(rows).for_each(|(&k, row)| wrench[k] = *row);
+        let wrench = Force::from(wrench);
+        let axes = if rows.len() < 3 { constraint.axes } else { Mat3::identity() }; // of a line or a plane
+        let along = Force::new(axes * wrench.linear, wrench.angular);
         let turned = |R: Mat3<f64>| Force::new(R * along.linear, R * along.angular);
         let (force, local) = match constraint.reference {
             ReferenceFrame::Local => (turned(R), along),
