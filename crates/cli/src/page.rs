@@ -1,6 +1,7 @@
 //! The page that `condyle plan` writes: plots and playback in one file that needs no network.
 
 use crate::budget::held;
+use crate::limits::LimitCounts;
 use crate::motion::Plan;
 use crate::report::{self, Budget, Violation};
 use crate::scene;
@@ -52,7 +53,7 @@ fn with_time(plan: &Plan) -> Vec<usize> {
 }
 
 /// Where the feet are at the knots, whether they touch between them, and what forces hold them then.
-fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::Error> {
+fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> {
     let (model, nq) = (&plan.model, plan.model.nq());
     let mut data = Data::new(model);
     let (mut trails, mut touches, mut forces) = (vec![Vec::new(); plan.feet.len()], Vec::new(), Vec::new());
@@ -162,6 +163,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
         },
         // A set of contacts that the solver took is one that can be made.
         "contacts": if plan.feet.is_empty() { None } else { contacts(plan, &knots).ok() },
+        "limits": LimitCounts::new(&plan.robot),
         "violations": violations,
         "version": env!("CARGO_PKG_VERSION"),
         "command": std::env::args().skip(1).fold("condyle".to_owned(), |line, word| line + " " + &word),

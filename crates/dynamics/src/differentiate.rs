@@ -34,6 +34,7 @@ fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
 }
 
 /// The number of directions of a state.
+#[track_caller]
 fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
     assert!(x.len() >= model.nq(), "x: expected at least {} numbers, found {}", model.nq(), x.len());
     x.len() - model.nq() + model.nv()
@@ -56,6 +57,7 @@ fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
 ///
 /// # Panics
 /// If x has fewer than nq numbers, or f gives another number of results for another x.
+#[track_caller]
 pub fn jacobian<R>(
     model: &Model<R>,
     x: &[f64],
@@ -132,6 +134,7 @@ impl LaneJacobian {
     ///
     /// # Panics
     /// If n is less than nq.
+    #[track_caller]
     pub fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
         assert!(n >= model.nq(), "n: expected at least {}, found {n}", model.nq());
         let width = match level() {
@@ -316,6 +319,7 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
 ///
 /// # Panics
 /// If x has fewer than nq numbers.
+#[track_caller]
 pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> Dual64) -> (f64, DVector<f64>) {
     let (value, J) = jacobian(model, x, |x| vec![f(x)]);
     (value[0], J.row(0).transpose())
@@ -337,6 +341,7 @@ pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> 
 ///
 /// # Panics
 /// If x has fewer than nq numbers.
+#[track_caller]
 pub fn hessian<R>(
     model: &Model<R>,
     x: &[f64],

@@ -79,7 +79,7 @@ mod time;
 
 pub use constrained::{
     AugmentedLagrangian, AutoDiffConstraint, Constrained, ConstraintSettings, GenericConstraint, Outcome,
-    PathConstraint,
+    PathConstraint, Violation, ViolationKind,
 };
 pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;

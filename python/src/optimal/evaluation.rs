@@ -114,7 +114,7 @@ pub(super) fn solution<'py>(
     let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
     let trace = s.trace.iter().map(|i| signals::record(py, i)).collect::<PyResult<Vec<_>>>()?;
     let t = &s.timings;
-    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total].map(|phase| phase.as_secs_f64());
+    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total, t.overrun].map(|phase| phase.as_secs_f64());
     let timings = class!(py, "Timings")?.call1(PyTuple::new(py, timings)?)?;
     let solution = class!(py, "Solution")?.call1((
         output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,

@@ -163,7 +163,7 @@ impl ActionModel for Constrained {
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         self.action.constraints(t, visit);
         let (lower, upper) = self.constraint.bounds(t);
-        visit(Bounded { count: self.g.len(), lower, upper, multipliers: &mut self.multipliers });
+        visit(Bounded { count: self.g.len(), lower, upper, parts: &[], multipliers: &mut self.multipliers });
     }
 
     fn shift(&mut self) {

@@ -2,9 +2,8 @@
 
 use super::contact::Contact;
 use super::dynamics::knots::knot_of;
-use super::residuals::residual::held;
 use crate::{Problem, Solution};
-use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, forward_kinematics};
+use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
 
 /// The accelerations, efforts and forces at a knot, at its beginning.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,11 +50,14 @@ impl KnotMotion {
 impl ContactForce {
     /// The force of a contact from the numbers of its rows, at a pose of its frame with the axes R.
     fn new(Contact { name, constraint }: &Contact, rows: &[f64], R: Mat3<f64>) -> Self {
-        let mut wrench = [0.0; 6];
-        held(rows.len()).iter().zip(rows).for_each(|(&k, row)| wrench[k] = *row);
-        let wrench = Force::from(wrench);
-        let axes = if rows.len() < 3 { constraint.axes } else { Mat3::identity() }; // of a line or a plane
-        let along = Force::new(axes * wrench.linear, wrench.angular);
+        let axes = constraint.axes;
+        let along = match *rows {
+            [n] => Force::new(axes * Vec3::new(0.0, 0.0, n), Vec3::zero()),
+            [t, n] => Force::new(axes * Vec3::new(t, 0.0, n), Vec3::zero()),
+            [x, y, z] => Force::new(Vec3::new(x, y, z), Vec3::zero()),
+            [x, y, z, l, m, n] => Force::new(Vec3::new(x, y, z), Vec3::new(l, m, n)),
+            _ => unreachable!("a contact has 1, 2, 3 or 6 rows, found {}", rows.len()),
+        };
         let turned = |R: Mat3<f64>| Force::new(R * along.linear, R * along.angular);
         let (force, local) = match constraint.reference {
             ReferenceFrame::Local => (turned(R), along),

@@ -126,7 +126,7 @@ pub enum Residual {
 }
 
 /// Which numbers of a wrench along a contact's axes are those of its rows, for so many rows: a line has z, a plane x and z.
-pub(crate) fn held(rows: usize) -> &'static [usize] {
+pub(super) fn held(rows: usize) -> &'static [usize] {
     match rows {
         1 => &[2],
         2 => &[0, 2],
