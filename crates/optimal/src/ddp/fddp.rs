@@ -16,7 +16,7 @@ use crate::time::Instant;
 use condyle_linalg::max_abs;
 use std::time::Duration;
 
-/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`]), with the rules and constants of Crocoddyl
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of Crocoddyl
 /// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
 /// are those of its box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022): while there are gaps
 /// the bounds only cut trials off; from then on each knot's step minimises its quadratic model within them.
