@@ -30,7 +30,7 @@ fn step(c: &mut Criterion) {
                 let mut k = 0;
                 b.iter(|| {
                     let [v, tau] = &states[k];
-                    simulation.set_state(&positions[k], v);
+                    simulation.set_state(&positions[k], v).expect("the state is valid");
                     let status = simulation.step(black_box(tau), &[]);
                     assert!(status.is_done(), "{status:?}");
                     k = (k + 1) % STATES;

@@ -28,7 +28,7 @@ use condyle_wholebody::{Error, Plan, PlanData};
 /// let times: Vec<f64> = (0..=10).map(|k| 0.05 * f64::from(k)).collect();
 /// let plan = plan_of(&arm, solution, &times, &[], 0.0)?; // an arm without contacts
 /// let mut tau = [0.0; 7];
-/// plan.feedback(0.0, &x0[..7], &x0[7..], &mut tau);
+/// plan.feedback(0.0, &x0[..7], &x0[7..], &mut tau)?;
 /// assert_eq!(tau[..], *solution.u(0)); // on the plan, the plan's control
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -49,9 +49,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let tasks = [Task { gains: Gains::critical(30.0), ..Task::com() }, trunk, foot, Task::posture()];
     let settings = Settings { contact_gains: Gains { stiffness: 0.0, damping: 40.0 }, ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks, settings)?;
-    let ground = controller.hold(&q).contacts[0].pose.translation.z;
+    let ground = controller.hold(&q)?.contacts[0].pose.translation.z;
     q[2] -= ground; // it stands at height 0
-    let start = controller.hold(&q);
+    let start = controller.hold(&q)?;
     let aside = start.contacts[0].pose.translation - start.com.position;
 
     let constraint = |sole: &str| ContactConstraint::rigid(model.frame(sole).expect("a sole of this robot"));
@@ -78,7 +78,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         error = controller.optimality(&world.q, &world.v, &references).worst().max(error);
         let forces = world.step(&tau, &[], DT);
         if tick % 250 == 0 {
-            let now = controller.hold(&world.q);
+            let now = controller.hold(&world.q)?;
             let (c, sole) = (now.com.position - start.com.position, now.frames[1].pose.translation.z);
             println!(
                 "  {t:5.2}   {:6.1} {:6.1} {:6.1} {:12.1} {:14.1} {:14.1}",

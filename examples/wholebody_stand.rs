@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let gains = Gains::critical(60.0);
     let tasks = [Task { gains, ..Task::com() }, Task { gains, ..Task::orientation("trunk") }, Task::posture()];
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks, Settings::default())?;
-    let references = controller.hold(&q);
+    let references = controller.hold(&q)?;
 
     println!(
         "{} of {:.1} kg, friction {FRICTION}, is pushed to the left by {} N",

@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings { contact_gains: Gains { stiffness: 0.0, damping: 40.0 }, ..Settings::default() };
     let mut controller = WholeBodyController::new(&robot, &contacts, &tasks, settings)?;
     let x0 = solution.x(0);
-    let mut references = controller.hold(&x0[..robot.nq()]);
+    let mut references = controller.hold(&x0[..robot.nq()])?;
     let feet = FEET.map(|foot| ContactConstraint::point(robot.frame(foot).expect("a foot of this robot")));
     let mut world = Ground::new(&robot, &x0[..robot.nq()], feet.to_vec());
 

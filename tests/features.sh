@@ -24,9 +24,9 @@ check condyle-linalg libm std threads
 check condyle-model libm loaders serde std threads
 check condyle-dynamics libm loaders serde std threads
 check condyle-optimal "" loaders serde threads
-check condyle-wholebody "" loaders threads
+check condyle-wholebody "" clarabel loaders threads
 check condyle-codegen "" cuda
-check condyle "" loaders serde threads
+check condyle "" clarabel loaders optimal serde threads wholebody
 
 cargo test --locked --package condyle-model --no-default-features --features libm --lib
 cargo test --locked --package condyle-spatial --no-default-features --features libm --test storage

@@ -1,5 +1,6 @@
 //! The trot and the walk of the examples, planned by FDDP, are tracked by whole-body control: on ground of our own constrained
 //! dynamics, each command solved, its forces within their cones, and the optimum of its program.
+#![cfg(all(feature = "loaders", feature = "optimal", feature = "wholebody"))]
 
 #[path = "../examples/support/ground.rs"]
 mod ground;
@@ -43,7 +44,7 @@ fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[
     let settings = Settings { contact_gains, force_weight: 1e-5, tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(robot, contacts, tasks, settings).unwrap();
     let x0 = &solution.x(0)[..robot.nq()];
-    let mut references = controller.hold(x0);
+    let mut references = controller.hold(x0).unwrap();
     let held = |contact: &FrictionContact| {
         let frame = robot.frame(&contact.frame).unwrap();
         if contacts.len() == 2 { ContactConstraint::rigid(frame) } else { ContactConstraint::point(frame) }
@@ -56,7 +57,7 @@ fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[
         let Command { tau, forces, status, .. } = controller.step(&world.q, &world.v, &references).clone();
         assert_eq!(status, Status::Solved, "tick {tick}");
         // Points stand on level ground; the normal of a sole turns with it, which may land on an edge.
-        for (f, here) in forces.iter().zip(&controller.hold(&world.q).contacts) {
+        for (f, here) in forces.iter().zip(&controller.hold(&world.q).unwrap().contacts) {
             let n = if contacts.len() == 2 { here.pose.rotation.z } else { Vec3::new(0.0, 0.0, 1.0) };
             assert!(in_cone(f, n), "tick {tick}: {f:?}");
         }
@@ -64,7 +65,7 @@ fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[
             check_optimality(&mut controller, &world.q, &world.v, &references, &format!("tick {tick}"));
         }
         world.step(&tau, &[], DT);
-        let away = controller.hold(&world.q).com.position - references.com.position;
+        let away = controller.hold(&world.q).unwrap().com.position - references.com.position;
         farthest = farthest.max(away.norm_squared().sqrt());
         assert!(farthest < ASTRAY, "tick {tick}: {away:?}");
     }

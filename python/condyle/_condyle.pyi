@@ -29,6 +29,8 @@ from ._types import (
     EnergyDerivatives,
     Evaluation,
     Frame,
+    Ground,
+    GroundContacts,
     Impulse,
     ImpulseDerivatives,
     Iteration,
@@ -98,6 +100,9 @@ __all__ = [
     "_casadi_hold",
     "_casadi_hold_knot",
     "_casadi_release",
+    "_check_pose",
+    "_check_rotations",
+    "_controller_from_numbers",
     "_generate",
     "_lend",
     "_model_from_bytes",
@@ -114,6 +119,8 @@ __all__ = [
     "body_classical_acceleration",
     "body_jacobian",
     "body_jacobian_rate",
+    "body_point_jacobian",
+    "body_point_velocity",
     "body_velocity",
     "body_velocity_derivative",
     "centerOfMass",
@@ -153,6 +160,8 @@ __all__ = [
     "frame_jacobian",
     "frame_jacobian_rate",
     "frame_placement",
+    "frame_point_jacobian",
+    "frame_point_velocity",
     "frame_velocity",
     "frame_velocity_derivative",
     "framesForwardKinematics",
@@ -219,7 +228,7 @@ _Input: TypeAlias = (
 )
 _Method: TypeAlias = Literal["aba", "dense", "sparse"]
 _Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
-_Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_Status: TypeAlias = Literal["done", "not_converged", "contacts_not_converged", "not_finite"]
 _OfTwo: TypeAlias = Callable[[NDArray[Any], NDArray[Any]], Any]
 _Shapes: TypeAlias = list[tuple[str, int, int]]
 _Space: TypeAlias = Model | tuple[int, _OfTwo, _OfTwo]
@@ -762,6 +771,8 @@ def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
     stays as it is unless it is `out`.
 
     q: nq numbers.
+
+    Raises `ModelError` for a quaternion or a pair whose length is 0 or not finite.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q = condyle.neutral(quadruped)
@@ -1715,6 +1726,23 @@ def body_jacobian_rate(
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
+def body_point_jacobian(
+    model: Model, data: Data, q: ArrayLike, body: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
+
+    q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+    """
+
+def body_point_velocity(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, body: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of the body's own
+    frame.
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+    """
+
 def body_velocity(
     model: Model,
     data: Data,
@@ -1822,6 +1850,29 @@ def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, ou
     >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
     >>> bool(tool[2, 3] > 0.5)  # stretched upwards
     True
+    """
+
+def frame_point_jacobian(
+    model: Model, data: Data, q: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a point of a frame, (3, nv): its velocity along the axes of the world is J v (m/s).
+
+    q: nq numbers; frame: its name or number; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
+    the world and S the columns of the joints before it.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
+    >>> J = condyle.frame_point_jacobian(arm, data, q, "tool", tip)
+    >>> np.allclose(J @ v, condyle.frame_point_velocity(arm, data, q, v, "tool", tip))
+    True
+    """
+
+def frame_point_velocity(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+
+    q: nq numbers; v: nv; frame: its name or number; point: in the frame, 3 numbers (m).
     """
 
 def frame_velocity(
@@ -2138,6 +2189,22 @@ class Model:
         >>> heavier = arm.with_inertias(twice)
         >>> heavier.total_mass == 2.0 * arm.total_mass
         True
+        """
+
+    def with_frame(self, name: str, parent: str | int | None, placement: ArrayLike | None = None) -> Model:
+        """The same robot with one more frame of the user's, the last one of `frames`. All other numbers stay as they are.
+
+        name: the new frame's name; parent: the name or number of the frame on which it is put, or the name of a body; None is
+        the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the identity.
+
+        Raises `ModelError` if the parent does not exist, the placement is no rotation and translation, or the user has a frame
+        of this name already.
+
+        >>> tip = np.eye(4)
+        >>> tip[2, 3] = 0.1
+        >>> arm = condyle.robots.arm7().with_frame("tip", "tool", tip)
+        >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.3] * 7, "tip").shape
+        (6, 7)
         """
 
     def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
@@ -3269,9 +3336,13 @@ class Simulation:
     passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
         none of either.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
-    max_iterations: it gives up after so many iterations.
+    max_iterations: Newton's method gives up after this number of iterations.
+    ground: a `Ground` on which the robot stands, slides and lands, with 'semi_implicit_euler' only; None for none.
 
-    Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
+    A simulation can be copied and pickled, and the copy goes on with the same bits.
+
+    Raises `ModelError` if M is singular or the ground cannot be, `ValueError` if dt is not above 0 or not finite, or
+    tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
@@ -3292,7 +3363,16 @@ class Simulation:
         passive: float | None = None,
         tolerance: float = 1e-09,
         max_iterations: int = 20,
+        ground: Ground | None = None,
     ) -> Simulation: ...
+    @property
+    def contacts(self) -> GroundContacts:
+        """The contacts of the ground's points in the last step, as `GroundContacts`."""
+
+    @property
+    def ground(self) -> Ground | None:
+        """The ground on which the robot stands, as a `Ground` of single points; None if there is none."""
+
     @property
     def q(self) -> _Array:
         """The position, nq numbers."""
@@ -3308,16 +3388,23 @@ class Simulation:
     def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
         """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
 
-        Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+        Raises `ModelError` if a number of q is not finite or a rotation in it does not have the length 1 (up to 1e-3),
         `ValueError` if one of v is not finite.
         """
 
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
         """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
-        tolerance (a shorter step helps); or 'not_finite', and then the step was not taken.
+        tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses break the laws of contact by
+        more than the ground's tolerance, and then the step was taken; or 'not_finite', and then it was not.
 
         tau: nv numbers (N m, N); f_ext: as for `rnea`.
         """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The parts of a pickle: what the constructor takes, and the state."""
+
+    def __setstate__(self, state: tuple[float, list[float], list[float], list[float]]) -> None:
+        """The state of a pickle."""
 
     def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
         """A number of steps, with a control law that is called before each of them. Returns the status of the last step,
@@ -3579,7 +3666,8 @@ class Plan:
     gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None if there are none.
     fade: the time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s).
 
-    Raises `ControllerError` for numbers that are not finite and times that run backwards.
+    Raises `ControllerError` for numbers that are not finite, for times that run backwards, and for states whose quaternions or
+    pairs (cos, sin) do not have length 1.
 
     >>> from condyle.wholebody import Plan
     >>> robot = condyle.robots.quadruped()
@@ -3613,7 +3701,8 @@ class Plan:
 
         t: the time (s); q: nq numbers; v: nv.
 
-        Raises `ValueError` if the plan has no controls.
+        Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose quaternions or pairs
+        (cos, sin) do not have length 1.
         """
 
 @final
@@ -3776,7 +3865,10 @@ class WholeBodyController:
     settings: `Settings`; None for the default ones.
 
     Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
-    without its contact, and for any number outside of its range.
+    without its contact, for any number outside of its range, and for an effort limit that is 0, of the model or the settings.
+
+    A controller can be copied and pickled: the copy continues with the same bits; with the back end 'clarabel', whose solvers are
+    built again, with the same solution up to its tolerance.
 
     >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
     >>> robot = condyle.robots.quadruped()
@@ -3806,6 +3898,8 @@ class WholeBodyController:
         the weight shared by the contacts in equal parts.
 
         q: nq numbers.
+
+        Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
         """
 
     def track(self, plan: Plan, t: float, references: References) -> None:
@@ -3819,7 +3913,8 @@ class WholeBodyController:
 
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
         """The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
-        Other threads run meanwhile.
+        A number that is not finite is the status 'not_finite'; a quaternion, a pair (cos, sin) or a reference's rotation that is none
+        is 'invalid_state', with the joint or the frame in the reason. Other threads run meanwhile.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.
@@ -3833,3 +3928,14 @@ class WholeBodyController:
         q: nq numbers; v: nv.
         references: `References` of this controller.
         """
+
+def _check_pose(name: str, pose: ArrayLike) -> None:
+    """Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is one."""
+
+def _check_rotations(name: str, q: ArrayLike, rotations: Sequence[tuple[str, int, int]]) -> None:
+    """Raises `ValueError` unless all rotations of a position have length 1; each is given by its joint and its range."""
+
+def _controller_from_numbers(
+    model: Model, contacts: Sequence[FrictionContact], tasks: Sequence[Task], settings: Settings, numbers: ArrayLike
+) -> WholeBodyController:
+    """The controller that a pickle holds. The model, which is one of its parts, checks the version."""

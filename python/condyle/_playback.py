@@ -133,7 +133,7 @@ def play(
 ) -> Player:
     """Shows a motion in the browser, at the address that the returned `Player` has.
 
-    q: positions, (N, nq), as `solution.xs[:, :model.nq]`.
+    q: positions, (N, nq), as `solution.xs[:, :model.nq]`; they are shown without being checked.
     dt: the time from one knot to the next (s).
     forces: contact forces of each knot, by the names of frames: the first three numbers are an arrow at the frame,
         along the axes of the world; `solution.forces` of contacts whose rows are 'local_world_aligned' and whose names

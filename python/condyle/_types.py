@@ -1,5 +1,6 @@
 """The results of functions that are more than an array, and some arguments: named tuples."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
@@ -622,6 +623,44 @@ class Control(NamedTuple):
     """The force on each body during the step, (nbodies, 6), at its origin and in its frame; likewise."""
 
 
+class Ground(NamedTuple):
+    """The plane on which a simulated robot stands, slides and lands, and the points of the robot that may touch it.
+
+    Rigid contacts with Coulomb friction at the level of velocities (Moreau 1988; Stewart and Trinkle 1996; Anitescu and
+    Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ with 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0 and the exact disc
+    ‖λ_t‖ ≤ μ λ_n of each point, whose velocity after the step is u⁺ = J v⁺ and whose gap to the plane is φ. Forces of
+    redundant contacts are not unique; their sum is. Errors are O(h). Only points and the plane meet: edges of soles,
+    other bodies and limits of joints do not.
+    """
+
+    points: Sequence[str | int | tuple[str | int, ArrayLike]]
+    """The points that may touch: a list of frames, each for its origin, or of pairs of a frame and the corners of a
+    sole in it, (n, 3) (m)."""
+    normal: ArrayLike = (0.0, 0.0, 1.0)
+    """The direction out of the ground, in the world's frame; need not be a unit vector."""
+    height: float = 0.0
+    """The height of the plane along the normal (m)."""
+    friction: float = 0.7
+    """μ, Coulomb's coefficient."""
+    restitution: float = 0.0
+    """The share of its normal speed that a point has after it has hit the ground, from 0 to 1."""
+    tolerance: float = 1e-8
+    """The largest error in the laws of contact (m/s)."""
+    max_iterations: int = 500
+    """The maximum number of iterations of the contact solver in a step."""
+
+
+class GroundContacts(NamedTuple):
+    """The contacts of the points of a `Ground` in the last step of a `Simulation`, in the order of the points."""
+
+    position: _Array
+    """The points in the world at the beginning of the step (m), (n, 3)."""
+    force: _Array
+    """The forces on the robot along the axes of the world, mean values over the step (N), (n, 3)."""
+    touches: NDArray[np.bool]
+    """Whether the ground pushed a point, (n,)."""
+
+
 _NUMBERS = 12
 """The number of numbers of a vector, and of things in a list, that a result shows; else it shows the shape."""
 
@@ -651,6 +690,8 @@ _MODULES = {
     "LqNode": "optimal",
     "Outcome": "optimal",
     "Control": "simulation",
+    "Ground": "simulation",
+    "GroundContacts": "simulation",
 }
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and issubclass(_item, tuple)]:
     setattr(_class, "__repr__", _repr)  # noqa: B010 - a type checker would not let a method be replaced

@@ -6,9 +6,10 @@ from typing import Any, Literal, NamedTuple, TypeAlias, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ._condyle import ControllerError
+from ._condyle import ControllerError, _check_pose, _check_rotations
 
 _Array: TypeAlias = NDArray[np.float64]
+_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # the joint, and the range in q of what has length 1
 
 
 class Gains(NamedTuple):
@@ -120,7 +121,9 @@ class Command(NamedTuple):
     Of a safe command, all members from `a` to `violation` are the last solution's.
     """
 
-    status: Literal["solved", "infeasible", "iteration_limit", "time_limit", "numerical_error", "not_finite"]
+    status: Literal[
+        "solved", "infeasible", "iteration_limit", "time_limit", "numerical_error", "not_finite", "invalid_state"
+    ]
     """The end of the step in a word."""
     reason: str
     """The end of the step in a sentence, with the name and the place of a number that is not finite."""
@@ -176,7 +179,29 @@ class Numbers:
         view, given = target._views[self.name], np.asarray(value, np.float64)
         if given.shape != view.shape:
             raise ValueError(f"{target._name}.{self.name}: expected shape {view.shape}, found {given.shape}")
+        self.check(target, given)
         view[...] = given
+
+    def check(self, target: "Target", given: _Array) -> None:
+        """Raises `ValueError` for numbers that these cannot be."""
+
+
+class Pose(Numbers):
+    """A pose of a `Target`: a homogeneous (4, 4) matrix, whose rotation is checked when it is set."""
+
+    def __init__(self, first: int) -> None:
+        super().__init__(first, 4, 4)
+
+    def check(self, target: "Target", given: _Array) -> None:
+        _check_pose(f"{target._name}.{self.name}", given)
+
+
+class Position(Numbers):
+    """A position of a `PostureTarget`, whose quaternions and pairs (cos, sin) are checked when it is set."""
+
+    def check(self, target: "Target", given: _Array) -> None:
+        if isinstance(target, PostureTarget):
+            _check_rotations(f"{target._name}.{self.name}", given, target._rotations)
 
 
 class Target:
@@ -231,7 +256,7 @@ class FrameTarget(Target):
 
     __slots__ = ()
     SIZE = 28
-    pose = Numbers(0, 4, 4)
+    pose = Pose(0)
     """oXf, a homogeneous (4, 4) matrix."""
     velocity = Numbers(16, 6)
     """(ṗ, ω) (m/s, rad/s), 6 numbers."""
@@ -244,7 +269,7 @@ class ContactTarget(Target):
 
     __slots__ = ()
     SIZE = 23
-    pose = Numbers(1, 4, 4)
+    pose = Pose(1)
     """Where the frame is held, a homogeneous (4, 4) matrix; acts only if `Settings.contact_gains` have a stiffness. Of
     a point, the translation alone."""
     force = Numbers(17, 6)
@@ -266,18 +291,19 @@ class ContactTarget(Target):
 
 
 class PostureTarget(Target):
-    """Where the joints should be; entries of a free-flyer are not read."""
+    """Where the joints should be: a state of the robot. Entries of a free-flyer do not act."""
 
-    __slots__ = ()
+    __slots__ = ("_rotations",)
 
-    def __init__(self, name: str, numbers: _Array, nq: int, nv: int) -> None:
-        self._name, self._numbers = name, numbers
+    def __init__(self, name: str, numbers: _Array, nq: int, nv: int, rotations: _Rotations = ()) -> None:
+        self._name, self._numbers, self._rotations = name, numbers, rotations
         self._views = {"q": numbers[:nq], "v": numbers[nq : nq + nv], "a": numbers[nq + nv :]}
 
     def __reduce__(self) -> "tuple[type[Target], tuple[Any, ...]]":
-        return type(self), (self._name, self._numbers.copy(), len(self._views["q"]), len(self._views["v"]))
+        sizes = len(self._views["q"]), len(self._views["v"])
+        return type(self), (self._name, self._numbers.copy(), *sizes, self._rotations)
 
-    q = Numbers(0)
+    q = Position(0)
     """q_ref, nq numbers."""
     v = Numbers(0)
     """v_ref, nv numbers."""
@@ -288,7 +314,8 @@ class PostureTarget(Target):
 class References:
     """What all tasks aim at during one tick. `WholeBodyController.hold` makes one to start from.
 
-    Its members are views of one array: they are changed in place, or set. A copy has numbers of its own.
+    Its members are views of one array: they are changed in place, or set. A copy has numbers of its own. What is set is
+    checked at once: rotations are rotations, quaternions and pairs (cos, sin) have length 1. A step checks all of it.
 
     >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
     >>> robot = condyle.robots.quadruped()
@@ -301,7 +328,7 @@ class References:
     <condyle.wholebody.References of 0 frames and 2 contacts>
     """
 
-    __slots__ = ("_numbers", "_sizes", "com", "contacts", "frames", "momentum", "posture")
+    __slots__ = ("_numbers", "_rotations", "_sizes", "com", "contacts", "frames", "momentum", "posture")
     com: ComTarget
     """The centre of mass."""
     momentum: MomentumTarget
@@ -313,13 +340,13 @@ class References:
     contacts: tuple[ContactTarget, ...]
     """One for each `FrictionContact`, in the same order."""
 
-    def __init__(self, sizes: tuple[int, int, int, int], numbers: _Array) -> None:
+    def __init__(self, sizes: tuple[int, int, int, int], numbers: _Array, rotations: _Rotations = ()) -> None:
         nq, nv, frames, contacts = self._sizes = sizes
-        self._numbers = numbers
+        self._numbers, self._rotations = numbers, rotations
         parts = self._parts()
         self.com = ComTarget("com", next(parts))
         self.momentum = MomentumTarget("momentum", next(parts))
-        self.posture = PostureTarget("posture", next(parts), nq, nv)
+        self.posture = PostureTarget("posture", next(parts), nq, nv, rotations)
         self.frames = tuple(FrameTarget(f"frames[{k}]", next(parts)) for k in range(frames))
         self.contacts = tuple(ContactTarget(f"contacts[{k}]", next(parts)) for k in range(contacts))
 
@@ -332,7 +359,7 @@ class References:
 
     def copy(self) -> "References":
         """References with the same numbers, which do not change with these."""
-        return References(self._sizes, self._numbers.copy())
+        return References(self._sizes, self._numbers.copy(), self._rotations)
 
     def __copy__(self) -> "References":
         return self.copy()
@@ -341,7 +368,7 @@ class References:
         return self.copy()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return References, (self._sizes, self._numbers)
+        return References, (self._sizes, self._numbers, self._rotations)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, References):

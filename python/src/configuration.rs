@@ -87,17 +87,19 @@ each(q0: Position, q1: Position) -> [] |to| {
 ///
 /// q: nq numbers.
 ///
+/// Raises `ModelError` for a quaternion or a pair whose length is 0 or not finite.
+///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> q = condyle.neutral(quadruped)
 /// >>> q[6] = 2.0
 /// >>> np.array_equal(condyle.normalize(quadruped, q), condyle.neutral(quadruped))
 /// True
-fn normalize(model; q: Position; out) {
+fn normalize(model; q: Scalable; out) {
     let mut q = q.to_vec();
     condyle::normalize(model, &mut q);
     q
 }
-each(q: Position) -> [nq] |to| {
+each(q: Scalable) -> [nq] |to| {
     to.copy_from_slice(q);
     condyle::normalize(model, to)
 }

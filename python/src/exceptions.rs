@@ -1,6 +1,6 @@
 //! What the package raises.
 
-use condyle::Error as Cause;
+use condyle::ModelError as Cause;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyValueError};
 use pyo3::prelude::*;

@@ -25,7 +25,7 @@
 
 use crate::arrays::{self, Number};
 use crate::batch::{self, Look};
-use crate::exceptions::{ModelError, wrong_word};
+use crate::exceptions::{ModelError, exception, wrong_word};
 use crate::hyper_dual;
 use crate::model::{body_index, frame_index};
 use condyle::{Force, ForwardDynamicsMethod, Model, ReferenceFrame};
@@ -172,6 +172,40 @@ vectors! {
     Tangent: nv
 }
 
+/// A position whose quaternions and pairs (cos, sin) can be scaled to length 1.
+pub(crate) enum Scalable {}
+
+impl<'a, 'py: 'a> Argument<'a, 'py> for Scalable {
+    type Given = &'a Bound<'py, PyAny>;
+    type Read<S: Number> = S::Input<'py, Ix1>;
+    type All = batch::Rows<'py>;
+    fn read_at<S: Number>(
+        name: &str,
+        given: &Self::Given,
+        model: &Model,
+        state: Option<usize>,
+    ) -> PyResult<Self::Read<S>> {
+        let q = Position::read_at::<S>(name, given, model, state)?;
+        let numbers: Vec<f64> = q.iter().map(|x| x.real()).collect();
+        model.check_normalizable(&numbers).map_err(exception)?;
+        Ok(q)
+    }
+    fn look(name: &str, given: &Self::Given, model: &Model) -> PyResult<Look> {
+        Position::look(name, given, model)
+    }
+    fn read_all(
+        name: &str,
+        given: &Self::Given,
+        model: &Model,
+        states: usize,
+        written: &[Range<usize>],
+    ) -> PyResult<Self::All> {
+        let all = Position::read_all(name, given, model, states, written)?;
+        all.chunks_exact(model.nq().max(1)).try_for_each(|q| model.check_normalizable(q)).map_err(exception)?;
+        Ok(all)
+    }
+}
+
 /// A force on each body, (nbodies, 6), or None.
 pub(crate) enum Forces {}
 
@@ -304,6 +338,9 @@ shared! {
     /// A number.
     Real<S>: &'a Bound<'py, PyAny> => S { |name, given, _| S::read_one(name, given),
         dual if |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
+
+    /// A point: three numbers that belong to no state.
+    Point<S>: &'a Bound<'py, PyAny> => condyle::Vec3<f64> { |name, given, _| crate::arrays::three(name, given) }
 
     /// A number that belongs to no state.
     Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given), at once if |_| true }

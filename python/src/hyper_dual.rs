@@ -354,6 +354,9 @@ impl Number for Hyper {
         check_shape(argument, array.cast::<PyUntypedArray>()?.shape(), shape)?;
         array.getattr("flat")?.try_iter()?.map(|x| Self::read_one(argument, &x?)).collect()
     }
+    fn real(&self) -> f64 {
+        self.0.re
+    }
     fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
         value.extract::<Operand>().map(|x| Self(x.0)).map_err(|_| {
             let found = value.get_type();

@@ -8,6 +8,7 @@ mod settings;
 mod tasks;
 
 pub(crate) use contacts::FrictionContact;
-pub(crate) use controller::WholeBodyController;
+pub(crate) use controller::{WholeBodyController, controller_from_numbers};
 pub(crate) use plan::Plan;
+pub(crate) use references::{check_pose, check_rotations};
 pub(crate) use tasks::Task;

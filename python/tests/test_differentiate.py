@@ -31,6 +31,8 @@ CASES: dict[str, Case] = {
     "body_classical_acceleration": lambda r, q, v: condyle.body_classical_acceleration(r.model, r.data, q, v, v, 3),
     "body_jacobian": lambda r, q, v: condyle.body_jacobian(r.model, r.data, q, 3),
     "body_jacobian_rate": lambda r, q, v: condyle.body_jacobian_rate(r.model, r.data, q, v, 3),
+    "body_point_jacobian": lambda r, q, v: condyle.body_point_jacobian(r.model, r.data, q, 3, [0.1, 0.2, 0.3]),
+    "body_point_velocity": lambda r, q, v: condyle.body_point_velocity(r.model, r.data, q, v, 3, [0.1, 0.2, 0.3]),
     "body_velocity": lambda r, q, v: condyle.body_velocity(r.model, r.data, q, v, 3),
     "body_velocity_derivative": lambda r, q, v: condyle.body_velocity_derivative(r.model, r.data, q, v, 3),
     "centroidal_derivatives": lambda r, q, v: condyle.centroidal_derivatives(r.model, r.data, q, v, v),

@@ -15,7 +15,7 @@ Exit status:
 pub(crate) enum Error {
     /// The robot's file, or a name in it.
     #[error(transparent)]
-    Model(#[from] condyle::Error),
+    Model(#[from] condyle::ModelError),
     /// The problem that was made of a task.
     #[error(transparent)]
     Problem(#[from] condyle::optimal::Error),

@@ -53,7 +53,7 @@ fn with_time(plan: &Plan) -> Vec<usize> {
 }
 
 /// Where the feet are at the knots, whether they touch between them, and what forces hold them then.
-fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::Error> {
+fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> {
     let (model, nq) = (&plan.model, plan.model.nq());
     let mut data = Data::new(model);
     let (mut trails, mut touches, mut forces) = (vec![Vec::new(); plan.feet.len()], Vec::new(), Vec::new());

@@ -96,6 +96,14 @@ pub enum Error {
         /// The fault, with the numbers.
         what: String,
     },
+    /// A velocity is none of the robot's.
+    #[error("joint `{joint}`: {what}")]
+    Velocity {
+        /// The joint's name.
+        joint: String,
+        /// The fault, with the numbers.
+        what: String,
+    },
     /// A list in a model's file is too short or too long.
     #[error("{name}: expected {expected} entries, found {found}")]
     Length {
@@ -112,6 +120,12 @@ pub enum Error {
         /// The constraint's number, counted from 0.
         constraint: usize,
         /// The fault, with the numbers.
+        what: String,
+    },
+    /// The ground of a simulation cannot be.
+    #[error("ground: {what}")]
+    Ground {
+        /// The fault, with the names and the numbers.
         what: String,
     },
     /// A strict loader met what is only odd.

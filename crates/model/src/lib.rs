@@ -48,6 +48,7 @@ mod body;
 mod builder;
 mod compose;
 mod configuration;
+mod equality;
 mod error;
 pub mod inertial_parameters;
 mod io;
@@ -60,6 +61,7 @@ pub mod limbs;
 mod magnitude;
 mod model;
 mod names;
+mod position;
 mod real;
 #[cfg(feature = "loaders")]
 pub mod robots;
@@ -67,8 +69,9 @@ pub mod robots;
 pub mod tree;
 mod validate;
 mod variants;
+mod with_frame;
 
-pub use body::{Body, Frame, FrameKind, JointOptions, Limits};
+pub use body::{Body, Frame, FrameKind, FrameParent, JointOptions, Limits};
 pub use builder::{BodyId, ModelBuilder, WORLD};
 pub use condyle_spatial::{Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
 pub use configuration::{
@@ -82,3 +85,5 @@ pub use error::{Error, Warning};
 pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};
 pub use joint::{Joint, Mimic};
 pub use model::Model;
+#[doc(hidden)]
+pub use position::{PositionFault, ROTATION_ROUNDING, unit_fault};

@@ -10,7 +10,7 @@ use crate::model::Model;
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
-use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Scalar, Se3, Sym3};
+use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3, Sym3};
 use nalgebra::{DMatrix, Matrix3};
 use rand::{SeedableRng, rngs::StdRng};
 
@@ -22,10 +22,6 @@ const PIVOT_ROUNDING: f64 = 1e-13;
 const LEAST_PIVOT: f64 = 1e-200;
 /// Positions at which M is looked at. A joint is called singular if it is so at all of them.
 const SAMPLES: usize = 3;
-
-/// The distance from 1 that the length of a quaternion or of (cos, sin) in a position may have: 0.707 in place of √½ is off
-/// by 1.5e-4, an estimate that was integrated in single precision by less.
-const UNIT_ROUNDING: f64 = 1e-3;
 
 /// Says what is wrong with a body's inertia or placement.
 pub(crate) fn check_body(Body { name, inertia: I, placement, .. }: &Body) -> Result<(), Error> {
@@ -142,44 +138,6 @@ impl Model {
             friction: self.friction[v],
             armature: self.armature[v],
         }
-    }
-
-    /// Checks that a position is one of the robot's: finite numbers, and quaternions and (cos, sin) of length 1, up to 1e-3.
-    /// Algorithms take any numbers and do not look.
-    ///
-    /// ```
-    /// use condyle_model::{neutral, robots};
-    /// let quadruped = robots::quadruped();
-    /// let mut q = neutral(&quadruped);
-    /// quadruped.check_position(&q)?;
-    /// q[6] = 0.0;
-    /// let error = quadruped.check_position(&q).unwrap_err().to_string();
-    /// assert_eq!(error, "joint `root_joint`: its rotation, q[3..7], has the length 0, expected 1");
-    /// # Ok::<(), condyle_model::Error>(())
-    /// ```
-    ///
-    /// # Errors
-    /// [`Error::Position`].
-    ///
-    /// # Panics
-    /// If `q` has not nq numbers.
-    pub fn check_position(&self, q: &[f64]) -> Result<(), Error> {
-        condyle_linalg::check("q", q.len(), self.nq());
-        for body in self.bodies.iter().skip(1).filter(|body| body.mimic.is_none()) {
-            let wrong = |what: String| Err(Error::Position { joint: body.joint_name.clone(), what });
-            for k in body.idx_q..body.idx_q + body.joint.nq() {
-                if !q[k].is_finite() {
-                    return wrong(format!("q[{k}] is {}, which is not finite", q[k]));
-                }
-            }
-            let Some(unit) = body.joint.unit_part() else { continue };
-            let (from, to) = (body.idx_q + unit.start, body.idx_q + unit.end);
-            let length = Scalar::sqrt(q[from..to].iter().map(|x| x * x).sum::<f64>());
-            if (length - 1.0).abs() > UNIT_ROUNDING {
-                return wrong(format!("its rotation, q[{from}..{to}], has the length {length}, expected 1"));
-            }
-        }
-        Ok(())
     }
 
     /// Finds the joints along which M is singular, wherever the robot is.

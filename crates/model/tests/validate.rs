@@ -1,6 +1,6 @@
 //! Inertias that no body has, and joints along which the inertia matrix is singular.
 
-use condyle_model::{Inertia, Joint, ModelBuilder, Se3, Sym3, Vec3, WORLD, Warning};
+use condyle_model::{Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, Warning, neutral};
 
 fn z() -> Joint {
     Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) }
@@ -52,4 +52,55 @@ fn impossible_inertias_are_named() {
     assert!(matches!(body(flat(0.1, 0.1, 0.3))[..], [Warning::Triangle { .. }]));
     assert!(matches!(body(flat(0.1, -0.1, 0.1))[..], [Warning::Negative { .. }]));
     assert!(body(flat(0.1, 0.1, 0.2)).is_empty()); // a flat plate
+}
+
+/// One joint of each kind whose position has a part of length 1, and a hinge.
+fn turning() -> Model {
+    let mut builder = ModelBuilder::new("turning");
+    let axis = Vec3::new(0.0, 0.0, 1.0);
+    let free = builder.body("free", WORLD, Joint::FreeFlyer, Se3::identity(), ball());
+    let hinge = builder.body("hinge", free, z(), Se3::identity(), ball());
+    let wheel = builder.body("wheel", hinge, Joint::Continuous { axis }, Se3::identity(), ball());
+    let socket = builder.body("socket", wheel, Joint::Spherical, Se3::identity(), ball());
+    builder.body("plane", socket, Joint::Planar, Se3::identity(), ball());
+    builder.build().unwrap()
+}
+
+#[test]
+fn positions_are_finite_and_rotations_of_length_1() {
+    let model = turning();
+    let q = neutral(&model);
+    for (part, joint) in [(3..7, "free"), (8..10, "wheel"), (10..14, "socket"), (16..18, "plane")] {
+        let scaled = |factor: f64| {
+            let mut q = q.clone();
+            q[part.clone()].iter_mut().for_each(|x| *x *= factor);
+            model.check_position(&q).map_err(|error| error.to_string())
+        };
+        for factor in [0.0, 0.99, 1.1, 2.0, 1e200] {
+            let length = if factor == 1e200 { f64::INFINITY } else { factor };
+            let (first, end) = (part.start, part.end);
+            let expected =
+                format!("joint `{joint}`: its rotation, q[{first}..{end}], has the length {length}, expected 1");
+            assert_eq!(scaled(factor), Err(expected));
+        }
+        assert_eq!((scaled(1.0), scaled(-1.0), scaled(1.0 + 9e-4)), (Ok(()), Ok(()), Ok(())));
+    }
+    for k in 0..model.nq() {
+        for value in [f64::NAN, f64::NEG_INFINITY] {
+            let mut q = q.clone();
+            q[k] = value;
+            let error = model.check_position(&q).unwrap_err().to_string();
+            assert!(error.ends_with(&format!("`: q[{k}] is {value}, which is not finite")), "{error}");
+        }
+    }
+}
+
+#[test]
+fn velocities_are_finite() {
+    let model = turning();
+    let (q, mut v) = (neutral(&model), vec![0.0; model.nv()]);
+    assert_eq!(model.check_state(&q, &v), Ok(()));
+    v[8] = f64::NAN;
+    let error = model.check_state(&q, &v).unwrap_err().to_string();
+    assert_eq!(error, "joint `socket`: v[8] is NaN, which is not finite");
 }

@@ -1,5 +1,6 @@
 //! The split of unknowns by equalities: x_B = p − T z; and rows of coefficients over z.
 
+use crate::carried::Reader;
 use crate::cone_program::ConeProgram;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, add_product_vector, at_level, max_abs, product_without_slack};
 use nalgebra::DMatrix;
@@ -157,12 +158,7 @@ impl Elimination {
         if self.shape != (equalities, n) || !self.eliminate(program, true) {
             self.eliminate(program, false);
             self.shape = (equalities, n);
-            basis.basic.clear();
-            basis.basic.extend(self.pivots.iter().map(|pivot| pivot.1));
-            basis.others.clear();
-            basis.others.extend((0..n).filter(|j| !basis.basic.contains(j)));
-            basis.others.iter().enumerate().for_each(|(z, &j)| basis.places[j] = Place::Other(z));
-            basis.basic.iter().enumerate().for_each(|(i, &j)| basis.places[j] = Place::Basic(i));
+            self.place(basis);
         }
         let Basis { others, T, p, .. } = basis;
         let (stride, ldt) = (self.W.nrows(), T.nrows());
@@ -173,6 +169,40 @@ impl Elimination {
                 *t = w[j];
             }
         }
+    }
+
+    /// Writes which unknowns the pivots make basic.
+    fn place(&self, basis: &mut Basis) {
+        basis.basic.clear();
+        basis.basic.extend(self.pivots.iter().map(|pivot| pivot.1));
+        basis.others.clear();
+        basis.others.extend((0..self.shape.1).filter(|j| !basis.basic.contains(j)));
+        basis.others.iter().enumerate().for_each(|(z, &j)| basis.places[j] = Place::Other(z));
+        basis.basic.iter().enumerate().for_each(|(i, &j)| basis.places[j] = Place::Basic(i));
+    }
+
+    /// Writes the pivots of the last call, which are tried first.
+    pub(crate) fn write(&self, out: &mut Vec<f64>) {
+        let (rows, unknowns) = self.shape;
+        out.extend([rows, unknowns, self.pivots.len()].map(|x| x as f64));
+        out.extend(self.pivots.iter().flat_map(|&(row, unknown)| [row as f64, unknown as f64]));
+    }
+
+    /// Reads the pivots of an elimination of the same capacity; `None` if they are none.
+    pub(crate) fn read(&mut self, basis: &mut Basis, from: &mut Reader<'_>) -> Option<()> {
+        let (most, unknowns) = (self.used.len(), basis.places.len());
+        self.shape = (from.index(most + 1)?, from.index(unknowns + 1)?);
+        let count = from.index(self.shape.0.min(self.shape.1) + 1)?;
+        self.pivots.clear();
+        for _ in 0..count {
+            let (row, unknown) = (from.index(self.shape.0)?, from.index(self.shape.1)?);
+            if self.pivots.iter().any(|&(r, j)| r == row || j == unknown) {
+                return None;
+            }
+            self.pivots.push((row, unknown));
+        }
+        self.place(basis);
+        Some(())
     }
 
     /// Gauss–Jordan elimination; with the pivots of the last call, unless one of them has become too small.

@@ -31,7 +31,7 @@ pub(crate) struct Known<'a> {
 
 /// The elimination of one priority's equalities, with room for the largest program.
 pub(crate) struct Condenser {
-    elimination: Elimination,
+    pub elimination: Elimination,
     pub basis: Basis,
     /// Scratch: rows of the objective. Shape: other × rows, with slack.
     rows: DMatrix<f64>,

@@ -5,6 +5,7 @@ use condyle_spatial::{Mat3, Vec3};
 
 /// The direction in which the environment pushes; of any length but 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Normal {
     /// Along the world's axes: the ground stays as it is when the foot turns. For points.
     World(Vec3<f64>),
@@ -12,8 +13,17 @@ pub enum Normal {
     Frame(Vec3<f64>),
 }
 
-/// By which unknowns the force on a surface is described.
+impl Normal {
+    /// The direction, along the axes in which it is given.
+    pub fn direction(self) -> Vec3<f64> {
+        let (Self::World(n) | Self::Frame(n)) = self;
+        n
+    }
+}
+
+/// Unknowns that describe the force on a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SurfaceForces {
     /// A force with a friction cone at each corner.
     Corners,
@@ -21,8 +31,9 @@ pub enum SurfaceForces {
     Wrench,
 }
 
-/// What touches.
+/// Shape that touches.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Shape {
     /// The frame's origin: it is held, the frame may turn about it.
     Point,
@@ -100,7 +111,7 @@ impl FrictionContact {
     }
 
     pub(crate) fn check(&self) -> Result<Geometry, Error> {
-        let (Normal::World(n) | Normal::Frame(n)) = self.normal;
+        let n = self.normal.direction();
         let length = norm(n);
         let yaw = self.yaw_friction.unwrap_or(0.0);
         for (name, value, good, allowed) in [

@@ -1,5 +1,6 @@
 //! The controller: fixes memory once, fills in the numbers at each tick, solves, and looks at what it gives out.
 
+use crate::command::{Command, CommandSource};
 use crate::cone_program::Status as Stopped;
 use crate::contact::FrictionContact;
 use crate::contact_numbers::ContactNumbers;
@@ -9,11 +10,14 @@ use crate::kinematics::Kinematics;
 use crate::levels::Levels;
 use crate::objective::{Objective, ResolvedTask};
 use crate::plan::{Plan, PlannedState};
-use crate::references::{ComTarget, ContactTarget, FrameTarget, MomentumTarget, PostureTarget, References};
+use crate::references::{
+    ComTarget, ContactTarget, FrameTarget, MomentumTarget, PostureTarget, References, valid_rotations,
+};
 use crate::safety::Safety;
 use crate::settings::Settings;
 use crate::task::{Task, TaskKind};
 use condyle_dynamics::{Force, Model, Motion, Vec3, neutral};
+use condyle_linalg::check;
 use std::fmt;
 
 /// A solution may violate its constraints by this part of 1 and the robot's weight (N, N m, m/s²); more is an error.
@@ -21,55 +25,6 @@ const FEASIBLE: f64 = 1e-6;
 
 /// The weight with which joints that cannot be kept within their limits are pulled back.
 const PULL: f64 = 1e3;
-
-/// From where a command comes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum CommandSource {
-    /// The program's solution; or, where the solver did not finish, an iterate that holds all constraints.
-    Solution,
-    /// The last solution, at most [`Settings::hold_ticks`] old.
-    LastSolution,
-    /// Gravity compensation with damping.
-    GravityCompensation,
-}
-
-/// What the robot should do now. Its numbers are finite, and `tau` is within the limits, whatever the status says.
-///
-/// Constraints hold to the solver's tolerance: with the default, a force may leave its cone by some 1e-7 N.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Command {
-    /// How the step ended.
-    pub status: Status,
-    /// From where the command comes.
-    pub source: CommandSource,
-    /// τ, the efforts of the motors: nv numbers (N m, N), 0 at a free-flyer.
-    pub tau: Vec<f64>,
-    /// q̈, the acceleration that follows if the contacts hold: nv numbers (rad/s², m/s²). Of a safe command, the last one's.
-    pub a: Vec<f64>,
-    /// What the environment then does to the robot at each contact, about the frame's origin along the world's axes (N,
-    /// N m). Of a safe command, the last one's.
-    pub forces: Vec<Force<f64>>,
-    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²). Of a safe command, the last one's.
-    pub com_acceleration: Vec3<f64>,
-    /// The violation of the worst constraint (N, N m, m/s²). Of a safe command, the last one's.
-    pub violation: f64,
-    /// Iterations of the solver.
-    pub iterations: u32,
-    /// Whether the solver fell short of [`Settings::tolerance`] and met only its reduced one.
-    pub reduced_accuracy: bool,
-    /// Whether the limits of joints had to give way to dynamics, contacts and torques.
-    pub limits_relaxed: bool,
-}
-
-impl Command {
-    /// The command if it was solved, else why not.
-    ///
-    /// # Errors
-    /// The status, unless it is [`Status::Solved`].
-    pub fn solved(&self) -> Result<&Self, Status> {
-        if self.status == Status::Solved { Ok(self) } else { Err(self.status) }
-    }
-}
 
 /// A whole-body controller: one cone program for each tick and priority, stated in the [crate's documentation](crate).
 ///
@@ -83,19 +38,19 @@ impl Command {
 /// // Knees inwards, feet on the ground.
 /// let mut q = vec![0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0];
 /// q.extend([0.0, 0.7, -1.4, 0.0, -0.7, 1.4, 0.0, 0.7, -1.4, 0.0, -0.7, 1.4]);
-/// let references = controller.hold(&q);
+/// let references = controller.hold(&q)?;
 /// let command = controller.step(&q, &[0.0; 18], &references).solved()?;
 /// let lift: f64 = command.forces.iter().map(|f| f.linear.z).sum();
 /// assert!((lift - 9.81 * robot.total_mass()).abs() < 0.1); // the feet carry the weight
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub struct WholeBodyController {
-    settings: Settings,
+    pub(crate) settings: Settings,
     pub(crate) equations: Equations,
     pub(crate) objective: Objective,
     pub(crate) levels: Levels,
-    safety: Safety,
-    command: Command,
+    pub(crate) safety: Safety,
+    pub(crate) command: Command,
     /// Scratch: the state of a plan.
     planned: PlannedState,
 }
@@ -108,6 +63,7 @@ impl WholeBodyController {
     pub fn new(model: &Model, contacts: &[FrictionContact], tasks: &[Task], settings: Settings) -> Result<Self, Error> {
         tasks.iter().try_for_each(|task| task.check(model.nv()))?;
         settings.check(model)?;
+        settings.check_effort(model)?;
         // each frame once: those of contacts, of tasks, and of their axes
         let mut frames: Vec<usize> = Vec::new();
         let mut place = |name: &str| -> Result<usize, Error> {
@@ -174,11 +130,15 @@ impl WholeBodyController {
     ///
     /// q: nq numbers.
     ///
+    /// # Errors
+    /// [`Error::Model`] for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
+    ///
     /// # Panics
-    /// If `q` has not nq numbers.
-    pub fn hold(&mut self, q: &[f64]) -> References {
+    /// If `q` does not have nq numbers.
+    #[track_caller]
+    pub fn hold(&mut self, q: &[f64]) -> Result<References, Error> {
         let k = &mut self.equations.kinematics;
-        check("q", q.len(), k.model.nq());
+        k.model.check_position(q)?;
         let rest = vec![0.0; k.model.nv()];
         k.update(q, &rest);
         let share = k.model.gravity().scale(-k.mass / self.equations.contacts.len() as f64);
@@ -189,13 +149,13 @@ impl WholeBodyController {
             let force = Force::new(share, c.centre_arm(&k.frames[c.frame]).cross(share));
             ContactTarget { activation: 1.0, pose: k.frames[c.frame].pose, force }
         };
-        References {
+        Ok(References {
             com: ComTarget { position: k.com, velocity: zero, acceleration: zero },
             frames: moved.map(target).collect(),
             posture: PostureTarget { q: q.to_vec(), v: rest.clone(), a: rest },
             momentum: MomentumTarget { momentum: zero, rate: zero },
             contacts: self.equations.contacts.iter().map(contact).collect(),
-        }
+        })
     }
 
     /// The references of a plan at a time: joints, and where they bring centre of mass, momentum and frames; contacts by
@@ -203,10 +163,14 @@ impl WholeBodyController {
     ///
     /// # Panics
     /// If the references were made for another controller, or the plan for a robot of other bodies and joints.
+    #[track_caller]
     pub fn track(&mut self, plan: &Plan, t: f64, references: &mut References) {
         let Self { equations: Equations { kinematics: k, contacts, .. }, objective, planned, .. } = self;
         check("references.contacts", references.contacts.len(), contacts.len());
-        plan.check(&k.model);
+        check("references.posture.q", references.posture.q.len(), k.model.nq());
+        check("references.posture.v", references.posture.v.len(), k.model.nv());
+        check("references.posture.a", references.posture.a.len(), k.model.nv());
+        plan.check(&k.model, contacts.len());
         plan.read(t, planned, &mut objective.error);
         let PlannedState { q, v, a } = planned;
         k.update(q, v);
@@ -245,27 +209,22 @@ impl WholeBodyController {
     }
 
     /// Efforts, acceleration and contact forces at the state (q, v). There always is a command: without a solution it is a
-    /// safe one, and its status says why.
+    /// safe one, and its status says why. A number that is not finite is [`Status::NotFinite`]; a quaternion, a pair (cos, sin)
+    /// or a reference's rotation that is none is [`Status::InvalidState`]. The safe command is then made of the last valid state.
     ///
     /// q: nq numbers; v: nv. The command stays readable as [`command`](Self::command). Allocates nothing with
     /// [`Backend::InteriorPoint`](crate::Backend); clarabel allocates once, and more for a new set of contacts.
     ///
     /// # Panics
     /// If `q`, `v` or a list of the references has the wrong length.
+    #[track_caller]
     pub fn step(&mut self, q: &[f64], v: &[f64], references: &References) -> &Command {
-        let (nq, nv) = (self.equations.model().nq(), self.equations.model().nv());
-        let moved = self.objective.tasks.iter().filter(|task| task.frame.is_some()).count();
-        check("q", q.len(), nq);
-        check("v", v.len(), nv);
-        check("references.posture.q", references.posture.q.len(), nq);
-        check("references.posture.v", references.posture.v.len(), nv);
-        check("references.posture.a", references.posture.a.len(), nv);
-        check("references.contacts", references.contacts.len(), self.equations.contacts.len());
-        check("references.frames", references.frames.len(), moved);
-
-        let state = finite("q", q.iter().copied()).and_then(|()| finite("v", v.iter().copied()));
+        self.check_lengths(q, v, references);
+        let state = finite("q", q.iter().copied())
+            .and_then(|()| finite("v", v.iter().copied()))
+            .and_then(|()| valid_rotations("q", self.equations.model(), q));
         self.safety.see(state.is_ok().then_some((q, v)));
-        let status = match state.and_then(|()| references.finite()) {
+        let status = match state.and_then(|()| references.check(self.equations.model())) {
             Ok(()) => self.solve(q, v, references),
             Err(status) => {
                 self.command.iterations = 0;
@@ -287,6 +246,20 @@ impl WholeBodyController {
             }
         }
         &self.command
+    }
+
+    /// Panics unless all arguments of a step have the lengths of this controller.
+    #[track_caller]
+    pub(crate) fn check_lengths(&self, q: &[f64], v: &[f64], references: &References) {
+        let (nq, nv) = (self.equations.model().nq(), self.equations.model().nv());
+        let moved = self.objective.tasks.iter().filter(|task| task.frame.is_some()).count();
+        check("q", q.len(), nq);
+        check("v", v.len(), nv);
+        check("references.posture.q", references.posture.q.len(), nq);
+        check("references.posture.v", references.posture.v.len(), nv);
+        check("references.posture.a", references.posture.a.len(), nv);
+        check("references.contacts", references.contacts.len(), self.equations.contacts.len());
+        check("references.frames", references.frames.len(), moved);
     }
 
     /// Computes constraints and tasks.
@@ -353,10 +326,4 @@ impl fmt::Debug for WholeBodyController {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("WholeBodyController").field("command", &self.command).finish_non_exhaustive()
     }
-}
-
-/// Panics unless an argument has as many entries as it must have.
-#[track_caller]
-fn check(argument: &str, found: usize, expected: usize) {
-    assert!(found == expected, "{argument}: expected {expected} entries, found {found}");
 }

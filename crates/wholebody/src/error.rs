@@ -1,8 +1,10 @@
-//! What can be wrong with a controller's description, and how a step can fail.
+//! Errors of a controller's description, and the ends of a step.
 
 use crate::cone_program;
+use condyle_dynamics::ROTATION_ROUNDING;
+use core::fmt;
 
-/// What is wrong with the description of a controller, found when it is built.
+/// Error in the description of a controller or of a plan, or in a state that is given to one.
 ///
 /// ```
 /// use condyle_wholebody::{FrictionContact, Settings, Task, WholeBodyController};
@@ -14,7 +16,7 @@ use crate::cone_program;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A name of the model is unknown; the message has the nearest one.
+    /// A name of the model is unknown (the message has the nearest one), or a state is invalid.
     #[error(transparent)]
     Model(#[from] condyle_dynamics::Error),
     /// The same frame is listed as a contact twice.
@@ -63,6 +65,24 @@ pub enum Error {
         /// The range.
         allowed: &'static str,
     },
+    /// The effort limit of an actuated coordinate leaves nothing to control it with.
+    #[error("joint `{joint}`: {origin} is {value}, but it must be above 0")]
+    Effort {
+        /// The joint's name.
+        joint: String,
+        /// The limit.
+        value: f64,
+        /// The model or the settings, in words.
+        origin: &'static str,
+    },
+    /// A knot of a plan has an invalid state.
+    #[error("states: knot {knot}: {error}")]
+    Knot {
+        /// Index of the knot.
+        knot: usize,
+        /// The fault, with the joint and the numbers.
+        error: condyle_dynamics::Error,
+    },
     /// A vector has another length than the model needs.
     #[error("`{name}`: expected {expected} numbers, found {found}")]
     Length {
@@ -105,6 +125,61 @@ pub enum Status {
         /// The number.
         value: f64,
     },
+    /// A rotation of the state or of the references is invalid. Nothing was solved.
+    /// [`WholeBodyController::reason`](crate::WholeBodyController::reason) names the joint or the frame.
+    #[error("{0}")]
+    InvalidState(InvalidRotation),
+}
+
+/// Rotation that is invalid, and its numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum InvalidRotation {
+    /// A quaternion or a pair (cos, sin) that does not have length 1, up to 1e-3.
+    Joint {
+        /// `q`, or `posture.q` of the references.
+        name: &'static str,
+        /// Index of the body that the joint moves.
+        body: usize,
+        /// Index in q of the first number.
+        first: usize,
+        /// Index in q after the last number.
+        end: usize,
+        /// Length of the quaternion or of the pair.
+        length: f64,
+    },
+    /// The rotation matrix of a reference's pose is no rotation, up to 1e-2.
+    Pose {
+        /// `frames` or `contacts` of the references.
+        name: &'static str,
+        /// Index of the frame or of the contact.
+        index: usize,
+        /// [`Mat3::rotation_error`](condyle_spatial::Mat3::rotation_error).
+        error: f64,
+    },
+}
+
+impl InvalidRotation {
+    /// The fault with its numbers, without the joint or the frame.
+    pub(crate) fn fault(&self) -> String {
+        match *self {
+            Self::Joint { name, first, end, length, .. } => {
+                format!("its rotation, {name}[{first}..{end}], has the length {length}, expected 1")
+            }
+            Self::Pose { name, index, error } => {
+                format!("{name}[{index}].pose is no rotation: off by {error}, at most {ROTATION_ROUNDING} is allowed")
+            }
+        }
+    }
+}
+
+impl fmt::Display for InvalidRotation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Joint { body, .. } => write!(f, "joint of body {body}: {}", self.fault()),
+            Self::Pose { .. } => f.write_str(&self.fault()),
+        }
+    }
 }
 
 impl From<cone_program::Status> for Status {

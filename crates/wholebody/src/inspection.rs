@@ -72,31 +72,41 @@ pub struct Optimum {
 
 impl WholeBodyController {
     /// Computes the program of the first priority as a step does, without solving it.
+    #[doc(hidden)]
+    #[track_caller]
     pub fn assemble(&mut self, q: &[f64], v: &[f64], references: &References) {
+        self.check_lengths(q, v, references);
         self.update(q, v, references);
         let (program, kinds) = self.equations.program();
         self.levels.assemble(program, kinds, &self.objective.levels[0]);
     }
 
-    /// Solves what was assembled.
+    /// Solves the program that was assembled.
+    #[doc(hidden)]
     pub fn solve_assembled(&mut self) {
         self.levels.solve_assembled(self.equations.program().1);
     }
 
     /// The program of the first priority as it stands before anything is eliminated.
+    #[doc(hidden)]
+    #[track_caller]
     pub fn program(&mut self, q: &[f64], v: &[f64], references: &References) -> Program {
+        self.check_lengths(q, v, references);
         self.update(q, v, references);
         self.objective.levels[0].write(&mut self.equations.program);
         Program::new(&self.equations.program)
     }
 
     /// The program of the first priority as its solver sees it.
+    #[doc(hidden)]
+    #[track_caller]
     pub fn reduced_program(&mut self, q: &[f64], v: &[f64], references: &References) -> Program {
         self.assemble(q, v, references);
         Program::new(self.levels.program())
     }
 
-    /// What the last step's solver of the first priority found.
+    /// The optimum that the last step's solver of the first priority found.
+    #[doc(hidden)]
     pub fn optimum(&self) -> Optimum {
         let solver = self.levels.first_solver();
         let multipliers = solver.multipliers();

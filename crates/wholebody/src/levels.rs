@@ -3,11 +3,16 @@
 //! Of min ½ ‖R x − b‖² over a convex set all minimisers have the same R x; the equality R x = R x* therefore describes them
 //! all. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014), section 2.
 
+use crate::basis::Elimination;
+use crate::carried::Reader;
 use crate::condense::{Condenser, Known};
+#[cfg(feature = "clarabel")]
+use crate::cone_program::Clarabel;
 use crate::cone_program::{
-    Clarabel, ConeProgram, InteriorPoint, Multipliers, Outcome, Settings as SolverSettings, Size, Solver, Start,
+    ConeProgram, InteriorPoint, Multipliers, Outcome, Settings as SolverSettings, Size, Solver, Start,
 };
 use crate::least_squares::LeastSquares;
+#[cfg(feature = "clarabel")]
 use crate::lifted::Lifted;
 use crate::memory::Memory;
 use crate::settings::{Backend, Form, Settings};
@@ -20,11 +25,12 @@ const WIDENED: f64 = 1e-7;
 /// A row whose coefficients all have become smaller than this part of what they were is decided by what is held.
 const DECIDED: f64 = 1e-9;
 
-/// What the solver of a priority gets.
-enum Given {
+/// Program that the solver of a priority gets.
+pub(crate) enum Given {
     /// A program without equalities.
     Condensed(Box<Condenser>, ConeProgram),
     /// A sparse one.
+    #[cfg(feature = "clarabel")]
     Lifted(Lifted),
     /// The program itself.
     Full(ConeProgram),
@@ -32,10 +38,10 @@ enum Given {
 
 /// The solvers, and the solution.
 pub(crate) struct Levels {
-    solvers: Vec<Box<dyn Solver + Send>>,
-    given: Vec<Given>,
+    solvers: Vec<Box<dyn Solver + Send + Sync>>,
+    pub given: Vec<Given>,
     /// The last solution of each.
-    memories: Vec<Memory>,
+    pub memories: Vec<Memory>,
     warm: bool,
     /// The last solution.
     pub x: Vec<f64>,
@@ -43,20 +49,27 @@ pub(crate) struct Levels {
 
 impl Levels {
     /// For programs of at most such a size, of which so many rows have few zeros, and objectives of so many rows.
-    pub(crate) fn new(capacity: Size, dense: usize, rows: &[usize], settings: &Settings) -> Self {
+    pub(crate) fn new(
+        capacity: Size,
+        #[cfg_attr(not(feature = "clarabel"), expect(unused_variables))] dense: usize,
+        rows: &[usize],
+        settings: &Settings,
+    ) -> Self {
         let Settings { tolerance, max_iterations, time_limit, form, .. } = *settings;
         let given = |(level, &objective): (usize, &usize)| match (form, settings.backend) {
             // What former priorities hold may depend on contacts and base: only an elimination sees that.
             _ if level > 0 => Given::condensed(capacity, objective),
             (Form::Condensed, _) => Given::condensed(capacity, objective),
+            #[cfg(feature = "clarabel")]
             (Form::Full, Backend::Clarabel) => Given::Lifted(Lifted::new(capacity, dense, objective)),
             (Form::Full, Backend::InteriorPoint) => Given::Full(ConeProgram::new(capacity)),
         };
         let given: Vec<Given> = rows.iter().enumerate().map(given).collect();
         let solver_settings = SolverSettings { tolerance, max_iterations, time_limit };
-        let solver = |given: &Given| -> Box<dyn Solver + Send> {
+        let solver = |given: &Given| -> Box<dyn Solver + Send + Sync> {
             let capacity = given.program().capacity();
             match settings.backend {
+                #[cfg(feature = "clarabel")]
                 Backend::Clarabel => Box::new(Clarabel::new(capacity, solver_settings)),
                 Backend::InteriorPoint => Box::new(InteriorPoint::new(capacity, solver_settings)),
             }
@@ -161,14 +174,28 @@ impl Given {
 
     fn program(&self) -> &ConeProgram {
         match self {
-            Given::Condensed(_, program) | Given::Full(program) | Given::Lifted(Lifted { program }) => program,
+            Given::Condensed(_, program) | Given::Full(program) => program,
+            #[cfg(feature = "clarabel")]
+            Given::Lifted(Lifted { program }) => program,
         }
+    }
+
+    /// The elimination whose pivots are tried first at the next tick.
+    pub(crate) fn elimination(&self) -> Option<&Elimination> {
+        if let Given::Condensed(condenser, _) = self { Some(&condenser.elimination) } else { None }
+    }
+
+    /// Reads these pivots; `None` if they are none.
+    pub(crate) fn read_elimination(&mut self, from: &mut Reader<'_>) -> Option<()> {
+        let Given::Condensed(condenser, _) = self else { return Some(()) };
+        condenser.elimination.read(&mut condenser.basis, from)
     }
 
     /// Writes what the solver gets.
     fn write(&mut self, from: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         match self {
             Given::Condensed(condenser, program) => condenser.condense(from, known, objective, program),
+            #[cfg(feature = "clarabel")]
             Given::Lifted(lifted) => lifted.write(from, known, objective),
             Given::Full(program) => {
                 program.copy_constraints(from);
@@ -184,6 +211,7 @@ impl Given {
                 solver.start_from(condenser.reduce(x), Multipliers { equalities: &[], ..multipliers });
             }
             Given::Full(_) => solver.start_from(x, multipliers),
+            #[cfg(feature = "clarabel")]
             Given::Lifted(_) => {} // clarabel starts cold
         }
     }
@@ -192,7 +220,9 @@ impl Given {
     fn read(&self, found: &[f64], x: &mut [f64]) {
         match self {
             Given::Condensed(condenser, _) => condenser.basis.expand(found, x),
-            Given::Full(_) | Given::Lifted(_) => x.copy_from_slice(&found[..x.len()]),
+            Given::Full(_) => x.copy_from_slice(&found[..x.len()]),
+            #[cfg(feature = "clarabel")]
+            Given::Lifted(_) => x.copy_from_slice(&found[..x.len()]),
         }
     }
 

@@ -18,7 +18,8 @@
 //! The efforts τ are eliminated: their limits are rows in x. [`Task`]s move the centre of mass, frames, joints, angular
 //! momentum and forces, with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v), by weights or in a strict order of priorities;
 //! [`References`] say where to, tick by tick, and which contacts touch. A step always gives a [`Command`] that is finite and
-//! within the torque limits; its [`Status`] says whether it is the solution.
+//! within the torque limits; its [`Status`] says whether it is the solution. An invalid state or reference (a quaternion that does
+//! not have length 1, a matrix that is no rotation, a number that is not finite) is a status too.
 //!
 //! # Conventions
 //! - q, v, τ as in [condyle_dynamics]; the actuated coordinates are all but those of free-flyers.
@@ -28,12 +29,18 @@
 //! - Memory is fixed by [`WholeBodyController::new`].
 //! - A wrong description is an [`Error`] of `new`; a wrong length panics.
 //!
+//! # Features
+//! On by default: `loaders` (files of robots, and embedded ones) and `threads` (those of rayon). Off by default: `clarabel`, a second
+//! solver for comparison, with its dependencies: `Backend::Clarabel` exists with it.
+//!
 //! Sources: Sentis and Khatib (2005), operational tasks under contact; Herzog et al. (2016), inverse dynamics as a
 //! program in (q̈, f); Lobo et al. (1998), friction as a second-order cone; Baumgarte (1972), drift; Caron, Pham and
 //! Nakamura (2015), the wrench of a sole.
 #![allow(non_snake_case)]
 
 mod basis;
+mod carried;
+mod command;
 mod condense;
 mod cone_program;
 mod contact;
@@ -46,6 +53,7 @@ pub mod inspection;
 mod kinematics;
 mod least_squares;
 mod levels;
+#[cfg(feature = "clarabel")]
 mod lifted;
 mod limits;
 mod memory;
@@ -57,9 +65,10 @@ mod safety;
 mod settings;
 mod task;
 
+pub use command::{Command, CommandSource};
 pub use contact::{FrictionContact, Normal, Shape, SurfaceForces};
-pub use controller::{Command, CommandSource, WholeBodyController};
-pub use error::{Error, Status};
+pub use controller::WholeBodyController;
+pub use error::{Error, InvalidRotation, Status};
 pub use optimality::Optimality;
 pub use plan::{Plan, PlanData};
 pub use references::{ComTarget, ContactTarget, FrameTarget, MomentumTarget, PostureTarget, References};

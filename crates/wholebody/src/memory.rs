@@ -38,13 +38,13 @@ impl Places {
 /// A solution with room for all contacts, and the numbers of it that a program asks for.
 pub(crate) struct Memory {
     /// Whether there is a solution.
-    known: bool,
-    all: Point,
+    pub known: bool,
+    pub all: Point,
     asked: Point,
 }
 
 /// x and the multipliers.
-struct Point {
+pub(crate) struct Point {
     x: Vec<f64>,
     equalities: Vec<f64>,
     rows: Vec<f64>,
@@ -60,6 +60,14 @@ impl Point {
             rows: vec![0.0; rows],
             cones: vec![0.0; cone_rows],
         }
+    }
+
+    pub(crate) fn parts(&self) -> [&Vec<f64>; 4] {
+        [&self.x, &self.equalities, &self.rows, &self.cones]
+    }
+
+    pub(crate) fn parts_mut(&mut self) -> [&mut Vec<f64>; 4] {
+        [&mut self.x, &mut self.equalities, &mut self.rows, &mut self.cones]
     }
 }
 

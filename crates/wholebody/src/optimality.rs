@@ -30,8 +30,11 @@ impl Optimality {
 
 impl WholeBodyController {
     /// The errors of the conditions of optimality at the last step, which was at this state and for these references. For tests
-    /// and demonstrations: it assembles the program anew, and allocates. After a safe command, which is no optimum, they say
-    /// nothing.
+    /// and demonstrations: it assembles the program anew, and allocates. After a safe command, which is no optimum, they mean
+    /// nothing, nor do those of a clone before its first step.
+    ///
+    /// # Panics
+    /// If `q`, `v` or a list of the references has the wrong length.
     ///
     /// ```
     /// # use condyle_dynamics::robots;
@@ -41,11 +44,12 @@ impl WholeBodyController {
     /// # let mut q = vec![0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0];
     /// # q.extend([0.0, 0.7, -1.4, 0.0, -0.7, 1.4, 0.0, 0.7, -1.4, 0.0, -0.7, 1.4]);
     /// let mut controller = WholeBodyController::new(&robot, &feet, &[Task::com(), Task::posture()], Settings::default())?;
-    /// let references = controller.hold(&q);
+    /// let references = controller.hold(&q)?;
     /// controller.step(&q, &[0.0; 18], &references).solved().unwrap();
     /// assert!(controller.optimality(&q, &[0.0; 18], &references).worst() < 1e-6);
     /// # Ok::<(), condyle_wholebody::Error>(())
     /// ```
+    #[track_caller]
     pub fn optimality(&mut self, q: &[f64], v: &[f64], references: &References) -> Optimality {
         let optimum = self.optimum();
         errors(&self.program(q, v, references), &optimum)

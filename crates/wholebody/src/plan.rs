@@ -1,7 +1,8 @@
 //! A planned motion, from plain arrays, as references over time.
 
 use crate::error::Error;
-use condyle_dynamics::{Model, difference, interpolate};
+use condyle_dynamics::{Joint, Model, difference, interpolate};
+use condyle_linalg::check;
 
 /// A planned motion: states at some times, efforts and gains between them, and which contacts touch when.
 ///
@@ -54,13 +55,14 @@ pub(crate) struct PlannedState {
 }
 
 impl Plan {
-    /// For a robot with so many contacts.
+    /// For a robot with this number of contacts.
     ///
     /// # Errors
-    /// [`Error`] for arrays of the wrong length, and for times that are not finite or run backwards.
+    /// [`Error`] for arrays of the wrong length, for numbers that are not finite, for times that run backwards, and for states
+    /// whose quaternions or pairs (cos, sin) do not have length 1: [`Error::Knot`] names the knot and the joint.
     pub fn new(model: &Model, contacts: usize, data: PlanData) -> Result<Self, Error> {
         let (nx, nv) = (model.nq() + model.nv(), model.nv());
-        let free = model.bodies().iter().skip(1).filter(|b| b.joint == condyle_dynamics::Joint::FreeFlyer).count();
+        let free = model.bodies().iter().skip(1).filter(|b| b.joint == Joint::FreeFlyer).count();
         let (controls, knots) = (nv - 6 * free, data.times.len());
         let steps = knots.saturating_sub(1);
         for (name, found, expected, may_be_empty) in [
@@ -79,7 +81,11 @@ impl Plan {
         {
             return wrong("times", data.times[k]);
         }
-        for (name, numbers) in [("states", &data.states), ("controls", &data.controls), ("gains", &data.gains)] {
+        for (knot, x) in data.states.chunks_exact(nx.max(1)).enumerate() {
+            let (q, v) = x.split_at(model.nq());
+            model.check_state(q, v).map_err(|error| Error::Knot { knot, error })?;
+        }
+        for (name, numbers) in [("controls", &data.controls), ("gains", &data.gains)] {
             if let Some(&x) = numbers.iter().find(|x| !x.is_finite()) {
                 return wrong(name, x);
             }
@@ -108,10 +114,12 @@ impl Plan {
         (after - 1, if to > from { ((t - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 })
     }
 
-    /// Panics unless it was made for this robot, or one of the same bodies and joints.
-    pub(crate) fn check(&self, model: &Model) {
+    /// Panics unless the plan was made for this robot, or one of the same bodies and joints, with as many contacts.
+    #[track_caller]
+    pub(crate) fn check(&self, model: &Model, contacts: usize) {
         let same = self.model.tree_hash() == model.tree_hash();
         assert!(same, "plan: made for another model (`{}`) than `{}`", self.model.name(), model.name());
+        assert!(self.contacts == contacts, "plan: expected {contacts} contacts, found {}", self.contacts);
     }
 
     /// q, v and a at a time; before the first and after the last knot at rest in it.
@@ -134,6 +142,7 @@ impl Plan {
     ///
     /// # Panics
     /// If there is no such contact.
+    #[track_caller]
     pub fn activation(&self, contact: usize, t: f64) -> f64 {
         assert!(contact < self.contacts, "contact: expected one of {}, found {contact}", self.contacts);
         let PlanData { times, touches, fade, .. } = &self.data;
@@ -150,11 +159,18 @@ impl Plan {
 
     /// The plan's own control at a state: u = ū + K (x ⊖ x̄), as efforts of all coordinates (nv numbers), 0 at a free-flyer.
     ///
+    /// # Errors
+    /// [`Error::Model`] for a state that is not finite or whose quaternions or pairs (cos, sin) do not have length 1; `tau` is
+    /// left as it was.
+    ///
     /// # Panics
     /// If an argument has the wrong length, or the plan has no controls.
-    pub fn feedback(&self, t: f64, q: &[f64], v: &[f64], tau: &mut [f64]) {
+    #[track_caller]
+    pub fn feedback(&self, t: f64, q: &[f64], v: &[f64], tau: &mut [f64]) -> Result<(), Error> {
         let (nv, nu, k) = (self.model.nv(), self.controls, self.step(t).0);
-        assert!(!self.data.controls.is_empty(), "controls: the plan has none");
+        check("tau", tau.len(), nv);
+        assert!(nu == 0 || !self.data.controls.is_empty(), "controls: the plan has none");
+        self.model.check_state(q, v)?;
         let mut planned = PlannedState { q: vec![0.0; q.len()], v: vec![0.0; nv], a: vec![0.0; nv] };
         let mut dx = vec![0.0; 2 * nv];
         self.read(t, &mut planned, &mut dx[..nv]);
@@ -166,5 +182,6 @@ impl Plan {
             let gain = self.data.gains.get(row..row + 2 * nv).unwrap_or_default();
             *tau = self.data.controls[k * nu + i] + gain.iter().zip(&dx).map(|(k, x)| k * x).sum::<f64>();
         }
+        Ok(())
     }
 }

@@ -1,6 +1,7 @@
-//! What a controller is told at each tick.
+//! The references of a tick.
 
-use crate::error::{Status, finite};
+use crate::error::{InvalidRotation, Status, finite};
+use condyle_dynamics::{Model, PositionFault, ROTATION_ROUNDING};
 use condyle_spatial::{Force, Motion, Se3, Vec3};
 
 /// Where the centre of mass should be, in the world's frame.
@@ -26,7 +27,7 @@ pub struct FrameTarget {
     pub acceleration: Motion<f64>,
 }
 
-/// Where the joints should be; entries of a free-flyer are not read.
+/// Where the joints should be: a state of the robot. Entries of a free-flyer do not act.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PostureTarget {
     /// nq numbers.
@@ -61,7 +62,10 @@ pub struct ContactTarget {
     pub force: Force<f64>,
 }
 
-/// What all tasks aim at during one tick. [`hold`](crate::WholeBodyController::hold) makes one to start from.
+/// References of all tasks during one tick. [`hold`](crate::WholeBodyController::hold) makes one to start from.
+///
+/// [`step`](crate::WholeBodyController::step) checks them: numbers are finite, quaternions and pairs (cos, sin) have length 1
+/// (up to 1e-3), and rotation matrices are rotations (up to 1e-2, in [`rotation_error`](condyle_spatial::Mat3::rotation_error)).
 ///
 /// ```
 /// use condyle_dynamics::{neutral, robots};
@@ -69,7 +73,7 @@ pub struct ContactTarget {
 /// let robot = robots::quadruped();
 /// let contacts = [FrictionContact::point("LF_foot", 0.7), FrictionContact::point("RH_foot", 0.7)];
 /// let mut controller = WholeBodyController::new(&robot, &contacts, &[Task::com()], Settings::default())?;
-/// let mut references = controller.hold(&neutral(&robot));
+/// let mut references = controller.hold(&neutral(&robot))?;
 /// references.com.acceleration.x = 0.5; // lean forward
 /// references.contacts[0].activation = 0.0; // without this foot
 /// assert!((references.contacts[1].force.linear.z - 9.81 * robot.total_mass() / 2.0).abs() < 1e-9);
@@ -90,8 +94,16 @@ pub struct References {
 }
 
 impl References {
+    /// Refuses infinite and NaN numbers, and rotations that are none.
+    pub(crate) fn check(&self, model: &Model) -> Result<(), Status> {
+        self.finite()?;
+        valid_rotations("posture.q", model, &self.posture.q)?;
+        self.frames.iter().enumerate().try_for_each(|(k, target)| rotates("frames", k, &target.pose))?;
+        self.contacts.iter().enumerate().try_for_each(|(k, target)| rotates("contacts", k, &target.pose))
+    }
+
     /// Refuses infinite and NaN numbers.
-    pub(crate) fn finite(&self) -> Result<(), Status> {
+    fn finite(&self) -> Result<(), Status> {
         let ComTarget { position, velocity, acceleration } = self.com;
         finite("com", [position, velocity, acceleration].into_iter().flat_map(Vec3::to_array))?;
         let frame = |f: &FrameTarget| pose(f.pose).chain(f.velocity.to_array()).chain(f.acceleration.to_array());
@@ -107,4 +119,21 @@ impl References {
 /// Translation, then the rotation by columns.
 fn pose(Se3 { rotation, translation }: Se3<f64>) -> impl Iterator<Item = f64> {
     [translation, rotation.x, rotation.y, rotation.z].into_iter().flat_map(Vec3::to_array)
+}
+
+/// `Ok` if all rotations of a position have length 1; the numbers are finite.
+pub(crate) fn valid_rotations(name: &'static str, model: &Model, q: &[f64]) -> Result<(), Status> {
+    let Some(fault) = model.rotation_fault(q) else { return Ok(()) };
+    let PositionFault { body, first, end, value: length } = fault;
+    Err(Status::InvalidState(InvalidRotation::Joint { name, body, first, end, length }))
+}
+
+/// `Ok` if the pose of a target rotates; its numbers are finite.
+fn rotates(name: &'static str, index: usize, pose: &Se3<f64>) -> Result<(), Status> {
+    let error = pose.rotation.rotation_error();
+    if error <= ROTATION_ROUNDING {
+        Ok(())
+    } else {
+        Err(Status::InvalidState(InvalidRotation::Pose { name, index, error }))
+    }
 }

@@ -9,14 +9,14 @@ use nalgebra::{Matrix6, Vector6};
 pub(crate) struct Safety {
     data: Data<f64>,
     /// The torques of the last solution; 0 before the first.
-    tau: Vec<f64>,
+    pub tau: Vec<f64>,
     /// How many ticks ago it was, if there was one.
-    age: Option<u32>,
-    /// The last state that was finite.
-    q: Vec<f64>,
-    v: Vec<f64>,
+    pub age: Option<u32>,
+    /// The last valid state.
+    pub q: Vec<f64>,
+    pub v: Vec<f64>,
     /// Whether that is the current one.
-    current: bool,
+    pub current: bool,
     /// Greatest effort of each coordinate.
     effort: Vec<f64>,
     damping: f64,
@@ -39,7 +39,7 @@ impl Safety {
         }
     }
 
-    /// The state of a tick, if it is finite.
+    /// Takes the state of a tick, if it is valid.
     pub(crate) fn see(&mut self, state: Option<(&[f64], &[f64])>) {
         self.current = state.is_some();
         if let Some((q, v)) = state {
@@ -83,6 +83,8 @@ impl Safety {
         }
         free.iter().for_each(|&i| tau[i] = 0.0);
         self.clip(tau);
+        // positions and velocities of 1e300 overflow
+        tau.iter_mut().filter(|tau| !tau.is_finite()).for_each(|tau| *tau = 0.0);
         false
     }
 

@@ -2,10 +2,12 @@
 
 use crate::error::Error;
 use crate::task::Gains;
-use condyle_dynamics::Model;
+use condyle_dynamics::{Joint, Model};
+use std::fmt;
 
-/// How the friction cone is described.
+/// Description of the friction cone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Friction {
     /// ‖f_t‖ ≤ μ f_n, a second-order cone.
     Cone,
@@ -18,18 +20,30 @@ pub enum Friction {
     },
 }
 
-/// Which solver.
+/// Solver of the cone programs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Backend {
-    /// clarabel, the reference.
+    /// clarabel, the reference. It exists with the feature `clarabel`, which is off by default.
+    #[cfg(feature = "clarabel")]
     Clarabel,
     /// Our own dense interior point method, warm-started from the last tick.
     InteriorPoint,
 }
 
-/// In which unknowns the program is solved; the solution is the same.
+impl fmt::Display for Backend {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            #[cfg(feature = "clarabel")]
+            Self::Clarabel => "clarabel",
+            Self::InteriorPoint => "interior point",
+        })
+    }
+}
+
+/// Unknowns in which the program is solved; the solution is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Form {
     /// The rows of the base and of the contacts are eliminated first.
     Condensed,
@@ -92,7 +106,8 @@ pub struct Settings {
     pub max_correction: f64,
     /// Cones or pyramids.
     pub friction: Friction,
-    /// Greatest effort of each coordinate, nv numbers (N m, N), infinite where there is none; `None` for the model's.
+    /// Greatest effort of each coordinate, nv numbers (N m, N), infinite where there is none; `None` for the model's. Above 0
+    /// for each actuated coordinate.
     pub effort: Option<Vec<f64>>,
     /// Limits of the joints' position and velocity; `None` for none.
     pub joint_limits: Option<JointLimits>,
@@ -165,17 +180,37 @@ impl Settings {
         }
         let (nq, nv) = (model.nq(), model.nv());
         for (name, numbers, expected, least) in [
-            ("effort", &self.effort, nv, 0.0),
-            ("joint_limits.lower", &limits.lower, nq, f64::NEG_INFINITY),
-            ("joint_limits.upper", &limits.upper, nq, f64::NEG_INFINITY),
-            ("joint_limits.velocity", &limits.velocity, nv, 0.0),
+            ("effort", &self.effort, nv, None), // its numbers: `check_effort`
+            ("joint_limits.lower", &limits.lower, nq, Some(f64::NEG_INFINITY)),
+            ("joint_limits.upper", &limits.upper, nq, Some(f64::NEG_INFINITY)),
+            ("joint_limits.velocity", &limits.velocity, nv, Some(0.0)),
         ] {
             let Some(numbers) = numbers else { continue };
             if numbers.len() != expected {
                 return Err(Error::Length { name, expected, found: numbers.len() });
             }
-            if let Some(&value) = numbers.iter().find(|&&x| x.is_nan() || x < least) {
+            let wrong = |least: f64| numbers.iter().find(move |&&x| x.is_nan() || x < least);
+            if let Some(&value) = least.and_then(wrong) {
                 return Err(Error::Setting { name, value, allowed: "at least 0, or any number for a position" });
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses efforts of actuated coordinates that are not above 0, by the joint's name.
+    pub(crate) fn check_effort(&self, model: &Model) -> Result<(), Error> {
+        let origin = match self.effort {
+            Some(_) => "setting `effort`",
+            None => "the model's limit of effort (the setting `effort` replaces it)",
+        };
+        for body in model.bodies().iter().skip(1).filter(|body| body.mimic.is_none()) {
+            let limits = &self.effort(model)[body.idx_v..body.idx_v + body.joint.nv()];
+            if body.joint == Joint::FreeFlyer {
+                let wrong = limits.iter().find(|&&x| x.is_nan() || x < 0.0); // no motor acts here
+                let error = |&value: &f64| Error::Setting { name: "effort", value, allowed: "at least 0" };
+                wrong.map_or(Ok(()), |value| Err(error(value)))?;
+            } else if let Some(&value) = limits.iter().find(|&&x| x.is_nan() || x <= 0.0) {
+                return Err(Error::Effort { joint: body.joint_name.clone(), value, origin });
             }
         }
         Ok(())

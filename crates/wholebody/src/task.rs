@@ -65,8 +65,9 @@ impl TaskKind {
     }
 }
 
-/// Along whose axes the numbers of a task are, which its mask picks from.
+/// Axes along which the numbers of a task are, from which its mask picks.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Axes {
     /// The world's.
     World,

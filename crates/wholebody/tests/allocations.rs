@@ -20,7 +20,7 @@ fn assembly_allocates_nothing() {
         let tasks = [humanoid_tasks(), vec![Task { priority, ..Task::pose("left_hand") }]].concat();
         let mut controller =
             WholeBodyController::new(&model, &soles(0.7), &tasks, Settings { backend, ..Settings::default() }).unwrap();
-        let mut references = controller.hold(&q);
+        let mut references = controller.hold(&q).unwrap();
         for round in 0..3 {
             for set in [3u32, 1, 3, 2, 0] {
                 for k in 0..2 {

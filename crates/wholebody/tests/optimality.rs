@@ -13,7 +13,7 @@ fn standing_still() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let contacts = feet(0.7);
     let mut controller = controller(&model, &contacts);
-    let references = controller.hold(&q);
+    let references = controller.hold(&q).unwrap();
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
     // All tasks agree with rest; only the equal shares of the weight do not, with a weight of 1e-7.
@@ -29,7 +29,7 @@ fn moving_anyhow() {
     let model = robots::quadruped();
     let contacts = feet(0.7);
     let mut controller = controller(&model, &contacts);
-    let references = controller.hold(&stance());
+    let references = controller.hold(&stance()).unwrap();
     for seed in 0..100 {
         let (q, v) = state(&model, seed, 0.1, 0.3);
         let command = controller.step(&q, &v, &references).solved().unwrap_or_else(|status| panic!("{seed}: {status}"));
@@ -48,7 +48,7 @@ fn a_humanoid_on_two_points() {
         WholeBodyController::new(&model, &contacts, &[Task::com(), Task::posture()], Settings::default()).unwrap();
     for seed in 0..20 {
         let (q, v) = near(&model, &neutral(&model), seed, 0.2, 0.1);
-        let references = controller.hold(&q);
+        let references = controller.hold(&q).unwrap();
         let command = controller.step(&q, &v, &references).solved().unwrap_or_else(|status| panic!("{seed}: {status}"));
         check(&model, &contacts, &q, &v, &references, command);
     }
@@ -61,7 +61,7 @@ fn a_feasible_task_is_met() {
     let settings = Settings { force_weight: 1e-9, acceleration_weight: 1e-9, ..Settings::default() };
     let tasks = [Task::com(), Task::orientation("trunk")];
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks, settings).unwrap();
-    let mut references = controller.hold(&q);
+    let mut references = controller.hold(&q).unwrap();
     references.com.acceleration = Vec3::new(0.5, -0.4, 0.3);
     let c = controller.step(&q, &v, &references).solved().unwrap().com_acceleration;
     assert!(norm(c - references.com.acceleration) < 1e-5, "{c:?}");
@@ -73,7 +73,7 @@ fn little_friction_tilts_forces_to_the_cone() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let contacts = feet(0.1);
     let mut controller = controller(&model, &contacts);
-    let mut references = controller.hold(&q);
+    let mut references = controller.hold(&q).unwrap();
     references.com.acceleration.x = 3.0; // of which 0.1 · 9.81 can be had
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
@@ -94,7 +94,7 @@ fn friction_has_no_preferred_direction() {
     let mut controller = controller(&model, &contacts);
     for k in 0..8 {
         let angle = f64::from(k) * std::f64::consts::TAU / 8.0;
-        let mut references = controller.hold(&q);
+        let mut references = controller.hold(&q).unwrap();
         references.com.acceleration = Vec3::new(3.0 * angle.cos(), 3.0 * angle.sin(), 0.0);
         let command = controller.step(&q, &v, &references).solved().unwrap();
         let sum = command.forces.iter().fold(Vec3::zero(), |sum, &f| sum + f.linear);
@@ -106,12 +106,12 @@ fn friction_has_no_preferred_direction() {
 fn torque_limits_bind() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let contacts = feet(0.7);
-    let free = controller(&model, &contacts).step(&q, &v, &{ controller(&model, &contacts).hold(&q) }).clone();
+    let free = controller(&model, &contacts).step(&q, &v, &{ controller(&model, &contacts).hold(&q).unwrap() }).clone();
     let strongest = max_abs(free.tau.iter().copied());
     let limit = 0.5 * strongest; // more than internal forces can make up for
     let settings = Settings { effort: Some(vec![limit; 18]), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks(), settings).unwrap();
-    let references = controller.hold(&q);
+    let references = controller.hold(&q).unwrap();
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
     let used = max_abs(command.tau.iter().copied());
@@ -127,7 +127,7 @@ fn force_bounds_bind() {
     contacts[0].max_force = 50.0;
     contacts[3].min_force = 95.0;
     let mut controller = controller(&model, &contacts);
-    let references = controller.hold(&q);
+    let references = controller.hold(&q).unwrap();
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
     assert!(command.forces[0].linear.z < 50.0 + EQUALITY && command.forces[3].linear.z > 95.0 - EQUALITY);
@@ -143,7 +143,7 @@ fn a_slope_is_a_tilted_world() {
     let leaning = model.clone().with_gravity(Vec3::new(-9.81 * sin, 0.0, -9.81 * cos)).unwrap();
     let contacts = feet(0.5);
     let mut level = controller(&leaning, &contacts);
-    let references = level.hold(&q);
+    let references = level.hold(&q).unwrap();
     let expected = level.step(&q, &v, &references).solved().unwrap().clone();
     // Gravity is straight; base and normals are turned by −slope about y.
     let mut turned = q.clone();
@@ -153,7 +153,7 @@ fn a_slope_is_a_tilted_world() {
     let normal = Normal::World(Vec3::new(-2.0 * sin, 0.0, 2.0 * cos)); // of any length
     let contacts: Vec<_> = contacts.into_iter().map(|c| FrictionContact { normal, ..c }).collect();
     let mut tilted = controller(&model, &contacts);
-    let references = tilted.hold(&turned);
+    let references = tilted.hold(&turned).unwrap();
     let found = tilted.step(&turned, &v, &references).solved().unwrap();
     for (f, e) in found.forces.iter().zip(&expected.forces) {
         let e = e.linear;
@@ -169,7 +169,7 @@ fn contacts_are_pulled_back() {
     let gains = Gains { stiffness: 400.0, damping: 40.0 };
     let settings = Settings { contact_gains: gains, ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks(), settings).unwrap();
-    let (q, mut references) = (stance(), controller.hold(&stance()));
+    let (q, mut references) = (stance(), controller.hold(&stance()).unwrap());
     references.contacts[1].pose.translation.x += 1e-3;
     let command = controller.step(&q, &[0.0; 18], &references).solved().unwrap();
     let (feet, _) = accelerations(&model, &contacts, &q, &[0.0; 18], &command.a);
@@ -183,7 +183,7 @@ fn a_fixed_base_arm_leans_on_its_tool() {
     let q = [0.3, 0.6, 0.0, 1.2, 0.0, 0.5, 0.0];
     let contact = FrictionContact { min_force: 20.0, ..FrictionContact::point("tool", 0.5) };
     let mut controller = WholeBodyController::new(&model, &[contact], &[Task::posture()], Settings::default()).unwrap();
-    let references = controller.hold(&q);
+    let references = controller.hold(&q).unwrap();
     let command = controller.step(&q, &[0.0; 7], &references).solved().unwrap();
     assert!(command.forces[0].linear.z > 20.0 - EQUALITY);
     assert!(command.tau.iter().all(|&tau| tau != 0.0));
@@ -194,7 +194,7 @@ fn what_cannot_be_is_infeasible() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let contacts: Vec<_> = feet(0.7).into_iter().map(|c| FrictionContact { min_force: 1000.0, ..c }).collect();
     let mut controller = controller(&model, &contacts);
-    let references = controller.hold(&q);
+    let references = controller.hold(&q).unwrap();
     assert_eq!(controller.step(&q, &v, &references).status, Status::Infeasible); // knees of 80 N m
 }
 
@@ -206,7 +206,7 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     let (q, v) = state(&model, 3, 0.05, 0.05);
     let settings = Settings { force_weight: 1e-5, ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks(), settings).unwrap();
-    let mut references = controller.hold(&q);
+    let mut references = controller.hold(&q).unwrap();
     references.com.acceleration = Vec3::new(0.3, -0.2, 0.4);
     let command = controller.step(&q, &v, &references).solved().unwrap();
     for (contact, &f) in contacts.iter().zip(&command.forces) {

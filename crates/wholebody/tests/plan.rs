@@ -32,7 +32,7 @@ fn references_follow_the_plan() {
     assert_eq!(plan.span(), [0.0, 0.4]);
     let tasks = [tasks(), vec![Task::position("LF_foot")]].concat();
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks, Settings::default()).unwrap();
-    let mut references = controller.hold(&stance());
+    let mut references = controller.hold(&stance()).unwrap();
     let height = references.com.position.z;
     controller.track(&plan, 0.1, &mut references);
     assert!((references.com.position.z - height - 0.002).abs() < 1e-12);
@@ -68,7 +68,7 @@ fn feedback_is_the_plans() {
     let mut up = vec![0.0; 18];
     up[2] = 0.01;
     integrate(&model, &stance(), &up, &mut q);
-    plan.feedback(0.0, &q, &[0.0; 18], &mut tau);
+    plan.feedback(0.0, &q, &[0.0; 18], &mut tau).unwrap();
     assert_eq!(tau[..6], [0.0; 6]);
     assert!((tau[6] - 1.0).abs() < 1e-12, "0 + 100 · 0.01 m");
     assert_eq!(tau[7..], (1..12).map(f64::from).collect::<Vec<_>>());
@@ -91,6 +91,43 @@ fn wrong_arrays_are_named() {
     );
 }
 
+/// Knots whose rotation does not have length 1, by any factor, and numbers that are not finite.
+#[test]
+fn states_are_checked() {
+    let model = robots::quadruped();
+    let refusal = |change: &dyn Fn(&mut [f64])| {
+        let mut data = data(&model);
+        change(&mut data.states[2 * 37..][..37]);
+        Plan::new(&model, 4, data).unwrap_err().to_string()
+    };
+    for factor in [0.0, 1.1, 2.0] {
+        let expected = format!("its rotation, q[3..7], has the length {factor}, expected 1");
+        let found = refusal(&|x| x[3..7].iter_mut().for_each(|x| *x *= factor));
+        assert_eq!(found, format!("states: knot 2: joint `root_joint`: {expected}"));
+    }
+    let found = refusal(&|x| x[19 + 6] = f64::INFINITY);
+    assert_eq!(found, "states: knot 2: joint `LF_HAA`: v[6] is inf, which is not finite");
+    let found = refusal(&|x| x[7] = f64::NAN);
+    assert_eq!(found, "states: knot 2: joint `LF_HAA`: q[7] is NaN, which is not finite");
+
+    let plan = Plan::new(&model, 4, data(&model)).unwrap();
+    let (mut q, mut tau) = (stance(), vec![7.0; 18]);
+    q[6] = 1.1;
+    let error = plan.feedback(0.0, &q, &[0.0; 18], &mut tau).unwrap_err().to_string();
+    assert_eq!(error, "joint `root_joint`: its rotation, q[3..7], has the length 1.1, expected 1");
+    assert_eq!(tau, [7.0; 18], "no efforts are written");
+}
+
+#[test]
+#[should_panic(expected = "plan: expected 3 contacts, found 4")]
+fn a_plan_of_other_contacts_is_refused() {
+    let model = robots::quadruped();
+    let plan = Plan::new(&model, 4, data(&model)).unwrap();
+    let mut controller = WholeBodyController::new(&model, &feet(0.7)[..3], &tasks(), Settings::default()).unwrap();
+    let mut references = controller.hold(&stance()).unwrap();
+    controller.track(&plan, 0.1, &mut references);
+}
+
 /// A robot with as many coordinates, whose knees slide.
 #[test]
 #[should_panic(expected = "plan: made for another model (`sliding`) than `quadruped`")]
@@ -104,6 +141,6 @@ fn a_plan_of_another_robot_is_refused() {
     assert_eq!((other.nq(), other.nv()), (model.nq(), model.nv()));
     let plan = Plan::new(&other, 4, data(&other)).unwrap();
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), Settings::default()).unwrap();
-    let mut references = controller.hold(&stance());
+    let mut references = controller.hold(&stance()).unwrap();
     controller.track(&plan, 0.1, &mut references);
 }

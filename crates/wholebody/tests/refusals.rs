@@ -1,10 +1,15 @@
-//! What is wrong is named: descriptions by `Error`, states and failed solves by `Status`, lengths by a panic.
+//! Faults are named: descriptions by `Error`, states and failed solves by `Status`, lengths by a panic.
 
 mod common;
 
 use common::*;
 use condyle_dynamics::{Vec3, robots};
-use condyle_wholebody::{Axes, Error, Friction, FrictionContact, Normal, Settings, Task, WholeBodyController};
+use condyle_wholebody::{
+    Axes, Backend, Command, CommandSource, Error, Friction, FrictionContact, Normal, Plan, PlanData, References,
+    Settings, Status, Task, WholeBodyController,
+};
+use std::cell::RefCell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 fn refusal(contacts: &[FrictionContact], tasks: &[Task], settings: Settings) -> String {
     WholeBodyController::new(&robots::quadruped(), contacts, tasks, settings).unwrap_err().to_string()
@@ -79,17 +84,100 @@ fn descriptions() {
 }
 
 #[test]
-#[should_panic(expected = "references.contacts: expected 4 entries, found 3")]
+#[should_panic(expected = "references.contacts: expected 4 numbers, found 3")]
 fn lengths() {
     let model = robots::quadruped();
     let mut controller = controller(&model, &feet(0.7));
-    let mut references = controller.hold(&stance());
+    let mut references = controller.hold(&stance()).unwrap();
     references.contacts.pop();
     let _ = controller.step(&stance(), &[0.0; 18], &references);
 }
 
+/// An effort of 0 leaves nothing to control a joint with: the model's is refused by the joint's name, and replaced by a setting.
 #[test]
-fn a_controller_moves_between_threads() {
-    fn is_send<T: Send>() {}
-    is_send::<WholeBodyController>();
+fn efforts_are_above_0() {
+    let model = robots::quadruped();
+    let mut limits = model.limits().clone();
+    limits.effort[7] = 0.0; // of LF_HFE
+    let powerless = model.clone().with_limits(limits).unwrap();
+    let new = |model, settings| WholeBodyController::new(model, &feet(0.7), &tasks(), settings).map(drop);
+    let error = new(&powerless, Settings::default()).unwrap_err().to_string();
+    let expected =
+        "joint `LF_HFE`: the model's limit of effort (the setting `effort` replaces it) is 0, but it must be above 0";
+    assert_eq!(error, expected);
+    let effort = |joint: f64, base: f64| {
+        let mut effort = vec![80.0; 18];
+        (effort[7], effort[2]) = (joint, base);
+        Settings { effort: Some(effort), ..Settings::default() }
+    };
+    assert_eq!(new(&powerless, effort(80.0, 0.0)), Ok(()), "no motor acts on the base");
+    assert_eq!(
+        new(&model, effort(80.0, -1.0)).unwrap_err().to_string(),
+        "setting `effort` is -1, but it must be at least 0"
+    );
+    for value in [0.0, -0.0, -80.0, f64::NAN] {
+        let error = new(&model, effort(value, 80.0)).unwrap_err().to_string();
+        assert_eq!(error, format!("joint `LF_HFE`: setting `effort` is {value}, but it must be above 0"));
+    }
+}
+
+/// The place of a panic is the caller's.
+#[test]
+fn panics_point_at_the_caller() {
+    let model = robots::quadruped();
+    let mut controller = controller(&model, &feet(0.7));
+    let references = controller.hold(&stance()).unwrap();
+    let x = [stance(), vec![0.0; 18]].concat();
+    let data = PlanData { times: vec![0.0, 0.5], states: x.repeat(2), touches: vec![true; 4], ..PlanData::default() };
+    let plan = Plan::new(&model, 4, data).unwrap();
+    let mut short = references.clone();
+    short.contacts.pop();
+    let (q, v) = (stance(), [0.0; 18]);
+
+    type Call<'a> = &'a mut dyn FnMut(&mut WholeBodyController);
+    // of this thread alone: other tests panic meanwhile
+    thread_local!(static PLACE: RefCell<Option<(String, String)>> = const { RefCell::new(None) });
+    std::panic::set_hook(Box::new(|panic| {
+        let file = panic.location().map(|place| place.file().to_owned()).unwrap_or_default();
+        PLACE.set(Some((file, panic.payload_as_str().unwrap_or_default().to_owned())));
+    }));
+    let mut place_of = |call: Call<'_>| {
+        assert!(catch_unwind(AssertUnwindSafe(|| call(&mut controller))).is_err());
+        PLACE.take().unwrap()
+    };
+    let calls: [(&str, Call<'_>); 8] = [
+        ("q: expected 19 numbers, found 3", &mut |c| drop(c.hold(&q[..3]))),
+        ("q: expected 19 numbers, found 3", &mut |c| drop(c.step(&q[..3], &v, &references).clone())),
+        ("v: expected 18 numbers, found 3", &mut |c| drop(c.step(&q, &v[..3], &references).clone())),
+        ("references.contacts: expected 4 numbers, found 3", &mut |c| drop(c.step(&q, &v, &short).clone())),
+        ("references.contacts: expected 4 numbers, found 3", &mut |c| c.track(&plan, 0.0, &mut short.clone())),
+        ("references.contacts: expected 4 numbers, found 3", &mut |c| _ = c.optimality(&q, &v, &short)),
+        ("contact: expected one of 4, found 4", &mut |_| _ = plan.activation(4, 0.0)),
+        ("controls: the plan has none", &mut |_| drop(plan.feedback(0.0, &q, &v, &mut [0.0; 18]))),
+    ];
+    let places = calls.map(|(expected, call)| (expected, place_of(call)));
+    let _ = std::panic::take_hook();
+    for (expected, (file, message)) in places {
+        assert_eq!(message, expected);
+        assert!(file.ends_with("refusals.rs"), "`{message}` points at {file}");
+    }
+}
+
+#[test]
+fn a_controller_is_shared_between_threads() {
+    fn is_usual<T: Clone + Send + Sync + std::fmt::Debug>() {}
+    is_usual::<WholeBodyController>();
+    is_usual::<References>();
+    is_usual::<Plan>();
+    is_usual::<Command>();
+    is_usual::<Settings>();
+    is_usual::<Error>();
+    is_usual::<Status>();
+}
+
+#[test]
+fn words_for_users() {
+    let sources = [CommandSource::Solution, CommandSource::LastSolution, CommandSource::GravityCompensation];
+    assert_eq!(sources.map(|s| s.to_string()), ["solution", "last solution", "gravity compensation"]);
+    assert_eq!([Backend::Clarabel, Backend::InteriorPoint].map(|b| b.to_string()), ["clarabel", "interior point"]);
 }

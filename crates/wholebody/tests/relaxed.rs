@@ -27,7 +27,7 @@ fn both_solve(model: &Model, contacts: &[FrictionContact], tasks: &[Task], stanc
             let limits = JointLimits { upper: Some(upper.clone()), ..JointLimits::default() };
             let settings = Settings { backend, joint_limits: Some(limits), ..Settings::default() };
             let mut controller = WholeBodyController::new(model, contacts, tasks, settings).unwrap();
-            let references = controller.hold(stance);
+            let references = controller.hold(stance).unwrap();
             controller.step(&q, &v, &references).clone()
         });
         let [ours, theirs] = &commands;

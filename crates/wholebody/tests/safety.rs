@@ -1,7 +1,11 @@
 //! Whatever happens there is a command: finite, within the torque limits, its status said.
 #![allow(non_snake_case)]
 
+#[path = "safety/clones.rs"]
+mod clones;
 mod common;
+#[path = "safety/invalid.rs"]
+mod invalid;
 
 use common::*;
 use condyle_dynamics::{Data, gravity, integrate, robots};
@@ -25,7 +29,7 @@ fn the_last_solution_then_gravity_compensation() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let effort = model.limits().effort.clone();
     let mut controller = controller(&model, &feet(0.7));
-    let references = controller.hold(&q);
+    let references = controller.hold(&q).unwrap();
     let good = controller.step(&q, &v, &references).solved().unwrap().clone();
     let mut bad = references.clone();
     bad.com.position.x = f64::NAN;
@@ -51,7 +55,7 @@ fn a_state_that_is_not_finite() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let effort = model.limits().effort.clone();
     let mut controller = controller(&model, &feet(0.7));
-    let references = controller.hold(&q);
+    let references = controller.hold(&q).unwrap();
     let (mut no_q, mut no_v) = (q.clone(), v.clone());
     (no_q[8], no_v[3]) = (f64::NAN, f64::INFINITY);
     for tick in 0..20 {
@@ -77,7 +81,7 @@ fn nothing_breaks_the_limits() {
     for (contacts, max_iterations) in [(heavy, 50), (soles(0.7), 2), (soles(0.7), 6), (soles(0.05), 50)] {
         let settings = Settings { max_iterations, hold_ticks: 1, ..Settings::default() };
         let mut controller = WholeBodyController::new(&model, &contacts, &humanoid_tasks(), settings).unwrap();
-        let references = controller.hold(&squat(&model));
+        let references = controller.hold(&squat(&model)).unwrap();
         for seed in 0..30 {
             let (q, v) = near(&model, &squat(&model), seed, 0.3, 5.0);
             let command = controller.step(&q, &v, &references);
@@ -97,7 +101,7 @@ fn too_slow_is_a_status() {
     for backend in [Backend::InteriorPoint, Backend::Clarabel] {
         let settings = Settings { backend, time_limit: 1e-12, ..Settings::default() };
         let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();
-        let references = controller.hold(&q);
+        let references = controller.hold(&q).unwrap();
         for _ in 0..10 {
             let command = controller.step(&q, &v, &references);
             is_safe(command, &effort);
@@ -111,7 +115,7 @@ fn too_slow_is_a_status() {
 fn compensation_without_contacts() {
     let model = robots::quadruped();
     let mut controller = controller(&model, &[]);
-    let references = controller.hold(&stance());
+    let references = controller.hold(&stance()).unwrap();
     let mut bad = references.clone();
     bad.momentum.rate.y = f64::INFINITY;
     let command = controller.step(&stance(), &[0.0; 18], &bad);
@@ -138,7 +142,7 @@ fn joints_stay_within_their_limits() {
     for beyond in [false, true] {
         let mut controller = WholeBodyController::new(&model, &[], &tasks, settings.clone()).unwrap();
         let (mut q, mut v) = (stance(), vec![0.0; 18]);
-        let mut references = controller.hold(&q);
+        let mut references = controller.hold(&q).unwrap();
         for i in 7..19 {
             references.posture.q[i] += if i % 2 == 0 { 1.0 } else { -1.0 }; // far outside
             if beyond {
@@ -185,7 +189,7 @@ fn limits_give_way_to_contacts() {
     let limits = JointLimits { upper: Some(upper), ..JointLimits::default() };
     let settings = Settings { joint_limits: Some(limits), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();
-    let references = controller.hold(&q);
+    let references = controller.hold(&q).unwrap();
     let command = controller.step(&q, &[0.0; 18], &references);
     check(&model, &feet(0.7), &q, &[0.0; 18], &references, command);
     assert!(command.limits_relaxed);

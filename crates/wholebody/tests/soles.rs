@@ -23,7 +23,7 @@ fn solve(
     change: impl Fn(&mut References),
 ) -> (References, Command) {
     let mut controller = WholeBodyController::new(model, contacts, tasks, settings).unwrap();
-    let mut references = controller.hold(q);
+    let mut references = controller.hold(q).unwrap();
     change(&mut references);
     let command = controller.step(q, v, &references).solved().unwrap().clone();
     (references, command)
@@ -35,7 +35,7 @@ fn a_humanoid_stands_on_soles() {
     for contacts in [soles(0.7), soles(0.7).into_iter().map(FrictionContact::by_corners).collect()] {
         let mut controller =
             WholeBodyController::new(&model, &contacts, &humanoid_tasks(), Settings::default()).unwrap();
-        let references = controller.hold(&squat(&model));
+        let references = controller.hold(&squat(&model)).unwrap();
         for seed in 0..20 {
             let (q, v) = near(&model, &squat(&model), seed, 0.02, 0.05);
             let command = controller.step(&q, &v, &references);

@@ -19,7 +19,7 @@ fn every_set_of_contacts() {
         WholeBodyController::new(&model, contacts, &tasks(), settings).unwrap()
     };
     let mut controller = make(&contacts);
-    let hold = controller.hold(&stance());
+    let hold = controller.hold(&stance()).unwrap();
     for (seed, set) in (0..16).chain((0..16).rev()).enumerate() {
         let (q, v) = state(&model, seed as u64, 0.05, 0.1);
         let mut references = hold.clone();
@@ -44,7 +44,7 @@ fn free_fall_is_a_tick_like_others() {
     let model = robots::quadruped();
     for contacts in [vec![], feet(0.7)] {
         let mut controller = controller(&model, &contacts);
-        let mut references = controller.hold(&stance());
+        let mut references = controller.hold(&stance()).unwrap();
         references.contacts.iter_mut().for_each(|c| c.activation = 0.0);
         let (q, v) = state(&model, 1, 0.1, 1.0);
         let command = controller.step(&q, &v, &references);
@@ -65,7 +65,7 @@ fn fading_contacts_do_not_jerk() {
     let settings = Settings { contact_gains: Gains::critical(100.0), tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks, settings).unwrap();
     let (mut q, mut v) = (squat(&model), vec![0.0; 38]);
-    let mut references = controller.hold(&q);
+    let mut references = controller.hold(&q).unwrap();
     let aside = references.contacts[0].pose.translation.y - references.com.position.y;
     let dt = 1e-3;
     let mut before: Option<Vec<f64>> = None;

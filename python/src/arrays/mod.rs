@@ -36,6 +36,8 @@ pub(crate) trait Number: Scalar {
         value: &Bound<'py, PyAny>,
         shape: &[usize],
     ) -> PyResult<Self::Input<'py, D>>;
+    /// The number without its derivatives.
+    fn real(&self) -> f64;
     /// Reads a number.
     fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
     /// Gives an array in C order, the caller's or a new one, when it is filled; `fill` sets all of its numbers.
@@ -60,6 +62,9 @@ impl Number for f64 {
         shape: &[usize],
     ) -> PyResult<Self::Input<'py, D>> {
         input::InPlace::read(argument, value, shape)
+    }
+    fn real(&self) -> f64 {
+        *self
     }
     fn read_one(_: &str, value: &Bound<'_, PyAny>) -> PyResult<Self> {
         value.extract()

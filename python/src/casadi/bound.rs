@@ -3,7 +3,7 @@
 
 use super::chart::{Chart, Position};
 use super::computation::{Calls, Computation};
-use condyle::Error;
+use condyle::ModelError as Error;
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::ffi::CString;

@@ -2,7 +2,7 @@
 //! Knows nothing of CasADi.
 
 use super::chart::Chart;
-use condyle::Error;
+use condyle::ModelError as Error;
 use nalgebra::DMatrix;
 
 /// A result: a matrix.

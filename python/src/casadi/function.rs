@@ -3,7 +3,7 @@
 use super::computation::Output;
 use crate::hyper_dual::Hyper;
 use condyle::{
-    ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Error, Matrix, Model, ReferenceFrame,
+    ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Matrix, Model, ModelError as Error, ReferenceFrame,
     RneaSecondDerivatives, Scalar, Vec3,
 };
 use nalgebra::DMatrix;

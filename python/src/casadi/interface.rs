@@ -10,7 +10,7 @@
 
 use super::bound::{Bound, Description, HESSIAN, JACOBIAN, Port, REVERSE, VALUE};
 use super::computation::Computation;
-use condyle::Error;
+use condyle::ModelError as Error;
 use core::ffi::{c_char, c_int};
 use core::ptr::null;
 use core::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};

@@ -10,7 +10,7 @@
 use super::chart::Chart;
 use super::computation::{Calls, Computation, Output};
 use condyle::optimal::{ActionModel, Hessian, LqNode};
-use condyle::{Error, Model};
+use condyle::{Model, ModelError as Error};
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};

@@ -4,7 +4,7 @@ use super::chart::Chart;
 use super::computation::{Calls, Computation, Output};
 use super::function::{DualScratch, Kind, Pattern, Scratch};
 use super::lanes::Lanes;
-use condyle::{ConstraintSet, Error, Model};
+use condyle::{ConstraintSet, Model, ModelError as Error};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 

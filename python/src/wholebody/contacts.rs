@@ -133,17 +133,16 @@ impl FrictionContact {
     #[getter]
     fn forces(&self) -> Option<&'static str> {
         match self.0.shape {
-            Shape::Point => None,
             Shape::Surface { forces: SurfaceForces::Wrench, .. } => Some("wrench"),
             Shape::Surface { forces: SurfaceForces::Corners, .. } => Some("corners"),
+            _ => None,
         }
     }
 
     /// The direction in which the environment pushes, 3 numbers.
     #[getter]
     fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let (Normal::World(normal) | Normal::Frame(normal)) = self.0.normal;
-        normal.give(py, None)
+        self.0.normal.direction().give(py, None)
     }
 
     /// The axes along which the normal is given: 'world' or 'frame'.
@@ -196,8 +195,8 @@ impl FrictionContact {
 
     fn __repr__(&self) -> String {
         let kind = match &self.0.shape {
-            Shape::Point => "point".to_owned(),
             Shape::Surface { corners, .. } => format!("{} corners", corners.len()),
+            _ => "point".to_owned(),
         };
         format!("<condyle.wholebody.FrictionContact '{}', {kind}, friction {}>", self.0.frame, self.0.friction)
     }

@@ -4,8 +4,8 @@ use super::contacts::FrictionContact;
 use super::plan::Plan;
 use super::tasks::Task;
 use super::{references, settings};
-use crate::arrays::{Give, class, vector};
-use crate::exceptions::controller_error;
+use crate::arrays::{self, Give, class, vector};
+use crate::exceptions::{ControllerError, controller_error};
 use crate::model::Model;
 use crate::optimal::lock;
 use condyle::wholebody as rust;
@@ -38,7 +38,10 @@ use std::sync::Mutex;
 /// settings: `Settings`; None for the default ones.
 ///
 /// Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
-/// without its contact, and for any number outside of its range.
+/// without its contact, for any number outside of its range, and for an effort limit that is 0, of the model or the settings.
+///
+/// A controller can be copied and pickled: the copy continues with the same bits; with the back end 'clarabel', whose solvers are
+/// built again, with the same solution up to its tolerance.
 ///
 /// >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
 /// >>> robot = condyle.robots.quadruped()
@@ -54,7 +57,8 @@ use std::sync::Mutex;
 pub(crate) struct WholeBodyController {
     model: Py<Model>,
     settings: rust::Settings,
-    contacts: usize,
+    contacts: Vec<rust::FrictionContact>,
+    tasks: Vec<rust::Task>,
     inner: Mutex<Inner>,
 }
 
@@ -83,9 +87,9 @@ impl WholeBodyController {
         let mut controller =
             rust::WholeBodyController::new(robot, &contacts, &tasks, settings.clone()).map_err(controller_error)?;
         let q = condyle::neutral(robot);
-        let references = controller.hold(&q);
+        let references = controller.hold(&q).map_err(controller_error)?;
         let inner = Mutex::new(Inner { controller, references, q, v: vec![0.0; robot.nv()] });
-        Ok(Self { model: model.clone().unbind(), settings, contacts: contacts.len(), inner })
+        Ok(Self { model: model.clone().unbind(), settings, contacts, tasks, inner })
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
@@ -102,10 +106,12 @@ impl WholeBodyController {
     /// the weight shared by the contacts in equal parts.
     ///
     /// q: nq numbers.
+    ///
+    /// Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
     fn hold<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut inner = lock("controller", &self.inner)?;
         let q = vector("q", q, inner.q.len())?;
-        references::give(py, &inner.controller.hold(&q))
+        references::give(py, &self.model.get().inner, &inner.controller.hold(&q).map_err(controller_error)?)
     }
 
     /// Sets references to those of a plan at a time: joints, and where they bring centre of mass, momentum and frames;
@@ -117,8 +123,8 @@ impl WholeBodyController {
     fn track(&self, plan: &Bound<'_, Plan>, t: f64, references: &Bound<'_, PyAny>) -> PyResult<()> {
         let plan = plan.get();
         plan.made_for.check("plan", self.model.get())?;
-        if plan.contacts != self.contacts {
-            let (expected, found) = (self.contacts, plan.contacts);
+        if plan.contacts != self.contacts.len() {
+            let (expected, found) = (self.contacts.len(), plan.contacts);
             return Err(PyValueError::new_err(format!("plan: expected {expected} contacts, found {found}")));
         }
         let mut inner = lock("controller", &self.inner)?;
@@ -129,7 +135,8 @@ impl WholeBodyController {
     }
 
     /// The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
-    /// Other threads run meanwhile.
+    /// A number that is not finite is the status 'not_finite'; a quaternion, a pair (cos, sin) or a reference's rotation that is none
+    /// is 'invalid_state', with the joint or the frame in the reason. Other threads run meanwhile.
     ///
     /// q: nq numbers; v: nv.
     /// references: `References` of this controller.
@@ -146,7 +153,8 @@ impl WholeBodyController {
         position.copy_from_slice(&q);
         velocity.copy_from_slice(&v);
         references::read(references, numbers)?;
-        give(py, py.detach(|| controller.step(position, velocity, numbers)))
+        py.detach(|| _ = controller.step(position, velocity, numbers));
+        give(py, controller)
     }
 
     /// How far the step at this state, for these references, is from the optimum of its program of the first priority:
@@ -176,34 +184,64 @@ impl WholeBodyController {
     /// The last `Command`; before the first step zeros.
     #[getter]
     fn command<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        give(py, lock("controller", &self.inner)?.controller.command())
+        give(py, &lock("controller", &self.inner)?.controller)
+    }
+
+    /// The parts of a pickle: what makes one like it, and the numbers that it carries from one tick to the next.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
+        let contacts: Vec<_> = self.contacts.iter().cloned().map(FrictionContact).collect();
+        let tasks: Vec<_> = self.tasks.iter().cloned().map(Task).collect();
+        let numbers = lock("controller", &self.inner)?.controller.carried().give(py, None)?;
+        let make = py.import("condyle._condyle")?.getattr("_controller_from_numbers")?;
+        let arguments = (self.model.clone_ref(py), contacts, tasks, settings::give(py, &self.settings)?, numbers);
+        Ok((make, arguments.into_pyobject(py)?.into_any()))
     }
 
     fn __repr__(&self) -> String {
         let name = self.model.get().inner.name();
-        format!("<condyle.wholebody.WholeBodyController of '{name}', {} contacts>", self.contacts)
+        format!("<condyle.wholebody.WholeBodyController of '{name}', {} contacts>", self.contacts.len())
     }
 }
 
-/// A command as Python sees it.
-fn give<'py>(py: Python<'py>, command: &rust::Command) -> PyResult<Bound<'py, PyAny>> {
+/// The controller that a pickle holds. The model, which is one of its parts, checks the version.
+#[pyfunction]
+#[pyo3(name = "_controller_from_numbers")]
+pub(crate) fn controller_from_numbers(
+    model: &Bound<'_, Model>,
+    contacts: Vec<PyRef<'_, FrictionContact>>,
+    tasks: Vec<PyRef<'_, Task>>,
+    settings: &Bound<'_, PyAny>,
+    numbers: &Bound<'_, PyAny>,
+) -> PyResult<WholeBodyController> {
+    let made = WholeBodyController::new(model, contacts, tasks, Some(settings))?;
+    let numbers = arrays::numbers("numbers", numbers)?;
+    if !lock("controller", &made.inner)?.controller.restore(&numbers) {
+        return Err(ControllerError::new_err("the pickle is damaged: its numbers are not those of such a controller"));
+    }
+    Ok(made)
+}
+
+/// The command of a controller as Python sees it.
+fn give<'py>(py: Python<'py>, controller: &rust::WholeBodyController) -> PyResult<Bound<'py, PyAny>> {
+    let command = controller.command();
     let status = match command.status {
         Status::Solved => "solved",
         Status::Infeasible => "infeasible",
         Status::IterationLimit => "iteration_limit",
         Status::TimeLimit => "time_limit",
         Status::NotFinite { .. } => "not_finite",
+        Status::InvalidState(_) => "invalid_state",
         _ => "numerical_error",
     };
     let source = match command.source {
         CommandSource::Solution => "solution",
         CommandSource::LastSolution => "last_solution",
-        CommandSource::GravityCompensation => "gravity_compensation",
+        _ => "gravity_compensation",
     };
     let forces: Vec<[f64; 6]> = command.forces.iter().map(|force| force.to_array()).collect();
     let members = [
         status.into_pyobject(py)?.into_any(),
-        command.status.to_string().into_pyobject(py)?.into_any(),
+        controller.reason().into_pyobject(py)?.into_any(),
         source.into_pyobject(py)?.into_any(),
         command.tau.give(py, None)?,
         command.a.give(py, None)?,

@@ -26,7 +26,8 @@ use rust::PlanData;
 /// gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None if there are none.
 /// fade: the time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s).
 ///
-/// Raises `ControllerError` for numbers that are not finite and times that run backwards.
+/// Raises `ControllerError` for numbers that are not finite, for times that run backwards, and for states whose quaternions or
+/// pairs (cos, sin) do not have length 1.
 ///
 /// >>> from condyle.wholebody import Plan
 /// >>> robot = condyle.robots.quadruped()
@@ -115,7 +116,8 @@ impl Plan {
     ///
     /// t: the time (s); q: nq numbers; v: nv.
     ///
-    /// Raises `ValueError` if the plan has no controls.
+    /// Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose quaternions or pairs
+    /// (cos, sin) do not have length 1.
     #[pyo3(signature = (t, q, v, out=None))]
     fn feedback<'py>(
         &self,
@@ -130,7 +132,9 @@ impl Plan {
         if self.inner.data().controls.is_empty() && self.nu > 0 {
             return Err(PyValueError::new_err("controls: the plan has none"));
         }
-        output(py, out, &[robot.nv()], |tau| self.inner.feedback(t, &q, &v, tau))
+        let mut efforts = vec![0.0; robot.nv()];
+        self.inner.feedback(t, &q, &v, &mut efforts).map_err(controller_error)?;
+        output(py, out, &[robot.nv()], |tau| tau.copy_from_slice(&efforts))
     }
 
     /// The parts of a pickle: the arrays that it was made of.

@@ -3,12 +3,13 @@
 //! The array has the centre of mass (3 × 3 numbers), the angular momentum (2 × 3), the posture (q, v, a), then 28 numbers
 //! for each frame (pose 4 × 4, velocity, acceleration) and 23 for each contact (activation, pose 4 × 4, force).
 
-use crate::arrays::{Array, class, output, writable};
+use crate::arrays::{Array, class, matrix, numbers, output, writable};
 use condyle::wholebody::References;
-use condyle::{Force, Mat3, Motion, Se3, Vec3};
+use condyle::{Force, Mat3, Model, Motion, ROTATION_ROUNDING, Se3, Vec3, unit_fault};
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyTuple;
 
 /// nq, nv, and how many frames and contacts there are.
 pub(super) type Sizes = (usize, usize, usize, usize);
@@ -138,9 +139,41 @@ pub(super) fn write(references: &References, given: &Bound<'_, PyAny>) -> PyResu
     Ok(())
 }
 
-/// References as Python sees them.
-pub(super) fn give<'py>(py: Python<'py>, references: &References) -> PyResult<Bound<'py, PyAny>> {
+/// References of a robot as Python sees them.
+pub(super) fn give<'py>(py: Python<'py>, model: &Model, references: &References) -> PyResult<Bound<'py, PyAny>> {
+    let rotations: Vec<_> = model.rotations().map(|(joint, range)| (joint, range.start, range.end)).collect();
+    let rotations = PyTuple::new(py, rotations)?;
     let sizes = sizes(references);
     let numbers = output(py, None, &[count(sizes)], |out| write_numbers(references, out))?;
-    class!(py, "condyle._wholebody", "References")?.call1((sizes, numbers))
+    class!(py, "condyle._wholebody", "References")?.call1((sizes, numbers, rotations))
+}
+
+/// Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is one.
+#[pyfunction]
+#[pyo3(name = "_check_pose")]
+pub(crate) fn check_pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<()> {
+    let error = Reader(&matrix(name, pose, [4, 4])?).pose().rotation.rotation_error();
+    if error <= ROTATION_ROUNDING {
+        return Ok(());
+    }
+    let message = format!("{name}: no rotation: off by {error}, at most {ROTATION_ROUNDING} is allowed");
+    Err(PyValueError::new_err(message))
+}
+
+/// Raises `ValueError` unless all rotations of a position have length 1; each is given by its joint and its range.
+#[pyfunction]
+#[pyo3(name = "_check_rotations")]
+pub(crate) fn check_rotations(
+    name: &str,
+    q: &Bound<'_, PyAny>,
+    rotations: Vec<(String, usize, usize)>,
+) -> PyResult<()> {
+    let q = numbers(name, q)?;
+    for (joint, first, end) in rotations {
+        let range = if first <= end && end <= q.len() { first..end } else { 0..0 };
+        if let Some(fault) = unit_fault(0, range, &q) {
+            return Err(PyValueError::new_err(format!("{name}: joint `{joint}`: {fault}")));
+        }
+    }
+    Ok(())
 }

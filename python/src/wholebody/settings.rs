@@ -81,10 +81,10 @@ pub(super) fn give_gains(py: Python<'_>, gains: rust::Gains) -> PyResult<Bound<'
 pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, PyAny>> {
     let list = |numbers: &Option<Vec<f64>>| numbers.as_ref().map(|x| x.give(py, None)).transpose();
     let friction = match s.friction {
-        Friction::Cone => "cone".into_pyobject(py)?.into_any(),
         Friction::Pyramid { sides, inscribed } => {
             class!(py, "condyle._wholebody", "Pyramid")?.call1((sides, inscribed))?
         }
+        _ => "cone".into_pyobject(py)?.into_any(),
     };
     let limits = |l: &JointLimits| {
         let (lower, upper, velocity) = (list(&l.lower)?, list(&l.upper)?, list(&l.velocity)?);
@@ -102,12 +102,7 @@ pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, Py
         s.hold_ticks.into_pyobject(py)?.into_any(),
         s.damping.give(py, None)?,
         if s.backend == Backend::Clarabel { "clarabel" } else { "interior_point" }.into_pyobject(py)?.into_any(),
-        match s.form {
-            Form::Condensed => "condensed",
-            Form::Full => "full",
-        }
-        .into_pyobject(py)?
-        .into_any(),
+        if s.form == Form::Full { "full" } else { "condensed" }.into_pyobject(py)?.into_any(),
         s.warm_start.into_pyobject(py)?.to_owned().into_any(),
         s.tolerance.give(py, None)?,
         s.max_iterations.into_pyobject(py)?.into_any(),

@@ -202,9 +202,9 @@ angular_momentum(): 3;
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(match &self.0.axes {
-            Axes::World => "world".into_pyobject(py)?.into_any(),
             Axes::Local => "local".into_pyobject(py)?.into_any(),
             Axes::Frame(name) => ("frame", name).into_pyobject(py)?.into_any(),
+            _ => "world".into_pyobject(py)?.into_any(),
         })
     }
 

@@ -2,6 +2,7 @@
 
 mod action;
 mod augmented;
+mod autodiff;
 mod multipliers;
 mod path_constraint;
 mod restart;
@@ -10,6 +11,7 @@ mod violation;
 
 pub use action::Constrained;
 pub use augmented::{AugmentedLagrangian, Outcome};
+pub use autodiff::{AutoDiffConstraint, GenericConstraint};
 pub use path_constraint::PathConstraint;
 pub use settings::ConstraintSettings;
 pub use violation::{Violation, ViolationKind};

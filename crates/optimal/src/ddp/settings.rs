@@ -1,6 +1,7 @@
 //! The settings of the FDDP family.
 
 use crate::error::Error;
+use core::fmt;
 use std::time::Duration;
 
 /// Which search for an optimum a solve is.
@@ -16,6 +17,26 @@ pub enum DdpMethod {
     /// trial of length α keeps the part 1 − α of each gap.
     #[default]
     Fddp,
+}
+
+impl DdpMethod {
+    /// Returns the name, as files and Python have it: `"ddp"` or `"fddp"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ddp => "ddp",
+            Self::Fddp => "fddp",
+        }
+    }
+}
+
+/// Writes the method by its usual abbreviation.
+impl fmt::Display for DdpMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Ddp => "DDP",
+            Self::Fddp => "FDDP",
+        })
+    }
 }
 
 /// The settings of [`Fddp`](crate::Fddp); the defaults are Crocoddyl's.

@@ -2,6 +2,7 @@
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
 use crate::problem::{Problem, Shape};
+use core::fmt;
 use core::ops::Range;
 use nalgebra::{DMatrix, DVector};
 #[cfg(feature = "serde")]
@@ -38,6 +39,38 @@ pub enum Status {
     /// solution is the best iterate before it; if it is the warm start itself, its cost may be infinite. States and controls
     /// are finite. Another warm start may help, such as x̂₀ held still ([`Problem::quasi_static`](crate::Problem::quasi_static)).
     NotFinite,
+}
+
+impl Status {
+    /// Returns the name, as files and Python have it: `"converged"`, `"max_iterations"` and so on.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::MaxIterations => "max_iterations",
+            Self::TimeLimit => "time_limit",
+            Self::Interrupted => "interrupted",
+            Self::RegularisationLimit => "regularisation_limit",
+            Self::ConstraintsViolated => "constraints_violated",
+            Self::Infeasible => "infeasible",
+            Self::NotFinite => "not_finite",
+        }
+    }
+}
+
+/// Writes the status as a short phrase.
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Converged => "converged",
+            Self::MaxIterations => "reached the limit of iterations",
+            Self::TimeLimit => "ran out of time",
+            Self::Interrupted => "was interrupted",
+            Self::RegularisationLimit => "found no step that lowers the cost",
+            Self::ConstraintsViolated => "constraints are violated",
+            Self::Infeasible => "no trajectory satisfies the constraints",
+            Self::NotFinite => "cost or derivatives are not finite",
+        })
+    }
 }
 
 /// A record of one iteration.
@@ -157,7 +190,10 @@ impl Solution {
     ///
     /// # Panics
     /// If t > N.
+    #[track_caller]
     pub fn x(&self, t: usize) -> &[f64] {
+        let horizon = self.shape.horizon();
+        assert!(t <= horizon, "`t` is {t}, expected at most {horizon}");
         &self.xs[self.shape.x(t)]
     }
 
@@ -165,8 +201,10 @@ impl Solution {
     ///
     /// # Panics
     /// If t ≥ N.
+    #[track_caller]
     pub fn u(&self, t: usize) -> &[f64] {
-        assert!(t < self.shape.horizon(), "`t` is {t}, but there are {} controls", self.shape.horizon());
+        let horizon = self.shape.horizon();
+        assert!(t < horizon, "`t` is {t}, expected less than {horizon}: knot {horizon} has no controls");
         &self.us[self.shape.u(t)]
     }
 

@@ -262,9 +262,21 @@ impl Mat3<f64> {
     /// assert!(turn.is_rotation() && !Mat3 { z: Vec3::new(0.0, 0.0, -1.0), ..turn }.is_rotation());
     /// ```
     pub fn is_rotation(self) -> bool {
+        self.rotation_error() < ROTATION_ROUNDING
+    }
+
+    /// The distance from a rotation: the largest of |xᵀx − 1|, |yᵀy − 1|, |xᵀy| and ‖x × y − z‖ of its columns x, y, z. It is
+    /// NaN or infinite if a number is not finite.
+    ///
+    /// ```
+    /// use condyle_spatial::Mat3;
+    /// let turn = Mat3::<f64>::identity();
+    /// assert_eq!((turn.rotation_error(), turn.scale(2.0).rotation_error()), (0.0, 3.0));
+    /// ```
+    pub fn rotation_error(self) -> f64 {
         let Self { x, y, z } = self;
         let off = [x.norm_squared() - 1.0, y.norm_squared() - 1.0, x.dot(y), (x.cross(y) - z).norm_squared().sqrt()];
-        off.iter().all(|e| e.abs() < ROTATION_ROUNDING)
+        off.iter().fold(0.0, |most: f64, e| if e.abs() <= most || most.is_nan() { most } else { e.abs() })
     }
 }
 

@@ -10,12 +10,14 @@
 //! Multipliers stand with the constraints' gradients: P x + c = Aᵀ y + Gᵀ z + Fᵀ w, where z is positive at a lower bound and
 //! negative at an upper one, and wₖ ∈ Qₖ.
 
+#[cfg(feature = "clarabel")]
 mod clarabel;
 mod interior_point;
 mod program;
-#[cfg(test)]
+#[cfg(all(test, feature = "clarabel"))]
 mod tests;
 
+#[cfg(feature = "clarabel")]
 pub(crate) use self::clarabel::Clarabel;
 pub(crate) use interior_point::InteriorPoint;
 pub(crate) use program::{ConeProgram, Size};

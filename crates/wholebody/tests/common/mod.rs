@@ -181,6 +181,7 @@ pub fn check_forces(
         let n = match contact.normal {
             Normal::World(n) => n,
             Normal::Frame(n) => R * n,
+            other => panic!("a normal that these checks do not know: {other:?}"),
         };
         let n = n.scale(1.0 / norm(n));
         let f_n = f.linear.dot(n);

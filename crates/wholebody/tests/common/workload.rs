@@ -133,7 +133,7 @@ impl Robot {
         }
         let contacts: Vec<_> = known.feet.iter().map(contact).collect();
         let mut robot = Self { name: name.to_owned(), model, q, contacts, tasks, push: if biped { 0.05 } else { 0.1 } };
-        let ground = robot.controller(Settings::default()).hold(&robot.q).contacts[0].pose.translation.z;
+        let ground = robot.controller(Settings::default()).hold(&robot.q).unwrap().contacts[0].pose.translation.z;
         robot.q[2] -= ground;
         Ok(robot)
     }
@@ -303,7 +303,7 @@ fn activation(t: f64, fade: f64, swing: f64) -> f64 {
 pub fn record(robot: &Robot, moves: bool, ticks: usize) -> Vec<Tick> {
     let (model, nv) = (&robot.model, robot.model.nv());
     let mut controller = robot.controller(Robot::settings());
-    let start = controller.hold(&robot.q);
+    let start = controller.hold(&robot.q).unwrap();
     let mut rng = StdRng::seed_from_u64(7);
     let foot = |contact: &FrictionContact| {
         let frame = model.frame(&contact.frame).expect("a foot");
@@ -330,7 +330,7 @@ pub fn record(robot: &Robot, moves: bool, ticks: usize) -> Vec<Tick> {
         let velocities = forward_velocities(model, &mut world.data, &world.q, &world.v);
         let velocity = velocities.com_velocity();
         if moves {
-            let com = controller.hold(&world.q).com.position;
+            let com = controller.hold(&world.q).unwrap().com.position;
             gait.write(t, [com, velocity], &mut references);
         }
         let (each, lasts) = ((PUSHES[0] / DT) as usize, (PUSHES[1] / DT) as usize);

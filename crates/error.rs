@@ -1,0 +1,65 @@
+//! The error of the façade, to which those of all its crates convert.
+
+/// Error of this library: those of all its crates convert to it, so that `?` works across them in one function.
+///
+/// Each part keeps an error of its own: [`ModelError`](crate::ModelError) of models and dynamics, `optimal::Error`,
+/// `wholebody::Error` and `wholebody::Status`. Its message and its source are those of the part.
+///
+#[cfg_attr(all(feature = "loaders", feature = "optimal", feature = "wholebody"), doc = "```")]
+#[cfg_attr(not(all(feature = "loaders", feature = "optimal", feature = "wholebody")), doc = "```ignore")]
+/// use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+/// use condyle::optimal::{Fddp, Problem};
+/// use condyle::wholebody::{Settings, Task, WholeBodyController};
+/// use condyle::{Model, UrdfOptions, robots};
+/// use std::sync::Arc;
+///
+/// /// Plans from the position q and computes the first effort.
+/// fn first_effort(urdf: &str, q: &[f64]) -> Result<f64, condyle::Error> {
+///     let arm = Arc::new(Model::from_urdf_str(urdf, &UrdfOptions::default())?); // a ModelError
+///     let x0 = [q, &vec![0.0; arm.nv()]].concat();
+///     let rest = Cost::new("rest", 1.0, Residual::State { reference: x0.clone() }, Activation::Quadratic);
+///     let knot = FreeDynamics::running(arm.clone(), 0.05, vec![rest.clone()])?; // an optimal::Error
+///     let end = FreeDynamics::terminal(arm.clone(), vec![rest])?;
+///     let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 5], Box::new(end))?;
+///     Fddp::new(&problem).solve(&mut problem, &x0.repeat(6), &vec![0.0; 5 * arm.nv()])?;
+///     let mut controller = WholeBodyController::new(&arm, &[], &[Task::posture()], Settings::default())?;
+///     let references = controller.hold(q)?; // a wholebody::Error
+///     let command = controller.step(q, &vec![0.0; arm.nv()], &references).solved()?; // a wholebody::Status
+///     Ok(command.tau[0])
+/// }
+///
+/// assert!(first_effort(robots::ARM7, &[0.3; 7])?.is_finite());
+/// let error = first_effort(robots::ARM7, &[f64::NAN; 7]).unwrap_err().to_string();
+/// assert!(error.contains("q[0] is NaN"), "{error}");
+/// assert!(matches!(first_effort("no XML", &[]), Err(condyle::Error::Model(_))));
+/// # Ok::<(), condyle::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// Error of a robot's description, of a name that is looked up in it, or of a state.
+    #[error(transparent)]
+    Model(#[from] condyle_dynamics::Error),
+    /// Inertia that no body of positive density has.
+    #[error(transparent)]
+    NotPhysical(#[from] condyle_dynamics::inertial_parameters::NotPhysical),
+    /// Level of vectors that the processor does not support.
+    #[error(transparent)]
+    Level(#[from] condyle_dynamics::level::Unsupported),
+    /// Error of a problem, a warm start or the settings of a solver.
+    #[cfg(feature = "optimal")]
+    #[error(transparent)]
+    Optimal(#[from] condyle_optimal::Error),
+    /// Sweep that stopped before the first knot.
+    #[cfg(feature = "optimal")]
+    #[error(transparent)]
+    Sweep(#[from] condyle_optimal::SweepError),
+    /// Error in the description of a whole-body controller or of a plan.
+    #[cfg(feature = "wholebody")]
+    #[error(transparent)]
+    WholeBody(#[from] condyle_wholebody::Error),
+    /// Step of a whole-body controller that was not solved.
+    #[cfg(feature = "wholebody")]
+    #[error(transparent)]
+    Step(#[from] condyle_wholebody::Status),
+}

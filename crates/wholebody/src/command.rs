@@ -1,0 +1,104 @@
+//! The command of a step, and its status in words.
+
+use crate::controller::WholeBodyController;
+use crate::error::{InvalidRotation, Status};
+use condyle_spatial::{Force, Vec3};
+use std::fmt;
+
+/// Origin of a command.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum CommandSource {
+    /// The program's solution; or, where the solver did not finish, an iterate that holds all constraints.
+    Solution,
+    /// The last solution, at most [`Settings::hold_ticks`](crate::Settings::hold_ticks) old.
+    LastSolution,
+    /// Gravity compensation with damping, at the last valid state.
+    GravityCompensation,
+}
+
+impl fmt::Display for CommandSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Solution => "solution",
+            Self::LastSolution => "last solution",
+            Self::GravityCompensation => "gravity compensation",
+        })
+    }
+}
+
+/// Command of a tick. Its numbers are finite, and `tau` is within the limits, whatever the status says.
+///
+/// Constraints hold to the solver's tolerance: with the default, a force may leave its cone by some 1e-7 N.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Command {
+    /// Status of the step.
+    pub status: Status,
+    /// Origin of the command.
+    pub source: CommandSource,
+    /// τ, the efforts of the motors: nv numbers (N m, N), 0 at a free-flyer.
+    pub tau: Vec<f64>,
+    /// q̈, the acceleration that follows if the contacts hold: nv numbers (rad/s², m/s²). Of a safe command, the last one's.
+    pub a: Vec<f64>,
+    /// Force of the environment on the robot at each contact, about the frame's origin along the world's axes (N, N m). Of a
+    /// safe command, the last one's.
+    pub forces: Vec<Force<f64>>,
+    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²). Of a safe command, the last one's.
+    pub com_acceleration: Vec3<f64>,
+    /// Violation of the worst constraint (N, N m, m/s²). Of a safe command, the last one's.
+    pub violation: f64,
+    /// Iterations of the solver.
+    pub iterations: u32,
+    /// Whether the solver fell short of [`Settings::tolerance`] and met only its reduced one.
+    pub reduced_accuracy: bool,
+    /// Whether the limits of joints had to give way to dynamics, contacts and torques.
+    pub limits_relaxed: bool,
+}
+
+impl Command {
+    /// Returns the command if it was solved.
+    ///
+    /// # Errors
+    /// The status, unless it is [`Status::Solved`].
+    pub fn solved(&self) -> Result<&Self, Status> {
+        if self.status == Status::Solved { Ok(self) } else { Err(self.status) }
+    }
+}
+
+impl WholeBodyController {
+    /// The status of the last command in words, with the name of the joint or of the frame that is invalid.
+    ///
+    /// ```
+    /// # use condyle_dynamics::{neutral, robots};
+    /// # use condyle_wholebody::{Settings, Task, WholeBodyController};
+    /// # let robot = robots::quadruped();
+    /// let mut controller = WholeBodyController::new(&robot, &[], &[Task::posture()], Settings::default())?;
+    /// let mut q = neutral(&robot);
+    /// let references = controller.hold(&q)?;
+    /// q[6] = 2.0;
+    /// controller.step(&q, &[0.0; 18], &references);
+    /// assert_eq!(controller.reason(), "joint `root_joint`: its rotation, q[3..7], has the length 2, expected 1");
+    /// # Ok::<(), condyle_wholebody::Error>(())
+    /// ```
+    pub fn reason(&self) -> String {
+        let Self { command: Command { status, .. }, equations, objective, .. } = self;
+        let whose = match *status {
+            Status::InvalidState(InvalidRotation::Joint { body, .. }) => {
+                equations.model().bodies().get(body).map(|body| format!("joint `{}`", body.joint_name))
+            }
+            Status::InvalidState(InvalidRotation::Pose { name: "contacts", index, .. }) => {
+                equations.contacts.get(index).map(|contact| format!("frame `{}`", contact.description.frame))
+            }
+            Status::InvalidState(InvalidRotation::Pose { index, .. }) => {
+                let mut frames = objective.tasks.iter().filter(|task| task.frame.is_some());
+                let task = frames.nth(index).and_then(|task| task.task.kind.frame());
+                task.map(|frame| format!("frame `{frame}`"))
+            }
+            _ => None,
+        };
+        match (whose, status) {
+            (Some(whose), Status::InvalidState(rotation)) => format!("{whose}: {}", rotation.fault()),
+            _ => status.to_string(),
+        }
+    }
+}
