@@ -6,7 +6,11 @@ use crate::exceptions::{ModelError, exception};
 use crate::inertial_parameters::{model_inertia, read_inertia};
 use crate::joint::{Joint, kind, root};
 use crate::tree::tree;
-use condyle::{FrameKind, FrameParent, MjcfOptions, SdfOptions, Se3, UrdfOptions, inertial_parameters};
+use condyle::{
+    MjcfOptions, SdfOptions, Se3, UrdfOptions,
+    regressors::inertial_parameters,
+    tree::{FrameKind, FrameParent},
+};
 use pyo3::exceptions::{PyAttributeError, PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyString};
@@ -628,7 +632,7 @@ impl Model {
     ) -> PyResult<Self> {
         let follower = body_index("follower: expected a joint's name", &self.inner, follower, 1)?;
         let leader = body_index("leader: expected a joint's name", &self.inner, leader, 1)?;
-        Ok(self.inner.with_mimic(follower, leader, condyle::Mimic { ratio, offset }).map_err(exception)?.into())
+        Ok(self.inner.with_mimic(follower, leader, condyle::tree::Mimic { ratio, offset }).map_err(exception)?.into())
     }
 
     /// The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.

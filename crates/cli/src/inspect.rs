@@ -6,7 +6,7 @@ use crate::limits::LimitCounts;
 use crate::lines::{Kind, Lines};
 use crate::robot::{self, Robot, RobotArguments};
 use crate::terminal::{Style, Table, heading, say, say_json, styled};
-use condyle::{Body, Data, FrameKind, Model, forward_kinematics, neutral};
+use condyle::{Body, Data, Model, forward_kinematics, neutral, tree::FrameKind};
 use serde::Serialize;
 use std::fmt::Write;
 
