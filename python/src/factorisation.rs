@@ -16,14 +16,14 @@ macro_rules! factor {
         $(#[$doc])*
         #[pyclass(module = "condyle")]
         pub(crate) struct $class {
-            inner: condyle::$class<f64>,
+            inner: condyle::dynamics::$class<f64>,
             size: usize,
             /// Whether `factorize` was called.
             done: bool,
         }
 
         impl $class {
-            fn factor(&self) -> PyResult<&condyle::$class<f64>> {
+            fn factor(&self) -> PyResult<&condyle::dynamics::$class<f64>> {
                 let nothing = || PyRuntimeError::new_err("nothing to solve with: call `factorize` first");
                 self.done.then_some(&self.inner).ok_or_else(nothing)
             }
