@@ -33,7 +33,7 @@ pub use condyle_dynamics::{
 #[cfg(feature = "loaders")]
 pub use condyle_dynamics::{MjcfOptions, SdfOptions, UrdfOptions, robots};
 
-/// Results of a [`Batch`](crate::Batch) of states.
+/// Results of a [`Batch`] of states.
 pub mod batch {
     pub use condyle_dynamics::{
         BatchAbaDerivatives, BatchAbaHessian, BatchAccelerationDerivatives, BatchAllTerms, BatchCentroidalDerivatives,
