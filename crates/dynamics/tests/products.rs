@@ -258,6 +258,9 @@ fn single_calls(model: &Model) {
     multiply("frame_jacobian of placements", &J);
     motion.frame_jacobian_rate(last, axes, &mut J);
     multiply("frame_jacobian_rate", &J);
+    let mut of_point = DMatrix::zeros(3, nv);
+    motion.frame_point_jacobian(last, Vec3::new(0.1, 0.2, 0.3), &mut of_point);
+    multiply("frame_point_jacobian", &of_point);
     motion.frame_acceleration_derivatives(last, axes, &mut J, &mut other);
     multiply("frame_acceleration_derivatives", &J);
     multiply("frame_acceleration_derivatives", &other);

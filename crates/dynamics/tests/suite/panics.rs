@@ -100,6 +100,12 @@ fn missing_bodies_and_frames_are_named() {
     assert_panic(HERE, &body, || moving.body_acceleration_derivatives(n, World, J, other));
     assert_panic(HERE, &frame, || moving.frame_acceleration_derivatives(n, World, J, other));
     assert_panic(HERE, &frame, || moving.frame_classical_acceleration_derivatives(n, World, J, other));
+    let (point, three) = (condyle_dynamics::Vec3::zero(), &mut DMatrix::zeros(3, 7));
+    assert_panic(HERE, &body, || moving.body_point_jacobian(n, point, three));
+    assert_panic(HERE, &frame, || moving.frame_point_jacobian(n, point, three));
+    assert_panic(HERE, &body, || _ = moving.body_point_velocity(n, point));
+    assert_panic(HERE, &frame, || _ = moving.frame_point_velocity(n, point));
+    assert_panic(HERE, &body, || _ = moving.force_on_body(n, point, point));
     let small = &mut DMatrix::zeros(5, 7);
     assert_panic(HERE, "da_dv: expected 6 × 7", || moving.frame_acceleration_derivatives(1, World, J, small));
     assert_panic(HERE, "dJ: expected 6 × 7", || moving.frame_jacobian_rate(1, World, small));
