@@ -48,7 +48,7 @@ pub struct Command {
     pub violation: f64,
     /// Iterations of the solver.
     pub iterations: u32,
-    /// Whether the solver fell short of [`Settings::tolerance`] and met only its reduced one.
+    /// Whether the solver fell short of [`Settings::tolerance`](crate::Settings::tolerance) and met only its reduced one.
     pub reduced_accuracy: bool,
     /// Whether the limits of joints had to give way to dynamics, contacts and torques.
     pub limits_relaxed: bool,
