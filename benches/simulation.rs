@@ -1,7 +1,7 @@
 //! One step of each integrator: `cargo bench --bench simulation`. What the steps are worth: `examples/energy_drift.rs`.
 
-use condyle::simulation::{Integrator, Settings, Simulation};
-use condyle::{random_configuration, robots};
+use condyle::simulation::{Ground, Integrator, Settings, Simulation};
+use condyle::{Data, Vec3, forward_kinematics, neutral, random_configuration, robots};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -30,7 +30,7 @@ fn step(c: &mut Criterion) {
                 let mut k = 0;
                 b.iter(|| {
                     let [v, tau] = &states[k];
-                    simulation.set_state(&positions[k], v);
+                    simulation.set_state(&positions[k], v).expect("the state is valid");
                     let status = simulation.step(black_box(tau), &[]);
                     assert!(status.is_done(), "{status:?}");
                     k = (k + 1) % STATES;
@@ -41,5 +41,31 @@ fn step(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, step);
+/// A step of 1 ms on the ground, without a first guess of the impulses: four feet, and the eight corners of two soles.
+fn step_on_ground(c: &mut Criterion) {
+    let corners = [(0.1, 0.05), (0.1, -0.05), (-0.1, -0.05), (-0.1, 0.05)].map(|(x, y)| Vec3::new(x, y, 0.0));
+    let robots = [
+        ("quadruped", robots::quadruped(), &["LF_foot", "RF_foot", "LH_foot", "RH_foot"][..], &[Vec3::zero()][..]),
+        ("humanoid", robots::humanoid(), &["left_sole", "right_sole"][..], &corners[..]),
+    ];
+    let mut group = c.benchmark_group("step_on_ground");
+    for (robot, model, feet, sole) in robots {
+        let frames = feet.iter().map(|foot| model.frame(foot).expect("the robot has this frame"));
+        let ground = frames.clone().fold(Ground::default(), |ground, frame| ground.with_sole(frame, sole));
+        let (mut q, v) = (neutral(&model), vec![0.0; model.nv()]);
+        q[2] -= forward_kinematics(&model, &mut Data::new(&model), &q).frame(ground.points[0].frame).translation.z;
+        let mut simulation = Simulation::<f64>::new(model, Settings::default());
+        simulation.set_ground(ground).expect("the ground fits the robot");
+        group.bench_function(BenchmarkId::from_parameter(robot), |b| {
+            b.iter(|| {
+                simulation.set_state(&q, &v).expect("the state is valid");
+                let status = simulation.step(black_box(&v), &[]);
+                assert!(status.is_done(), "{status}");
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, step, step_on_ground);
 criterion_main!(benches);

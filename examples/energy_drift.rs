@@ -73,7 +73,7 @@ fn drift(system: &System, integrator: Integrator, dt: f64) -> Result<Drift, Stat
         (velocities.mechanical_energy(), velocities.kinetic_energy())
     };
     let mut simulation = Simulation::new(model, Settings { integrator, dt, ..Settings::default() });
-    simulation.set_state(q, v);
+    simulation.set_state(q, v).expect("the state is valid");
     let (start, _) = energy(q, v);
     let mut drift = Drift { start, kinetic: 0.0, errors: Vec::new(), end: 0.0 };
     let (efforts, steps) = (vec![0.0; model.nv()], (TIME / dt).round() as usize);

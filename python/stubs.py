@@ -38,7 +38,7 @@ ALIASES = {
     ' | tuple[Literal["force", "inertia"], str | int] | tuple[Literal["friction"], float]',
     "_Method": 'Literal["aba", "dense", "sparse"]',
     "_Integrator": 'Literal["semi_implicit_euler", "runge_kutta_4", "variational"]',
-    "_Status": 'Literal["done", "not_converged", "not_finite"]',
+    "_Status": 'Literal["done", "not_converged", "contacts_not_converged", "not_finite"]',
     "_OfTwo": "Callable[[NDArray[Any], NDArray[Any]], Any]",
     "_Shapes": "list[tuple[str, int, int]]",
     "_Space": "Model | tuple[int, _OfTwo, _OfTwo]",
@@ -78,7 +78,7 @@ SPELLED = [  # the first two have no `data`
 # The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
 ARGUMENTS = {
     "ArrayLike": """
-        A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement
+        A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement point
         q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
         Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers""",
@@ -98,7 +98,9 @@ ARGUMENTS = {
     "str | int": """
         body frame Model.with_mimic.follower Model.with_mimic.leader getVelocity.joint getAcceleration.joint
         getClassicalAcceleration.joint getJointJacobian.joint""",
-    "str | int | None": "Model.append.frame",
+    "str | int | None": "Model.append.frame Model.with_frame.parent",
+    "Ground": "Simulation.ground",
+    "tuple[float, list[float], list[float], list[float]]": "Simulation.__setstate__.state",
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
@@ -237,6 +239,7 @@ RESULTS = {
     "Optimality": "WholeBodyController.optimality",
     "None": """
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
+        Simulation.__setstate__
         AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
         ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
         Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
@@ -246,11 +249,11 @@ RESULTS = {
     "list[int]": "Ltdl.order Model.idx_qs Model.idx_vs Model.nqs Model.nvs Model.parents Model.singular_joints",
     "list[str]": "Model.body_names Model.joint_types Model.names Model.warnings",
     "list[tuple[int, float]]": "Ltdl.row",
-    "tuple[Any, ...]": "HyperDual.__reduce__ Model.__reduce__",
+    "tuple[Any, ...]": "HyperDual.__reduce__ Model.__reduce__ Simulation.__reduce__",
     "HyperDual": "HyperDual",
     "Model": """
         _SpelledModel.ours Model.__copy__ Model.__deepcopy__ Model.append Model.from_pinocchio Model.lock
-        Model.with_armature Model.with_gravity Model.with_inertias Model.with_limits Model.with_mimic
+        Model.with_armature Model.with_frame Model.with_gravity Model.with_inertias Model.with_limits Model.with_mimic
         ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
     "Any": "Model.to_pinocchio _lend",
@@ -263,6 +266,8 @@ RESULTS = {
     "Inertia": "from_log_cholesky to_inertia",
     "AssemblySize": "DivideConquer.size",
     "_Status": "Simulation.run Simulation.step",
+    "Ground | None": "Simulation.ground",
+    "GroundContacts": "Simulation.contacts",
     "Solution": "AugmentedLagrangian.resume AugmentedLagrangian.solve Fddp.resume Fddp.solve",
     "Evaluation": "Problem.evaluate Problem._evaluate",
     "list[LqNode]": "Problem.derivatives",

@@ -29,8 +29,10 @@ def text(page: str) -> str:
 def main() -> None:
     docs = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "doc"
     first = (docs / "condyle" / "index.html").read_text(encoding="utf-8")
-    names = re.findall(r'<dt[^>]*>.*?<a class="(?:mod|struct|enum|trait|fn|constant|type|union|macro)" [^>]*>(.*?)</a>', first)
-    reexports = re.findall(r'<dt[^>]*><code>pub use ', first)
+    names = re.findall(
+        r'<dt[^>]*>.*?<a class="(?:mod|struct|enum|trait|fn|constant|type|union|macro)" [^>]*>(.*?)</a>', first
+    )
+    reexports = re.findall(r"<dt[^>]*><code>pub use ", first)
     print(f"condyle/index.html: {len(names)} names, {len(reexports)} re-exports")
     faults = []
     if not 20 <= len(names) <= LARGEST:

@@ -1,7 +1,7 @@
 //! A page that plays a motion, from the parts of the page of `condyle plan`.
 
 use condyle::optimal::Solution;
-use condyle::{Data, Model, Quaternion, Se3, forward_kinematics};
+use condyle::{Data, Model, Se3, forward_kinematics, spatial::Quaternion};
 use serde_json::{Value, json};
 use std::path::Path;
 

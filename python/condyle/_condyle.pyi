@@ -29,6 +29,8 @@ from ._types import (
     EnergyDerivatives,
     Evaluation,
     Frame,
+    Ground,
+    GroundContacts,
     Impulse,
     ImpulseDerivatives,
     Iteration,
@@ -117,6 +119,8 @@ __all__ = [
     "body_classical_acceleration",
     "body_jacobian",
     "body_jacobian_rate",
+    "body_point_jacobian",
+    "body_point_velocity",
     "body_velocity",
     "body_velocity_derivative",
     "centerOfMass",
@@ -156,6 +160,8 @@ __all__ = [
     "frame_jacobian",
     "frame_jacobian_rate",
     "frame_placement",
+    "frame_point_jacobian",
+    "frame_point_velocity",
     "frame_velocity",
     "frame_velocity_derivative",
     "framesForwardKinematics",
@@ -222,7 +228,7 @@ _Input: TypeAlias = (
 )
 _Method: TypeAlias = Literal["aba", "dense", "sparse"]
 _Integrator: TypeAlias = Literal["semi_implicit_euler", "runge_kutta_4", "variational"]
-_Status: TypeAlias = Literal["done", "not_converged", "not_finite"]
+_Status: TypeAlias = Literal["done", "not_converged", "contacts_not_converged", "not_finite"]
 _OfTwo: TypeAlias = Callable[[NDArray[Any], NDArray[Any]], Any]
 _Shapes: TypeAlias = list[tuple[str, int, int]]
 _Space: TypeAlias = Model | tuple[int, _OfTwo, _OfTwo]
@@ -1720,6 +1726,23 @@ def body_jacobian_rate(
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
+def body_point_jacobian(
+    model: Model, data: Data, q: ArrayLike, body: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
+
+    q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+    """
+
+def body_point_velocity(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, body: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of the body's own
+    frame.
+
+    q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+    """
+
 def body_velocity(
     model: Model,
     data: Data,
@@ -1827,6 +1850,29 @@ def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, ou
     >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
     >>> bool(tool[2, 3] > 0.5)  # stretched upwards
     True
+    """
+
+def frame_point_jacobian(
+    model: Model, data: Data, q: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The Jacobian J of a point of a frame, (3, nv): its velocity along the axes of the world is J v (m/s).
+
+    q: nq numbers; frame: its name or number; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
+    the world and S the columns of the joints before it.
+
+    >>> arm = condyle.robots.arm7()
+    >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
+    >>> J = condyle.frame_point_jacobian(arm, data, q, "tool", tip)
+    >>> np.allclose(J @ v, condyle.frame_point_velocity(arm, data, q, v, "tool", tip))
+    True
+    """
+
+def frame_point_velocity(
+    model: Model, data: Data, q: ArrayLike, v: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
+) -> _Array:
+    """The velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+
+    q: nq numbers; v: nv; frame: its name or number; point: in the frame, 3 numbers (m).
     """
 
 def frame_velocity(
@@ -2145,6 +2191,22 @@ class Model:
         True
         """
 
+    def with_frame(self, name: str, parent: str | int | None, placement: ArrayLike | None = None) -> Model:
+        """The same robot with one more frame of the user's, the last one of `frames`. All other numbers stay as they are.
+
+        name: the new frame's name; parent: the name or number of the frame on which it is put, or the name of a body; None is
+        the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the identity.
+
+        Raises `ModelError` if the parent does not exist, the placement is no rotation and translation, or the user has a frame
+        of this name already.
+
+        >>> tip = np.eye(4)
+        >>> tip[2, 3] = 0.1
+        >>> arm = condyle.robots.arm7().with_frame("tip", "tool", tip)
+        >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.3] * 7, "tip").shape
+        (6, 7)
+        """
+
     def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
         """The same robot with some joints locked where they are at q.
 
@@ -2325,10 +2387,12 @@ class AugmentedLagrangian:
     y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 
     `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
-    ended as "infeasible" or "not_finite"; `shift` moves them on. A solution is "converged" when the residuals of
-    `outcome` are below the tolerances, and "infeasible" if the penalty reached its limit and the limits do not hold.
-    Its cost contains the terms of the limits, that of `outcome` does not; its trace and gains are those of the last
-    inner solve.
+    ended as "not_finite" or with violated limits at the largest penalty; `shift` moves them on. A solution is "converged"
+    when the residuals of `outcome` are below the tolerances. It is "constraints_violated" if the penalty reached its limit
+    and the limits do not hold, which proves nothing: another warm start may find a solution. It is "infeasible" if the
+    initial state itself violates a limit of knot 0 that no control can change. `outcome.worst` names the knot, the limit
+    and the amount. The cost of the solution contains the terms of the limits, that of `outcome` does not; its trace and
+    gains are those of the last inner solve. Controls of a warm start that are outside of their bounds are moved into them.
 
     problem: the problem to solve; all memory is made for its shape, once.
     inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
@@ -2339,6 +2403,8 @@ class AugmentedLagrangian:
         `max_solves`: the number of inner solves at most.
         `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
         factor by which it rises.
+        `restart`: whether a `solve` with limits or bounds that is not finite, or violates limits at the largest penalty, begins
+        once more, from the initial state held still at all knots (default: yes). The better result counts.
 
     >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()
@@ -2396,6 +2462,8 @@ class AugmentedLagrangian:
     ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
+        With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+
         callback, verbose, progress: as of `solve`.
 
         Raises `ProblemError` as `solve`, and if there is no solution yet.
@@ -2408,7 +2476,9 @@ class AugmentedLagrangian:
         with it.
 
         `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-        last one is served by a model of the problem, with those that it has for all knots.
+        last one is served by a model of the problem, with those that it has for all knots. The last state follows
+        from the last control, which is repeated. At a second shift without a step of a solve in between the last
+        state is repeated too, as a rollout by repeated controls would diverge.
 
         last: the index of that model.
 
@@ -2613,7 +2683,11 @@ class Fddp:
         `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
         `inverse_dynamics_form`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
         (default: yes): the same steps in less time.
-        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
+        `project_warm_start`: whether controls of a warm start that are outside of their bounds are moved into them, in `solve`
+        and in `resume` (default: yes). Crocoddyl keeps them, so its iterates need False.
+        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit". The first iteration
+        always runs, unless the budget is 0. A later phase runs if the median of its last five durations fits. A solve that
+        takes longer tells by how much in `timings.overrun`.
         `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
         there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
         `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep beside
@@ -2660,6 +2734,8 @@ class Fddp:
     ) -> Solution:
         """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
 
+        With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+
         callback, verbose, progress: as of `solve`.
 
         Raises `ProblemError` as `solve`, and if there is no solution yet.
@@ -2672,7 +2748,9 @@ class Fddp:
         with it.
 
         `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-        last one is served by a model of the problem, with those that it has for all knots.
+        last one is served by a model of the problem, with those that it has for all knots. The last state follows
+        from the last control, which is repeated. At a second shift without a step of a solve in between the last
+        state is repeated too, as a rollout by repeated controls would diverge.
 
         last: the index of that model.
 
@@ -3258,9 +3336,13 @@ class Simulation:
     passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
         none of either.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
-    max_iterations: it gives up after so many iterations.
+    max_iterations: Newton's method gives up after this number of iterations.
+    ground: a `Ground` on which the robot stands, slides and lands, with 'semi_implicit_euler' only; None for none.
 
-    Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
+    A simulation can be copied and pickled, and the copy goes on with the same bits.
+
+    Raises `ModelError` if M is singular or the ground cannot be, `ValueError` if dt is not above 0 or not finite, or
+    tolerance is negative.
 
     >>> from condyle.simulation import Simulation
     >>> quadruped = condyle.robots.quadruped()
@@ -3281,7 +3363,16 @@ class Simulation:
         passive: float | None = None,
         tolerance: float = 1e-09,
         max_iterations: int = 20,
+        ground: Ground | None = None,
     ) -> Simulation: ...
+    @property
+    def contacts(self) -> GroundContacts:
+        """The contacts of the ground's points in the last step, as `GroundContacts`."""
+
+    @property
+    def ground(self) -> Ground | None:
+        """The ground on which the robot stands, as a `Ground` of single points; None if there is none."""
+
     @property
     def q(self) -> _Array:
         """The position, nq numbers."""
@@ -3297,16 +3388,23 @@ class Simulation:
     def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
         """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
 
-        Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+        Raises `ModelError` if a number of q is not finite or a rotation in it does not have the length 1 (up to 1e-3),
         `ValueError` if one of v is not finite.
         """
 
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
         """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
-        tolerance (a shorter step helps); or 'not_finite', and then the step was not taken.
+        tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses break the laws of contact by
+        more than the ground's tolerance, and then the step was taken; or 'not_finite', and then it was not.
 
         tau: nv numbers (N m, N); f_ext: as for `rnea`.
         """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The parts of a pickle: what the constructor takes, and the state."""
+
+    def __setstate__(self, state: tuple[float, list[float], list[float], list[float]]) -> None:
+        """The state of a pickle."""
 
     def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
         """A number of steps, with a control law that is called before each of them. Returns the status of the last step,

@@ -1,5 +1,6 @@
 """The results of functions that are more than an array, and some arguments: named tuples."""
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, TypeAlias
 
 import numpy as np
@@ -437,6 +438,9 @@ class Timings(NamedTuple):
     """Trial rollouts of the line searches, accepted or not."""
     total: float
     """The whole solve."""
+    overrun: float = 0.0
+    """The time beyond `time_budget`: above zero where the budget is shorter than an iteration, or something delayed the
+    solve. A budget of 0 asks for no iteration, and is never overrun."""
 
 
 class Evaluation(NamedTuple):
@@ -479,10 +483,15 @@ class _Solution(NamedTuple):
         "time_limit",
         "interrupted",
         "regularisation_limit",
+        "constraints_violated",
         "infeasible",
         "not_finite",
     ]
-    """The end of the solve in a word."""
+    """The end of the solve in a word.
+
+    "constraints_violated": the penalty reached its limit and limits do not hold; no proof that no solution exists.
+    "infeasible": a proof, in `outcome.worst`: the initial state violates a limit of knot 0 that no control can change.
+    """
     trace: list[Iteration]
     """A record per iteration."""
     timings: Timings
@@ -561,6 +570,23 @@ class SweepResult(NamedTuple):
     """Their Hessians, (N + 1, ndx, ndx)."""
 
 
+class Violation(NamedTuple):
+    """A row of a limit, or of the dynamics, that does not hold at the end of a solve."""
+
+    kind: Literal["constraint", "gap"]
+    """A limit or constraint of a knot, or a gap of the dynamics."""
+    knot: int
+    """The knot, 0 … N."""
+    row: int
+    """The index in `multipliers[knot]`, or of a gap the entry of the tangent vector."""
+    name: str | None
+    """The name of the limit, None for a constraint of a `ConstrainedAction` and for a gap."""
+    entry: int
+    """The row within the limit of that name, else `row`."""
+    amount: float
+    """The distance from the bound, or of a gap its size; infinite if it is not a number."""
+
+
 class Outcome(NamedTuple):
     """The state of the limits after a solve of `AugmentedLagrangian`, beside its `Solution`."""
 
@@ -578,6 +604,8 @@ class Outcome(NamedTuple):
     """The number of inner solves."""
     iterations: int
     """The number of iterations of all of them."""
+    worst: Violation | None = None
+    """The largest violation; None if all limits hold exactly."""
 
 
 class Control(NamedTuple):
@@ -593,6 +621,44 @@ class Control(NamedTuple):
     """The joint efforts during the step, nv numbers (N m, N); 0 when the law is called, which sets them in place."""
     f_ext: _Array
     """The force on each body during the step, (nbodies, 6), at its origin and in its frame; likewise."""
+
+
+class Ground(NamedTuple):
+    """The plane on which a simulated robot stands, slides and lands, and the points of the robot that may touch it.
+
+    Rigid contacts with Coulomb friction at the level of velocities (Moreau 1988; Stewart and Trinkle 1996; Anitescu and
+    Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ with 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0 and the exact disc
+    ‖λ_t‖ ≤ μ λ_n of each point, whose velocity after the step is u⁺ = J v⁺ and whose gap to the plane is φ. Forces of
+    redundant contacts are not unique; their sum is. Errors are O(h). Only points and the plane meet: edges of soles,
+    other bodies and limits of joints do not.
+    """
+
+    points: Sequence[str | int | tuple[str | int, ArrayLike]]
+    """The points that may touch: a list of frames, each for its origin, or of pairs of a frame and the corners of a
+    sole in it, (n, 3) (m)."""
+    normal: ArrayLike = (0.0, 0.0, 1.0)
+    """The direction out of the ground, in the world's frame; need not be a unit vector."""
+    height: float = 0.0
+    """The height of the plane along the normal (m)."""
+    friction: float = 0.7
+    """μ, Coulomb's coefficient."""
+    restitution: float = 0.0
+    """The share of its normal speed that a point has after it has hit the ground, from 0 to 1."""
+    tolerance: float = 1e-8
+    """The largest error in the laws of contact (m/s)."""
+    max_iterations: int = 500
+    """The maximum number of iterations of the contact solver in a step."""
+
+
+class GroundContacts(NamedTuple):
+    """The contacts of the points of a `Ground` in the last step of a `Simulation`, in the order of the points."""
+
+    position: _Array
+    """The points in the world at the beginning of the step (m), (n, 3)."""
+    force: _Array
+    """The forces on the robot along the axes of the world, mean values over the step (N), (n, 3)."""
+    touches: NDArray[np.bool_]
+    """Whether the ground pushed a point, (n,)."""
 
 
 _NUMBERS = 12
@@ -624,6 +690,8 @@ _MODULES = {
     "LqNode": "optimal",
     "Outcome": "optimal",
     "Control": "simulation",
+    "Ground": "simulation",
+    "GroundContacts": "simulation",
 }
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and issubclass(_item, tuple)]:
     setattr(_class, "__repr__", _repr)  # noqa: B010 - a type checker would not let a method be replaced

@@ -3,10 +3,11 @@
 A `crocoddyl.ShootingProblem` that is there already goes to our solvers in two lines::
 
     problem = condyle.crocoddyl.problem(shooting_problem)
-    solution = condyle.optimal.Fddp(problem).solve(xs, us)
+    solution = condyle.optimal.Fddp(problem, project_warm_start=False).solve(xs, us)
 
 where xs and us are arrays of Crocoddyl's states and controls. Numbers, their order and the iterates are Crocoddyl's;
-gains have the opposite sign: u = ū + α k + K (x ⊖ x̄). The other way round, `differential_action(model)` is a
+gains have the opposite sign: u = ū + α k + K (x ⊖ x̄). `project_warm_start=False` matters where controls are bounded: it
+keeps a warm start outside of the bounds, as Crocoddyl does. The other way round, `differential_action(model)` is a
 `crocoddyl.DifferentialActionModelAbstract` that computes with our dynamics, for Crocoddyl's own solvers.
 
 The tutorial `python/examples/coming_from_crocoddyl.py` has a table of names. Crocoddyl is not among what is installed

@@ -34,7 +34,8 @@ It needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names there, and here (of `c
 
 Signs and axes: the feedback here is u = ū + α k + K (x ⊖ x̄), with the opposite sign of Crocoddyl's k and K. Forces are
 those on the robot, along the axes of the contact, in both. Contacts in the frame WORLD are "local_world_aligned" here.
-Bounds of a knot count in Fddp, where SolverFDDP does not look at them. Costs of controls at the end, which are zero
+Bounds of a knot count in Fddp, where SolverFDDP does not look at them. Fddp moves a warm start into the bounds, unless
+project_warm_start=False, which SolverBoxFDDP corresponds to. Costs of controls at the end, which are zero
 there, are refused here. Everything else has the same sign, order and unit.
 """
 
@@ -89,9 +90,9 @@ print(f"Crocoddyl: cost {theirs.cost:.9f} after {theirs.iter + 1} iterations, {t
 
 # 2. The same problem here, in two lines. SolverFDDP does not look at bounds; those of this arm are its efforts' limits.
 problem = condyle.crocoddyl.problem(shooting_problem, bounded=False)
-ours = Fddp(problem, tolerance=theirs.th_stop).solve(np.array(xs), np.array(us))
+ours = Fddp(problem, tolerance=theirs.th_stop, project_warm_start=False).solve(np.array(xs), np.array(us))
 
-solver = Fddp(problem, tolerance=theirs.th_stop)
+solver = Fddp(problem, tolerance=theirs.th_stop, project_warm_start=False)
 took = quickest(lambda: solver.solve(np.array(xs), np.array(us)))
 print(f"Condyle:   cost {ours.cost:.9f} after {len(ours.trace)} iterations, {took:.2f} ms")
 assert len(ours.trace) == theirs.iter + 1 and np.isclose(ours.cost, theirs.cost, rtol=1e-9)

@@ -104,6 +104,48 @@ batch b: any(q: Position; body: BodyOf, reference: Reference) -> One {
 }
 }
 
+functions! {
+/// The Jacobian J of a point of a frame, (3, nv): its velocity along the axes of the world is J v (m/s).
+///
+/// q: nq numbers; frame: its name or number; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
+/// the world and S the columns of the joints before it.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
+/// >>> J = condyle.frame_point_jacobian(arm, data, q, "tool", tip)
+/// >>> np.allclose(J @ v, condyle.frame_point_velocity(arm, data, q, v, "tool", tip))
+/// True
+fn frame_point_jacobian(model, data; q: Position, frame: FrameOf, point: Point; out) {
+    let mut J = nalgebra::DMatrix::from_element(3, model.nv(), condyle::Scalar::zero());
+    condyle::forward_kinematics(model, data, &q).frame_point_jacobian(frame, point.lift(), &mut J);
+    J
+}
+
+/// The Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
+///
+/// q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+fn body_point_jacobian(model, data; q: Position, body: BodyOf, point: Point; out) {
+    let mut J = nalgebra::DMatrix::from_element(3, model.nv(), condyle::Scalar::zero());
+    condyle::forward_kinematics(model, data, &q).body_point_jacobian(body, point.lift(), &mut J);
+    J
+}
+
+/// The velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+///
+/// q: nq numbers; v: nv; frame: its name or number; point: in the frame, 3 numbers (m).
+fn frame_point_velocity(model, data; q: Position, v: Tangent, frame: FrameOf, point: Point; out) {
+    condyle::forward_velocities(model, data, &q, &v).frame_point_velocity(frame, point.lift()).to_array()
+}
+
+/// The velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of the body's own
+/// frame.
+///
+/// q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
+fn body_point_velocity(model, data; q: Position, v: Tangent, body: BodyOf, point: Point; out) {
+    condyle::forward_velocities(model, data, &q, &v).body_point_velocity(body, point.lift()).to_array()
+}
+}
+
 motions! {
 /// The velocity of a frame, 6 numbers: that of the body's point at the origin of the reference (m/s), then the angular
 /// velocity (rad/s); O(n).

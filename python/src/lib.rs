@@ -107,9 +107,10 @@ mod _condyle {
     use joint::Joint;
     #[pymodule_export]
     use kinematics::{
-        body_acceleration, body_classical_acceleration, body_jacobian, body_jacobian_rate, body_velocity,
-        forward_kinematics, frame_acceleration, frame_classical_acceleration, frame_jacobian, frame_jacobian_rate,
-        frame_placement, frame_velocity,
+        body_acceleration, body_classical_acceleration, body_jacobian, body_jacobian_rate, body_point_jacobian,
+        body_point_velocity, body_velocity, forward_kinematics, frame_acceleration, frame_classical_acceleration,
+        frame_jacobian, frame_jacobian_rate, frame_placement, frame_point_jacobian, frame_point_velocity,
+        frame_velocity,
     };
     #[pymodule_export]
     use model::{Model, model_from_bytes};

@@ -6,7 +6,11 @@ use crate::exceptions::{ModelError, exception};
 use crate::inertial_parameters::{model_inertia, read_inertia};
 use crate::joint::{Joint, kind, root};
 use crate::tree::tree;
-use condyle::{FrameKind, MjcfOptions, SdfOptions, Se3, UrdfOptions, inertial_parameters};
+use condyle::{
+    MjcfOptions, SdfOptions, Se3, UrdfOptions,
+    regressors::inertial_parameters,
+    tree::{FrameKind, FrameParent},
+};
 use pyo3::exceptions::{PyAttributeError, PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyString};
@@ -431,6 +435,7 @@ impl Model {
                     FrameKind::Link => "link",
                     FrameKind::Joint => "joint",
                     FrameKind::User => "user",
+                    other => unreachable!("{other:?}: a kind of frame without a word for it"),
                 };
                 class.call1((f.name.as_str(), kind, f.body, read_only(py, &f.placement, "")?))
             };
@@ -518,6 +523,39 @@ impl Model {
         Ok(self.inner.with_inertias(|body, _| inertias[body]).map_err(exception)?.into())
     }
 
+    /// The same robot with one more frame of the user's, the last one of `frames`. All other numbers stay as they are.
+    ///
+    /// name: the new frame's name; parent: the name or number of the frame on which it is put, or the name of a body; None is
+    /// the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the identity.
+    ///
+    /// Raises `ModelError` if the parent does not exist, the placement is no rotation and translation, or the user has a frame
+    /// of this name already.
+    ///
+    /// >>> tip = np.eye(4)
+    /// >>> tip[2, 3] = 0.1
+    /// >>> arm = condyle.robots.arm7().with_frame("tip", "tool", tip)
+    /// >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.3] * 7, "tip").shape
+    /// (6, 7)
+    #[pyo3(signature = (name, parent, placement=None))]
+    fn with_frame(
+        &self,
+        name: &str,
+        parent: Option<&Bound<'_, PyAny>>,
+        placement: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let placement = placement.map_or(Ok(Se3::identity()), |placement| pose("placement", placement))?;
+        let text: String;
+        let parent = match parent {
+            None => FrameParent::Body(0),
+            Some(parent) if parent.is_instance_of::<PyString>() => {
+                text = parent.extract()?;
+                FrameParent::Named(&text)
+            }
+            Some(parent) => FrameParent::Frame(frame_index(&self.inner, parent)?),
+        };
+        Ok(self.inner.with_frame(name, parent, placement).map_err(exception)?.into())
+    }
+
     /// The same robot with some joints locked where they are at q.
     ///
     /// Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
@@ -594,7 +632,7 @@ impl Model {
     ) -> PyResult<Self> {
         let follower = body_index("follower: expected a joint's name", &self.inner, follower, 1)?;
         let leader = body_index("leader: expected a joint's name", &self.inner, leader, 1)?;
-        Ok(self.inner.with_mimic(follower, leader, condyle::Mimic { ratio, offset }).map_err(exception)?.into())
+        Ok(self.inner.with_mimic(follower, leader, condyle::tree::Mimic { ratio, offset }).map_err(exception)?.into())
     }
 
     /// The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.

@@ -1,26 +1,17 @@
 //! Robots that move by themselves, as Python sees them: the module `condyle.simulation`.
 
-use crate::arrays::{Give, class, output};
+use crate::arrays::{Give, class, found_type, matrix, output, three};
 use crate::exceptions::{exception, wrong_word};
 use crate::functions::{Argument, Forces, Position, Tangent, positive_speed, regular};
-use crate::model::Model;
+use crate::model::{Model, frame_index, members_of};
 use crate::signals::{self, Signals};
 use condyle::simulation as rust;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
-use rust::{Integrator, Settings, Status};
-
-type Steps<'m> = rust::Simulation<'m, f64>;
-
-self_cell::self_cell!(
-    /// A simulation together with its model.
-    struct Owned {
-        owner: Py<Model>,
-        #[covariant]
-        dependent: Steps,
-    }
-);
+use pyo3::types::PyTuple;
+use rust::{Ground, Integrator, Settings, State, Status};
+use std::sync::Arc;
 
 /// A simulation of a robot: its state, and the memory to move it on.
 ///
@@ -35,9 +26,13 @@ self_cell::self_cell!(
 /// passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
 ///     none of either.
 /// tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
-/// max_iterations: it gives up after so many iterations.
+/// max_iterations: Newton's method gives up after this number of iterations.
+/// ground: a `Ground` on which the robot stands, slides and lands, with 'semi_implicit_euler' only; None for none.
 ///
-/// Raises `ModelError` if M is singular, `ValueError` if dt is not above 0 or not finite, or tolerance is negative.
+/// A simulation can be copied and pickled, and the copy goes on with the same bits.
+///
+/// Raises `ModelError` if M is singular or the ground cannot be, `ValueError` if dt is not above 0 or not finite, or
+/// tolerance is negative.
 ///
 /// >>> from condyle.simulation import Simulation
 /// >>> quadruped = condyle.robots.quadruped()
@@ -49,21 +44,83 @@ self_cell::self_cell!(
 /// >>> bool(abs(simulation.q[2] + 0.5 * 9.81 * 0.1**2) < 2e-3)  # it has fallen ½ g t²
 /// True
 #[pyclass(module = "condyle.simulation")]
-pub(crate) struct Simulation(Owned);
+pub(crate) struct Simulation {
+    inner: rust::Simulation<f64>,
+    model: Py<Model>,
+}
 
 fn word(status: Status) -> &'static str {
     match status {
         Status::Done => "done",
         Status::NotConverged { .. } => "not_converged",
+        Status::ContactsNotConverged { .. } => "contacts_not_converged",
         _ => "not_finite",
     }
+}
+
+/// The word of an integrator.
+fn name(integrator: Integrator) -> &'static str {
+    match integrator {
+        Integrator::SemiImplicitEuler => "semi_implicit_euler",
+        Integrator::RungeKutta4 => "runge_kutta_4",
+        Integrator::Variational => "variational",
+        other => unreachable!("{other:?}: an integrator without a word for it"),
+    }
+}
+
+/// A `Ground` of `condyle._types` as the library has it.
+fn read_ground(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<Ground> {
+    if !given.is_instance(class!(given.py(), "Ground")?)? {
+        return Err(PyTypeError::new_err(format!("ground: expected a `Ground`, found {}", found_type(given))));
+    }
+    let mut ground = Ground {
+        normal: three("ground.normal", &given.getattr("normal")?)?,
+        height: given.getattr("height")?.extract()?,
+        friction: given.getattr("friction")?.extract()?,
+        restitution: given.getattr("restitution")?.extract()?,
+        tolerance: given.getattr("tolerance")?.extract()?,
+        max_iterations: given.getattr("max_iterations")?.extract()?,
+        ..Ground::default()
+    };
+    let expected = "frames, or pairs of a frame and corners";
+    for point in members_of("ground.points", expected, &given.getattr("points")?)? {
+        ground = match point.cast::<PyTuple>() {
+            Err(_) => ground.with_sole(frame_index(model, &point)?, &[condyle::Vec3::zero()]),
+            Ok(pair) if pair.len() == 2 => {
+                let frame = frame_index(model, &pair.get_item(0)?)?;
+                let corners = pair.get_item(1)?;
+                let rows = matrix("ground.points: corners", &corners, [corners.len()?, 3])?;
+                let corners: Vec<_> = rows.chunks_exact(3).map(|p| condyle::Vec3::new(p[0], p[1], p[2])).collect();
+                ground.with_sole(frame, &corners)
+            }
+            Ok(other) => {
+                let found = other.len();
+                return Err(PyTypeError::new_err(format!(
+                    "ground.points: expected a list of {expected}, found a tuple of {found}"
+                )));
+            }
+        };
+    }
+    Ok(ground)
+}
+
+/// The library's ground as a `Ground` of `condyle._types`.
+fn give_ground<'py>(py: Python<'py>, ground: &Ground) -> PyResult<Bound<'py, PyAny>> {
+    let point = |point: &rust::GroundPoint| {
+        let corner = output(py, None, &[1, 3], |x| x.copy_from_slice(&point.position.to_array()))?;
+        Ok((point.frame, corner))
+    };
+    let points = ground.points.iter().map(point).collect::<PyResult<Vec<_>>>()?;
+    let normal = ground.normal.to_array()[..].give(py, None)?;
+    let Ground { height, friction, restitution, tolerance, max_iterations, .. } = *ground;
+    class!(py, "Ground")?.call1((points, normal, height, friction, restitution, tolerance, max_iterations))
 }
 
 #[pymethods]
 impl Simulation {
     #[new]
     #[pyo3(signature = (
-        model, integrator="semi_implicit_euler", dt=1e-3, passive=None, tolerance=1e-9, max_iterations=20
+        model, integrator="semi_implicit_euler", dt=1e-3, passive=None, tolerance=1e-9, max_iterations=20, ground=None
     ))]
     fn new(
         model: &Bound<'_, Model>,
@@ -72,6 +129,7 @@ impl Simulation {
         passive: Option<f64>,
         tolerance: f64,
         max_iterations: usize,
+        ground: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let integrator = match integrator {
             "semi_implicit_euler" => Integrator::SemiImplicitEuler,
@@ -93,62 +151,102 @@ impl Simulation {
         }
         regular(&model.get().inner)?;
         let settings = Settings { integrator, dt, passive, tolerance, max_iterations };
-        let owned = Owned::new(model.clone().unbind(), |model| rust::Simulation::new(&model.get().inner, settings));
-        Ok(Self(owned))
+        let mut inner = rust::Simulation::new(Arc::clone(&model.get().inner), settings);
+        if let Some(ground) = ground {
+            inner.set_ground(read_ground(&model.get().inner, ground)?).map_err(exception)?;
+        }
+        Ok(Self { inner, model: model.clone().unbind() })
     }
 
     /// The robot's name and the time.
     fn __repr__(&self) -> String {
-        let (name, time) = (self.0.borrow_owner().get().inner.name(), self.0.borrow_dependent().time());
-        format!("<condyle.simulation.Simulation of '{name}' at {time} s>")
+        format!("<condyle.simulation.Simulation of '{}' at {} s>", self.inner.model().name(), self.inner.time())
     }
 
     /// The position, nq numbers.
     #[getter]
     fn q<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.borrow_dependent().q().give(py, None)
+        self.inner.q().give(py, None)
     }
 
     /// The velocity, nv numbers.
     #[getter]
     fn v<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.0.borrow_dependent().v().give(py, None)
+        self.inner.v().give(py, None)
     }
 
     /// The time since the state was set: the sum of the steps (s).
     #[getter]
     fn time(&self) -> f64 {
-        self.0.borrow_dependent().time()
+        self.inner.time()
+    }
+
+    /// The ground on which the robot stands, as a `Ground` of single points; None if there is none.
+    #[getter]
+    fn ground<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.inner.ground().map(|ground| give_ground(py, ground)).transpose()
+    }
+
+    /// The contacts of the ground's points in the last step, as `GroundContacts`.
+    #[getter]
+    fn contacts<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let contacts = self.inner.contacts();
+        let rows = |of: fn(&rust::GroundContact) -> [f64; 3]| {
+            let numbers = contacts.iter().flat_map(of).collect::<Vec<_>>();
+            output(py, None, &[contacts.len(), 3], |x| x.copy_from_slice(&numbers))
+        };
+        let (position, force) = (rows(|c| c.position.to_array())?, rows(|c| c.force.to_array())?);
+        let touches: Vec<bool> = contacts.iter().map(|c| c.touches).collect();
+        let touches = py.import("numpy")?.call_method1("array", (touches, "bool"))?;
+        class!(py, "GroundContacts")?.call1((position, force, touches))
     }
 
     /// Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
     ///
-    /// Raises `ModelError` if a number of q is not finite or a rotation in it has not the length 1 (up to 1e-3),
+    /// Raises `ModelError` if a number of q is not finite or a rotation in it does not have the length 1 (up to 1e-3),
     /// `ValueError` if one of v is not finite.
     fn set_state(&mut self, q: &Bound<'_, PyAny>, v: &Bound<'_, PyAny>) -> PyResult<()> {
-        let model = &self.0.borrow_owner().get().inner;
+        let model = &self.model.get().inner;
         let (q, v) = (Position::read("q", q, model)?, Tangent::read("v", v, model)?);
         model.check_position(&q).map_err(exception)?;
         if let Some((k, found)) = v.iter().enumerate().find(|(_, x)| !x.is_finite()) {
             return Err(PyValueError::new_err(format!("v: expected finite numbers, found {found} at {k}")));
         }
-        self.0.with_dependent_mut(|_, simulation| simulation.set_state(&q, &v));
-        Ok(())
+        self.inner.set_state(&q, &v).map_err(exception)
     }
 
     /// A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
-    /// tolerance (a shorter step helps); or 'not_finite', and then the step was not taken.
+    /// tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses break the laws of contact by
+    /// more than the ground's tolerance, and then the step was taken; or 'not_finite', and then it was not.
     ///
     /// tau: nv numbers (N m, N); f_ext: as for `rnea`.
     #[pyo3(signature = (tau, f_ext=None))]
     fn step(&mut self, tau: &Bound<'_, PyAny>, f_ext: Option<&Bound<'_, PyAny>>) -> PyResult<&'static str> {
-        let model = &self.0.borrow_owner().get().inner;
+        let model = &self.model.get().inner;
         let (tau, f_ext) = (Tangent::read("tau", tau, model)?, Forces::read("f_ext", f_ext, model)?);
-        Ok(word(self.0.with_dependent_mut(|_, simulation| simulation.step(&tau, &f_ext))))
+        Ok(word(self.inner.step(&tau, &f_ext)))
     }
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
-        visit.call(self.0.borrow_owner())
+        visit.call(&self.model)
+    }
+
+    /// The parts of a pickle: what the constructor takes, and the state.
+    fn __reduce__<'py>(
+        slf: &Bound<'py, Self>,
+    ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>, Bound<'py, PyAny>)> {
+        let (py, this) = (slf.py(), slf.try_borrow()?);
+        let Settings { integrator, dt, passive, tolerance, max_iterations } = this.inner.settings;
+        let ground = this.ground(py)?;
+        let made = (&this.model, name(integrator), dt, passive, tolerance, max_iterations, ground).into_pyobject(py)?;
+        let State { time, q, v, impulses } = this.inner.state();
+        Ok((slf.get_type().into_any(), made, (time, q, v, impulses).into_pyobject(py)?.into_any()))
+    }
+
+    /// The state of a pickle.
+    fn __setstate__(&mut self, state: (f64, Vec<f64>, Vec<f64>, Vec<f64>)) -> PyResult<()> {
+        let (time, q, v, impulses) = state;
+        self.inner.restore(&State { time, q, v, impulses }).map_err(exception)
     }
 
     /// A number of steps, with a control law that is called before each of them. Returns the status of the last step,
@@ -163,31 +261,29 @@ impl Simulation {
         let py = slf.py();
         let Some(control) = control else {
             let mut this = slf.try_borrow_mut()?;
-            let (owned, mut signals) = (&mut this.0, Signals::new(signals::LONG));
+            let (simulation, mut signals) = (&mut this.inner, Signals::new(signals::LONG));
             let status = py.detach(|| {
-                owned.with_dependent_mut(|_, simulation| {
-                    let mut status = Status::Done;
-                    for _ in 0..steps {
-                        status = simulation.run(1, |_| {});
-                        if !status.is_done() || signals.go_on().is_break() {
-                            break;
-                        }
+                let mut status = Status::Done;
+                for _ in 0..steps {
+                    status = simulation.run(1, |_| {});
+                    if !status.is_done() || signals.go_on().is_break() {
+                        break;
                     }
-                    status
-                })
+                }
+                status
             });
             signals.finish()?;
             return Ok(word(status));
         };
         let class = class!(py, "Control")?;
-        let model = slf.try_borrow()?.0.borrow_owner().clone_ref(py);
+        let model = slf.try_borrow()?.model.clone_ref(py);
         let (nv, bodies) = (model.get().inner.nv(), model.get().inner.bodies().len());
         let mut status = Status::Done;
         for _ in 0..steps {
             let (tau, f_ext) = (output(py, None, &[nv], |_| ())?, output(py, None, &[bodies, 6], |_| ())?);
             let now = {
                 let this = slf.try_borrow()?;
-                let s = this.0.borrow_dependent();
+                let s = &this.inner;
                 class.call1((s.time(), s.q().give(py, None)?, s.v().give(py, None)?, &tau, &f_ext))?
             };
             if !control.call1((now,))?.is_none() {
@@ -197,7 +293,7 @@ impl Simulation {
             let robot = &model.get().inner;
             let (tau, f_ext) = (Tangent::read("tau", &tau, robot)?, Forces::read("f_ext", Some(&f_ext), robot)?);
             let mut this = slf.try_borrow_mut()?;
-            status = this.0.with_dependent_mut(|_, simulation| simulation.step(&tau, &f_ext));
+            status = this.inner.step(&tau, &f_ext);
             if !status.is_done() {
                 break;
             }

@@ -1,7 +1,7 @@
 //! The tree of a robot as text.
 
 use crate::joint::kind;
-use condyle::{FrameKind, Model};
+use condyle::{Model, tree::FrameKind};
 use std::fmt::Write;
 
 /// The bodies below one another, each with its joint, its coordinates and its mass; and the frames on them, but those of the

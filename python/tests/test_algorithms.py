@@ -104,6 +104,42 @@ def test_motion_of_frames(robot: Robot, reference: Any) -> None:
         assert np.array_equal(classical[3:], spatial[3:])
 
 
+def test_points(robot: Robot) -> None:
+    """A point moves as a frame that is put there; many states give what each gives."""
+    model, data, q, v, *_ = robot
+    point, at = np.array([0.1, -0.2, 0.3]), np.eye(4)
+    at[:3, 3] = point
+    for frame in range(0, len(model.frames), 5):
+        other = model.with_frame("point", frame, at)
+        J = condyle.frame_jacobian(other, condyle.Data(other), q, "point", "local_world_aligned")[:3]
+        np.testing.assert_allclose(condyle.frame_point_jacobian(model, data, q, frame, point), J, **CLOSE)
+        np.testing.assert_allclose(condyle.frame_point_velocity(model, data, q, v, frame, point), J @ v, **CLOSE)
+        two = condyle.frame_point_velocity(model, data, np.stack([q, q]), np.stack([v, -v]), frame, point)
+        np.testing.assert_allclose(two, [J @ v, -J @ v], **CLOSE)
+    name, body = model.body_names[-1], model.nbodies - 1
+    J = condyle.frame_point_jacobian(model, data, q, name, point)
+    np.testing.assert_allclose(condyle.body_point_jacobian(model, data, q, body, point), J, **CLOSE)
+    np.testing.assert_allclose(condyle.body_point_velocity(model, data, q, v, model.names[-1], point), J @ v, **CLOSE)
+    with pytest.raises(ValueError, match=r"^point: expected shape \(3,\), found \(2,\)$"):
+        condyle.frame_point_jacobian(model, data, q, 0, [0.0, 1.0])
+
+
+def test_frames_are_added() -> None:
+    arm = condyle.robots.arm7()
+    assert arm.with_frame("here", None).frames[-1].body == 0
+    tip = arm.with_frame("tip", "tool")
+    assert tip.frames[-1].kind == "user"
+    assert (tip.frames[-1].body, len(tip.frames)) == (7, len(arm.frames) + 1)
+    with pytest.raises(condyle.ModelError, match="^two frames are named `tip`$"):
+        tip.with_frame("tip", "tool")
+    with pytest.raises(condyle.ModelError, match="^unknown frame `tol`; nearest is `tool`$"):
+        arm.with_frame("tip", "tol")
+    with pytest.raises(condyle.ModelError, match="^frame `tip`: placement is no rotation and translation$"):
+        arm.with_frame("tip", "tool", 2.0 * np.eye(4))
+    with pytest.raises(IndexError, match="^frame: expected a name or 0 to .*, found 99$"):
+        arm.with_frame("tip", 99)
+
+
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
 def test_motion_of_bodies(robot: Robot, reference: Any) -> None:
     """That of the frames that joints have at the bodies' origins; the world stands still."""

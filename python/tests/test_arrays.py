@@ -15,6 +15,7 @@ Call = Callable[..., Any]
 def calls(robot: Robot) -> dict[str, Call]:
     """Every function that returns one array, as a function of `out`."""
     model, data, q, v, a, tau, f_ext = robot
+    tip = [0.1, 0.2, 0.3]
     return {
         "rnea": lambda **k: condyle.rnea(model, data, q, v, a, f_ext, **k),
         "aba": lambda **k: condyle.aba(model, data, q, v, tau, f_ext, **k),
@@ -37,6 +38,10 @@ def calls(robot: Robot) -> dict[str, Call]:
         "body_acceleration": lambda **k: condyle.body_acceleration(model, data, q, v, a, 1, **k),
         "body_classical_acceleration": lambda **k: condyle.body_classical_acceleration(model, data, q, v, a, 1, **k),
         "body_jacobian_rate": lambda **k: condyle.body_jacobian_rate(model, data, q, v, 1, **k),
+        "frame_point_jacobian": lambda **k: condyle.frame_point_jacobian(model, data, q, 0, tip, **k),
+        "frame_point_velocity": lambda **k: condyle.frame_point_velocity(model, data, q, v, 0, tip, **k),
+        "body_point_jacobian": lambda **k: condyle.body_point_jacobian(model, data, q, 1, tip, **k),
+        "body_point_velocity": lambda **k: condyle.body_point_velocity(model, data, q, v, 1, tip, **k),
         "com": lambda **k: condyle.com(model, data, q, **k),
         "com_velocity": lambda **k: condyle.com_velocity(model, data, q, v, **k),
         "com_acceleration": lambda **k: condyle.com_acceleration(model, data, q, v, a, **k),
@@ -93,6 +98,10 @@ def test_shapes(robot: Robot) -> None:
         "body_acceleration": (6,),
         "body_classical_acceleration": (6,),
         "body_jacobian_rate": (6, nv),
+        "frame_point_jacobian": (3, nv),
+        "frame_point_velocity": (3,),
+        "body_point_jacobian": (3, nv),
+        "body_point_velocity": (3,),
         "com": (3,),
         "com_velocity": (3,),
         "com_acceleration": (3,),

@@ -123,9 +123,40 @@ def test_what_cannot_be_held_is_said() -> None:
     problem = Problem(
         X0, [knot], [0] * 3, FreeDynamics(ARM, None, [Cost("rest", 1.0, Residual.state(X0))], limits=[far])
     )
-    solver = AugmentedLagrangian(problem, penalty_max=1e3, inner={"max_iterations": 20})
-    assert solver.solve(np.tile(X0, (4, 1)), np.zeros((3, 7))).status == "infeasible"
-    assert solver.outcome.primal > 1.0
+    xs, us = np.tile(X0, (4, 1)), np.zeros((3, 7))
+    hasty = AugmentedLagrangian(problem, penalty_max=1e3, inner={"max_iterations": 20})
+    assert hasty.solve(xs, us).status == "max_iterations"
+    solver = AugmentedLagrangian(problem)
+    assert solver.solve(xs, us).status == "constraints_violated"
+    worst = solver.outcome.worst
+    assert worst is not None and solver.outcome.primal == worst.amount > 1.0
+    assert (worst.kind, worst.knot, worst.name) == ("constraint", 3, "far") and worst.row == worst.entry < 3
+
+
+def test_what_is_infeasible_is_proved() -> None:
+    lower = np.full(14, -np.inf)
+    lower[2] = 0.5
+    bent = Limit("bent", Residual.state(X0), lower, np.full(14, np.inf))
+    costs = [Cost("rest", 1.0, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+    knot = FreeDynamics(ARM, DT, costs, limits_at={0: [bent]})
+    problem = Problem(X0, [knot], [0] * 3, FreeDynamics(ARM, None, []))
+    solver = AugmentedLagrangian(problem)
+    solution = solver.solve(np.tile(X0, (4, 1)), np.tile(knot.quasi_static(X0), (3, 1)))
+    assert solution.status == "infeasible"
+    assert solver.outcome.worst == ("constraint", 0, 2, "bent", 2, 0.5)
+
+
+def test_a_start_is_moved_into_the_bounds() -> None:
+    costs = [Cost("rest", 0.1, Residual.state(X0)), Cost("effort", 1e-3, Residual.control(np.zeros(7)))]
+    knot = FreeDynamics(ARM, DT, costs, lower=np.full(7, -20.0), upper=np.full(7, 20.0))
+    problem = Problem(X0, [knot], [0] * 5, FreeDynamics(ARM, None, costs[:1]))
+    xs, us = np.tile(X0, (6, 1)), np.full((5, 7), 60.0)
+    assert np.abs(Fddp(problem, max_iterations=0).solve(xs, us).us).max() == 20.0
+    kept = Fddp(problem, max_iterations=0, project_warm_start=False).solve(xs, us)
+    assert kept.status == "max_iterations" and np.array_equal(kept.us, us)
+    inner = {"max_iterations": 0, "project_warm_start": False}  # the augmented Lagrangian does so anyway
+    solution = AugmentedLagrangian(problem, inner=inner, max_solves=1, restart=False).solve(xs, us)
+    assert solution.status != "converged" and np.abs(solution.us).max() == 20.0
 
 
 def test_feet_do_not_slip() -> None:

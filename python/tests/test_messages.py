@@ -126,6 +126,7 @@ def test_settings_that_are_not_there_are_told_those_that_are() -> None:
         names = message.split("there are ", 1)[1].split(", ")
         assert "tolerance" in names
         words = {"method": "fddp", "time_budget": 1.0, "second_order": True, "inverse_dynamics_form": True}
+        words |= {"project_warm_start": False, "restart": False}
         numbers = {"regularisation_min": 1e-9, "regularisation_factor": 10.0}
         for name in names:  # each is one
             solver(problem, **{name: (words | numbers).get(name, 1)})

@@ -1,5 +1,7 @@
 """Simulations: what a step is, control laws, and what is refused."""
 
+import copy
+import pickle
 from typing import Any
 
 import numpy as np
@@ -8,7 +10,7 @@ from sample import Robot
 from test_model import PENDULUM
 
 import condyle
-from condyle.simulation import Control, Simulation
+from condyle.simulation import Control, Ground, Simulation
 
 CLOSE = {"rtol": 1e-12, "atol": 1e-12}
 INTEGRATORS: tuple[Any, ...] = ("semi_implicit_euler", "runge_kutta_4", "variational")
@@ -133,3 +135,96 @@ def test_what_is_refused(quadruped: Robot) -> None:
         simulation.set_state(np.zeros(18), np.zeros(18))
     with pytest.raises(ValueError, match=r"^f_ext: expected shape \(14, 6\), found \(13, 6\)$"):
         simulation.step(np.zeros(18), np.zeros((13, 6)))
+
+
+FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
+BOX = """<mujoco><worldbody><body name="box"><freejoint name="free"/>
+  <geom type="box" size="0.2 0.15 0.05" mass="3"/></body></worldbody></mujoco>"""
+CORNERS = [[x, y, -0.05] for x in (-0.2, 0.2) for y in (-0.15, 0.15)]
+
+
+def stiff(now: Control) -> None:
+    """Holds the legs straight."""
+    now.tau[6:] = -80.0 * now.q[7:] - 2.0 * now.v[6:]
+
+
+def test_a_robot_lands_and_stands(quadruped: Robot) -> None:
+    model = quadruped.model
+    simulation = Simulation(model, ground=Ground(FEET, friction=0.8))
+    q = condyle.neutral(model)
+    q[2] = 0.72
+    simulation.set_state(q, np.zeros(18))
+    assert simulation.run(1, stiff) == "done"
+    assert not simulation.contacts.touches.any()
+    assert simulation.run(2000, stiff) == "done"
+    contacts = simulation.contacts
+    assert contacts.touches.all()
+    assert contacts.touches.dtype == np.bool_
+    assert contacts.position.shape == contacts.force.shape == (4, 3)
+    assert abs(contacts.position[:, 2]).max() < 1e-6
+    np.testing.assert_allclose(contacts.force[:, 2].sum(), 9.81 * model.total_mass, rtol=1e-3)
+    tangential = np.linalg.norm(contacts.force[:, :2], axis=1)
+    assert (tangential <= 0.8 * contacts.force[:, 2] * (1.0 + 1e-9)).all()
+
+
+@pytest.mark.parametrize("mu", [0.2, 0.6])
+def test_a_box_slides_to_a_stop(mu: float) -> None:
+    """v²/(2 μ g), less half a step's way."""
+    model = condyle.Model.from_mjcf_str(BOX).with_frame("centre", "box")
+    simulation = Simulation(model, ground=Ground([("centre", CORNERS)], friction=mu))
+    q, v = condyle.neutral(model), np.array([0.6, 0.8, 0.0, 0.0, 0.0, 0.0])
+    q[2] = 0.05
+    simulation.set_state(q, v)
+    assert simulation.run(1000) == "done"
+    assert abs(simulation.v).max() < 1e-8
+    expected = 1.0 / (2.0 * mu * 9.81) - 0.5e-3
+    np.testing.assert_allclose(np.linalg.norm(simulation.q[:2]), expected, atol=1e-5)
+
+
+def test_copies_go_on_with_the_same_bits(quadruped: Robot) -> None:
+    model = quadruped.model
+    soles = [("LF_foot", [[0.0, 0.01, 0.0], [0.0, -0.01, 0.0]]), *FEET[1:]]
+    ground = Ground(soles, normal=(0.0, 0.1, 1.0), height=-0.01, friction=0.5, restitution=0.1)
+    simulation = Simulation(model, dt=5e-4, ground=ground)
+    q = condyle.neutral(model)
+    q[2] = 0.71
+    simulation.set_state(q, np.full(18, 0.1))
+    assert simulation.run(300, stiff) == "done"
+    time = simulation.time
+    copies = [copy.copy(simulation), copy.deepcopy(simulation), pickle.loads(pickle.dumps(simulation))]
+    assert simulation.run(300, stiff) == "done"
+    for other in copies:
+        assert other.time == time
+        assert other.run(300, stiff) == "done"
+        assert np.array_equal(other.q, simulation.q)
+        assert np.array_equal(other.v, simulation.v)
+        assert np.array_equal(other.contacts.force, simulation.contacts.force)
+        assert other.ground is not None
+        assert (other.ground.friction, other.ground.restitution, len(other.ground.points)) == (0.5, 0.1, 5)
+    plain = Simulation(condyle.robots.arm7(), "variational", dt=0.002, passive=0.1)
+    assert plain.run(10) == "done"
+    again = pickle.loads(pickle.dumps(plain))
+    assert plain.run(10) == again.run(10) == "done"
+    assert np.array_equal(plain.q, again.q)
+    assert again.ground is None
+
+
+def test_grounds_that_are_refused(quadruped: Robot) -> None:
+    model = quadruped.model
+    with pytest.raises(condyle.ModelError, match=r"^ground: it acts with the integrator SemiImplicitEuler only"):
+        Simulation(model, "variational", ground=Ground(FEET))
+    with pytest.raises(TypeError, match=r"^ground: expected a `Ground`, found a list"):
+        Simulation(model, ground=FEET)  # type: ignore[arg-type]
+    with pytest.raises(condyle.ModelError, match=r"^unknown frame `LF_fot`; nearest is `LF_foot`$"):
+        Simulation(model, ground=Ground(["LF_fot"]))
+    with pytest.raises(condyle.ModelError, match=r"^ground: friction is -1, expected a finite number of at least 0$"):
+        Simulation(model, ground=Ground(FEET, friction=-1.0))
+    with pytest.raises(ValueError, match=r"^ground.points: corners: expected shape \(1, 3\), found \(1, 2\)$"):
+        Simulation(model, ground=Ground([("LF_foot", [[0.0, 1.0]])]))
+    with pytest.raises(TypeError, match=r"^ground.points: expected a list of frames"):
+        Simulation(model, ground=Ground("LF_foot"))
+    simulation = Simulation(model, ground=Ground(FEET, max_iterations=0))
+    q = condyle.neutral(model)
+    q[2] = 0.6
+    simulation.set_state(q, np.zeros(18))
+    assert simulation.run(3) == "contacts_not_converged"

@@ -39,6 +39,10 @@ def test_without_time_a_solve_returns_what_it_has() -> None:
     solution = Fddp(problem, time_budget=0.0).solve(xs, us)
     assert solution.status == "time_limit" and not solution.trace
     np.testing.assert_array_equal(solution.us, us)
+    assert solution.timings.overrun == 0.0  # no iteration was asked for
+    late = Fddp(problem, time_budget=1e-9, tolerance=0.0).solve(xs, us)
+    assert late.status == "time_limit" and len(late.trace) == 1
+    assert 0.0 < late.timings.overrun <= late.timings.total
     with pytest.raises(ValueError, match="time_budget: expected at least 0 seconds"):
         Fddp(problem, time_budget=-1.0)
 

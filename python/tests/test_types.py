@@ -4,16 +4,17 @@ import ast
 import pkgutil
 import types
 import typing
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 import condyle
 from condyle import _condyle, _inertia, _spelling, _types
 from condyle.optimal import AugmentedLagrangian, Fddp, FreeDynamics, FrictionCone, Outcome, Problem, Residual, Solution
-from condyle.simulation import Simulation
+from condyle.simulation import Ground, Simulation
 
 STUB = ast.parse(pkgutil.get_data("condyle", "_condyle.pyi") or b"")
 ARM = condyle.robots.arm7()
@@ -30,6 +31,7 @@ ARGUMENTS = {
     "X": np.eye(7),
     "t": 0.5,
     "frame": "tool",
+    "point": np.zeros(3),
     "body": "joint3",
     "wrt": "gravity",
     "smoothing": 1e-3,
@@ -61,7 +63,7 @@ OBJECTS = {
     "DivideConquer": condyle.DivideConquer(ARM, 1),
     "Joint": condyle.Joint.prismatic([0.0, 0.0, 1.0]),
     "HyperDual": condyle.HyperDual(1.0),
-    "Simulation": Simulation(ARM),
+    "Simulation": Simulation(ARM, ground=Ground(["tool"])),
     "Problem": PROBLEM,
     "_SpelledModel": SPELLED["_SpelledModel"],
     "_SpelledData": SPELLED["_SpelledData"],
@@ -90,12 +92,16 @@ def conforms(value: Any, kind: Any) -> bool:
     origin, parts = typing.get_origin(kind), typing.get_args(kind)
     if kind is Any or kind is None:
         return kind is Any or value is None
+    if kind == ArrayLike:
+        return isinstance(value, np.ndarray)
     if origin in (typing.Union, types.UnionType):
         return any(conforms(value, part) for part in parts)
+    if origin is Sequence:
+        return isinstance(value, list) and all(conforms(item, parts[0]) for item in value)
     if origin is typing.Literal:
         return value in parts
     if origin is np.ndarray:
-        return isinstance(value, np.ndarray) and value.dtype == np.float64
+        return isinstance(value, np.ndarray) and value.dtype == typing.get_args(parts[1])[0]
     if origin is list:
         return isinstance(value, list) and all(conforms(item, parts[0]) for item in value)
     if origin is tuple:

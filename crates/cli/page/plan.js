@@ -5,7 +5,7 @@
 // (a number that is not finite becomes null too). N knots have a control, N + 1 a state.
 //
 //   robot, title      names: of the robot; the heading of the page
-//   status            "converged", "settled" (limits hold, hardly anything left to gain), or in a few words why the solver stopped
+//   status            "converged", "settled" (constraints hold, hardly anything left to gain), or in a few words why the solver stopped
 //   frame             name of the end-effector frame, or null
 //   target            [x, y, z] that it is to reach, m, or null
 //   miss, tolerance   distance at the last knot, and what counts as reached, m, or null
@@ -29,6 +29,8 @@
 //   scene.trail       [N + 1][3]: the end-effector in the world, or null
 //   contacts          { feet: [F] names, trails: [F][N + 1][3] (m), touches: [N][F], forces: [N][F] of [3] (N) or null where
 //                     the foot does not touch, weight: of the robot (N) }, or null, or left out; along the world's axes
+//   limits            { source, positions, velocities, efforts, of }: where the limits come from, the numbers of limited
+//                     coordinates of each kind, and the degrees of freedom of the robot
 //   violations        [] of { what: "position" | "velocity" | "torque", joint (its name), at_knot, amount, limit }: the
 //                     worst knot of each joint and quantity that leaves its limits; amount beyond, limit that it crosses
 //   version, command  of the program that wrote the page; the command line, or null
@@ -93,7 +95,7 @@ function header(data) {
     item.append(text);
     $("badges").append(item);
   };
-  const solved = { converged: "Converged", settled: "Settled: limits held, the cost hardly falls any more" }[data.status];
+  const solved = { converged: "Converged", settled: "Settled: constraints hold, the cost hardly falls any more" }[data.status];
   badge(solved ? "good" : "bad", solved ?? `Not converged: ${data.status}`);
   if (data.miss != null) {
     const reached = data.tolerance == null || data.miss <= data.tolerance;
@@ -104,8 +106,12 @@ function header(data) {
     const { total_ms: total, budget_ms: budget } = data.budget;
     badge(total <= budget ? "good" : "warn", `${total <= budget ? "Within" : "Over"} budget: ${brief(total)} of ${brief(budget)} ms`);
   }
-  const breaches = data.violations.length;
-  badge(breaches ? "bad" : "good", breaches ? `${breaches} ${breaches === 1 ? "limit" : "limits"} exceeded` : "All limits kept");
+  const breaches = data.violations.length, { source, positions, velocities, efforts, of } = data.limits;
+  const total = positions + velocities + efforts;
+  const kinds = `${positions} of ${of} positions, ${velocities} of ${of} velocities, ${efforts} of ${of} efforts`;
+  if (!total) badge("warn", `No limits checked: ${source} has none`);
+  else if (breaches) badge("bad", `${breaches} of ${total} limits exceeded (${source}: ${kinds})`);
+  else badge("good", `${total === 1 ? "1 limit holds" : `All ${total} limits hold`} (${source}: ${kinds})`);
   $("footer").append("Made by Condyle", data.version ? ` ${data.version}` : "", ...(data.command ? [" with ", element("code", {}, data.command)] : []), ". Drawn with three.js and uPlot (MIT).");
 }
 

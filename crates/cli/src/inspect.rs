@@ -2,10 +2,11 @@
 
 use crate::error::Error;
 use crate::findings::{self, Finding};
+use crate::limits::LimitCounts;
 use crate::lines::{Kind, Lines};
 use crate::robot::{self, Robot, RobotArguments};
 use crate::terminal::{Style, Table, heading, say, say_json, styled};
-use condyle::{Body, Data, FrameKind, Model, forward_kinematics, neutral};
+use condyle::{Body, Data, Model, forward_kinematics, neutral, tree::FrameKind};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -43,6 +44,7 @@ struct Report {
     /// The centre of mass of what moves, at the neutral position, in the world (m); none if nothing has mass.
     com: Option<[f64; 3]>,
     gravity: [f64; 3],
+    limits: LimitCounts,
     bodies: Vec<BodyReport>,
     limbs: Limbs,
     mimics: Vec<Follower>,
@@ -133,6 +135,7 @@ impl Report {
             fixed_mass,
             com: (mass > 0.0).then_some(com),
             gravity: model.gravity().to_array(),
+            limits: LimitCounts::new(robot),
             bodies: (1..model.bodies().len()).map(|i| BodyReport::new(model, i, &lines)).collect(),
             limbs: Limbs {
                 side_by_side: plan.is_some(),
@@ -166,6 +169,7 @@ impl Report {
         if let Some([x, y, z]) = self.com {
             let _ = writeln!(out, "  centre of mass ({x:.4}, {y:.4}, {z:.4}) m at the neutral position");
         }
+        let _ = writeln!(out, "  {}", self.limits);
         let Limbs { steps, bodies, .. } = self.limbs;
         let _ = match self.limbs.side_by_side {
             true => writeln!(

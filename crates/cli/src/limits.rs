@@ -1,8 +1,93 @@
-//! Where a robot may be: starts within the limits of its joints, and these limits as constraints of a problem.
+//! Limits of a robot's joints: how many there are, starts within them, and the limits as constraints of a problem.
 
 use crate::error::Error;
+use crate::robot::Robot;
 use condyle::optimal::robot::{Limit, Residual};
 use condyle::{Model, neutral};
+use serde::Serialize;
+use std::fmt;
+
+/// A coordinate with a limit.
+pub(crate) struct Limited<'a> {
+    /// `position`, `velocity` or `torque`.
+    pub what: &'static str,
+    /// The name of its joint.
+    pub joint: &'a str,
+    /// The index in q of a position, in v otherwise.
+    pub index: usize,
+    pub lower: f64,
+    pub upper: f64,
+}
+
+/// Lists the limited positions, velocities and efforts of a robot, joint after joint. A position has a limit of its own where the
+/// joint has as many positions as velocities; a limit of 0 for a velocity or an effort counts as none.
+pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
+    let limits = model.limits();
+    let mut all = Vec::new();
+    for body in model.bodies()[1..].iter().filter(|b| b.mimic.is_none()) {
+        let joint = &*body.joint_name;
+        for index in (body.idx_q..body.idx_q + body.joint.nq()).filter(|_| body.joint.nq() == body.joint.nv()) {
+            let (lower, upper) = (limits.lower[index], limits.upper[index]);
+            if lower.is_finite() || upper.is_finite() {
+                all.push(Limited { what: "position", joint, index, lower, upper });
+            }
+        }
+        for (what, greatest) in [("velocity", &limits.velocity), ("torque", &limits.effort)] {
+            for index in body.idx_v..body.idx_v + body.joint.nv() {
+                let upper = greatest[index];
+                if upper > 0.0 && upper.is_finite() {
+                    all.push(Limited { what, joint, index, lower: -upper, upper });
+                }
+            }
+        }
+    }
+    all
+}
+
+/// The numbers of limited coordinates of a robot, and the source of the limits.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct LimitCounts {
+    /// The robot's file, or the name of a built-in robot: the only source of limits.
+    pub source: String,
+    pub positions: usize,
+    pub velocities: usize,
+    pub efforts: usize,
+    /// The degrees of freedom of the robot, nv.
+    pub of: usize,
+}
+
+impl LimitCounts {
+    /// Counts the limits of a robot.
+    pub(crate) fn new(robot: &Robot) -> Self {
+        let all = limited(&robot.model);
+        let count = |what| all.iter().filter(|limit| limit.what == what).count();
+        Self {
+            source: robot.source.clone(),
+            positions: count("position"),
+            velocities: count("velocity"),
+            efforts: count("torque"),
+            of: robot.model.nv(),
+        }
+    }
+
+    /// Returns the number of all limits.
+    pub(crate) fn total(&self) -> usize {
+        self.positions + self.velocities + self.efforts
+    }
+}
+
+impl fmt::Display for LimitCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { source, positions, velocities, efforts, of } = self;
+        match self.total() {
+            0 => write!(f, "{source} limits no position, velocity or effort"),
+            _ => write!(
+                f,
+                "{source} limits {positions} of {of} positions, {velocities} of {of} velocities, {efforts} of {of} efforts"
+            ),
+        }
+    }
+}
 
 /// Refuses a start outside of the limits, with the joint's name.
 pub(crate) fn check_start(model: &Model, q: &[f64]) -> Result<(), Error> {

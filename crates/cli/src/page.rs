@@ -1,6 +1,7 @@
 //! The page that `condyle plan` writes: plots and playback in one file that needs no network.
 
 use crate::budget::held;
+use crate::limits::LimitCounts;
 use crate::motion::Plan;
 use crate::report::{self, Budget, Violation};
 use crate::scene;
@@ -162,6 +163,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
         },
         // A set of contacts that the solver took is one that can be made.
         "contacts": if plan.feet.is_empty() { None } else { contacts(plan, &knots).ok() },
+        "limits": LimitCounts::new(&plan.robot),
         "violations": violations,
         "version": env!("CARGO_PKG_VERSION"),
         "command": std::env::args().skip(1).fold("condyle".to_owned(), |line, word| line + " " + &word),

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, positive};
 use crate::gait::Gait;
-use crate::limits::{check_start, last_frame, start};
+use crate::limits::{LimitCounts, check_start, last_frame, start};
 use crate::motion::{Goal, Plan};
 use crate::robot::{self, ReadingOptions};
 use crate::task::{self, Task};
@@ -22,11 +22,11 @@ use std::sync::Arc;
   condyle plan --example trot > trot.toml
   condyle plan trot.toml --out trot.html --record trot.csv
 
-A task file is TOML; --example writes one that says what its entries mean. Limits of positions, speeds and efforts are
-held; where that is not possible the exit status is 1, as it is when the target is missed. A motion is `settled`, and the
-status 0, where limits hold and the cost is expected to fall by less than 1e-7 of itself, but the solver's own tolerance for
-the gradient of the Lagrangian is not reached. Ctrl-C ends the solver, and the
-page and the record are written with the best motion so far.")]
+A task file is TOML; --example writes one that says what its entries mean. The limits that the robot's file gives for
+positions, speeds and efforts are held, and the report says how many these are. The exit status is 1 where a limit is
+exceeded or the target is missed. A motion is `settled`, and the status 0, where the limits hold and the cost is expected to
+fall by less than 1e-7 of itself, but the solver's own tolerance for the gradient of the Lagrangian is not reached. Ctrl-C
+ends the solver, and the page and the record are written with the best motion so far.")]
 pub(crate) struct Arguments {
     /// A task file, in place of the flags for robot, frame and target
     #[arg(value_name = "TASK.toml", conflicts_with_all = ["robot", "frame", "target", "q0", "knots", "tolerance"])]
@@ -54,13 +54,13 @@ pub(crate) struct Arguments {
     /// Seconds from knot to knot. Default: 0.01, or what the task says
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     dt: Option<f64>,
-    /// The time that one solver iteration may take (ms); going over is said, and no error
+    /// Time budget per solver iteration (ms); overruns are reported but are not errors
     #[arg(long, default_value_t = 10.0, value_name = "MS", allow_negative_numbers = true)]
     budget_ms: f64,
-    /// How far from the target is still there (m)
+    /// Distance to the target that counts as reached (m)
     #[arg(long, default_value_t = 0.01, value_name = "METRES", allow_negative_numbers = true)]
     tolerance: f64,
-    /// Iterations after which the solver stops; where limits must be held, each of its solves
+    /// Maximum solver iterations (per inner solve when limits are enforced)
     #[arg(long, default_value_t = 200)]
     max_iterations: usize,
     /// Where the page goes
@@ -174,6 +174,9 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
         && (miss > tolerance || miss.is_nan())
     {
         let hint = match plan.solution.status {
+            _ if nearest > tolerance && LimitCounts::new(&plan.robot).positions == 0 => {
+                "no posture was found that reaches it"
+            }
             _ if nearest > tolerance => "no posture within the joints' limits was found that reaches it",
             Status::Converged => "it may be too far for the time that there is; more --knots may help",
             _ => "the solver did not converge; more --knots, more --max-iterations or another --q0 may help",
@@ -339,8 +342,10 @@ fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
         return false;
     }
     if !arguments.json {
-        let joints = if violations.len() == 1 { "limit is" } else { "limits are" };
-        say(&format!("{} {joints} exceeded: once more, with the limits as constraints\n", violations.len()));
+        let limits = LimitCounts::new(&plan.robot);
+        let are = if violations.len() == 1 { "is" } else { "are" };
+        let exceeded = format!("{} of these {} {are} exceeded", violations.len(), limits.total());
+        say(&format!("{limits}; {exceeded}: once more, with the limits as constraints\n"));
     }
     true
 }

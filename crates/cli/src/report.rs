@@ -1,5 +1,6 @@
 //! What `condyle plan` prints: iterations, where the time went, what is beyond its limits.
 
+use crate::limits::{LimitCounts, Limited, limited};
 use crate::motion::Plan;
 use crate::terminal::{Style, styled};
 use condyle::optimal::{Iteration, Status};
@@ -115,32 +116,22 @@ pub(crate) struct Violation {
 /// All quantities that are beyond their limits.
 pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
     let (model, solution) = (&plan.model, &plan.solution);
-    let (limits, knots) = (model.limits(), plan.knots());
+    let knots = plan.knots();
     let efforts: Vec<Vec<f64>> = (0..knots).map(|t| plan.effort(t)).collect();
     let mut found = Vec::new();
-    let mut examine = |what, joint: &str, lower: f64, upper: f64, values: &mut dyn Iterator<Item = f64>| {
+    for Limited { what, joint, index, lower, upper } in limited(model) {
+        let values: Vec<f64> = match what {
+            "position" => (0..=knots).map(|t| solution.x(t)[index]).collect(),
+            "velocity" => (0..=knots).map(|t| solution.x(t)[model.nq() + index]).collect(),
+            _ => efforts.iter().map(|effort| effort[index]).collect(),
+        };
         let beyond = |x: f64| if x > upper { (x - upper, upper) } else { (lower - x, lower) };
-        let worst = values.map(beyond).enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
+        let worst = values.into_iter().map(beyond).enumerate().max_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let range = if (upper - lower).is_finite() { upper - lower } else { 1.0 };
         if let Some((at_knot, (amount, limit))) = worst
             && amount > ROUNDING * range.max(1.0)
         {
             found.push(Violation { what, joint: joint.to_owned(), at_knot, amount, limit });
-        }
-    };
-    for body in model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1 && b.mimic.is_none()) {
-        let (iq, iv) = (body.idx_q, body.idx_v);
-        if body.joint.nq() == 1 {
-            let mut q = (0..=knots).map(|t| solution.x(t)[iq]);
-            examine("position", &body.joint_name, limits.lower[iq], limits.upper[iq], &mut q);
-        }
-        let mut v = (0..=knots).map(|t| solution.x(t)[model.nq() + iv]);
-        if limits.velocity[iv] > 0.0 {
-            examine("velocity", &body.joint_name, -limits.velocity[iv], limits.velocity[iv], &mut v);
-        }
-        let mut tau = efforts.iter().map(|u| u[iv]);
-        if limits.effort[iv] > 0.0 {
-            examine("torque", &body.joint_name, -limits.effort[iv], limits.effort[iv], &mut tau);
         }
     }
     found
@@ -155,6 +146,8 @@ pub(crate) fn status(plan: &Plan) -> &'static str {
         Status::RegularisationLimit => "no descent found",
         Status::TimeLimit => "out of time",
         Status::Interrupted => "interrupted",
+        Status::ConstraintsViolated => "limits violated at the greatest penalty",
+        Status::Infeasible => "no motion from this start holds the limits",
         _ => "not finite",
     }
 }
@@ -166,7 +159,7 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> St
     let mut text = format!("\n{ended} after {iterations} iterations, {:.1} ms\n", budget.solve_ms);
     if let Some(left) = plan.settled {
         let why = "the gradient of the Lagrangian is lost in rounding above its tolerance";
-        text += &format!("settled: limits hold, the cost would fall by {left:.0e} of itself; {why}\n");
+        text += &format!("settled: the constraints hold, the cost would fall by {left:.0e} of itself; {why}\n");
     }
     if let Some(goal) = &plan.goal {
         text += &format!("`{}` ends {:.2} mm from the target\n", model.frames()[goal.frame].name, 1e3 * goal.miss);
@@ -191,11 +184,16 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> St
     line("One iteration", &Row { name: "", us_per_knot, ms_per_horizon: budget.total_ms });
     let verdict = if budget.total_ms <= budget.budget_ms { "within" } else { "OVER" };
     text += &format!("one iteration is {verdict} the budget of {} ms\n", budget.budget_ms);
-    if violations.is_empty() {
-        text += "\nall positions, velocities and torques are within their limits\n";
-    } else {
-        text += &format!("\n{}\n", styled(Style::Bad, "beyond its limit:"));
-    }
+    let limits = LimitCounts::new(&plan.robot);
+    text += &match (limits.total(), violations.len()) {
+        (0, _) => format!("\n{limits}: there was none to check\n"),
+        (1, 0) => format!("\n{limits}: the limit holds at all knots\n"),
+        (total, 0) => format!("\n{limits}: all {total} hold at all knots\n"),
+        (total, beyond) => {
+            let are = if beyond == 1 { "is" } else { "are" };
+            format!("\n{limits}\n{}\n", styled(Style::Bad, &format!("{beyond} of these {total} {are} exceeded:")))
+        }
+    };
     for v in violations {
         text +=
             &format!("  {} of `{}` by {:.3e} (limit {}) at knot {}\n", v.what, v.joint, v.amount, v.limit, v.at_knot);
@@ -212,6 +210,6 @@ pub(crate) fn summary(plan: &Plan, budget: &Budget, violations: &[Violation]) ->
     json!({
         "robot": plan.model.name(), "title": plan.title, "status": plan.solution.status, "settled": plan.settled, "cost": plan.solution.cost,
         "iterations": plan.trace.len(), "knots": plan.knots(), "duration_s": plan.times.last(), "goal": goal,
-        "solve_ms": budget.solve_ms, "budget": budget, "violations": violations,
+        "solve_ms": budget.solve_ms, "budget": budget, "limits": LimitCounts::new(&plan.robot), "violations": violations,
     })
 }

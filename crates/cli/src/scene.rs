@@ -2,7 +2,10 @@
 
 use crate::robot::{Format, Robot};
 use crate::visuals::{self, Geometry};
-use condyle::{Act, Data, Model, Quaternion, Se3, Vec3, forward_kinematics};
+use condyle::{
+    Data, Model, Se3, Vec3, forward_kinematics,
+    spatial::{Act, Quaternion},
+};
 use condyle_meshes::{Drawn, Meshes, mjcf};
 use serde::Serialize;
 use std::collections::HashMap;

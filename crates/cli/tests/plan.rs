@@ -37,7 +37,8 @@ fn the_arm_that_comes_along_reaches_its_target() {
     for words in ["iteration", "converged after", "from the target", "ABA derivatives", "Riccati sweep", "Rollout"] {
         assert!(said.contains(words), "`{words}` is missing in\n{said}");
     }
-    assert!(said.contains("within their limits"), "{said}");
+    let limits = "arm7 limits 7 of 7 positions, 7 of 7 velocities, 7 of 7 efforts: all 21 hold at all knots";
+    assert!(said.contains(limits), "{said}");
     let page = std::fs::read_to_string(folder.join("plan.html")).unwrap();
     assert!(!page.contains("{{"), "a part of the template was not filled in");
     let data = page.split("application/json").nth(1).and_then(|rest| rest.split_once('>')).unwrap().1;
@@ -65,6 +66,90 @@ fn a_robot_from_a_file_is_drawn_as_bones() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let page = std::fs::read_to_string(folder.join("plan.html")).unwrap();
     assert!(page.contains("\"segment\""));
+}
+
+/// A chain of two links in a plane, whose joints are written as given.
+fn chain(folder: &Path, joints: [&str; 2]) -> String {
+    let mut urdf = "<robot name=\"chain\"><link name=\"base\"/>".to_owned();
+    for (k, joint) in joints.iter().enumerate() {
+        let parent = if k == 0 { "base".to_owned() } else { format!("link{}", k - 1) };
+        let place = if k == 0 { "" } else { "<origin xyz=\"0 0 0.5\"/>" };
+        urdf += &format!(
+            "<link name=\"link{k}\"><inertial><origin xyz=\"0 0 0.25\"/><mass value=\"1\"/><inertia ixx=\"0.02\" ixy=\"0\" \
+             ixz=\"0\" iyy=\"0.02\" iyz=\"0\" izz=\"0.01\"/></inertial></link>\
+             <joint name=\"joint{k}\" {joint}{place}<parent link=\"{parent}\"/><child link=\"link{k}\"/>\
+             <axis xyz=\"0 1 0\"/></joint>"
+        );
+    }
+    urdf += "<link name=\"tip\"/><joint name=\"fixed\" type=\"fixed\"><origin xyz=\"0 0 0.5\"/><parent link=\"link1\"/>\
+             <child link=\"tip\"/></joint></robot>";
+    let file = folder.join("chain.urdf");
+    std::fs::write(&file, urdf).unwrap();
+    file.to_str().unwrap().to_owned()
+}
+
+/// Sentences on limits say how many there are and where they come from, in the report, the page and `inspect`; where there is
+/// none they do not say that any holds.
+#[test]
+fn limits_are_counted() {
+    let all = "type=\"revolute\"><limit lower=\"-2\" upper=\"2\" velocity=\"9\" effort=\"90\"/>";
+    let (none, speed) = ("type=\"continuous\">", "type=\"continuous\"><limit velocity=\"9\" effort=\"0\"/>");
+    for (test, joints, [positions, velocities, efforts]) in [
+        ("none", [none, none], [0, 0, 0]),
+        ("one", [none, speed], [0, 1, 0]),
+        ("some", [all, speed], [1, 2, 1]),
+        ("all", [all, all], [2, 2, 2]),
+    ] {
+        let folder = folder(&format!("limits_{test}"));
+        let robot = chain(&folder, joints);
+        let arguments = ["--robot", &robot, "--frame", "tip", "--target", "0.5,0,0.8", "--q0"];
+        let q0 = joints.map(|joint| if joint.contains("revolute") { "0.1" } else { "1,0" }).join(",");
+        let arguments = [&arguments[..], &[&q0]].concat();
+        let said = |arguments: &[&str]| {
+            let output = plan(&folder, arguments);
+            let (said, error) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+            assert!(output.status.success(), "{test}: {said}{error}");
+            said
+        };
+        let text = said(&arguments);
+        let counts =
+            format!("{robot} limits {positions} of 2 positions, {velocities} of 2 velocities, {efforts} of 2 efforts");
+        let total = positions + velocities + efforts;
+        let sentence = match total {
+            0 => format!("{robot} limits no position, velocity or effort: there was none to check"),
+            1 => format!("{counts}: the limit holds at all knots"),
+            _ => format!("{counts}: all {total} hold at all knots"),
+        };
+        assert!(text.contains(&sentence), "{test}: `{sentence}` is missing in\n{text}");
+        assert!(total > 0 || !text.contains("hold"), "{text}");
+        let expected = serde_json::json!({"source": robot, "positions": positions, "velocities": velocities,
+            "efforts": efforts, "of": 2});
+        let summary: Value = serde_json::from_str(&said(&[&arguments[..], &["--json"]].concat())).unwrap();
+        assert_eq!(summary["limits"], expected);
+        let page = std::fs::read_to_string(folder.join("plan.html")).unwrap();
+        let data = page.split("application/json").nth(1).and_then(|rest| rest.split_once('>')).unwrap().1;
+        let data: Value = serde_json::from_str(data.split("</script>").next().unwrap()).unwrap();
+        assert_eq!(data["limits"], expected);
+        let inspect = Command::new(env!("CARGO_BIN_EXE_condyle")).args(["inspect", &robot]).output().unwrap();
+        let inspect = String::from_utf8(inspect.stdout).unwrap();
+        assert!(inspect.contains(sentence.split(": ").next().unwrap()), "{inspect}");
+    }
+}
+
+/// A link that is too weak falls out of its range: what is exceeded is counted among all limits.
+#[test]
+fn limits_that_are_exceeded_are_counted() {
+    let weak = "type=\"revolute\"><limit lower=\"1.19\" upper=\"1.21\" velocity=\"9\" effort=\"0.5\"/>";
+    let folder = folder("limits_exceeded");
+    let robot = chain(&folder, [weak, "type=\"continuous\">"]);
+    let flags = ["--frame", "tip", "--target", "0.9,0,0.2", "--q0", "1.2,1,0", "--max-iterations", "20"];
+    let output = plan(&folder, &[&["--robot", &robot][..], &flags].concat());
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let counts = format!("{robot} limits 1 of 2 positions, 1 of 2 velocities, 1 of 2 efforts");
+    assert!(said.contains(&format!("{counts}; ")) && said.contains("of these 3"), "{said}");
+    assert!(said.contains("of these 3 are exceeded:") || said.contains("of these 3 is exceeded:"), "{said}");
+    assert!(!said.contains("hold at all knots"), "{said}");
 }
 
 #[test]

@@ -34,6 +34,7 @@ fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
 }
 
 /// The number of directions of a state.
+#[track_caller]
 fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
     assert!(x.len() >= model.nq(), "x: expected at least {} numbers, found {}", model.nq(), x.len());
     x.len() - model.nq() + model.nv()
@@ -56,6 +57,7 @@ fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
 ///
 /// # Panics
 /// If x has fewer than nq numbers, or f gives another number of results for another x.
+#[track_caller]
 pub fn jacobian<R>(
     model: &Model<R>,
     x: &[f64],
@@ -132,6 +134,7 @@ impl LaneJacobian {
     ///
     /// # Panics
     /// If n is less than nq.
+    #[track_caller]
     pub fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
         assert!(n >= model.nq(), "n: expected at least {}, found {n}", model.nq());
         let width = match level() {
@@ -146,18 +149,63 @@ impl LaneJacobian {
     ///
     /// # Panics
     /// If x or the results of f have other lengths than [`new`](Self::new) was told, or the robot is another one.
+    #[track_caller]
     pub fn of<R: Constant<f64>>(
         &mut self,
         model: &Model<R>,
         x: &[f64],
         f: &mut impl StateFunction,
     ) -> (&DVector<f64>, &DMatrix<f64>) {
+        self.run(model, x, f, None)
+    }
+
+    /// Computes f(x) and some columns of its Jacobian, those of the directions k of δ in `directions`. The other columns are
+    /// not written: they are zeros until a call computes them.
+    ///
+    /// ```
+    /// # use condyle_dynamics::{Data, LaneJacobian, Scalar, StateFunction, robots};
+    /// struct Square;
+    /// impl StateFunction for Square {
+    ///     fn len(&self) -> usize { 1 }
+    ///     fn call<S: Scalar>(&mut self, _: &mut Data<S>, q: &[S], y: &mut [S]) { y[0] = q[0] * q[0] + q[1]; }
+    /// }
+    /// let arm = robots::arm7();
+    /// let mut by_lanes = LaneJacobian::new(&arm, 7, 1);
+    /// let (_, J) = by_lanes.along(&arm, &[3.0; 7], &mut Square, &[0]);
+    /// assert_eq!((J[0], J[1]), (6.0, 0.0));
+    /// ```
+    ///
+    /// # Panics
+    /// As [`of`](Self::of), and if a direction is not below nv + others.
+    #[track_caller]
+    pub fn along<R: Constant<f64>>(
+        &mut self,
+        model: &Model<R>,
+        x: &[f64],
+        f: &mut impl StateFunction,
+        directions: &[usize],
+    ) -> (&DVector<f64>, &DMatrix<f64>) {
+        let n = self.J.ncols();
+        if let Some(&k) = directions.iter().find(|&&k| k >= n) {
+            panic!("directions: found {k}, expected less than {n}");
+        }
+        self.run(model, x, f, Some(directions))
+    }
+
+    #[track_caller]
+    fn run<R: Constant<f64>>(
+        &mut self,
+        model: &Model<R>,
+        x: &[f64],
+        f: &mut impl StateFunction,
+        columns: Option<&[usize]>,
+    ) -> (&DVector<f64>, &DMatrix<f64>) {
         let Self { width, value, J } = self;
         assert!(f.len() == value.len(), "f: expected {} results, found {}", value.len(), f.len());
         match width {
-            Width::Long(d) => d.run(model, x, f, value, J),
-            Width::Short(d) => d.run(model, x, f, value, J),
-            Width::One(d) => d.run(model, x, f, value, J),
+            Width::Long(d) => d.run(model, x, f, columns, value, J),
+            Width::Short(d) => d.run(model, x, f, columns, value, J),
+            Width::One(d) => d.run(model, x, f, columns, value, J),
         }
         (value, J)
     }
@@ -182,17 +230,19 @@ impl<S: Block<Number = f64>> Directions<S> {
         Self { data, delta: zeros(n - model.nq() + model.nv()), x: zeros(n), moved: zeros(n), y: zeros(results) }
     }
 
+    #[track_caller]
     fn run<R: Constant<f64>>(
         &mut self,
         model: &Model<R>,
         x: &[f64],
         f: &mut impl StateFunction,
+        columns: Option<&[usize]>,
         value: &mut DVector<f64>,
         J: &mut DMatrix<f64>,
     ) {
         self.data.check(model);
         check("x", x.len(), self.x.len());
-        S::enter(SideBySide { directions: self, model, x, f, value, J });
+        S::enter(SideBySide { directions: self, model, x, f, columns, value, J });
     }
 }
 
@@ -202,6 +252,8 @@ struct SideBySide<'a, S, R, F> {
     model: &'a Model<R>,
     x: &'a [f64],
     f: &'a mut F,
+    /// The columns that are wanted; all if there is no list.
+    columns: Option<&'a [usize]>,
     value: &'a mut DVector<f64>,
     J: &'a mut DMatrix<f64>,
 }
@@ -212,8 +264,9 @@ const WIDEST: usize = 8;
 impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R, F> {
     #[inline(always)]
     fn run(self) {
-        let Self { directions: Directions { data, delta, x: from, moved, y }, model, x, f, value, J } = self;
-        let (n, nq, nv) = (delta.len(), model.nq(), model.nv());
+        let Self { directions: Directions { data, delta, x: from, moved, y }, model, x, f, columns, value, J } = self;
+        let (n, nq, nv) = (columns.map_or(delta.len(), <[usize]>::len), model.nq(), model.nv());
+        let column = |k: usize| columns.map_or(k, |columns| columns[k]);
         for (to, &x) in from.iter_mut().zip(x) {
             *to = LaneDual::splat(x);
         }
@@ -223,7 +276,7 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
             for k in 0..count {
                 let mut direction = [0.0; WIDEST];
                 direction[k] = 1.0;
-                delta[first + k].eps = S::load(&direction);
+                delta[column(first + k)].eps = S::load(&direction);
             }
             integrate(model, &from[..nq], &delta[..nv], &mut moved[..nq]);
             for k in nq..from.len() {
@@ -236,11 +289,11 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
                 y.eps.store(&mut eps);
                 value[row] = re[0];
                 for k in 0..count {
-                    J[(row, first + k)] = eps[k];
+                    J[(row, column(first + k))] = eps[k];
                 }
             }
             for k in 0..count {
-                delta[first + k].eps = S::zero();
+                delta[column(first + k)].eps = S::zero();
             }
             first += S::LANES;
         }
@@ -266,6 +319,7 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
 ///
 /// # Panics
 /// If x has fewer than nq numbers.
+#[track_caller]
 pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> Dual64) -> (f64, DVector<f64>) {
     let (value, J) = jacobian(model, x, |x| vec![f(x)]);
     (value[0], J.row(0).transpose())
@@ -287,6 +341,7 @@ pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> 
 ///
 /// # Panics
 /// If x has fewer than nq numbers.
+#[track_caller]
 pub fn hessian<R>(
     model: &Model<R>,
     x: &[f64],

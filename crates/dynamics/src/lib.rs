@@ -50,9 +50,9 @@ pub use batch::derivatives::{
     BatchAbaDerivatives, BatchAbaHessian, BatchCentroidalDerivatives, BatchCoriolisDerivatives, BatchEnergyDerivatives,
     BatchRneaDerivatives, BatchRneaHessian,
 };
-pub use batch::group::StateMatrix;
 pub use batch::kinematics::BatchAccelerationDerivatives;
 pub use batch::results::{Matrices, Poses};
+pub use batch::state_matrix::StateMatrix;
 pub use batch::{Batch, BatchNumber, BatchWriter};
 pub use calls::centroidal::{centroidal_map, centroidal_map_rate, compute_all_terms};
 pub use calls::constrained_dynamics::{
@@ -85,9 +85,9 @@ pub use calls::second_derivatives::{
 };
 pub use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
 pub use condyle_model::{
-    Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, IntegrateArgument, Joint, JointOptions, Limits, Mimic,
-    Model, ModelBuilder, WORLD, Warning, difference, difference_jacobian, distance, inertial_parameters, integrate,
-    integrate_jacobian, interpolate, neutral, normalize, random_configuration, transport,
+    Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, FrameParent, IntegrateArgument, Joint, JointOptions,
+    Limits, Mimic, Model, ModelBuilder, WORLD, Warning, difference, difference_jacobian, distance, inertial_parameters,
+    integrate, integrate_jacobian, interpolate, neutral, normalize, random_configuration, transport,
 };
 #[cfg(feature = "loaders")]
 pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};

@@ -87,6 +87,7 @@ impl<S: Scalar> Cholesky<S> {
     ///
     /// # Panics
     /// If n is above [`MOST_ROWS`](Self::MOST_ROWS).
+    #[track_caller]
     pub fn new(n: usize) -> Self {
         assert!(n <= Self::MOST_ROWS, "n: expected at most {} rows, found {n}", Self::MOST_ROWS);
         Self { L: matrix(n, n, S::zero()) }
@@ -104,6 +105,7 @@ impl<S: Scalar> Cholesky<S> {
     /// # Panics
     /// If `M` is not n × n.
     #[inline(always)]
+    #[track_caller]
     pub fn factorize(&mut self, M: &DenseMatrix<S, impl Dense<S>>) {
         self.factorize_while(M, || true);
     }
@@ -112,6 +114,7 @@ impl<S: Scalar> Cholesky<S> {
     /// the factor is done.
     #[doc(hidden)]
     #[inline(always)]
+    #[track_caller]
     pub fn factorize_while(&mut self, M: &DenseMatrix<S, impl Dense<S>>, go_on: impl FnMut() -> bool) -> bool {
         let n = self.L.nrows();
         assert!(M.shape() == (n, n), "M: expected {n} × {n}, found {:?}", M.shape());
@@ -126,6 +129,7 @@ impl<S: Scalar> Cholesky<S> {
     /// # Panics
     /// If `b` has not n numbers.
     #[inline(always)]
+    #[track_caller]
     pub fn solve(&self, b: &mut [S]) {
         check("b", b.len(), self.L.nrows());
         solve(self.L.as_slice(), b);
@@ -138,6 +142,7 @@ impl<S: Scalar> Cholesky<S> {
     /// # Panics
     /// If `B` has not n rows.
     #[inline(always)]
+    #[track_caller]
     pub fn solve_matrix(&self, B: &mut DenseMatrix<S, impl Dense<S>>) {
         check("B", B.nrows(), self.L.nrows());
         for column in B.as_mut_slice().chunks_exact_mut(self.L.nrows().max(1)) {
@@ -152,6 +157,7 @@ impl<S: Scalar> Cholesky<S> {
     /// # Panics
     /// If `X` is not n × n.
     #[inline(always)]
+    #[track_caller]
     pub fn inverse(&self, X: &mut DenseMatrix<S, impl Dense<S>>) {
         self.inverse_while(X, || true);
     }
@@ -160,6 +166,7 @@ impl<S: Scalar> Cholesky<S> {
     /// done.
     #[doc(hidden)]
     #[inline(always)]
+    #[track_caller]
     pub fn inverse_while(&self, X: &mut DenseMatrix<S, impl Dense<S>>, mut go_on: impl FnMut() -> bool) -> bool {
         let n = self.L.nrows();
         assert!(X.shape() == (n, n), "X: expected {n} × {n}, found {:?}", X.shape());

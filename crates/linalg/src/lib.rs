@@ -71,6 +71,24 @@ pub fn check(argument: &str, found: usize, expected: usize) {
     }
 }
 
+/// Panics unless an index is below the number of the things that it counts: `check_index("frame", frame, 12, "frames")`.
+#[doc(hidden)]
+#[inline(always)]
+#[track_caller]
+pub fn check_index(argument: &str, found: usize, count: usize, things: &str) {
+    if found >= count {
+        wrong_index(argument, found, count, things);
+    }
+}
+
+/// The panic of [`check_index`], not inlined.
+#[cold]
+#[inline(never)]
+#[track_caller]
+fn wrong_index(argument: &str, found: usize, count: usize, things: &str) -> ! {
+    panic!("{argument}: expected an index below {count}, the number of {things}, found {found}");
+}
+
 /// The panic of [`check`], not inlined: hundreds of calls check several arguments each.
 #[cold]
 #[inline(never)]

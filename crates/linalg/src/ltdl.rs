@@ -7,8 +7,8 @@
 //! Where joints share a coordinate (mimic), the tree is that of `elimination_tree.rs`.
 
 use crate::axpy::{axpy, dot};
-use crate::check;
 use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
+use crate::{check, check_index};
 use condyle_spatial::{Array, Dense, DenseMatrix, Scalar, alike};
 
 /// Rows are stored in steps of this many numbers, so that the innermost loop has no remainder. What stands behind a
@@ -156,7 +156,9 @@ impl<S: Scalar> Ltdl<S> {
     ///
     /// # Panics
     /// If k is not less than nv.
+    #[track_caller]
     pub fn row(&self, k: usize) -> impl Iterator<Item = (usize, S)> {
+        check_index("k", k, self.D_inv.len(), "rows");
         let above = |k: usize| Some(self.tree.parent[k]).filter(|&p| p != NONE);
         let row = &self.rows[self.tree.first[k]..][..self.tree.depth[k]];
         core::iter::successors(above(k), move |&k| above(k)).zip(row.iter().rev().copied())
@@ -176,6 +178,7 @@ impl<S: Scalar> Ltdl<S> {
     /// # Panics
     /// If `M` is not nv × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn factorize(&mut self, M: &DenseMatrix<S, impl Dense<S>>) {
         self.factorize_while(M, || true);
     }
@@ -184,6 +187,7 @@ impl<S: Scalar> Ltdl<S> {
     /// the factor is done.
     #[doc(hidden)]
     #[inline(always)]
+    #[track_caller]
     pub fn factorize_while(&mut self, M: &DenseMatrix<S, impl Dense<S>>, mut go_on: impl FnMut() -> bool) -> bool {
         let nv = self.D_inv.len();
         assert!(M.shape() == (nv, nv), "M: expected {nv} × {nv}, found {:?}", M.shape());
@@ -221,6 +225,7 @@ impl<S: Scalar> Ltdl<S> {
     /// # Panics
     /// If `b` has not nv numbers.
     #[inline(always)]
+    #[track_caller]
     pub fn solve(&self, b: &mut [S]) {
         check("b", b.len(), self.D_inv.len());
         let EliminationTree { swaps, parent, depth, run, first, .. } = &self.tree;
@@ -276,6 +281,7 @@ impl<S: Scalar> Ltdl<S> {
     /// # Panics
     /// If `B` has not nv rows.
     #[inline(always)]
+    #[track_caller]
     pub fn solve_matrix(&self, B: &mut DenseMatrix<S, impl Dense<S>>) {
         check("B", B.nrows(), self.D_inv.len());
         for column in B.as_mut_slice().chunks_exact_mut(self.D_inv.len().max(1)) {
@@ -291,6 +297,7 @@ impl<S: Scalar> Ltdl<S> {
     /// # Panics
     /// If `X` is not nv × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn inverse(&self, X: &mut DenseMatrix<S, impl Dense<S>>) {
         self.inverse_while(X, || true);
     }
@@ -299,6 +306,7 @@ impl<S: Scalar> Ltdl<S> {
     /// done.
     #[doc(hidden)]
     #[inline(always)]
+    #[track_caller]
     pub fn inverse_while(&self, X: &mut DenseMatrix<S, impl Dense<S>>, mut go_on: impl FnMut() -> bool) -> bool {
         let nv = self.D_inv.len();
         assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use condyle_spatial::{Inertia, Se3};
 
 /// A moving body (a link, with all that fixed joints merge into it) and the joint that carries it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Body {
     /// The joint's name: how Pinocchio names the pair.
@@ -30,7 +30,7 @@ pub struct Body {
 }
 
 /// A frame fixed to a body.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frame {
     /// The name of the link or joint, or the user's.
@@ -46,6 +46,7 @@ pub struct Frame {
 /// The origin of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
 pub enum FrameKind {
     /// A link of the URDF.
     Link,
@@ -53,6 +54,24 @@ pub enum FrameKind {
     Joint,
     /// Added by the user.
     User,
+}
+
+/// The body or frame on which [`Model::with_frame`](crate::Model::with_frame) puts a frame; a name is one too (`"tool".into()`).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FrameParent<'a> {
+    /// Index of a body; 0 is the world.
+    Body(usize),
+    /// Index of a frame.
+    Frame(usize),
+    /// Name of a frame (a link's, else the user's, else a joint's), else of a body.
+    Named(&'a str),
+}
+
+impl<'a> From<&'a str> for FrameParent<'a> {
+    fn from(name: &'a str) -> Self {
+        Self::Named(name)
+    }
 }
 
 /// Limits of position, velocity and effort; infinite where there are none.

@@ -11,6 +11,7 @@ use alloc::borrow::ToOwned;
 use alloc::collections::BTreeSet;
 use alloc::string::String;
 use alloc::vec::Vec;
+use condyle_linalg::check_index;
 use condyle_spatial::{Act, Inertia, Se3, Vec3};
 
 /// The name of a body of a builder. [`WORLD`] is the one that is always there.
@@ -26,6 +27,7 @@ const MAX_DEGREES: usize = 4096;
 /// The most coordinates that a model may have whose joints follow others: its inertia matrix is factored as a dense one.
 const MAX_SHARED: usize = 1024;
 
+#[derive(Clone, Debug)]
 struct Draft {
     body: Body,
     options: JointOptions,
@@ -50,6 +52,7 @@ struct Draft {
 /// assert_eq!(model.nv(), 2);
 /// # Ok::<(), condyle_model::Error>(())
 /// ```
+#[derive(Clone, Debug)]
 pub struct ModelBuilder {
     name: String,
     drafts: Vec<Draft>,
@@ -118,7 +121,12 @@ impl ModelBuilder {
     }
 
     /// Fixes more inertia to a body: `inertia` is in a frame that is at `placement` in the body's.
+    ///
+    /// # Panics
+    /// If the body is not one of this builder's.
+    #[track_caller]
     pub fn merge(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>) {
+        check_index("body", body.0, self.drafts.len(), "bodies");
         self.drafts[body.0].body.inertia += placement.act(inertia);
     }
 
@@ -146,7 +154,12 @@ impl ModelBuilder {
     }
 
     /// Lets a joint follow another one, in place of a coordinate of its own; see [`Mimic`].
+    ///
+    /// # Panics
+    /// If the follower is not one of this builder's bodies.
+    #[track_caller]
     pub fn mimic(&mut self, follower: BodyId, leader: BodyId, mimic: Mimic) {
+        check_index("follower", follower.0, self.drafts.len(), "bodies");
         self.drafts[follower.0].mimic = Some((leader.0, mimic));
     }
 

@@ -7,7 +7,7 @@ use crate::joint::{Joint, Mimic};
 use crate::layout::Single;
 use crate::model::Model;
 use alloc::vec::Vec;
-use condyle_linalg::check;
+use condyle_linalg::{check, check_index};
 use condyle_spatial::{Inertia, Se3, Vec3};
 
 impl ModelBuilder {
@@ -21,6 +21,7 @@ impl ModelBuilder {
     ///
     /// # Panics
     /// If there are no joints.
+    #[track_caller]
     pub fn chain(&mut self, name: &str, parent: BodyId, joints: &[(Joint, Se3<f64>)], inertia: Inertia<f64>) -> BodyId {
         let ((last, placement), before) = joints.split_last().expect("joints: expected at least one");
         let mut at = parent;
@@ -149,10 +150,11 @@ impl Model {
     ///
     /// # Panics
     /// If `q` has not nq numbers, or a body does not exist or is the world.
+    #[track_caller]
     pub fn lock(&self, bodies: &[usize], q: &[f64]) -> Result<Self, Error> {
         check("q", q.len(), self.tree.nq);
         for &i in bodies {
-            assert!((1..self.bodies.len()).contains(&i), "bodies: there is no joint {i}");
+            self.check_joint("bodies", i);
         }
         self.check_position(q)?;
         let coordinates: Vec<usize> = bodies.iter().map(|&i| self.bodies[i].idx_v).collect();
@@ -184,9 +186,9 @@ impl Model {
     ///
     /// # Panics
     /// If there is no such body.
+    #[track_caller]
     pub fn append(&self, body: usize, placement: Se3<f64>, other: &Self, prefix: &str) -> Result<Self, Error> {
-        let bodies = self.bodies.len();
-        assert!(body < bodies, "body: expected a number below {bodies}, found {body}");
+        check_index("body", body, self.bodies.len(), "bodies");
         let (mut builder, place) = self.to_builder();
         builder.append(place[body].0, placement, other, prefix);
         builder.build()
@@ -209,13 +211,21 @@ impl Model {
     ///
     /// # Panics
     /// If a body does not exist or is the world.
+    #[track_caller]
     pub fn with_mimic(&self, follower: usize, leader: usize, mimic: Mimic) -> Result<Self, Error> {
         for (name, i) in [("follower", follower), ("leader", leader)] {
-            assert!((1..self.bodies.len()).contains(&i), "{name}: there is no joint {i}");
+            self.check_joint(name, i);
         }
         let (mut builder, place) = self.to_builder();
         builder.mimic(place[follower].0, place[leader].0, mimic);
         builder.build()
+    }
+
+    /// Panics unless body i exists and has a joint.
+    #[track_caller]
+    fn check_joint(&self, name: &str, i: usize) {
+        assert!(i > 0, "{name}: the world, body 0, has no joint");
+        check_index(name, i, self.bodies.len(), "bodies");
     }
 
     /// A builder of this robot, and where each of its bodies is there.

@@ -6,6 +6,7 @@ use crate::tree::Space;
 use alloc::vec::Vec;
 use condyle_linalg::check;
 use condyle_spatial::Scalar;
+use condyle_spatial::simd::Kernel;
 use nalgebra::DMatrix;
 
 /// The greatest distance from zero (rad, m) of a random position in a coordinate that has no limits.
@@ -68,12 +69,29 @@ pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Ve
 ///
 /// # Panics
 /// If an argument has the wrong length.
+#[track_caller]
 pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]) {
     check("q", q.len(), model.nq());
     check("v", v.len(), model.nv());
     check("out", out.len(), model.nq());
-    for space in &model.tree.spaces {
-        space.joint.integrate(&q[space.q.clone()], &v[space.v.clone()], &mut out[space.q.clone()]);
+    S::enter(Integrate { model, q, v, out });
+}
+
+/// q ⊕ v, compiled for the level of its scalar.
+struct Integrate<'a, S, R> {
+    model: &'a Model<R>,
+    q: &'a [S],
+    v: &'a [S],
+    out: &'a mut [S],
+}
+
+impl<S: Scalar, R> Kernel for Integrate<'_, S, R> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { model, q, v, out } = self;
+        for space in &model.tree.spaces {
+            space.joint.integrate(&q[space.q.clone()], &v[space.v.clone()], &mut out[space.q.clone()]);
+        }
     }
 }
 
@@ -83,6 +101,7 @@ pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]
 ///
 /// # Panics
 /// If an argument has the wrong length.
+#[track_caller]
 pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut [S]) {
     check("q0", q0.len(), model.nq());
     check("q1", q1.len(), model.nq());
@@ -105,6 +124,7 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
 ///
 /// # Panics
 /// If an argument has the wrong length.
+#[track_caller]
 pub fn interpolate<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], t: S, tangent: &mut [S], out: &mut [S]) {
     difference(model, q0, q1, tangent);
     for x in tangent.iter_mut() {
@@ -119,6 +139,7 @@ pub fn interpolate<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], t: S, tan
 ///
 /// # Panics
 /// If an argument has the wrong length.
+#[track_caller]
 pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mut [S]) -> S {
     difference(model, q0, q1, tangent);
     let mut sum = S::zero();
@@ -144,6 +165,7 @@ pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mu
 ///
 /// # Panics
 /// If `q` has not nq numbers.
+#[track_caller]
 pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
     check("q", q.len(), model.nq());
     for (joint, iq, _) in model.tree.coordinates() {
@@ -168,6 +190,7 @@ pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
 ///
 /// # Panics
 /// If `v` has not nv numbers or `X` has not nv rows.
+#[track_caller]
 pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
     check("v", v.len(), model.nv());
     assert!(X.nrows() == model.nv(), "X: expected {} rows, found {}", model.nv(), X.nrows());
@@ -214,6 +237,7 @@ impl IntegrateArgument {
 ///
 /// # Panics
 /// If `v` has not nv numbers or `J` is not nv × nv.
+#[track_caller]
 pub fn integrate_jacobian<S: Scalar, R>(model: &Model<R>, v: &[S], argument: IntegrateArgument, J: &mut DMatrix<S>) {
     block_diagonal(model, ("v", v), argument.jacobian(), S::one(), J);
 }
@@ -243,11 +267,13 @@ impl DifferenceArgument {
 ///
 /// # Panics
 /// If `d` has not nv numbers or `J` is not nv × nv.
+#[track_caller]
 pub fn difference_jacobian<S: Scalar, R>(model: &Model<R>, d: &[S], argument: DifferenceArgument, J: &mut DMatrix<S>) {
     block_diagonal(model, ("d", d), GroupJacobian::Log, argument.sign(), J);
 }
 
 /// sign · J(sign · v), joint by joint, for a tangent vector v with the name that its caller gave it.
+#[track_caller]
 fn block_diagonal<S: Scalar, R>(
     model: &Model<R>,
     (name, v): (&str, &[S]),

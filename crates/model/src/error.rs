@@ -122,6 +122,12 @@ pub enum Error {
         /// The fault, with the numbers.
         what: String,
     },
+    /// The ground of a simulation cannot be.
+    #[error("ground: {what}")]
+    Ground {
+        /// The fault, with the names and the numbers.
+        what: String,
+    },
     /// A strict loader met what is only odd.
     #[error("{file}: {warning}")]
     Strict {

@@ -25,6 +25,8 @@ pub trait Layout {
     /// The number that the pass computes with.
     type S: Scalar;
 
+    /// The hash of the tree and of where its joints and frames are.
+    fn geometry_hash(&self) -> u64;
     /// The bodies in order, parents first; 0 is the world and not among them.
     fn bodies(&self) -> Range<usize>;
     /// The kind of joint that carries body i, its axis turned to z.
@@ -125,6 +127,7 @@ pub struct Single<'m, S, R> {
     gravity: &'m Vec3<R>,
     nv: usize,
     has_mimic: bool,
+    geometry: u64,
     scalar: PhantomData<S>,
 }
 
@@ -132,16 +135,20 @@ impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
     /// The layout of a model.
     #[inline(always)]
     pub fn new(model: &'m Model<R>) -> Self {
-        let Model { tree, armature, gravity, .. } = model;
+        let Model { tree, armature, gravity, geometry, .. } = model;
         let Tree { nodes, closed, turns, support, nv, .. } = tree;
-        let (nv, has_mimic) = (*nv, tree.has_mimic());
-        Self { nodes, closed, turns, support, armature, tree, gravity, nv, has_mimic, scalar: PhantomData }
+        let (nv, has_mimic, geometry) = (*nv, tree.has_mimic(), *geometry);
+        Self { nodes, closed, turns, support, armature, tree, gravity, nv, has_mimic, geometry, scalar: PhantomData }
     }
 }
 
 impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     type S = S;
 
+    #[inline(always)]
+    fn geometry_hash(&self) -> u64 {
+        self.geometry
+    }
     #[inline(always)]
     fn bodies(&self) -> Range<usize> {
         1..self.nodes.len()

@@ -48,6 +48,7 @@ mod body;
 mod builder;
 mod compose;
 mod configuration;
+mod equality;
 mod error;
 pub mod inertial_parameters;
 mod io;
@@ -68,8 +69,9 @@ pub mod robots;
 pub mod tree;
 mod validate;
 mod variants;
+mod with_frame;
 
-pub use body::{Body, Frame, FrameKind, JointOptions, Limits};
+pub use body::{Body, Frame, FrameKind, FrameParent, JointOptions, Limits};
 pub use builder::{BodyId, ModelBuilder, WORLD};
 pub use condyle_spatial::{Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
 pub use configuration::{

@@ -8,6 +8,7 @@ use crate::names::nearest;
 use crate::tree::{Column, Node, Tree, hash};
 use alloc::borrow::ToOwned;
 use alloc::string::String;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use condyle_linalg::ColumnTree;
 use condyle_linalg::sparsity::NonzeroRows;
@@ -53,6 +54,13 @@ pub struct Model<R = f64> {
 }
 
 condyle_spatial::alike!(Model);
+
+/// A copy of the model, to be shared: what owns an `Arc` of a model, as a simulation, can be made of `&model`.
+impl<R: Clone> From<&Model<R>> for Arc<Model<R>> {
+    fn from(model: &Model<R>) -> Self {
+        Self::new(model.clone())
+    }
+}
 
 impl<R> Model<R> {
     /// The robot's name.

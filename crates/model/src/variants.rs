@@ -33,6 +33,7 @@ impl<R: Scalar> Model<R> {
     /// # Panics
     /// If `armature` has not nv numbers.
     #[doc(hidden)]
+    #[track_caller]
     pub fn with_scalar_armature(mut self, armature: &[R]) -> Self {
         check("armature", armature.len(), self.nv());
         self.armature.copy_from_slice(armature);
@@ -48,6 +49,7 @@ impl Model {
     ///
     /// # Panics
     /// If `armature` has not nv numbers.
+    #[track_caller]
     pub fn with_armature(mut self, armature: &[f64]) -> Result<Self, Error> {
         check("armature", armature.len(), self.nv());
         self.armature.copy_from_slice(armature);

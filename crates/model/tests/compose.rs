@@ -17,6 +17,20 @@ fn refused(text: &str, strict: bool, message: &str) {
     assert_eq!(said, message);
 }
 
+/// Models and builders are values that threads can share.
+#[test]
+fn models_and_builders_are_values() {
+    fn value<T: Clone + Send + Sync + std::fmt::Debug + 'static>(_: &T) {}
+    let mut builder = ModelBuilder::new("two");
+    builder.append(WORLD, Se3::identity(), &robots::arm7(), "");
+    value(&builder);
+    let (model, twin) = (builder.clone().build().unwrap(), builder.build().unwrap());
+    value(&model);
+    assert_eq!(model, twin);
+    let shared: std::sync::Arc<Model> = (&model).into();
+    assert_eq!(*shared, model);
+}
+
 #[test]
 fn positions_have_names() {
     let quadruped = robots::quadruped();

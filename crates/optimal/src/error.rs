@@ -43,6 +43,13 @@ pub enum Error {
         nu: usize,
     },
 
+    /// A problem with an action that has no copy is to be copied.
+    #[error("{}: cannot be copied, as its `fork` returns `None`", model_name(*.model))]
+    NoCopy {
+        /// The index of the model; none for the terminal one.
+        model: Option<usize>,
+    },
+
     /// A solver is to go on from a solution that it has not.
     #[error("resume: there is no solution to go on from; call solve first")]
     NothingToResume,
@@ -195,6 +202,11 @@ pub enum Error {
 /// Which knot an error is about.
 fn at(knot: Option<usize>) -> String {
     knot.map_or_else(String::new, |t| format!(" of knot {t}"))
+}
+
+/// The argument of [`Problem::new`](crate::Problem::new) that an error is about.
+fn model_name(model: Option<usize>) -> String {
+    model.map_or_else(|| "terminal".to_owned(), |index| format!("models[{index}]"))
 }
 
 impl Error {

@@ -16,6 +16,7 @@
 //!   [`Limit`](robot::Limit)s.
 //! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is what its name says.
 //! - [`AutoDiff`] makes an action of dynamics and a cost that are written for any scalar: exact derivatives by dual numbers.
+//!   [`AutoDiffConstraint`] does so with a path constraint, [`robot::OwnResidual::autodiff`] with a robot's residual.
 //! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
 //!
 //! Nothing outside [`robot`] knows what a robot is: a state is a list of nx numbers, on which an action may define ⊕ and ⊖
@@ -27,7 +28,8 @@
 //! - The gap at a knot is f = φ(x, u) ⊖ x⁺; at the start x̂₀ ⊖ x₀. A warm start may have gaps.
 //! - The feedback is u = ū + α k + K (x ⊖ x̄). Crocoddyl has the opposite sign of k and K; otherwise the iterates of
 //!   [`Fddp`] are those of its `SolverFDDP`.
-//! - A wrong shape inside a program panics with the argument's name; a wrong problem, warm start or setting is an
+//! - Problems, solvers and solutions are `Send` and `Sync`. A problem is copied by [`Problem::try_clone`].
+//! - A wrong shape inside a program panics at the caller's line, with the argument's name; a wrong problem, warm start or setting is an
 //!   [`Error`] before a solve begins; how a solve ended is its [`Status`].
 //!
 //! # Example
@@ -75,7 +77,10 @@ mod read;
 pub mod robot;
 mod time;
 
-pub use constrained::{AugmentedLagrangian, Constrained, ConstraintSettings, Outcome, PathConstraint};
+pub use constrained::{
+    AugmentedLagrangian, AutoDiffConstraint, Constrained, ConstraintSettings, GenericConstraint, Outcome,
+    PathConstraint, Violation, ViolationKind,
+};
 pub use ddp::{DdpMethod, Fddp, Iteration, Observer, Settings, Solution, Status, Timings, Verdict};
 pub use error::Error;
 pub use lq::{EulerBlock, Hessian, LqKnot, LqNode, Structure, Sweep, SweepError};

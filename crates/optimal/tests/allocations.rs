@@ -8,9 +8,10 @@ use common::{HANGING, cartpole, limited_cartpole, random, random_node, straight}
 use condyle_dynamics::{ConstraintKind, ContactConstraint, Force, Motion, ReferenceFrame, Se3, Vec3, neutral, robots};
 use condyle_optimal::robot::{
     Activation, Actuation, Contact, ContactDynamics, ContactInverseDynamics, ControlPolynomial, Cost, FreeAcceleration,
-    FreeDynamics, FrictionCone, ImpulseDynamics, Integrator, Limit, Residual,
+    FreeDynamics, FrictionCone, GenericResidual, ImpulseDynamics, Integrator, Limit, OwnResidual, Residual, RobotState,
 };
 use condyle_optimal::{AugmentedLagrangian, DdpMethod, Fddp, Iteration, Problem, Status, Sweep};
+use condyle_spatial::Scalar;
 use counting::{allocated, allocations};
 
 #[test]
@@ -277,4 +278,45 @@ fn active_rows_allocate_nothing() {
         .solve_with(&mut problem, &x0.repeat(9), &us, |i: &Iteration| counts[i.iteration] = Some(allocated()))
         .unwrap();
     assert_eq!(counts[0], counts[2], "{counts:?}");
+}
+
+/// The height of the tool above a slope.
+struct Height(usize);
+
+impl GenericResidual for Height {
+    fn size(&self) -> usize {
+        1
+    }
+    fn calc<S: Scalar>(&self, state: &mut RobotState<'_, S>, r: &mut [S]) {
+        let p = state.placements().frame(self.0).translation;
+        r[0] = p.z - p.x * S::splat(0.1);
+    }
+}
+
+/// A residual of one's own is computed in memory that is there, and a target is changed in place.
+#[test]
+fn own_residuals_and_changed_targets_allocate_nothing() {
+    let arm = std::sync::Arc::new(robots::arm7());
+    let height = || Residual::Own(OwnResidual::autodiff(arm.clone(), Height(arm.frame("tool").unwrap())));
+    let reach = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.2, 0.5) };
+    let costs = || {
+        vec![
+            Cost::new("height", 1.0, height(), Activation::Quadratic),
+            Cost::new("reach", 1.0, reach.clone(), Activation::Quadratic),
+            Cost::new("rest", 1e-2, Residual::State { reference: vec![0.1; 14] }, Activation::Quadratic),
+        ]
+    };
+    let knot = FreeDynamics::running(arm.clone(), 0.02, costs()).unwrap();
+    let end = FreeDynamics::terminal(arm.clone(), costs()).unwrap();
+    let mut problem = Problem::new(vec![0.1; 14], vec![Box::new(knot)], vec![0; 10], Box::new(end)).unwrap();
+    let (xs, us, mut solver) = ([0.1; 14].repeat(11), [0.0; 70], Fddp::new(&problem));
+    solver.solve(&mut problem, &xs, &us).unwrap();
+    let reference = [0.2; 14];
+    let count = allocations(|| {
+        problem.cost_mut(0, "reach").unwrap().set_target(Vec3::new(0.3, 0.2, 0.5)).unwrap();
+        problem.cost_at_mut(10, "height").unwrap().set_weight(2.0).unwrap();
+        problem.change_costs("rest", |cost| cost.set_target(&reference)).unwrap();
+        solver.solve(&mut problem, &xs, &us).unwrap();
+    });
+    assert_eq!(count, 0);
 }

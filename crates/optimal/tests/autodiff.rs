@@ -5,7 +5,10 @@ use condyle_dynamics::{Data, Model, aba, difference, integrate, neutral, robots}
 use condyle_optimal::robot::{
     Activation, Actuation, Cost, FreeAcceleration, FreeDynamics, Integrated, Integrator, Residual,
 };
-use condyle_optimal::{ActionModel, AutoDiff, Fddp, GenericAction, Hessian, LqNode, NumDiff, Problem, Status};
+use condyle_optimal::{
+    ActionModel, AutoDiff, AutoDiffConstraint, Fddp, GenericAction, GenericConstraint, Hessian, LqNode, NumDiff,
+    PathConstraint, Problem, Status,
+};
 use condyle_spatial::Scalar;
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
@@ -149,4 +152,57 @@ fn an_action_of_any_scalar_is_solved() {
     let mut solver = Fddp::new(&problem);
     let solution = solver.solve(&mut problem, &x0.repeat(11), &[0.0; 70]).unwrap();
     assert_eq!(solution.status, Status::Converged);
+}
+
+/// The height of a point on a unit circle, x = (cos φ, sin φ), and what turns it.
+#[derive(Clone)]
+struct OnCircle;
+
+impl GenericConstraint for OnCircle {
+    fn size(&self) -> usize {
+        2
+    }
+    fn bounds(&self, _: usize) -> (&[f64], &[f64]) {
+        (&[-1.0, 0.0], &[0.5, 0.0])
+    }
+    fn calc<S: Scalar>(&self, t: usize, x: &[S], u: &[S], g: &mut [S]) {
+        g[0] = x[1];
+        g[1] = x[0] * u[0] * S::splat(t as f64);
+    }
+    fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
+        let (s, c) = dx[0].sin_cos();
+        (out[0], out[1]) = (x[0] * c - x[1] * s, x[0] * s + x[1] * c);
+    }
+}
+
+/// ∂(sin φ)/∂φ = cos φ and ∂(t u cos φ)/∂(φ, u) = (−t u sin φ, t cos φ), along the circle, whatever was in the matrices.
+#[test]
+fn constraints_of_any_scalar_are_differentiated_along_the_manifold() {
+    let (x, u) = ([0.8, 0.6], [3.0]);
+    let mut constraint = AutoDiffConstraint::new(OnCircle);
+    for _ in 0..2 {
+        let (mut gx, mut gu) = (DMatrix::from_element(2, 1, 9.0), DMatrix::from_element(2, 1, 9.0));
+        assert!(constraint.calc_diff(2, &x, &u, &mut gx, &mut gu));
+        assert_eq!((gx.as_slice(), gu.as_slice()), (&[0.8, -6.0 * 0.6][..], &[0.0, 1.6][..]));
+    }
+    // at the end there are no controls
+    let (mut gx, mut gu) = (DMatrix::zeros(1, 1), DMatrix::zeros(1, 0));
+    #[derive(Clone)]
+    struct Top;
+    impl GenericConstraint for Top {
+        fn size(&self) -> usize {
+            1
+        }
+        fn bounds(&self, _: usize) -> (&[f64], &[f64]) {
+            (&[0.0], &[0.0])
+        }
+        fn calc<S: Scalar>(&self, _: usize, x: &[S], _: &[S], g: &mut [S]) {
+            g[0] = x[0];
+        }
+        fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
+            OnCircle.integrate(x, dx, out);
+        }
+    }
+    assert!(AutoDiffConstraint::new(Top).calc_diff(0, &x, &[], &mut gx, &mut gu));
+    assert_eq!(gx[0], -0.6);
 }

@@ -6,7 +6,8 @@ mod common;
 
 use common::{Linear, Unicycle, cartpole_action, random, random_matrix, random_node};
 use condyle_optimal::{
-    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, LqNode, NumDiff, PathConstraint, Problem, Status,
+    ActionModel, AugmentedLagrangian, Constrained, ConstraintSettings, LqNode, NumDiff, PathConstraint, Problem,
+    Status, ViolationKind,
 };
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
@@ -237,8 +238,14 @@ fn a_constraint_that_is_not_a_number_never_counts_as_met() {
     let solution = solver.solve(&mut problem, &[0.0; 18], &[0.0; 10]).unwrap();
     assert!(solution.xs.iter().chain(&solution.us).all(|x| x.is_finite()));
     assert_ne!(solution.status, Status::Converged);
+    solver.settings.restart = false;
     let at_start = solver.solve(&mut problem, &[0.2; 18], &[0.0; 10]).unwrap();
     assert_eq!(at_start.status, Status::NotFinite);
+    let worst = solver.outcome().worst.as_ref().unwrap();
+    assert_eq!((worst.knot, worst.row, worst.amount), (5, 0, f64::INFINITY));
+    solver.settings.restart = true;
+    let again = solver.solve(&mut problem, &[0.2; 18], &[0.0; 10]).unwrap();
+    assert!(again.status != Status::Converged && again.status != Status::Infeasible);
 }
 
 #[test]
@@ -255,11 +262,61 @@ fn what_cannot_be_met_is_said() {
         (result, solver.outcome().clone())
     };
     let (status, outcome) = solve(3.0, 3.0, 1.0);
-    assert_eq!(status, Ok(Status::Infeasible));
+    assert_eq!(status, Ok(Status::ConstraintsViolated));
     assert!(outcome.primal > 0.1);
+    let worst = outcome.worst.unwrap();
+    assert_eq!((worst.kind, worst.knot, worst.name), (ViolationKind::Constraint, 10, None));
+    assert_eq!((worst.row, worst.entry, worst.amount), (0, 0, outcome.primal));
     let (status, outcome) = solve(0.5, 0.8, 1.0);
     assert_eq!(status, Ok(Status::Converged));
     assert!(outcome.multipliers[10][0] < 0.0); // the lower bound holds it
+    assert!(outcome.worst.is_none_or(|worst| worst.amount == outcome.primal && outcome.primal <= 1e-6));
     let error = solve(2.0, 1.0, 1.0).0.unwrap_err().to_string();
     assert_eq!(error, "knot 10: constraint 0 must be at least 2 and at most 1");
+}
+
+/// An inner solve that stops early, at the largest penalty, proves nothing and keeps its status.
+#[test]
+fn a_solve_that_stops_early_claims_nothing() {
+    let rows = Rows::new(&[(&[0.0, 0.0, 0.0, 1.0, 0.0], -1.0, 1.0)]);
+    let end = Rows::new(&[(&[1.0, 0.0, 0.0], 0.5, 0.8)]);
+    let running = Constrained::new(Box::new(Unicycle { nu: 2, lanes: 1 }), Box::new(rows));
+    let terminal = Constrained::new(Box::new(Unicycle { nu: 0, lanes: 1 }), Box::new(end));
+    let mut problem = Problem::new(vec![0.0; 3], vec![Box::new(running)], vec![0; 10], Box::new(terminal)).unwrap();
+    let mut solver = AugmentedLagrangian::new(&problem);
+    (solver.settings.penalty_start, solver.settings.penalty_max) = (1e8, 1e8);
+    solver.inner.max_iterations = 1;
+    let status = solver.solve(&mut problem, &[0.0; 33], &[0.0; 20]).unwrap().status;
+    assert_eq!(status, Status::MaxIterations);
+    (solver.inner.max_iterations, solver.inner.regularisation_start) = (100, 9e8);
+    let status = solver.solve(&mut problem, &[0.0; 33], &[0.0; 20]).unwrap().status;
+    assert!(!matches!(status, Status::Infeasible | Status::ConstraintsViolated), "{status:?}");
+}
+
+/// A row of the initial state is a proof at a knot without controls; with controls a user's constraint might depend on them.
+#[test]
+fn what_is_infeasible_is_proved() {
+    let solve = |nu: usize| {
+        let first = Rows::new(&[(&[vec![1.0, 0.0, 0.0], vec![0.0; nu]].concat(), 0.25, 1.0)]);
+        let first = Constrained::new(Box::new(Unicycle { nu, lanes: 1 }), Box::new(first));
+        let then = Box::new(Unicycle { nu: 2, lanes: 1 });
+        let end = Rows::new(&[(&[1.0, 0.0, 0.0], 0.5, 0.5)]);
+        let end = Constrained::new(Box::new(Unicycle { nu: 0, lanes: 1 }), Box::new(end));
+        let stages = [vec![0], vec![1; 9]].concat();
+        let mut problem = Problem::new(vec![0.0; 3], vec![Box::new(first), then], stages, Box::new(end)).unwrap();
+        let mut solver = AugmentedLagrangian::new(&problem);
+        let us = vec![0.0; problem.control_range(10).end];
+        let solution = solver.solve(&mut problem, &[0.0; 33], &us).unwrap().clone();
+        (solution, solver.outcome().clone())
+    };
+    let (solution, outcome) = solve(0);
+    assert_eq!(solution.status, Status::Infeasible);
+    let worst = outcome.worst.unwrap();
+    assert_eq!((worst.knot, worst.row, worst.amount), (0, 0, 0.25));
+    assert_eq!(worst.to_string(), "knot 0: constraint 0 is 2.500e-1 beyond its bound");
+    // the other constraint holds, and the solve did not spoil its penalty for nothing
+    assert!((solution.x(10)[0] - 0.5).abs() < 1e-6 && outcome.penalty < 1e8, "{}", outcome.penalty);
+    let (solution, outcome) = solve(2);
+    assert!(!matches!(solution.status, Status::Infeasible | Status::Converged), "{:?}", solution.status);
+    assert_eq!(outcome.worst.map(|worst| worst.knot), Some(0));
 }

@@ -42,6 +42,7 @@ fn compare(name: &str, build: Build, lanes: usize) {
     let us = vec![0.0; problem.control_range(horizon).end];
 
     let mut solver = Fddp::new(&problem);
+    solver.settings.project_warm_start = false; // Crocoddyl keeps a start outside of the bounds
     solver.settings.method = if reference["method"] == "ddp" { DdpMethod::Ddp } else { DdpMethod::Fddp };
     solver.settings.max_iterations = reference["max_iterations"].as_u64().unwrap() as usize;
     solver.settings.regularisation_start = reference["regularisation"].as_f64().unwrap();

@@ -1,6 +1,9 @@
 //! Robots under limits: closed forms, the optimum of IPOPT, cones that hold, and the same by other ways.
 #![allow(non_snake_case)] // G
 
+#[path = "limits/starts.rs"]
+mod starts;
+
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint as Held, Data, Inertia, Joint, Model, ModelBuilder, ReferenceFrame, Se3, Sym3,
     Vec3, WORLD, constrained_dynamics, forward_kinematics, neutral, robots,

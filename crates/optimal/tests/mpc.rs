@@ -1,11 +1,13 @@
 //! Model predictive control: horizons that move on, solves with little time, solutions that are kept.
 
+#[path = "mpc/budgets.rs"]
+mod budgets;
 mod common;
 
 use common::{HANGING, Linear, cartpole, random, random_matrix, random_node, straight};
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Limit, Residual};
-use condyle_optimal::{ActionModel, Error, Fddp, Iteration, Problem, Solution, Status};
+use condyle_optimal::{ActionModel, Error, Fddp, Iteration, Problem, Settings, Solution, Status};
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
@@ -155,6 +157,12 @@ fn a_solution_survives_a_file() {
     assert!(read.K.iter().zip(&solution.K).all(|(a, b)| close(a.as_slice(), b.as_slice())));
     assert!(read.status == solution.status && read.trace.len() == solution.trace.len());
     assert!(text.contains("\"status\":\"converged\""));
+    // files of earlier versions have no overrun and no projection
+    let mut earlier: Value = serde_json::from_str(&text).unwrap();
+    assert!(earlier["timings"].as_object_mut().unwrap().remove("overrun").is_some());
+    assert_eq!(serde_json::from_value::<Solution>(earlier).unwrap().timings.overrun, Duration::ZERO);
+    let settings: Settings = serde_json::from_value(json!({"max_iterations": 7})).unwrap();
+    assert!(settings.project_warm_start && settings.max_iterations == 7);
 }
 
 /// A solution from a file has the lengths of one horizon, or is refused before anything reads beyond them.

@@ -162,15 +162,31 @@ impl<A: Alike<B>, B> Rename<Array<B>> for Array<A> {
 /// ```
 pub type Matrix<T> = nalgebra::Matrix<T, Dyn, Dyn, MatrixStorage<T>>;
 
-/// Any matrix whose numbers stand by columns without gaps: a [`Matrix`] or one of nalgebra's own, a `DMatrix`.
+/// A matrix whose numbers stand by columns without gaps: a [`Matrix`] or one of nalgebra's own, a `DMatrix`.
+///
+/// A view is none, because there may be gaps between its rows or columns. It does not compile where such a matrix is expected:
+///
+/// ```compile_fail,E0277
+/// use condyle_spatial::{Dense, DenseMatrix};
+/// fn clear(J: &mut DenseMatrix<f64, impl Dense<f64>>) {
+///     J.as_mut_slice().fill(0.0);
+/// }
+/// let mut J = nalgebra::DMatrix::<f64>::zeros(6, 6);
+/// clear(&mut J);
+/// clear(&mut J.view_with_steps_mut((0, 0), (3, 6), (1, 0))); // every second row
+/// ```
 pub type DenseMatrix<T, Storage> = nalgebra::Matrix<T, Dyn, Dyn, Storage>;
 
 /// The storage of a [`DenseMatrix`].
 pub trait Dense<T>: RawStorageMut<T, Dyn, Dyn> + IsContiguous {}
 impl<T, Storage: RawStorageMut<T, Dyn, Dyn> + IsContiguous> Dense<T> for Storage {}
 
-/// A matrix whose entries are all equal.
+/// Makes a matrix whose entries are all equal.
+///
+/// # Panics
+/// If rows · columns is above the largest `usize`.
 #[inline]
+#[track_caller]
 pub fn matrix<T: nalgebra::Scalar>(rows: usize, columns: usize, entry: T) -> Matrix<T> {
     let size = rows.checked_mul(columns).expect("a matrix of a size that a machine can count");
     let numbers = alloc::vec![entry; size].into();

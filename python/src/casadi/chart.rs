@@ -7,7 +7,7 @@
 //! δ = T dq + ½ Σ dqᵀ C_k dq e_k + …      ∂f/∂q = ∂f/∂δ T      ∂²f/∂q² = Tᵀ ∂²f/∂δ² T + Σ_k ∂f/∂δ_k C_k
 //! ```
 
-use condyle::{Joint, Mat3, Model, Vec3};
+use condyle::{Joint, Model, Vec3, spatial::Mat3};
 use core::ops::Range;
 use nalgebra::{DMatrix, SMatrix};
 
@@ -263,7 +263,7 @@ fn tangent_map(joint: Joint, q: &[f64], length: f64) -> Block {
         }
         Joint::Spherical => quaternion(&mut T, (0, 0), q, length),
         Joint::FreeFlyer => {
-            let R: Mat3<f64> = condyle::Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation();
+            let R: Mat3<f64> = condyle::spatial::Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation();
             for (i, column) in [R.x, R.y, R.z].into_iter().enumerate() {
                 for (j, x) in column.to_array().into_iter().enumerate() {
                     T[(i, j)] = x; // Rᵀ

@@ -1,7 +1,7 @@
 //! Inverse and forward dynamics with their derivatives for several states at a time, in the lanes of vector registers.
 
 use super::function::Kind;
-use condyle::{Batch, Matrices, Model};
+use condyle::{Batch, Model, batch::Matrices};
 use nalgebra::DMatrix;
 
 /// The most states of a call: some registers full, whose matrices stay in the cache.
@@ -17,14 +17,15 @@ pub(super) struct Lanes {
 /// Writes a matrix of each state into those with a block for each two arguments: to the block from this row and column on.
 fn place(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: Matrices<'_, f64>) {
     for (to, block) in to.iter_mut().zip(blocks.iter()) {
-        to.view_mut((row, column), block.shape()).copy_from(&block);
+        block.copy_to(&mut to.view_mut((row, column), block.shape()));
     }
 }
 
 /// Writes the transpose of a matrix of each state likewise.
 fn place_transposed(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: Matrices<'_, f64>) {
     for (to, block) in to.iter_mut().zip(blocks.iter()) {
-        to.view_mut((row, column), block.shape()).tr_copy_from(&block);
+        let block = block.transpose();
+        block.copy_to(&mut to.view_mut((row, column), block.shape()));
     }
 }
 

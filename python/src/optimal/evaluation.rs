@@ -113,17 +113,8 @@ pub(super) fn solution<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let (horizon, nx, ndx) = (problem.horizon(), problem.nx(), problem.ndx());
     let trace = s.trace.iter().map(|i| signals::record(py, i)).collect::<PyResult<Vec<_>>>()?;
-    let status = match s.status {
-        rust::Status::Converged => "converged",
-        rust::Status::MaxIterations => "max_iterations",
-        rust::Status::TimeLimit => "time_limit",
-        rust::Status::RegularisationLimit => "regularisation_limit",
-        rust::Status::Interrupted => "interrupted",
-        rust::Status::Infeasible => "infeasible",
-        _ => "not_finite",
-    };
     let t = &s.timings;
-    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total].map(|phase| phase.as_secs_f64());
+    let timings = [t.calc, t.calc_diff, t.sweep, t.rollout, t.total, t.overrun].map(|phase| phase.as_secs_f64());
     let timings = class!(py, "Timings")?.call1(PyTuple::new(py, timings)?)?;
     let solution = class!(py, "Solution")?.call1((
         output(py, None, &[horizon + 1, nx], |out| out.copy_from_slice(&s.xs))?,
@@ -133,7 +124,7 @@ pub(super) fn solution<'py>(
         s.cost,
         s.gap,
         s.feasible,
-        status,
+        s.status.name(),
         trace,
         timings,
     ))?;

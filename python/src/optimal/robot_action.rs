@@ -67,13 +67,10 @@ impl<A: ActionModel + Clone> RobotAction<A> {
     /// The action in a few words.
     pub(super) fn repr(&self, class: &str) -> String {
         let Knot { dynamics, costs, limits, .. } = &self.described.knot;
-        let duration = match dynamics {
-            Dynamics::Free { dt, .. }
-            | Dynamics::Contact { dt, .. }
-            | Dynamics::Inverse { dt, .. }
-            | Dynamics::ContactInverse { dt, .. } => format!("{dt} s"),
-            Dynamics::Impulse { .. } => "an impact".to_owned(),
-            Dynamics::End => "the end".to_owned(),
+        let duration = match (dynamics.dt(), dynamics) {
+            (Some(dt), _) => format!("{dt} s"),
+            (None, Dynamics::Impulse { .. }) => "an impact".to_owned(),
+            (None, _) => "the end".to_owned(),
         };
         let contacts: Vec<_> = match dynamics {
             Dynamics::Contact { contacts, .. }

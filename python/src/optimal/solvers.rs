@@ -74,7 +74,7 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
         seconds.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
     }
     set!(s, given, {
-        method by method, second_order, inverse_dynamics_form, max_iterations, time_budget by duration, segments, threads,
+        method by method, second_order, inverse_dynamics_form, project_warm_start, max_iterations, time_budget by duration, segments, threads,
         tolerance, tolerance_bounded, step_lengths, accept, accept_ascent, flat,
         regularisation_start, regularisation_min, regularisation_max, regularisation_factor,
         regularisation_decrease_above, regularisation_increase_below
@@ -191,6 +191,8 @@ macro_rules! solver {
 
             /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
             ///
+            /// With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+            ///
             /// callback, verbose, progress: as of `solve`.
             ///
             /// Raises `ProblemError` as `solve`, and if there is no solution yet.
@@ -256,7 +258,9 @@ macro_rules! solver {
             /// with it.
             ///
             /// `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-            /// last one is served by a model of the problem, with those that it has for all knots.
+            /// last one is served by a model of the problem, with those that it has for all knots. The last state follows
+            /// from the last control, which is repeated. At a second shift without a step of a solve in between the last
+            /// state is repeated too, as a rollout by repeated controls would diverge.
             ///
             /// last: the index of that model.
             ///
@@ -285,7 +289,11 @@ solver! {
 ///     `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
 ///     `inverse_dynamics_form`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
 ///     (default: yes): the same steps in less time.
-///     `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit".
+///     `project_warm_start`: whether controls of a warm start that are outside of their bounds are moved into them, in `solve`
+///     and in `resume` (default: yes). Crocoddyl keeps them, so its iterates need False.
+///     `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit". The first iteration
+///     always runs, unless the budget is 0. A later phase runs if the median of its last five durations fits. A solve that
+///     takes longer tells by how much in `timings.overrun`.
 ///     `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
 ///     there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
 ///     `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep beside
@@ -330,10 +338,12 @@ solver! {
 /// y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
 ///
 /// `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
-/// ended as "infeasible" or "not_finite"; `shift` moves them on. A solution is "converged" when the residuals of
-/// `outcome` are below the tolerances, and "infeasible" if the penalty reached its limit and the limits do not hold.
-/// Its cost contains the terms of the limits, that of `outcome` does not; its trace and gains are those of the last
-/// inner solve.
+/// ended as "not_finite" or with violated limits at the largest penalty; `shift` moves them on. A solution is "converged"
+/// when the residuals of `outcome` are below the tolerances. It is "constraints_violated" if the penalty reached its limit
+/// and the limits do not hold, which proves nothing: another warm start may find a solution. It is "infeasible" if the
+/// initial state itself violates a limit of knot 0 that no control can change. `outcome.worst` names the knot, the limit
+/// and the amount. The cost of the solution contains the terms of the limits, that of `outcome` does not; its trace and
+/// gains are those of the last inner solve. Controls of a warm start that are outside of their bounds are moved into them.
 ///
 /// problem: the problem to solve; all memory is made for its shape, once.
 /// inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
@@ -344,6 +354,8 @@ solver! {
 ///     `max_solves`: the number of inner solves at most.
 ///     `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
 ///     factor by which it rises.
+///     `restart`: whether a `solve` with limits or bounds that is not finite, or violates limits at the largest penalty, begins
+///     once more, from the initial state held still at all knots (default: yes). The better result counts.
 ///
 /// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
 /// >>> arm = condyle.robots.arm7()
@@ -374,7 +386,16 @@ AugmentedLagrangian {
         let solver = lock("solver", &self.solver)?;
         let o = solver.outcome();
         let multipliers = o.multipliers.iter().map(|y| y.give(py, None)).collect::<PyResult<Vec<_>>>()?;
-        class!(py, "Outcome")?.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations))
+        let worst = o.worst.as_ref().map(|worst| {
+            let kind = match worst.kind {
+                rust::ViolationKind::Gap => "gap",
+                _ => "constraint",
+            };
+            let name = worst.name.as_deref();
+            class!(py, "Violation")?.call1((kind, worst.knot, worst.row, name, worst.entry, worst.amount))
+        });
+        let worst = worst.transpose()?;
+        class!(py, "Outcome")?.call1((o.cost, o.primal, o.dual, multipliers, o.penalty, o.solves, o.iterations, worst))
     }
 }
 }
@@ -390,7 +411,7 @@ impl AugmentedLagrangian {
         set(&mut solver.inner, inner)?;
         solver.inner.check().map_err(problem_error)?;
         set!(solver.settings, settings, {
-            max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor
+            max_solves, tolerance, tolerance_dual, penalty_start, penalty_max, penalty_factor, restart
         });
         let inner = inner.map(|inner| kept(py, Some(inner))).transpose()?;
         let (problem, solver, settings) = (problem.unbind(), Mutex::new(solver), kept(py, settings)?);

@@ -5,7 +5,7 @@
 
 use crate::arrays::{Array, class, matrix, numbers, output, writable};
 use condyle::wholebody::References;
-use condyle::{Force, Mat3, Model, Motion, ROTATION_ROUNDING, Se3, Vec3, unit_fault};
+use condyle::{Force, Model, Motion, ROTATION_ROUNDING, Se3, Vec3, spatial::Mat3, unit_fault};
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;

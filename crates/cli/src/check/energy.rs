@@ -83,7 +83,7 @@ fn drift(model: &Model, integrator: Integrator, dt: f64, count: usize, q: &[f64]
         (velocities.mechanical_energy(), velocities.kinetic_energy())
     };
     let mut simulation = Simulation::new(model, Settings { integrator, dt, ..Settings::default() });
-    simulation.set_state(q, v);
+    simulation.set_state(q, v).ok()?;
     let (start, mut kinetic) = energy(q, v);
     let (efforts, mut error) = (vec![0.0; model.nv()], 0.0_f64);
     for _ in 0..count {

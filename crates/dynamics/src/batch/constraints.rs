@@ -7,6 +7,7 @@ use crate::constraints::plan::Proximal;
 use crate::workspace::Gate;
 use alloc::borrow::ToOwned;
 use alloc::vec::Vec;
+use condyle_linalg::check_index;
 use condyle_model::{Error, Model};
 use condyle_spatial::block::Real;
 use core::ops::Range;
@@ -25,13 +26,13 @@ use core::ops::Range;
 /// assert!(d.residual.iter().all(|&x| x < 1e-9));
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct BatchConstraints<T: Real = f64> {
     pub(super) sets: Sets<T>,
 }
 
 /// A set for each thread, with as many lanes as the groups of the batch have.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) enum Sets<T: Real> {
     Single(Vec<ConstraintSet<T>>),
     Short(Vec<ConstraintSet<T::Short<Gate>>>),
@@ -79,6 +80,7 @@ impl<T: Real> BatchConstraints<T> {
     ///
     /// # Panics
     /// If there is no such constraint.
+    #[track_caller]
     pub fn range(&self, k: usize) -> Range<usize> {
         each!(Sets, &self.sets, sets => sets[0].range(k))
     }
@@ -95,7 +97,9 @@ impl<T: Real> BatchConstraints<T> {
     ///
     /// # Panics
     /// If there is no such constraint.
+    #[track_caller]
     pub fn set_target(&mut self, k: usize, target: Target<f64>) -> Result<(), Error> {
+        check_index("k", k, each!(Sets, &self.sets, sets => sets[0].len()), "constraints");
         if let Some(what) = target.wrong() {
             return Err(Error::Constraint { constraint: k, what: what.to_owned() });
         }

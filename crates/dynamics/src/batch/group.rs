@@ -1,6 +1,7 @@
 //! The work of a batch: groups of states, a lane for each, spread over threads.
 
 use super::places::Places;
+use super::state_matrix::StateMatrix;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::data::Data;
 use crate::workspace::{filled, zero_matrix};
@@ -10,13 +11,9 @@ use condyle_model::Model;
 use condyle_spatial::block::{Block, MOST, Real, Strided, flat_mut, gather, lanes, scatter_matrix};
 use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Array, Force, Matrix};
-use nalgebra::{DMatrixView, Dyn, MatrixView};
-
-/// A matrix of one state, whose entries do not lie next to each other.
-pub type StateMatrix<'b, T> = MatrixView<'b, T, Dyn, Dyn, Dyn, Dyn>;
 
 /// Groups of as many states as a scalar has lanes, and who computes them.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Group<S: Block> {
     /// The workers, one for each thread.
     workers: Vec<Worker<S>>,
@@ -70,6 +67,16 @@ impl<S: Block> Worker<S> {
             six: [zero_matrix(6, nv), zero_matrix(6, nv)],
             wide: filled(S::zero, nv * nv.max(10)),
         }
+    }
+}
+
+impl<S: Block> Clone for Worker<S> {
+    /// A copy with as much room for forces, so that it does not allocate later either.
+    fn clone(&self) -> Self {
+        let Self { data, numbers, f_ext, six, wide } = self;
+        let mut forces = Vec::with_capacity(f_ext.capacity());
+        forces.extend_from_slice(f_ext);
+        Self { data: data.clone(), numbers: numbers.clone(), f_ext: forces, six: six.clone(), wide: wide.clone() }
     }
 }
 
@@ -221,6 +228,7 @@ impl<S: Block> Group<S> {
     }
 
     /// Panics unless this was made for a model of the same tree.
+    #[track_caller]
     pub(super) fn check(&self, model: &Model) {
         self.workers[0].data.check(model);
     }
@@ -261,7 +269,7 @@ impl<S: Block> Group<S> {
         let matrix = &self.matrices[k / S::LANES][kind];
         let n = matrix.nrows();
         let lane = lanes(matrix.as_slice()).get(k % S::LANES..).unwrap_or_default();
-        DMatrixView::from_slice_with_strides(lane, n, n, S::LANES, S::LANES * n)
+        StateMatrix::new(lane, [n, n], [S::LANES, S::LANES * n])
     }
 
     /// The matrices of the first states, as many as there is room for, each by rows.

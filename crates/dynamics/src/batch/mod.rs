@@ -28,6 +28,8 @@ pub(crate) mod group;
 pub(crate) mod kinematics;
 mod places;
 pub(crate) mod results;
+pub(crate) mod state_matrix;
+mod state_matrix_operators;
 mod table;
 
 use crate::workspace::Gate;
@@ -38,7 +40,7 @@ use condyle_model::Model;
 use condyle_spatial::block::Real;
 use condyle_spatial::level::{Level, level};
 use constraints::{BatchConstraints, Sets};
-use group::{ARGUMENTS, Arguments, FORCES, Group, Pass, enter};
+use group::{ARGUMENTS, Arguments, FORCES, Group, MINV, Pass, enter};
 use places::{MOST_RESULTS, Places};
 use results::{Last, Shape};
 use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
@@ -66,7 +68,7 @@ use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 /// let mut data = Data::new(&arm);
 /// assert_eq!(tau[63..70], *rnea(&arm, &mut data, &q[63..70], &v[63..70], &a[63..70], &[])); // the tenth
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Batch<T: Real = f64> {
     states: usize,
     lanes: InLanes<T>,
@@ -85,7 +87,7 @@ impl BatchNumber for f64 {}
 impl BatchNumber for f32 {}
 
 /// Groups of as many states as the vectors of the level have lanes.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
     Short(Group<T::Short<Gate>>),
@@ -104,6 +106,7 @@ impl<T: Real> Batch<T> {
     /// # Panics
     /// If `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
     /// [`MOST_STATES`](Self::MOST_STATES).
+    #[track_caller]
     pub fn new(model: &Model, states: usize, threads: usize) -> Self
     where
         T: BatchNumber,
@@ -195,6 +198,10 @@ impl<T: Real> Batch<T> {
         if let Some(constraints) = &constraints {
             constraints.check(model);
             assert!(constraints.fits(self), "constraints: made for another batch");
+        }
+        let inverse = P::KINDS.contains(&MINV) || given.iter().any(|one| one.name == "tau");
+        if inverse || constraints.is_some() {
+            model.check_regular(); // before the lanes are entered, so that the panic names the caller's line
         }
         let rows = constraints.as_ref().map_or(0, |constraints| constraints.rows());
         let size = |&size: &usize| match size {

@@ -1,12 +1,11 @@
 //! What a batch gives: vectors, matrices and poses of each state, and structs of them.
 
-use super::group::StateMatrix;
 use super::places::MOST_RESULTS;
+use super::state_matrix::StateMatrix;
 use super::{Batch, InLanes};
-use condyle_linalg::check;
+use condyle_linalg::{check, check_index};
 use condyle_spatial::block::Real;
 use condyle_spatial::{Mat3, Se3, Vec3};
-use nalgebra::DMatrixView;
 
 /// The shape of a result for one state: no sizes for a number, one for a vector, two for a matrix, three for so many matrices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -136,16 +135,17 @@ enum Stored<'b, T: Real> {
 }
 
 impl<'b, T: Real> Matrices<'b, T> {
-    /// The matrix of state k: a view, which [`copy_from`](nalgebra::Matrix::copy_from) copies to a matrix of one's own.
+    /// Returns the matrix of state k, which [`to_owned`](StateMatrix::to_owned) copies to one of nalgebra's.
     ///
     /// # Panics
-    /// If there are not so many states.
+    /// If state k does not exist.
+    #[track_caller]
     pub fn at(&self, k: usize) -> StateMatrix<'b, T> {
         check_state(k, self.states);
         let [m, n] = self.shape;
         match self.of {
             Stored::InLanes(lanes, kind) => each!(InLanes, lanes, group => group.matrix(kind, k)),
-            Stored::ByRows(rows) => DMatrixView::from_slice_with_strides(&rows[k * m * n..(k + 1) * m * n], m, n, n, 1),
+            Stored::ByRows(rows) => StateMatrix::new(&rows[k * m * n..(k + 1) * m * n], [m, n], [n, 1]),
         }
     }
 
@@ -162,7 +162,8 @@ impl<'b, T: Real> Matrices<'b, T> {
     /// ```
     ///
     /// # Panics
-    /// If `to` has not as many numbers.
+    /// If `to` does not have as many numbers.
+    #[track_caller]
     pub fn write_rows(&self, to: &mut [T]) {
         let [m, n] = self.shape;
         check("to", to.len(), self.states * m * n);
@@ -172,8 +173,18 @@ impl<'b, T: Real> Matrices<'b, T> {
         }
     }
 
-    /// The matrices of all states.
-    pub fn iter(&self) -> impl Iterator<Item = StateMatrix<'b, T>> {
+    /// Returns the number of states.
+    pub fn len(&self) -> usize {
+        self.states
+    }
+
+    /// Returns whether there are no states.
+    pub fn is_empty(&self) -> bool {
+        self.states == 0
+    }
+
+    /// Iterates over the matrices of all states.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = StateMatrix<'b, T>> {
         let this = *self;
         (0..self.states).map(move |k| this.at(k))
     }
@@ -189,13 +200,14 @@ pub struct Poses<'b, T> {
 }
 
 impl<T: Real> Poses<'_, T> {
-    /// Pose number i of state k.
+    /// Returns pose i of state k.
     ///
     /// # Panics
-    /// If there are not so many states, or poses.
+    /// If state k or pose i does not exist.
+    #[track_caller]
     pub fn at(&self, k: usize, i: usize) -> Se3<T> {
         check_state(k, self.states);
-        assert!(i < self.each, "i: expected a number below that of the poses, {}, found {i}", self.each);
+        check_index("i", i, self.each, "poses of a state");
         let x = &self.numbers[16 * (k * self.each + i)..];
         let column = |j: usize| Vec3::new(x[j], x[4 + j], x[8 + j]);
         Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3))
@@ -204,7 +216,7 @@ impl<T: Real> Poses<'_, T> {
 
 #[track_caller]
 fn check_state(k: usize, states: usize) {
-    assert!(k < states, "k: expected a number below that of the states, {states}, found {k}");
+    check_index("k", k, states, "states");
 }
 
 /// Structs of results, each made of a single call's struct: its members of these names are put one after the other, in places

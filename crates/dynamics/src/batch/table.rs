@@ -13,6 +13,11 @@
 //! them too.
 
 use super::group::FORCES;
+use crate::calls::parameter_derivatives::Input;
+use crate::passes::factored_dynamics::ForwardDynamicsMethod;
+use crate::passes::frames::{ReferenceFrame, check_body, check_frame};
+use crate::passes::passive::check_smoothing;
+use condyle_model::Model;
 
 /// Sizes that depend on the robot, in shapes.
 pub(super) const NV: usize = usize::MAX;
@@ -59,6 +64,44 @@ pub(super) const fn place(name: &str) -> usize {
         b"a" | b"tau" => 2,
         b"lambda" => 3,
         _ => FORCES,
+    }
+}
+
+/// An argument that all states share. It is checked before the lanes are entered, so that the panic names the caller's line.
+pub(super) trait Shared: Sized {
+    /// Panics if the argument of this name is wrong for the model.
+    #[track_caller]
+    fn check(self, _name: &str, _model: &Model) {}
+}
+
+impl Shared for ReferenceFrame {}
+impl Shared for Option<ForwardDynamicsMethod> {}
+
+/// A body or a frame.
+impl Shared for usize {
+    #[track_caller]
+    fn check(self, name: &str, model: &Model) {
+        match name {
+            "frame" => check_frame(model, self),
+            _ => check_body(model, self),
+        }
+    }
+}
+
+/// A restitution or a smoothing.
+impl Shared for f64 {
+    #[track_caller]
+    fn check(self, name: &str, _: &Model) {
+        if name == "smoothing" {
+            check_smoothing(self);
+        }
+    }
+}
+
+impl Shared for Input {
+    #[track_caller]
+    fn check(self, _: &str, model: &Model) {
+        Input::check(self, model, "input", (model.nv(), self.len(model)));
     }
 }
 
@@ -124,6 +167,7 @@ macro_rules! batched {
 
             /// For all states, to where the results are `written` or to where they stay.
             #[allow(clippy::too_many_arguments)] // those of the function
+            #[track_caller]
             pub(super) fn compute<T: condyle_spatial::block::Real>(
                 batch: &mut $crate::batch::Batch<T>,
                 $model: &condyle_model::Model,
@@ -132,6 +176,7 @@ macro_rules! batched {
                 $($($shared: $Shared,)*)?
                 written: Option<&mut [&mut [T]]>,
             ) {
+                $($($crate::batch::table::Shared::check($shared, stringify!($shared), $model);)*)?
                 let (columns, constraints) = (0 $(+ $columns)?, None $(.or(Some($set)))?);
                 let given: &[_] = &[$($crate::batch::table::Given {
                     name: stringify!($given),
@@ -146,6 +191,7 @@ macro_rules! batched {
 
         impl<T: condyle_spatial::block::Real> $crate::batch::Batch<T> {$(
             $(#[$doc])*
+            #[track_caller]
             pub fn $name(
                 &mut self,
                 $model: &condyle_model::Model,
@@ -162,7 +208,8 @@ macro_rules! batched {
             #[doc = concat!("Writes what [`Batch::", stringify!($name), "`](crate::Batch::", stringify!($name), ") gives.")]
             ///
             /// # Panics
-            /// As it does, or if there are not as many places as results, or a place has not the size of its result.
+            /// As it does, or if there are not as many places as results, or a place does not have the size of its result.
+            #[track_caller]
             pub fn $name(
                 &mut self,
                 $model: &condyle_model::Model,

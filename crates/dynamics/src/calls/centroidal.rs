@@ -25,6 +25,7 @@ use condyle_spatial::{Constant, Scalar};
 /// # Panics
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
 #[inline(always)]
+#[track_caller]
 pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -52,6 +53,7 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -84,6 +86,7 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn compute_all_terms<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,

@@ -54,6 +54,7 @@ pub struct Constrained<'d, S> {
 /// # Panics
 /// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -152,6 +153,7 @@ pub struct ConstrainedEquations<'d, S> {
 /// # Panics
 /// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -245,6 +247,7 @@ pub struct ConstrainedDerivatives<'d, S> {
 /// # Panics
 /// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn constrained_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

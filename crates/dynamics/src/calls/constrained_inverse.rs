@@ -47,6 +47,7 @@ pub struct ConstrainedInverse<'d, S> {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` or `constraints` were made for another model.
+#[track_caller]
 pub fn constrained_inverse_dynamics<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -105,6 +106,7 @@ pub struct ConstrainedInverseDerivatives<'d, S> {
 ///
 /// # Panics
 /// As [`constrained_inverse_dynamics`].
+#[track_caller]
 pub fn constrained_inverse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -143,6 +145,7 @@ pub struct EquationsAt<'d, S> {
 /// [`constrained_inverse_dynamics_derivatives`] without the values: for the knots of an optimal control problem, whose rollout
 /// has found q̈ and λ.
 #[doc(hidden)]
+#[track_caller]
 pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

@@ -34,6 +34,7 @@ use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another size.
+#[track_caller]
 pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -63,6 +64,7 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another size.
+#[track_caller]
 pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -103,6 +105,7 @@ pub struct RneaDerivatives<'d, S, R = f64> {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -132,7 +135,7 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut
 /// What `pass` has left, body by body or in the limbs' lanes.
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
-    let in_limbs = data.world.placed == PlacementCache::Limbs;
+    let in_limbs = matches!(data.world.placed, PlacementCache::Limbs(_));
     let limbs = data.limbs.as_ref().zip(model.limbs()).filter(|_| in_limbs);
     let limbs = limbs.map(|(scratch, plan)| LaneView::new(plan, scratch));
     let state = State { model, world: &data.world, pass: d, limbs };
@@ -163,6 +166,7 @@ pub struct CoriolisDerivatives<'d, S> {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another size.
+#[track_caller]
 pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -210,6 +214,7 @@ pub struct AbaDerivatives<'d, S, R = f64> {
 /// # Panics
 /// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -285,6 +290,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another size.
+#[track_caller]
 pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

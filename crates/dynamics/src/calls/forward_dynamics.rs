@@ -35,6 +35,7 @@ use condyle_spatial::{Constant, Force, Scalar};
 /// # Panics
 /// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular wherever the robot is
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn aba<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -97,6 +98,7 @@ impl ForwardDynamicsMethod {
 /// # Panics
 /// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

@@ -49,6 +49,7 @@ pub struct Impulse<'d, S> {
 /// # Panics
 /// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn impulse_dynamics<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -139,6 +140,7 @@ pub struct ImpulseDerivatives<'d, S> {
 /// # Panics
 /// If an argument has the wrong length, `data` or `constraints` were made for another model, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn impulse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

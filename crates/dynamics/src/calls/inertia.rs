@@ -25,6 +25,7 @@ use condyle_spatial::{Constant, Matrix, Scalar};
 ///
 /// # Panics
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {
     data.check(model);
     check("q", q.len(), model.nq());
@@ -54,6 +55,7 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
 /// # Panics
 /// If `q` has not nq numbers, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {
     data.check(model);
     model.check_regular();

@@ -33,6 +33,7 @@ fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, argument
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -65,6 +66,7 @@ pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -95,6 +97,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
     data.check(model);
     check("q", q.len(), model.nq());
@@ -124,6 +127,7 @@ pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Da
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -156,6 +160,7 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn coriolis_matrix<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

@@ -2,7 +2,7 @@
 
 use super::limbs::spread;
 use crate::data::Data;
-use crate::passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities, columns};
+use crate::passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities, check_body, check_frame, columns};
 use crate::passes::kinematics::{PlacementCache, accelerations, positions, velocities};
 use crate::passes::path_jacobian::path_jacobian;
 use condyle_linalg::check;
@@ -10,8 +10,10 @@ use condyle_model::Model;
 use condyle_spatial::{Constant, Dense, DenseMatrix, Scalar, Se3, Vec3};
 
 impl<S: Scalar> Data<S> {
-    /// The placements at the position of the last call on this data: they need not be computed again. There are none if it
-    /// did without them, as [`rnea`](crate::rnea()) does.
+    /// Returns the placements at the position of the last call on this data, without computing them again. Returns `None` if
+    /// the call did without them, as [`rnea`](crate::rnea()) does.
+    ///
+    /// The model must have the joints and frames of the model of that call. Inertias and gravity may differ.
     ///
     /// ```
     /// use condyle_dynamics::{Data, aba, forward_kinematics, robots};
@@ -24,14 +26,31 @@ impl<S: Scalar> Data<S> {
     /// ```
     ///
     /// # Panics
-    /// If this was made for a model of another tree.
+    /// If this was made for a model of another tree, or the last call was for a model with joints or frames elsewhere.
+    #[track_caller]
     pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
         self.check(model);
-        if self.world.placed == PlacementCache::Limbs {
+        let (PlacementCache::Bodies(geometry) | PlacementCache::Limbs(geometry)) = self.world.placed else {
+            return None;
+        };
+        if geometry != model.geometry_hash() {
+            wrong_geometry(model.name());
+        }
+        if let PlacementCache::Limbs(_) = self.world.placed {
             spread(model, self);
         }
-        (self.world.placed == PlacementCache::Bodies).then_some(Placements { model, world: &self.world })
+        matches!(self.world.placed, PlacementCache::Bodies(_)).then_some(Placements { model, world: &self.world })
     }
+}
+
+/// Reports placements of another robot.
+#[cold]
+#[inline(never)]
+#[track_caller]
+fn wrong_geometry(name: &str) -> ! {
+    panic!(
+        "data: its placements are those of another robot than `{name}`, with the same tree but joints or frames elsewhere"
+    );
 }
 
 /// Places all bodies: oXi = oXλ λXi(q), in O(n).
@@ -50,6 +69,7 @@ impl<S: Scalar> Data<S> {
 ///
 /// # Panics
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -80,6 +100,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If `q` has not nq numbers, there is no such frame, or `J` is not 6 × nv.
+#[track_caller]
 pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     q: &[S],
@@ -93,6 +114,7 @@ pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
 /// [`frame_jacobian`] to where one row lies `strides[0]` numbers behind the one before, and one column `strides[1]`: for
 /// languages whose matrices lie by rows.
 #[doc(hidden)]
+#[track_caller]
 pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     q: &[S],
@@ -101,6 +123,7 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
     J: &mut [S],
     strides: [usize; 2],
 ) {
+    check_frame(model, frame);
     let frame = &model.frames()[frame];
     jacobian_on(model, q, frame.body, frame.placement, reference, J, strides);
 }
@@ -117,6 +140,7 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If `q` has not nq numbers, there is no such body, or `J` is not 6 × nv.
+#[track_caller]
 pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     q: &[S],
@@ -129,6 +153,7 @@ pub fn body_jacobian<S: Scalar, R: Constant<S>>(
 
 /// [`body_jacobian`] to where rows and columns lie as in [`frame_jacobian_strided`].
 #[doc(hidden)]
+#[track_caller]
 pub fn body_jacobian_strided<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     q: &[S],
@@ -140,6 +165,7 @@ pub fn body_jacobian_strided<S: Scalar, R: Constant<S>>(
     jacobian_on(model, q, body, Se3::identity(), reference, J, strides);
 }
 
+#[track_caller]
 fn jacobian_on<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     q: &[S],
@@ -151,6 +177,7 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
 ) {
     check("q", q.len(), model.nq());
     check("J", J.len(), 6 * model.nv());
+    check_body(model, body);
     let zXb = Se3::new(model.nodes()[body].axis_rotation.transpose(), Vec3::zero());
     path_jacobian(model, q, body, (zXb * bXf).lift(), reference, J, strides);
 }
@@ -171,6 +198,7 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -201,6 +229,7 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn forward_accelerations<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,

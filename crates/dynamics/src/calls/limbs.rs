@@ -140,7 +140,7 @@ fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments
         return rnea_by_steps(model, plan, s, arguments.x, f_ext, Fused::of_mut(&mut data.rnea.tau));
     }
     place_steps(model, plan, s);
-    data.world.placed = PlacementCache::Limbs;
+    data.world.placed = PlacementCache::Limbs(model.geometry_hash());
     match task {
         Task::Crba => crba_by_steps(model, plan, s, Fused::of_mut(data.crba.M.as_mut_slice())),
         Task::Minv => factorize_by_steps(model, plan, s),
@@ -167,5 +167,5 @@ pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Dat
             columns[model.nodes()[i].column + k] = view.column(i, k);
         }
     }
-    *placed = PlacementCache::Bodies;
+    *placed = PlacementCache::Bodies(model.geometry_hash());
 }

@@ -103,7 +103,7 @@ fn enter(model: &Model, plan: &Plan, data: &mut Data<f64>, set: &mut ConstraintS
     let (Some(s), Some(mut lanes)) = (data.limbs.as_deref_mut(), set.limbs.take()) else { return };
     load_steps(plan, s, arguments);
     place_steps(model, plan, s);
-    data.world.placed = PlacementCache::Limbs;
+    data.world.placed = PlacementCache::Limbs(model.geometry_hash());
     articulate(model, plan, s, !arguments.f_ext.is_empty());
     carry_forces(model, plan, s, &mut lanes, set);
     decompose(set);

@@ -13,7 +13,9 @@
 
 use super::derivatives::{AbaDerivatives, RneaDerivatives};
 use super::differentiated::State;
+use crate::passes::passive::check_smoothing;
 use crate::passes::regressor::{PARAMETERS, effort};
+use condyle_linalg::check_index;
 use condyle_model::Model;
 use condyle_spatial::elementary::tanh;
 use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Matrix, Scalar, alike, kernel};
@@ -153,16 +155,19 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
 }
 
 impl Input {
-    /// Panics for an input that there is not, or a derivative of another shape.
+    /// Panics for an input that does not exist, or a derivative of another shape.
     #[track_caller]
-    fn check<R>(self, model: &Model<R>, name: &str, found: (usize, usize)) {
+    pub(crate) fn check<R>(self, model: &Model<R>, name: &str, found: (usize, usize)) {
         let shape = (model.nv(), self.len(model));
         assert!(found == shape, "{name}: expected {} × {}, found {found:?}", shape.0, shape.1);
+        let bodies = model.nodes().len();
         match self {
-            Self::Inertia(body) => assert!(body > 0, "input: the world has no inertia"),
-            Self::Friction { smoothing } => {
-                assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");
+            Self::Force(body) => check_index("input", body, bodies, "bodies"),
+            Self::Inertia(body) => {
+                assert!(body > 0, "input: the world has no inertia");
+                check_index("input", body, bodies, "bodies");
             }
+            Self::Friction { smoothing } => check_smoothing(smoothing),
             _ => {}
         }
     }
@@ -185,6 +190,7 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
     ///
     /// # Panics
     /// If `dtau` has not that shape, or the input names no moving body or a smoothing that is not positive.
+    #[track_caller]
     pub fn with_respect_to(&self, input: Input, dtau: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "dtau", dtau.shape());
         self.write_input(input, dtau.as_mut_slice());
@@ -214,6 +220,7 @@ impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
     ///
     /// # Panics
     /// If `da` has not that shape, or the input names no moving body or a smoothing that is not positive.
+    #[track_caller]
     pub fn with_respect_to(&self, input: Input, da: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "da", da.shape());
         self.write_input(input, da.as_mut_slice());

@@ -26,6 +26,7 @@ use condyle_spatial::{Constant, Matrix, Scalar};
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -55,6 +56,7 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,
@@ -83,6 +85,7 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
 ///
 /// # Panics
 /// If `q` has not nq numbers, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn potential_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

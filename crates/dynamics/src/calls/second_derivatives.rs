@@ -51,6 +51,7 @@ pub struct RneaHessian<'d, S, R = f64> {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` was made for a model of another tree.
+#[track_caller]
 pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,
@@ -111,6 +112,7 @@ impl<S: Scalar> RneaSecondDerivatives<S> {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `data` or `out` was made for a model of another tree.
+#[track_caller]
 pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -130,6 +132,7 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
 }
 
 /// [`rnea_hessian`] for each unit vector in turn: gives its number and the matrices. lambda is scratch, overwritten.
+#[track_caller]
 pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -185,6 +188,7 @@ pub struct AbaHessian<'d, S, R = f64> {
 /// # Panics
 /// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
+#[track_caller]
 pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
     data: &'d mut Data<S>,

@@ -116,9 +116,10 @@ impl<S: Scalar> ConstraintSet<S> {
     /// # Panics
     /// If there is no such constraint.
     #[inline(always)]
+    #[track_caller]
     pub fn force(&self, k: usize) -> Force<S> {
         let mut f = [S::zero(); 6];
-        let (plan, lambda) = (&self.plans[k], &self.lambda[self.range(k)]);
+        let (lambda, plan) = (&self.lambda[self.range(k)], &self.plans[k]);
         let axes: Mat3<S> = plan.axes.lift();
         match plan.kind {
             ConstraintKind::Line => return Force::new(axes.z.scale(lambda[0]), Vec3::zero()),

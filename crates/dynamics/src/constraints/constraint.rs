@@ -11,6 +11,7 @@ use core::any::Any;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
 pub enum ConstraintKind {
     /// The origin of a frame: three rows, a force.
     Point,

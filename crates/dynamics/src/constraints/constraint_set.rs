@@ -9,6 +9,7 @@ use crate::workspace::{filled, zero_matrix};
 use alloc::borrow::ToOwned;
 use alloc::boxed::Box;
 use alloc::vec::Vec;
+use condyle_linalg::check_index;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Error;
 use condyle_model::Model;
@@ -140,7 +141,9 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Panics
     /// If there is no such constraint.
+    #[track_caller]
     pub fn range(&self, k: usize) -> Range<usize> {
+        check_index("k", k, self.len(), "constraints");
         self.plans[k].row..self.plans[k].row + self.plans[k].rows()
     }
 
@@ -154,7 +157,9 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Panics
     /// If there is no such constraint.
+    #[track_caller]
     pub fn target(&self, k: usize) -> Target<S> {
+        check_index("k", k, self.len(), "constraints");
         self.targets[k]
     }
 
@@ -166,7 +171,9 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Panics
     /// If there is no such constraint.
+    #[track_caller]
     pub fn set_target(&mut self, k: usize, target: Target<S>) -> Result<(), Error> {
+        check_index("k", k, self.len(), "constraints");
         let to = &mut self.targets[k];
         if let Some(what) = target.wrong() {
             return Err(Error::Constraint { constraint: k, what: what.to_owned() });
@@ -179,6 +186,7 @@ impl<S: Scalar> ConstraintSet<S> {
     ///
     /// # Panics
     /// If `J` is not rows × nv.
+    #[track_caller]
     pub fn jacobian(&self, J: &mut DenseMatrix<S, impl Dense<S>>) {
         let shape = (self.rows(), self.nv);
         assert!(J.shape() == shape, "J: expected {} × {}, found {:?}", shape.0, shape.1, J.shape());

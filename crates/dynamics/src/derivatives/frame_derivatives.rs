@@ -14,7 +14,7 @@
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), section IV. A
 //! derivative costs O(depth + nv); nothing allocates.
 
-use crate::passes::frames::{Accelerations, ReferenceFrame, Velocities, add, columns};
+use crate::passes::frames::{Accelerations, ReferenceFrame, Velocities, add, check_frame, columns};
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Motion, Scalar, Se3, kernel};
 
@@ -49,6 +49,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such body, or `dv_dq` is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn body_velocity_derivative(
         &self,
         body: usize,
@@ -74,12 +75,14 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or `dv_dq` is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn frame_velocity_derivative(
         &self,
         frame: usize,
         reference: ReferenceFrame,
         dv_dq: &mut DenseMatrix<S, impl Dense<S>>,
     ) {
+        check_frame(self.model, frame);
         velocity_derivative(
             *self,
             self.model.frames()[frame].body,
@@ -135,6 +138,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// # Panics
     /// If there is no such body, or a matrix is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn body_acceleration_derivatives(
         &self,
         body: usize,
@@ -151,6 +155,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or a matrix is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn frame_acceleration_derivatives(
         &self,
         frame: usize,
@@ -158,6 +163,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         da_dq: &mut DenseMatrix<S, impl Dense<S>>,
         da_dv: &mut DenseMatrix<S, impl Dense<S>>,
     ) {
+        check_frame(self.model, frame);
         let body = self.model.frames()[frame].body;
         self.differentiate(body, &self.frame(frame), reference, None, da_dq, da_dv);
     }
@@ -182,6 +188,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or a matrix is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn frame_classical_acceleration_derivatives(
         &self,
         frame: usize,
@@ -189,12 +196,14 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         da_dq: &mut DenseMatrix<S, impl Dense<S>>,
         da_dv: &mut DenseMatrix<S, impl Dense<S>>,
     ) {
+        check_frame(self.model, frame);
         let (body, v) = (self.model.frames()[frame].body, self.frame_velocity(frame, reference));
         self.differentiate(body, &self.frame(frame), reference, Some(&v), da_dq, da_dv);
     }
 
     /// ∂a/∂q and ∂a/∂v of a frame at oXf on a body, as for [`acceleration_derivatives`].
     #[inline(always)]
+    #[track_caller]
     fn differentiate(
         &self,
         body: usize,

@@ -115,6 +115,7 @@ impl<S: Scalar> DivideConquer<S> {
     /// # Panics
     /// If an argument has the wrong length, `model` has joints or frames elsewhere than the one that was planned for, or M
     /// is singular ([`Model::singular_joints`]).
+    #[track_caller]
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes().len(), self.bodies.len() + 1);
         let other = if bodies == planned { " of another robot" } else { "" };

@@ -122,6 +122,14 @@ impl<'d> Rename<AllTerms<'d, Fused>> for AllTerms<'d, f64> {
     }
 }
 
+impl<'d, S, R> AllTerms<'d, S, R> {
+    /// The robot.
+    #[inline(always)]
+    fn robot(&self) -> &'d Model<R> {
+        self.kinematics.placements.model
+    }
+}
+
 answers! {
     /// J̇ v of a frame along the world's axes: p̈ of its origin and ω̇ where q̈ = 0 (m/s², rad/s²), in O(1). With J of
     /// [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's classical acceleration.

@@ -15,6 +15,7 @@ macro_rules! answers {
         impl<S: condyle_spatial::Scalar, R: condyle_spatial::Constant<S>> $Of<'_, S, R> {
             $(#[$doc])*
             #[inline(always)]
+            #[track_caller]
             pub fn $name(&self $(, $arg: $type)*) -> $Answer<S> {
                 #[inline(always)]
                 fn here<S: condyle_spatial::Scalar, R: condyle_spatial::Constant<S>>(
@@ -27,6 +28,7 @@ macro_rules! answers {
                         *answer = here(of $(, $arg)*);
                     }
                 }
+                $($crate::passes::answers::answers!(@check self, $arg $arg);)*
                 if !condyle_spatial::gate::is::<S, f64>() {
                     return here(*self $(, $arg)*);
                 }
@@ -36,5 +38,13 @@ macro_rules! answers {
             }
         }
     )*};
+    // a body or a frame that does not exist is reported where the question is asked
+    (@check $of:ident, body $body:ident) => {
+        $crate::passes::frames::check_body($of.robot(), $body)
+    };
+    (@check $of:ident, frame $frame:ident) => {
+        $crate::passes::frames::check_frame($of.robot(), $frame)
+    };
+    (@check $of:ident, $other:ident $same:ident) => {};
 }
 pub(crate) use answers;

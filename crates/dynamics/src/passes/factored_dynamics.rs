@@ -9,6 +9,7 @@ use condyle_spatial::{Array, Matrix, Scalar};
 
 /// A way to compute forward dynamics. All give the same numbers, up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ForwardDynamicsMethod {
     /// The articulated-body algorithm, O(n).
     ArticulatedBody,

@@ -11,6 +11,7 @@
 
 use crate::passes::answers::answers;
 use crate::passes::kinematics::{Moving, World};
+use condyle_linalg::check_index;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
 use condyle_spatial::gate::{Fused, Rename};
@@ -101,6 +102,14 @@ impl<'d> Rename<Accelerations<'d, Fused>> for Accelerations<'d, f64> {
     }
 }
 
+impl<'d, S, R> Placements<'d, S, R> {
+    /// The robot.
+    #[inline(always)]
+    pub(crate) fn robot(&self) -> &'d Model<R> {
+        self.model
+    }
+}
+
 impl<'d, S, R> Deref for Velocities<'d, S, R> {
     type Target = Placements<'d, S, R>;
     #[inline(always)]
@@ -128,8 +137,23 @@ pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut [S], c: usize, s: Moti
     }
 }
 
+/// Panics unless the model has this body.
+#[inline(always)]
+#[track_caller]
+pub(crate) fn check_body<R>(model: &Model<R>, body: usize) {
+    check_index("body", body, model.nodes().len(), "bodies");
+}
+
+/// Panics unless the model has this frame.
+#[inline(always)]
+#[track_caller]
+pub(crate) fn check_frame<R>(model: &Model<R>, frame: usize) {
+    check_index("frame", frame, model.frames().len(), "frames");
+}
+
 /// The columns of a Jacobian, if it is 6 × nv.
 #[inline]
+#[track_caller]
 pub(crate) fn columns<'a, S>(name: &str, J: &'a mut DenseMatrix<S, impl Dense<S>>, nv: usize) -> &'a mut [S] {
     assert!(J.shape() == (6, nv), "{name}: expected 6 × {nv}, found {:?}", J.shape());
     J.as_mut_slice()
@@ -257,6 +281,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// # Panics
     /// If there is no such body, or `J` is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn body_jacobian(&self, body: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
         jacobian(*self, body, &self.body(body), reference, columns("J", J, self.model.nv()));
     }
@@ -266,7 +291,9 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or `J` is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn frame_jacobian(&self, frame: usize, reference: ReferenceFrame, J: &mut DenseMatrix<S, impl Dense<S>>) {
+        check_frame(self.model, frame);
         jacobian(
             *self,
             self.model.frames()[frame].body,
@@ -284,6 +311,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such body, or `dJ` is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn body_jacobian_rate(&self, body: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {
         jacobian_rate(*self, body, &self.body(body), reference, columns("dJ", dJ, self.model.nv()));
     }
@@ -310,7 +338,9 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     /// # Panics
     /// If there is no such frame, or `dJ` is not 6 × nv.
     #[inline(always)]
+    #[track_caller]
     pub fn frame_jacobian_rate(&self, frame: usize, reference: ReferenceFrame, dJ: &mut DenseMatrix<S, impl Dense<S>>) {
+        check_frame(self.model, frame);
         jacobian_rate(
             *self,
             self.model.frames()[frame].body,

@@ -24,21 +24,21 @@ workspace! {
     }
 }
 
-/// The place of the bodies' placements.
+/// The place of the bodies' placements, with the [geometry hash](Model::geometry_hash) of their robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PlacementCache {
     /// They were not computed.
     Nowhere,
     /// Body by body.
-    Bodies,
+    Bodies(u64),
     /// Placements in the steps of limbs side by side.
-    Limbs,
+    Limbs(u64),
 }
 
 /// oXi = oXλ λXi, and the columns of S, for all bodies.
 #[inline(always)]
 pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
-    *placed = PlacementCache::Bodies;
+    *placed = PlacementCache::Bodies(l.geometry_hash());
     Joint::sin_cos(l, q, sin_cos);
     let (oX, S, sin, cos) = (&mut oX[..], &mut S[..], &sin_cos.sin[..], &sin_cos.cos[..]);
     for i in l.bodies() {

@@ -17,6 +17,7 @@ pub(crate) mod kinematics;
 pub(crate) mod minv;
 pub(crate) mod passive;
 pub(crate) mod path_jacobian;
+mod points;
 pub(crate) mod regressor;
 pub(crate) mod rnea;
 pub(crate) mod statics;

@@ -38,6 +38,7 @@ use condyle_spatial::{Scalar, kernel};
 ///
 /// # Panics
 /// If an argument has the wrong length, or `smoothing` is not positive.
+#[track_caller]
 pub fn passive_torque<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, tau: &mut [S]) {
     check_arguments(model, v, smoothing, "tau", tau.len());
     losses(model.damping(), model.friction(), v, smoothing, tau);
@@ -67,6 +68,7 @@ kernel! {
 ///
 /// # Panics
 /// If an argument has the wrong length, or `smoothing` is not positive.
+#[track_caller]
 pub fn passive_torque_derivative<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, dtau_dv: &mut [S]) {
     check_arguments(model, v, smoothing, "dtau_dv", dtau_dv.len());
     slopes(model.damping(), model.friction(), v, smoothing, dtau_dv);
@@ -87,5 +89,11 @@ kernel! {
 fn check_arguments<S, R>(model: &Model<R>, v: &[S], smoothing: f64, name: &str, out: usize) {
     check("v", v.len(), model.nv());
     check(name, out, model.nv());
+    check_smoothing(smoothing);
+}
+
+/// Panics unless a smoothing is positive.
+#[track_caller]
+pub(crate) fn check_smoothing(smoothing: f64) {
     assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");
 }

@@ -1,6 +1,6 @@
 //! The semi-implicit (symplectic) Euler method.
 
-use super::{Input, Status, acceleration};
+use super::{Input, acceleration};
 use crate::data::Data;
 use crate::workspace::{filled, workspace};
 use condyle_model::Model;
@@ -9,27 +9,41 @@ use condyle_spatial::{Array, Constant, Scalar};
 
 workspace! {
     pub(super) struct Workspace<S>(size) {
-        /// Efforts, the passive ones included. Written by: `step`.
+        /// Efforts, the passive ones included. Written by: `velocity`.
         effort: Array<S> = filled(S::zero, size.nv),
-        /// h v'. Written by: `step`.
+        /// h v'. Written by: `position`.
         way: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// The whole method.
-pub(super) fn step<S: Scalar, R: Constant<S>>(
+/// v' = v + h a: the velocity after the step, without the ground.
+pub(super) fn velocity<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
     w: &mut Workspace<S>,
     input: Input<S>,
     (q, v): (&[S], &[S]),
-    (q_next, v_next): (&mut [S], &mut [S]),
-) -> Status {
+    v_next: &mut [S],
+) {
     let a = acceleration(model, data, input, (q, v), &mut w.effort);
     for k in 0..v.len() {
         v_next[k] = a[k].mul_add(input.h, v[k]); // v' = v + h a
-        w.way[k] = v_next[k] * input.h;
     }
-    integrate(model, q, &w.way, q_next); // q' = q ⊕ h v'
-    Status::Done
+}
+
+/// q' = q ⊕ h (v' + w): the position after the step. The correction w is empty, or has nv numbers.
+pub(super) fn position<S: Scalar, R>(
+    model: &Model<R>,
+    d: &mut Workspace<S>,
+    h: S,
+    (q, v_next, w): (&[S], &[S], &[f64]),
+    q_next: &mut [S],
+) {
+    for (k, &v) in v_next.iter().enumerate() {
+        d.way[k] = v * h;
+    }
+    for (way, &w) in d.way.iter_mut().zip(w) {
+        *way += S::splat(w) * h;
+    }
+    integrate(model, q, &d.way, q_next); // q' = q ⊕ h v'
 }

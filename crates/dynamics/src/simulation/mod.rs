@@ -8,16 +8,24 @@
 //! use condyle_dynamics::simulation::{Settings, Simulation};
 //! let quadruped = robots::quadruped();
 //! let mut simulation = Simulation::new(&quadruped, Settings::default());
-//! simulation.set_state(&neutral(&quadruped), &[0.0; 18]);
+//! simulation.set_state(&neutral(&quadruped), &[0.0; 18])?;
 //! let status = simulation.run(100, |now| now.tau[8] = -0.5 * now.v[8]); // a control law, once per step
 //! assert!(status.is_done());
 //! assert!((simulation.q()[2] + 0.5 * 9.81 * 0.1f64.powi(2)).abs() < 2e-3); // it has fallen ½ g t²
+//! # Ok::<(), condyle_dynamics::Error>(())
 //! ```
+//!
+//! A [`Ground`] lets it stand, slide, land and lift off. Limits of joints do not act: a control law can hold them.
 
+mod contact_solver;
+mod contacts;
 mod euler;
+mod ground;
 mod lagrangian;
 mod lu;
 mod runge_kutta;
+mod state;
+mod status;
 mod tangent;
 mod variational;
 
@@ -25,15 +33,24 @@ use crate::calls::forward_dynamics::aba;
 use crate::data::{Data, check_forces};
 use crate::passes::passive::passive_torque;
 use crate::workspace::Size;
+use alloc::boxed::Box;
+use alloc::sync::Arc;
 use alloc::vec::Vec;
 use condyle_linalg::check;
-use condyle_model::Model;
+use condyle_model::{Error, Model};
 use condyle_spatial::{Constant, Force, Scalar};
+use core::any::Any;
+
+pub use ground::{Ground, GroundContact, GroundPoint};
+pub use state::State;
+pub use status::Status;
 
 /// The method by which a step is computed. τ and the external forces stay as they are during a step, forces in the body's
 /// frame;
 /// [passive torques](crate::passive_torque) follow the velocity within it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Integrator {
     /// v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation. Where M is constant it is symplectic; elsewhere
@@ -51,8 +68,10 @@ pub enum Integrator {
     Variational,
 }
 
-/// How to simulate.
+/// Method and step of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Settings {
     /// The method.
     pub integrator: Integrator,
@@ -72,30 +91,6 @@ impl Default for Settings {
     /// Semi-implicit Euler at 1 kHz, no passive torques; 1e-9 and 20.
     fn default() -> Self {
         Self { integrator: Integrator::SemiImplicitEuler, dt: 1e-3, passive: None, tolerance: 1e-9, max_iterations: 20 }
-    }
-}
-
-/// The outcome of a step, or of a run of steps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[must_use]
-#[non_exhaustive]
-pub enum Status {
-    /// As it should.
-    Done,
-    /// Newton's method has not reached the tolerance: the step was not taken, the state is the one before it. A shorter
-    /// step helps.
-    NotConverged {
-        /// The number that were made.
-        iterations: usize,
-    },
-    /// The velocity is no longer finite: the step was not taken, the state is the one before it.
-    NotFinite,
-}
-
-impl Status {
-    /// Whether all steps were taken.
-    pub fn is_done(self) -> bool {
-        self == Self::Done
     }
 }
 
@@ -124,15 +119,17 @@ struct Input<'a, S> {
     passive: Option<f64>,
 }
 
-/// A robot's state, and all that is needed to move it on: nothing is allocated after [`new`](Self::new).
+/// A robot's state, and all that is needed to move it on: nothing is allocated after [`new`](Self::new) and
+/// [`set_ground`](Self::set_ground).
 ///
-/// Several simulations run side by side on a scalar with lanes, and on dual numbers a simulation gives its own
-/// derivatives. Newton's method then iterates until all lanes have converged.
+/// It shares its model, so it may be stored, cloned and sent to another thread. Several simulations run side by side on a scalar
+/// with lanes, and on dual numbers a simulation gives its own derivatives. Newton's method then iterates until all lanes have
+/// converged. A ground acts on `f64` only.
 #[derive(Clone, Debug)]
-pub struct Simulation<'m, S: Scalar, R = f64> {
-    /// May be changed between steps.
+pub struct Simulation<S: Scalar, R = f64> {
+    /// Method and step; may be changed between steps.
     pub settings: Settings,
-    model: &'m Model<R>,
+    model: Arc<Model<R>>,
     data: Data<S>,
     time: f64,
     q: Vec<S>,
@@ -146,17 +143,51 @@ pub struct Simulation<'m, S: Scalar, R = f64> {
     euler: euler::Workspace<S>,
     runge_kutta: runge_kutta::Workspace<S>,
     variational: variational::Workspace<S>,
+    ground: Option<Box<contacts::Contacts>>,
 }
 
-impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
-    /// Allocates everything; the robot stands still at [`neutral`](crate::neutral), at time 0.
-    pub fn new(model: &'m Model<R>, settings: Settings) -> Self {
-        let q: Vec<S> = crate::neutral(model).into_iter().map(S::splat).collect();
-        let (size, zero) = (Size::new(model), vec![S::zero(); model.nv()]);
+impl Simulation<f64> {
+    /// Puts the robot on a ground, in place of the one before; one without points takes it away.
+    ///
+    /// The state stays, also where points are below the ground. Allocates what the ground needs.
+    ///
+    /// # Errors
+    /// [`Error::Ground`] if the integrator is another one than
+    /// [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame does not exist or is fixed to the world, the normal is no
+    /// direction, the restitution is not in 0..=1, or another number is not finite or negative.
+    pub fn set_ground(&mut self, ground: Ground) -> Result<(), Error> {
+        if self.settings.integrator != Integrator::SemiImplicitEuler {
+            let what =
+                format!("it acts with the integrator SemiImplicitEuler only, found {:?}", self.settings.integrator);
+            return Err(Error::Ground { what });
+        }
+        let contacts = contacts::Contacts::new(&self.model, ground)?;
+        self.ground = (!contacts.ground.points.is_empty()).then(|| Box::new(contacts));
+        Ok(())
+    }
+
+    /// The ground on which the robot stands, if it has one.
+    pub fn ground(&self) -> Option<&Ground> {
+        self.ground.as_ref().map(|contacts| &contacts.ground)
+    }
+
+    /// The contacts of the ground's points in the last step, in their order; none before the first step is taken.
+    pub fn contacts(&self) -> &[GroundContact] {
+        self.ground.as_ref().map_or(&[], |contacts| &contacts.results)
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
+    /// Allocates everything; the robot is at [`neutral`](crate::neutral), at rest, at time 0.
+    ///
+    /// model: an [`Arc`] of it, which is shared; the model itself, which is moved; or `&model`, which is copied.
+    pub fn new(model: impl Into<Arc<Model<R>>>, settings: Settings) -> Self {
+        let model = model.into();
+        let q: Vec<S> = crate::neutral(&model).into_iter().map(S::splat).collect();
+        let (size, zero) = (Size::new(&model), vec![S::zero(); model.nv()]);
         Self {
             settings,
-            model,
-            data: Data::new(model),
+            data: Data::new(&model),
             time: 0.0,
             q_next: q.clone(),
             q,
@@ -166,8 +197,15 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
             f_ext: vec![Force::zero(); model.nodes().len()],
             euler: euler::Workspace::new(size),
             runge_kutta: runge_kutta::Workspace::new(size),
-            variational: variational::Workspace::new(size, model),
+            variational: variational::Workspace::new(size, &model),
+            ground: None,
+            model,
         }
+    }
+
+    /// The robot.
+    pub fn model(&self) -> &Arc<Model<R>> {
+        &self.model
     }
 
     /// The position, nq numbers.
@@ -187,16 +225,31 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
 
     /// Puts the robot at position q with velocity v, and the clock to 0. Allocates nothing.
     ///
-    /// q: nq numbers; v: nv.
+    /// q: nq numbers; v: nv. Numbers of `f64` are checked, other scalars are not.
+    ///
+    /// # Errors
+    /// [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in it does not have length 1 up
+    /// to 1e-3; [`Error::Velocity`] if a number of v is not finite. The state is then the one before.
     ///
     /// # Panics
     /// If an argument has the wrong length.
-    pub fn set_state(&mut self, q: &[S], v: &[S]) {
+    #[track_caller]
+    pub fn set_state(&mut self, q: &[S], v: &[S]) -> Result<(), Error> {
         check("q", q.len(), self.model.nq());
         check("v", v.len(), self.model.nv());
-        self.q.copy_from_slice(q);
-        self.v.copy_from_slice(v);
+        self.q_next.copy_from_slice(q);
+        self.v_next.copy_from_slice(v);
+        let model = (&*self.model as &dyn Any).downcast_ref::<Model>();
+        if let (Some(model), Some(q), Some(v)) = (model, doubles(&self.q_next), doubles(&self.v_next)) {
+            model.check_state(q, v)?;
+        }
+        core::mem::swap(&mut self.q, &mut self.q_next);
+        core::mem::swap(&mut self.v, &mut self.v_next);
         self.time = 0.0;
+        if let Some(ground) = &mut self.ground {
+            ground.reset();
+        }
+        Ok(())
     }
 
     /// One step of `settings.dt` under constant efforts and forces.
@@ -206,35 +259,46 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     ///
     /// ```
     /// use condyle_dynamics::{robots, simulation::{Integrator, Settings, Simulation}};
-    /// let arm = robots::arm7();
     /// let settings = Settings { integrator: Integrator::Variational, ..Settings::default() };
-    /// let mut simulation = Simulation::new(&arm, settings);
+    /// let mut simulation = Simulation::new(robots::arm7(), settings);
     /// assert!(simulation.step(&[0.1; 7], &[]).is_done());
     /// assert!(simulation.v().iter().any(|&v: &f64| v != 0.0));
     /// ```
     ///
     /// # Panics
-    /// If an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt` is not above
-    /// 0 or not finite.
+    /// If an argument has the wrong length, the smoothing of passive torques is not positive, `settings.dt` is not above 0 or
+    /// not finite, or there is a ground and `settings.integrator` is not semi-implicit Euler.
+    #[track_caller]
     pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
         check("tau", tau.len(), self.model.nv());
         check_forces(f_ext.len(), self.model.nodes().len());
         let Settings { integrator, dt, passive, .. } = self.settings;
         assert!(dt > 0.0 && dt.is_finite(), "settings.dt: expected a finite number above 0, found {dt}");
         let input = Input { h: S::splat(dt), tau, f_ext, passive };
-        let (model, data, state) = (self.model, &mut self.data, (&self.q[..], &self.v[..]));
+        let euler = integrator == Integrator::SemiImplicitEuler;
+        assert!(
+            euler || self.ground.is_none(),
+            "settings.integrator: the ground acts with SemiImplicitEuler only, found {integrator:?}"
+        );
+        let (model, data, state) = (&*self.model, &mut self.data, (&self.q[..], &self.v[..]));
         let (q, v) = (&mut self.q_next, &mut self.v_next);
         let status = match integrator {
-            Integrator::SemiImplicitEuler => euler::step(model, data, &mut self.euler, input, state, (q, v)),
+            Integrator::SemiImplicitEuler => {
+                euler::velocity(model, data, &mut self.euler, input, state, v);
+                let status = on_ground(self.ground.as_deref_mut(), (model, data), dt, (&self.q, &self.v), v);
+                let correction = self.ground.as_ref().map_or(&[][..], |ground| &ground.correction);
+                euler::position(model, &mut self.euler, input.h, (state.0, v, correction), q);
+                status
+            }
             Integrator::RungeKutta4 => runge_kutta::step(model, data, &mut self.runge_kutta, input, state, (q, v)),
             Integrator::Variational => {
                 variational::step(model, data, &mut self.variational, &self.settings, input, state, (q, v))
             }
         };
         if !self.v_next.iter().all(|v| S::all(v.abs().lt(S::splat(f64::MAX)))) {
-            return if status.is_done() { Status::NotFinite } else { status };
+            return if status.is_taken() { Status::NotFinite } else { status };
         }
-        if status.is_done() {
+        if status.is_taken() {
             core::mem::swap(&mut self.q, &mut self.q_next);
             core::mem::swap(&mut self.v, &mut self.v_next);
             self.time += dt;
@@ -248,6 +312,7 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
     ///
     /// # Panics
     /// As [`step`](Self::step).
+    #[track_caller]
     pub fn run(&mut self, steps: usize, mut control: impl FnMut(&mut Control<S>)) -> Status {
         let (mut tau, mut f_ext) = (core::mem::take(&mut self.tau), core::mem::take(&mut self.f_ext));
         let mut status = Status::Done;
@@ -262,6 +327,27 @@ impl<'m, S: Scalar, R: Constant<S>> Simulation<'m, S, R> {
         }
         (self.tau, self.f_ext) = (tau, f_ext);
         status
+    }
+}
+
+/// The numbers of a vector of doubles.
+fn doubles(x: &dyn Any) -> Option<&[f64]> {
+    x.downcast_ref::<Vec<f64>>().map(Vec::as_slice)
+}
+
+/// Turns the velocity after a step without contacts into the velocity with them. Only simulations of `f64` have a ground.
+fn on_ground(
+    ground: Option<&mut contacts::Contacts>,
+    (model, data): (&dyn Any, &mut dyn Any),
+    h: f64,
+    (q, v): (&dyn Any, &dyn Any),
+    v_next: &mut dyn Any,
+) -> Status {
+    let Some(ground) = ground else { return Status::Done };
+    let (model, data, v_next) = (model.downcast_ref(), data.downcast_mut(), v_next.downcast_mut::<Vec<f64>>());
+    match (model, data, doubles(q), doubles(v), v_next) {
+        (Some(model), Some(data), Some(q), Some(v), Some(v_next)) => ground.advance(model, data, h, (q, v), v_next),
+        _ => unreachable!("`set_ground` is a function of simulations of f64"),
     }
 }
 

@@ -2,6 +2,7 @@
 #![allow(dead_code)] // each test file uses a part of it
 
 pub(crate) mod contacts;
+pub(crate) mod panics;
 pub(crate) mod table;
 
 use condyle_dynamics::{

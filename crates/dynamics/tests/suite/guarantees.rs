@@ -11,6 +11,7 @@ use condyle_dynamics::{
     rnea_derivatives, robots,
 };
 use nalgebra::DMatrix;
+use num_dual::Dual64;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// A function gives the same bits whatever ran before it on the same `Data`, not-a-numbers included.
@@ -223,4 +224,21 @@ fn names() {
     let error = arm.frame("gripper").unwrap_err();
     assert_eq!(error.to_string(), "unknown frame `gripper`; no frame has a similar name");
     assert_eq!(arm.frames()[arm.frame("base").unwrap()].body, 0);
+}
+
+/// Models are shared by threads, and scratch moves between them; all of them are cloned.
+#[test]
+fn types_are_cloned_and_cross_threads() {
+    use condyle_dynamics::{Batch, BatchConstraints, ConstraintSet, Data, DivideConquer, Matrices, Model, StateMatrix};
+    fn check<T: Clone + Send + Sync>() {}
+    check::<Model>();
+    check::<Model<Dual64>>();
+    check::<Data<f64>>();
+    check::<Data<Dual64>>();
+    check::<ConstraintSet<f64>>();
+    check::<DivideConquer<f64>>();
+    check::<Batch>();
+    check::<BatchConstraints>();
+    check::<Matrices<'_, f64>>();
+    check::<StateMatrix<'_, f64>>();
 }

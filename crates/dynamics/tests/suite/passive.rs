@@ -104,7 +104,7 @@ fn simulations_lose_energy() {
         let lossy = Settings { passive: Some(SMOOTHING), ..lossless };
         let slide = |settings| {
             let mut simulation = Simulation::new(&sledge, settings);
-            simulation.set_state(&[0.0], &[3.0]);
+            simulation.set_state(&[0.0], &[3.0]).unwrap();
             assert!(simulation.run(2000, |_| {}).is_done());
             (simulation.q()[0], simulation.v()[0])
         };
@@ -117,7 +117,7 @@ fn simulations_lose_energy() {
         let State { q, v, .. } = State::random(&model, &mut rng(2));
         let mut data = Data::new(&model);
         let mut simulation = Simulation::new(&model, lossy);
-        simulation.set_state(&q, &v);
+        simulation.set_state(&q, &v).unwrap();
         let mut last = f64::INFINITY;
         for _ in 0..20 {
             let now = forward_velocities(&model, &mut data, simulation.q(), simulation.v()).mechanical_energy();

@@ -1,14 +1,15 @@
 //! Integrators: their order, and what they conserve.
 
-use crate::common::{self, State, Tree, lift, moved, normal, relative, rng};
+use crate::common::{self, State as Random, Tree, lift, moved, normal, relative, rng};
 use crate::counting::allocations;
-use condyle_dynamics::simulation::{Integrator, Settings, Simulation, Status};
+use condyle_dynamics::simulation::{Integrator, Settings, Simulation, State, Status};
 use condyle_dynamics::{
     Act, Data, Force, Inertia, Joint, JointOptions, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, difference,
     forward_kinematics, forward_velocities, joint_torque_regressor, kinetic_energy_regressor, lie, neutral,
     passive_torque, potential_energy_regressor, robots,
 };
 use num_dual::Dual64;
+use std::sync::Arc;
 
 const ALL: [(Integrator, f64); 3] =
     [(Integrator::SemiImplicitEuler, 1.0), (Integrator::RungeKutta4, 4.0), (Integrator::Variational, 2.0)];
@@ -25,7 +26,7 @@ fn settings(integrator: Integrator, dt: f64) -> Settings {
 /// Where the robot is after some time without efforts, with how fast it moves.
 fn simulate(model: &Model, settings: Settings, (q, v): (&[f64], &[f64]), time: f64) -> (Vec<f64>, Vec<f64>) {
     let mut simulation = Simulation::new(model, settings);
-    simulation.set_state(q, v);
+    simulation.set_state(q, v).unwrap();
     let steps = (time / settings.dt).round() as usize;
     assert_eq!(simulation.run(steps, |_| {}), Status::Done);
     assert!((simulation.time() - time).abs() < 1e-9);
@@ -105,12 +106,12 @@ fn order_on_trees() {
     let (tree, mimics) = (Tree::random(&mut rng(0)), Tree::random_with_mimics(&mut rng(1)));
     for (seed, model) in [tree.build(), mimics.build(), double_pendulum(&losses)].into_iter().enumerate() {
         let mut random = rng(seed as u64);
-        let State { q, v, tau, f_ext, .. } = State::random(&model, &mut random);
+        let Random { q, v, tau, f_ext, .. } = Random::random(&model, &mut random);
         let v: Vec<f64> = v.iter().map(|v| 0.3 * v).collect();
         let end = |integrator, dt: f64| {
             let settings = Settings { passive: Some(0.5), ..settings(integrator, dt) };
             let mut simulation = Simulation::new(&model, settings);
-            simulation.set_state(&q, &v);
+            simulation.set_state(&q, &v).unwrap();
             for _ in 0..(0.16 / dt).round() as usize {
                 assert!(simulation.step(&tau, &f_ext).is_done());
             }
@@ -167,7 +168,7 @@ fn energy_does_not_drift() {
     let mut energy = |q: &[f64], v: &[f64]| forward_velocities(&model, &mut data, q, v).mechanical_energy();
     let start = energy(&q, &v);
     let mut simulation = Simulation::new(&model, settings(Integrator::Variational, 5e-3));
-    simulation.set_state(&q, &v);
+    simulation.set_state(&q, &v).unwrap();
     let mut largest = [0.0; 4]; // in each quarter of 400 s
     for largest in &mut largest {
         for _ in 0..20_000 {
@@ -186,12 +187,12 @@ fn variational_steps_are_symmetric() {
     for seed in 0..4 {
         let mut random = rng(seed);
         let model = Tree::random_with_mimics(&mut random).build();
-        let State { q, v, tau, f_ext, .. } = State::random(&model, &mut random);
+        let Random { q, v, tau, f_ext, .. } = Random::random(&model, &mut random);
         let mut simulation = Simulation::new(&model, settings(Integrator::Variational, 1e-3));
-        simulation.set_state(&q, &v);
+        simulation.set_state(&q, &v).unwrap();
         assert!(simulation.step(&tau, &f_ext).is_done());
         let (there, back) = (simulation.q().to_vec(), simulation.v().iter().map(|v| -v).collect::<Vec<_>>());
-        simulation.set_state(&there, &back);
+        simulation.set_state(&there, &back).unwrap();
         assert!(simulation.step(&tau, &f_ext).is_done());
         let begin: Vec<f64> = v.iter().map(|v| -v).collect();
         assert!(distance(&model, (simulation.q(), simulation.v()), (&q, &begin)) < 1e-9, "seed {seed}");
@@ -204,13 +205,13 @@ fn variational_steps_converge_quadratically() {
     let trees = (0..8).map(|seed| Tree::random_with_mimics(&mut rng(seed)).build());
     let damped = double_pendulum(&JointOptions { damping: 5.0, ..JointOptions::default() });
     for (seed, model) in trees.chain([damped]).enumerate() {
-        let State { q, v, tau, f_ext, .. } = State::random(&model, &mut rng(seed as u64));
+        let Random { q, v, tau, f_ext, .. } = Random::random(&model, &mut rng(seed as u64));
         let iterations = |tolerance: f64| {
             let takes = |&max_iterations: &usize| {
                 let variational = settings(Integrator::Variational, 0.1);
                 let settings = Settings { passive: Some(1.0), tolerance, max_iterations, ..variational };
                 let mut simulation = Simulation::new(&model, settings);
-                simulation.set_state(&q, &v);
+                simulation.set_state(&q, &v).unwrap();
                 simulation.step(&tau, &f_ext).is_done()
             };
             (1..50).find(takes).expect("it converges")
@@ -251,7 +252,7 @@ fn momentum_is_conserved() {
     let start = momentum(&model, &mut data, &q, &v);
     let mut error = |integrator, dt: f64| {
         let mut simulation = Simulation::new(&model, settings(integrator, dt));
-        simulation.set_state(&q, &v);
+        simulation.set_state(&q, &v).unwrap();
         let status = simulation.run((0.5 / dt).round() as usize, |now| {
             for k in 6..now.tau.len() {
                 now.tau[k] = 0.1 * efforts[k] - 0.05 * now.v[k];
@@ -308,7 +309,7 @@ fn external_forces_act() {
         let (way, speed): (f64, f64) = (simulation.q()[1], simulation.v()[1]);
         assert!((speed - 2.0).abs() < 1e-9 && (way - 1.0).abs() < 2e-3);
         let by_force = simulation.q().to_vec();
-        simulation.set_state(&neutral(&model), &[0.0; 6]);
+        simulation.set_state(&neutral(&model), &[0.0; 6]).unwrap();
         for _ in 0..1000 {
             assert!(simulation.step(&[0.0, 4.0, 0.0, 0.0, 0.0, 0.0], &[]).is_done());
         }
@@ -316,20 +317,71 @@ fn external_forces_act() {
     }
 }
 
+/// A state that is none of the robot's is refused with the joint and the numbers, and the state before stays.
+#[test]
+fn invalid_states_are_refused() {
+    let quadruped = robots::quadruped();
+    let mut simulation = Simulation::new(&quadruped, Settings::default());
+    let (q, v) = (neutral(&quadruped), [0.0; 18]);
+    for (scale, length) in [(1.1, "1.1"), (2.0, "2"), (0.0, "0"), (f64::NAN, "NaN")] {
+        let mut bad = q.clone();
+        bad[6] *= scale;
+        let said = simulation.set_state(&bad, &v).unwrap_err().to_string();
+        let expected = if scale.is_nan() {
+            "joint `root_joint`: q[6] is NaN, which is not finite".to_owned()
+        } else {
+            format!("joint `root_joint`: its rotation, q[3..7], has the length {length}, expected 1")
+        };
+        assert_eq!(said, expected);
+    }
+    let mut fast = v;
+    fast[7] = f64::INFINITY;
+    let said = simulation.set_state(&q, &fast).unwrap_err().to_string();
+    assert_eq!(said, "joint `LF_HFE`: v[7] is inf, which is not finite");
+    assert_eq!((simulation.q(), simulation.v()), (&q[..], &v[..]));
+}
+
+/// A simulation shares its model, is a value, and goes on from a stored state with the same bits.
+#[test]
+fn simulations_are_values() {
+    fn shared<T: Clone + Send + Sync + 'static>(_: &T) {}
+    let arm = Arc::new(robots::arm7());
+    for (integrator, _) in ALL {
+        let mut simulation = Simulation::<f64>::new(Arc::clone(&arm), settings(integrator, 1e-3));
+        shared(&simulation);
+        assert!(Arc::ptr_eq(simulation.model(), &arm));
+        assert!(simulation.run(10, |now| now.tau.fill(0.3)).is_done());
+        let (state, mut twin) = (simulation.state(), simulation.clone());
+        let mut restored = Simulation::new(robots::arm7(), settings(integrator, 1e-3));
+        restored.restore(&state).unwrap();
+        for simulation in [&mut simulation, &mut twin, &mut restored] {
+            assert!(simulation.run(10, |now| now.tau.fill(0.3)).is_done());
+        }
+        let end = simulation.state();
+        assert_eq!((&twin.state(), &restored.state()), (&end, &end));
+        let short = State { q: vec![0.0; 6], ..end.clone() };
+        assert_eq!(restored.restore(&short).unwrap_err().to_string(), "state.q: expected 7 entries, found 6");
+        assert_eq!(restored.state(), end);
+    }
+    assert_eq!(Status::Done.to_string(), "done");
+    let said = Status::NotConverged { iterations: 3 }.to_string();
+    assert_eq!(said, "Newton's method did not converge in 3 iterations; the step was not taken");
+}
+
 /// A step that fails leaves the state and says why.
 #[test]
 fn failures_are_typed() {
     let model = robots::arm7();
-    let state = State::random(&model, &mut rng(1));
+    let state = Random::random(&model, &mut rng(1));
     let mut simulation = Simulation::new(&model, settings(Integrator::Variational, 1e-3));
-    simulation.set_state(&state.q, &state.v);
+    simulation.set_state(&state.q, &state.v).unwrap();
     simulation.settings.max_iterations = 1;
     assert_eq!(simulation.step(&state.tau, &[]), Status::NotConverged { iterations: 1 });
     assert_eq!((simulation.q(), simulation.v(), simulation.time()), (&state.q[..], &state.v[..], 0.0));
     simulation.settings.max_iterations = 20;
     for (integrator, _) in ALL {
         simulation.settings.integrator = integrator;
-        simulation.set_state(&state.q, &state.v);
+        simulation.set_state(&state.q, &state.v).unwrap();
         let status = simulation.run(3, |now| now.tau.fill(f64::MAX));
         assert!(!status.is_done(), "{integrator:?}");
         assert_eq!((simulation.q(), simulation.v(), simulation.time()), (&state.q[..], &state.v[..], 0.0));
@@ -343,19 +395,19 @@ fn a_step_can_be_differentiated() {
     const DIFFERENCES: f64 = 1e-7;
     let mut random = rng(7);
     let model = Tree::random_with_mimics(&mut random).build();
-    let State { q, v, tau, .. } = State::random(&model, &mut random);
+    let Random { q, v, tau, .. } = Random::random(&model, &mut random);
     let (dq, dv) = (normal(&mut random, model.nv()), normal(&mut random, model.nv()));
     for (integrator, _) in ALL {
         let mut simulation = Simulation::<Dual64>::new(&model, settings(integrator, 1e-2));
         let direction: Vec<Dual64> = dq.iter().map(|&d| Dual64::new(0.0, d)).collect();
-        simulation.set_state(&moved(&model, &lift(&q), &direction), &common::dual(&v, &dv));
+        simulation.set_state(&moved(&model, &lift(&q), &direction), &common::dual(&v, &dv)).unwrap();
         assert!(simulation.step(&lift(&tau), &[]).is_done());
         let found = common::eps(simulation.v());
         let end = |s: f64| {
             let scaled = |d: &[f64]| d.iter().map(|d| d * s).collect::<Vec<_>>();
             let mut simulation = Simulation::new(&model, settings(integrator, 1e-2));
             let v: Vec<f64> = v.iter().zip(&dv).map(|(v, d)| v + s * d).collect();
-            simulation.set_state(&moved(&model, &q, &scaled(&dq)), &v);
+            simulation.set_state(&moved(&model, &q, &scaled(&dq)), &v).unwrap();
             assert!(simulation.step(&tau, &[]).is_done());
             simulation.v().to_vec()
         };
@@ -377,12 +429,12 @@ fn wrong_shape() {
 #[test]
 fn nothing_is_allocated() {
     for (seed, model) in common::all_models(1).iter().enumerate() {
-        let State { q, v, a, tau, f_ext } = State::random(model, &mut rng(seed as u64));
+        let Random { q, v, a, tau, f_ext } = Random::random(model, &mut rng(seed as u64));
         for (integrator, _) in ALL {
             let settings = Settings { passive: Some(0.1), ..settings(integrator, 1e-4) };
             let mut simulation = Simulation::new(model, settings);
             let count = allocations(|| {
-                simulation.set_state(&q, &v);
+                simulation.set_state(&q, &v).unwrap();
                 let _ = simulation.step(&tau, &f_ext);
                 let _ = simulation.run(3, |now| now.tau.fill(0.1));
             });

@@ -1,9 +1,10 @@
 //! Every way to make a model goes through the same checks: what is odd is found anew, and what is impossible is refused.
 
+use crate::common::panics::assert_panic;
 use condyle_dynamics::simulation::{Settings, Simulation, Status};
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, DivideConquer, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD,
-    Warning, aba, neutral, robots,
+    Warning, aba, forward_kinematics, neutral, rnea, robots,
 };
 use num_dual::Dual64;
 use std::panic::catch_unwind;
@@ -208,6 +209,25 @@ fn plans_know_their_robot() {
     let heavier = one.with_inertias(|_, I| I.scale(2.0)).unwrap().with_gravity(Vec3::zero()).unwrap();
     assert_eq!(accepted(&heavier), (true, true));
     assert_eq!(accepted(&read_again(&one)), (true, true));
+    // placements are those of a robot with joints and frames in the same places
+    let mut data = Data::<f64>::new(&one);
+    forward_kinematics(&one, &mut data, &[0.3; 4]);
+    assert!(data.placements(&one).is_some() && data.placements(&heavier).is_some());
+    for other in [&longer, &turned] {
+        let refused = "data: its placements are those of another robot than `arm`, with the same tree";
+        assert_panic("tests/suite/validity.rs", refused, || _ = data.placements(other));
+        aba(other, &mut data, &[0.3; 4], &[0.0; 4], &[0.0; 4], &[]);
+        assert!(data.placements(other).is_some());
+        assert_panic("tests/suite/validity.rs", refused, || _ = data.placements(&one));
+        forward_kinematics(&one, &mut data, &[0.3; 4]);
+    }
+    rnea(&one, &mut data, &[0.3; 4], &[0.0; 4], &[0.0; 4], &[]);
+    assert!(data.placements(&longer).is_none(), "there are none that could be those of another robot");
+    let seeded = one.with_inertias(|_, I| I.lift::<Dual64>()).unwrap();
+    let mut duals = Data::<Dual64>::new(&one);
+    forward_kinematics(&seeded, &mut duals, &[0.3.into(); 4]);
+    assert!(duals.placements(&one).is_some());
+    assert_panic("tests/suite/validity.rs", "another robot", || _ = duals.placements(&longer));
     // another kind of joint is another tree
     let mut builder = ModelBuilder::new("slides");
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3::diagonal(0.1));

@@ -1,5 +1,6 @@
 //! Many states at once: the same bits as one by one.
 
+use crate::common::panics::panic_of;
 use crate::common::table::Input;
 use crate::common::{fixed, rng};
 use crate::counting::{allocations, bytes};
@@ -338,4 +339,64 @@ fn constraints_of_another_batch() {
     let mut constraints = Batch::<f64>::new(model, 2, 2).constraints(model, &[], Proximal::default()).unwrap();
     let (q, v) = ([0.0; 7], [0.0; 7]);
     _ = Batch::<f64>::new(model, 2, 1).constrained_dynamics(model, &mut constraints, &q, &v, &v, &[]);
+}
+
+/// A copy has the results of the original, computes the same bits, and shares no memory with it.
+#[test]
+fn copies_compute_alone() {
+    let _best = best_level();
+    let model = &robots::quadruped();
+    let (s, other) = (states(model, 11, 1), states(model, 11, 2));
+    let mut batch = Batch::new(model, 11, 1);
+    batch.constrained_dynamics(model, &mut held(model, &batch.clone()), &s.q, &s.v, &s.x, &s.f_ext);
+    let expected = batch.aba_derivatives(model, &s.q, &s.v, &s.x, &s.f_ext).da_dq.at(10).to_owned();
+    let mut copy = batch.clone();
+    assert_eq!((copy.capacity(), copy.threads()), (11, 1));
+    copy.aba_derivatives(model, &other.q, &other.v, &other.x, &other.f_ext);
+    let found = copy.aba_derivatives(model, &s.q, &s.v, &s.x, &s.f_ext);
+    assert_eq!(found.da_dq.at(10), expected);
+    assert_eq!(batch.aba_derivatives(model, &s.q, &s.v, &s.x, &s.f_ext).da_dq.at(10), expected);
+    let (mut one, mut constraints) = (copy.clone(), held(model, &copy));
+    let first = one.constrained_dynamics(model, &mut constraints.clone(), &s.q, &s.v, &s.x, &[]).a.to_vec();
+    assert_eq!(copy.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a, first);
+    // with forces for the first time, in a copy of a batch that never had some
+    let (mut without, rnea) = (Batch::new(model, 11, 1), batch.rnea(model, &s.q, &s.v, &s.x, &s.f_ext).to_vec());
+    without.rnea(model, &s.q, &s.v, &s.x, &[]);
+    let mut with = without.clone();
+    let count = allocations(|| _ = with.rnea(model, &s.q, &s.v, &s.x, &s.f_ext));
+    assert_eq!((count, with.rnea(model, &s.q, &s.v, &s.x, &s.f_ext)), (0, &rnea[..]));
+}
+
+/// The constraints of the table.
+fn held(model: &Model, batch: &Batch) -> condyle_dynamics::BatchConstraints {
+    let (held, proximal) = constraints(model);
+    batch.constraints(model, &held, proximal).unwrap()
+}
+
+/// A wrong number of numbers is reported in the file of the caller, by every function.
+#[test]
+fn wrong_lengths_are_reported_at_the_call() {
+    let _best = best_level();
+    let model = &robots::quadruped();
+    for row in table::<f64>() {
+        let mut panics = 0;
+        for argument in ["q", "v", "x", "f_ext"] {
+            let mut s = states(model, 3, 1);
+            match argument {
+                "q" => drop(s.q.pop()),
+                "v" => drop(s.v.pop()),
+                "x" => drop(s.x.pop()),
+                _ => drop(s.f_ext.pop()),
+            }
+            let mut batch = Batch::new(model, 3, 1);
+            let (mut constraints, mut found) = (held(model, &batch), Found::default());
+            let call = || (row.many)(model, &mut batch, &mut constraints, &s, &mut found);
+            if let Some((file, message)) = panic_of(call) {
+                let called = file.ends_with("tests/vectors/table.rs");
+                assert!(called, "{}, {argument} too short: {message:?} is reported in {file}", row.name);
+                panics += 1;
+            }
+        }
+        assert!(panics > 0, "{} accepts every length", row.name);
+    }
 }

@@ -62,3 +62,37 @@ fn of_dynamics() {
         println!("{level:?}");
     });
 }
+
+/// Chosen columns are those of the whole Jacobian, in whatever order they are asked for; the others stay zero.
+#[test]
+fn along_some_directions() {
+    let models = models(TREES);
+    each_level(|level| {
+        for (seed, model) in models.iter().enumerate() {
+            let Input { q, v, x, f_ext, .. } = Input::random(model, &mut rng(seed as u64));
+            let state = [&q[..], &v, &x].concat();
+            let new = || LaneJacobian::new(model, state.len(), model.nv());
+            let (mut whole, mut some) = (new(), new());
+            let mut f = Dynamics { model, f_ext: &f_ext, forward: false };
+            let (tau, J) = whole.of(model, &state, &mut f);
+            let chosen: Vec<_> = (0..J.ncols()).rev().filter(|k| k % 3 != 1).collect();
+            for directions in [&[][..], &chosen] {
+                let (value, columns) = some.along(model, &state, &mut f, directions);
+                assert_eq!(value, tau, "{level:?}");
+                for k in 0..J.ncols() {
+                    let expected = if directions.contains(&k) { J.column(k).amax() } else { 0.0 };
+                    assert_eq!(columns.column(k).amax(), expected, "{level:?}: column {k}");
+                    assert!(!directions.contains(&k) || columns.column(k) == J.column(k), "{level:?}: column {k}");
+                }
+            }
+        }
+    });
+}
+
+#[test]
+#[should_panic(expected = "directions: found 14, expected less than 14")]
+fn directions_that_do_not_exist_are_refused() {
+    let arm = condyle_dynamics::robots::arm7();
+    let mut f = Dynamics { model: &arm, f_ext: &[], forward: false };
+    LaneJacobian::new(&arm, 14, 7).along(&arm, &[0.0; 14], &mut f, &[3, 14]);
+}

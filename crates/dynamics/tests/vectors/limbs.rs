@@ -2,11 +2,12 @@
 
 use crate::best_level;
 use crate::common::contacts::random_constraints;
+use crate::common::panics::assert_panic;
 use crate::common::{State, Tree, Worst, all_models, relative, rng};
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, Inertia, Input, Joint, Model, ModelBuilder, Proximal, ReferenceFrame, Se3,
-    Sym3, Vec3, WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv, nonlinear_effects,
-    rnea, rnea_derivatives, robots,
+    Sym3, Vec3, WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv, neutral,
+    nonlinear_effects, rnea, rnea_derivatives, robots,
 };
 use nalgebra::DMatrix;
 
@@ -328,4 +329,22 @@ fn calls_leave_their_placements() {
             assert!(data.placements(m).is_none(), "{}: rnea places no bodies", m.name());
         }
     }
+}
+
+/// Placements in the lanes of limbs are refused to a robot whose base sits elsewhere.
+#[test]
+fn placements_of_limbs_know_their_robot() {
+    let _level = best_level();
+    let quadruped = robots::quadruped();
+    let mut builder = ModelBuilder::new("raised");
+    builder.append(WORLD, Se3 { translation: Vec3::new(0.0, 0.0, 1.0), ..Se3::identity() }, &quadruped, "");
+    let raised = builder.build().unwrap();
+    assert_eq!(raised.tree_hash(), quadruped.tree_hash());
+    let (mut data, q, o) = (Data::<f64>::new(&quadruped), neutral(&quadruped), [0.0; 18]);
+    aba(&quadruped, &mut data, &q, &o, &o, &[]);
+    assert_panic("tests/vectors/limbs.rs", "another robot than `raised`", || _ = data.placements(&raised));
+    assert!(data.placements(&quadruped).is_some());
+    // in the lanes again, and under other inertias
+    aba(&quadruped, &mut data, &q, &o, &o, &[]);
+    assert!(data.placements(&quadruped.with_inertias(|_, I| I.scale(2.0)).unwrap()).is_some());
 }

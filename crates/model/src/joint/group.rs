@@ -52,6 +52,7 @@ impl Joint {
     }
 
     /// q ⊕ v: the position after moving with v for one unit of time.
+    #[inline(always)]
     pub(crate) fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
@@ -116,6 +117,7 @@ impl Joint {
     }
 
     /// The tangent vector as a twist of the body.
+    #[inline(always)]
     fn twist<S: Scalar>(self, v: &[S]) -> Motion<S> {
         let mut m = [S::zero(); 6];
         for (k, &axis) in self.axes().iter().enumerate() {
@@ -125,6 +127,7 @@ impl Joint {
     }
 
     /// X_J(q) of the joints whose group is not commutative.
+    #[inline(always)]
     fn pose<S: Scalar>(self, q: &[S]) -> (Quaternion<S>, Vec3<S>) {
         match self {
             Self::Spherical => (Quaternion::new(q[0], q[1], q[2], q[3]), Vec3::zero()),
@@ -138,6 +141,7 @@ impl Joint {
     }
 
     /// The inverse of `pose`.
+    #[inline(always)]
     fn set_pose<S: Scalar>(self, R: Quaternion<S>, p: Vec3<S>, q: &mut [S]) {
         let (u, w) = (R.vector, R.scalar);
         let two = S::splat(2.0);

@@ -4,6 +4,7 @@ use super::path_constraint::{self, PathConstraint};
 use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use crate::problem::{ActionModel, Bounded, Multipliers, Visit};
+use core::fmt;
 use nalgebra::DMatrix;
 use std::any::Any;
 
@@ -98,6 +99,13 @@ impl Constrained {
     }
 }
 
+impl fmt::Debug for Constrained {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (nx, nu, constraints) = (self.nx(), self.nu(), self.g.len());
+        f.debug_struct("Constrained").field("nx", &nx).field("nu", &nu).field("constraints", &constraints).finish()
+    }
+}
+
 impl ActionModel for Constrained {
     fn nx(&self) -> usize {
         self.action.nx()
@@ -133,6 +141,7 @@ impl ActionModel for Constrained {
         self.add_derivatives(t, x, u, node);
     }
 
+    #[track_caller]
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
         let (nx, nu) = (self.nx(), self.nu());
         self.action.calc_group(knots, xs, us, next, costs);
@@ -141,6 +150,7 @@ impl ActionModel for Constrained {
         }
     }
 
+    #[track_caller]
     fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         let (nx, nu) = (self.nx(), self.nu());
         assert_length("nodes", nodes.len(), knots.len());
@@ -153,7 +163,7 @@ impl ActionModel for Constrained {
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         self.action.constraints(t, visit);
         let (lower, upper) = self.constraint.bounds(t);
-        visit(Bounded { count: self.g.len(), lower, upper, multipliers: &mut self.multipliers });
+        visit(Bounded { count: self.g.len(), lower, upper, parts: &[], multipliers: &mut self.multipliers });
     }
 
     fn shift(&mut self) {
@@ -166,6 +176,17 @@ impl ActionModel for Constrained {
 
     fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
         self.action.hold(t, x)
+    }
+
+    fn inner_mut(&mut self) -> Option<&mut dyn ActionModel> {
+        Some(&mut *self.action)
+    }
+
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        let (action, constraint) = (self.action.fork()?, self.constraint.fork()?);
+        let Self { multipliers, g, d, dd, gx, gu, .. } = self;
+        let (multipliers, [g, d, dd]) = (multipliers.clone(), [g, d, dd].map(Vec::clone));
+        Some(Box::new(Self { action, constraint, multipliers, g, d, dd, gx: gx.clone(), gu: gu.clone() }))
     }
 
     fn reserve(&mut self) {

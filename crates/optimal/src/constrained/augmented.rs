@@ -2,7 +2,8 @@
 #![allow(non_snake_case)]
 
 use super::settings::ConstraintSettings;
-use crate::ddp::{Fddp, Observer, Settings, Solution, Status, Unobserved};
+use super::violation::{Violation, ViolationKind};
+use crate::ddp::{Fddp, Observer, Recent, Rules, Settings, Solution, Status, Unobserved};
 use crate::error::Error;
 use crate::problem::Problem;
 use crate::time::Instant;
@@ -76,13 +77,29 @@ pub struct AugmentedLagrangian {
     pub settings: ConstraintSettings,
     /// The settings of the inner solves; their tolerances are chosen, and the time budget is that of all of them.
     pub inner: Settings,
-    solver: Fddp,
-    outcome: Outcome,
+    pub(super) solver: Fddp,
+    pub(super) outcome: Outcome,
     /// The adjoint state, and its predecessor.
     adjoint: [DVector<f64>; 2],
-    /// The time that the residuals took the last time.
-    measuring: Duration,
+    /// The durations of the last measurements of the residuals.
+    measuring: Recent,
+    /// Whether the multipliers and the penalty are of no use to the next solve.
+    pub(super) lost: bool,
 }
+
+/// Residuals of the stopping tests, besides those of the [`Outcome`].
+struct Residuals {
+    /// The largest violation of what a control can change, gaps included.
+    primal: f64,
+    /// The largest violation of x̂₀ itself.
+    fixed: Option<Violation>,
+    /// Whether the trajectory minimises the augmented Lagrangian, up to rounding.
+    stationary: bool,
+}
+
+/// Largest entry of the gradient of the augmented Lagrangian at a stationary trajectory, as a multiple of the largest
+/// multiplier: four digits of the violation's own gradient, as rounding takes the others at the largest penalty.
+const STATIONARY: f64 = 1e-4;
 
 /// The state of the constraints after a solve, beside its [`Solution`].
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -91,6 +108,9 @@ pub struct Outcome {
     pub cost: f64,
     /// The largest distance of a constraint from its bounds, or gap of the dynamics.
     pub primal: f64,
+    /// The row with this distance or gap: the evidence of [`Status::ConstraintsViolated`]; `None` if all constraints hold
+    /// exactly. Of [`Status::Infeasible`] the row that proves it, the one of x̂₀ with the largest violation.
+    pub worst: Option<Violation>,
     /// The largest entry of the gradient of the Lagrangian by the controls, projected on their bounds.
     pub dual: f64,
     /// The multipliers y of each knot: positive at an upper bound, negative at a lower one, none where there is no
@@ -111,15 +131,21 @@ impl AugmentedLagrangian {
         let adjoint = [(); 2].map(|()| DVector::zeros(problem.ndx()));
         let (settings, inner) = (ConstraintSettings::default(), Settings::default());
         let (solver, outcome) = (Fddp::new(problem), Outcome::default());
-        Self { settings, inner, solver, outcome, adjoint, measuring: Duration::ZERO }
+        Self { settings, inner, solver, outcome, adjoint, measuring: Recent::default(), lost: false }
     }
 
     /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, and multipliers of zero.
     ///
     /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances,
-    /// [`Status::Infeasible`] if the penalty reached its limit and the constraints do not hold, or that of the inner solve
-    /// that stopped early. The cost of the solution contains the terms of the constraints, the outcome's does not. The
-    /// problem keeps nothing of the multipliers.
+    /// [`Status::ConstraintsViolated`] if the penalty reached its limit, the inner solve found a minimum and the constraints
+    /// do not hold, and [`Status::Infeasible`] if x̂₀ itself violates a constraint of knot 0 that is a function of the state
+    /// alone; the solve goes on under the other constraints. Otherwise it is that of the inner solve that stopped early. The
+    /// cost of the solution contains the terms of the constraints, the outcome's does not. The problem keeps nothing of the
+    /// multipliers.
+    ///
+    /// Controls of the warm start that are outside of their bounds are moved into them, whatever
+    /// [`Settings::project_warm_start`] of [`inner`](Self::inner) says. A solve that is lost from its warm start begins once
+    /// more, from x̂₀ held still: see [`ConstraintSettings::restart`].
     ///
     /// # Errors
     /// [`Error`] as for [`Fddp::solve`], or if a constraint's bounds leave no value.
@@ -142,8 +168,8 @@ impl AugmentedLagrangian {
     }
 
     /// Solves `problem` from the last solution, its multipliers and its penalty: with a new initial state, new references
-    /// or, after [`shift`](Self::shift), for the next horizon. After a solve that ended as [`Status::Infeasible`] or
-    /// [`Status::NotFinite`] the multipliers are zero and the penalty is the first one.
+    /// or, after [`shift`](Self::shift), for the next horizon. After a solve that ended as [`Status::NotFinite`], or with
+    /// violated constraints at the largest penalty, the multipliers are zero and the penalty is the first one.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -183,27 +209,37 @@ impl AugmentedLagrangian {
         warm_start: Option<[&[f64]; 2]>,
         observer: &mut dyn Observer,
     ) -> Result<&Solution, Error> {
-        let result = self.iterate(problem, warm_start, observer);
+        let begin = Instant::now();
+        let mut result = self.attempt(problem, warm_start, observer, begin, true);
+        if let (Ok(status), Some(start)) = (&result, warm_start)
+            && self.lost
+            && self.settings.restart
+        {
+            result = self.restart(problem, start, *status, observer, begin);
+        }
         if result.is_ok() {
             problem.multipliers(&mut self.outcome.multipliers);
         }
         problem.forget_multipliers();
         self.solver.solution.status = result?;
+        let total = self.solver.solution.timings.total;
+        self.solver.solution.timings.end(begin.elapsed(), self.inner.time_budget);
+        self.solver.solution.timings.total = total; // of the last inner solve, as its parts
         Ok(&self.solver.solution)
     }
 
-    /// The outer iterations.
-    fn iterate(
+    /// Solves once, with a budget that lasts from `begin`; the first attempt makes an iteration whatever the time.
+    pub(super) fn attempt(
         &mut self,
         problem: &mut Problem,
         warm_start: Option<[&[f64]; 2]>,
         observer: &mut dyn Observer,
+        begin: Instant,
+        first: bool,
     ) -> Result<Status, Error> {
-        let begin = Instant::now();
         self.settings.check()?;
-        self.solver.settings = self.inner.clone();
-        let lost = matches!(self.solver.solution.status, Status::Infeasible | Status::NotFinite);
-        let goes_on = warm_start.is_none() && !lost && self.outcome.solves > 0;
+        self.solver.settings = Settings { project_warm_start: true, ..self.inner.clone() };
+        let goes_on = warm_start.is_none() && !self.lost && self.outcome.solves > 0;
         let ConstraintSettings { tolerance, tolerance_dual, penalty_start, penalty_max, .. } = self.settings;
         let penalty = if goes_on { self.outcome.penalty.clamp(penalty_start, penalty_max) } else { penalty_start };
         let mut mu = 1.0 / penalty;
@@ -216,24 +252,29 @@ impl AugmentedLagrangian {
         // the tolerances of one inner solve, which follow μ
         let (mut eta, mut omega) = (mu.powf(0.1), mu);
         let mut status = Status::MaxIterations;
+        let mut residuals = Residuals { primal: f64::INFINITY, fixed: None, stationary: false };
+        self.lost = false;
         for solve in 0..self.settings.max_solves {
             // the expected decrease of an inner solve is about the square of its gradient
             let dual = omega.max(0.1 * tolerance_dual);
             (self.solver.settings.tolerance, self.solver.settings.tolerance_bounded) = (dual * dual, dual * dual);
-            let over = begin.elapsed() + self.measuring;
+            let over = begin.elapsed() + self.measuring.median();
             self.solver.settings.time_budget = self.inner.time_budget.map(|budget| budget.saturating_sub(over));
-            let result = self.solver.run(problem, warm_start.filter(|_| solve == 0), observer)?;
+            let guaranteed = first && solve == 0 && self.inner.time_budget != Some(Duration::ZERO);
+            let rules = Rules { guaranteed, trusts_start: true };
+            let result = self.solver.run(problem, warm_start.filter(|_| solve == 0), observer, rules)?;
             self.outcome.solves += 1;
             self.outcome.iterations += result.trace.len();
             let stopped = result.status;
             // z − Π z at the iterate, and how far it is from a solution
-            self.measure(problem);
+            residuals = self.measure(problem);
             if matches!(stopped, Status::TimeLimit | Status::Interrupted | Status::NotFinite) {
+                self.lost = stopped == Status::NotFinite;
                 return Ok(stopped);
             }
-            if self.outcome.primal <= eta.max(tolerance) {
+            if residuals.primal <= eta.max(tolerance) {
                 problem.update_multipliers();
-                if self.outcome.primal <= tolerance && self.outcome.dual <= tolerance_dual {
+                if residuals.primal <= tolerance && self.outcome.dual <= tolerance_dual {
                     status = Status::Converged;
                     break;
                 }
@@ -241,7 +282,8 @@ impl AugmentedLagrangian {
                 omega *= mu;
             } else {
                 if mu <= 1.0 / penalty_max {
-                    status = Status::Infeasible;
+                    let solved = stopped == Status::Converged || residuals.stationary;
+                    (status, self.lost) = (if solved { Status::ConstraintsViolated } else { stopped }, true);
                     break;
                 }
                 mu = (mu / self.settings.penalty_factor).max(1.0 / penalty_max);
@@ -249,6 +291,11 @@ impl AugmentedLagrangian {
                 problem.set_penalty(mu);
                 self.outcome.penalty = 1.0 / mu;
             }
+        }
+        // x₀ = x̂₀ cannot be changed: no trajectory satisfies a constraint of it that does not hold
+        if let Some(proof) = residuals.fixed.filter(|violation| violation.amount > tolerance) {
+            self.outcome.worst = Some(proof);
+            return Ok(Status::Infeasible);
         }
         Ok(status)
     }
@@ -265,16 +312,25 @@ impl AugmentedLagrangian {
 
     /// Cost and residuals at the iterate: λ = q + Aᵀλ⁺,  ∂L/∂u = r + Bᵀλ⁺, whose q and r hold the constraints' terms, which
     /// are yᵀ∂g of the multipliers that an update would give.
-    fn measure(&mut self, problem: &mut Problem) {
-        let Self { solver, outcome, adjoint: [lambda, before], .. } = self;
+    fn measure(&mut self, problem: &mut Problem) -> Residuals {
+        let Self { settings, solver, outcome, adjoint: [lambda, before], .. } = self;
         let (horizon, begin) = (problem.horizon(), Instant::now());
         let Solution { xs, us, gap, cost, .. } = &solver.solution;
         for node in &mut solver.nodes {
             node.inverse_dynamics.wanted = false; // r and B are read
         }
         problem.calc_diff(xs, us, &mut solver.nodes);
-        let (violation, terms) = problem.measure_constraints();
-        (outcome.primal, outcome.cost, outcome.dual) = (larger(*gap, violation), cost - terms, 0.0);
+        let measured = problem.measure_constraints(xs[..problem.nx()] == *problem.x0());
+        let violation = measured.worst.as_ref().map_or(0.0, |worst| worst.amount);
+        (outcome.primal, outcome.cost, outcome.dual) = (larger(*gap, violation), cost - measured.terms, 0.0);
+        outcome.worst = match solver.largest_gap() {
+            Some((knot, row, amount)) if amount > violation => {
+                Some(Violation { kind: ViolationKind::Gap, knot, row, name: None, entry: row, amount })
+            }
+            _ => measured.worst,
+        };
+        let primal = larger(*gap, measured.rest);
+        let mut slope_of_free = 0.0; // of controls that are not pressed against a bound
         lambda.copy_from(&solver.nodes[horizon].q);
         for t in (0..horizon).rev() {
             let node = &solver.nodes[t];
@@ -288,6 +344,9 @@ impl AugmentedLagrangian {
                 // u = the projection of u − ∂L/∂u into its bounds
                 let projected = if slope.is_nan() { slope } else { (u - slope).min(upper).max(lower) };
                 outcome.dual = larger(outcome.dual, (u - projected).abs());
+                if !(*u <= lower && slope > 0.0 || *u >= upper && slope < 0.0) {
+                    slope_of_free = larger(slope_of_free, slope.abs());
+                }
             }
             before.copy_from(&node.q);
             before.gemv_tr(1.0, &node.A, lambda, 1.0);
@@ -296,7 +355,9 @@ impl AugmentedLagrangian {
         for number in [&mut outcome.cost, &mut outcome.primal, &mut outcome.dual] {
             *number = if number.is_nan() { f64::INFINITY } else { *number };
         }
-        self.measuring = begin.elapsed();
+        self.measuring.add(begin.elapsed());
+        let stationary = *gap <= settings.tolerance && slope_of_free <= STATIONARY * measured.multiplier;
+        Residuals { primal, fixed: measured.fixed, stationary }
     }
 }
 

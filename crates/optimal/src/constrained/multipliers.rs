@@ -1,7 +1,23 @@
 //! The multipliers of all constraints of a problem.
 
+use super::violation::{Violation, ViolationKind};
 use crate::error::Error;
 use crate::problem::{PENALTY, Problem};
+
+/// The state of all constraints at a trajectory.
+#[derive(Debug, Default)]
+pub(crate) struct Measured {
+    /// The largest violation, or none.
+    pub(crate) worst: Option<Violation>,
+    /// The largest violation of a constraint that no control can change: one of x₀ = x̂₀ alone.
+    pub(crate) fixed: Option<Violation>,
+    /// The amount of the largest violation of all other constraints.
+    pub(crate) rest: f64,
+    /// The largest of the next multipliers of all other constraints, |z − Π z| / μ.
+    pub(crate) multiplier: f64,
+    /// The sum of the cost's terms.
+    pub(crate) terms: f64,
+}
 
 impl Problem {
     /// Multipliers of zero everywhere, and the penalty 1/μ.
@@ -49,6 +65,13 @@ impl Problem {
         self.share_multipliers();
     }
 
+    /// Whether some knot has a constraint.
+    pub(crate) fn has_constraints(&mut self) -> bool {
+        let mut any = false;
+        (0..=self.horizon()).for_each(|t| self.action_mut(t).constraints(t, &mut |bounded| any |= bounded.count > 0));
+        any
+    }
+
     /// The penalty 1/μ.
     pub(crate) fn set_penalty(&mut self, mu: f64) {
         for t in 0..=self.horizon() {
@@ -65,18 +88,43 @@ impl Problem {
         self.share_multipliers();
     }
 
-    /// The largest distance of a constraint from its bounds, infinite if one is not a number, and the sum of the cost's
-    /// terms, at the trajectory at which derivatives were computed last.
-    pub(crate) fn measure_constraints(&mut self) -> (f64, f64) {
-        let (mut worst, mut sum) = (0.0_f64, 0.0);
+    /// Measures the constraints at the trajectory at which derivatives were computed last, of which x₀ is x̂₀ or not. The
+    /// violation of what is not a number is infinite.
+    pub(crate) fn measure_constraints(&mut self, starts_at_x0: bool) -> Measured {
+        let mut all = Measured::default();
         for t in 0..=self.horizon() {
+            let without_controls = self.nu(t) == 0;
+            let mut before = 0; // constraints of the knot that were seen already
             self.action_mut(t).constraints(t, &mut |bounded| {
-                let [violation, term] = bounded.multipliers.measured(t);
-                worst = worst.max(if violation.is_nan() { f64::INFINITY } else { violation });
-                sum += term;
+                let (excess, next, term) = bounded.multipliers.measured(t, bounded.count);
+                all.terms += term;
+                for (i, (excess, y)) in excess.iter().zip(next).enumerate() {
+                    let part = || bounded.parts.iter().rfind(|part| part.first <= i);
+                    let fixed =
+                        t == 0 && starts_at_x0 && (without_controls || part().is_some_and(|part| part.of_state));
+                    if !fixed {
+                        all.multiplier = all.multiplier.max(y.abs());
+                    }
+                    let amount = if excess.is_nan() { f64::INFINITY } else { excess.abs() };
+                    if amount == 0.0 {
+                        continue;
+                    }
+                    let worst = if fixed { &mut all.fixed } else { &mut all.worst };
+                    if worst.as_ref().is_none_or(|worst| worst.amount < amount) {
+                        let (name, entry) = part().map_or((None, i), |part| (Some(part.name.clone()), i - part.first));
+                        let kind = ViolationKind::Constraint;
+                        *worst = Some(Violation { kind, knot: t, row: before + i, name, entry, amount });
+                    }
+                }
+                before += bounded.count;
             });
         }
-        (worst, sum)
+        let amount = |violation: &Option<Violation>| violation.as_ref().map_or(0.0, |violation| violation.amount);
+        all.rest = amount(&all.worst);
+        if amount(&all.fixed) > all.rest {
+            all.worst.clone_from(&all.fixed);
+        }
+        all
     }
 
     /// y of each knot. Allocates at the first call.

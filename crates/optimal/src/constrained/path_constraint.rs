@@ -7,7 +7,8 @@ use std::any::Any;
 
 /// Functions of state and control that must stay within bounds: lower ≤ gₜ(x, u) ≤ upper; equalities where both are equal.
 ///
-/// At a terminal knot u is empty. The rules for [`ActionModel`]s hold here too.
+/// At a terminal knot u is empty. The rules for [`ActionModel`]s hold here too. An
+/// [`AutoDiffConstraint`](crate::AutoDiffConstraint) needs no Jacobian.
 ///
 /// # Examples
 /// The second number of the state may not exceed 1:
@@ -27,7 +28,7 @@ use std::any::Any;
 ///     }
 /// }
 /// ```
-pub trait PathConstraint: Any + Send {
+pub trait PathConstraint: Any + Send + Sync {
     /// The number of functions.
     fn size(&self) -> usize;
 
@@ -43,6 +44,11 @@ pub trait PathConstraint: Any + Send {
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
         let _ = (t, x, u, gx, gu);
         false
+    }
+
+    /// Returns a copy that computes the same, as [`ActionModel::fork`]; `None` by default.
+    fn fork(&self) -> Option<Box<dyn PathConstraint>> {
+        None
     }
 }
 

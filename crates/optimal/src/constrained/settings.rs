@@ -19,6 +19,11 @@ pub struct ConstraintSettings {
     pub penalty_max: f64,
     /// Factor by which 1/μ rises.
     pub penalty_factor: f64,
+    /// Whether a solve that ends as not finite, or with violated constraints at the largest penalty, begins once more: from
+    /// x̂₀ at all knots, and the controls that hold it still ([`quasi_static`](crate::Problem::quasi_static)). The better
+    /// result counts. A rollout that diverges, or saturated controls, are such warm starts. Allocates. Never done by `resume`,
+    /// nor in a problem without constraints and bounds.
+    pub restart: bool,
 }
 
 impl Default for ConstraintSettings {
@@ -30,6 +35,7 @@ impl Default for ConstraintSettings {
             penalty_start: 10.0,
             penalty_max: 1e8,
             penalty_factor: 10.0,
+            restart: true,
         }
     }
 }

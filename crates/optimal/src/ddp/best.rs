@@ -1,7 +1,8 @@
 //! The best iterate of a solve, to go back to at the end when the last one is worse.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
-use super::fddp::{Fddp, Progress};
+use super::fddp::Fddp;
+use super::iterations::Progress;
 use super::solution::{Solution, Status};
 use crate::problem::Problem;
 
@@ -14,7 +15,8 @@ const SAME_COST: f64 = 1e-12;
 /// it.
 const RUNAWAY: f64 = 1e8;
 
-/// The best iterate from which a direction could be computed: the one with the smallest gap, and among equals the cheapest.
+/// The best iterate from which a direction could be computed: one within the bounds on controls, then the one with the
+/// smallest gap, and among equals the cheapest.
 ///
 /// An iterate comes here when a step from it is accepted, by an exchange of buffers; nothing is copied.
 #[derive(Debug, Clone)]
@@ -34,6 +36,10 @@ pub(super) struct Value {
     pub(super) gap: f64,
     pub(super) cost: f64,
     pub(super) feasible: bool,
+    /// Whether its controls are within their bounds; only a warm start that was not projected can be outside.
+    pub(super) bounded: bool,
+    /// The number of accepted steps that led to it.
+    pub(super) steps: usize,
     /// The regularisation of the sweep at it.
     pub(super) regularisation: f64,
 }
@@ -82,6 +88,7 @@ impl Best {
         match (ran_away(best.cost), ran_away(other.cost)) {
             (false, true) => true,
             (true, false) => false,
+            _ if best.bounded != other.bounded => best.bounded,
             _ if (other.gap - best.gap).abs() > SAME_GAP => other.gap > best.gap,
             _ => other.cost - best.cost > SAME_COST * (1.0 + best.cost.abs()),
         }
@@ -108,7 +115,7 @@ impl Fddp {
         self.solution.gap = infinite_if_nan(self.update_gaps(problem));
         self.solution.cost = infinite_if_nan(self.solution.cost);
         let Solution { gap, cost, .. } = self.solution;
-        let last = Value { gap, cost, feasible: now.feasible, regularisation: now.regularisation };
+        let last = now.value(gap, cost);
         let regularisation = now.regularisation;
         let goes_back = match status {
             Status::Converged => false,
@@ -116,7 +123,8 @@ impl Fddp {
             _ => self.best.is_better_than(&last),
         };
         if goes_back && let Some(best) = self.best.restore(&mut self.solution, &mut self.next) {
-            (self.solution.gap, self.solution.cost, now.feasible) = (best.gap, best.cost, best.feasible);
+            (self.solution.gap, self.solution.cost) = (best.gap, best.cost);
+            (now.feasible, now.steps) = (best.feasible, best.steps);
             self.update_gaps(problem);
             self.knows_motions = false;
             if !now.swept_best {
@@ -125,6 +133,7 @@ impl Fddp {
                 now.swept = swept.unwrap_or_else(|| self.sweep(problem, best.regularisation)).is_ok();
             }
         }
+        self.renewed |= now.steps > 0;
         let solution = &mut self.solution;
         solution.feasible = now.feasible;
         solution.regularisation = regularisation;

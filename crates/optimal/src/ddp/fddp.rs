@@ -1,13 +1,14 @@
 //! Differential dynamic programming, feasibility-driven or not.
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
-use super::best::{Best, Value};
+use super::best::Best;
 use super::clock::{Clock, Phase};
+use super::iterations::Progress;
 use super::observer::{Observer, PacedObserver, Unobserved};
 use super::rollout::Sum;
-use super::search::{Iterate, LineSearch, Search};
-use super::settings::{DdpMethod, Settings};
-use super::solution::{Iteration, Solution, Status, Timings};
+use super::search::LineSearch;
+use super::settings::Settings;
+use super::solution::{Solution, Timings};
 use crate::error::Error;
 use crate::lq::{Hessian, LqNode, Sweep, SweepError};
 use crate::problem::{ActionModel, Problem};
@@ -15,7 +16,7 @@ use crate::time::Instant;
 use condyle_linalg::max_abs;
 use std::time::Duration;
 
-/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`]), with the rules and constants of Crocoddyl
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of Crocoddyl
 /// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
 /// are those of its box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022): while there are gaps
 /// the bounds only cut trials off; from then on each knot's step minimises its quadratic model within them.
@@ -84,36 +85,36 @@ pub struct Fddp {
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
     pub(super) next: Vec<f64>,
     /// The accelerations and forces of the iterate, N equal parts, for nodes in inverse-dynamics form.
-    motions: Vec<f64>,
+    pub(super) motions: Vec<f64>,
     /// Whether they are those of the iterate.
     pub(super) knows_motions: bool,
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
-    gaps: Vec<f64>,
+    pub(super) gaps: Vec<f64>,
     /// The best iterate, which the solution becomes if the last one is worse.
     pub(super) best: Best,
-    clock: Clock,
+    pub(super) clock: Clock,
     /// Whether knots may come as equations of inverse dynamics.
     inverse_dynamics: bool,
     /// Whether there is a trajectory to go on from.
     started: bool,
+    /// Whether the trajectory was given or found since the last [`shift`](Self::shift): a shift without a step in between
+    /// copies its end.
+    pub(super) renewed: bool,
+}
+
+/// The rules of a solve that its caller sets, besides the settings.
+#[derive(Clone, Copy)]
+pub(crate) struct Rules {
+    /// Whether the first iteration runs whatever the time.
+    pub(crate) guaranteed: bool,
+    /// Whether a warm start without gaps, of which a control lies on its bound, counts as feasible. Crocoddyl's rule is no:
+    /// the bounds then only cut trials off until the first full step, which is never taken where they press.
+    pub(crate) trusts_start: bool,
 }
 
 /// The iterations for which there is room in the trace when a solve begins; with more it grows.
 const FORESEEN: usize = 10_000;
-
-/// The state that goes from one iteration to the next.
-pub(super) struct Progress {
-    pub(super) regularisation: f64,
-    pub(super) feasible: bool,
-    /// Whether the iterate before the last accepted step was feasible.
-    pub(super) was_feasible: bool,
-    pub(super) tolerance: f64,
-    /// Whether there are gains of this solve.
-    pub(super) swept: bool,
-    /// Whether they are those of the best iterate, which the last step left.
-    pub(super) swept_best: bool,
-}
 
 impl Fddp {
     /// A solver with the default settings and the workspace for problems with the dimensions of `problem`.
@@ -136,6 +137,7 @@ impl Fddp {
             clock: Clock::default(),
             inverse_dynamics: false,
             started: false,
+            renewed: false,
         }
     }
 
@@ -146,7 +148,7 @@ impl Fddp {
     /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see
     /// [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]), &mut Unobserved)
+        self.run(problem, Some([xs, us]), &mut Unobserved, self.rules())
     }
 
     /// As [`solve`](Self::solve), and shows each iteration as it ends to `observer`, who may end the solve.
@@ -160,7 +162,7 @@ impl Fddp {
         us: &[f64],
         mut observer: impl Observer,
     ) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]), &mut observer)
+        self.run(problem, Some([xs, us]), &mut observer, self.rules())
     }
 
     /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
@@ -169,7 +171,7 @@ impl Fddp {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
-        self.run(problem, None, &mut Unobserved)
+        self.run(problem, None, &mut Unobserved, self.rules())
     }
 
     /// As [`resume`](Self::resume), and shows each iteration as it ends to `observer`, who may end the solve.
@@ -177,15 +179,21 @@ impl Fddp {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
-        self.run(problem, None, &mut observer)
+        self.run(problem, None, &mut observer, self.rules())
     }
 
-    /// A solve, from a warm start or the trajectory of the last one.
+    /// Returns the rules of a solve by itself, which are Crocoddyl's.
+    fn rules(&self) -> Rules {
+        Rules { guaranteed: self.settings.time_budget != Some(Duration::ZERO), trusts_start: false }
+    }
+
+    /// Solves from a warm start or the trajectory of the last solve.
     pub(crate) fn run(
         &mut self,
         problem: &mut Problem,
         warm_start: Option<[&[f64]; 2]>,
         observer: &mut dyn Observer,
+        rules: Rules,
     ) -> Result<&Solution, Error> {
         let begin = Instant::now();
         if let Some([xs, us]) = warm_start {
@@ -197,7 +205,7 @@ impl Fddp {
             }
             self.solution.xs.copy_from_slice(xs);
             self.solution.us.copy_from_slice(us);
-            self.started = true;
+            (self.started, self.renewed) = (true, true);
         } else if !self.started {
             return Err(Error::NothingToResume);
         }
@@ -209,6 +217,9 @@ impl Fddp {
         let bounded = problem.check_bounds()?;
         self.inverse_dynamics = self.settings.inverse_dynamics_form && !bounded && !self.settings.second_order;
         let tolerance = if bounded { self.settings.tolerance_bounded } else { self.settings.tolerance };
+        if bounded && self.settings.project_warm_start {
+            self.solution.project(problem, 0..problem.horizon());
+        }
 
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
@@ -222,16 +233,19 @@ impl Fddp {
             feasible: false,
             was_feasible: false,
             tolerance,
+            bounded: !bounded || self.solution.is_bounded(problem),
+            steps: 0,
             swept: false,
             swept_best: false,
         };
         self.sweep.set_segments(self.settings.segments);
         self.sweep.forget();
         self.best.start();
-        self.clock.start(begin, self.settings.time_budget);
-        let status = self.iterate(problem, &mut progress, &mut PacedObserver::new(observer, begin));
+        self.clock.start(begin, self.settings.time_budget, rules.guaranteed);
+        let trusts_start = bounded && rules.trusts_start && self.solution.touches_bounds(problem);
+        let status = self.iterate(problem, &mut progress, trusts_start, &mut PacedObserver::new(observer, begin));
         self.finish(problem, &mut progress, status);
-        self.solution.timings.total = begin.elapsed();
+        self.solution.timings.end(begin.elapsed(), self.settings.time_budget);
         Ok(&self.solution)
     }
 
@@ -240,98 +254,8 @@ impl Fddp {
         &self.solution
     }
 
-    /// The iterations, until one of the reasons to stop.
-    fn iterate(&mut self, problem: &mut Problem, now: &mut Progress, watch: &mut PacedObserver<'_>) -> Status {
-        self.calc(problem);
-        let mut gap = self.update_gaps(problem);
-        if !(self.solution.cost.is_finite() && gap.is_finite()) {
-            return Status::NotFinite;
-        }
-        let mut search = Search::default();
-        for iteration in 0..self.settings.max_iterations {
-            if search.accepted {
-                gap = self.update_gaps(problem);
-            }
-            self.sweep.keep_values(self.settings.counts_gaps(now.feasible));
-            let mut swept = None;
-            if search.accepted || iteration == 0 {
-                let phases = [Phase::CalcDiff, Phase::Sweep];
-                if let Err(status) = self.clock.allows(&phases[..1 + usize::from(self.follows())], watch) {
-                    return status;
-                }
-                swept = self.calc_diff(problem, now.feasible, now.regularisation);
-            }
-            if swept.is_none()
-                && let Err(status) = self.clock.allows(&[Phase::Sweep], watch)
-            {
-                return status;
-            }
-            now.swept_best = false;
-            while let Err(error) = swept.take().unwrap_or_else(|| self.sweep(problem, now.regularisation)) {
-                now.regularisation = self.increased(now.regularisation);
-                if now.regularisation == self.settings.regularisation_max {
-                    return match error {
-                        SweepError::NotPositive { .. } => Status::RegularisationLimit,
-                        SweepError::NotFinite { .. } => Status::NotFinite,
-                    };
-                }
-                if let Err(status) = self.clock.allows(&[Phase::Sweep], watch) {
-                    return status;
-                }
-            }
-            now.swept = true;
-            let Self { line_search, solution, next, motions, gaps, best, sweep, settings, clock, .. } = self;
-            let (knots, feasible) = (sweep.knots(), now.feasible);
-            let value = Value { gap, cost: solution.cost, feasible, regularisation: now.regularisation };
-            let iterate =
-                Iterate { solution, next, motions, value, best, gaps, knots, feasible, settings, clock, watch };
-            search = line_search.run(problem, iterate, search);
-            if let Some(status) = search.stopped {
-                return status;
-            }
-            if search.accepted {
-                now.swept_best = search.left_best;
-                now.was_feasible = now.feasible;
-                now.feasible |= search.step == 1.0 || self.settings.method == DdpMethod::Ddp;
-            }
-            if search.step > self.settings.regularisation_decrease_above {
-                now.regularisation = self.decreased(now.regularisation);
-            }
-            if search.step <= self.settings.regularisation_increase_below {
-                now.regularisation = self.increased(now.regularisation);
-            }
-            let stop = (search.d1 + 0.5 * search.d2).abs(); // the expected decrease for α = 1
-            let record = Iteration {
-                iteration,
-                cost: self.solution.cost,
-                gap,
-                stop,
-                step: search.step,
-                regularisation: now.regularisation,
-                d1: search.d1,
-                d2: search.d2,
-                decrease: search.decrease,
-                expected_decrease: search.expected_decrease,
-                feasible: now.feasible,
-                accepted: search.accepted,
-            };
-            self.solution.trace.push(record);
-            let verdict = watch.iteration(&record);
-            if now.regularisation == self.settings.regularisation_max {
-                return Status::RegularisationLimit;
-            }
-            if now.was_feasible && stop < now.tolerance {
-                return Status::Converged;
-            }
-            if verdict.is_break() {
-                return Status::Interrupted;
-            }
-        }
-        Status::MaxIterations
-    }
-
     /// Dynamics and cost of the warm start.
-    fn calc(&mut self, problem: &mut Problem) {
+    pub(super) fn calc(&mut self, problem: &mut Problem) {
         let clock = Instant::now();
         let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
         problem.calc_with_motion(xs, us, next, costs, motions);
@@ -355,6 +279,14 @@ impl Fddp {
             }
         }
         max_abs(&self.gaps)
+    }
+
+    /// Returns knot, entry of the tangent space, and size of the largest gap of the last iterate.
+    pub(crate) fn largest_gap(&self) -> Option<(usize, usize, f64)> {
+        let ndx = self.solution.shape().ndx;
+        let sizes = self.gaps.iter().map(|gap| if gap.is_nan() { f64::INFINITY } else { gap.abs() });
+        let (i, size) = sizes.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (size > 0.0).then_some((i / ndx, i % ndx, size))
     }
 
     /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on. On several threads
@@ -431,7 +363,7 @@ impl Fddp {
     }
 
     /// Whether the sweep follows the derivatives.
-    fn follows(&self) -> bool {
+    pub(super) fn follows(&self) -> bool {
         self.settings.threads > 1 && !self.settings.second_order && self.sweep.is_sequential()
     }
 
@@ -450,13 +382,5 @@ impl Fddp {
         };
         self.solution.timings.sweep += self.clock.ran(Phase::Sweep, clock);
         result
-    }
-
-    fn increased(&self, regularisation: f64) -> f64 {
-        (regularisation * self.settings.regularisation_factor).min(self.settings.regularisation_max)
-    }
-
-    fn decreased(&self, regularisation: f64) -> f64 {
-        (regularisation / self.settings.regularisation_factor).max(self.settings.regularisation_min)
     }
 }

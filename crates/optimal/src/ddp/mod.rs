@@ -3,6 +3,7 @@
 mod best;
 mod clock;
 mod fddp;
+mod iterations;
 mod observer;
 mod rollout;
 mod search;
@@ -10,7 +11,9 @@ mod settings;
 mod shift;
 mod solution;
 
+pub(crate) use clock::Recent;
 pub use fddp::Fddp;
+pub(crate) use fddp::Rules;
 pub(crate) use observer::Unobserved;
 pub use observer::{Observer, Verdict};
 pub use settings::{DdpMethod, Settings};

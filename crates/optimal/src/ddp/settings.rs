@@ -1,6 +1,7 @@
 //! The settings of the FDDP family.
 
 use crate::error::Error;
+use core::fmt;
 use std::time::Duration;
 
 /// Which search for an optimum a solve is.
@@ -16,6 +17,26 @@ pub enum DdpMethod {
     /// trial of length α keeps the part 1 − α of each gap.
     #[default]
     Fddp,
+}
+
+impl DdpMethod {
+    /// Returns the name, as files and Python have it: `"ddp"` or `"fddp"`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ddp => "ddp",
+            Self::Fddp => "fddp",
+        }
+    }
+}
+
+/// Writes the method by its usual abbreviation.
+impl fmt::Display for DdpMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Ddp => "DDP",
+            Self::Fddp => "FDDP",
+        })
+    }
 }
 
 /// The settings of [`Fddp`](crate::Fddp); the defaults are Crocoddyl's.
@@ -39,9 +60,20 @@ pub struct Settings {
     pub tolerance: f64,
     /// The tolerance of problems with bounds on controls: the expected decrease does not see the bounds' multipliers.
     pub tolerance_bounded: f64,
-    /// A solve ends when this time is over: before derivatives, a sweep (on several threads: before both) or a trial that
-    /// would end later if it took as long as the last of its kind. `None` for no limit. A solve that goes back to a better
-    /// iterate may take a sweep longer.
+    /// Whether a warm start outside of the bounds on controls is moved into them, entry by entry, before a solve: what is
+    /// given to [`solve`], and the last trajectory in [`resume`]. Crocoddyl keeps such a start, so its iterates need `false`.
+    /// A solution that violates a bound is never [`Converged`], with either value.
+    ///
+    /// [`solve`]: crate::Fddp::solve
+    /// [`resume`]: crate::Fddp::resume
+    /// [`Converged`]: crate::Status::Converged
+    pub project_warm_start: bool,
+    /// The time that a solve may take; `None` for no limit. The first iteration always runs, unless the budget is zero.
+    /// A later phase (derivatives, a sweep, a trial; on several threads derivatives and sweep together) starts only if it
+    /// would end in time. Its duration is predicted as the median of the last five of its kind, of all solves, so that one
+    /// or two delays do not shorten later solves. A solve that takes longer reports
+    /// [`Timings::overrun`](crate::Timings::overrun): the budget is shorter than an iteration, or something delayed it. A
+    /// solve that goes back to a better iterate may take a sweep longer.
     pub time_budget: Option<Duration>,
     /// The number of segments of the horizon on which a sweep works at the same time: see [`Sweep::set_segments`]. It is
     /// not the number of threads, which are those of rayon's pool, and any number of them finds the same. At most 1024.
@@ -93,6 +125,7 @@ impl Default for Settings {
             max_iterations: 100,
             tolerance: 1e-9,
             tolerance_bounded: 5e-5,
+            project_warm_start: true,
             time_budget: None,
             segments: 1,
             threads: 1,

@@ -7,8 +7,13 @@ use crate::problem::Problem;
 
 impl Fddp {
     /// Makes the solution a warm start for a problem that was [shifted](Problem::shift) by a knot since: states, controls
-    /// and gains move one knot to the front, the last control stays (where the number of controls changes, it is zero),
-    /// and the last state follows from it. Allocates nothing unless numbers of controls differ along the horizon.
+    /// and gains move one knot to the front, and the last control is repeated (it is zero where the number of controls
+    /// changes). Allocates nothing unless numbers of controls differ along the horizon.
+    ///
+    /// The last state follows from the last control, x_N = φ(x_{N−1}, u_{N−1}), if the trajectory is that of a solve that
+    /// took a step, or of a warm start. At each further shift without such a solve in between the last state is repeated,
+    /// x_N = x_{N−1}, and the next solve closes the gap. Nothing stabilises a rollout by repeated controls, so the end of
+    /// the horizon would diverge exponentially while solves run out of time.
     ///
     /// # Errors
     /// [`Error`] if the problem is not the one solved before, shifted once.
@@ -37,7 +42,14 @@ impl Fddp {
         }
         self.line_search.reshape(problem);
         self.best.reshape(problem);
+        if self.settings.project_warm_start {
+            self.solution.project(problem, horizon - 1..horizon);
+        }
+        if !std::mem::take(&mut self.renewed) {
+            return Ok(()); // x_N = x_{N−1}
+        }
         // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
+        let new = problem.shape();
         let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
         let next = &mut self.next[..end.len()];
         problem.action_mut(horizon - 1).calc(horizon - 1, &self.solution.xs[x], &self.solution.us[u], next);

@@ -2,6 +2,8 @@
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
 use crate::problem::{Problem, Shape};
+use core::fmt;
+use core::ops::Range;
 use nalgebra::{DMatrix, DVector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -9,7 +11,8 @@ use std::time::Duration;
 
 /// The outcome of a solve. Whatever it says, the [`Solution`] holds the best iterate found: a converged one; else, of those
 /// from which a step could be computed and of the last one, the one with the smallest gap, and among equals that of least
-/// cost. An iterate that costs 1e8 times as much as the cheapest one and 1 has run away and is no candidate.
+/// cost. An iterate within the bounds on controls precedes a warm start outside. An iterate has diverged, and is no candidate,
+/// if its cost exceeds the lowest of the solve by more than 1e8·(1 + |lowest|).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -25,12 +28,49 @@ pub enum Status {
     Interrupted,
     /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
     RegularisationLimit,
-    /// The constraints do not hold, however much leaving them costs: there may be no solution.
+    /// The penalty reached its limit and constraints are still violated. This proves nothing: another warm start, or a
+    /// larger penalty, may find a solution. [`Outcome::worst`](crate::Outcome::worst) is the largest violation.
+    ConstraintsViolated,
+    /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof: the initial state x̂₀ itself violates a
+    /// constraint of knot 0 that depends on no control. The solution is that under the other constraints, as far as the
+    /// solve came.
     Infeasible,
     /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so that no direction can be computed. The
     /// solution is the best iterate before it; if it is the warm start itself, its cost may be infinite. States and controls
-    /// are finite.
+    /// are finite. Another warm start may help, such as x̂₀ held still ([`Problem::quasi_static`](crate::Problem::quasi_static)).
     NotFinite,
+}
+
+impl Status {
+    /// Returns the name, as files and Python have it: `"converged"`, `"max_iterations"` and so on.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::MaxIterations => "max_iterations",
+            Self::TimeLimit => "time_limit",
+            Self::Interrupted => "interrupted",
+            Self::RegularisationLimit => "regularisation_limit",
+            Self::ConstraintsViolated => "constraints_violated",
+            Self::Infeasible => "infeasible",
+            Self::NotFinite => "not_finite",
+        }
+    }
+}
+
+/// Writes the status as a short phrase.
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Converged => "converged",
+            Self::MaxIterations => "reached the limit of iterations",
+            Self::TimeLimit => "ran out of time",
+            Self::Interrupted => "was interrupted",
+            Self::RegularisationLimit => "found no step that lowers the cost",
+            Self::ConstraintsViolated => "constraints are violated",
+            Self::Infeasible => "no trajectory satisfies the constraints",
+            Self::NotFinite => "cost or derivatives are not finite",
+        })
+    }
 }
 
 /// A record of one iteration.
@@ -63,7 +103,7 @@ pub struct Iteration {
     pub accepted: bool,
 }
 
-/// The times that the phases of a solve took.
+/// The durations of the phases of a solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timings {
@@ -77,6 +117,21 @@ pub struct Timings {
     pub rollout: Duration,
     /// The whole solve, observer included.
     pub total: Duration,
+    /// The time beyond [`Settings::time_budget`](crate::Settings::time_budget), zero if the solve ended in time: above zero
+    /// where the budget is shorter than the first iteration, or a phase lasted longer than predicted. A budget of zero asks
+    /// for no iteration, and is never overrun. Of an [`AugmentedLagrangian`](crate::AugmentedLagrangian) that of all inner
+    /// solves together.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub overrun: Duration,
+}
+
+impl Timings {
+    /// Sets the duration of the whole solve, and its excess over a budget.
+    pub(crate) fn end(&mut self, total: Duration, budget: Option<Duration>) {
+        self.total = total;
+        let budget = budget.filter(|budget| !budget.is_zero());
+        self.overrun = budget.map_or(Duration::ZERO, |budget| total.saturating_sub(budget));
+    }
 }
 
 /// The result of a solve. One that is read from a file is checked: its parts have the lengths of one horizon.
@@ -135,7 +190,10 @@ impl Solution {
     ///
     /// # Panics
     /// If t > N.
+    #[track_caller]
     pub fn x(&self, t: usize) -> &[f64] {
+        let horizon = self.shape.horizon();
+        assert!(t <= horizon, "`t` is {t}, expected at most {horizon}");
         &self.xs[self.shape.x(t)]
     }
 
@@ -143,8 +201,10 @@ impl Solution {
     ///
     /// # Panics
     /// If t ≥ N.
+    #[track_caller]
     pub fn u(&self, t: usize) -> &[f64] {
-        assert!(t < self.shape.horizon(), "`t` is {t}, but there are {} controls", self.shape.horizon());
+        let horizon = self.shape.horizon();
+        assert!(t < horizon, "`t` is {t}, expected less than {horizon}: knot {horizon} has no controls");
         &self.us[self.shape.u(t)]
     }
 
@@ -174,6 +234,36 @@ impl Solution {
 
     pub(crate) fn shape(&self) -> &Shape {
         &self.shape
+    }
+
+    /// Moves the controls of some knots into their bounds.
+    pub(crate) fn project(&mut self, problem: &Problem, knots: Range<usize>) {
+        for t in knots {
+            let Some((lower, upper)) = problem.action(t).bounds(t) else { continue };
+            for (u, (lower, upper)) in self.us[self.shape.u(t)].iter_mut().zip(lower.iter().zip(upper)) {
+                *u = u.max(*lower).min(*upper);
+            }
+        }
+    }
+
+    /// Whether some control lies on a bound.
+    pub(crate) fn touches_bounds(&self, problem: &Problem) -> bool {
+        (0..self.shape.horizon()).any(|t| {
+            problem.action(t).bounds(t).is_some_and(|(lower, upper)| {
+                let mut bounds = lower.iter().zip(upper);
+                self.us[self.shape.u(t)].iter().any(|u| bounds.next().is_some_and(|(l, h)| u <= l || u >= h))
+            })
+        })
+    }
+
+    /// Whether all controls are within their bounds.
+    pub(crate) fn is_bounded(&self, problem: &Problem) -> bool {
+        (0..self.shape.horizon()).all(|t| {
+            problem.action(t).bounds(t).is_none_or(|(lower, upper)| {
+                let mut bounds = lower.iter().zip(upper);
+                self.us[self.shape.u(t)].iter().all(|u| bounds.next().is_none_or(|(l, h)| (*l..=*h).contains(u)))
+            })
+        })
     }
 
     /// Says which part of a solution from a file has not the length that its horizon asks for.

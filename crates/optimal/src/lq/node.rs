@@ -4,6 +4,7 @@
 use super::inverse_dynamics_form::InverseDynamicsForm;
 use super::structure::{EulerBlock, LARGEST_BLOCK, Structure};
 use crate::error::assert_length;
+use core::fmt;
 use nalgebra::{DMatrix, DVector};
 
 /// Beyond this a value has diverged and the sweep or the trial is given up.
@@ -17,7 +18,7 @@ pub(crate) const DIVERGED: f64 = 1e30;
 ///
 /// and to lower ≤ δu ≤ upper. Q and R are symmetric, with both triangles filled. At the terminal knot (nu = 0) only Q
 /// and q are read.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub struct LqNode {
     /// ∂x⁺/∂x, ndx × ndx.
     pub A: DMatrix<f64>,
@@ -45,6 +46,17 @@ pub struct LqNode {
     pub(crate) inverse_dynamics: InverseDynamicsForm,
 }
 
+/// Shows what a user writes, and not the scratch of the sweep.
+impl fmt::Debug for LqNode {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { A, B, f: gap, Q, S, R, q, r, lower, upper, structure, .. } = self;
+        let mut shown = f.debug_struct("LqNode");
+        shown.field("A", A).field("B", B).field("f", gap).field("Q", Q).field("S", S).field("R", R);
+        shown.field("q", q).field("r", r).field("lower", lower).field("upper", upper).field("structure", structure);
+        shown.finish_non_exhaustive()
+    }
+}
+
 impl LqNode {
     /// The most states, and the most controls: a knot has matrices of them.
     pub const MOST_SIZE: usize = 4096;
@@ -53,6 +65,7 @@ impl LqNode {
     ///
     /// # Panics
     /// If a number is above [`MOST_SIZE`](Self::MOST_SIZE).
+    #[track_caller]
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         let most = Self::MOST_SIZE;
         assert!(ndx <= most && nu <= most, "expected at most {most} states and controls, found {ndx} and {nu}");
@@ -166,6 +179,7 @@ pub struct Hessian {
 
 impl Hessian {
     /// Zeros for ndx states and nu controls.
+    #[track_caller]
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         Self { xx: DMatrix::zeros(ndx, ndx), xu: DMatrix::zeros(ndx, nu), uu: DMatrix::zeros(nu, nu) }
     }

@@ -7,6 +7,7 @@ use super::workspace::Workspace;
 
 /// Why a sweep stopped before the first knot.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SweepError {
     /// Quu has a pivot that is not positive: the problem is not convex in the control there. More regularisation helps.
     #[error("knot {knot}: Quu is not positive definite (pivot {row} is {pivot:e})")]

@@ -76,16 +76,18 @@ impl Sweep {
     /// # Panics
     /// If `nodes` is empty, the shapes of a node do not fit each other, ndx differs from node to node, or the terminal
     /// node has controls.
+    #[track_caller]
     pub fn new(nodes: &[LqNode]) -> Self {
         level(); // chosen now, as reading CONDYLE_LEVEL allocates
-        let terminal = nodes.last().expect("`nodes` is empty");
+        assert!(!nodes.is_empty(), "`nodes` is empty, expected at least the terminal node");
+        let terminal = &nodes[nodes.len() - 1];
         let n = terminal.ndx();
         assert_length("r of the terminal node", terminal.nu(), 0);
-        let knots = nodes.iter().map(|node| {
+        for node in nodes {
             node.assert_shapes(n, node.nu());
-            LqKnot::zeros(n, node.nu())
-        });
-        let (knots, sizes) = (knots.collect(), Sizes::of(nodes));
+        }
+        let knots = nodes.iter().map(|node| LqKnot::zeros(n, node.nu())).collect();
+        let sizes = Sizes::of(nodes);
         let step = Step::new(sizes, 0, nodes.iter().map(LqNode::nu).collect());
         Self { knots, step, at_once: 1, segments: None, gains: Vec::new(), sizes }
     }
@@ -110,6 +112,7 @@ impl Sweep {
     ///
     /// # Panics
     /// If `segments` is 0.
+    #[track_caller]
     pub fn set_segments(&mut self, segments: usize) {
         assert!(segments > 0, "`segments` is 0, expected at least 1");
         if segments != self.at_once {
@@ -144,6 +147,7 @@ impl Sweep {
     ///
     /// # Panics
     /// If the shapes of `nodes` are not those given to [`new`](Self::new).
+    #[track_caller]
     pub fn run(&mut self, nodes: &[LqNode], regularisation: f64) -> Result<(), SweepError> {
         self.check(nodes);
         let Self { segments, knots, .. } = self;
@@ -162,6 +166,7 @@ impl Sweep {
     ///
     /// # Panics
     /// As [`run`](Self::run).
+    #[track_caller]
     pub fn run_with(
         &mut self,
         nodes: &[LqNode],

@@ -2,6 +2,7 @@
 
 use super::action::ActionModel;
 use super::action::differences::write_curvature;
+use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use condyle_spatial::Scalar;
 use num_dual::HyperDual64;
@@ -9,7 +10,7 @@ use std::any::Any;
 
 /// The dynamics x⁺ = φₜ(x, u) and the cost ℓₜ(x, u) of a knot, written for any [`Scalar`], so that [`AutoDiff`] makes an
 /// action of it. The rules for [`ActionModel`]s hold here too.
-pub trait GenericAction: Any + Send {
+pub trait GenericAction: Any + Send + Sync {
     /// The number of entries of a state x.
     fn nx(&self) -> usize;
 
@@ -24,6 +25,14 @@ pub trait GenericAction: Any + Send {
     /// As [`ActionModel::bounds`].
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         let _ = t;
+        None
+    }
+
+    /// Returns a copy that computes the same, as [`ActionModel::fork`]; `None` by default.
+    fn fork(&self) -> Option<Self>
+    where
+        Self: Sized,
+    {
         None
     }
 
@@ -118,7 +127,10 @@ impl<A: GenericAction> AutoDiff<A> {
     }
 
     /// φ(x, u), from which changes are counted.
+    #[track_caller]
     fn start(&mut self, t: usize, x: &[f64], u: &[f64]) {
+        assert_length("x", x.len(), self.x.len());
+        assert_length("u", u.len(), self.u.len());
         let lift = |to: &mut [HyperDual64], from: &[f64]| (0..to.len()).for_each(|k| to[k] = from[k].into());
         lift(&mut self.x, x);
         lift(&mut self.u, u);
@@ -168,10 +180,15 @@ impl<A: GenericAction> ActionModel for AutoDiff<A> {
         self.action.bounds(t)
     }
 
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        Some(Box::new(Self::new(self.action.fork()?)))
+    }
+
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.action.calc(t, x, u, next)
     }
 
+    #[track_caller]
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         let (ndx, n) = (self.dx.len(), self.dx.len() + self.u.len());
         self.start(t, x, u);
@@ -192,6 +209,7 @@ impl<A: GenericAction> ActionModel for AutoDiff<A> {
         }
     }
 
+    #[track_caller]
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let (ndx, n) = (self.dx.len(), self.dx.len() + self.u.len());
         self.start(t, x, u);

@@ -161,8 +161,9 @@ impl Problem {
     ///
     /// # Panics
     /// If t > N.
+    #[track_caller]
     pub fn nu(&self, t: usize) -> usize {
-        assert!(t <= self.horizon(), "`t` is {t}, beyond the horizon of {} knots", self.horizon());
+        self.assert_knot(t);
         self.shape.nu(t)
     }
 
@@ -170,8 +171,9 @@ impl Problem {
     ///
     /// # Panics
     /// If t > N.
+    #[track_caller]
     pub fn control_range(&self, t: usize) -> Range<usize> {
-        assert!(t <= self.horizon(), "`t` is {t}, beyond the horizon of {} knots", self.horizon());
+        self.assert_knot(t);
         self.shape.u(t)
     }
 
@@ -194,10 +196,41 @@ impl Problem {
     /// The action model `index`, if there is one and it is a `T`; to change a reference between solves. Its dimensions
     /// must stay. Where one action stands for several models, what is changed is this model's.
     pub fn model_mut<T: ActionModel>(&mut self, index: usize) -> Option<&mut T> {
+        let model: &mut dyn Any = self.chosen(index)?;
+        model.downcast_mut()
+    }
+
+    /// The action of model `index`, to change what is this model's.
+    pub(crate) fn chosen(&mut self, index: usize) -> Option<&mut dyn ActionModel> {
         if index < self.models.len() {
             self.copies.forget(self.models.place(index)[0]);
         }
         self.models.chosen(index)
+    }
+
+    /// The number of models.
+    pub(crate) fn model_count(&self) -> usize {
+        self.models.len()
+    }
+
+    /// Copies the problem, with all costs, limits, references and weights as they are now, so that another thread can solve
+    /// it. The robot's [`Model`](condyle_dynamics::Model) and functions of one's own are shared. Allocates.
+    ///
+    /// A problem is not [`Clone`]: an action of a user's own has a copy only where [`fork`](ActionModel::fork) gives one. All
+    /// actions of this crate do, except [`NumDiff`](crate::NumDiff); [`AutoDiff`](crate::AutoDiff) and
+    /// [`Constrained`](crate::Constrained) do if what they are made of does.
+    ///
+    /// # Errors
+    /// [`Error::NoCopy`] for an action without a copy.
+    pub fn try_clone(&self) -> Result<Self, Error> {
+        let Self { x0, models, stages, terminal, shape, runs: own_runs, knots, unread, .. } = self;
+        let (x0, models, stages, shape) = (x0.clone(), models.try_clone()?, stages.clone(), shape.clone());
+        let mut terminal = terminal.fork().ok_or(Error::NoCopy { model: None })?;
+        terminal.reserve();
+        let mut runs = Vec::with_capacity(stages.len()); // as many as a shift may need
+        runs.extend_from_slice(own_runs);
+        let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
+        Ok(Self { x0, models, stages, terminal, shape, runs, knots, copies, unread })
     }
 
     /// The terminal model, if it is a `T`.
@@ -241,12 +274,14 @@ impl Problem {
     ///
     /// # Panics
     /// If a length is wrong.
+    #[track_caller]
     pub fn calc(&mut self, xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
         self.calc_with_motion(xs, us, next, costs, &mut []);
     }
 
     /// As [`calc`](Self::calc), and the motion of each knot into `motions`, N equal parts that are empty or have
     /// [`motion_size`](Self::motion_size) numbers.
+    #[track_caller]
     pub(crate) fn calc_with_motion(
         &mut self,
         xs: &[f64],
@@ -278,6 +313,7 @@ impl Problem {
     ///
     /// # Panics
     /// If a length is wrong.
+    #[track_caller]
     pub fn calc_diff(&mut self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         let horizon = self.horizon();
         self.begin_derivatives(xs, us, nodes);
@@ -298,6 +334,7 @@ impl Problem {
     ///
     /// # Panics
     /// If a length is wrong.
+    #[track_caller]
     pub(crate) fn calc_diff_on(
         &mut self,
         [xs, us]: [&[f64]; 2],
@@ -352,6 +389,7 @@ impl Problem {
     ///
     /// # Panics
     /// If a length is wrong.
+    #[track_caller]
     pub fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
         for (name, found, expected) in
             [("x0", x0.len(), self.nx()), ("x1", x1.len(), self.nx()), ("out", out.len(), self.ndx())]
@@ -365,6 +403,7 @@ impl Problem {
     ///
     /// # Panics
     /// If t > N or a length is wrong.
+    #[track_caller]
     pub fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         assert_length("x", x.len(), self.nx());
         assert_length("u", u.len(), self.nu(t));
@@ -460,6 +499,12 @@ impl Problem {
     fn places(&self, knots: &Range<usize>) -> (Range<usize>, Range<usize>) {
         let Shape { nx, offsets, .. } = &self.shape;
         (knots.start * nx..knots.end * nx, offsets[knots.start]..offsets[knots.end])
+    }
+
+    /// Panics if t > N.
+    #[track_caller]
+    pub(crate) fn assert_knot(&self, t: usize) {
+        assert!(t <= self.horizon(), "`t` is {t}, expected at most the horizon {}", self.horizon());
     }
 
     #[track_caller]

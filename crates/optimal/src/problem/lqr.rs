@@ -27,6 +27,7 @@ impl Lqr {
     ///
     /// # Panics
     /// If the shapes of the node's matrices do not fit each other.
+    #[track_caller]
     pub fn new(node: LqNode) -> Self {
         let (n, m) = (node.ndx(), node.nu());
         for (name, found, expected) in [

@@ -18,7 +18,7 @@ pub(crate) use actors::Actors;
 pub use autodiff::{AutoDiff, GenericAction};
 pub use horizon::Problem;
 pub use lqr::Lqr;
-pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Visit, leave_a_value};
+pub(crate) use multipliers::{Bounded, Multipliers, PENALTY, Part, Visit, leave_a_value};
 pub use numdiff::NumDiff;
 pub(crate) use shape::{MOST_KNOTS, Shape};
 pub use unicycle::Unicycle;

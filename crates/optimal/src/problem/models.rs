@@ -4,7 +4,6 @@
 use super::action::ActionModel;
 use super::shape::{MOST_ENTRIES, MOST_KNOTS};
 use crate::error::Error;
-use std::any::Any;
 
 /// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
 const MOST_NUMBERS: usize = 1 << 28;
@@ -71,13 +70,27 @@ impl Models {
         &mut *self.actions[self.places[model][0]]
     }
 
-    /// The action that stands for a model, if it is a `T`; what is changed through it is that model's.
-    pub(crate) fn chosen<T: ActionModel>(&mut self, model: usize) -> Option<&mut T> {
+    /// The action that stands for a model; what is changed through it is that model's.
+    pub(crate) fn chosen(&mut self, model: usize) -> Option<&mut dyn ActionModel> {
         let [action, own] = *self.places.get(model)?;
-        let action = &mut self.actions[action];
+        let action = &mut *self.actions[action];
         action.choose(own);
-        let action: &mut dyn Any = action.as_mut();
-        action.downcast_mut()
+        Some(action)
+    }
+
+    /// Copies of all actions, for the same models.
+    ///
+    /// # Errors
+    /// [`Error::NoCopy`] for an action that has none.
+    pub(crate) fn try_clone(&self) -> Result<Self, Error> {
+        let model = |k: usize| self.places.iter().position(|place| place[0] == k);
+        let mut actions = Vec::with_capacity(self.actions.len());
+        for (k, action) in self.actions.iter().enumerate() {
+            let mut copy = action.fork().ok_or(Error::NoCopy { model: model(k) })?;
+            copy.reserve();
+            actions.push(copy);
+        }
+        Ok(Self { actions, places: self.places.clone() })
     }
 }
 

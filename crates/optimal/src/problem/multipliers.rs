@@ -1,6 +1,7 @@
 //! The multipliers of an action's constraints, and their terms of its cost.
 
 use crate::error::Error;
+use std::sync::Arc;
 
 /// The multipliers y of constraints lower ≤ g(x, u) ≤ upper at the knots that an action serves, and the penalty 1/μ. To
 /// the action's cost comes, at each knot,
@@ -19,14 +20,17 @@ pub(crate) struct Multipliers {
     y: Vec<f64>,
     /// e / μ at each knot's last derivatives, which are better multipliers. Written by: `slopes`.
     next: Vec<f64>,
-    /// The largest distance of g from its bounds there, and the cost's term. Written by: `begin`, `slopes`.
-    measured: Vec<[f64; 2]>,
+    /// g − Π g at each knot's last derivatives, NaN where g is. Shape: knots × size. Written by: `slopes`.
+    excess: Vec<f64>,
+    /// The cost's term there, of each knot. Written by: `begin`, `slopes`.
+    terms: Vec<f64>,
 }
 
 impl Clone for Multipliers {
     fn clone(&self) -> Self {
         let Self { mu, size, .. } = *self;
-        Self { mu, size, y: self.y.clone(), next: self.next.clone(), measured: self.measured.clone() }
+        let [y, next, excess, terms] = [&self.y, &self.next, &self.excess, &self.terms].map(Vec::clone);
+        Self { mu, size, y, next, excess, terms }
     }
 
     /// Allocates nothing for as many knots.
@@ -34,7 +38,8 @@ impl Clone for Multipliers {
         (self.mu, self.size) = (other.mu, other.size);
         self.y.clone_from(&other.y);
         self.next.clone_from(&other.next);
-        self.measured.clone_from(&other.measured);
+        self.excess.clone_from(&other.excess);
+        self.terms.clone_from(&other.terms);
     }
 }
 
@@ -44,7 +49,19 @@ pub struct Bounded<'a> {
     pub(crate) count: usize,
     pub(crate) lower: &'a [f64],
     pub(crate) upper: &'a [f64],
+    /// The parts of the constraints that are known by name; empty for those of a user.
+    pub(crate) parts: &'a [Part],
     pub(crate) multipliers: &'a mut Multipliers,
+}
+
+/// Consecutive constraints of a knot that have a name.
+#[derive(Clone, Debug)]
+pub(crate) struct Part {
+    pub(crate) name: Arc<str>,
+    /// The first of its rows; the last is before the first of the next part.
+    pub(crate) first: usize,
+    /// Whether its rows are functions of the state alone.
+    pub(crate) of_state: bool,
 }
 
 /// A function that is called with the constraints of a knot.
@@ -89,7 +106,7 @@ fn outside(z: f64, lower: f64, upper: f64) -> f64 {
 impl Multipliers {
     /// Zeros, for at most `size` constraints a knot.
     pub(crate) fn new(size: usize) -> Self {
-        Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], measured: vec![] }
+        Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], excess: vec![], terms: vec![] }
     }
 
     /// The most constraints that a knot has.
@@ -100,11 +117,11 @@ impl Multipliers {
     /// Zeros at knot t of so many, and μ. Allocates at the first call.
     pub(crate) fn start(&mut self, t: usize, knots: usize, mu: f64) {
         self.mu = mu;
-        for numbers in [&mut self.y, &mut self.next] {
+        for numbers in [&mut self.y, &mut self.next, &mut self.excess] {
             numbers.resize(knots * self.size, 0.0);
             numbers[t * self.size..(t + 1) * self.size].fill(0.0);
         }
-        self.measured.resize(knots, [0.0; 2]);
+        self.terms.resize(knots, 0.0);
     }
 
     pub(crate) fn set_mu(&mut self, mu: f64) {
@@ -127,9 +144,11 @@ impl Multipliers {
         self.y[knot.clone()].copy_from_slice(&self.next[knot]);
     }
 
-    /// The largest distance of g from its bounds and the cost's term, at the last derivatives of knot t.
-    pub(crate) fn measured(&self, t: usize) -> [f64; 2] {
-        self.measured[t]
+    /// g − Π g of the first `count` constraints, their next multipliers, and the cost's term, at the last derivatives of
+    /// knot t.
+    pub(crate) fn measured(&self, t: usize, count: usize) -> (&[f64], &[f64], f64) {
+        let first = t * self.size;
+        (&self.excess[first..][..count], &self.next[first..][..count], self.terms[t])
     }
 
     fn y(&self, t: usize, row: usize) -> f64 {
@@ -149,8 +168,8 @@ impl Multipliers {
 
     /// Begins the derivatives of knot t.
     pub(crate) fn begin(&mut self, t: usize) {
-        if let Some(measured) = self.measured.get_mut(t) {
-            *measured = [0.0; 2];
+        if let Some(term) = self.terms.get_mut(t) {
+            *term = 0.0;
         }
     }
 
@@ -164,19 +183,19 @@ impl Multipliers {
         d: &mut [f64],
         dd: &mut [f64],
     ) {
-        let term = self.value(t, first, g, lower, upper);
-        let mut violation = 0.0_f64;
         for i in 0..g.len() {
             let e = outside(g[i] + self.mu * self.y(t, first + i), lower[i], upper[i]);
             let active = e != 0.0 || lower[i] == upper[i];
             (d[i], dd[i]) = (e / self.mu, if active { 1.0 / self.mu } else { 0.0 });
-            violation = violation.max(outside(g[i], lower[i], upper[i]).abs());
         }
-        if let Some([worst, sum]) = self.measured.get_mut(t) {
-            // `max` drops a NaN, the sum does not
-            *worst = if (term + *worst).is_nan() { f64::NAN } else { violation.max(*worst) };
+        let term = self.value(t, first, g, lower, upper);
+        if let Some(sum) = self.terms.get_mut(t) {
             *sum += term;
-            self.next[t * self.size + first..][..g.len()].copy_from_slice(&d[..g.len()]);
+            let rows = t * self.size + first..t * self.size + first + g.len();
+            self.next[rows.clone()].copy_from_slice(&d[..g.len()]);
+            for (i, excess) in self.excess[rows].iter_mut().enumerate() {
+                *excess = outside(g[i], lower[i], upper[i]);
+            }
         }
     }
 }

@@ -50,6 +50,10 @@ impl<A: ActionModel> ActionModel for NumDiff<A> {
         self.0.nu()
     }
 
+    fn inner_mut(&mut self) -> Option<&mut dyn ActionModel> {
+        Some(&mut self.0)
+    }
+
     fn is_end(&self) -> bool {
         self.0.is_end()
     }

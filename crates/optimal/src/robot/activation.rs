@@ -12,6 +12,7 @@ use crate::problem::leave_a_value;
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
+#[non_exhaustive]
 pub enum Activation {
     /// ½ Σ rᵢ².
     Quadratic,
@@ -61,13 +62,30 @@ impl Activation {
     ///
     /// # Panics
     /// If a weight or bound for an entry of r is missing.
+    #[track_caller]
     pub fn value(&self, r: &[f64]) -> f64 {
         let mut sum = 0.0;
+        self.assert_fits(r.len());
         match self {
             Self::Smooth2 { epsilon } => sum = (epsilon + square(r)).sqrt(),
             _ => self.each(r, |_, [value, ..]| sum += value),
         }
         sum
+    }
+
+    /// Panics if there is no weight or bound for some of n entries.
+    #[track_caller]
+    fn assert_fits(&self, n: usize) {
+        let found = match self {
+            Self::Weighted(weights) => weights.len(),
+            Self::Barrier { lower, upper } => lower.len().min(upper.len()),
+            Self::WeightedBarrier { lower, upper, weights } => lower.len().min(upper.len()).min(weights.len()),
+            Self::Quadratic | Self::Sum | Self::Smooth1 { .. } | Self::Smooth2 { .. } => n,
+        };
+        assert!(
+            n <= found,
+            "`r` has length {n}, expected at most {found}: the activation has weights or bounds for these"
+        );
     }
 
     /// Writes a′ᵢ and a″ᵢ, the gradient and the diagonal of the Hessian.

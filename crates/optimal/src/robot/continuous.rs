@@ -44,7 +44,7 @@ use nalgebra::DMatrix;
 /// assert!((next[0] - 0.1_f64.cos()).abs() < 1e-7);
 /// # Ok::<(), condyle_optimal::Error>(())
 /// ```
-pub trait ContinuousModel: Send + 'static {
+pub trait ContinuousModel: Send + Sync + 'static {
     /// The number of entries of a position q.
     fn nq(&self) -> usize;
 
@@ -203,7 +203,7 @@ pub trait ContinuousModel: Send + 'static {
 }
 
 /// A knot t of the horizon with its state x = (q, v) and its controls u, one of a group that an integrator has prepared.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct KnotInput<'a> {
     /// The place of the state in the group that was [prepared](ContinuousModel::prepare).
@@ -231,7 +231,7 @@ pub enum Wanted {
 }
 
 /// What [`ContinuousModel::calc_diff`] gives. Of a node in inverse-dynamics form only `a` is read.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Derivatives<'d> {
     /// a itself, nv numbers.
     pub a: &'d [f64],

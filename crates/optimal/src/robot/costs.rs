@@ -37,8 +37,8 @@ impl Cost {
 /// are computed once for a knot, and only where a Jacobian is not zero is anything added.
 #[derive(Clone, Debug)]
 pub struct Costs {
-    model: Arc<Model>,
-    capabilities: Arc<Capabilities>,
+    pub(super) model: Arc<Model>,
+    pub(super) capabilities: Arc<Capabilities>,
     pub(super) terms: Terms<Cost>,
 }
 

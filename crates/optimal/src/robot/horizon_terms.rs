@@ -49,6 +49,11 @@ impl HorizonTerms {
         self.costs.chosen_mut().at_mut(t)
     }
 
+    /// The costs of all knots: those that knots share, and those of single knots.
+    pub(crate) fn all_costs_mut(&mut self) -> impl Iterator<Item = &mut Costs> {
+        self.costs.chosen_mut().all_mut().iter_mut()
+    }
+
     /// Changes the weights of the terms called `name`, of all knots; says whether there is one.
     pub(crate) fn set_weight(&mut self, name: &str, weight: f64) -> Result<bool, Error> {
         check_weight(name, weight)?;

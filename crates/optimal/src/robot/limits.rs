@@ -7,7 +7,7 @@ use super::residuals::layout::{KnotLayout, Plan};
 use super::residuals::residual::Residual;
 use super::residuals::terms::{KinematicTerms, Objective, Term, Terms};
 use crate::Error;
-use crate::problem::{Bounded, Multipliers, Visit, leave_a_value};
+use crate::problem::{Bounded, Multipliers, Part, Visit, leave_a_value};
 use condyle_dynamics::Model;
 
 /// A residual within bounds: lower ≤ r(x, u) ≤ upper, an equality where both are equal; without any bounds r(x, u) = 0.
@@ -97,6 +97,8 @@ struct LimitSet {
     /// The bounds of all, one after the other.
     lower: Vec<f64>,
     upper: Vec<f64>,
+    /// The name and the rows of each.
+    parts: Vec<Part>,
 }
 
 impl LimitSet {
@@ -110,6 +112,8 @@ impl LimitSet {
                 return Err(wrong("another limit has this name".to_owned()));
             }
             let plan = limit.plan(model, capabilities).map_err(wrong)?;
+            let of_state = matches!(limit.residual, Residual::State { .. }) || limit.residual.is_kinematic();
+            set.parts.push(Part { name: limit.name.as_str().into(), first: set.lower.len(), of_state });
             set.lower.extend(&limit.lower);
             set.upper.extend(&limit.upper);
             set.terms.push(limit, plan);
@@ -210,8 +214,8 @@ impl Limits {
 
     /// Shows the limits of knot t.
     pub(super) fn visit(&mut self, t: usize, visit: &mut Visit<'_>) {
-        let LimitSet { terms, lower, upper } = self.sets.at(t).at(t);
-        visit(Bounded { count: terms.len(), lower, upper, multipliers: &mut self.multipliers });
+        let LimitSet { terms, lower, upper, parts } = self.sets.at(t).at(t);
+        visit(Bounded { count: terms.len(), lower, upper, parts, multipliers: &mut self.multipliers });
     }
 }
 

@@ -7,6 +7,10 @@
 //!   [`InverseDynamics`] the accelerations are the controls, in [`ContactInverseDynamics`] the forces of contacts too. An
 //!   [`Actuation`] drives the robot, an [`Integrator`] steps through the time of a knot, and a [`ControlPolynomial`] says how
 //!   the controls go through it.
+//! - A residual of your own is a [`GenericResidual`], written once for any scalar and differentiated exactly
+//!   ([`OwnResidual::autodiff`]), or a [`ResidualFunction`] with its Jacobian. Costs and limits take both.
+//! - [`Problem::motion`](crate::Problem::motion) gives the accelerations, efforts and contact forces of a solution;
+//!   [`Problem::cost_mut`](crate::Problem::cost_mut) gives a cost by its name, to change its [`Target`] or weight.
 //! - A [`RobotProblem`] is a problem as data, in a file for example.
 //! - A [`ContinuousModel`] of your own makes a knot in the same way, with [`Integrated`].
 //!
@@ -48,13 +52,16 @@ mod actuation;
 mod capabilities;
 mod contact;
 mod continuous;
+mod cost_access;
 mod costs;
 mod dynamics;
 mod horizon_terms;
 mod integrators;
 mod knot;
 mod limits;
+mod motion;
 mod on_demand;
+mod own_constraint;
 mod per_knot;
 mod per_model;
 mod problem;
@@ -65,6 +72,7 @@ pub use activation::Activation;
 pub use actuation::Actuation;
 pub use contact::Contact;
 pub use continuous::{ContinuousModel, Derivatives, KnotInput, Wanted};
+pub use cost_access::CostMut;
 pub use costs::{Cost, Costs};
 pub use dynamics::contact::{ContactAcceleration, ContactDynamics};
 pub use dynamics::free::{FreeAcceleration, FreeDynamics};
@@ -73,9 +81,13 @@ pub use dynamics::inverse::{ControlledAcceleration, InverseDynamics};
 pub use dynamics::inverse_contact::{ContactInverseDynamics, ControlledContactAcceleration};
 pub use integrators::{ControlPolynomial, Integrated, Integrator};
 pub use limits::Limit;
+pub use motion::{ContactForce, KnotMotion};
+pub use own_constraint::OwnConstraint;
 pub use problem::{ControlBounds, Dynamics, Knot, RobotProblem};
+pub use residuals::autodiff::{GenericResidual, RobotState};
 pub use residuals::cones::{FrictionCone, WrenchCone};
 pub use residuals::frame_name::FrameName;
-pub use residuals::own::{OwnResidual, ResidualFunction};
+pub use residuals::own::{Inputs, OwnResidual, ResidualFunction};
 pub use residuals::residual::Residual;
+pub use residuals::target::Target;
 pub use state::groups;

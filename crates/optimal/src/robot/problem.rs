@@ -100,6 +100,7 @@ pub struct ControlBounds {
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
+#[non_exhaustive]
 pub enum Dynamics {
     /// [`FreeDynamics`].
     Free {
@@ -158,6 +159,19 @@ pub enum Dynamics {
     },
     /// [`FreeDynamics::terminal`], after the last knot.
     End,
+}
+
+impl Dynamics {
+    /// Returns Δt (s); `None` for an impact and the end, which take no time.
+    pub fn dt(&self) -> Option<f64> {
+        match *self {
+            Self::Free { dt, .. }
+            | Self::Contact { dt, .. }
+            | Self::Inverse { dt, .. }
+            | Self::ContactInverse { dt, .. } => Some(dt),
+            Self::Impulse { .. } | Self::End => None,
+        }
+    }
 }
 
 impl RobotProblem {

@@ -159,7 +159,7 @@ fn it_is_forward_dynamics_backwards() {
 }
 
 /// The quadruped with bent knees.
-fn standing(model: &Model) -> Vec<f64> {
+pub(super) fn standing(model: &Model) -> Vec<f64> {
     let mut x = neutral(model);
     (0..4).for_each(|leg| (x[8 + 3 * leg], x[9 + 3 * leg]) = (0.7, -1.4));
     x.extend(vec![0.0; model.nv()]);

@@ -1,20 +1,24 @@
 //! Robots in contact, at impacts, and with other drives: exact derivatives, and what is refused.
 #![allow(non_snake_case)] // the names of the literature
 
+mod access;
+mod callers;
 mod files;
 mod groups;
 mod implicit;
 mod integrators;
 mod inverse;
 mod limits;
+mod motion;
+mod own;
 
 use condyle_dynamics::{
     ContactConstraint, Data, Force, Mat3, Model, Motion, ReferenceFrame, Vec3, centroidal_map, forward_kinematics,
     forward_velocities, integrate, neutral, robots,
 };
 use condyle_optimal::robot::{
-    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FrameName, FreeDynamics, FrictionCone,
-    ImpulseDynamics, Integrated, Integrator, InverseDynamics, Residual, WrenchCone,
+    Activation, Actuation, Contact, ContactAcceleration, ContactDynamics, Cost, FrameName, FreeAcceleration,
+    FreeDynamics, FrictionCone, ImpulseDynamics, Integrated, Integrator, InverseDynamics, Residual, WrenchCone,
 };
 use condyle_optimal::{ActionModel, Error, Fddp, LqNode, NumDiff, Problem, Status, Structure, Sweep};
 use nalgebra::DMatrix;

@@ -60,7 +60,29 @@ macro_rules! impl_six {
 impl_six!(Motion);
 impl_six!(Force);
 
+impl<S: Scalar> Force<S> {
+    /// [f; p × f]: the force f (N) that acts at a point p (m), about the frame's origin.
+    ///
+    /// ```
+    /// use condyle_spatial::{Act, Force, Mat3, Se3, Vec3};
+    /// // a force of the world at a point of the world, in the frame of a body and about its origin
+    /// let oXb = Se3::new(Mat3::identity(), Vec3::new(0.0, 0.0, 1.0));
+    /// let push = oXb.act_inv(Force::at_point(Vec3::new(0.0, 0.0, 3.0), Vec3::new(5.0, 0.0, 0.0)));
+    /// assert_eq!(push.to_array(), [5.0, 0.0, 0.0, 0.0, 10.0, 0.0]);
+    /// ```
+    #[inline(always)]
+    pub fn at_point(point: Vec3<S>, force: Vec3<S>) -> Self {
+        Self { linear: force, angular: point.cross(force) }
+    }
+}
+
 impl<S: Scalar> Motion<S> {
+    /// v + ω × p: the velocity of the body's point that is at p (m) in the frame (m/s).
+    #[inline(always)]
+    pub fn velocity_at(self, point: Vec3<S>) -> Vec3<S> {
+        self.angular.cross_add(point, self.linear)
+    }
+
     /// ⟨m, f⟩ = m · f: the power of force f on motion m (W).
     #[inline(always)]
     pub fn dot(self, f: Force<S>) -> S {

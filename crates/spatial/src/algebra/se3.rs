@@ -1,7 +1,6 @@
 //! Poses, and how they act on motions, forces, inertias and points.
 
 use crate::algebra::motion::{Force, Motion};
-use crate::algebra::quaternion::Quaternion;
 use crate::algebra::vector::{Mat3, Vec3, impl_lift};
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
@@ -102,25 +101,5 @@ impl<S: Scalar> Act<Vec3<S>> for Se3<S> {
     #[inline(always)]
     fn act_inv(&self, x: Vec3<S>) -> Vec3<S> {
         self.rotation.transpose_mul(x - self.translation)
-    }
-}
-
-impl<R: Constant<f64>> From<Se3<R>> for nalgebra::Isometry3<f64> {
-    fn from(X: Se3<R>) -> Self {
-        let X = X.lift::<f64>();
-        // Not `UnitQuaternion::from_matrix`: it iterates, and stays where it began at half turns.
-        let q = Quaternion::from_rotation(X.rotation);
-        let q = nalgebra::Quaternion::new(q.scalar, q.vector.x, q.vector.y, q.vector.z);
-        let rotation = nalgebra::UnitQuaternion::new_normalize(q);
-        Self::from_parts(nalgebra::Vector3::from(X.translation.to_array()).into(), rotation)
-    }
-}
-
-impl From<nalgebra::Isometry3<f64>> for Se3<f64> {
-    fn from(X: nalgebra::Isometry3<f64>) -> Self {
-        let R = X.rotation.to_rotation_matrix();
-        let column = |i: usize| Vec3::new(R[(0, i)], R[(1, i)], R[(2, i)]);
-        let p = X.translation.vector;
-        Self { rotation: Mat3 { x: column(0), y: column(1), z: column(2) }, translation: Vec3::new(p.x, p.y, p.z) }
     }
 }

@@ -118,12 +118,7 @@ impl DifferentialAction {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, this) = (slf.py(), slf.get());
         let [calc, calc_diff] = this.written.functions.clones(py);
-        let integrator = match this.step {
-            Some((Integrator::RungeKutta2, _)) => "runge_kutta_2",
-            Some((Integrator::RungeKutta3, _)) => "runge_kutta_3",
-            Some((Integrator::RungeKutta4, _)) => "runge_kutta_4",
-            _ => "semi_implicit_euler",
-        };
+        let integrator = this.step.map_or(Integrator::SemiImplicitEuler, |(integrator, _)| integrator).name();
         let (lower, upper) = this.bounds.clone().map(|[lower, upper]| (lower, upper)).unzip();
         let model = this.model.as_ref().map(|model| model.clone_ref(py));
         let (nv, nu, dt) = (this.written.nv, this.written.nu, this.step.map(|(_, dt)| dt));
@@ -362,8 +357,18 @@ impl ContinuousModel for OwnDynamics {
 
     fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         if let Space::Robot(model) = &self.written.space {
-            condyle::integrate_jacobian(model, dq, condyle::IntegrateArgument::Position, by_q);
-            condyle::integrate_jacobian(model, dq, condyle::IntegrateArgument::Velocity, by_dq);
+            condyle::configuration::integrate_jacobian(
+                model,
+                dq,
+                condyle::configuration::IntegrateArgument::Position,
+                by_q,
+            );
+            condyle::configuration::integrate_jacobian(
+                model,
+                dq,
+                condyle::configuration::IntegrateArgument::Velocity,
+                by_dq,
+            );
         }
     }
 }

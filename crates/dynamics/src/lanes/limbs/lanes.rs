@@ -30,6 +30,7 @@ pub(crate) struct Limbs<'a> {
     coordinates: &'a [Source],
     pub armature: &'a [f64],
     pub gravity: Vec3<f64>,
+    geometry: u64,
 }
 
 /// The vectors that something is made of.
@@ -93,6 +94,10 @@ fn gathered<T: Copy>(of: &[T], from: &[(usize, Move)]) -> T {
 impl Layout for Limbs<'_> {
     type S = Four;
 
+    #[inline(always)]
+    fn geometry_hash(&self) -> u64 {
+        self.geometry
+    }
     #[inline(always)]
     fn bodies(&self) -> Range<usize> {
         1..self.steps.len()
@@ -207,9 +212,9 @@ impl<'a> Limbs<'a> {
     pub(crate) fn new(plan: &'a Plan, model: &'a Model) -> Self {
         let Plan { steps, closed, turns, state, columns, .. } = plan;
         let ColumnMap { support, pairs, copies, predecessors, .. } = columns;
-        let (armature, gravity) = (model.armature(), *model.gravity());
+        let (armature, gravity, geometry) = (model.armature(), *model.gravity(), model.geometry_hash());
         let coordinates = &state.coordinates;
-        Self { steps, support, pairs, copies, predecessors, closed, turns, coordinates, armature, gravity }
+        Self { steps, support, pairs, copies, predecessors, closed, turns, coordinates, armature, gravity, geometry }
     }
 
     /// What stands at the predecessor of an entry of the support.

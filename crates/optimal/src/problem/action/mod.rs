@@ -59,7 +59,7 @@ use std::any::Any;
 /// action.calc_group(&[0, 1], &[1.0, 2.0, 3.0, 4.0], &[0.0, 1.0], &mut next, &mut costs);
 /// assert_eq!(next, [2.0, 2.0, 5.0, 4.5]);
 /// ```
-pub trait ActionModel: Any + Send {
+pub trait ActionModel: Any + Send + Sync {
     /// The number of entries of a state x.
     fn nx(&self) -> usize;
 
@@ -95,6 +95,13 @@ pub trait ActionModel: Any + Send {
     /// is bounded. They must not change during a solve.
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         let _ = t;
+        None
+    }
+
+    /// The action that this one wraps, if it adds something to another one: typed access to a robot's costs and forces
+    /// ([`Problem::cost_mut`](crate::Problem::cost_mut), [`Problem::motion`](crate::Problem::motion)) looks through. `None` by
+    /// default.
+    fn inner_mut(&mut self) -> Option<&mut dyn ActionModel> {
         None
     }
 
@@ -155,6 +162,7 @@ pub trait ActionModel: Any + Send {
     ///
     /// # Panics
     /// If the lengths are not knots.len() times nx, nu, nx and 1.
+    #[track_caller]
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
         let (nx, nu) = (self.nx(), self.nu());
         assert_length("xs", xs.len(), knots.len() * nx);
@@ -176,6 +184,7 @@ pub trait ActionModel: Any + Send {
     /// As [`calc_group`](Self::calc_group), and writes the accelerations and forces of each knot to the beginning of its part
     /// of `motions`, which are as many equal parts as knots.
     #[doc(hidden)]
+    #[track_caller]
     fn calc_group_with_motion(
         &mut self,
         knots: &[usize],
@@ -193,6 +202,7 @@ pub trait ActionModel: Any + Send {
     ///
     /// # Panics
     /// If the lengths are not knots.len() times nx, nu and 1.
+    #[track_caller]
     fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         let (nx, nu) = (self.nx(), self.nu());
         assert_length("xs", xs.len(), knots.len() * nx);
@@ -221,8 +231,9 @@ pub trait ActionModel: Any + Send {
     /// Nothing by default. May not allocate.
     fn shift(&mut self) {}
 
-    /// A copy that computes the same, for another thread; `None`, unless an implementation gives one: then its knots are
-    /// all differentiated on one thread, whatever [`threads`](crate::Settings::threads) says.
+    /// A copy that computes the same, for another thread or another problem; `None`, unless an implementation gives one. An
+    /// action without a copy is differentiated on one thread, whatever [`threads`](crate::Settings::threads) says, and its
+    /// problem has no copy ([`Problem::try_clone`](crate::Problem::try_clone)).
     fn fork(&self) -> Option<Box<dyn ActionModel>> {
         None
     }

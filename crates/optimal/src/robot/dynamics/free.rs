@@ -74,6 +74,7 @@ impl FreeDynamics {
     ///
     /// # Panics
     /// If `x` has not nq + nv numbers.
+    #[track_caller]
     pub fn quasi_static(&mut self, x: &[f64]) -> Vec<f64> {
         self.inner_mut().0.hold(x)
     }

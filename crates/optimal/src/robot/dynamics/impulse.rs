@@ -5,6 +5,7 @@ use super::robot::{Parts, RobotDynamics, Work};
 use super::sensitivities::DynamicsSensitivities;
 use crate::ActionModel;
 use crate::Error;
+use crate::error::assert_length;
 use crate::lq::LqNode;
 use crate::problem::Visit;
 use crate::robot::actuation::Actuation;
@@ -48,7 +49,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct ImpulseDynamics {
     pub(super) robot: RobotDynamics,
-    contacts: Vec<Contact>,
+    pub(super) contacts: Vec<Contact>,
     restitution: f64,
     damping: f64,
     set: OnDemand<ConstraintSet<f64>>,
@@ -82,8 +83,10 @@ impl ImpulseDynamics {
 
     /// Computes v⁺ − v and the impulses at a state, with their derivatives if these are asked for, and what the residuals
     /// see.
+    #[track_caller]
     fn evaluate(&mut self, t: usize, x: &[f64], slopes: bool) {
         let Self { robot, contacts, damping, set, restitution, zero } = self;
+        assert_length("x", x.len(), robot.model.nq() + robot.model.nv());
         let Parts { model, terms, work: Work { single, data, .. }, .. } = robot.parts();
         let set = set.get(|| made_constraints(model, contacts, *damping));
         let ((q, v), knot) = (x.split_at(model.nq()), &mut data[0]);
@@ -181,8 +184,10 @@ impl ActionModel for ImpulseDynamics {
         Some(Box::new(self.clone()))
     }
 
+    #[track_caller]
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
         self.evaluate(t, x, false);
+        assert_length("next", next.len(), x.len());
         let Parts { model, terms, work: Work { data, .. }, .. } = self.robot.parts();
         let (nq, data) = (model.nq(), &data[0]);
         next.copy_from_slice(x);
@@ -190,6 +195,7 @@ impl ActionModel for ImpulseDynamics {
         terms.calc(t, KnotState { x, u, data }) + terms.limits.term
     }
 
+    #[track_caller]
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         self.evaluate(t, x, true);
         let Parts { model, actuation, terms, work: Work { data, .. }, .. } = self.robot.parts();

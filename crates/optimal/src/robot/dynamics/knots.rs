@@ -6,8 +6,10 @@ use super::impulse::ImpulseDynamics;
 use super::inverse::{ControlledAcceleration, InverseDynamics};
 use super::inverse_contact::{ContactInverseDynamics, ControlledContactAcceleration};
 use super::robot::RobotDynamics;
+use crate::ActionModel;
 use crate::Error;
 use crate::lq::{Hessian, LqNode};
+use crate::robot::contact::Contact;
 use crate::robot::continuous::{ContinuousModel, Derivatives, KnotInput, Wanted};
 use crate::robot::costs::{Cost, Costs};
 use crate::robot::integrators::Integrated;
@@ -15,12 +17,33 @@ use crate::robot::limits::{Limit, Limits};
 use condyle_dynamics::{Model, difference, integrate};
 use core::ops::Range;
 use nalgebra::DMatrix;
+use std::any::Any;
 use std::sync::Arc;
 
 /// A knot or a continuous model of a robot.
 pub(crate) trait HasRobot {
     fn robot(&self) -> &RobotDynamics;
     fn robot_mut(&mut self) -> &mut RobotDynamics;
+
+    /// The contacts of the knot, in the order of their forces.
+    fn contacts(&self) -> &[Contact] {
+        self.robot().contacts()
+    }
+}
+
+/// The robot's knot that an action is, or that it wraps.
+pub(crate) fn knot_of(action: &mut dyn ActionModel) -> Option<&mut dyn HasRobot> {
+    macro_rules! find {
+        ($($Knot:ty),*) => {$({
+            let any: &dyn Any = action;
+            if any.is::<$Knot>() {
+                let any: &mut dyn Any = action;
+                return any.downcast_mut::<$Knot>().map(|knot| knot as &mut dyn HasRobot);
+            }
+        })*};
+    }
+    find!(FreeDynamics, ContactDynamics, InverseDynamics, ContactInverseDynamics, ImpulseDynamics);
+    knot_of(action.inner_mut()?)
 }
 
 impl<M: ContinuousModel + HasRobot> HasRobot for Integrated<M> {
@@ -40,6 +63,10 @@ impl HasRobot for ImpulseDynamics {
 
     fn robot_mut(&mut self) -> &mut RobotDynamics {
         &mut self.robot
+    }
+
+    fn contacts(&self) -> &[Contact] {
+        &self.contacts
     }
 }
 

@@ -228,6 +228,19 @@ impl RobotDynamics {
         Ok(Self { model, actuation, terms, law, given, capabilities, groups, work: OnDemand::default() })
     }
 
+    /// The contacts of its law, in the order of their forces.
+    pub(crate) fn contacts(&self) -> &[Contact] {
+        match &self.law {
+            Law::Contact(contacts, _) | Law::ContactInverse(contacts, _) => contacts,
+            _ => &[],
+        }
+    }
+
+    /// Whether its knots are impacts.
+    pub(crate) fn is_impact(&self) -> bool {
+        self.capabilities.impulse
+    }
+
     /// The number of controls.
     pub(crate) fn nu(&self) -> usize {
         self.capabilities.nu
@@ -368,6 +381,7 @@ impl RobotDynamics {
 
     /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺ g(q); and
     /// where accelerations are controls, none of these.
+    #[track_caller]
     pub(crate) fn hold(&mut self, x: &[f64]) -> Vec<f64> {
         let (nq, nv) = (self.model.nq(), self.model.nv());
         assert_length("x", x.len(), nq + nv);

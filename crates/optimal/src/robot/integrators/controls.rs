@@ -26,6 +26,7 @@ use crate::lq::LqNode;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[non_exhaustive]
 pub enum ControlPolynomial {
     /// The same controls all the time.
     #[default]

@@ -3,6 +3,7 @@
 mod controls;
 mod curvature;
 mod euler;
+mod integrator;
 mod retraction;
 mod runge_kutta;
 
@@ -16,30 +17,10 @@ use crate::problem::{Visit, hold};
 pub use controls::ControlPolynomial;
 use controls::widen;
 use curvature::Curvature;
+pub use integrator::Integrator;
 use retraction::Retraction;
 use runge_kutta::RungeKutta;
 use std::any::Any;
-
-/// The rule by which a knot steps through its time.
-///
-/// The stages of the Runge–Kutta methods add velocities of different points as if positions were a vector space, as
-/// Crocoddyl's do; for a free-flyer they are therefore of first order in its rotation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Integrator {
-    /// v⁺ = v + a Δt, q⁺ = q ⊕ (v Δt + a Δt²): one evaluation; symplectic. Crocoddyl's `IntegratedActionModelEuler`.
-    SemiImplicitEuler,
-    /// The midpoint rule, 2 evaluations.
-    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_2"))]
-    RungeKutta2,
-    /// Heun's rule of third order, 3 evaluations.
-    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_3"))]
-    RungeKutta3,
-    /// The classical rule, 4 evaluations.
-    #[cfg_attr(feature = "serde", serde(rename = "runge_kutta_4"))]
-    RungeKutta4,
-}
 
 /// A knot of Δt seconds of a [`ContinuousModel`], or the end, where time stands still and the cost is ℓ itself.
 #[derive(Clone, Debug)]
@@ -95,8 +76,9 @@ impl<M: ContinuousModel> Integrated<M> {
     ///
     /// # Panics
     /// If the model has controls.
+    #[track_caller]
     pub fn end(model: M) -> Self {
-        assert!(model.nu() == 0, "model: a terminal one has no controls, found {}", model.nu());
+        assert!(model.nu() == 0, "`model` has {} controls, expected 0 at the end", model.nu());
         let (controls, work) = (ControlPolynomial::Constant, OnDemand::default());
         Self { inner: model, method: Method::Still, controls, bounds: None, work }
     }
@@ -134,6 +116,7 @@ impl<M: ContinuousModel> Integrated<M> {
     /// # Panics
     /// If there are not as many numbers of each as the model has controls.
     #[must_use]
+    #[track_caller]
     pub fn with_bounds(mut self, lower: Vec<f64>, upper: Vec<f64>) -> Self {
         assert_length("lower", lower.len(), self.inner.nu());
         assert_length("upper", upper.len(), self.inner.nu());
@@ -154,6 +137,7 @@ impl<M: ContinuousModel> Integrated<M> {
 
     /// Prepares the states of a group, as many at a time as there are lanes, and calls a function for each of them with its
     /// number in the group. Runge–Kutta methods prepare each stage.
+    #[track_caller]
     fn each(
         &mut self,
         knots: &[usize],
@@ -199,6 +183,13 @@ impl<M: ContinuousModel> Integrated<M> {
                 self.differentiate(KnotInput { lane, t, x, u }, node);
             }
         }
+    }
+
+    /// Panics if a state or controls have a wrong length.
+    #[track_caller]
+    fn assert_knot(&self, x: &[f64], u: &[f64]) {
+        assert_length("x", x.len(), self.nx());
+        assert_length("u", u.len(), self.nu());
     }
 
     /// Whether a step is one of semi-implicit Euler with controls that stay the same.
@@ -292,6 +283,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         Some(Box::new(Self { inner, method: *method, controls: *controls, bounds, work }))
     }
 
+    #[track_caller]
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
         let nx = self.nx();
         assert_length("next", next.len(), knots.len() * nx);
@@ -305,6 +297,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         if self.is_simple_step() { self.inner.motion_size() } else { 0 }
     }
 
+    #[track_caller]
     fn calc_group_with_motion(
         &mut self,
         knots: &[usize],
@@ -325,6 +318,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         });
     }
 
+    #[track_caller]
     fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         assert_length("nodes", nodes.len(), knots.len());
         if nodes.first().is_some_and(|node| node.inverse_dynamics.wanted) && self.inverse_dynamics_form().is_some() {
@@ -333,13 +327,20 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.each(knots, xs, us, Wanted::Derivatives, |knot, input, i| knot.differentiate(input, &mut nodes[i]));
     }
 
+    #[track_caller]
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        self.assert_knot(x, u);
+        if self.method != Method::Still {
+            assert_length("next", next.len(), self.nx());
+        }
         let mut cost = 0.0;
         self.each(&[t], x, u, Wanted::Motion, |knot, input, _| cost = knot.step(input, next));
         cost
     }
 
+    #[track_caller]
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        self.assert_knot(x, u);
         self.each(&[t], x, u, Wanted::Derivatives, |knot, input, _| knot.differentiate(input, node));
     }
 
@@ -351,6 +352,7 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         }
     }
 
+    #[track_caller]
     fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
         match self.inner.hold(x) {
             Some(u) => u.repeat(self.controls.nodes()),
@@ -376,14 +378,22 @@ impl<M: ContinuousModel> ActionModel for Integrated<M> {
         self.inner.check_position(&x[..self.inner.nq()])
     }
 
+    #[track_caller]
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         let (nq, nv) = (self.inner.nq(), self.inner.nv());
+        assert_length("x", x.len(), nq + nv);
+        assert_length("dx", dx.len(), 2 * nv);
+        assert_length("out", out.len(), nq + nv);
         self.inner.integrate(&x[..nq], &dx[..nv], &mut out[..nq]);
         (0..nv).for_each(|k| out[nq + k] = x[nq + k] + dx[nv + k]);
     }
 
+    #[track_caller]
     fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
         let (nq, nv) = (self.inner.nq(), self.inner.nv());
+        assert_length("x0", x0.len(), nq + nv);
+        assert_length("x1", x1.len(), nq + nv);
+        assert_length("out", out.len(), 2 * nv);
         self.inner.difference(&x0[..nq], &x1[..nq], &mut out[..nv]);
         (0..nv).for_each(|k| out[nv + k] = x1[nq + k] - x0[nq + k]);
     }

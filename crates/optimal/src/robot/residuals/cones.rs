@@ -75,6 +75,7 @@ impl FrictionCone {
     ///
     /// # Panics
     /// If there are no sides, or more than 1000.
+    #[track_caller]
     pub fn rows(&self) -> Vec<[f64; 3]> {
         self.assert_facets();
         let mut rows = Vec::new();
@@ -99,6 +100,7 @@ impl FrictionCone {
     ///
     /// # Panics
     /// If there are no sides, or more than 1000.
+    #[track_caller]
     pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
         self.assert_facets();
         let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; self.facets], vec![0.0; self.facets]);
@@ -168,6 +170,7 @@ impl WrenchCone {
     ///
     /// # Panics
     /// If there are no sides, or more than 1000.
+    #[track_caller]
     pub fn rows(&self) -> Vec<[f64; 6]> {
         let (R, mu) = (self.friction.rotation, self.friction.slope());
         let mut rows: Vec<_> = self.friction.rows().iter().map(|&[a, b, c]| [a, b, c, 0.0, 0.0, 0.0]).collect();
@@ -189,6 +192,7 @@ impl WrenchCone {
     ///
     /// # Panics
     /// If there are no sides, or more than 1000.
+    #[track_caller]
     pub fn bounds(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut lower, mut upper) = self.friction.bounds();
         lower.extend([f64::NEG_INFINITY; 12]);

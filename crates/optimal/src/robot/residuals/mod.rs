@@ -1,5 +1,6 @@
 //! Residuals: what costs and limits look at, and how it is computed.
 
+pub(super) mod autodiff;
 pub(super) mod cones;
 pub(super) mod frame_name;
 pub(super) mod kernel;
@@ -8,5 +9,6 @@ pub(super) mod own;
 pub(super) mod residual;
 pub(super) mod rows;
 pub(super) mod surplus;
+pub(super) mod target;
 pub(super) mod terms;
 pub(super) mod view;

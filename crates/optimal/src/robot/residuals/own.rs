@@ -1,15 +1,54 @@
 //! Residuals of one's own: any function of the state and the control.
 
 use crate::lq::Hessian;
+use condyle_dynamics::Model;
 use core::fmt;
 use core::ops::Deref;
 use std::any::Any;
 use std::sync::Arc;
 
+/// The arguments of which a residual r(q, v, u) is a function.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inputs {
+    /// The position q.
+    pub positions: bool,
+    /// The velocity v.
+    pub velocities: bool,
+    /// The controls u.
+    pub controls: bool,
+}
+
+impl Inputs {
+    /// All of q, v and u.
+    pub const ALL: Self = Self { positions: true, velocities: true, controls: true };
+    /// The state x = (q, v).
+    pub const STATE: Self = Self { controls: false, ..Self::ALL };
+    /// The position q alone.
+    pub const POSITIONS: Self = Self { velocities: false, ..Self::STATE };
+}
+
 /// A residual that is written by a user, r(t, x, u), with its Jacobian. Several threads may call it at a time.
+///
+/// [`GenericResidual`](crate::robot::GenericResidual) needs no Jacobian: dual numbers compute it.
 pub trait ResidualFunction: Any + Send + Sync {
     /// The number of entries of r.
     fn size(&self) -> usize;
+
+    /// The arguments on which r depends, which must not change: all by default. Of the others, the columns of the Jacobian
+    /// are not read.
+    fn inputs(&self) -> Inputs {
+        Inputs::ALL
+    }
+
+    /// Refuses a robot, or a number of controls, for which r is not made. By default none is refused. An action calls this
+    /// when it is given the residual.
+    ///
+    /// # Errors
+    /// The fault, with the numbers.
+    fn check(&self, model: &Model, nu: usize) -> Result<(), String> {
+        let _ = (model, nu);
+        Ok(())
+    }
 
     /// r(t, x, u) of knot t.
     fn calc(&self, t: usize, x: &[f64], u: &[f64], r: &mut [f64]);

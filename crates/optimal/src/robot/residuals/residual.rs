@@ -2,7 +2,8 @@
 
 use super::cones::{FrictionCone, WrenchCone, pressure_rows, wrong_size};
 use super::frame_name::FrameName;
-use super::own::OwnResidual;
+use super::own::{Inputs, OwnResidual};
+use super::target::check_rotation;
 use crate::robot::capabilities::{Capabilities, Output};
 use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 
@@ -12,6 +13,7 @@ use condyle_dynamics::{Force, Mat3, Model, Motion, ReferenceFrame, Se3, Vec3};
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case", deny_unknown_fields))]
+#[non_exhaustive]
 pub enum Residual {
     /// x ⊖ x_ref, 2 nv numbers.
     State {
@@ -153,6 +155,7 @@ impl Residual {
             | Self::FramePlacement { .. }
             | Self::FrameTranslation { .. }
             | Self::FrameRotation { .. } => Part::Positions,
+            Self::Own(own) if own.inputs() == Inputs::POSITIONS => Part::Positions,
             _ => Part::All,
         }
     }
@@ -184,7 +187,7 @@ impl Residual {
     }
 
     /// The numbers of its target: a position, a twist or a wrench, then a rotation by columns; zeros where there is none.
-    pub(crate) fn target(&self) -> [f64; 12] {
+    pub(crate) fn target_numbers(&self) -> [f64; 12] {
         let mut to = [0.0; 12];
         let mut write = |from: usize, numbers: &[f64]| to[from..][..numbers.len()].copy_from_slice(numbers);
         match self {
@@ -234,41 +237,19 @@ impl Residual {
 
     /// The number of its entries, or what does not fit the robot and the capabilities of its dynamics.
     pub(crate) fn check(&self, model: &Model, capabilities: &Capabilities) -> Result<usize, String> {
-        let (nx, nv, nu) = (model.nq() + model.nv(), model.nv(), capabilities.nu);
-        let finite = |name: &str, numbers: &[f64]| match numbers.iter().all(|x| x.is_finite()) {
-            true => Ok(()),
-            false if numbers.iter().any(|x| x.is_nan()) => Err(format!("its {name} holds a NaN")),
-            false => Err(format!("its {name} holds an infinite number")),
-        };
-        let length = |numbers: &[f64], expected: usize| match numbers.len() == expected {
-            true => finite("reference", numbers),
-            false => Err(format!("its reference has {} numbers, expected {expected}", numbers.len())),
-        };
+        let (nv, nu) = (model.nv(), capabilities.nu);
         let rows = self.contact().map_or(Ok(0), |name| capabilities.contact(name).map(|rows| rows.len()))?;
         let rigid = |what: &str| match rows {
             6 => Ok(()),
             _ => Err(format!("{what} needs a rigid contact, of 6 rows; this one has {rows}")),
         };
-        finite("target", &self.target())?;
-        let turns = |name: &str, R: &Mat3<f64>| match R.is_rotation() {
-            true => Ok(()),
-            false => Err(format!("its {name} is no rotation: expected three unit vectors at right angles")),
-        };
-        match self {
-            Self::FramePlacement { target, .. } => turns("target", &target.rotation)?,
-            Self::FrameRotation { target, .. } => turns("target", target)?,
-            _ => {}
+        if let Some(target) = self.target() {
+            self.check_target(model, nu, target)?;
         }
         let n = match self {
-            Self::State { reference } => {
-                length(reference, nx)?;
-                model.check_position(&reference[..model.nq()]).map_err(|error| format!("its reference: {error}"))?;
-                2 * nv
-            }
-            Self::Control { reference } => length(reference, nu).map(|()| nu)?,
-            Self::JointEffort { reference } | Self::JointAcceleration { reference } => {
-                length(reference, nv).map(|()| nv)?
-            }
+            Self::State { .. } => 2 * nv,
+            Self::Control { .. } => nu,
+            Self::JointEffort { .. } | Self::JointAcceleration { .. } => nv,
             Self::ControlGravity => nv,
             Self::CenterOfMass { .. } | Self::FrameTranslation { .. } | Self::FrameRotation { .. } => 3,
             Self::CentroidalMomentum { .. } | Self::FramePlacement { .. } | Self::FrameVelocity { .. } => 6,
@@ -283,13 +264,13 @@ impl Residual {
             Self::CenterOfPressure { rotation, size, .. } => {
                 rigid("a centre of pressure")?;
                 wrong_size(*size).map_or(Ok(()), Err)?;
-                turns("rotation", rotation).map(|()| 4)?
+                check_rotation("rotation", rotation).map(|()| 4)?
             }
             Self::ImpulseCenterOfMass if !capabilities.impulse => {
                 return Err("only an impact changes velocities at once".to_owned());
             }
             Self::ImpulseCenterOfMass => 3,
-            Self::Own(own) => own.size(),
+            Self::Own(own) => own.check(model, nu).map(|()| own.size())?,
         };
         match self.output() {
             Some(Output::ContactAcceleration) if !capabilities.inverse => {

@@ -68,6 +68,11 @@ impl<T: Term> Terms<T> {
         &self.all
     }
 
+    /// Term k, to change its target and what it is worth, and the number of its entries.
+    pub(crate) fn term_mut(&mut self, k: usize) -> (&mut T, usize) {
+        (&mut self.all[k], self.plans[k].n)
+    }
+
     /// All terms, to change what they are worth.
     pub(crate) fn all_mut(&mut self) -> &mut [T] {
         &mut self.all

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // D, W
 
 use super::layout::{KinematicData, KnotLayout, Plan};
-use super::own::OwnResidual;
+use super::own::{Inputs, OwnResidual};
 use super::residual::{Part, Residual, held};
 use super::rows::{Rows, add_control_diagonal, add_state_diagonal};
 use crate::lq::{Hessian, LARGEST_BLOCK, LqNode};
@@ -118,6 +118,9 @@ impl ResidualView<'_> {
     pub(crate) fn push_rows(&mut self, residual: &Residual, plan: &Plan, sensitivities: &dyn Sensitivities) {
         let (s, nv) = (&mut *self.scratch, self.model.nv());
         let worth = s.d.iter().zip(&s.dd).map(|(d, dd)| [*d, *dd]);
+        if let Residual::Own(own) = residual {
+            return self.push_own_rows(own, plan.n, sensitivities);
+        }
         if residual.part() == Part::Positions {
             for (row, worth) in self.kinematics.rows(nv, residual, plan).zip(worth) {
                 s.rows.push_positions(row, worth);
@@ -133,9 +136,6 @@ impl ResidualView<'_> {
                 g.q.copy_from_slice(&row[nv..]);
             }
             return;
-        }
-        if let Residual::Own(own) = residual {
-            return self.push_own_rows(own, plan.n, sensitivities);
         }
         for i in 0..plan.n {
             if active(&[self.scratch.d[i], self.scratch.dd[i]]) {
@@ -161,11 +161,23 @@ impl ResidualView<'_> {
             }
             None => own.calc_diff(self.t, x, u, by_x, by_u),
         }
+        let inputs = own.inputs();
         for i in (0..n).filter(|&i| [d[i], dd[i]] != [0.0, 0.0]) {
+            if inputs == Inputs::POSITIONS {
+                rows.push_positions(&by_x[i * 2 * nv..][..nv], [d[i], dd[i]]);
+                continue;
+            }
             let g = &mut rows.push([d[i], dd[i]]);
             let (by_q, by_v) = by_x[i * 2 * nv..][..2 * nv].split_at(nv);
-            g.q.copy_from_slice(by_q);
-            g.v.copy_from_slice(by_v);
+            if inputs.positions {
+                g.q.copy_from_slice(by_q);
+            }
+            if inputs.velocities {
+                g.v.copy_from_slice(by_v);
+            }
+            if !inputs.controls {
+                continue;
+            }
             for (k, slope) in by_u[i * u.len()..][..u.len()].iter().enumerate() {
                 sensitivities.add_control(k, *slope, g);
             }

@@ -1,0 +1,129 @@
+//! Points of bodies and frames: velocity, Jacobian, and forces that act there.
+//!
+//! A point is given in the frame of its body, or in a frame on it, and moves with that. With its place p in the world, and S
+//! the columns of the body's joints in the world's frame,
+//!
+//! ```text
+//! ṗ = v + ω × p     J = ∂ṗ/∂v = S_v + S_ω × p
+//! ```
+//!
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 2.3 (velocities of points).
+
+use super::frames::{Placements, Velocities};
+use condyle_model::layout::{Columns, Single};
+use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Force, Scalar, Vec3, kernel};
+
+kernel! {
+    /// J of the point of a body that is at p in the world, 3 × nv by columns.
+    pub(crate) fn point_jacobian<S, R>(of: Placements<'_, S, R>, body: usize, p: &Vec3<S>, J: &mut [S]) {
+        J.fill(S::zero());
+        for &c in Single::<S, R>::new(of.model).support(body) {
+            let (s, column) = (of.world.S[c], &of.model.columns()[c]);
+            let moved = s.velocity_at(*p).scale(S::splat(column.ratio)).to_array(); // S_v + S_ω × p
+            let J = &mut J[3 * column.coordinate..][..3];
+            for (J, &x) in J.iter_mut().zip(&moved) {
+                *J += x;
+            }
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
+    /// The Jacobian J of a point of a body, 3 × nv: its velocity along the axes of the world is J v (m/s). J is overwritten.
+    ///
+    /// point: in the frame of the body (m). O(depth + nv); allocates nothing. Equation: see
+    /// [`frame_point_jacobian`](Self::frame_point_jacobian).
+    ///
+    /// # Panics
+    /// If there is no such body, or `J` is not 3 × nv.
+    #[inline(always)]
+    #[track_caller]
+    pub fn body_point_jacobian(&self, body: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
+        point_jacobian(*self, body, &self.body(body).act(point), columns(J, self.model.nv()));
+    }
+
+    /// The Jacobian J of a point of a frame, 3 × nv: its velocity along the axes of the world is J v (m/s). J is overwritten.
+    ///
+    /// point: in the frame (m). J = S_v + S_ω × p, with p = oXf · point and S the columns of the joints before it; these are
+    /// the linear rows of the Jacobian of a frame at the point, in `LocalWorldAligned`. O(depth + nv); allocates nothing.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Act, Data, Vec3, forward_velocities, robots};
+    /// use nalgebra::{DMatrix, DVector, Vector3};
+    /// let arm = robots::arm7();
+    /// let (tool, mut data, tip) = (arm.frame("tool")?, Data::new(&arm), Vec3::new(0.0, 0.02, 0.1));
+    /// let motion = forward_velocities(&arm, &mut data, &[0.3; 7], &[0.5; 7]);
+    /// let mut J = DMatrix::zeros(3, 7);
+    /// motion.frame_point_jacobian(tool, tip, &mut J);
+    /// let velocity = Vector3::from(motion.frame_point_velocity(tool, tip));
+    /// assert!((J * DVector::from_element(7, 0.5) - velocity).amax() < 1e-14);
+    /// let place = motion.frame(tool).act(tip); // the point in the world
+    /// assert!(place.z > 0.3);
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If there is no such frame, or `J` is not 3 × nv.
+    #[inline(always)]
+    #[track_caller]
+    pub fn frame_point_jacobian(&self, frame: usize, point: Vec3<S>, J: &mut DenseMatrix<S, impl Dense<S>>) {
+        let p = self.frame(frame).act(point);
+        point_jacobian(*self, self.model.frames()[frame].body, &p, columns(J, self.model.nv()));
+    }
+
+    /// A force of the world at a point of the world, as `f_ext` wants it: in the frame of the body, about its origin.
+    ///
+    /// point: the place in the world at which it acts (m); force: along the axes of the world (N). With the body's pose
+    /// (R, p): f = Rᵀ force, n = Rᵀ ((point − p) × force). A point that is known in the body's frame is `body(body).act(point)`
+    /// in the world.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Data, Force, Vec3, forward_kinematics, aba, robots};
+    /// let quadruped = robots::quadruped();
+    /// let (mut data, q) = (Data::new(&quadruped), condyle_dynamics::neutral(&quadruped));
+    /// let mut f_ext = vec![Force::zero(); quadruped.bodies().len()];
+    /// let placements = forward_kinematics(&quadruped, &mut data, &q);
+    /// let push = Vec3::new(0.0, 0.0, 9.81 * quadruped.total_mass()); // its weight, at its trunk
+    /// f_ext[1] += placements.force_on_body(1, placements.body(1).translation, push);
+    /// let a = aba(&quadruped, &mut data, &q, &[0.0; 18], &[0.0; 18], &f_ext);
+    /// assert!(a[2] > 0.0);
+    /// ```
+    ///
+    /// # Panics
+    /// If there is no such body.
+    #[inline(always)]
+    #[track_caller]
+    pub fn force_on_body(&self, body: usize, point: Vec3<S>, force: Vec3<S>) -> Force<S> {
+        self.body(body).act_inv(Force::at_point(point, force))
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
+    /// The velocity of a point of a body along the axes of the world (m/s): ṗ = v + ω × p. point: in the frame of the body (m).
+    ///
+    /// # Panics
+    /// If there is no such body.
+    #[inline(always)]
+    #[track_caller]
+    pub fn body_point_velocity(&self, body: usize, point: Vec3<S>) -> Vec3<S> {
+        self.moving.v[body].velocity_at(self.body(body).act(point))
+    }
+
+    /// The velocity of a point of a frame along the axes of the world (m/s): ṗ = v + ω × p. point: in the frame (m).
+    ///
+    /// # Panics
+    /// If there is no such frame.
+    #[inline(always)]
+    #[track_caller]
+    pub fn frame_point_velocity(&self, frame: usize, point: Vec3<S>) -> Vec3<S> {
+        self.moving.v[self.model.frames()[frame].body].velocity_at(self.frame(frame).act(point))
+    }
+}
+
+/// The columns of a Jacobian of a point, if it is 3 × nv.
+#[inline]
+#[track_caller]
+fn columns<S>(J: &mut DenseMatrix<S, impl Dense<S>>, nv: usize) -> &mut [S] {
+    assert!(J.shape() == (3, nv), "J: expected 3 × {nv}, found {:?}", J.shape());
+    J.as_mut_slice()
+}

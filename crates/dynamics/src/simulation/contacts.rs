@@ -1,0 +1,253 @@
+//! A step on the ground: gaps, Jacobians and the Delassus matrix of the points that may touch, the impulses, and the correction of
+//! what is below the plane. Model and equations: [`Ground`]; impulses: `contact_solver.rs`.
+
+use super::Status;
+use super::contact_solver::{ContactSolver, Outcome};
+use super::ground::{Ground, GroundContact};
+use crate::calls::inertia::crba;
+use crate::calls::kinematics::forward_kinematics;
+use crate::data::Data;
+use alloc::vec::Vec;
+use condyle_linalg::{Ltdl, dot};
+use condyle_model::{Error, Model};
+use condyle_spatial::{Act, Matrix, Vec3, matrix};
+
+/// Maximum distance from the plane at which a point counts as on it (m). The solver's tolerance moves a point that rests by less
+/// (1e-12 m a step); if such distances were made up for, the points of a sole would take turns in bearing it.
+const RESTING: f64 = 1e-7;
+/// Share of its depth by which a point is taken out of the ground in a step.
+const OUT: f64 = 0.2;
+/// Maximum speed at which that happens (m/s).
+const OUT_SPEED: f64 = 0.5;
+/// Multiple of the speed that gravity gives in a step, below which a point that hits the ground does not leave it again: the
+/// restitution of a point at rest would shake it.
+const REST: f64 = 2.0;
+
+/// Memory for the contacts of one robot with its ground. P is the number of points.
+#[derive(Clone, Debug)]
+pub(super) struct Contacts {
+    pub ground: Ground,
+    /// Two unit vectors along the plane, then its normal.
+    axes: [Vec3<f64>; 3],
+    /// Impulses of all points along the axes, at the end of the last step (N s). Shape: 3P. Written by: `advance`.
+    pub impulses: Vec<f64>,
+    /// Contacts of the last step. Shape: P. Written by: `advance`.
+    pub results: Vec<GroundContact>,
+    /// Velocity that corrects the displacement of the step, not the velocity. Shape: nv. Written by: `advance`.
+    pub correction: Vec<f64>,
+    /// J of one point along the axes of the world. Shape: 3 × nv.
+    jacobian: Matrix<f64>,
+    /// Rows of J of all points along the axes, one row after the other. Shape: 3P × nv.
+    J: Vec<f64>,
+    /// Rows of J M⁻¹, as `J`, of the points in the program.
+    Y: Vec<f64>,
+    /// φ: the distance to the plane (m), 0 where it is less than `RESTING`. Shape: P.
+    gaps: Vec<f64>,
+    positions: Vec<Vec3<f64>>,
+    /// The points in the program, in the order in which they came to it. Shape: up to P.
+    active: Vec<usize>,
+    factor: Ltdl<f64>,
+    solver: ContactSolver,
+}
+
+impl Contacts {
+    /// Allocates memory for a ground.
+    pub(super) fn new(model: &Model, ground: Ground) -> Result<Self, Error> {
+        let ground = ground.checked(model)?;
+        let (points, nv) = (ground.points.len(), model.nv());
+        let nothing = GroundContact { position: Vec3::zero(), force: Vec3::zero(), touches: false };
+        Ok(Self {
+            axes: axes(ground.normal),
+            impulses: vec![0.0; 3 * points],
+            results: vec![nothing; points],
+            correction: vec![0.0; nv],
+            jacobian: matrix(3, nv, 0.0),
+            J: vec![0.0; 3 * points * nv],
+            Y: vec![0.0; 3 * points * nv],
+            gaps: vec![0.0; points],
+            positions: vec![Vec3::zero(); points],
+            active: Vec::with_capacity(points),
+            factor: Ltdl::new(model),
+            solver: ContactSolver::new(points),
+            ground,
+        })
+    }
+
+    /// Forgets the last step: the next one depends on its state alone.
+    pub(super) fn reset(&mut self) {
+        self.impulses.fill(0.0);
+        let nothing = GroundContact { position: Vec3::zero(), force: Vec3::zero(), touches: false };
+        self.results.fill(nothing);
+    }
+
+    /// v_next, the velocity after a step without contacts, becomes the one with them; q and v are the state before it.
+    pub(super) fn advance(
+        &mut self,
+        model: &Model,
+        data: &mut Data<f64>,
+        h: f64,
+        (q, v): (&[f64], &[f64]),
+        v_next: &mut [f64],
+    ) -> Status {
+        self.correction.fill(0.0);
+        if !v_next.iter().all(|v| v.is_finite()) {
+            return Status::Done; // the caller sees that it is not finite
+        }
+        self.place(model, data, q);
+        self.factor.factorize(crba(model, data, q));
+        self.active.clear();
+        for i in 0..self.gaps.len() {
+            // a point that would be below the plane, or was pushed in the last step
+            let reached = self.gaps[i] + h * self.normal_speed(i, v_next);
+            if reached < 0.0 || self.impulses[3 * i + 2] > 0.0 {
+                self.add(i);
+            }
+        }
+        let rest = REST * h * model.gravity().norm();
+        let outcome = loop {
+            let outcome = self.solve(h, v, v_next, rest);
+            // points outside of the program that the impulses of the others would push below the plane
+            let before = self.active.len();
+            for i in 0..self.gaps.len() {
+                let reached = self.gaps[i] + h * self.speed_after(i, v_next);
+                if reached < -h * self.ground.tolerance && !self.active.contains(&i) {
+                    self.add(i);
+                }
+            }
+            if self.active.len() == before {
+                break outcome;
+            }
+        };
+        self.record(h, v_next);
+        self.correct(h, v_next);
+        match outcome {
+            Outcome::Solved => Status::Done,
+            Outcome::NotSolved(error) => Status::ContactsNotConverged { error },
+        }
+    }
+
+    /// Positions, gaps and Jacobians of all points.
+    fn place(&mut self, model: &Model, data: &mut Data<f64>, q: &[f64]) {
+        let nv = model.nv();
+        let placements = forward_kinematics(model, data, q);
+        for (i, point) in self.ground.points.iter().enumerate() {
+            let p = placements.frame(point.frame).act(point.position);
+            self.positions[i] = p;
+            let gap = self.ground.normal.dot(p) - self.ground.height; // φ = n · p − height
+            self.gaps[i] = if gap.abs() <= RESTING { 0.0 } else { gap };
+            placements.frame_point_jacobian(point.frame, point.position, &mut self.jacobian);
+            for (k, axis) in self.axes.iter().enumerate() {
+                let row = &mut self.J[(3 * i + k) * nv..][..nv];
+                for (J, column) in row.iter_mut().zip(self.jacobian.as_slice().chunks_exact(3)) {
+                    *J = axis.dot(Vec3::new(column[0], column[1], column[2]));
+                }
+            }
+        }
+    }
+
+    /// Row k of J of point i.
+    fn row(&self, i: usize, k: usize) -> &[f64] {
+        let nv = self.correction.len();
+        &self.J[(3 * i + k) * nv..][..nv]
+    }
+
+    /// Puts a point into the program: its rows of J M⁻¹.
+    fn add(&mut self, i: usize) {
+        let (nv, at) = (self.correction.len(), 3 * self.active.len());
+        for k in 0..3 {
+            let (from, to) = ((3 * i + k) * nv, (at + k) * nv);
+            self.Y[to..to + nv].copy_from_slice(&self.J[from..from + nv]);
+            self.factor.solve(&mut self.Y[to..to + nv]);
+        }
+        self.active.push(i);
+    }
+
+    /// J_n v of a point.
+    fn normal_speed(&self, i: usize, v: &[f64]) -> f64 {
+        dot(self.row(i, 2), v)
+    }
+
+    /// J_n (v + M⁻¹ Jᵀ λ) of a point, with the impulses of the program.
+    fn speed_after(&self, i: usize, v: &[f64]) -> f64 {
+        let (nv, row) = (v.len(), self.row(i, 2));
+        let pushes = self.Y.chunks_exact(nv.max(1)).zip(&self.solver.impulses).take(3 * self.active.len());
+        pushes.fold(dot(row, v), |sum, (Y, &impulse)| sum + impulse * dot(row, Y))
+    }
+
+    /// The impulses of the points in the program: G = J M⁻¹ Jᵀ, b = J v plus what the gaps ask for.
+    fn solve(&mut self, h: f64, v: &[f64], v_next: &[f64], rest: f64) -> Outcome {
+        let (nv, points) = (v.len(), self.active.len());
+        let n = 3 * points;
+        for a in 0..n {
+            let (i, k) = (self.active[a / 3], a % 3);
+            let mut b = dot(self.row(i, k), v_next);
+            if k == 2 {
+                let (gap, speed) = (self.gaps[i].max(0.0), -self.normal_speed(i, v));
+                let back = self.ground.restitution * speed;
+                let hits = self.ground.restitution > 0.0 && speed > rest && self.gaps[i] + h * b < 0.0;
+                b += if hits { -back } else { gap / h }; // u_n⁺ ≥ e s, or u_n⁺ + max(φ, 0)/h ≥ 0
+            }
+            for c in 0..=a {
+                let g = dot(self.row(i, k), &self.Y[c * nv..][..nv]);
+                self.solver.G[c * n + a] = g;
+                self.solver.G[a * n + c] = g;
+            }
+            self.solver.b[a] = b;
+            self.solver.impulses[a] = self.impulses[3 * i + k]; // the first guess
+        }
+        let Ground { friction, tolerance, max_iterations, .. } = self.ground;
+        self.solver.solve(points, friction, tolerance, max_iterations)
+    }
+
+    /// v⁺ = v_next + M⁻¹ Jᵀ λ, and the forces λ/h.
+    fn record(&mut self, h: f64, v_next: &mut [f64]) {
+        let nv = v_next.len();
+        self.impulses.fill(0.0);
+        for (contact, &position) in self.results.iter_mut().zip(&self.positions) {
+            *contact = GroundContact { position, force: Vec3::zero(), touches: false };
+        }
+        for (at, &i) in self.active.iter().enumerate() {
+            let mut force = Vec3::zero();
+            for k in 0..3 {
+                let impulse = self.solver.impulses[3 * at + k];
+                self.impulses[3 * i + k] = impulse;
+                force = self.axes[k].scale_add(impulse / h, force);
+                let Y = &self.Y[(3 * at + k) * nv..][..nv];
+                v_next.iter_mut().zip(Y).for_each(|(v, y)| *v += impulse * y);
+            }
+            self.results[i].force = force;
+            self.results[i].touches = self.impulses[3 * i + 2] > 0.0;
+        }
+    }
+
+    /// w = M⁻¹ J_nᵀ π with 0 ≤ π ⊥ J_n (v⁺ + w) − (share of the depth)/h ≥ 0: contacts without friction.
+    fn correct(&mut self, h: f64, v_next: &[f64]) {
+        let (nv, points) = (v_next.len(), self.active.len());
+        let mut deep = false;
+        for (at, &i) in self.active.iter().enumerate() {
+            let out = (OUT * (-self.gaps[i]).max(0.0) / h).min(OUT_SPEED);
+            let speed = dot(&self.J[(3 * i + 2) * nv..][..nv], v_next) + self.gaps[i].max(0.0) / h;
+            deep |= speed < out - self.ground.tolerance;
+            self.solver.b[3 * at..][..3].copy_from_slice(&[0.0, 0.0, speed - out]);
+            self.solver.impulses[3 * at..][..3].fill(0.0);
+        }
+        if !deep {
+            return;
+        }
+        let Ground { tolerance, max_iterations, .. } = self.ground;
+        self.solver.solve(points, 0.0, tolerance, max_iterations);
+        for (Y, &push) in self.Y.chunks_exact(nv).zip(&self.solver.impulses).take(3 * points) {
+            self.correction.iter_mut().zip(Y).for_each(|(w, y)| *w += push * y);
+        }
+    }
+}
+
+/// Two unit vectors at right angles to n and to each other, then n. For z they are x and y.
+fn axes(n: Vec3<f64>) -> [Vec3<f64>; 3] {
+    // Duff et al. (2017): without cancellation for any n
+    let sign = 1f64.copysign(n.z);
+    let a = -1.0 / (sign + n.z);
+    let b = n.x * n.y * a;
+    let first = Vec3::new(1.0 + sign * n.x * n.x * a, sign * b, -sign * n.x);
+    [first, Vec3::new(b, sign + n.y * n.y * a, -n.y), n]
+}

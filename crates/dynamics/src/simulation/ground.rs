@@ -1,0 +1,178 @@
+//! The ground on which a simulated robot stands: a plane, and the points of the robot that may touch it.
+
+use condyle_model::{Error, Model};
+use condyle_spatial::Vec3;
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// Distance from 1 to which rounding takes the length of a vector that was divided by it. Such a normal stays as it is, to the
+/// last bit.
+const UNIT: f64 = 1e-15;
+
+/// Point of a robot that may touch the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct GroundPoint {
+    /// Index of the frame to which the point is fixed.
+    pub frame: usize,
+    /// Position of the point in that frame (m).
+    pub position: Vec3<f64>,
+}
+
+/// Plane on which a robot stands, slides and lands, and the points of the robot that may touch it.
+///
+/// The model is that of rigid bodies and Coulomb's friction, at the level of velocities (Moreau 1988; Stewart and Trinkle 1996;
+/// Anitescu and Potra 1997), with the steps of [`SemiImplicitEuler`](super::Integrator::SemiImplicitEuler). Each point has its
+/// gap φ to the plane, its velocity u⁺ = J v⁺ after the step, with a part along the normal and one along the plane, and an
+/// impulse λ:
+///
+/// ```text
+/// v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ
+/// 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0                                  landing, standing, lift-off
+/// ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t⁺/‖u_t⁺‖ where u_t⁺ ≠ 0       Coulomb's disc: no pyramid
+/// ```
+///
+/// So a point that comes near is slowed down to arrive at the plane at the end of a step, without penetration to first order.
+/// With a restitution e, a point that would hit the plane faster than 2 h ‖g‖ leaves it with e times its speed instead (Newton's
+/// law). Where a point is below the plane, in the first state or by the curvature of its path, a correction w of the step's
+/// displacement, q⁺ = q ⊕ h (v⁺ + w), takes it out by a fifth of its depth a step, at no more than 0.5 m/s. w is never part of the
+/// velocity, so depth does not become speed.
+///
+/// Limits. Errors are O(h): contact begins and ends on a step, and so does sliding. Contacts take no energy but give none either:
+/// kinetic energy never grows by λ, except for e > 0 with several contacts and friction, where Newton's law can. Contacts of
+/// edges, of other bodies and with each other do not exist, nor do rolling resistance and torsional friction: a sole resists
+/// turning by its corners. Impulses of redundant contacts are not unique; their sum is. Forces are mean values over a step.
+///
+/// ```
+/// use condyle_dynamics::{Vec3, neutral, robots};
+/// use condyle_dynamics::simulation::{Ground, Settings, Simulation};
+/// let quadruped = robots::quadruped();
+/// let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"].map(|name| quadruped.frame(name).unwrap());
+/// let weight = 9.81 * quadruped.total_mass();
+/// let mut simulation = Simulation::new(&quadruped, Settings::default());
+/// let mut q = neutral(&quadruped);
+/// q[2] = 0.7; // above the ground
+/// simulation.set_state(&q, &[0.0; 18])?;
+/// simulation.set_ground(Ground { friction: 0.8, ..Ground::at_frames(feet) })?;
+/// let stiff = |now: &mut condyle_dynamics::simulation::Control<'_, f64>| {
+///     (6..18).for_each(|k| now.tau[k] = -80.0 * now.q[k + 1] - 2.0 * now.v[k]);
+/// };
+/// assert!(simulation.run(2000, stiff).is_done());
+/// let lifted: f64 = simulation.contacts().iter().map(|contact| contact.force.z).sum();
+/// assert!((lifted / weight - 1.0).abs() < 1e-2); // it has landed and stands
+/// # Ok::<(), condyle_dynamics::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Ground {
+    /// n, the direction out of the ground, in the world's frame; made a unit vector by
+    /// [`set_ground`](super::Simulation::set_ground).
+    pub normal: Vec3<f64>,
+    /// Height of the plane along n (m): n · p of its points p.
+    pub height: f64,
+    /// μ, Coulomb's coefficient of friction, at least 0.
+    pub friction: f64,
+    /// e, the share of the normal speed that a point has after it has hit the ground, from 0 to 1.
+    pub restitution: f64,
+    /// Points of the robot that may touch the plane.
+    pub points: Vec<GroundPoint>,
+    /// Largest error in the laws of contact (m/s): a point at rest moves no faster. Most steps end far below it, since the last
+    /// step of Newton's method squares the error.
+    pub tolerance: f64,
+    /// Maximum number of iterations of the contact solver in a step; each is a step of Newton's method or a few sweeps of
+    /// Gauss–Seidel.
+    pub max_iterations: usize,
+}
+
+impl Default for Ground {
+    /// The plane z = 0 with friction 0.7, no restitution, and no points; a tolerance of 1e-8 m/s and 500 iterations.
+    fn default() -> Self {
+        Self {
+            normal: Vec3::new(0.0, 0.0, 1.0),
+            height: 0.0,
+            friction: 0.7,
+            restitution: 0.0,
+            points: Vec::new(),
+            tolerance: 1e-8,
+            max_iterations: 500,
+        }
+    }
+}
+
+impl Ground {
+    /// The default ground, which the origins of some frames may touch.
+    pub fn at_frames(frames: impl IntoIterator<Item = usize>) -> Self {
+        frames.into_iter().fold(Self::default(), |ground, frame| ground.with_sole(frame, &[Vec3::zero()]))
+    }
+
+    /// The same ground with a sole: a polygon by its corners, in its frame (m). One corner is a point.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Vec3, robots, simulation::Ground};
+    /// let humanoid = robots::humanoid();
+    /// let corners = [(0.1, 0.05), (0.1, -0.05), (-0.1, -0.05), (-0.1, 0.05)].map(|(x, y)| Vec3::new(x, y, 0.0));
+    /// let soles = ["left_sole", "right_sole"].map(|name| humanoid.frame(name).unwrap());
+    /// let ground = soles.into_iter().fold(Ground::default(), |ground, sole| ground.with_sole(sole, &corners));
+    /// assert_eq!(ground.points.len(), 8);
+    /// ```
+    #[must_use]
+    pub fn with_sole(mut self, frame: usize, corners: &[Vec3<f64>]) -> Self {
+        self.points.extend(corners.iter().map(|&position| GroundPoint { frame, position }));
+        self
+    }
+
+    /// Checks all numbers for a robot, and makes the normal a unit vector.
+    pub(super) fn checked(mut self, model: &Model) -> Result<Self, Error> {
+        let wrong = |what: String| Err(Error::Ground { what });
+        let Vec3 { x, y, z } = self.normal;
+        let length = self.normal.norm();
+        if !(length.is_normal() && length.is_finite()) {
+            return wrong(format!("normal ({x}, {y}, {z}) is no direction"));
+        }
+        if (length - 1.0).abs() > UNIT {
+            self.normal /= length;
+        }
+        if !self.height.is_finite() {
+            return wrong(format!("height is {} m, expected a finite number", self.height));
+        }
+        for (name, number, most) in [
+            ("friction", self.friction, f64::MAX),
+            ("restitution", self.restitution, 1.0),
+            ("tolerance", self.tolerance, f64::MAX),
+        ] {
+            if !(0.0..=most).contains(&number) {
+                let range = if most == 1.0 { "from 0 to 1" } else { "of at least 0" };
+                return wrong(format!("{name} is {number}, expected a finite number {range}"));
+            }
+        }
+        let frames = model.frames().len();
+        for (i, point) in self.points.iter().enumerate() {
+            let Some(frame) = model.frames().get(point.frame) else {
+                return wrong(format!("point {i}: there is no frame {}: the model has {frames}", point.frame));
+            };
+            if frame.body == 0 {
+                return wrong(format!("point {i}: frame `{}` is fixed to the world", frame.name));
+            }
+            let Vec3 { x, y, z } = point.position;
+            if ![x, y, z].into_iter().all(f64::is_finite) {
+                let at = format!("position ({x}, {y}, {z}) in frame `{}`", frame.name);
+                return wrong(format!("point {i}: {at} is not finite"));
+            }
+        }
+        Ok(self)
+    }
+}
+
+/// Contact of one point with the ground during the last step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GroundContact {
+    /// Position of the point in the world at the beginning of the step (m).
+    pub position: Vec3<f64>,
+    /// Force on the robot at the point, along the axes of the world, as the mean over the step (N).
+    pub force: Vec3<f64>,
+    /// Whether the ground pushed the point in the step.
+    pub touches: bool,
+}

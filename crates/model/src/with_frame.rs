@@ -1,0 +1,71 @@
+//! The same robot with one more frame.
+
+use crate::body::{Frame, FrameKind, FrameParent};
+use crate::error::Error;
+use crate::model::Model;
+use crate::validate::check_frame;
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use condyle_spatial::Se3;
+
+impl Model {
+    /// The same robot with one more frame of the user's, the last one of [`frames`](Self::frames).
+    ///
+    /// parent: the body or frame on which it is put, or a name; placement: pXf, the new frame in the parent's frame. All
+    /// numbers of bodies, frames and coordinates stay as they are, so scratch made for this robot fits the new one; what
+    /// is planned from frames, as a constraint set, does not.
+    ///
+    /// ```
+    /// use condyle_model::{FrameParent, Se3, Vec3, robots};
+    /// let at = Se3 { translation: Vec3::new(0.0, 0.0, 0.1), ..Se3::identity() };
+    /// let arm = robots::arm7().with_frame("tip", "tool", at)?.with_frame("elbow", FrameParent::Body(4), at)?;
+    /// let (tip, tool) = (&arm.frames()[arm.frame("tip")?], &arm.frames()[arm.frame("tool")?]);
+    /// assert_eq!((tip.body, tip.placement), (tool.body, tool.placement * at));
+    /// # Ok::<(), condyle_model::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::UnknownFrame`] if the parent is a name that neither a frame nor a body has; [`Error::Frame`] if the parent's
+    /// index is too large, or the placement is no rotation and translation, or is not finite; [`Error::Duplicate`] if the
+    /// user has a frame of this name already.
+    pub fn with_frame<'a>(
+        &self,
+        name: &str,
+        parent: impl Into<FrameParent<'a>>,
+        placement: Se3<f64>,
+    ) -> Result<Self, Error> {
+        let wrong = |what: String| Error::Frame { frame: name.to_owned(), what };
+        let (body, bXp) = self.frame_parent(parent.into(), wrong)?;
+        let mut frame = Frame { name: name.to_owned(), kind: FrameKind::User, body, placement };
+        check_frame(&frame)?;
+        if self.frames.iter().any(|f| f.kind == FrameKind::User && f.name == name) {
+            return Err(Error::Duplicate { kind: "frame", name: name.to_owned() });
+        }
+        frame.placement = bXp * placement;
+        let mut model = self.clone();
+        model.frames.push(frame);
+        model.validate()?;
+        model.geometry = model.hash_geometry();
+        Ok(model)
+    }
+
+    /// The body of a parent, and the parent's frame in the body's.
+    fn frame_parent(
+        &self,
+        parent: FrameParent<'_>,
+        wrong: impl Fn(String) -> Error,
+    ) -> Result<(usize, Se3<f64>), Error> {
+        let on = |frame: usize| (self.frames[frame].body, self.frames[frame].placement);
+        let (bodies, frames) = (self.bodies.len(), self.frames.len());
+        match parent {
+            FrameParent::Body(body) if body < bodies => Ok((body, Se3::identity())),
+            FrameParent::Body(body) => Err(wrong(format!("there is no body {body}: the model has {bodies}"))),
+            FrameParent::Frame(frame) if frame < frames => Ok(on(frame)),
+            FrameParent::Frame(frame) => Err(wrong(format!("there is no frame {frame}: the model has {frames}"))),
+            FrameParent::Named(name) => self.frame(name).map(on).or_else(|unknown| {
+                let body = self.bodies.iter().position(|body| body.name == name);
+                body.map(|body| (body, Se3::identity())).ok_or(unknown)
+            }),
+        }
+    }
+}

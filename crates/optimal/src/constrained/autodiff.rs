@@ -1,0 +1,119 @@
+//! Path constraints that are written for any scalar, with exact Jacobians by dual numbers.
+
+use super::path_constraint::PathConstraint;
+use condyle_spatial::Scalar;
+use nalgebra::DMatrix;
+use num_dual::Dual64;
+use std::any::Any;
+
+/// Functions of state and control that must stay within bounds, written for any [`Scalar`], so that
+/// [`AutoDiffConstraint`] makes a [`PathConstraint`] of them. A robot's own residuals share its kinematics: see
+/// [`OwnConstraint`](crate::robot::OwnConstraint).
+pub trait GenericConstraint: Any + Clone + Send + Sync {
+    /// The number of functions.
+    fn size(&self) -> usize;
+
+    /// As [`PathConstraint::bounds`].
+    fn bounds(&self, t: usize) -> (&[f64], &[f64]);
+
+    /// Computes gₜ(x, u) into `g`.
+    fn calc<S: Scalar>(&self, t: usize, x: &[S], u: &[S], g: &mut [S]);
+
+    /// Computes x ⊕ δx into `out` (nx): the sum in a vector space. It must be the ⊕ of the action.
+    fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
+        for ((out, &x), &dx) in out.iter_mut().zip(x).zip(dx) {
+            *out = x + dx;
+        }
+    }
+}
+
+/// A path constraint whose Jacobian is exact: that of [`GenericConstraint::calc`] by dual numbers, at ndx + nu calls.
+///
+/// ```
+/// use condyle_optimal::{AutoDiffConstraint, GenericConstraint, PathConstraint};
+/// use condyle_spatial::Scalar;
+/// use nalgebra::DMatrix;
+///
+/// /// A vehicle at x = (x, y, θ) stays 1 m from the origin.
+/// #[derive(Clone)]
+/// struct Distance;
+/// impl GenericConstraint for Distance {
+///     fn size(&self) -> usize { 1 }
+///     fn bounds(&self, _: usize) -> (&[f64], &[f64]) { (&[1.0], &[f64::INFINITY]) }
+///     fn calc<S: Scalar>(&self, _: usize, x: &[S], _: &[S], g: &mut [S]) {
+///         g[0] = (x[0] * x[0] + x[1] * x[1]).sqrt();
+///     }
+/// }
+///
+/// let (mut gx, mut gu) = (DMatrix::zeros(1, 3), DMatrix::zeros(1, 2));
+/// AutoDiffConstraint::new(Distance).calc_diff(0, &[0.0, 4.0, 0.0], &[0.0; 2], &mut gx, &mut gu);
+/// assert_eq!(gx, DMatrix::from_row_slice(1, 3, &[0.0, 1.0, 0.0]));
+/// ```
+#[derive(Clone, Debug)]
+pub struct AutoDiffConstraint<C> {
+    constraint: C,
+    /// x, and x ⊕ δx. Shape: nx. Written by: `calc_diff`.
+    x: Vec<Dual64>,
+    moved: Vec<Dual64>,
+    /// δx, u + δu and g. Shape: ndx; nu; size. Written by: `calc_diff`.
+    dx: Vec<Dual64>,
+    u: Vec<Dual64>,
+    g: Vec<Dual64>,
+}
+
+impl<C: GenericConstraint> AutoDiffConstraint<C> {
+    /// Makes the path constraint of `constraint`. Its workspace is allocated by the first derivatives.
+    pub fn new(constraint: C) -> Self {
+        let [x, moved, dx, u, g] = [(); 5].map(|()| Vec::new());
+        Self { constraint, x, moved, dx, u, g }
+    }
+
+    /// Returns the constraint that is differentiated, to change it.
+    pub fn constraint_mut(&mut self) -> &mut C {
+        &mut self.constraint
+    }
+}
+
+impl<C: GenericConstraint> PathConstraint for AutoDiffConstraint<C> {
+    fn size(&self) -> usize {
+        self.constraint.size()
+    }
+
+    fn bounds(&self, t: usize) -> (&[f64], &[f64]) {
+        self.constraint.bounds(t)
+    }
+
+    fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]) {
+        self.constraint.calc(t, x, u, g);
+    }
+
+    fn calc_diff(&mut self, t: usize, at: &[f64], by: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
+        let Self { constraint, x, moved, dx, u, g } = self;
+        let zero = Dual64::from(0.0);
+        for (numbers, n) in [(&mut *moved, at.len()), (&mut *dx, gx.ncols()), (&mut *g, gx.nrows())] {
+            numbers.resize(n, zero);
+        }
+        for (numbers, from) in [(&mut *x, at), (&mut *u, by)] {
+            numbers.clear();
+            numbers.extend(from.iter().map(|&x| Dual64::from(x)));
+        }
+        for k in 0..gx.ncols() {
+            dx[k].eps = 1.0;
+            constraint.integrate(x, dx, moved);
+            constraint.calc(t, moved, u, g);
+            dx[k].eps = 0.0;
+            gx.column_mut(k).iter_mut().zip(&*g).for_each(|(to, g)| *to = g.eps);
+        }
+        for k in 0..gu.ncols() {
+            u[k].eps = 1.0;
+            constraint.calc(t, x, u, g);
+            u[k].eps = 0.0;
+            gu.column_mut(k).iter_mut().zip(&*g).for_each(|(to, g)| *to = g.eps);
+        }
+        true
+    }
+
+    fn fork(&self) -> Option<Box<dyn PathConstraint>> {
+        Some(Box::new(self.clone()))
+    }
+}

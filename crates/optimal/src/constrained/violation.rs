@@ -1,0 +1,69 @@
+//! A constraint that does not hold, as evidence.
+
+use core::fmt;
+use std::sync::Arc;
+
+/// The kind of a [`Violation`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum ViolationKind {
+    /// A constraint of a knot: a robot's [`Limit`](crate::robot::Limit) or a [`PathConstraint`](crate::PathConstraint).
+    Constraint,
+    /// A gap of the dynamics: f₀ = x̂₀ ⊖ x₀ at knot 0, else fₜ = φ(xₜ₋₁, uₜ₋₁) ⊖ xₜ.
+    Gap,
+}
+
+/// A row of a constraint, or of the dynamics, that does not hold at the end of a solve.
+///
+/// ```
+/// # use condyle_dynamics::robots;
+/// # use condyle_optimal::robot::{FreeDynamics, Limit, Residual};
+/// # use condyle_optimal::{AugmentedLagrangian, Problem, Status};
+/// # use std::sync::Arc;
+/// # let arm = Arc::new(robots::arm7());
+/// # let x0 = vec![0.0; 14];
+/// // the arm begins at rest, where a limit asks its third joint for at least 0.5 rad
+/// let mut lower = vec![f64::NEG_INFINITY; 14];
+/// lower[2] = 0.5;
+/// let bent = Limit::new("bent", Residual::State { reference: x0.clone() }, lower, vec![f64::INFINITY; 14]);
+/// let knot = FreeDynamics::running(arm.clone(), 0.05, vec![])?.with_limits(vec![bent])?;
+/// let end = FreeDynamics::terminal(arm, vec![])?;
+/// # let mut knot = knot;
+/// # let us = knot.quasi_static(&x0).repeat(5);
+/// let mut problem = Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; 5], Box::new(end))?;
+/// let mut solver = AugmentedLagrangian::new(&problem);
+/// # solver.settings.max_solves = 2;
+/// let status = solver.solve(&mut problem, &x0.repeat(6), &us)?.status;
+/// assert_eq!(status, Status::Infeasible);
+/// let worst = solver.outcome().worst.as_ref().unwrap();
+/// assert_eq!(worst.to_string(), "knot 0: entry 2 of `bent` is 5.000e-1 beyond its bound");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Violation {
+    /// The kind of the row.
+    pub kind: ViolationKind,
+    /// The knot, 0 … N.
+    pub knot: usize,
+    /// The row: the index in [`Outcome::multipliers`](crate::Outcome::multipliers) of the knot, or of a gap the entry of the
+    /// tangent vector.
+    pub row: usize,
+    /// The name of the [`Limit`](crate::robot::Limit), if it is one.
+    pub name: Option<Arc<str>>,
+    /// The row within the limit of that name, else `row`.
+    pub entry: usize,
+    /// The distance from the bound, or of a gap its size, in the units of the row; infinite if it is not a number.
+    pub amount: f64,
+}
+
+impl fmt::Display for Violation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, knot, row, name, entry, amount } = self;
+        match (kind, name) {
+            (ViolationKind::Gap, _) => write!(f, "knot {knot}: entry {row} of the gap is {amount:.3e}"),
+            (_, Some(name)) => write!(f, "knot {knot}: entry {entry} of `{name}` is {amount:.3e} beyond its bound"),
+            (_, None) => write!(f, "knot {knot}: constraint {row} is {amount:.3e} beyond its bound"),
+        }
+    }
+}

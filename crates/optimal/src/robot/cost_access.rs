@@ -1,0 +1,146 @@
+//! Access to the costs of a problem's robots by their names, to change targets, weights and activations in place.
+
+use super::activation::Activation;
+use super::costs::{Cost, Costs, check_weight};
+use super::dynamics::knots::knot_of;
+use super::horizon_terms::HorizonTerms;
+use super::residuals::target::Target;
+use crate::{ActionModel, Error, Problem};
+use condyle_dynamics::Model;
+
+/// A cost term of a robot's knots, to be changed between solves. What does not fit is refused and changes nothing.
+#[derive(Debug)]
+pub struct CostMut<'a> {
+    cost: &'a mut Cost,
+    model: &'a Model,
+    nu: usize,
+    /// The number of entries of the residual.
+    n: usize,
+}
+
+impl CostMut<'_> {
+    /// Returns the term.
+    pub fn get(&self) -> &Cost {
+        self.cost
+    }
+
+    /// Returns the target of its residual; `None` if that has none.
+    pub fn target(&self) -> Option<Target<'_>> {
+        self.cost.residual.target()
+    }
+
+    /// Sets the target of its residual: a position, a placement, a reference of as many numbers as before. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`Error::Cost`] if the residual has no target or one of another kind, for a reference of another length, numbers that
+    /// are not finite, and what is no rotation.
+    pub fn set_target<'t>(&mut self, target: impl Into<Target<'t>>) -> Result<(), Error> {
+        let target = target.into();
+        let wrong = |what| Error::Cost { name: self.cost.name.clone(), what };
+        self.cost.residual.check_target(self.model, self.nu, target).map_err(wrong)?;
+        self.cost.residual.write_target(target);
+        Ok(())
+    }
+
+    /// Sets the weight. Allocates nothing.
+    ///
+    /// # Errors
+    /// [`Error::Cost`] if the weight is negative or not finite.
+    pub fn set_weight(&mut self, weight: f64) -> Result<(), Error> {
+        check_weight(&self.cost.name, weight)?;
+        self.cost.weight = weight;
+        Ok(())
+    }
+
+    /// Sets the activation.
+    ///
+    /// # Errors
+    /// [`Error::Cost`] if its weights or bounds do not have as many numbers as the residual, or make no sense.
+    pub fn set_activation(&mut self, activation: Activation) -> Result<(), Error> {
+        if let Some(what) = activation.wrong(self.n) {
+            return Err(Error::Cost { name: self.cost.name.clone(), what });
+        }
+        self.cost.activation = activation;
+        Ok(())
+    }
+}
+
+impl Costs {
+    /// Returns the term called `name`, to change its target, weight or activation between solves; `None` if there is none.
+    pub fn cost_mut(&mut self, name: &str) -> Option<CostMut<'_>> {
+        let k = self.terms().iter().position(|cost| cost.name == name)?;
+        let Self { model, capabilities, terms } = self;
+        let (cost, n) = terms.term_mut(k);
+        Some(CostMut { cost, model, nu: capabilities.nu, n })
+    }
+}
+
+/// The costs and limits of the robot of an action.
+fn terms_of(action: &mut dyn ActionModel) -> Option<&mut HorizonTerms> {
+    Some(&mut knot_of(action)?.robot_mut().terms)
+}
+
+/// Access to the costs of robots, whatever the dynamics and integrator of a knot, under [`Constrained`](crate::Constrained)
+/// actions too.
+impl Problem {
+    /// Returns the cost called `name` of the model `index`, which all knots of that model share that have no costs of their
+    /// own; `None` if there is no such model or cost, or the model is not of a robot.
+    ///
+    /// ```
+    /// use condyle_dynamics::{Vec3, robots};
+    /// use condyle_optimal::Problem;
+    /// use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+    /// use std::sync::Arc;
+    /// let arm = Arc::new(robots::arm7());
+    /// let reach = Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.4, 0.2, 0.5) };
+    /// let costs = vec![Cost::new("reach", 1.0, reach, Activation::Quadratic)];
+    /// let knot = FreeDynamics::running(arm.clone(), 0.02, costs.clone())?;
+    /// let end = FreeDynamics::terminal(arm, costs)?;
+    /// let mut problem = Problem::new(vec![0.0; 14], vec![Box::new(knot)], vec![0; 20], Box::new(end))?;
+    /// problem.cost_mut(0, "reach").unwrap().set_target(Vec3::new(0.3, 0.2, 0.5))?;
+    /// # Ok::<(), condyle_optimal::Error>(())
+    /// ```
+    pub fn cost_mut(&mut self, index: usize, name: &str) -> Option<CostMut<'_>> {
+        terms_of(self.chosen(index)?)?.costs_mut(None).cost_mut(name)
+    }
+
+    /// Returns the cost called `name` of knot t, of the terminal one for t = N: the knot's own if it has costs of its own,
+    /// else that of its model, which other knots share; `None` if there is none.
+    ///
+    /// # Panics
+    /// If t > N.
+    #[track_caller]
+    pub fn cost_at_mut(&mut self, t: usize, name: &str) -> Option<CostMut<'_>> {
+        self.assert_knot(t);
+        let action = match self.stages().get(t) {
+            Some(&index) => self.chosen(index)?,
+            None => self.action_mut(t),
+        };
+        terms_of(action)?.costs_mut(Some(t)).cost_mut(name)
+    }
+
+    /// Calls a function with each cost called `name`: of all models, of knots with costs of their own, and of the terminal
+    /// one. Returns whether there is one.
+    ///
+    /// # Errors
+    /// The first error of the function; costs that it has changed before keep the change.
+    pub fn change_costs(
+        &mut self,
+        name: &str,
+        mut change: impl FnMut(&mut CostMut<'_>) -> Result<(), Error>,
+    ) -> Result<bool, Error> {
+        let (mut found, horizon) = (false, self.horizon());
+        for index in (0..self.model_count()).map(Some).chain([None]) {
+            let action = match index {
+                Some(index) => self.chosen(index),
+                None => Some(self.action_mut(horizon)),
+            };
+            let Some(terms) = action.and_then(terms_of) else { continue };
+            for mut cost in terms.all_costs_mut().filter_map(|costs| costs.cost_mut(name)) {
+                change(&mut cost)?;
+                found = true;
+            }
+        }
+        Ok(found)
+    }
+}

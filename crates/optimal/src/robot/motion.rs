@@ -1,0 +1,148 @@
+//! The motion of a robot at a knot: accelerations, efforts of joints, and forces of contacts.
+
+use super::contact::Contact;
+use super::dynamics::knots::knot_of;
+use crate::{Problem, Solution};
+use condyle_dynamics::{Data, Force, Mat3, Model, ReferenceFrame, Vec3, forward_kinematics};
+
+/// The accelerations, efforts and forces at a knot, at its beginning.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct KnotMotion {
+    /// The accelerations q̈. Shape: nv; empty at an impact.
+    pub acceleration: Vec<f64>,
+    /// The efforts τ of all joints (N, N m): S u, or where accelerations are controls those of inverse dynamics, which are 0 for
+    /// an undriven base up to the tolerance of the constraints. Shape: nv; empty at an impact and without a robot.
+    pub effort: Vec<f64>,
+    /// The jump of the velocities at an impact, v⁺ − v. Shape: nv; empty at other knots.
+    pub velocity_change: Vec<f64>,
+    /// The contacts of the knot, in the order in which the action was given them.
+    pub contacts: Vec<ContactForce>,
+}
+
+/// The force with which the world acts on a contact's body (N, N m); at an impact its impulse (N s, N m s). For a loop, that
+/// on the body of the constraint's first frame.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ContactForce {
+    /// The name of the contact.
+    pub name: String,
+    /// The number of the contact's frame in the robot.
+    pub frame: usize,
+    /// The force along the world's axes; its moment is about the frame's origin. Of a point it has no moment.
+    pub force: Force<f64>,
+    /// The same along the frame's own axes.
+    pub local: Force<f64>,
+}
+
+impl KnotMotion {
+    /// Returns the force of the contact called `name`; `None` if the knot has no such contact.
+    pub fn contact(&self, name: &str) -> Option<&ContactForce> {
+        self.contacts.iter().find(|contact| contact.name == name)
+    }
+
+    /// Returns whether the knot is an impact, whose forces are impulses.
+    pub fn is_impact(&self) -> bool {
+        !self.velocity_change.is_empty()
+    }
+}
+
+impl ContactForce {
+    /// The force of a contact from the numbers of its rows, at a pose of its frame with the axes R.
+    fn new(Contact { name, constraint }: &Contact, rows: &[f64], R: Mat3<f64>) -> Self {
+        let axes = constraint.axes;
+        let along = match *rows {
+            [n] => Force::new(axes * Vec3::new(0.0, 0.0, n), Vec3::zero()),
+            [t, n] => Force::new(axes * Vec3::new(t, 0.0, n), Vec3::zero()),
+            [x, y, z] => Force::new(Vec3::new(x, y, z), Vec3::zero()),
+            [x, y, z, l, m, n] => Force::new(Vec3::new(x, y, z), Vec3::new(l, m, n)),
+            _ => unreachable!("a contact has 1, 2, 3 or 6 rows, found {}", rows.len()),
+        };
+        let turned = |R: Mat3<f64>| Force::new(R * along.linear, R * along.angular);
+        let (force, local) = match constraint.reference {
+            ReferenceFrame::Local => (turned(R), along),
+            _ => (along, turned(R.transpose())),
+        };
+        Self { name: name.clone(), frame: constraint.frame, force, local }
+    }
+}
+
+/// The forces of some contacts at a position, from the numbers of all their rows.
+fn forces(model: &Model, contacts: &[Contact], rows: &[f64], q: &[f64]) -> Vec<ContactForce> {
+    if contacts.is_empty() {
+        return Vec::new();
+    }
+    let mut data = Data::new(model);
+    let placements = forward_kinematics(model, &mut data, q);
+    let mut rest = rows;
+    let force = |contact: &Contact| {
+        let (rows, others) = rest.split_at(contact.constraint.kind.rows());
+        rest = others;
+        ContactForce::new(contact, rows, placements.frame(contact.constraint.frame).rotation)
+    };
+    contacts.iter().map(force).collect()
+}
+
+/// Accelerations, efforts and contact forces of robots, whatever the dynamics and integrator of a knot, under
+/// [`Constrained`](crate::Constrained) actions too.
+impl Problem {
+    /// Computes the accelerations, efforts and contact forces of a solution at knot t, 0 to N; `None` where there are none: at
+    /// the end of a horizon, and for actions that are not of a robot and compute no accelerations. Allocates.
+    ///
+    /// The solution must be of this problem as it is now. After [`shift`](Self::shift), a solution of before belongs to other
+    /// knots.
+    ///
+    /// ```
+    /// use condyle_dynamics::robots;
+    /// use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
+    /// use condyle_optimal::{Fddp, Problem};
+    /// use std::sync::Arc;
+    /// let arm = Arc::new(robots::arm7());
+    /// let rest = Cost::new("rest", 1.0, Residual::State { reference: vec![0.1; 14] }, Activation::Quadratic);
+    /// let knot = FreeDynamics::running(arm.clone(), 0.02, vec![rest])?;
+    /// let end = FreeDynamics::terminal(arm, vec![])?;
+    /// let mut problem = Problem::new(vec![0.0; 14], vec![Box::new(knot)], vec![0; 5], Box::new(end))?;
+    /// let solution = Fddp::new(&problem).solve(&mut problem, &[0.0; 6 * 14], &[0.0; 5 * 7])?.clone();
+    /// let motion = problem.motion(&solution, 0).unwrap();
+    /// assert_eq!((motion.acceleration.len(), &motion.effort[..]), (7, solution.u(0)));
+    /// # Ok::<(), condyle_optimal::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If t > N, or the solution is of another horizon or has other dimensions there.
+    #[track_caller]
+    pub fn motion(&mut self, solution: &Solution, t: usize) -> Option<KnotMotion> {
+        self.assert_knot(t);
+        let (found, expected) = (solution.xs.len(), (self.horizon() + 1) * self.nx());
+        assert!(found == expected, "`solution.xs` has length {found}, expected {expected}");
+        let u = if t < self.horizon() { solution.u(t) } else { &[] };
+        self.motion_at(t, solution.x(t), u)
+    }
+
+    /// Computes as [`motion`](Self::motion) at a state x of knot t and its controls u: as many as the knot has, none at t = N.
+    ///
+    /// # Panics
+    /// If t > N, or x or u has a wrong length.
+    #[track_caller]
+    pub fn motion_at(&mut self, t: usize, x: &[f64], u: &[f64]) -> Option<KnotMotion> {
+        let (mut motion, mut rows) = (KnotMotion::default(), Vec::new());
+        self.outputs(t, x, u, &mut |name, numbers| match name {
+            "acceleration" => motion.acceleration = numbers.to_vec(),
+            "effort" => motion.effort = numbers.to_vec(),
+            name if name.starts_with("force/") => rows.extend_from_slice(numbers), // in the order of contacts
+            _ => {}
+        });
+        let action = self.action_mut(t);
+        if let Some(knot) = knot_of(action) {
+            let (model, is_impact) = (knot.robot().model.clone(), knot.robot().is_impact());
+            motion.contacts = forces(&model, knot.contacts(), &rows, &x[..model.nq()]);
+            if is_impact {
+                let mut next = x.to_vec();
+                action.calc(t, x, u, &mut next);
+                motion.velocity_change = (model.nq()..x.len()).map(|k| next[k] - x[k]).collect();
+            }
+        }
+        let nothing = motion.acceleration.is_empty() && !motion.is_impact();
+        (!nothing).then_some(motion)
+    }
+}

@@ -1,0 +1,244 @@
+//! Time budgets: what a delay does to a controller, and how the controller recovers.
+
+use condyle_optimal::{ActionModel, AugmentedLagrangian, Error, Fddp, LqNode, Problem, Solution, Status};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+/// Budget of each solve, and one delay, both long against an iteration of some µs and against what else the machine does.
+const BUDGET: Duration = Duration::from_millis(400);
+const DELAY: u64 = 900;
+/// A solve of this horizon takes several iterations from a new initial state.
+const HORIZON: usize = 30;
+/// The largest |x| that belongs to the closed loop; a rollout that diverges passes it by orders.
+const SANE: f64 = 50.0;
+
+/// An unstable pendulum, θ̈ = 3 sin θ + u, by Euler steps of 0.1: its state triples in 6 knots under a constant control.
+/// Sleeps, and breaks, in its derivatives once it is told to.
+#[derive(Clone)]
+struct Unstable {
+    nu: usize,
+    /// Milliseconds for which the next derivatives sleep.
+    delay: Arc<AtomicU64>,
+    /// Whether derivatives are NaN.
+    broken: Arc<AtomicU64>,
+}
+
+impl ActionModel for Unstable {
+    fn nx(&self) -> usize {
+        2
+    }
+    fn nu(&self) -> usize {
+        self.nu
+    }
+    fn calc(&mut self, _: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64 {
+        let u: f64 = u.iter().sum();
+        next[0] = x[0] + 0.1 * x[1];
+        next[1] = x[1] + 0.1 * (3.0 * x[0].sin() + u);
+        0.5 * (10.0 * x[0] * x[0] + x[1] * x[1] + 0.1 * u * u)
+    }
+    fn calc_diff(&mut self, _: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
+        let delay = self.delay.swap(0, Ordering::SeqCst);
+        if delay > 0 {
+            std::thread::sleep(Duration::from_millis(delay));
+        }
+        let factor = if self.broken.load(Ordering::SeqCst) > 0 { f64::NAN } else { 1.0 };
+        node.A.copy_from_slice(&[1.0, 0.3 * x[0].cos(), 0.1, 1.0]);
+        node.Q.copy_from_slice(&[10.0, 0.0, 0.0, 1.0]);
+        node.q.copy_from_slice(&[10.0 * x[0] * factor, x[1]]);
+        for i in 0..self.nu {
+            (node.B[(0, i)], node.B[(1, i)], node.R[(i, i)], node.r[i]) = (0.0, 0.1, 0.1, 0.1 * u[i]);
+            (node.S[(0, i)], node.S[(1, i)]) = (0.0, 0.0);
+        }
+    }
+    fn fork(&self) -> Option<Box<dyn ActionModel>> {
+        Some(Box::new(self.clone()))
+    }
+}
+
+/// Either solver.
+enum Solver {
+    Fddp(Box<Fddp>),
+    Constrained(Box<AugmentedLagrangian>),
+}
+
+impl Solver {
+    fn each(problem: &Problem) -> [Self; 2] {
+        [Self::Fddp(Box::new(Fddp::new(problem))), Self::Constrained(Box::new(AugmentedLagrangian::new(problem)))]
+    }
+    fn settings(&mut self) -> &mut condyle_optimal::Settings {
+        match self {
+            Self::Fddp(solver) => &mut solver.settings,
+            Self::Constrained(solver) => &mut solver.inner,
+        }
+    }
+    fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Solution {
+        match self {
+            Self::Fddp(solver) => solver.solve(problem, xs, us),
+            Self::Constrained(solver) => solver.solve(problem, xs, us),
+        }
+        .unwrap()
+        .clone()
+    }
+    fn resume(&mut self, problem: &mut Problem) -> Solution {
+        match self {
+            Self::Fddp(solver) => solver.resume(problem),
+            Self::Constrained(solver) => solver.resume(problem),
+        }
+        .unwrap()
+        .clone()
+    }
+    fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
+        problem.shift(0)?;
+        match self {
+            Self::Fddp(solver) => solver.shift(problem),
+            Self::Constrained(solver) => solver.shift(problem),
+        }
+    }
+    fn solution(&self) -> &Solution {
+        match self {
+            Self::Fddp(solver) => solver.solution(),
+            Self::Constrained(solver) => solver.solution(),
+        }
+    }
+    /// The iterations of all inner solves.
+    fn iterations(&self) -> usize {
+        match self {
+            Self::Fddp(solver) => solver.solution().trace.len(),
+            Self::Constrained(solver) => solver.outcome().iterations,
+        }
+    }
+}
+
+/// A controller that has solved once without a budget: plant, problem, solver.
+struct Loop {
+    plant: Unstable,
+    problem: Problem,
+    solver: Solver,
+    x: Vec<f64>,
+}
+
+impl Loop {
+    fn all() -> impl Iterator<Item = Self> {
+        [(0, 1), (0, 2), (1, 1), (1, 2)].into_iter().map(|(which, threads)| {
+            let plant = Unstable { nu: 1, delay: Arc::default(), broken: Arc::default() };
+            let end = Unstable { nu: 0, ..plant.clone() };
+            let x = vec![0.8, 0.0];
+            let mut problem =
+                Problem::new(x.clone(), vec![Box::new(plant.clone())], vec![0; HORIZON], Box::new(end)).unwrap();
+            let mut solver = Solver::each(&problem).into_iter().nth(which).unwrap();
+            solver.settings().threads = threads;
+            let first = solver.solve(&mut problem, &x.repeat(HORIZON + 1), &[0.0; HORIZON]);
+            assert_eq!(first.status, Status::Converged);
+            Self { plant, problem, solver, x }
+        })
+    }
+
+    /// A period: the plant moves by the plan, the horizon moves on, and the next plan is made.
+    fn step(&mut self) -> Solution {
+        let plan = self.solver.solution();
+        let u = plan.u(0)[0] + (0..2).map(|i| plan.K[0][(0, i)] * (self.x[i] - plan.x(0)[i])).sum::<f64>();
+        let mut next = vec![0.0; 2];
+        self.plant.calc(0, &self.x, &[u], &mut next);
+        next[1] += 0.02; // something pushes
+        self.x = next;
+        self.solver.shift(&mut self.problem).unwrap();
+        self.problem.set_x0(&self.x).unwrap();
+        self.solver.resume(&mut self.problem)
+    }
+}
+
+/// The largest entry of a trajectory.
+fn size(solution: &Solution) -> f64 {
+    solution.xs.iter().chain(&solution.us).fold(0.0, |most, x| most.max(x.abs()))
+}
+
+/// One delay makes one solve late, which says so; the solves after it are as before.
+#[test]
+fn a_controller_recovers_from_a_delay() {
+    for mut now in Loop::all() {
+        now.solver.settings().time_budget = Some(BUDGET);
+        for _ in 0..6 {
+            assert!(now.step().status == Status::Converged && now.solver.iterations() > 1);
+        }
+        now.plant.delay.store(DELAY, Ordering::SeqCst);
+        let late = now.step();
+        assert_eq!((late.status, late.trace.len()), (Status::TimeLimit, 1));
+        assert!(late.timings.overrun >= Duration::from_millis(DELAY) - BUDGET, "{:?}", late.timings);
+        for _ in 0..6 {
+            let next = now.step();
+            assert!(next.status == Status::Converged && now.solver.iterations() > 1, "{:?}", next.status);
+            assert_eq!(next.timings.overrun, Duration::ZERO);
+        }
+        assert!(now.x[0].abs() < 0.8);
+    }
+}
+
+/// A budget that is always too short still lets each solve make an iteration, which steers.
+#[test]
+fn a_budget_below_an_iteration_is_overrun() {
+    for mut now in Loop::all() {
+        now.solver.settings().time_budget = Some(Duration::from_nanos(1));
+        for _ in 0..60 {
+            let solution = now.step();
+            assert_eq!((solution.status, now.solver.iterations()), (Status::TimeLimit, 1));
+            assert!(solution.timings.overrun > Duration::ZERO && size(&solution) < SANE);
+        }
+        assert!(now.x[0].abs() < 0.1, "{:?}", now.x);
+    }
+}
+
+/// A budget of zero asks for no iteration. Horizons that only move on end in copies of their last state, so that a solve with
+/// time finds the same as one that begins afresh.
+#[test]
+fn horizons_stay_sane_without_iterations() {
+    for mut now in Loop::all() {
+        now.solver.settings().time_budget = Some(Duration::ZERO);
+        for _ in 0..4 * HORIZON {
+            let solution = now.solver.resume(&mut now.problem);
+            assert_eq!((solution.status, now.solver.iterations()), (Status::TimeLimit, 0));
+            assert_eq!(solution.timings.overrun, Duration::ZERO);
+            now.solver.shift(&mut now.problem).unwrap();
+            assert!(size(now.solver.solution()) < SANE);
+        }
+        // x_N follows from the last control once, and then is copied
+        let xs = &now.solver.solution().xs;
+        assert_eq!(xs[..2].repeat(HORIZON), xs[2..]);
+        now.solver.settings().time_budget = None;
+        let solution = now.solver.resume(&mut now.problem);
+        let fresh = Loop::all().next().unwrap();
+        assert_eq!(solution.status, Status::Converged);
+        assert!((solution.cost - fresh.solver.solution().cost).abs() < 1e-6, "{}", solution.cost);
+    }
+}
+
+/// Shifts in a row: the first rolls the last control out, the others copy.
+#[test]
+fn only_a_new_trajectory_is_rolled_out() {
+    for mut now in Loop::all() {
+        let solved = now.solver.solution().clone();
+        let mut next = [0.0; 2];
+        now.plant.calc(0, solved.x(HORIZON), solved.u(HORIZON - 1), &mut next);
+        now.solver.shift(&mut now.problem).unwrap();
+        assert_eq!(now.solver.solution().x(HORIZON), next);
+        now.solver.shift(&mut now.problem).unwrap();
+        assert_eq!(now.solver.solution().x(HORIZON), next);
+        assert_eq!(now.solver.solution().u(HORIZON - 1), solved.u(HORIZON - 1));
+    }
+}
+
+/// Solves that end as not finite leave the horizon sane, too.
+#[test]
+fn horizons_stay_sane_when_nothing_is_finite() {
+    for mut now in Loop::all() {
+        now.plant.broken.store(1, Ordering::SeqCst);
+        for _ in 0..2 * HORIZON {
+            now.solver.shift(&mut now.problem).unwrap();
+            let solution = now.solver.resume(&mut now.problem);
+            assert!(solution.status == Status::NotFinite && size(&solution) < SANE, "{:?}", solution.status);
+        }
+        now.plant.broken.store(0, Ordering::SeqCst);
+        let solution = now.solver.resume(&mut now.problem);
+        assert!(solution.status == Status::Converged && size(&solution) < SANE, "{:?}", solution.status);
+    }
+}
