@@ -23,12 +23,11 @@ pub use condyle_wholebody as wholebody;
 pub use condyle_dynamics::{nalgebra, num_dual, rand};
 
 pub use condyle_dynamics::{
-    Batch, Body, ConstraintSet, ContactConstraint, Data, Error as ModelError, Force, Frame, Inertia, Joint,
-    JointOptions, Limits, Model, ModelBuilder, Motion, Placements, ReferenceFrame, Scalar, Se3, Sym3, Vec3, WORLD, aba,
-    aba_derivatives, body_jacobian, constrained_dynamics, constrained_dynamics_derivatives, crba, difference,
-    forward_accelerations, forward_kinematics, forward_velocities, frame_jacobian, gradient, hessian, integrate,
-    jacobian, level, minv, neutral, nonlinear_effects, normalize, random_configuration, rnea, rnea_derivatives,
-    simulation,
+    Batch, ConstraintSet, ContactConstraint, Data, Error as ModelError, Force, Inertia, Joint, JointOptions, Limits,
+    Model, ModelBuilder, Motion, Placements, ReferenceFrame, Scalar, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives,
+    constrained_dynamics, constrained_dynamics_derivatives, crba, difference, forward_accelerations,
+    forward_kinematics, forward_velocities, frame_jacobian, gradient, hessian, integrate, jacobian, level, minv,
+    neutral, nonlinear_effects, normalize, random_configuration, rnea, rnea_derivatives, simulation,
 };
 #[cfg(feature = "loaders")]
 pub use condyle_dynamics::{MjcfOptions, SdfOptions, UrdfOptions, robots};
@@ -91,7 +90,7 @@ pub mod factors {
 
 /// Velocities and accelerations of bodies and frames.
 pub mod kinematics {
-    pub use condyle_dynamics::{Accelerations, Velocities};
+    pub use condyle_dynamics::{Accelerations, Velocities, body_jacobian};
 }
 
 /// Regressors of efforts and energies, and inertial parameters.
@@ -113,7 +112,7 @@ pub mod terms {
 
 /// Parts of a robot's description.
 pub mod tree {
-    pub use condyle_dynamics::{BodyId, FrameKind, FrameParent, Mimic, Warning};
+    pub use condyle_dynamics::{Body, BodyId, Frame, FrameKind, FrameParent, Mimic, Warning};
 }
 
 /// The Rust blocks of the book, as doctests.

@@ -98,12 +98,12 @@ fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize
 
 impl Model {
     /// A number for each joint that has coordinates of its own; 0 for the others.
-    fn of_joints(&self, get: impl Fn(&condyle::Body) -> usize) -> Vec<usize> {
-        let count = |(i, b): (usize, &condyle::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
+    fn of_joints(&self, get: impl Fn(&condyle::tree::Body) -> usize) -> Vec<usize> {
+        let count = |(i, b): (usize, &condyle::tree::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
         self.inner.bodies().iter().enumerate().map(count).collect()
     }
 
-    fn of_bodies<T>(&self, get: impl FnMut(&condyle::Body) -> T) -> Vec<T> {
+    fn of_bodies<T>(&self, get: impl FnMut(&condyle::tree::Body) -> T) -> Vec<T> {
         self.inner.bodies().iter().map(get).collect()
     }
 
@@ -353,7 +353,7 @@ impl Model {
     fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Mimics, || {
             let class = class!(py, "Mimic")?;
-            let mimic = |b: &condyle::Body| b.mimic.map(|m| class.call1((m.ratio, m.offset))).transpose();
+            let mimic = |b: &condyle::tree::Body| b.mimic.map(|m| class.call1((m.ratio, m.offset))).transpose();
             self.inner.bodies().iter().map(mimic).collect()
         })
     }
@@ -430,7 +430,7 @@ impl Model {
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Frames, || {
             let class = class!(py, "Frame")?;
-            let frame = |f: &condyle::Frame| {
+            let frame = |f: &condyle::tree::Frame| {
                 let kind = match f.kind {
                     FrameKind::Link => "link",
                     FrameKind::Joint => "joint",

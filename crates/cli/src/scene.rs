@@ -56,7 +56,7 @@ pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool)
             _ => _ = shapes.insert(body, bones),
         }
     }
-    let body = |(i, b): (usize, &condyle::Body)| Body {
+    let body = |(i, b): (usize, &condyle::tree::Body)| Body {
         name: b.name.clone(),
         parent: if i == 0 { -1 } else { b.parent as isize },
         shapes: shapes.remove(&i).unwrap_or_default(),

@@ -57,7 +57,7 @@ pub(super) struct Position {
 impl Chart {
     pub(super) fn new(model: &Model) -> Self {
         let own = model.bodies().iter().skip(1).filter(|body| body.mimic.is_none());
-        let group = |body: &condyle::Body| {
+        let group = |body: &condyle::tree::Body| {
             let (q, v) = (body.idx_q..body.idx_q + body.joint.nq(), body.idx_v..body.idx_v + body.joint.nv());
             Group { joint: body.joint, q, v }
         };
