@@ -2,8 +2,11 @@
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, constrained_dynamics, constrained_dynamics_derivatives,
-    constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, impulse_dynamics,
-    impulse_dynamics_derivatives, random_configuration, robots,
+    constraints::{
+        constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, impulse_dynamics,
+        impulse_dynamics_derivatives,
+    },
+    random_configuration, robots,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;

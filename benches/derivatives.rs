@@ -17,8 +17,11 @@
 //! ∂τ and λᵀ∂²τ grow as O(n · depth), until n² zeros have to be written. So does ∂q̈ on chains, where it is solved for; on
 //! other trees it is a product, as what λᵀ∂²q̈ has beside λᵀ∂²τ is everywhere, and grows faster.
 use condyle::{
-    BodyId, Data, Inertia, Joint, LaneJacobian, Mat3, Model, ModelBuilder, Scalar, Se3, StateFunction, Sym3, Vec3,
-    WORLD, aba, aba_derivatives, aba_hessian, integrate, random_configuration, rnea, rnea_derivatives, rnea_hessian,
+    Data, Inertia, Joint, Model, ModelBuilder, Scalar, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives,
+    derivatives::{LaneJacobian, StateFunction, aba_hessian, rnea_hessian},
+    integrate, random_configuration, rnea, rnea_derivatives,
+    spatial::Mat3,
+    tree::BodyId,
 };
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};

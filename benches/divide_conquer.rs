@@ -8,8 +8,8 @@
 //! than eight processors for a chain.
 
 use condyle::{
-    BodyId, Data, DivideConquer, Inertia, Joint, Mat3, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, aba,
-    random_configuration, robots,
+    Data, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, aba, divide_conquer::DivideConquer,
+    random_configuration, robots, spatial::Mat3, tree::BodyId,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;

@@ -2,10 +2,12 @@
 //! `cargo bench --bench dynamics`.
 
 use condyle::{
-    Data, Model, aba, aba_derivatives, centroidal_map, centroidal_map_rate, compute_all_terms, coriolis_matrix, crba,
-    forward_accelerations, forward_kinematics, forward_velocities, joint_torque_regressor, kinetic_energy_regressor,
-    minv, nonlinear_effects, potential_energy_regressor, random_configuration, rnea, rnea_derivatives, robots,
-    static_torque,
+    Data, Model, aba, aba_derivatives,
+    centroidal::{centroidal_map, centroidal_map_rate},
+    crba, forward_accelerations, forward_kinematics, forward_velocities, minv, nonlinear_effects, random_configuration,
+    regressors::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor},
+    rnea, rnea_derivatives, robots,
+    terms::{compute_all_terms, coriolis_matrix, static_torque},
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;

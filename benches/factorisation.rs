@@ -10,8 +10,11 @@
 #![allow(non_snake_case)]
 
 use condyle::{
-    BodyId, Cholesky, Data, ForwardDynamicsMethod, Inertia, Joint, Ltdl, Mat3, Model, ModelBuilder, Se3, Sym3, Vec3,
-    WORLD, crba, forward_dynamics, minv, random_configuration, robots,
+    Data, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, crba,
+    factors::{Cholesky, ForwardDynamicsMethod, Ltdl, forward_dynamics},
+    minv, random_configuration, robots,
+    spatial::Mat3,
+    tree::BodyId,
 };
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::DMatrix;

@@ -3,7 +3,9 @@
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Se3, WORLD, constrained_dynamics,
-    constrained_dynamics_derivatives, impulse_dynamics, impulse_dynamics_derivatives, random_configuration, robots,
+    constrained_dynamics_derivatives,
+    constraints::{impulse_dynamics, impulse_dynamics_derivatives},
+    random_configuration, robots,
 };
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};

@@ -6,15 +6,114 @@ mod error;
 #[cfg(all(feature = "optimal", feature = "wholebody"))]
 mod plan;
 
-pub use condyle_dynamics::Error as ModelError;
-pub use condyle_dynamics::*;
+pub use error::Error;
+#[cfg(all(feature = "optimal", feature = "wholebody"))]
+pub use plan::plan_of;
+
+/// Models and algorithms, all in one module. The names used most are at the top of this crate, the others in modules by theme.
+#[doc(no_inline)]
+pub use condyle_dynamics as dynamics;
 #[cfg(feature = "optimal")]
 pub use condyle_optimal as optimal;
 #[cfg(feature = "wholebody")]
 pub use condyle_wholebody as wholebody;
-pub use error::Error; // in place of that of dynamics
-#[cfg(all(feature = "optimal", feature = "wholebody"))]
-pub use plan::plan_of;
+
+/// Versions of other crates whose types are part of the public interface.
+#[doc(no_inline)]
+pub use condyle_dynamics::{nalgebra, num_dual, rand};
+
+pub use condyle_dynamics::{
+    Batch, ConstraintSet, ContactConstraint, Data, Error as ModelError, Force, Inertia, Joint, JointOptions, Limits,
+    Model, ModelBuilder, Motion, Placements, ReferenceFrame, Scalar, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives,
+    constrained_dynamics, constrained_dynamics_derivatives, crba, difference, forward_accelerations,
+    forward_kinematics, forward_velocities, frame_jacobian, gradient, hessian, integrate, jacobian, level, minv,
+    neutral, nonlinear_effects, normalize, random_configuration, rnea, rnea_derivatives, simulation,
+};
+#[cfg(feature = "loaders")]
+pub use condyle_dynamics::{MjcfOptions, SdfOptions, UrdfOptions, robots};
+
+/// Results of a [`Batch`] of states.
+pub mod batch {
+    pub use condyle_dynamics::{
+        BatchAbaDerivatives, BatchAbaHessian, BatchAccelerationDerivatives, BatchAllTerms, BatchCentroidalDerivatives,
+        BatchCentroidalMap, BatchCentroidalMapRate, BatchConstrained, BatchConstrainedDerivatives,
+        BatchConstrainedEquations, BatchConstraints, BatchCoriolisDerivatives, BatchEnergyDerivatives, BatchImpulse,
+        BatchImpulseDerivatives, BatchNumber, BatchRneaDerivatives, BatchRneaHessian, BatchWriter, Matrices, Poses,
+        StateMatrix,
+    };
+}
+
+/// Centroidal momentum, its map and their derivatives.
+pub mod centroidal {
+    pub use condyle_dynamics::{
+        CentroidalDerivatives, CentroidalMap, CentroidalMapRate, centroidal_derivatives, centroidal_map,
+        centroidal_map_rate,
+    };
+}
+
+/// Positions on the joints' groups: Jacobians of ⊕ and ⊖, distances, interpolation.
+pub mod configuration {
+    pub use condyle_dynamics::{
+        DifferenceArgument, IntegrateArgument, difference_jacobian, distance, integrate_jacobian, interpolate,
+        transport,
+    };
+}
+
+/// Impacts, inverse dynamics under constraints, and the types of constraints and results.
+pub mod constraints {
+    pub use condyle_dynamics::{
+        Constrained, ConstrainedDerivatives, ConstrainedEquations, ConstrainedInverse, ConstrainedInverseDerivatives,
+        ConstraintKind, Impulse, ImpulseDerivatives, Proximal, Target, constrained_dynamics_equations,
+        constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, impulse_dynamics,
+        impulse_dynamics_derivatives,
+    };
+}
+
+/// Results of derivatives, second derivatives, and derivatives of other terms.
+pub mod derivatives {
+    pub use condyle_dynamics::{
+        AbaDerivatives, AbaHessian, CoriolisDerivatives, EnergyDerivatives, Input, LaneJacobian, RneaDerivatives,
+        RneaHessian, RneaSecondDerivatives, StateFunction, aba_hessian, coriolis_derivatives, energy_derivatives,
+        passive_torque_derivative, rnea_hessian, rnea_second_derivatives, static_torque_derivative,
+    };
+}
+
+/// Forward dynamics by divide and conquer, for chains of hundreds of bodies on several threads.
+pub mod divide_conquer {
+    pub use condyle_dynamics::{AssemblySize, DivideConquer};
+}
+
+/// Factors of the inertia matrix, and forward dynamics by them.
+pub mod factors {
+    pub use condyle_dynamics::{Cholesky, ColumnTree, ForwardDynamicsMethod, Ltdl, forward_dynamics};
+}
+
+/// Velocities and accelerations of bodies and frames.
+pub mod kinematics {
+    pub use condyle_dynamics::{Accelerations, Velocities, body_jacobian};
+}
+
+/// Regressors of efforts and energies, and inertial parameters.
+pub mod regressors {
+    pub use condyle_dynamics::{
+        inertial_parameters, joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor,
+    };
+}
+
+/// Rotations, exponentials and logarithms, dense matrices, and the traits of spatial algebra.
+pub mod spatial {
+    pub use condyle_dynamics::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Matrix, Quaternion, lie};
+}
+
+/// Coriolis, gravity and passive efforts, and all terms in one pass.
+pub mod terms {
+    pub use condyle_dynamics::{AllTerms, compute_all_terms, coriolis_matrix, gravity, passive_torque, static_torque};
+}
+
+/// Parts of a robot's description.
+pub mod tree {
+    pub use condyle_dynamics::{Body, BodyId, Frame, FrameKind, FrameParent, Mimic, Warning};
+}
 
 /// The Rust blocks of the book, as doctests.
 #[cfg(doctest)]

@@ -4,7 +4,7 @@
 //! numbers come in; Newton's method with the exact Hessian then needs a handful of steps.
 #![allow(non_snake_case)]
 
-use condyle::{Data, Error, Model, Scalar, Vec3, forward_kinematics, gravity, hessian, integrate, robots};
+use condyle::{Data, Error, Model, Scalar, Vec3, forward_kinematics, hessian, integrate, robots, terms::gravity};
 
 /// ½ (|p(q) − target|² + 1e-4 |g(q)|² + 1e-2 |q − q₀|²), in m², (N m)² and rad².
 fn cost<S: Scalar>(arm: &Model, data: &mut Data<S>, tool: usize, q: &[S]) -> S {

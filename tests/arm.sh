@@ -34,8 +34,8 @@ run() {
     "${cargo[@]}" test --locked --target $target "${packages[@]/#/--package=condyle-}" "$@"
 }
 
-# registers and packers; dense kernels; batches and limbs, but for how much memory they take; in `./test full` sweeps too
-run --test vectors --test sin_cos --test kernels --test tree ${CONDYLE_FULL:+--test lqr} -- --skip memory_by_state
+# registers and packers; dense kernels; batches, limbs and products of all results, except how much memory they take; in `./test full` sweeps too
+run --test vectors --test products --test sin_cos --test kernels --test tree ${CONDYLE_FULL:+--test lqr} -- --skip memory_by_state
 checked=vectors
 if [ -n "${CONDYLE_FULL:-}" ]; then
     # knots side by side, but for derivatives that are differences of thousands of calls

@@ -117,7 +117,8 @@ class Ours:
     def settings(self, solver):
         """What our solver is told to do as Crocoddyl's of this name does."""
         spec = self.spec
-        settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box"), "project_warm_start": False}
+        settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
+        settings["project_warm_start"] = False  # Crocoddyl keeps a start outside of the bounds
         if spec["init_reg"] is not None:
             settings["regularisation_start"] = spec["init_reg"]
         if spec["th_stop"] is not None:

@@ -10,8 +10,9 @@
 //! `batch` there are those of batches alone, and the least instead of the median: see `python.py`.
 
 use condyle::{
-    Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, aba_hessian, crba, integrate, minv, rnea,
-    rnea_derivatives, rnea_hessian,
+    Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, crba,
+    derivatives::{aba_hessian, rnea_hessian},
+    integrate, minv, rnea, rnea_derivatives,
 };
 use num_dual::Dual64;
 use std::hint::black_box;

@@ -3,7 +3,7 @@
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Force, Model, ReferenceFrame, Vec3, constrained_dynamics,
-    forward_kinematics, impulse_dynamics, integrate,
+    constraints::impulse_dynamics, forward_kinematics, integrate,
 };
 
 /// How fast a held foot's drift decays (1/s).

@@ -4,7 +4,7 @@ use condyle::optimal::robot::{
     Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, ImpulseDynamics, Residual, WrenchCone,
 };
 use condyle::optimal::{ActionModel, Error, Fddp, Iteration, Problem, Solution};
-use condyle::{ContactConstraint, Data, Mat3, Model, ReferenceFrame, Se3, Vec3, forward_kinematics};
+use condyle::{ContactConstraint, Data, Model, ReferenceFrame, Se3, Vec3, forward_kinematics, spatial::Mat3};
 use std::sync::Arc;
 
 const FRICTION: f64 = 0.7;

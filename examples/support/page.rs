@@ -1,7 +1,7 @@
 //! A page that plays a motion, from the parts of the page of `condyle plan`.
 
 use condyle::optimal::Solution;
-use condyle::{Data, Model, Quaternion, Se3, forward_kinematics};
+use condyle::{Data, Model, Se3, forward_kinematics, spatial::Quaternion};
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -36,7 +36,7 @@ fn bodies(model: &Model, feet: &[&str]) -> Vec<Value> {
     for foot in model.frames().iter().filter(|frame| feet.contains(&frame.name.as_str())) {
         bone(foot.body, foot.placement.translation.to_array(), 0.015);
     }
-    let body = |(k, body): (usize, &condyle::Body)| {
+    let body = |(k, body): (usize, &condyle::tree::Body)| {
         let parent = if k == 0 { -1 } else { body.parent as isize };
         json!({"name": body.name, "parent": parent, "shapes": core::mem::take(&mut shapes[k])})
     };
@@ -45,10 +45,10 @@ fn bodies(model: &Model, feet: &[&str]) -> Vec<Value> {
 
 /// The worst knot of each joint and quantity that leaves its limits.
 fn violations(
-    joints: &[&condyle::Body],
+    joints: &[&condyle::tree::Body],
     name: &str,
     values: &[Vec<f64>],
-    limits: &dyn Fn(&condyle::Body) -> [f64; 2],
+    limits: &dyn Fn(&condyle::tree::Body) -> [f64; 2],
 ) -> Vec<Value> {
     let mut found = Vec::new();
     for (k, body) in joints.iter().enumerate() {
@@ -80,7 +80,7 @@ pub(crate) fn write(
     let joints: Vec<_> = model.bodies()[1..].iter().filter(|body| body.joint.nv() == 1).collect();
     let limits = model.limits();
     let finite = |x: f64| x.is_finite().then_some(x);
-    let joint = |body: &&condyle::Body| {
+    let joint = |body: &&condyle::tree::Body| {
         json!({
             "name": body.joint_name,
             "unit": if matches!(body.joint, condyle::Joint::Prismatic { .. }) { "m" } else { "rad" },
@@ -89,7 +89,7 @@ pub(crate) fn write(
         })
     };
     let passive = model.nv() - joints.len();
-    let series = |knots: &[usize], value: &dyn Fn(usize, &condyle::Body) -> f64| -> Vec<Vec<f64>> {
+    let series = |knots: &[usize], value: &dyn Fn(usize, &condyle::tree::Body) -> f64| -> Vec<Vec<f64>> {
         knots.iter().map(|&t| joints.iter().map(|body| value(t, body)).collect()).collect()
     };
     let mut data = Data::new(model);

@@ -2403,8 +2403,8 @@ class AugmentedLagrangian:
         `max_solves`: the number of inner solves at most.
         `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
         factor by which it rises.
-        `restart`: whether a `solve` that is not finite, or violates limits at the largest penalty, begins once more, from the
-        initial state held still at all knots (default: yes). The better result counts.
+        `restart`: whether a `solve` with limits or bounds that is not finite, or violates limits at the largest penalty, begins
+        once more, from the initial state held still at all knots (default: yes). The better result counts.
 
     >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()

@@ -6,7 +6,7 @@ use crate::arrays::{Give, Number, Symmetric, give_named};
 use crate::functions::{any, functions, regular};
 use pyo3::prelude::*;
 
-impl<S: Number> Give for condyle::RneaDerivatives<'_, S> {
+impl<S: Number> Give for condyle::derivatives::RneaDerivatives<'_, S> {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let dtau_da = Symmetric(self.dtau_da);
         give_named!(py, out, "RneaDerivatives", {
@@ -15,7 +15,7 @@ impl<S: Number> Give for condyle::RneaDerivatives<'_, S> {
     }
 }
 
-impl<S: Number> Give for condyle::AbaDerivatives<'_, S> {
+impl<S: Number> Give for condyle::derivatives::AbaDerivatives<'_, S> {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let da_dtau = Symmetric(self.da_dtau);
         give_named!(py, out, "AbaDerivatives", {
@@ -72,7 +72,7 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> One { 
 fn forward_dynamics(model, data;
     q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None, method: MethodOf = None; out) {
     regular(model)?;
-    condyle::forward_dynamics(model, data, &q, &v, &tau, &f_ext, method)
+    condyle::factors::forward_dynamics(model, data, &q, &v, &tau, &f_ext, method)
 }
 batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; method: MethodOf) -> One {
     b.forward_dynamics(model, q, v, tau, f_ext, method)
@@ -122,7 +122,7 @@ batch b: any(q: Position, v: Tangent) -> One { b.nonlinear_effects(model, q, v) 
 /// >>> bool(abs(g[2] - 9.81 * quadruped.total_mass) < 1e-9)  # the base carries the weight
 /// True
 fn gravity(model, data; q: Position; out) {
-    condyle::gravity(model, data, &q)
+    condyle::terms::gravity(model, data, &q)
 }
 batch b: any(q: Position) -> One { b.gravity(model, q) }
 
@@ -130,7 +130,7 @@ batch b: any(q: Position) -> One { b.gravity(model, q) }
 ///
 /// q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
 fn static_torque(model, data; q: Position, f_ext: Forces = None; out) {
-    condyle::static_torque(model, data, &q, &f_ext)
+    condyle::terms::static_torque(model, data, &q, &f_ext)
 }
 batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque(model, q, f_ext) }
 
@@ -144,7 +144,7 @@ batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque(model, q, f_ex
 /// >>> np.allclose(condyle.coriolis_matrix(arm, data, q, v) @ v, h - g)
 /// True
 fn coriolis_matrix(model, data; q: Position, v: Tangent; out) {
-    condyle::coriolis_matrix(model, data, &q, &v)
+    condyle::terms::coriolis_matrix(model, data, &q, &v)
 }
 batch b: any(q: Position, v: Tangent) -> One { b.coriolis_matrix(model, q, v) }
 

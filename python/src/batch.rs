@@ -8,7 +8,7 @@
 use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
 use crate::hyper_dual;
 use crate::signals::{self, Signals};
-use condyle::{Batch, BatchWriter, Force, Scalar};
+use condyle::{Batch, Force, Scalar, batch::BatchWriter};
 use numpy::{Ix2, PyArrayDescrMethods, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::intern;

@@ -5,7 +5,10 @@ use crate::exceptions::{exception, wrong_word};
 use crate::inertial_parameters::read_inertia;
 use crate::joint::Joint;
 use crate::model::Model;
-use condyle::{FrameKind, Inertia, JointOptions, Mimic, Se3};
+use condyle::{
+    Inertia, JointOptions, Se3,
+    tree::{FrameKind, Mimic},
+};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -14,7 +17,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// The identity of a body in a builder, as `ModelBuilder.body` and others return it. `WORLD` is always there.
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct BodyId {
-    inner: condyle::BodyId,
+    inner: condyle::tree::BodyId,
     /// The number of its builder; none for the world.
     builder: Option<u64>,
 }
@@ -74,7 +77,7 @@ impl ModelBuilder {
         self.inner.as_mut().ok_or_else(|| PyRuntimeError::new_err("the model is built; make another builder"))
     }
 
-    fn body_of(&self, argument: &str, body: &Bound<'_, BodyId>) -> PyResult<condyle::BodyId> {
+    fn body_of(&self, argument: &str, body: &Bound<'_, BodyId>) -> PyResult<condyle::tree::BodyId> {
         let BodyId { inner, builder } = body.get();
         if builder.is_none_or(|number| number == self.number) {
             return Ok(*inner);
@@ -82,7 +85,7 @@ impl ModelBuilder {
         Err(PyValueError::new_err(format!("{argument}: a body of another builder")))
     }
 
-    fn added(&self, body: condyle::BodyId) -> BodyId {
+    fn added(&self, body: condyle::tree::BodyId) -> BodyId {
         BodyId { inner: body, builder: Some(self.number) }
     }
 }

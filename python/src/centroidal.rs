@@ -45,7 +45,7 @@ batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.com_acceleration(mo
 ///
 /// q: nq numbers. It is a part of `centroidal_map`.
 fn com_jacobian(model, data; q: Position; out) {
-    condyle::centroidal_map(model, data, &q).Jcom
+    condyle::centroidal::centroidal_map(model, data, &q).Jcom
 }
 batch b: any(q: Position) -> One { b.com_jacobian(model, q) }
 
@@ -60,7 +60,7 @@ batch b: any(q: Position) -> One { b.com_jacobian(model, q) }
 /// >>> bool(abs(map.Ag[0, 0] - quadruped.total_mass) < 1e-9)  # pushed forwards, all goes forwards
 /// True
 fn centroidal_map(model, data; q: Position; out) {
-    condyle::centroidal_map(model, data, &q)
+    condyle::centroidal::centroidal_map(model, data, &q)
 }
 batch b: any(q: Position) -> Named("CentroidalMap") { b.centroidal_map(model, q) }
 
@@ -70,7 +70,7 @@ batch b: any(q: Position) -> Named("CentroidalMap") { b.centroidal_map(model, q)
 /// q: nq numbers; v: nv. Bodies fixed to the world do not count. The results are not numbers if no moving body has a
 /// mass. out: seven arrays, such as an earlier result.
 fn centroidal_map_rate(model, data; q: Position, v: Tangent; out) {
-    condyle::centroidal_map_rate(model, data, &q, &v)
+    condyle::centroidal::centroidal_map_rate(model, data, &q, &v)
 }
 batch b: any(q: Position, v: Tangent) -> Named("CentroidalMapRate") { b.centroidal_map_rate(model, q, v) }
 
@@ -132,7 +132,7 @@ batch b: any(q: Position, v: Tangent) -> One { b.mechanical_energy(model, q, v) 
 /// >>> terms.M.shape, terms.h.shape, terms.centroidal.Ag.shape
 /// ((7, 7), (7,), (6, 7))
 fn compute_all_terms(model, data; q: Position, v: Tangent) {
-    condyle::compute_all_terms(model, data, &q, &v)
+    condyle::terms::compute_all_terms(model, data, &q, &v)
 }
 batch b: any(q: Position, v: Tangent) -> AllTerms { b.compute_all_terms(model, q, v) }
 }

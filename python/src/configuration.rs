@@ -4,7 +4,10 @@ use crate::arrays::{Computed, Give};
 use crate::exceptions::wrong_word;
 use crate::functions::functions;
 use crate::model::Model;
-use condyle::{DifferenceArgument, IntegrateArgument, Scalar};
+use condyle::{
+    Scalar,
+    configuration::{DifferenceArgument, IntegrateArgument},
+};
 use nalgebra::DMatrix;
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
@@ -65,21 +68,21 @@ each(q0: Position, q1: Position) -> [nv] |v| { condyle::difference(model, q0, q1
 /// array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
 fn interpolate(model; q0: Position, q1: Position, t: Real; out) {
     let (mut tangent, mut q) = (vec![Scalar::zero(); model.nv()], vec![Scalar::zero(); model.nq()]);
-    condyle::interpolate(model, &q0, &q1, t, &mut tangent, &mut q);
+    condyle::configuration::interpolate(model, &q0, &q1, t, &mut tangent, &mut q);
     q
 }
 each(q0: Position, q1: Position; t: Real) -> [nq] |q| {
-    condyle::interpolate(model, q0, q1, t, &mut vec![0.0; model.nv()], q)
+    condyle::configuration::interpolate(model, q0, q1, t, &mut vec![0.0; model.nv()], q)
 }
 
 /// The distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) count alike.
 ///
 /// q0, q1: nq numbers.
 fn distance(model; q0: Position, q1: Position) {
-    condyle::distance(model, &q0, &q1, &mut vec![Scalar::zero(); model.nv()])
+    condyle::configuration::distance(model, &q0, &q1, &mut vec![Scalar::zero(); model.nv()])
 }
 each(q0: Position, q1: Position) -> [] |to| {
-    to[0] = condyle::distance(model, q0, q1, &mut vec![0.0; model.nv()])
+    to[0] = condyle::configuration::distance(model, q0, q1, &mut vec![0.0; model.nv()])
 }
 
 /// The position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument itself
@@ -116,7 +119,7 @@ each(q: Scalable) -> [nq] |to| {
 /// True
 fn transport(model; v: Tangent, X: Tangents; out) {
     let mut moved = X;
-    condyle::transport(model, &v, &mut moved);
+    condyle::configuration::transport(model, &v, &mut moved);
     moved
 }
 
@@ -130,7 +133,7 @@ fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
         other => return Err(wrong_word("argument", "'position' or 'velocity'", other)),
     };
     let mut J = DMatrix::from_element(model.nv(), model.nv(), condyle::Scalar::zero());
-    condyle::integrate_jacobian(model, &v, argument, &mut J);
+    condyle::configuration::integrate_jacobian(model, &v, argument, &mut J);
     J
 }
 
@@ -145,7 +148,7 @@ fn difference_jacobian(model; d: Tangent, argument: Word; out) {
         other => return Err(wrong_word("argument", "'from' or 'to'", other)),
     };
     let mut J = DMatrix::from_element(model.nv(), model.nv(), condyle::Scalar::zero());
-    condyle::difference_jacobian(model, &d, argument, &mut J);
+    condyle::configuration::difference_jacobian(model, &d, argument, &mut J);
     J
 }
 }

@@ -7,7 +7,10 @@ use crate::functions::{Argument, Reference, functions, regular};
 use crate::hyper_dual::Hyper;
 use crate::made_for::MadeFor;
 use crate::model::{Model, frame_index, members_of};
-use condyle::{ContactConstraint, Motion, Proximal, Scalar, Target};
+use condyle::{
+    ContactConstraint, Motion, Scalar,
+    constraints::{Proximal, Target},
+};
 use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -101,7 +104,7 @@ pub(crate) struct ConstraintSet {
     /// The set for hyper-dual numbers, made when it is first needed after the targets changed.
     dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
     /// The sets for the lanes of a batch, made when they are first needed.
-    lanes: Option<Box<condyle::BatchConstraints>>,
+    lanes: Option<Box<condyle::batch::BatchConstraints>>,
     /// The constraints with their present targets.
     constraints: Vec<ContactConstraint>,
     nv: usize,
@@ -123,7 +126,7 @@ impl ConstraintSet {
         &mut self,
         batch: &condyle::Batch,
         model: &condyle::Model,
-    ) -> PyResult<&mut condyle::BatchConstraints> {
+    ) -> PyResult<&mut condyle::batch::BatchConstraints> {
         let fitting = self.lanes.take().filter(|lanes| lanes.fits(batch));
         let lanes = match fitting {
             Some(lanes) => lanes,
@@ -314,7 +317,7 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 fn constrained_dynamics_equations(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None; out) {
     regular(model)?;
-    condyle::constrained_dynamics_equations(model, data, constraints, &q, &v, &tau, &f_ext)
+    condyle::constraints::constrained_dynamics_equations(model, data, constraints, &q, &v, &tau, &f_ext)
 }
 batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> Named("ConstrainedEquations") {
     b.constrained_dynamics_equations(model, constraints, q, v, tau, f_ext)
@@ -335,7 +338,7 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
 fn impulse_dynamics(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, restitution: Coefficient = 0.0; out) {
     regular(model)?;
-    condyle::impulse_dynamics(model, data, constraints, &q, &v, Scalar::splat(restitution))
+    condyle::constraints::impulse_dynamics(model, data, constraints, &q, &v, Scalar::splat(restitution))
 }
 batch b, constraints: regular(q: Position, v: Tangent; restitution: Coefficient) -> Named("Impulse") {
     b.impulse_dynamics(model, constraints, q, v, restitution)
@@ -355,7 +358,7 @@ batch b, constraints: regular(q: Position, v: Tangent; restitution: Coefficient)
 fn impulse_dynamics_derivatives(model, data, constraints: ConstraintSet;
     q: Position, v: Tangent, restitution: Coefficient = 0.0; out) {
     regular(model)?;
-    condyle::impulse_dynamics_derivatives(model, data, constraints, &q, &v, Scalar::splat(restitution))
+    condyle::constraints::impulse_dynamics_derivatives(model, data, constraints, &q, &v, Scalar::splat(restitution))
 }
 batch b, constraints: regular(q: Position, v: Tangent; restitution: Coefficient) -> Named("ImpulseDerivatives") {
     b.impulse_dynamics_derivatives(model, constraints, q, v, restitution)

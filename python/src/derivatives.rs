@@ -3,7 +3,7 @@
 use crate::arrays::{Array, Number, named_tuples};
 use crate::functions::{any, functions, regular};
 use crate::kinematics::motions;
-use condyle::{RneaSecondDerivatives, Scalar};
+use condyle::{Scalar, derivatives::RneaSecondDerivatives};
 use nalgebra::DMatrix;
 use pyo3::prelude::*;
 
@@ -86,7 +86,7 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; wrt: Inpu
 /// >>> np.allclose(hessian.dqdq, hessian.dqdq.T)
 /// True
 fn rnea_hessian(model, data; q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
-    condyle::rnea_hessian(model, data, &q, &v, &a, &f_ext, &lambda_)
+    condyle::derivatives::rnea_hessian(model, data, &q, &v, &a, &f_ext, &lambda_)
 }
 batch b: any(q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Forces) -> Named("RneaHessian") {
     b.rnea_hessian(model, q, v, a, f_ext, lambda_)
@@ -99,7 +99,7 @@ batch b: any(q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Force
 /// derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
 fn aba_hessian(model, data; q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
     regular(model)?;
-    condyle::aba_hessian(model, data, &q, &v, &tau, &f_ext, &lambda_)
+    condyle::derivatives::aba_hessian(model, data, &q, &v, &tau, &f_ext, &lambda_)
 }
 batch b: regular(q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext: Forces) -> Named("AbaHessian") {
     b.aba_hessian(model, q, v, tau, f_ext, lambda_)
@@ -119,7 +119,7 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext:
 /// True
 fn rnea_second_derivatives(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; out) {
     let mut tensors = RneaSecondDerivatives::new(model);
-    condyle::rnea_second_derivatives(model, data, &q, &v, &a, &f_ext, &mut tensors);
+    condyle::derivatives::rnea_second_derivatives(model, data, &q, &v, &a, &f_ext, &mut tensors);
     tensors
 }
 batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> Named("RneaSecondDerivatives") {
@@ -177,7 +177,7 @@ functions! {
 /// >>> np.allclose(d.drate_da, condyle.centroidal_map(quadruped, data, q).Ag)
 /// True
 fn centroidal_derivatives(model, data; q: Position, v: Tangent, a: Tangent; out) {
-    condyle::centroidal_derivatives(model, data, &q, &v, &a)
+    condyle::centroidal::centroidal_derivatives(model, data, &q, &v, &a)
 }
 batch b: any(q: Position, v: Tangent, a: Tangent) -> Named("CentroidalDerivatives") {
     b.centroidal_derivatives(model, q, v, a)
@@ -188,7 +188,7 @@ batch b: any(q: Position, v: Tangent, a: Tangent) -> Named("CentroidalDerivative
 ///
 /// q: nq numbers; v: nv.
 fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
-    condyle::energy_derivatives(model, data, &q, &v)
+    condyle::derivatives::energy_derivatives(model, data, &q, &v)
 }
 batch b: any(q: Position, v: Tangent) -> Named("EnergyDerivatives") { b.energy_derivatives(model, q, v) }
 
@@ -196,7 +196,7 @@ batch b: any(q: Position, v: Tangent) -> Named("EnergyDerivatives") { b.energy_d
 ///
 /// q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
 fn static_torque_derivative(model, data; q: Position, f_ext: Forces = None; out) {
-    condyle::static_torque_derivative(model, data, &q, &f_ext)
+    condyle::derivatives::static_torque_derivative(model, data, &q, &f_ext)
 }
 batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque_derivative(model, q, f_ext) }
 
@@ -211,7 +211,7 @@ batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque_derivative(mod
 /// >>> np.allclose(d.dv, 2.0 * condyle.coriolis_matrix(arm, data, q, v))  # C v is quadratic in v
 /// True
 fn coriolis_derivatives(model, data; q: Position, v: Tangent; out) {
-    condyle::coriolis_derivatives(model, data, &q, &v)
+    condyle::derivatives::coriolis_derivatives(model, data, &q, &v)
 }
 batch b: any(q: Position, v: Tangent) -> Named("CoriolisDerivatives") { b.coriolis_derivatives(model, q, v) }
 }

@@ -16,14 +16,14 @@ macro_rules! factor {
         $(#[$doc])*
         #[pyclass(module = "condyle")]
         pub(crate) struct $class {
-            inner: condyle::$class<f64>,
+            inner: condyle::dynamics::$class<f64>,
             size: usize,
             /// Whether `factorize` was called.
             done: bool,
         }
 
         impl $class {
-            fn factor(&self) -> PyResult<&condyle::$class<f64>> {
+            fn factor(&self) -> PyResult<&condyle::dynamics::$class<f64>> {
                 let nothing = || PyRuntimeError::new_err("nothing to solve with: call `factorize` first");
                 self.done.then_some(&self.inner).ok_or_else(nothing)
             }
@@ -129,7 +129,7 @@ Ltdl {
     #[new]
     fn new(model: &Bound<'_, Model>) -> Self {
         let model = &*model.get().inner;
-        Self { inner: condyle::Ltdl::new(model), size: model.nv(), done: false }
+        Self { inner: condyle::factors::Ltdl::new(model), size: model.nv(), done: false }
     }
 
     /// The number of entries of L and D that may differ from zero, without the ones on L's diagonal.
@@ -177,8 +177,8 @@ factor! {
 Cholesky {
     #[new]
     fn new(n: usize) -> PyResult<Self> {
-        within("n", n, 0, condyle::Cholesky::<f64>::MOST_ROWS)?;
-        Ok(Self { inner: condyle::Cholesky::new(n), size: n, done: false })
+        within("n", n, 0, condyle::factors::Cholesky::<f64>::MOST_ROWS)?;
+        Ok(Self { inner: condyle::factors::Cholesky::new(n), size: n, done: false })
     }
 
     /// The factor L, lower triangular.
@@ -209,7 +209,7 @@ Cholesky {
 /// AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, levels=4)
 #[pyclass(module = "condyle")]
 pub(crate) struct DivideConquer {
-    inner: condyle::DivideConquer<f64>,
+    inner: condyle::divide_conquer::DivideConquer<f64>,
     made_for: MadeFor,
 }
 
@@ -218,7 +218,10 @@ impl DivideConquer {
     #[new]
     fn new(model: &Bound<'_, Model>, grain: usize) -> Self {
         let model = model.get();
-        Self { inner: condyle::DivideConquer::new(&model.inner, grain), made_for: MadeFor::with_geometry(model) }
+        Self {
+            inner: condyle::divide_conquer::DivideConquer::new(&model.inner, grain),
+            made_for: MadeFor::with_geometry(model),
+        }
     }
 
     /// The robot's name, and how many runs of bodies there are.

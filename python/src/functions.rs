@@ -28,7 +28,7 @@ use crate::batch::{self, Look};
 use crate::exceptions::{ModelError, exception, wrong_word};
 use crate::hyper_dual;
 use crate::model::{body_index, frame_index};
-use condyle::{Force, ForwardDynamicsMethod, Model, ReferenceFrame};
+use condyle::{Force, Model, ReferenceFrame, factors::ForwardDynamicsMethod};
 use nalgebra::DMatrix;
 use numpy::{Ix1, Ix2};
 use pyo3::exceptions::PyValueError;
@@ -313,8 +313,8 @@ shared! {
     }, at once if |_| true }
 
     /// An input of the dynamics beside q, v, a and τ: a word, or a word with a body or a number.
-    InputOf<S>: &'a Bound<'py, PyAny> => condyle::Input { |name, given, model| {
-        use condyle::Input;
+    InputOf<S>: &'a Bound<'py, PyAny> => condyle::derivatives::Input { |name, given, model| {
+        use condyle::derivatives::Input;
         if let Ok((word, of)) = given.extract::<(String, Bound<'py, PyAny>)>() {
             let body = || body_index("wrt: expected a joint's name", model, &of, 0);
             return match word.as_str() {
@@ -379,7 +379,7 @@ pub(crate) fn any(_: &Model) -> PyResult<()> {
 
 /// The check of a function that needs the inverse of the inertia matrix.
 pub(crate) fn regular(model: &Model) -> PyResult<()> {
-    match model.warnings().iter().find(|w| matches!(w, condyle::Warning::Singular { .. })) {
+    match model.warnings().iter().find(|w| matches!(w, condyle::tree::Warning::Singular { .. })) {
         None => Ok(()),
         Some(singular) => Err(ModelError::new_err(singular.to_string())),
     }

@@ -2,7 +2,7 @@
 
 use crate::arrays::{Give, array, class, matrix, read_only, three};
 use crate::exceptions::NotPhysicalError;
-use condyle::{Inertia, Mat3, Sym3, Vec3, inertial_parameters as rust};
+use condyle::{Inertia, Sym3, Vec3, regressors::inertial_parameters as rust, spatial::Mat3};
 use pyo3::prelude::*;
 
 /// An inertia as Python sees it.

@@ -21,7 +21,7 @@ macro_rules! motions {
         $crate::functions::functions! {$(
             $(#[$doc])*
             fn $name(model, data; $($arg: $kind,)* $of: $Of, reference: Reference = "local"; out) {
-                let motion = condyle::$pass(model, data, $(&$arg),*);
+                let motion = condyle::dynamics::$pass(model, data, $(&$arg),*);
                 $crate::kinematics::motions!(@call model, motion, $name($of, reference) $($($matrix)+)?)
             }
             batch b: any($($arg: $kind),*; $of: $Of, reference: Reference) -> $Kind {
@@ -76,7 +76,7 @@ functions! {
 fn frame_jacobian(model, data; q: Position, frame: FrameOf, reference: Reference = "local"; out) {
     let _ = data; // only the joints between the frame and the world count
     Computed::new([6, model.nv()], |J| {
-        condyle::frame_jacobian_strided(model, &q, frame, reference, J, [model.nv(), 1]);
+        condyle::dynamics::frame_jacobian_strided(model, &q, frame, reference, J, [model.nv(), 1]);
     })
 }
 batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
@@ -96,7 +96,7 @@ batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
 fn body_jacobian(model, data; q: Position, body: BodyOf, reference: Reference = "local"; out) {
     let _ = data;
     Computed::new([6, model.nv()], |J| {
-        condyle::body_jacobian_strided(model, &q, body, reference, J, [model.nv(), 1]);
+        condyle::dynamics::body_jacobian_strided(model, &q, body, reference, J, [model.nv(), 1]);
     })
 }
 batch b: any(q: Position; body: BodyOf, reference: Reference) -> One {

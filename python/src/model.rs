@@ -6,7 +6,11 @@ use crate::exceptions::{ModelError, exception};
 use crate::inertial_parameters::{model_inertia, read_inertia};
 use crate::joint::{Joint, kind, root};
 use crate::tree::tree;
-use condyle::{FrameKind, FrameParent, MjcfOptions, SdfOptions, Se3, UrdfOptions, inertial_parameters};
+use condyle::{
+    MjcfOptions, SdfOptions, Se3, UrdfOptions,
+    regressors::inertial_parameters,
+    tree::{FrameKind, FrameParent},
+};
 use pyo3::exceptions::{PyAttributeError, PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList, PyString};
@@ -94,12 +98,12 @@ fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize
 
 impl Model {
     /// A number for each joint that has coordinates of its own; 0 for the others.
-    fn of_joints(&self, get: impl Fn(&condyle::Body) -> usize) -> Vec<usize> {
-        let count = |(i, b): (usize, &condyle::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
+    fn of_joints(&self, get: impl Fn(&condyle::tree::Body) -> usize) -> Vec<usize> {
+        let count = |(i, b): (usize, &condyle::tree::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
         self.inner.bodies().iter().enumerate().map(count).collect()
     }
 
-    fn of_bodies<T>(&self, get: impl FnMut(&condyle::Body) -> T) -> Vec<T> {
+    fn of_bodies<T>(&self, get: impl FnMut(&condyle::tree::Body) -> T) -> Vec<T> {
         self.inner.bodies().iter().map(get).collect()
     }
 
@@ -349,7 +353,7 @@ impl Model {
     fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Mimics, || {
             let class = class!(py, "Mimic")?;
-            let mimic = |b: &condyle::Body| b.mimic.map(|m| class.call1((m.ratio, m.offset))).transpose();
+            let mimic = |b: &condyle::tree::Body| b.mimic.map(|m| class.call1((m.ratio, m.offset))).transpose();
             self.inner.bodies().iter().map(mimic).collect()
         })
     }
@@ -426,7 +430,7 @@ impl Model {
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Frames, || {
             let class = class!(py, "Frame")?;
-            let frame = |f: &condyle::Frame| {
+            let frame = |f: &condyle::tree::Frame| {
                 let kind = match f.kind {
                     FrameKind::Link => "link",
                     FrameKind::Joint => "joint",
@@ -628,7 +632,7 @@ impl Model {
     ) -> PyResult<Self> {
         let follower = body_index("follower: expected a joint's name", &self.inner, follower, 1)?;
         let leader = body_index("leader: expected a joint's name", &self.inner, leader, 1)?;
-        Ok(self.inner.with_mimic(follower, leader, condyle::Mimic { ratio, offset }).map_err(exception)?.into())
+        Ok(self.inner.with_mimic(follower, leader, condyle::tree::Mimic { ratio, offset }).map_err(exception)?.into())
     }
 
     /// The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.

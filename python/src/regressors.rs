@@ -17,7 +17,7 @@ functions! {
 /// >>> np.allclose(Y @ arm.inertial_parameters, condyle.rnea(arm, data, q, v, a))
 /// True
 fn joint_torque_regressor(model, data; q: Position, v: Tangent, a: Tangent; out) {
-    condyle::joint_torque_regressor(model, data, &q, &v, &a)
+    condyle::regressors::joint_torque_regressor(model, data, &q, &v, &a)
 }
 batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.joint_torque_regressor(model, q, v, a) }
 
@@ -26,7 +26,7 @@ batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.joint_torque_regres
 ///
 /// q: nq numbers; v: nv.
 fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
-    condyle::kinetic_energy_regressor(model, data, &q, &v)
+    condyle::regressors::kinetic_energy_regressor(model, data, &q, &v)
 }
 batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy_regressor(model, q, v) }
 
@@ -35,7 +35,7 @@ batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy_regressor(model,
 ///
 /// q: nq numbers.
 fn potential_energy_regressor(model, data; q: Position; out) {
-    condyle::potential_energy_regressor(model, data, &q)
+    condyle::regressors::potential_energy_regressor(model, data, &q)
 }
 batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 
@@ -51,10 +51,10 @@ batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 /// True
 fn passive_torque(model; v: Tangent, smoothing: Speed; out) {
     let mut tau = vec![Scalar::zero(); model.nv()];
-    condyle::passive_torque(model, &v, smoothing, &mut tau);
+    condyle::terms::passive_torque(model, &v, smoothing, &mut tau);
     tau
 }
-each(v: Tangent; smoothing: Speed) -> [nv] |tau| { condyle::passive_torque(model, v, smoothing, tau); }
+each(v: Tangent; smoothing: Speed) -> [nv] |tau| { condyle::terms::passive_torque(model, v, smoothing, tau); }
 
 /// The derivative ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`, nv numbers: the diagonal of a matrix without
 /// other entries; O(n).
@@ -62,10 +62,10 @@ each(v: Tangent; smoothing: Speed) -> [nv] |tau| { condyle::passive_torque(model
 /// v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
 fn passive_torque_derivative(model; v: Tangent, smoothing: Speed; out) {
     let mut slope = vec![Scalar::zero(); model.nv()];
-    condyle::passive_torque_derivative(model, &v, smoothing, &mut slope);
+    condyle::derivatives::passive_torque_derivative(model, &v, smoothing, &mut slope);
     slope
 }
 each(v: Tangent; smoothing: Speed) -> [nv] |slope| {
-    condyle::passive_torque_derivative(model, v, smoothing, slope)
+    condyle::derivatives::passive_torque_derivative(model, v, smoothing, slope)
 }
 }

@@ -236,7 +236,7 @@ macro_rules! motions {
             let (number, reference) = ($number(&robot.inner, $of)?, reference(frame)?);
             let mut scratch = take(robot, data.ours.bind(py))?;
             let scratch = Holds::<f64>::held(&mut *scratch, &robot.inner)?;
-            let motion = condyle::$pass(&robot.inner, scratch, $(&data.$kept),*).$method(number, reference);
+            let motion = condyle::dynamics::$pass(&robot.inner, scratch, $(&data.$kept),*).$method(number, reference);
             spatial(class!(py, "condyle._spelling", "Motion")?, &motion.give(py, None)?)
         }
     )*};
@@ -258,7 +258,7 @@ motions! {
         frame_classical_acceleration of forward_accelerations(q, v, a);
 }
 
-/// `condyle::body_jacobian_strided`, or of a frame: model, q, body or frame, reference frame, J and its strides.
+/// `condyle::dynamics::body_jacobian_strided`, or of a frame: model, q, body or frame, reference frame, J and its strides.
 type FillJacobian = fn(&condyle::Model, &[f64], usize, ReferenceFrame, &mut [f64], [usize; 2]);
 
 /// The Jacobian of a joint's body or of a frame at the last computeJointJacobians.
@@ -285,7 +285,7 @@ pub(crate) fn getJointJacobian<'py>(
     joint: &Bound<'py, PyAny>,
     frame: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    kept_jacobian(model, data, |robot| joint_number(robot, joint), frame, condyle::body_jacobian_strided)
+    kept_jacobian(model, data, |robot| joint_number(robot, joint), frame, condyle::dynamics::body_jacobian_strided)
 }
 
 /// The Jacobian of a frame at the last computeJointJacobians, (6, nv).
@@ -296,7 +296,7 @@ pub(crate) fn getFrameJacobian<'py>(
     frame_id: isize,
     frame: &Bound<'py, PyAny>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    kept_jacobian(model, data, |robot| frame_number(robot, frame_id), frame, condyle::frame_jacobian_strided)
+    kept_jacobian(model, data, |robot| frame_number(robot, frame_id), frame, condyle::dynamics::frame_jacobian_strided)
 }
 
 /// The Jacobian of a frame, (6, nv).

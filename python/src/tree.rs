@@ -1,7 +1,7 @@
 //! The tree of a robot as text.
 
 use crate::joint::kind;
-use condyle::{FrameKind, Model};
+use condyle::{Model, tree::FrameKind};
 use std::fmt::Write;
 
 /// The bodies below one another, each with its joint, its coordinates and its mass; and the frames on them, but those of the
@@ -14,8 +14,9 @@ pub(crate) fn tree(model: &Model, frames: bool) -> String {
     }
     let mut text = String::from("universe");
     let of_body = |text: &mut String, body: usize, indent: &str| {
-        let own = |f: &&condyle::Frame| f.body == body && (f.kind == FrameKind::Link || f.kind == FrameKind::User);
-        let named = |f: &&condyle::Frame| body == 0 || f.name != bodies[body].name;
+        let own =
+            |f: &&condyle::tree::Frame| f.body == body && (f.kind == FrameKind::Link || f.kind == FrameKind::User);
+        let named = |f: &&condyle::tree::Frame| body == 0 || f.name != bodies[body].name;
         let names: Vec<_> = model.frames().iter().filter(own).filter(named).map(|f| f.name.as_str()).collect();
         if frames && !names.is_empty() {
             let _ = write!(text, "\n{indent}· {}", names.join(", "));

@@ -1,7 +1,7 @@
 //! What is odd about a robot: the model's own warnings, and what makes its numbers hard to work with.
 
 use crate::lines::{Kind, Lines};
-use condyle::{Body, Inertia, Model, Warning, neutral};
+use condyle::{Inertia, Model, neutral, tree::Body, tree::Warning};
 use nalgebra::Matrix3;
 use serde::Serialize;
 

@@ -9,7 +9,7 @@ use condyle::optimal::robot::{
     WrenchCone,
 };
 use condyle::optimal::{ActionModel, Problem};
-use condyle::{ContactConstraint, Data, Joint, Mat3, Model, Se3, Vec3, forward_kinematics, neutral};
+use condyle::{ContactConstraint, Data, Joint, Model, Se3, Vec3, forward_kinematics, neutral, spatial::Mat3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

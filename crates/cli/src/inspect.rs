@@ -6,7 +6,7 @@ use crate::limits::LimitCounts;
 use crate::lines::{Kind, Lines};
 use crate::robot::{self, Robot, RobotArguments};
 use crate::terminal::{Style, Table, heading, say, say_json, styled};
-use condyle::{Body, Data, FrameKind, Model, forward_kinematics, neutral};
+use condyle::{Data, Model, forward_kinematics, neutral, tree::Body, tree::FrameKind};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -278,7 +278,7 @@ impl BodyReport {
         let (q, v) = (b.idx_q..b.idx_q + b.joint.nq(), b.idx_v..b.idx_v + b.joint.nv());
         let finite = |values: &[f64]| values.iter().map(|&x| x.is_finite().then_some(x)).collect();
         let (com, moments) = findings::moments(b.inertia);
-        let merged = |f: &&condyle::Frame| f.body == i && f.kind == FrameKind::Link && f.name != b.name;
+        let merged = |f: &&condyle::tree::Frame| f.body == i && f.kind == FrameKind::Link && f.name != b.name;
         Self {
             index: i,
             name: b.name.clone(),

@@ -19,7 +19,7 @@ pub(crate) struct Limited<'a> {
     pub upper: f64,
 }
 
-/// The limited positions, velocities and efforts of a robot, joint after joint. A position has a limit of its own where the
+/// Lists the limited positions, velocities and efforts of a robot, joint after joint. A position has a limit of its own where the
 /// joint has as many positions as velocities; a limit of 0 for a velocity or an effort counts as none.
 pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
     let limits = model.limits();
@@ -70,7 +70,7 @@ impl LimitCounts {
         }
     }
 
-    /// The number of all limits.
+    /// Returns the number of all limits.
     pub(crate) fn total(&self) -> usize {
         self.positions + self.velocities + self.efforts
     }

@@ -42,7 +42,7 @@ pub(crate) fn write(
 }
 
 /// The joints that the page shows: those with a degree of freedom of their own.
-fn shown(model: &Model) -> impl Iterator<Item = &condyle::Body> {
+fn shown(model: &Model) -> impl Iterator<Item = &condyle::tree::Body> {
     model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1 && b.mimic.is_none())
 }
 
@@ -96,7 +96,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
     let (nq, limits) = (model.nq(), model.limits());
     let knots = with_time(plan);
     let finite = |x: f64| x.is_finite().then_some(x);
-    let joint = |b: &condyle::Body| {
+    let joint = |b: &condyle::tree::Body| {
         let range = |limit: &[f64]| if b.joint.nq() == 1 { finite(limit[b.idx_q]) } else { None };
         json!({
             "name": b.joint_name,
@@ -107,11 +107,11 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
             "effort": finite(limits.effort[b.idx_v]).filter(|&e| e > 0.0),
         })
     };
-    let position = |x: &[f64], b: &condyle::Body| match b.joint {
+    let position = |x: &[f64], b: &condyle::tree::Body| match b.joint {
         Joint::Continuous { .. } => x[b.idx_q + 1].atan2(x[b.idx_q]),
         _ => x[b.idx_q],
     };
-    let series = |knots: &[usize], value: &dyn Fn(usize, &condyle::Body) -> f64| -> Vec<Vec<f64>> {
+    let series = |knots: &[usize], value: &dyn Fn(usize, &condyle::tree::Body) -> f64| -> Vec<Vec<f64>> {
         knots.iter().map(|&t| shown(model).map(|b| value(t, b)).collect()).collect()
     };
     let goal = plan.goal.as_ref();

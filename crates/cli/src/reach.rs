@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::limits::{efforts_of, inside, limits_of};
 use condyle::optimal::Problem;
 use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residual};
-use condyle::{Data, Model, Vec3, difference, gravity, integrate, neutral, rnea};
+use condyle::{Data, Model, Vec3, difference, integrate, neutral, rnea, terms::gravity};
 use std::sync::Arc;
 
 /// What an effort without a limit is weighed with, as if its limit were 100 N m or N.

@@ -2,7 +2,10 @@
 
 use crate::robot::{Format, Robot};
 use crate::visuals::{self, Geometry};
-use condyle::{Act, Data, Model, Quaternion, Se3, Vec3, forward_kinematics};
+use condyle::{
+    Data, Model, Se3, Vec3, forward_kinematics,
+    spatial::{Act, Quaternion},
+};
 use condyle_meshes::{Drawn, Meshes, mjcf};
 use serde::Serialize;
 use std::collections::HashMap;
@@ -53,7 +56,7 @@ pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool)
             _ => _ = shapes.insert(body, bones),
         }
     }
-    let body = |(i, b): (usize, &condyle::Body)| Body {
+    let body = |(i, b): (usize, &condyle::tree::Body)| Body {
         name: b.name.clone(),
         parent: if i == 0 { -1 } else { b.parent as isize },
         shapes: shapes.remove(&i).unwrap_or_default(),

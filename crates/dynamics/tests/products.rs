@@ -96,10 +96,10 @@ fn multiply_state(what: &str, M: StateMatrix<'_, f64>) {
     let (m, n) = M.shape();
     let copy = DMatrix::from_fn(m, n, |i, j| M[(i, j)]);
     assert!(copy.iter().all(|x| x.is_finite()), "{what} is not finite");
-    let (x, y, B) = (vector(n), vector(m), matrix(n, 9));
+    let (x, y, B, borrowed) = (vector(n), vector(m), matrix(n, 9), &M);
     let expected = plain(&copy, &column(&x));
     equal(&(M * &x), &expected, what);
-    equal(&(&M * x.clone()), &expected, what);
+    equal(&(borrowed * x.clone()), &expected, what);
     equal(&(M * DVectorView::from_slice(x.as_slice(), n)), &expected, what);
     equal(&(M * x.as_slice()), &expected, what);
     let mut out = y.clone();
@@ -258,6 +258,9 @@ fn single_calls(model: &Model) {
     multiply("frame_jacobian of placements", &J);
     motion.frame_jacobian_rate(last, axes, &mut J);
     multiply("frame_jacobian_rate", &J);
+    let mut of_point = DMatrix::zeros(3, nv);
+    motion.frame_point_jacobian(last, Vec3::new(0.1, 0.2, 0.3), &mut of_point);
+    multiply("frame_point_jacobian", &of_point);
     motion.frame_acceleration_derivatives(last, axes, &mut J, &mut other);
     multiply("frame_acceleration_derivatives", &J);
     multiply("frame_acceleration_derivatives", &other);

@@ -1,7 +1,7 @@
 //! The split of unknowns by equalities: x_B = p − T z; and rows of coefficients over z.
 
-use crate::carried::Reader;
 use crate::cone_program::ConeProgram;
+use crate::numbers::Reader;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, add_product_vector, at_level, max_abs, product_without_slack};
 use nalgebra::DMatrix;
 

@@ -11,6 +11,7 @@ use crate::controller::WholeBodyController;
 use crate::error::{InvalidRotation, Status};
 use crate::levels::Levels;
 use crate::memory::Memory;
+use crate::numbers::{Reader, flag};
 use crate::safety::Safety;
 use condyle_spatial::{Force, Vec3};
 
@@ -20,46 +21,6 @@ const NAMES: [&str; 8] = ["q", "v", "com", "frames", "posture", "momentum", "con
 /// Sources of a command, in the order of their numbers.
 const SOURCES: [CommandSource; 3] =
     [CommandSource::Solution, CommandSource::LastSolution, CommandSource::GravityCompensation];
-
-/// Takes numbers from the front of a slice; `None` if there are too few, or one is invalid.
-pub(crate) struct Reader<'a>(&'a [f64]);
-
-impl Reader<'_> {
-    /// A number that may be infinite or NaN.
-    fn any(&mut self) -> Option<f64> {
-        let (&first, rest) = self.0.split_first()?;
-        self.0 = rest;
-        Some(first)
-    }
-
-    pub(crate) fn number(&mut self) -> Option<f64> {
-        self.any().filter(|x| x.is_finite())
-    }
-
-    /// An integer below a limit.
-    pub(crate) fn index(&mut self, limit: usize) -> Option<usize> {
-        let x = self.number()?;
-        (x >= 0.0 && x < limit as f64 && x.fract() == 0.0).then_some(x as usize)
-    }
-
-    pub(crate) fn flag(&mut self) -> Option<bool> {
-        self.index(2).map(|x| x == 1)
-    }
-
-    pub(crate) fn fill(&mut self, to: &mut [f64]) -> Option<()> {
-        to.iter_mut().try_for_each(|to| self.number().map(|x| *to = x))
-    }
-
-    fn array<const N: usize>(&mut self) -> Option<[f64; N]> {
-        let mut array = [0.0; N];
-        self.fill(&mut array).map(|()| array)
-    }
-}
-
-/// A flag as a number.
-pub(crate) fn flag(x: bool) -> f64 {
-    f64::from(u8::from(x))
-}
 
 impl Clone for WholeBodyController {
     /// A controller with memory of its own that continues as this one does: with the same bits, or with
@@ -89,9 +50,9 @@ impl WholeBodyController {
     /// Takes the numbers that a controller of the same description carried; `false` if they are none.
     #[doc(hidden)]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
-        let mut from = Reader(numbers);
+        let mut from = Reader::new(numbers);
         let read = self.read(&mut from);
-        read.is_some() && from.0.is_empty()
+        read.is_some() && from.is_empty()
     }
 
     fn read(&mut self, from: &mut Reader<'_>) -> Option<()> {

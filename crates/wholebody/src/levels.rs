@@ -4,7 +4,6 @@
 //! all. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014), section 2.
 
 use crate::basis::Elimination;
-use crate::carried::Reader;
 use crate::condense::{Condenser, Known};
 #[cfg(feature = "clarabel")]
 use crate::cone_program::Clarabel;
@@ -15,6 +14,7 @@ use crate::least_squares::LeastSquares;
 #[cfg(feature = "clarabel")]
 use crate::lifted::Lifted;
 use crate::memory::Memory;
+use crate::numbers::Reader;
 use crate::settings::{Backend, Form, Settings};
 use condyle_linalg::max_abs;
 

@@ -1,6 +1,6 @@
 //! Arrays that Python gives.
 
-use condyle::{Mat3, Se3, Vec3};
+use condyle::{Se3, Vec3, spatial::Mat3};
 use nalgebra::DMatrix;
 use numpy::ndarray::Dimension;
 use numpy::npyffi::{NPY_ARRAY_ALIGNED, NPY_ARRAY_C_CONTIGUOUS, PyArrayObject};

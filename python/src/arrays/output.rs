@@ -2,7 +2,7 @@
 
 use super::Number;
 use super::input::{check_shape, tuple, type_name};
-use condyle::{Force, Inertia, Mat3, Motion, Se3, Vec3};
+use condyle::{Force, Inertia, Motion, Se3, Vec3, spatial::Mat3};
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage};
 use numpy::{
     BorrowError, PyArray, PyArrayDyn, PyArrayMethods, PyReadwriteArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
@@ -149,7 +149,7 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
 }
 
 /// A square matrix that is symmetric up to rounding, so that its columns stand for its rows.
-pub(crate) struct Symmetric<'a, N>(pub(crate) &'a condyle::Matrix<N>);
+pub(crate) struct Symmetric<'a, N>(pub(crate) &'a condyle::spatial::Matrix<N>);
 
 impl<N: Number> Array for Symmetric<'_, N> {
     type Number = N;
@@ -387,7 +387,7 @@ macro_rules! named_tuples {
     (@name $member:ident) => { stringify!($member) };
     (@name $member:ident as $name:ident) => { stringify!($name) };
     ($($type:ident $(<$life:lifetime>)? { $($member:ident $(as $name:ident)?),* })*) => {$(
-        impl<S: $crate::arrays::Number + $crate::arrays::Give> $crate::arrays::Give for condyle::$type<$($life,)? S> {
+        impl<S: $crate::arrays::Number + $crate::arrays::Give> $crate::arrays::Give for condyle::dynamics::$type<$($life,)? S> {
             fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
                 $crate::arrays::give_named!(py, out, stringify!($type), {
                     $($crate::arrays::named_tuples!(@name $member $(as $name)?) => self.$member),*

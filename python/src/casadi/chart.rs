@@ -7,7 +7,7 @@
 //! δ = T dq + ½ Σ dqᵀ C_k dq e_k + …      ∂f/∂q = ∂f/∂δ T      ∂²f/∂q² = Tᵀ ∂²f/∂δ² T + Σ_k ∂f/∂δ_k C_k
 //! ```
 
-use condyle::{Joint, Mat3, Model, Vec3};
+use condyle::{Joint, Model, Vec3, spatial::Mat3};
 use core::ops::Range;
 use nalgebra::{DMatrix, SMatrix};
 
@@ -57,7 +57,7 @@ pub(super) struct Position {
 impl Chart {
     pub(super) fn new(model: &Model) -> Self {
         let own = model.bodies().iter().skip(1).filter(|body| body.mimic.is_none());
-        let group = |body: &condyle::Body| {
+        let group = |body: &condyle::tree::Body| {
             let (q, v) = (body.idx_q..body.idx_q + body.joint.nq(), body.idx_v..body.idx_v + body.joint.nv());
             Group { joint: body.joint, q, v }
         };
@@ -263,7 +263,7 @@ fn tangent_map(joint: Joint, q: &[f64], length: f64) -> Block {
         }
         Joint::Spherical => quaternion(&mut T, (0, 0), q, length),
         Joint::FreeFlyer => {
-            let R: Mat3<f64> = condyle::Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation();
+            let R: Mat3<f64> = condyle::spatial::Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation();
             for (i, column) in [R.x, R.y, R.z].into_iter().enumerate() {
                 for (j, x) in column.to_array().into_iter().enumerate() {
                     T[(i, j)] = x; // Rᵀ

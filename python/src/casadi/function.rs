@@ -3,8 +3,9 @@
 use super::computation::Output;
 use crate::hyper_dual::Hyper;
 use condyle::{
-    ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Matrix, Model, ModelError as Error, ReferenceFrame,
-    RneaSecondDerivatives, Scalar, Vec3,
+    ConstraintSet, ContactConstraint, Data, Model, ModelError as Error, ReferenceFrame, Scalar, Vec3,
+    derivatives::RneaSecondDerivatives,
+    spatial::{Dense, DenseMatrix, Matrix},
 };
 use nalgebra::DMatrix;
 
@@ -170,7 +171,7 @@ impl Kind {
             }
             Self::Crba => {
                 let tensors = tensors.as_mut().expect("made with the scratch");
-                condyle::rnea_second_derivatives(model, data, &x[0], zeros, zeros, &[], tensors);
+                condyle::derivatives::rnea_second_derivatives(model, data, &x[0], zeros, zeros, &[], tensors);
                 for (i, dM_i) in tensors.dadq.iter().enumerate() {
                     place(J, i * nv, 0, dM_i); // ∂M_ij/∂q_k, of a symmetric matrix
                 }
@@ -196,11 +197,11 @@ impl Kind {
                 place(J, 0, 1, frame_jacobian);
             }
             Self::Com => {
-                let d = condyle::centroidal_derivatives(model, data, &x[0], zeros, zeros);
+                let d = condyle::centroidal::centroidal_derivatives(model, data, &x[0], zeros, zeros);
                 place(J, 0, 0, d.dcom_dq);
             }
             Self::CentroidalMomentum => {
-                let d = condyle::centroidal_derivatives(model, data, &x[0], &x[1], zeros);
+                let d = condyle::centroidal::centroidal_derivatives(model, data, &x[0], &x[1], zeros);
                 place(J, 0, 0, d.dh_dq);
                 place(J, 0, 1, d.dh_dv);
             }
@@ -245,13 +246,13 @@ impl Kind {
         };
         match self {
             Self::Rnea => {
-                let h = condyle::rnea_hessian(model, &mut s.data, &x[0], &x[1], &x[2], &[], lambda);
+                let h = condyle::derivatives::rnea_hessian(model, &mut s.data, &x[0], &x[1], &x[2], &[], lambda);
                 write(h.dqdq, h.dvdq, h.dvdv, h.dadq);
                 first([h.first.dtau_dq, h.first.dtau_dv, h.first.dtau_da]);
                 true
             }
             Self::Aba => {
-                let h = condyle::aba_hessian(model, &mut s.data, &x[0], &x[1], &x[2], &[], lambda);
+                let h = condyle::derivatives::aba_hessian(model, &mut s.data, &x[0], &x[1], &x[2], &[], lambda);
                 write(h.dqdq, h.dvdq, h.dvdv, h.dtaudq);
                 first([h.first.da_dq, h.first.da_dv, h.first.da_dtau]);
                 true

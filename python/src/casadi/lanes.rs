@@ -1,7 +1,7 @@
 //! Inverse and forward dynamics with their derivatives for several states at a time, in the lanes of vector registers.
 
 use super::function::Kind;
-use condyle::{Batch, Matrices, Model};
+use condyle::{Batch, Model, batch::Matrices};
 use nalgebra::DMatrix;
 
 /// The most states of a call: some registers full, whose matrices stay in the cache.

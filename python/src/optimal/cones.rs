@@ -2,8 +2,8 @@
 
 use crate::arrays::{self, Give};
 use crate::exceptions::{ProblemError, problem_error, within};
-use condyle::Mat3;
 use condyle::optimal::robot;
+use condyle::spatial::Mat3;
 use pyo3::prelude::*;
 
 /// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.

@@ -4,8 +4,10 @@
 //! for each frame (pose 4 × 4, velocity, acceleration) and 23 for each contact (activation, pose 4 × 4, force).
 
 use crate::arrays::{Array, class, matrix, numbers, output, writable};
+use condyle::dynamics::{ROTATION_ROUNDING, unit_fault};
+use condyle::spatial::Mat3;
 use condyle::wholebody::References;
-use condyle::{Force, Mat3, Model, Motion, ROTATION_ROUNDING, Se3, Vec3, unit_fault};
+use condyle::{Force, Model, Motion, Se3, Vec3};
 use numpy::{PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;

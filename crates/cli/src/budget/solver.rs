@@ -8,7 +8,7 @@ use condyle::optimal::robot::{
     Integrator, Residual,
 };
 use condyle::optimal::{ActionModel, Fddp, Problem, Status};
-use condyle::{ConstraintKind, Model, integrate};
+use condyle::{Model, constraints::ConstraintKind, integrate};
 use rayon::ThreadPool;
 use serde::Serialize;
 use std::sync::Arc;

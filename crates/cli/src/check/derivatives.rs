@@ -6,7 +6,7 @@
 use super::identities::{SOLVES, inverted, spectrum};
 use super::ledger::Row;
 use crate::states::States;
-use condyle::{Data, Matrix, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_derivatives};
+use condyle::{Data, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_derivatives, spatial::Matrix};
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 

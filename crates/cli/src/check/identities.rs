@@ -6,9 +6,15 @@
 use super::ledger::Row;
 use crate::states::States;
 use condyle::{
-    Data, Joint, Matrix, Model, aba, centroidal_map_rate, coriolis_matrix, crba, energy_derivatives,
-    forward_accelerations, forward_kinematics, forward_velocities, gravity, inertial_parameters, integrate,
-    joint_torque_regressor, minv, nonlinear_effects, rnea,
+    Data, Joint, Model, aba,
+    centroidal::centroidal_map_rate,
+    crba,
+    derivatives::energy_derivatives,
+    forward_accelerations, forward_kinematics, forward_velocities, integrate, minv, nonlinear_effects,
+    regressors::{inertial_parameters, joint_torque_regressor},
+    rnea,
+    spatial::Matrix,
+    terms::{coriolis_matrix, gravity},
 };
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;

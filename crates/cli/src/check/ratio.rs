@@ -5,7 +5,7 @@ use super::ledger::Row;
 use crate::error::Error;
 use crate::robot;
 use crate::states::States;
-use condyle::{Data, Inertia, Model, aba, crba, inertial_parameters, nonlinear_effects, rnea};
+use condyle::{Data, Inertia, Model, aba, crba, nonlinear_effects, regressors::inertial_parameters, rnea};
 use nalgebra::DVector;
 
 /// How many times a tip is heavier than the body that it sits on.

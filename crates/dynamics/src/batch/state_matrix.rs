@@ -205,7 +205,7 @@ impl<T: Scalar> StateMatrix<'_, T> {
     /// ```
     /// use condyle_dynamics::{Batch, robots};
     /// let (arm, mut all) = (robots::arm7(), nalgebra::DMatrix::zeros(7, 14));
-    /// let M = Batch::new(&arm, 1, 1).crba(&arm, &[0.3; 7]).at(0).copy_to(&mut all.columns_mut(7, 7));
+    /// Batch::new(&arm, 1, 1).crba(&arm, &[0.3; 7]).at(0).copy_to(&mut all.columns_mut(7, 7));
     /// assert!(all[(0, 7)] > 0.0 && all[(0, 0)] == 0.0);
     /// ```
     ///

@@ -9,7 +9,7 @@
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 2.3 (velocities of points).
 
-use super::frames::{Placements, Velocities};
+use super::frames::{Placements, Velocities, check_body, check_frame};
 use condyle_model::layout::{Columns, Single};
 use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Force, Scalar, Vec3, kernel};
 
@@ -106,6 +106,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     #[inline(always)]
     #[track_caller]
     pub fn body_point_velocity(&self, body: usize, point: Vec3<S>) -> Vec3<S> {
+        check_body(self.model, body);
         self.moving.v[body].velocity_at(self.body(body).act(point))
     }
 
@@ -116,6 +117,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     #[inline(always)]
     #[track_caller]
     pub fn frame_point_velocity(&self, frame: usize, point: Vec3<S>) -> Vec3<S> {
+        check_frame(self.model, frame);
         self.moving.v[self.model.frames()[frame].body].velocity_at(self.frame(frame).act(point))
     }
 }

@@ -42,7 +42,8 @@ impl AugmentedLagrangian {
         }
         let second = self.attempt(problem, Some([&held_xs, &held_us]), observer, begin, false)?;
         let (solves, iterations) = (first.outcome.solves, first.outcome.iterations);
-        let better = second == Status::Converged || self.outcome.primal < first.outcome.primal;
+        let solved = second == Status::Converged || second == Status::Infeasible && !self.lost;
+        let better = solved || self.outcome.primal < first.outcome.primal;
         if !better {
             let stopped = matches!(second, Status::TimeLimit | Status::Interrupted);
             let counts = (self.outcome.solves, self.outcome.iterations);

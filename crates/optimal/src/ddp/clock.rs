@@ -26,12 +26,13 @@ pub(crate) struct Recent {
 }
 
 impl Recent {
+    /// Notes a duration, in place of the oldest of more than five.
     pub(crate) fn add(&mut self, duration: Duration) {
         self.durations[self.count % RECENT] = duration;
         self.count += 1;
     }
 
-    /// The median, the lower one of an even number; zero if there is none yet.
+    /// Returns the median, the lower one of an even number; zero if there is none yet.
     pub(crate) fn median(&self) -> Duration {
         let mut sorted = self.durations;
         let known = &mut sorted[..self.count.min(RECENT)];

@@ -16,7 +16,7 @@ use crate::time::Instant;
 use condyle_linalg::max_abs;
 use std::time::Duration;
 
-/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`]), with the rules and constants of Crocoddyl
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of Crocoddyl
 /// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
 /// are those of its box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022): while there are gaps
 /// the bounds only cut trials off; from then on each knot's step minimises its quadratic model within them.
@@ -108,8 +108,8 @@ pub struct Fddp {
 pub(crate) struct Rules {
     /// Whether the first iteration runs whatever the time.
     pub(crate) guaranteed: bool,
-    /// Whether a bounded problem counts as feasible from the start if the warm start has no gaps. Crocoddyl's rule is no: the
-    /// bounds then only cut trials off until the first full step.
+    /// Whether a warm start without gaps, of which a control lies on its bound, counts as feasible. Crocoddyl's rule is no:
+    /// the bounds then only cut trials off until the first full step, which is never taken where they press.
     pub(crate) trusts_start: bool,
 }
 
@@ -182,7 +182,7 @@ impl Fddp {
         self.run(problem, None, &mut observer, self.rules())
     }
 
-    /// The rules of a solve by itself, which are Crocoddyl's.
+    /// Returns the rules of a solve by itself, which are Crocoddyl's.
     fn rules(&self) -> Rules {
         Rules { guaranteed: self.settings.time_budget != Some(Duration::ZERO), trusts_start: false }
     }
@@ -242,7 +242,7 @@ impl Fddp {
         self.sweep.forget();
         self.best.start();
         self.clock.start(begin, self.settings.time_budget, rules.guaranteed);
-        let trusts_start = bounded && rules.trusts_start;
+        let trusts_start = bounded && rules.trusts_start && self.solution.touches_bounds(problem);
         let status = self.iterate(problem, &mut progress, trusts_start, &mut PacedObserver::new(observer, begin));
         self.finish(problem, &mut progress, status);
         self.solution.timings.end(begin.elapsed(), self.settings.time_budget);
@@ -281,7 +281,7 @@ impl Fddp {
         max_abs(&self.gaps)
     }
 
-    /// The entry of the tangent space with the largest gap of the last iterate: knot, entry and size.
+    /// Returns knot, entry of the tangent space, and size of the largest gap of the last iterate.
     pub(crate) fn largest_gap(&self) -> Option<(usize, usize, f64)> {
         let ndx = self.solution.shape().ndx;
         let sizes = self.gaps.iter().map(|gap| if gap.is_nan() { f64::INFINITY } else { gap.abs() });

@@ -28,7 +28,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// The value of an iterate with this gap and cost.
+    /// Returns the value of an iterate with this gap and cost.
     pub(super) fn value(&self, gap: f64, cost: f64) -> Value {
         let Self { feasible, bounded, steps, regularisation, .. } = *self;
         Value { gap, cost, feasible, bounded, steps, regularisation }

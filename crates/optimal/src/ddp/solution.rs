@@ -32,12 +32,12 @@ pub enum Status {
     /// larger penalty, may find a solution. [`Outcome::worst`](crate::Outcome::worst) is the largest violation.
     ConstraintsViolated,
     /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof: the initial state x̂₀ itself violates a
-    /// constraint of knot 0 that depends on no control. The other constraints hold, or the solve would report
-    /// another status.
+    /// constraint of knot 0 that depends on no control. The solution is that under the other constraints, as far as the
+    /// solve came.
     Infeasible,
     /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so that no direction can be computed. The
     /// solution is the best iterate before it; if it is the warm start itself, its cost may be infinite. States and controls
-    /// are finite.
+    /// are finite. Another warm start may help, such as x̂₀ held still ([`Problem::quasi_static`](crate::Problem::quasi_static)).
     NotFinite,
 }
 
@@ -244,6 +244,16 @@ impl Solution {
                 *u = u.max(*lower).min(*upper);
             }
         }
+    }
+
+    /// Whether some control lies on a bound.
+    pub(crate) fn touches_bounds(&self, problem: &Problem) -> bool {
+        (0..self.shape.horizon()).any(|t| {
+            problem.action(t).bounds(t).is_some_and(|(lower, upper)| {
+                let mut bounds = lower.iter().zip(upper);
+                self.us[self.shape.u(t)].iter().any(|u| bounds.next().is_some_and(|(l, h)| u <= l || u >= h))
+            })
+        })
     }
 
     /// Whether all controls are within their bounds.

@@ -115,6 +115,7 @@ fn statuses_and_methods_are_printed() {
         Status::TimeLimit,
         Status::Interrupted,
         Status::RegularisationLimit,
+        Status::ConstraintsViolated,
         Status::Infeasible,
         Status::NotFinite,
     ] {

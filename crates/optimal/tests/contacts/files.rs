@@ -73,8 +73,7 @@ fn a_problem_in_a_file_is_the_same_problem() {
     let data = problem_as_data(&mut rng);
     let text = serde_json::to_string(&data).unwrap();
     let read: RobotProblem = serde_json::from_str(&text).unwrap();
-    assert_eq!((&read.x0, &read.knots, &read.stages), (&data.x0, &data.knots, &data.stages));
-    assert_eq!(read.terminal, data.terminal);
+    assert_eq!(read, data);
     assert!(text.contains(r#""upper":[null,null,null]"#) && text.contains("limits_at"));
     assert_eq!(serde_json::to_string(&read).unwrap(), text);
     let mut problems = [data, read].map(|data| data.build().unwrap());

@@ -58,14 +58,13 @@ impl ActionModel for Unstable {
 
 /// Either solver.
 enum Solver {
-    Fddp(Fddp),
-    Constrained(AugmentedLagrangian),
+    Fddp(Box<Fddp>),
+    Constrained(Box<AugmentedLagrangian>),
 }
 
 impl Solver {
     fn each(problem: &Problem) -> [Self; 2] {
-        let constrained = AugmentedLagrangian::new(problem);
-        [Self::Fddp(Fddp::new(problem)), Self::Constrained(constrained)]
+        [Self::Fddp(Box::new(Fddp::new(problem))), Self::Constrained(Box::new(AugmentedLagrangian::new(problem)))]
     }
     fn settings(&mut self) -> &mut condyle_optimal::Settings {
         match self {

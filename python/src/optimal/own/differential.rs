@@ -357,8 +357,18 @@ impl ContinuousModel for OwnDynamics {
 
     fn integrate_jacobians(&self, dq: &[f64], by_q: &mut DMatrix<f64>, by_dq: &mut DMatrix<f64>) {
         if let Space::Robot(model) = &self.written.space {
-            condyle::integrate_jacobian(model, dq, condyle::IntegrateArgument::Position, by_q);
-            condyle::integrate_jacobian(model, dq, condyle::IntegrateArgument::Velocity, by_dq);
+            condyle::configuration::integrate_jacobian(
+                model,
+                dq,
+                condyle::configuration::IntegrateArgument::Position,
+                by_q,
+            );
+            condyle::configuration::integrate_jacobian(
+                model,
+                dq,
+                condyle::configuration::IntegrateArgument::Velocity,
+                by_dq,
+            );
         }
     }
 }

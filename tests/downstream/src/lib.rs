@@ -1,0 +1,9 @@
+//! The first day of a user: robots, points and forces, a plan, a controller and a simulation, by the façade alone.
+#![deny(warnings)]
+
+#[cfg(feature = "control")]
+pub mod control;
+pub mod kinematics;
+pub mod simulation;
+#[cfg(test)]
+mod panics;
