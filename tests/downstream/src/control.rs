@@ -4,7 +4,7 @@ use condyle::nalgebra::DVector;
 use condyle::optimal::robot::{
     Activation, Cost, FreeDynamics, GenericResidual, Inputs, Limit, OwnResidual, Residual, RobotState,
 };
-use condyle::optimal::{AugmentedLagrangian, Fddp, Problem, Solution, Status};
+use condyle::optimal::{Fddp, Problem, Solution};
 use condyle::wholebody::{Settings, Task, WholeBodyController};
 use condyle::{Error, Model, Scalar, Vec3};
 use std::sync::Arc;
@@ -68,6 +68,7 @@ pub fn first_effort(arm: &Arc<Model>, x0: &[f64]) -> Result<DVector<f64>, Error>
 #[cfg(test)]
 mod tests {
     use super::*;
+    use condyle::optimal::{AugmentedLagrangian, Status};
     use condyle::robots;
 
     fn arm() -> (Arc<Model>, Vec<f64>) {

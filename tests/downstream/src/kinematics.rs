@@ -1,8 +1,7 @@
 //! Frames and points of a robot, forces at points, and the types they are made of.
 
 use condyle::nalgebra::{DMatrix, DVector, Vector3};
-use condyle::spatial::Act;
-use condyle::{Batch, Data, Error, Force, Model, Motion, Se3, Vec3, aba, aba_derivatives, forward_velocities};
+use condyle::{Batch, Data, Error, Force, Model, Se3, Vec3, aba, aba_derivatives, forward_velocities};
 
 /// Returns the arm with a frame at the tip of a pen that it holds.
 pub fn with_pen(arm: &Model) -> Result<Model, Error> {
@@ -12,11 +11,11 @@ pub fn with_pen(arm: &Model) -> Result<Model, Error> {
 
 /// Returns the Jacobian of the tip, and its velocity by the Jacobian and by the recursion.
 pub fn velocity_of_the_tip(arm: &Model, q: &[f64], v: &[f64]) -> Result<(DMatrix<f64>, [Vector3<f64>; 2]), Error> {
-    let (pen, mut data, mut J) = (arm.frame("pen")?, Data::new(arm), DMatrix::zeros(3, arm.nv()));
+    let (pen, mut data, mut jacobian) = (arm.frame("pen")?, Data::new(arm), DMatrix::zeros(3, arm.nv()));
     let motion = forward_velocities(arm, &mut data, q, v);
-    motion.frame_point_jacobian(pen, Vec3::zero(), &mut J);
-    let by_jacobian = Vector3::from_iterator((&J * DVector::from_column_slice(v)).iter().copied());
-    Ok((J, [by_jacobian, motion.frame_point_velocity(pen, Vec3::zero()).into()]))
+    motion.frame_point_jacobian(pen, Vec3::zero(), &mut jacobian);
+    let by_jacobian = Vector3::from_iterator((&jacobian * DVector::from_column_slice(v)).iter().copied());
+    Ok((jacobian, [by_jacobian, motion.frame_point_velocity(pen, Vec3::zero()).into()]))
 }
 
 /// Returns the accelerations of a resting arm that is pushed at its pen, in world coordinates.
@@ -44,13 +43,14 @@ pub fn last_of_a_batch(arm: &Model, states: usize) -> [DVector<f64>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use condyle::{ModelBuilder, robots};
+    use condyle::spatial::Act;
+    use condyle::{ModelBuilder, Motion, robots};
 
     #[test]
     fn points_move_as_their_jacobians_say() -> Result<(), Error> {
         let arm = with_pen(&robots::arm7())?;
-        let (J, [a, b]) = velocity_of_the_tip(&arm, &[0.3; 7], &[0.5; 7])?;
-        assert!((a - b).norm() < 1e-13 && J.norm() > 0.1);
+        let (jacobian, [a, b]) = velocity_of_the_tip(&arm, &[0.3; 7], &[0.5; 7])?;
+        assert!((a - b).norm() < 1e-13 && jacobian.norm() > 0.1);
         Ok(())
     }
 
@@ -58,11 +58,12 @@ mod tests {
     #[test]
     fn forces_at_points_act_by_the_jacobian() -> Result<(), Error> {
         let (arm, q, tau, push) = (with_pen(&robots::arm7())?, [0.3; 7], [0.0; 7], Vec3::new(1.0, -2.0, 3.0));
-        let change = DVector::from_vec(pushed(&arm, &q, &tau, push)?) - DVector::from_vec(pushed(&arm, &q, &tau, Vec3::default())?);
-        let (J, _) = velocity_of_the_tip(&arm, &q, &[0.0; 7])?;
+        let change = DVector::from_vec(pushed(&arm, &q, &tau, push)?)
+            - DVector::from_vec(pushed(&arm, &q, &tau, Vec3::default())?);
+        let (jacobian, _) = velocity_of_the_tip(&arm, &q, &[0.0; 7])?;
         let mut data = Data::new(&arm);
         let effort = condyle::crba(&arm, &mut data, &q) * change;
-        assert!((effort - J.transpose() * Vector3::from(push)).norm() < 1e-10);
+        assert!((effort - jacobian.transpose() * Vector3::from(push)).norm() < 1e-10);
         Ok(())
     }
 

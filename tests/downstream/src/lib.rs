@@ -4,6 +4,6 @@
 #[cfg(feature = "control")]
 pub mod control;
 pub mod kinematics;
-pub mod simulation;
 #[cfg(test)]
 mod panics;
+pub mod simulation;

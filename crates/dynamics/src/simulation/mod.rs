@@ -126,7 +126,7 @@ struct Input<'a, S> {
 /// with lanes, and on dual numbers a simulation gives its own derivatives. Newton's method then iterates until all lanes have
 /// converged. A ground acts on `f64` only.
 #[derive(Clone, Debug)]
-pub struct Simulation<S: Scalar, R = f64> {
+pub struct Simulation<S: Scalar = f64, R = f64> {
     /// Method and step; may be changed between steps.
     pub settings: Settings,
     model: Arc<Model<R>>,
