@@ -81,8 +81,8 @@ class Settings(NamedTuple):
     friction: Literal["cone"] | Pyramid = "cone"
     """The description of friction: ‖f_t‖ ≤ μ f_n itself, or a `Pyramid`."""
     effort: ArrayLike | None = None
-    """The greatest effort of each coordinate (N m, N), nv numbers, infinite where there is none; None: the model's. Above
-    0 for each actuated coordinate."""
+    """Greatest effort of each coordinate (N m, N), nv numbers, infinite where there is none. None: the model's. It is
+    above 0 for each actuated coordinate."""
     joint_limits: JointLimits | None = JointLimits()
     """The limits of the joints' position and velocity; None for no such limits."""
     hold_ticks: int = 5
@@ -127,8 +127,8 @@ class Command(NamedTuple):
     ]
     """The end of the step in a word."""
     reason: str
-    """The end of the step in a sentence: with the index of a number that is not finite, or with the name of the joint or
-    of the frame whose rotation is invalid."""
+    """End of the step in a sentence. It names the index of a number that is not finite, or the joint or the frame whose
+    rotation is invalid."""
     source: Literal["solution", "last_solution", "gravity_compensation"]
     """The origin of the command. A solver that has not finished may still give an iterate that holds all constraints:
     a 'solution'. Others are safe commands: the last solution's torques for some ticks, then gravity compensation with
