@@ -183,7 +183,7 @@ def test_a_box_slides_to_a_stop(mu: float) -> None:
 
 def test_copies_go_on_with_the_same_bits(quadruped: Robot) -> None:
     model = quadruped.model
-    soles = [("LF_foot", [[0.0, 0.01, 0.0], [0.0, -0.01, 0.0]]), *FEET[1:]]
+    soles: list[Any] = [("LF_foot", [[0.0, 0.01, 0.0], [0.0, -0.01, 0.0]]), *FEET[1:]]
     ground = Ground(soles, normal=(0.0, 0.1, 1.0), height=-0.01, friction=0.5, restitution=0.1)
     simulation = Simulation(model, dt=5e-4, ground=ground)
     q = condyle.neutral(model)
