@@ -176,7 +176,7 @@ fn walker() -> Model {
     builder.build().unwrap()
 }
 
-/// Positions, velocities, accelerations or efforts, and forces of so many states.
+/// Positions, velocities, accelerations or efforts, and forces of a number of states.
 struct States {
     q: Vec<f64>,
     v: Vec<f64>,

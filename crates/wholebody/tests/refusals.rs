@@ -1,6 +1,8 @@
 //! Faults are named: descriptions by `Error`, states and failed solves by `Status`, lengths by a panic.
 
 mod common;
+#[path = "../../../tests/common/panics.rs"]
+mod panics;
 
 use common::*;
 use condyle_dynamics::{Vec3, robots};
@@ -8,8 +10,6 @@ use condyle_wholebody::{
     Axes, Backend, Command, CommandSource, Error, Friction, FrictionContact, Normal, Plan, PlanData, References,
     Settings, Status, Task, WholeBodyController,
 };
-use std::cell::RefCell;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 fn refusal(contacts: &[FrictionContact], tasks: &[Task], settings: Settings) -> String {
     WholeBodyController::new(&robots::quadruped(), contacts, tasks, settings).unwrap_err().to_string()
@@ -135,16 +135,6 @@ fn panics_point_at_the_caller() {
     let (q, v) = (stance(), [0.0; 18]);
 
     type Call<'a> = &'a mut dyn FnMut(&mut WholeBodyController);
-    // of this thread alone: other tests panic meanwhile
-    thread_local!(static PLACE: RefCell<Option<(String, String)>> = const { RefCell::new(None) });
-    std::panic::set_hook(Box::new(|panic| {
-        let file = panic.location().map(|place| place.file().to_owned()).unwrap_or_default();
-        PLACE.set(Some((file, panic.payload_as_str().unwrap_or_default().to_owned())));
-    }));
-    let mut place_of = |call: Call<'_>| {
-        assert!(catch_unwind(AssertUnwindSafe(|| call(&mut controller))).is_err());
-        PLACE.take().unwrap()
-    };
     let calls: [(&str, Call<'_>); 8] = [
         ("q: expected 19 numbers, found 3", &mut |c| drop(c.hold(&q[..3]))),
         ("q: expected 19 numbers, found 3", &mut |c| drop(c.step(&q[..3], &v, &references).clone())),
@@ -155,11 +145,10 @@ fn panics_point_at_the_caller() {
         ("contact: expected one of 4, found 4", &mut |_| _ = plan.activation(4, 0.0)),
         ("controls: the plan has none", &mut |_| drop(plan.feedback(0.0, &q, &v, &mut [0.0; 18]))),
     ];
-    let places = calls.map(|(expected, call)| (expected, place_of(call)));
-    let _ = std::panic::take_hook();
-    for (expected, (file, message)) in places {
-        assert_eq!(message, expected);
-        assert!(file.ends_with("refusals.rs"), "`{message}` points at {file}");
+    for (expected, call) in calls {
+        let panic = panics::panic_of(|| call(&mut controller)).expect(expected);
+        assert_eq!(panic.message, expected);
+        assert!(panic.file.ends_with("refusals.rs"), "{panic:?}");
     }
 }
 

@@ -1,23 +1,9 @@
 //! Panics for a caller's mistake point into this file.
 
 use condyle::{Data, robots};
-use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
-use std::sync::{Arc, Mutex};
 
-/// Runs a call that panics, and returns the file and the message of its panic.
-fn panic_of(call: impl FnOnce()) -> (String, String) {
-    let seen = Arc::new(Mutex::new((String::new(), String::new())));
-    let (kept, hook) = (seen.clone(), take_hook());
-    set_hook(Box::new(move |info| {
-        let file = info.location().map_or(String::new(), |place| place.file().to_owned());
-        *kept.lock().unwrap() = (file, info.payload_as_str().unwrap_or_default().to_owned());
-    }));
-    let result = catch_unwind(AssertUnwindSafe(call));
-    set_hook(hook);
-    assert!(result.is_err(), "no panic");
-    let seen = seen.lock().unwrap().clone();
-    seen
-}
+#[path = "../../common/panics.rs"]
+mod shared;
 
 #[test]
 fn panics_are_the_callers() {
@@ -31,8 +17,8 @@ fn panics_are_the_callers() {
         ("3", Box::new(|| _ = condyle::Batch::new(&arm, 3, 1).crba(&arm, &[0.0; 21]).at(3))),
     ];
     for (word, call) in calls {
-        let (file, message) = panic_of(call);
-        assert!(file.ends_with("panics.rs"), "{file}: {message}");
-        assert!(message.contains(word), "{message}");
+        let panic = shared::panic_of(call).expect(word);
+        assert!(panic.file.ends_with("downstream/src/panics.rs") || panic.file == "src/panics.rs", "{panic:?}");
+        assert!(panic.line > 0 && panic.message.contains(word), "{panic:?}");
     }
 }

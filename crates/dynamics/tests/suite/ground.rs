@@ -83,7 +83,7 @@ fn a_box_slides_to_a_stop() {
     }
 }
 
-/// What stands neither drifts nor shakes: the same forces in each step, of the weight in sum.
+/// Forces of a standing robot are the same in each step and sum up to its weight: nothing drifts or shakes.
 #[test]
 fn standing_is_still() {
     let model = free_box();
@@ -341,7 +341,7 @@ fn robots_stand() {
     assert!((lifted - 1.0).abs() < 0.05 && (q[2] - z).abs() < 0.05);
 }
 
-/// What is below the ground at the start is taken out gently: depth does not become speed.
+/// Points below the ground at the start are taken out gently: depth does not become speed.
 #[test]
 fn depth_does_not_become_speed() {
     let model = free_box();

@@ -1,6 +1,6 @@
 //! A panic for a caller's mistake names the mistake, and points into the caller's file.
 
-use crate::common::panics::{assert_panic, panic_of};
+use crate::common::panics::{Panic, assert_panic, panic_of};
 use crate::common::rng;
 use crate::common::table::{Input, Output, functions};
 use condyle_dynamics::ReferenceFrame::World;
@@ -42,7 +42,8 @@ fn wrong_lengths<S: Scalar>() {
                     _ => drop(input.f_ext.pop()),
                 }
                 let (mut data, mut output) = (Data::new(&model), Output::new(&model));
-                if let Some((file, message)) = panic_of(|| function(&model, &mut data, &input, &mut output)) {
+                if let Some(Panic { file, message, .. }) = panic_of(|| function(&model, &mut data, &input, &mut output))
+                {
                     let called = file.ends_with("common/table.rs");
                     assert!(called, "{name}, {argument} too short: {message:?} is reported in {file}");
                     panics += 1;
@@ -166,7 +167,7 @@ fn other_mistakes_are_reported_at_the_call() {
     });
 }
 
-/// What a batch and its results are asked.
+/// Calls of a batch and of its results, each with a wrong argument.
 #[test]
 fn mistakes_with_batches_are_reported_at_the_call() {
     let arm = robots::arm7();

@@ -1,6 +1,6 @@
 //! Many states at once: the same bits as one by one.
 
-use crate::common::panics::panic_of;
+use crate::common::panics::{Panic, panic_of};
 use crate::common::table::Input;
 use crate::common::{fixed, rng};
 use crate::counting::{allocations, bytes};
@@ -391,7 +391,7 @@ fn wrong_lengths_are_reported_at_the_call() {
             let mut batch = Batch::new(model, 3, 1);
             let (mut constraints, mut found) = (held(model, &batch), Found::default());
             let call = || (row.many)(model, &mut batch, &mut constraints, &s, &mut found);
-            if let Some((file, message)) = panic_of(call) {
+            if let Some(Panic { file, message, .. }) = panic_of(call) {
                 let called = file.ends_with("tests/vectors/table.rs");
                 assert!(called, "{}, {argument} too short: {message:?} is reported in {file}", row.name);
                 panics += 1;

@@ -2,7 +2,7 @@
 #![allow(non_snake_case)] // K beside k, the names of the literature
 
 use super::fddp::Fddp;
-use super::iterations::Progress;
+use super::progress::{Progress, Value};
 use super::solution::{Solution, Status};
 use crate::problem::Problem;
 
@@ -28,20 +28,6 @@ pub(super) struct Best {
     value: Option<Value>,
     /// The lowest cost of an iterate of this solve, that of the warm start included.
     lowest: f64,
-}
-
-/// The merit of an iterate, and how its feedback was found.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Value {
-    pub(super) gap: f64,
-    pub(super) cost: f64,
-    pub(super) feasible: bool,
-    /// Whether its controls are within their bounds; only a warm start that was not projected can be outside.
-    pub(super) bounded: bool,
-    /// The number of accepted steps that led to it.
-    pub(super) steps: usize,
-    /// The regularisation of the sweep at it.
-    pub(super) regularisation: f64,
 }
 
 impl Best {

@@ -3,8 +3,8 @@
 
 use super::best::Best;
 use super::clock::{Clock, Phase};
-use super::iterations::Progress;
 use super::observer::{Observer, PacedObserver, Unobserved};
+use super::progress::Progress;
 use super::rollout::Sum;
 use super::search::LineSearch;
 use super::settings::Settings;

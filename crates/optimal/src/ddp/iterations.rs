@@ -1,39 +1,14 @@
 //! The iterations of a solve, and why they end.
 
-use super::best::Value;
 use super::clock::Phase;
 use super::fddp::Fddp;
 use super::observer::PacedObserver;
+use super::progress::Progress;
 use super::search::{Iterate, Search};
 use super::settings::DdpMethod;
 use super::solution::{Iteration, Status};
 use crate::lq::SweepError;
 use crate::problem::Problem;
-
-/// The state that goes from one iteration to the next.
-pub(super) struct Progress {
-    pub(super) regularisation: f64,
-    pub(super) feasible: bool,
-    /// Whether the iterate before the last accepted step was feasible.
-    pub(super) was_feasible: bool,
-    pub(super) tolerance: f64,
-    /// Whether all controls of the iterate are within their bounds: those of a trial are, a warm start need not be.
-    pub(super) bounded: bool,
-    /// The number of accepted steps.
-    pub(super) steps: usize,
-    /// Whether there are gains of this solve.
-    pub(super) swept: bool,
-    /// Whether they are those of the best iterate, which the last step left.
-    pub(super) swept_best: bool,
-}
-
-impl Progress {
-    /// Returns the value of an iterate with this gap and cost.
-    pub(super) fn value(&self, gap: f64, cost: f64) -> Value {
-        let Self { feasible, bounded, steps, regularisation, .. } = *self;
-        Value { gap, cost, feasible, bounded, steps, regularisation }
-    }
-}
 
 impl Fddp {
     /// Iterates until one of the reasons to stop. A start without gaps is feasible if it is trusted.

@@ -5,6 +5,7 @@ mod clock;
 mod fddp;
 mod iterations;
 mod observer;
+mod progress;
 mod rollout;
 mod search;
 mod settings;

@@ -1,8 +1,9 @@
 //! The line search of differential dynamic programming: what a step should gain, and whether it does.
 
-use super::best::{Best, Value};
+use super::best::Best;
 use super::clock::{Clock, Phase};
 use super::observer::PacedObserver;
+use super::progress::Value;
 use super::rollout::{Nominal, Trials};
 use super::settings::{DdpMethod, Settings};
 use super::solution::{Solution, Status};

@@ -4,33 +4,15 @@
 use super::*;
 use condyle_optimal::robot::{OwnResidual, RobotProblem};
 use condyle_optimal::{AugmentedLagrangian, DdpMethod, Hessian, Lqr, Settings, Solution};
-use std::cell::RefCell;
-use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
-use std::sync::Once;
 
-thread_local! {
-    /// The file and the line of the last panic of this thread, while it is asked for.
-    static PLACE: RefCell<Option<(String, u32)>> = const { RefCell::new(None) };
-}
+#[path = "../../../../tests/common/panics.rs"]
+mod panics;
 
 /// The message of a panic, which must be at a line of this file.
-fn said(what: &str, line: u32, f: impl FnOnce()) -> String {
-    static HOOK: Once = Once::new();
-    HOOK.call_once(|| {
-        let before = take_hook();
-        set_hook(Box::new(move |info| {
-            let place = info.location().map(|at| (at.file().to_owned(), at.line())).unwrap_or_default();
-            let asked = PLACE.with_borrow_mut(|known| known.is_some() && known.replace(place).is_some());
-            if !asked {
-                before(info);
-            }
-        }));
-    });
-    PLACE.set(Some((String::new(), 0)));
-    let panic = catch_unwind(AssertUnwindSafe(f)).expect_err(what);
-    let (file, at) = PLACE.take().unwrap();
-    assert!(file.ends_with("callers.rs") && at == line, "{what}: the panic is at {file}:{at}, not at line {line}");
-    panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(|s| s.to_string())).unwrap()
+fn said(what: &str, line: u32, call: impl FnOnce()) -> String {
+    let panic = panics::panic_of(call).expect(what);
+    assert!(panic.file.ends_with("callers.rs") && panic.line == line, "{what}, line {line}: {panic:?}");
+    panic.message
 }
 
 /// Checks that an expression panics at its own line with a message.
