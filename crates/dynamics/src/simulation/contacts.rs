@@ -23,10 +23,15 @@ const OUT_SPEED: f64 = 0.5;
 /// restitution of a point at rest would shake it.
 const REST: f64 = 2.0;
 
+/// A step on the ground: [`Contacts::advance`].
+type Step = fn(&mut Contacts, &Model, &mut Data<f64>, f64, (&[f64], &[f64]), &mut [f64]) -> Status;
+
 /// Memory for the contacts of one robot with its ground. P is the number of points.
 #[derive(Clone, Debug)]
 pub(super) struct Contacts {
     pub ground: Ground,
+    /// [`advance`](Self::advance). It is called by this pointer, so that programs without a ground do not contain its code.
+    pub step: Step,
     /// Two unit vectors along the plane, then its normal.
     axes: [Vec3<f64>; 3],
     /// Impulses of all points along the axes, at the end of the last step (N s). Shape: 3P. Written by: `advance`.
@@ -69,6 +74,7 @@ impl Contacts {
             active: Vec::with_capacity(points),
             factor: Ltdl::new(model),
             solver: ContactSolver::new(points),
+            step: Self::advance,
             ground,
         })
     }
@@ -81,7 +87,7 @@ impl Contacts {
     }
 
     /// v_next, the velocity after a step without contacts, becomes the one with them; q and v are the state before it.
-    pub(super) fn advance(
+    fn advance(
         &mut self,
         model: &Model,
         data: &mut Data<f64>,

@@ -346,7 +346,9 @@ fn on_ground(
     let Some(ground) = ground else { return Status::Done };
     let (model, data, v_next) = (model.downcast_ref(), data.downcast_mut(), v_next.downcast_mut::<Vec<f64>>());
     match (model, data, doubles(q), doubles(v), v_next) {
-        (Some(model), Some(data), Some(q), Some(v), Some(v_next)) => ground.advance(model, data, h, (q, v), v_next),
+        (Some(model), Some(data), Some(q), Some(v), Some(v_next)) => {
+            (ground.step)(ground, model, data, h, (q, v), v_next)
+        }
         _ => unreachable!("`set_ground` is a function of simulations of f64"),
     }
 }
