@@ -249,8 +249,8 @@ impl Simulation {
         self.inner.restore(&State { time, q, v, impulses }).map_err(exception)
     }
 
-    /// A number of steps, with a control law that is called before each of them. Returns the status of the last step,
-    /// and ends early when a step fails.
+    /// A number of steps, with a control law that is called before each of them. Ends early when a step is not taken, and
+    /// returns its status; else 'contacts_not_converged' if a step had it, or 'done'.
     ///
     /// control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
     ///     efforts, then other threads run meanwhile.
@@ -265,8 +265,8 @@ impl Simulation {
             let status = py.detach(|| {
                 let mut status = Status::Done;
                 for _ in 0..steps {
-                    status = simulation.run(1, |_| {});
-                    if !status.is_done() || signals.go_on().is_break() {
+                    status = status.and(simulation.run(1, |_| {}));
+                    if !status.is_taken() || signals.go_on().is_break() {
                         break;
                     }
                 }
@@ -293,8 +293,8 @@ impl Simulation {
             let robot = &model.get().inner;
             let (tau, f_ext) = (Tangent::read("tau", &tau, robot)?, Forces::read("f_ext", Some(&f_ext), robot)?);
             let mut this = slf.try_borrow_mut()?;
-            status = this.inner.step(&tau, &f_ext);
-            if !status.is_done() {
+            status = status.and(this.inner.step(&tau, &f_ext));
+            if !status.is_taken() {
                 break;
             }
         }

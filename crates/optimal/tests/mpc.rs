@@ -3,6 +3,8 @@
 #[path = "mpc/budgets.rs"]
 mod budgets;
 mod common;
+#[path = "mpc/recovery.rs"]
+mod recovery;
 
 use common::{HANGING, Linear, cartpole, random, random_matrix, random_node, straight};
 use condyle_dynamics::{Vec3, robots};

@@ -343,7 +343,7 @@ solver! {
 /// and the limits do not hold, which proves nothing: another warm start may find a solution. It is "infeasible" if the
 /// initial state itself violates a limit of knot 0 that no control can change. `outcome.worst` names the knot, the limit
 /// and the amount. The cost of the solution contains the terms of the limits, that of `outcome` does not; its trace and
-/// gains are those of the last inner solve. Controls of a warm start that are outside of their bounds are moved into them.
+/// gains are those of the last inner solve, and its timings those of the whole solve. Controls of a warm start that are outside of their bounds are moved into them.
 ///
 /// problem: the problem to solve; all memory is made for its shape, once.
 /// inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that

@@ -295,7 +295,7 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
                 variational::step(model, data, &mut self.variational, &self.settings, input, state, (q, v))
             }
         };
-        if !self.v_next.iter().all(|v| S::all(v.abs().lt(S::splat(f64::MAX)))) {
+        if !self.v_next.iter().chain(&self.q_next).all(|x| S::all(x.abs().lt(S::splat(f64::MAX)))) {
             return if status.is_taken() { Status::NotFinite } else { status };
         }
         if status.is_taken() {
@@ -306,7 +306,9 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         status
     }
 
-    /// A number of steps, with a control law that is called before each of them; ends early when one fails.
+    /// A number of steps, with a control law that is called before each of them; ends early when one is not taken. Returns the
+    /// status of that step, or else [`ContactsNotConverged`](Status::ContactsNotConverged) with the largest error if a step had
+    /// it.
     ///
     /// Allocates nothing, unless the law does.
     ///
@@ -320,8 +322,9 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
             tau.fill(S::zero());
             f_ext.fill(Force::zero());
             control(&mut Control { time: self.time, q: &self.q, v: &self.v, tau: &mut tau, f_ext: &mut f_ext });
-            status = self.step(&tau, &f_ext);
-            if !status.is_done() {
+            let step = self.step(&tau, &f_ext);
+            status = status.and(step);
+            if !step.is_taken() {
                 break;
             }
         }

@@ -22,7 +22,7 @@ pub enum Status {
         /// Largest error in the velocity of a point (m/s).
         error: f64,
     },
-    /// The velocity is no longer finite: the step was not taken, the state is the one before it.
+    /// The velocity or the position is no longer finite: the step was not taken, the state is the one before it.
     NotFinite,
 }
 
@@ -32,9 +32,22 @@ impl Status {
         self == Self::Done
     }
 
-    /// Whether the step was taken.
-    pub(super) fn is_taken(self) -> bool {
+    /// Whether all steps were taken.
+    pub fn is_taken(self) -> bool {
         matches!(self, Self::Done | Self::ContactsNotConverged { .. })
+    }
+
+    /// Returns the status of a run whose last step has the status `last`: that of a step that was not taken, or else the
+    /// largest error of the contacts.
+    #[must_use = "the status of the run"]
+    pub fn and(self, last: Self) -> Self {
+        match (self, last) {
+            (Self::ContactsNotConverged { error }, Self::Done) => Self::ContactsNotConverged { error },
+            (Self::ContactsNotConverged { error: a }, Self::ContactsNotConverged { error: b }) => {
+                Self::ContactsNotConverged { error: a.max(b) }
+            }
+            _ => last,
+        }
     }
 }
 
@@ -48,7 +61,7 @@ impl fmt::Display for Status {
             Self::ContactsNotConverged { error } => {
                 write!(f, "contacts did not converge: an error of {error:.1e} m/s is left; the step was taken")
             }
-            Self::NotFinite => write!(f, "the velocity is no longer finite; the step was not taken"),
+            Self::NotFinite => write!(f, "the state is no longer finite; the step was not taken"),
         }
     }
 }

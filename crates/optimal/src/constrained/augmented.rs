@@ -3,7 +3,7 @@
 
 use super::settings::ConstraintSettings;
 use super::violation::{Violation, ViolationKind};
-use crate::ddp::{Fddp, Observer, Recent, Rules, Settings, Solution, Status, Unobserved};
+use crate::ddp::{Fddp, Observer, Recent, Rules, Settings, Solution, Status, Timings, Unobserved};
 use crate::error::Error;
 use crate::problem::Problem;
 use crate::time::Instant;
@@ -83,6 +83,8 @@ pub struct AugmentedLagrangian {
     adjoint: [DVector<f64>; 2],
     /// The durations of the last measurements of the residuals.
     measuring: Recent,
+    /// Durations of the phases of all inner solves so far.
+    timings: Timings,
     /// Whether the multipliers and the penalty are of no use to the next solve.
     pub(super) lost: bool,
 }
@@ -131,7 +133,16 @@ impl AugmentedLagrangian {
         let adjoint = [(); 2].map(|()| DVector::zeros(problem.ndx()));
         let (settings, inner) = (ConstraintSettings::default(), Settings::default());
         let (solver, outcome) = (Fddp::new(problem), Outcome::default());
-        Self { settings, inner, solver, outcome, adjoint, measuring: Recent::default(), lost: false }
+        Self {
+            settings,
+            inner,
+            solver,
+            outcome,
+            adjoint,
+            measuring: Recent::default(),
+            timings: Timings::default(),
+            lost: false,
+        }
     }
 
     /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, and multipliers of zero.
@@ -210,6 +221,7 @@ impl AugmentedLagrangian {
         observer: &mut dyn Observer,
     ) -> Result<&Solution, Error> {
         let begin = Instant::now();
+        self.timings = Timings::default();
         let mut result = self.attempt(problem, warm_start, observer, begin, true);
         if let (Ok(status), Some(start)) = (&result, warm_start)
             && self.lost
@@ -222,9 +234,8 @@ impl AugmentedLagrangian {
         }
         problem.forget_multipliers();
         self.solver.solution.status = result?;
-        let total = self.solver.solution.timings.total;
-        self.solver.solution.timings.end(begin.elapsed(), self.inner.time_budget);
-        self.solver.solution.timings.total = total; // of the last inner solve, as its parts
+        self.timings.end(begin.elapsed(), self.inner.time_budget);
+        self.solver.solution.timings = std::mem::take(&mut self.timings);
         Ok(&self.solver.solution)
     }
 
@@ -261,8 +272,9 @@ impl AugmentedLagrangian {
             let over = begin.elapsed() + self.measuring.median();
             self.solver.settings.time_budget = self.inner.time_budget.map(|budget| budget.saturating_sub(over));
             let guaranteed = first && solve == 0 && self.inner.time_budget != Some(Duration::ZERO);
-            let rules = Rules { guaranteed, trusts_start: true };
+            let rules = Rules { guaranteed, trusts_start: true, resumes: warm_start.is_none() && solve == 0 };
             let result = self.solver.run(problem, warm_start.filter(|_| solve == 0), observer, rules)?;
+            self.timings += result.timings;
             self.outcome.solves += 1;
             self.outcome.iterations += result.trace.len();
             let stopped = result.status;

@@ -111,6 +111,8 @@ pub(crate) struct Rules {
     /// Whether a warm start without gaps, of which a control lies on its bound, counts as feasible. Crocoddyl's rule is no:
     /// the bounds then only cut trials off until the first full step, which is never taken where they press.
     pub(crate) trusts_start: bool,
+    /// Whether the solve goes on from the last one, and not from a warm start or an earlier part of the same solve.
+    pub(crate) resumes: bool,
 }
 
 /// The iterations for which there is room in the trace when a solve begins; with more it grows.
@@ -148,7 +150,7 @@ impl Fddp {
     /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see
     /// [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]), &mut Unobserved, self.rules())
+        self.run(problem, Some([xs, us]), &mut Unobserved, self.rules(false))
     }
 
     /// As [`solve`](Self::solve), and shows each iteration as it ends to `observer`, who may end the solve.
@@ -162,16 +164,20 @@ impl Fddp {
         us: &[f64],
         mut observer: impl Observer,
     ) -> Result<&Solution, Error> {
-        self.run(problem, Some([xs, us]), &mut observer, self.rules())
+        self.run(problem, Some([xs, us]), &mut observer, self.rules(false))
     }
 
     /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
     /// [`shift`](Self::shift), for the next horizon.
     ///
+    /// A trajectory that is lost is replaced by x̂₀ held still at all knots, if that costs less: one that is not finite, or costs
+    /// more than ten times as much as the last solution, with 1 added to both. After a solve that ran out of time or iterations
+    /// with a refused step, the regularisation begins where it was.
+    ///
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume(&mut self, problem: &mut Problem) -> Result<&Solution, Error> {
-        self.run(problem, None, &mut Unobserved, self.rules())
+        self.run(problem, None, &mut Unobserved, self.rules(true))
     }
 
     /// As [`resume`](Self::resume), and shows each iteration as it ends to `observer`, who may end the solve.
@@ -179,12 +185,12 @@ impl Fddp {
     /// # Errors
     /// As [`solve`](Self::solve).
     pub fn resume_with(&mut self, problem: &mut Problem, mut observer: impl Observer) -> Result<&Solution, Error> {
-        self.run(problem, None, &mut observer, self.rules())
+        self.run(problem, None, &mut observer, self.rules(true))
     }
 
     /// Returns the rules of a solve by itself, which are Crocoddyl's.
-    fn rules(&self) -> Rules {
-        Rules { guaranteed: self.settings.time_budget != Some(Duration::ZERO), trusts_start: false }
+    fn rules(&self, resumes: bool) -> Rules {
+        Rules { guaranteed: self.settings.time_budget != Some(Duration::ZERO), trusts_start: false, resumes }
     }
 
     /// Solves from a warm start or the trajectory of the last solve.
@@ -221,19 +227,19 @@ impl Fddp {
             self.solution.project(problem, 0..problem.horizon());
         }
 
+        let start = if rules.resumes { self.resumed_regularisation() } else { self.settings.regularisation_start };
         self.solution.timings = Timings::default();
         self.solution.trace.clear();
         self.solution.trace.reserve(self.settings.max_iterations.min(FORESEEN));
         let motion_size = if self.inverse_dynamics { problem.motion_size() } else { 0 };
         self.motions.resize(problem.horizon() * motion_size, 0.0);
         self.line_search.start(problem, self.settings.step_lengths, motion_size, self.settings.threads);
-        let start = self.settings.regularisation_start;
         let mut progress = Progress {
             regularisation: start,
             feasible: false,
             was_feasible: false,
             tolerance,
-            bounded: !bounded || self.solution.is_bounded(problem),
+            bounded: false,
             steps: 0,
             swept: false,
             swept_best: false,
@@ -242,8 +248,14 @@ impl Fddp {
         self.sweep.forget();
         self.best.start();
         self.clock.start(begin, self.settings.time_budget, rules.guaranteed);
-        let trusts_start = bounded && rules.trusts_start && self.solution.touches_bounds(problem);
-        let status = self.iterate(problem, &mut progress, trusts_start, &mut PacedObserver::new(observer, begin));
+        let last_cost = self.solution.cost;
+        let mut gap = self.start(problem);
+        if rules.resumes {
+            gap = self.recover(problem, gap, last_cost);
+        }
+        progress.bounded = !bounded || self.solution.is_bounded(problem);
+        progress.feasible = bounded && rules.trusts_start && gap == 0.0 && self.solution.touches_bounds(problem);
+        let status = self.iterate(problem, &mut progress, gap, &mut PacedObserver::new(observer, begin));
         self.finish(problem, &mut progress, status);
         self.solution.timings.end(begin.elapsed(), self.settings.time_budget);
         Ok(&self.solution)

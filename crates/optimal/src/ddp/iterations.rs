@@ -11,17 +11,14 @@ use crate::lq::SweepError;
 use crate::problem::Problem;
 
 impl Fddp {
-    /// Iterates until one of the reasons to stop. A start without gaps is feasible if it is trusted.
+    /// Iterates from a start with a largest gap until one of the reasons to stop.
     pub(super) fn iterate(
         &mut self,
         problem: &mut Problem,
         now: &mut Progress,
-        trusts_start: bool,
+        mut gap: f64,
         watch: &mut PacedObserver<'_>,
     ) -> Status {
-        self.calc(problem);
-        let mut gap = self.update_gaps(problem);
-        now.feasible = trusts_start && gap == 0.0;
         if !(self.solution.cost.is_finite() && gap.is_finite()) {
             return Status::NotFinite;
         }

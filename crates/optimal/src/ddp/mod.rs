@@ -6,6 +6,7 @@ mod fddp;
 mod iterations;
 mod observer;
 mod progress;
+mod recover;
 mod rollout;
 mod search;
 mod settings;

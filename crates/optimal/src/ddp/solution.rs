@@ -3,7 +3,7 @@
 
 use crate::problem::{Problem, Shape};
 use core::fmt;
-use core::ops::Range;
+use core::ops::{AddAssign, Range};
 use nalgebra::{DMatrix, DVector};
 #[cfg(feature = "serde")]
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -103,7 +103,7 @@ pub struct Iteration {
     pub accepted: bool,
 }
 
-/// The durations of the phases of a solve.
+/// Durations of the phases of a solve: of an [`AugmentedLagrangian`](crate::AugmentedLagrangian) of all inner solves together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timings {
@@ -119,10 +119,19 @@ pub struct Timings {
     pub total: Duration,
     /// The time beyond [`Settings::time_budget`](crate::Settings::time_budget), zero if the solve ended in time: above zero
     /// where the budget is shorter than the first iteration, or a phase lasted longer than predicted. A budget of zero asks
-    /// for no iteration, and is never overrun. Of an [`AugmentedLagrangian`](crate::AugmentedLagrangian) that of all inner
-    /// solves together.
+    /// for no iteration, and is never overrun.
     #[cfg_attr(feature = "serde", serde(default))]
     pub overrun: Duration,
+}
+
+/// Adds the phases of another part of the same solve. `total` and `overrun` are set at its end.
+impl AddAssign for Timings {
+    fn add_assign(&mut self, part: Self) {
+        self.calc += part.calc;
+        self.calc_diff += part.calc_diff;
+        self.sweep += part.sweep;
+        self.rollout += part.rollout;
+    }
 }
 
 impl Timings {
