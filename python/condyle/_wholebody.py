@@ -284,6 +284,7 @@ class ContactTarget(Target):
 
         Between them the frame is held and the normal force is at most α times the contact's `max_force`, or the robot's
         weight if that is infinite: a ramp over some ticks loads or unloads the contact without a jump in the torques.
+        Numbers outside of 0 to 1 are clamped.
         """
         return float(self._numbers[0])
 

@@ -21,7 +21,7 @@ macro_rules! data {
         $(#[$doc])*
         #[derive(Debug)]
         #[repr(C)]
-        pub struct Data<S> {
+        pub struct Data<S = f64> {
             size: Size,
             /// The hash of the tree that it was made for.
             tree: u64,

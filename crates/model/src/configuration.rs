@@ -126,6 +126,7 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
 /// If an argument has the wrong length.
 #[track_caller]
 pub fn interpolate<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], t: S, tangent: &mut [S], out: &mut [S]) {
+    check("tangent", tangent.len(), model.nv());
     difference(model, q0, q1, tangent);
     for x in tangent.iter_mut() {
         *x = *x * t;
@@ -141,6 +142,7 @@ pub fn interpolate<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], t: S, tan
 /// If an argument has the wrong length.
 #[track_caller]
 pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mut [S]) -> S {
+    check("tangent", tangent.len(), model.nv());
     difference(model, q0, q1, tangent);
     let mut sum = S::zero();
     for &x in tangent.iter() {

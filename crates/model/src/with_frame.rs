@@ -26,8 +26,8 @@ impl Model {
     ///
     /// # Errors
     /// [`Error::UnknownFrame`] if the parent is a name that neither a frame nor a body has; [`Error::Frame`] if the parent's
-    /// index is too large, or the placement is no rotation and translation, or is not finite; [`Error::Duplicate`] if the
-    /// user has a frame of this name already.
+    /// index is too large, the name is empty, or the placement is no rotation and translation, or is not finite;
+    /// [`Error::Duplicate`] if a frame has this name already: [`frame`](Self::frame) would not find the new one.
     pub fn with_frame<'a>(
         &self,
         name: &str,
@@ -38,7 +38,10 @@ impl Model {
         let (body, bXp) = self.frame_parent(parent.into(), wrong)?;
         let mut frame = Frame { name: name.to_owned(), kind: FrameKind::User, body, placement };
         check_frame(&frame)?;
-        if self.frames.iter().any(|f| f.kind == FrameKind::User && f.name == name) {
+        if name.is_empty() {
+            return Err(wrong("a frame without a name cannot be found".to_owned()));
+        }
+        if self.frames.iter().any(|f| f.name == name) {
             return Err(Error::Duplicate { kind: "frame", name: name.to_owned() });
         }
         frame.placement = bXp * placement;

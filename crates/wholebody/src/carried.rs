@@ -135,6 +135,7 @@ fn write_command(command: &Command, out: &mut Vec<f64>) {
         Status::InvalidState(InvalidRotation::Pose { name: n, index, error }) => {
             out.extend([7.0, name(n), index as f64, error]);
         }
+        Status::NotStarted => out.push(8.0),
     }
 }
 
@@ -152,7 +153,7 @@ fn read_command(command: &mut Command, from: &mut Reader<'_>) -> Option<()> {
 }
 
 fn read_status(from: &mut Reader<'_>) -> Option<Status> {
-    let kind = from.index(8)?;
+    let kind = from.index(9)?;
     let mut name = || from.index(NAMES.len()).map(|k| NAMES[k]);
     Some(match kind {
         0 => Status::Solved,
@@ -166,9 +167,10 @@ fn read_status(from: &mut Reader<'_>) -> Option<Status> {
             let (body, first, end) = (index()?, index()?, index()?);
             Status::InvalidState(InvalidRotation::Joint { name, body, first, end, length: from.any()? })
         }
-        _ => {
+        7 => {
             let (name, index) = (name()?, from.index(usize::MAX)?);
             Status::InvalidState(InvalidRotation::Pose { name, index, error: from.any()? })
         }
+        _ => Status::NotStarted,
     })
 }

@@ -106,7 +106,7 @@ impl WholeBodyController {
             priorities => rows.iter().sum::<usize>() + (priorities - 1) * model.nv(),
         };
         let command = Command {
-            status: Status::Solved,
+            status: Status::NotStarted,
             source: CommandSource::GravityCompensation,
             tau: vec![0.0; model.nv()],
             a: vec![0.0; model.nv()],

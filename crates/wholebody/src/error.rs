@@ -99,6 +99,9 @@ pub enum Error {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Status {
+    /// No step has been made: the command is zero.
+    #[error("no step has been made")]
+    NotStarted,
     /// The command is the program's solution.
     #[error("solved")]
     Solved,

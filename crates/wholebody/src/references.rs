@@ -52,7 +52,7 @@ pub struct MomentumTarget {
 pub struct ContactTarget {
     /// α, from 0 (it does not touch: no force, and the frame may move) to 1 (it touches). Between them the frame is held and
     /// the normal force is at most α times the contact's `max_force`, or the robot's weight if that is infinite: a ramp of α
-    /// over some ticks loads or unloads the contact without a jump in the torques.
+    /// over some ticks loads or unloads the contact without a jump in the torques. Numbers outside of 0 to 1 are clamped.
     pub activation: f64,
     /// Where the frame is held; acts only if [`Settings::contact_gains`](crate::Settings::contact_gains) have a stiffness. Of
     /// a point, the translation alone.

@@ -69,9 +69,13 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
     }
     fn duration(given: &Bound<'_, PyAny>) -> PyResult<Option<Duration>> {
         let seconds: Option<f64> = given.extract()?;
-        let wrong =
-            |seconds| PyValueError::new_err(format!("time_budget: expected at least 0 seconds, found {seconds}"));
-        seconds.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
+        let wrong = |seconds| {
+            PyValueError::new_err(format!(
+                "time_budget: expected at least 0 seconds (and at most 1.8e19, or inf), found {seconds:e}"
+            ))
+        };
+        let limit = seconds.filter(|&s| s != f64::INFINITY); // no limit
+        limit.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
     }
     set!(s, given, {
         method by method, second_order, inverse_dynamics_form, project_warm_start, max_iterations, time_budget by duration, segments, threads,

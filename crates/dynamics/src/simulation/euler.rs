@@ -17,6 +17,7 @@ workspace! {
 }
 
 /// v' = v + h a: the velocity after the step, without the ground.
+#[track_caller]
 pub(super) fn velocity<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,

@@ -274,6 +274,10 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         check_forces(f_ext.len(), self.model.nodes().len());
         let Settings { integrator, dt, passive, .. } = self.settings;
         assert!(dt > 0.0 && dt.is_finite(), "settings.dt: expected a finite number above 0, found {dt}");
+        assert!(
+            passive.is_none_or(|smoothing| smoothing > 0.0),
+            "settings.passive: expected a smoothing above 0, found {passive:?}"
+        );
         let input = Input { h: S::splat(dt), tau, f_ext, passive };
         let euler = integrator == Integrator::SemiImplicitEuler;
         assert!(
@@ -358,6 +362,7 @@ fn on_ground(
 
 /// aba(q, v, τ + passive torque).
 #[inline(always)]
+#[track_caller]
 fn acceleration<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &'d mut Data<S>,

@@ -41,7 +41,8 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// Continues from a state of a simulation of this robot on this ground.
     ///
     /// # Errors
-    /// [`Error::Length`] if a list is too short or too long; else as [`set_state`](Self::set_state).
+    /// [`Error::Length`] if a list is too short or too long; [`Error::Ground`] if an impulse is not finite; else as
+    /// [`set_state`](Self::set_state).
     pub fn restore(&mut self, state: &State<S>) -> Result<(), Error> {
         let impulses = self.ground.as_ref().map_or(0, |ground| ground.impulses.len());
         for (name, expected, found) in [
@@ -52,6 +53,10 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
             if expected != found {
                 return Err(Error::Length { name, expected, found });
             }
+        }
+        if let Some(k) = state.impulses.iter().position(|impulse| !impulse.is_finite()) {
+            let what = format!("impulses[{k}] is {}, which is not finite", state.impulses[k]);
+            return Err(Error::Ground { what });
         }
         self.set_state(&state.q, &state.v)?;
         self.time = state.time;

@@ -17,7 +17,8 @@ pub enum Status {
     },
     /// The impulses of the ground break the laws of contact by more than the tolerance. The step was taken with them: they
     /// push only, and are inside the friction cones. More iterations
-    /// ([`Ground::max_iterations`](super::Ground::max_iterations)) or a shorter step help.
+    /// ([`Ground::max_iterations`](super::Ground::max_iterations)) or a shorter step may help. Where M is badly conditioned, as
+    /// with bodies of some grams, rounding leaves an error, and the [`tolerance`](super::Ground::tolerance) should be larger.
     ContactsNotConverged {
         /// Largest error in the velocity of a point (m/s).
         error: f64,

@@ -135,6 +135,7 @@ fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S
 const STILL: f64 = 1e-30;
 
 /// The whole method.
+#[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,

@@ -201,7 +201,7 @@ impl AugmentedLagrangian {
     /// constraints.
     ///
     /// # Errors
-    /// [`Error`] if the problem is not the one solved before, shifted once.
+    /// [`Error`] if the numbers of knots, states and controls are not those of the last problem, shifted once.
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         self.solver.shift(problem)?;
         let horizon = problem.horizon();

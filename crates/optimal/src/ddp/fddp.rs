@@ -63,8 +63,9 @@ use std::time::Duration;
 /// #     }
 /// # }
 /// // x⁺ = x + u, ℓ = ½ (x² + u²): linear and quadratic, so the first step is the last.
-/// let mut problem = Problem::new(vec![1.0], vec![Box::new(Integrator { nu: 1 })], vec![0; 30], Box::new(Integrator { nu: 0
-/// }))?; let mut solver = Fddp::new(&problem);
+/// let (knot, end) = (Integrator { nu: 1 }, Integrator { nu: 0 });
+/// let mut problem = Problem::new(vec![1.0], vec![Box::new(knot)], vec![0; 30], Box::new(end))?;
+/// let mut solver = Fddp::new(&problem);
 /// let solution = solver.solve(&mut problem, &[0.0; 31], &[0.0; 30])?;
 ///
 /// assert_eq!(solution.status, Status::Converged);

@@ -16,7 +16,7 @@ impl Fddp {
     /// the horizon would diverge exponentially while solves run out of time.
     ///
     /// # Errors
-    /// [`Error`] if the problem is not the one solved before, shifted once.
+    /// [`Error`] if the numbers of knots, states and controls are not those of the last problem, shifted once.
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         let (old, new) = (self.solution.shape(), problem.shape());
         let (horizon, ndx) = (new.horizon(), new.ndx);

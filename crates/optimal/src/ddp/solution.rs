@@ -32,7 +32,7 @@ pub enum Status {
     /// larger penalty, may find a solution. [`Outcome::worst`](crate::Outcome::worst) is the largest violation.
     ConstraintsViolated,
     /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof: the initial state x̂₀ itself violates a
-    /// constraint of knot 0 that depends on no control. The solution is that under the other constraints, as far as the
+    /// constraint of knot 0 that is known to depend on no control: a built-in residual of the state alone. The solution is that under the other constraints, as far as the
     /// solve came.
     Infeasible,
     /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so that no direction can be computed. The
