@@ -164,6 +164,17 @@ fn a_controller_is_shared_between_threads() {
     is_usual::<Status>();
 }
 
+/// A command is no solution before the first step.
+#[test]
+fn nothing_is_solved_before_the_first_step() {
+    let model = robots::quadruped();
+    let mut controller = controller(&model, &feet(0.7));
+    assert_eq!(controller.command().solved().unwrap_err(), Status::NotStarted);
+    assert_eq!(controller.clone().command().status, Status::NotStarted);
+    let references = controller.hold(&stance()).unwrap();
+    assert!(controller.step(&stance(), &[0.0; 18], &references).solved().is_ok());
+}
+
 #[test]
 fn words_for_users() {
     let sources = [CommandSource::Solution, CommandSource::LastSolution, CommandSource::GravityCompensation];

@@ -397,10 +397,15 @@ fn a_solver_that_is_stopped_says_so() {
     let model = free_box();
     let ground = Ground { max_iterations: 0, ..Ground::default() }.with_sole(0, &corners()[..4]);
     let mut simulation = on(&model, ground, &[0.0, 0.0, HALF[2], 0.0, 0.0, 0.0, 1.0], &[0.0; 6]);
-    let status = simulation.run(5, passive);
+    let status = simulation.run(1, passive);
     let Status::ContactsNotConverged { error } = status else { panic!("{status}") };
     assert!((error - G * H).abs() < 1e-12, "{error}");
-    assert_eq!(simulation.time(), H); // the step was taken, the run ended
+    assert_eq!(simulation.time(), H); // the step was taken
+    let run = simulation.run(4, passive);
+    assert!((simulation.time() - 5.0 * H).abs() < 1e-12); // a run goes on, and reports the largest error
+    assert!(matches!(run, Status::ContactsNotConverged { error: largest } if largest > error), "{run}");
+    assert_eq!(run.and(Status::Done), run);
+    assert_eq!(run.and(Status::NotFinite), Status::NotFinite);
     let said = "contacts did not converge: an error of 9.8e-3 m/s is left; the step was taken";
     assert_eq!(status.to_string(), said);
 }

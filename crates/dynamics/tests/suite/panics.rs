@@ -271,3 +271,27 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
     let files = files.into_iter().filter(|path| path.extension().is_some_and(|extension| extension == "rs"));
     files.chain(folders.iter().flat_map(|folder| sources(folder))).collect()
 }
+
+#[test]
+fn mistakes_with_simulations_and_scratch_are_reported_at_the_call() {
+    use condyle_dynamics::simulation::{Integrator, Settings, Simulation};
+    let arm = robots::arm7();
+    for integrator in [Integrator::SemiImplicitEuler, Integrator::RungeKutta4, Integrator::Variational] {
+        let settings = Settings { integrator, passive: Some(0.0), ..Settings::default() };
+        assert_panic(HERE, "settings.passive: expected a smoothing above 0, found Some(0.0)", || {
+            let _ = Simulation::new(&arm, settings).step(&[0.0; 7], &[]);
+        });
+    }
+    let mut short = [0.0; 3];
+    assert_panic(HERE, "tangent: expected 7 numbers, found 3", || {
+        condyle_dynamics::interpolate(&arm, &[0.0; 7], &[0.0; 7], 0.5, &mut short, &mut [0.0; 7]);
+    });
+    assert_panic(HERE, "tangent: expected 7 numbers, found 3", || {
+        condyle_dynamics::distance(&arm, &[0.0; 7], &[0.0; 7], &mut [0.0; 3]);
+    });
+    // a joint that moves no mass: M is singular
+    let massless = crate::validity::massless_tip();
+    assert_panic(HERE, "singular", || {
+        let _ = Simulation::new(&massless, Settings::default()).step(&vec![0.0; massless.nv()], &[]);
+    });
+}

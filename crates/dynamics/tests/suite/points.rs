@@ -134,6 +134,8 @@ fn frames_that_cannot_be() {
     assert_eq!(said("tip", "tool".into(), infinite), "frame `tip`: placement is not finite");
     let twice = arm.with_frame("tip", FrameParent::Body(0), here).unwrap().with_frame("tip", "tool", here);
     assert_eq!(twice.unwrap_err().to_string(), "two frames are named `tip`");
+    assert_eq!(said("tool", "tool".into(), here), "two frames are named `tool`"); // the robot's own
+    assert_eq!(said("", "tool".into(), here), "frame ``: a frame without a name cannot be found");
 }
 
 /// A model is equal to its clone and to itself read back; not to one with another number.

@@ -450,3 +450,26 @@ fn nothing_is_allocated() {
         assert_eq!(count, 0, "on\n{model}");
     }
 }
+
+/// A step to a position that is not finite is not taken, even if the velocity still is finite.
+#[test]
+fn positions_stay_finite() {
+    let quadruped = robots::quadruped();
+    for (integrator, _) in ALL {
+        let mut simulation = Simulation::new(&quadruped, settings(integrator, 1e-3));
+        let q: Vec<f64> = neutral(&quadruped);
+        simulation.set_state(&q, &[1e80; 18]).unwrap();
+        let status = simulation.step(&[0.0; 18], &[]);
+        assert!(!status.is_done() && simulation.q() == q, "{integrator:?}: {status}");
+    }
+}
+
+#[test]
+fn states_that_cannot_be_restored() {
+    let mut simulation = Simulation::<f64>::new(robots::arm7(), Settings::default());
+    simulation.set_ground(condyle_dynamics::simulation::Ground::at_frames([5])).unwrap();
+    let good = simulation.state();
+    let bad = State { impulses: vec![0.0, f64::INFINITY, 0.0], ..good.clone() };
+    assert_eq!(simulation.restore(&bad).unwrap_err().to_string(), "ground: impulses[1] is inf, which is not finite");
+    assert_eq!(simulation.state(), good);
+}

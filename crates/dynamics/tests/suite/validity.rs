@@ -10,7 +10,7 @@ use num_dual::Dual64;
 use std::panic::catch_unwind;
 
 /// An arm whose last link has no mass, so that forward dynamics has no answer.
-fn massless_tip() -> Model {
+pub(crate) fn massless_tip() -> Model {
     let mut builder = ModelBuilder::new("tip");
     let hinge = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3::diagonal(0.1));
