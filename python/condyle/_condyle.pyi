@@ -2392,7 +2392,7 @@ class AugmentedLagrangian:
     and the limits do not hold, which proves nothing: another warm start may find a solution. It is "infeasible" if the
     initial state itself violates a limit of knot 0 that no control can change. `outcome.worst` names the knot, the limit
     and the amount. The cost of the solution contains the terms of the limits, that of `outcome` does not; its trace and
-    gains are those of the last inner solve. Controls of a warm start that are outside of their bounds are moved into them.
+    gains are those of the last inner solve, and its timings those of the whole solve. Controls of a warm start that are outside of their bounds are moved into them.
 
     problem: the problem to solve; all memory is made for its shape, once.
     inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
@@ -3407,8 +3407,8 @@ class Simulation:
         """The state of a pickle."""
 
     def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
-        """A number of steps, with a control law that is called before each of them. Returns the status of the last step,
-        and ends early when a step fails.
+        """A number of steps, with a control law that is called before each of them. Ends early when a step is not taken, and
+        returns its status; else 'contacts_not_converged' if a step had it, or 'done'.
 
         control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
             efforts, then other threads run meanwhile.

@@ -630,8 +630,9 @@ class Ground(NamedTuple):
     Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ with 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0 and the exact disc
     ‖λ_t‖ ≤ μ λ_n of each point, whose velocity after the step is u⁺ = J v⁺ and whose gap to the plane is φ. Forces of
     redundant contacts are not unique; their sum is. Errors are O(h). Only points and the plane meet: edges of soles,
-    other bodies and limits of joints do not. With a restitution above 0 (Newton's law) and friction, an impact of several
-    points may raise the energy. A point below the plane is taken out by a fifth of its depth a step, at most 0.5 m/s.
+    other bodies and limits of joints do not. With a restitution above 0 (Newton's law) and friction, an impact of
+    several points may raise the energy. A point below the plane is taken out by a fifth of its depth a step, at most
+    0.5 m/s.
     """
 
     points: Sequence[str | int | tuple[str | int, ArrayLike]]
