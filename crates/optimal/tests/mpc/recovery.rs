@@ -52,22 +52,6 @@ fn a_horizon_whose_end_runs_away_is_replaced() {
     }
 }
 
-#[test]
-fn a_lost_solution_does_not_stay() {
-    let mut problem = reach(40.0);
-    let (xs, us) = start(&mut problem);
-    let mut solver = Fddp::new(&problem);
-    let expected = solver.solve(&mut problem, &xs, &us).unwrap().cost;
-    // the initial state leaves, and comes back
-    let mut far = REST;
-    far[7..].fill(1e6);
-    problem.set_x0(&far).unwrap();
-    solver.resume(&mut problem).unwrap();
-    problem.set_x0(&REST).unwrap();
-    let found = solver.resume(&mut problem).unwrap();
-    assert!(found.cost < SANE.min(10.0 * expected), "{} {}", found.status, found.cost);
-}
-
 /// One iteration a solve, whose steps are refused until the regularisation is large enough.
 #[test]
 fn short_budgets_make_progress() {
