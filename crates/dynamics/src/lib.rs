@@ -120,4 +120,6 @@ pub use passes::centroidal::{CentroidalMap, CentroidalMapRate};
 pub use passes::energy::EnergyDerivatives;
 pub use passes::factored_dynamics::ForwardDynamicsMethod;
 pub use passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities};
+#[doc(hidden)]
+pub use passes::free_armature::{add_armature_bias, subtract_armature_bias};
 pub use passes::passive::{passive_torque, passive_torque_derivative};

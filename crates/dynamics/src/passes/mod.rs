@@ -13,6 +13,7 @@ pub(crate) mod crba;
 pub(crate) mod energy;
 pub(crate) mod factored_dynamics;
 pub(crate) mod frames;
+pub(crate) mod free_armature;
 pub(crate) mod kinematics;
 pub(crate) mod minv;
 pub(crate) mod passive;

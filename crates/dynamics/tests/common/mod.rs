@@ -185,6 +185,20 @@ impl Tree {
     }
 }
 
+/// Efforts of armature: a q̈, and for a free joint's linear coordinates a (v̇ + ω × v).
+#[allow(dead_code)] // by some of the tests
+pub(crate) fn armature_torque(model: &Model, v: &[f64], a: &[f64]) -> Vec<f64> {
+    let mut tau: Vec<f64> = model.armature().iter().zip(a).map(|(armature, a)| armature * a).collect();
+    for body in model.bodies()[1..].iter().filter(|body| body.joint == Joint::FreeFlyer) {
+        let k = body.idx_v;
+        let (linear, angular) = (Vec3::new(v[k], v[k + 1], v[k + 2]), Vec3::new(v[k + 3], v[k + 4], v[k + 5]));
+        for (axis, x) in angular.cross(linear).to_array().into_iter().enumerate() {
+            tau[k + axis] += model.armature()[k + axis] * x;
+        }
+    }
+    tau
+}
+
 /// A robot that does not move: two bodies that are fixed to the world, and a frame.
 #[allow(dead_code)] // by some of the tests
 pub(crate) fn fixed() -> Model {
@@ -196,9 +210,10 @@ pub(crate) fn fixed() -> Model {
     builder.build().expect("a robot need not move")
 }
 
-/// The embedded robots, and random trees without and with mimic joints.
+/// The embedded robots, one of them with an apparent mass of its base as well, and random trees without and with mimic joints.
 pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     let mut models = embedded().to_vec();
+    models.push(robots::quadruped().with_armature(&[0.7; 18]).expect("three equal numbers"));
     for seed in 0..trees {
         models.push(Tree::random(&mut rng(seed)).build());
         models.push(Tree::random_with_mimics(&mut rng(100 + seed)).build());
