@@ -1,9 +1,17 @@
 //! Robots from MJCF, the format of MuJoCo: kinematics, inertias, limits. Meshes are never looked at.
 
+mod actuator;
 mod attributes;
+mod beside;
 mod equality;
 mod geometry;
 mod include;
+mod keyframe;
+mod law;
+mod reference;
+mod spring;
+mod tendon;
+mod transmission;
 
 use super::xml::Element;
 use crate::body::{FrameKind, JointOptions};
@@ -14,8 +22,8 @@ use crate::model::Model;
 use crate::warning::{Warning, WarningKind};
 use attributes::{Attributes, Compiler, Defaults, FromGeoms, MAIN, turn};
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
-use equality::Joints;
 use include::Includes;
+use spring::{FileJoint, Joints};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -94,9 +102,9 @@ fn model(root: &Element, options: &MjcfOptions) -> Result<Model, Error> {
     }
     let defaults = Defaults::read(root)?;
     let compiler = Compiler::read(root)?;
-    let (names, joints) = (HashMap::new(), HashMap::new());
+    let (names, joints, poses) = (HashMap::new(), Joints::default(), vec![Se3::identity()]);
     let (defaults, warnings) = (&defaults, Vec::new());
-    let reader = Reader { options, compiler, defaults, bodies: 0, names, joints, mass: 0.0, warnings };
+    let reader = Reader { options, compiler, defaults, bodies: 0, names, joints, poses, mass: 0.0, warnings };
     let model = reader.model(root)?;
     root.accepted(model, options.strict, &options.allow)
 }
@@ -133,7 +141,9 @@ struct Reader<'a> {
     bodies: usize,
     /// The elements that have names, by kind and name.
     names: HashMap<(&'static str, String), &'a Element>,
-    joints: Joints,
+    joints: Joints<'a>,
+    /// Pose in the world that the file has drawn, for each body of the builder.
+    poses: Vec<Se3<f64>>,
     /// The mass of all bodies so far (kg).
     mass: f64,
     warnings: Vec<Warning>,
@@ -161,14 +171,21 @@ impl<'a> Reader<'a> {
         if let Some(total) = self.compiler.total_mass.filter(|_| self.mass > 0.0) {
             builder.scale_inertias(total / self.mass);
         }
-        let warnings = equality::add(&mut builder, root, &self.joints, self.options.mimic)?;
+        let mimic = self.options.mimic;
+        let warnings = equality::add(&mut builder, root, self.defaults, &self.joints, &self.poses, mimic)?;
+        self.warnings.extend(warnings);
         let place = |kind, name: &String| self.names.get(&(kind, name.clone()));
-        let mut model = builder.build().map_err(|e| match &e {
+        let (joints, warnings) = (&mut self.joints, &mut self.warnings);
+        let mut complete = |model: &mut Model| {
+            warnings.extend(beside::add(model, root, (self.defaults, &self.compiler), joints, &self.poses)?);
+            Ok(())
+        };
+        let mut model = builder.build_with(&mut complete).map_err(|e| match &e {
             Error::Body { body, what } => place("body", body).map_or(e.clone(), |at| at.wrong(what.clone())),
             Error::Joint { joint, what } => place("joint", joint).map_or(e.clone(), |at| at.wrong(what.clone())),
             _ => e,
         })?;
-        model.warnings.extend(self.warnings.into_iter().chain(warnings));
+        model.warnings.append(&mut self.warnings);
         Ok(model)
     }
 
@@ -225,9 +242,11 @@ impl<'a> Reader<'a> {
             let between = format!("{name}#{}", k + 1);
             let (called, inertia) = if last { (&name, jXl.act(inertia)) } else { (&between, Inertia::zero()) };
             body = builder.body_with((called, &joint_name), body, joint, placement, inertia, options);
-            let unit = if matches!(joint, Joint::Revolute { .. }) { self.compiler.angle } else { 1.0 };
-            let at_zero = a.number("ref")?.unwrap_or(0.0) * unit;
-            self.joints.insert(joint_name.clone(), (body, at_zero));
+            let drawn = self.poses[w.on.0] * w.placement;
+            self.poses.push(drawn * jXl.inverse());
+            let (angle, autolimits) = (self.compiler.angle, self.compiler.autolimits);
+            let found = FileJoint::read(a, joint, angle, autolimits)?;
+            self.joints.add(joint_name.clone(), found.on(body.0, drawn));
             if !last {
                 builder.between(body);
             }
@@ -236,6 +255,10 @@ impl<'a> Reader<'a> {
         }
         if count == 0 {
             builder.merge(body, bXl, inertia);
+        }
+        let compensated = Attributes::plain(w.element).number("gravcomp")?.unwrap_or(0.0);
+        if compensated != 0.0 {
+            builder.compensate_gravity(body, bXl, inertia, compensated);
         }
         builder.frame_of_kind(&name, FrameKind::Link, body, bXl);
         self.sites(builder, &parts, body, bXl)?;
@@ -301,9 +324,7 @@ impl<'a> Reader<'a> {
             if a.flag("align", Some("auto"))? == Some(true) {
                 return Err(wrong("align is not supported".to_owned()));
             }
-            let number = |name| a.number(name).map(|x| x.unwrap_or(0.0));
-            let (armature, damping) = (number("armature")?, number("damping")?);
-            let options = JointOptions { armature, damping, ..JointOptions::default() };
+            let options = JointOptions { armature: a.number("armature")?.unwrap_or(0.0), ..JointOptions::default() };
             return Ok((Joint::FreeFlyer, Se3::identity(), Se3::identity(), options));
         }
         let axis = a.vector("axis")?.unwrap_or(Vec3::new(0.0, 0.0, 1.0));
@@ -326,15 +347,10 @@ impl<'a> Reader<'a> {
         if let Some((lower, upper)) = range.filter(|r| r.0 > r.1) {
             return Err(wrong(format!("range: lower limit {lower} is above upper limit {upper}")));
         }
-        let effort = self.limits(a, "actuatorfrcrange", "actuatorfrclimited")?;
         let options = JointOptions {
             position: range.filter(|_| joint != Joint::Spherical),
-            velocity: None,
-            effort: effort.map(|[lower, upper]| (lower, upper)),
-            damping: a.number("damping")?.unwrap_or(0.0),
-            damping_polynomial: [0.0; 2],
-            friction: a.number("frictionloss")?.unwrap_or(0.0),
             armature: a.number("armature")?.unwrap_or(0.0),
+            ..JointOptions::default() // limits of effort, damping and friction: see beside.rs
         };
         Ok((joint, lXj, jXl, options))
     }
