@@ -5,9 +5,9 @@ use crate::common;
 use common::{Tree, moved, normal, rng};
 use condyle_dynamics::simulation::{Integrator, Settings, Simulation};
 use condyle_dynamics::{
-    Act, Body, Data, GravityCompensation, Inertia, Joint, JointOptions, Mimic, Model, ModelBuilder, Quaternion, Se3,
-    Sym3, Vec3, WORLD, crba, forward_kinematics, forward_velocities, gravity, neutral, nonlinear_effects,
-    passive_torque, passive_torque_derivatives, random_configuration,
+    Act, Body, Data, GravityCompensation, Inertia, Joint, JointOptions, Mimic, MjcfOptions, Model, ModelBuilder,
+    Quaternion, Se3, Sym3, Vec3, WORLD, crba, forward_kinematics, forward_velocities, gravity, neutral,
+    nonlinear_effects, passive_torque, passive_torque_derivatives, random_configuration,
 };
 use nalgebra::DMatrix;
 
@@ -149,7 +149,7 @@ fn like_mujoco() -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// M, bias and passive efforts equal MuJoCo's.
+/// M, bias and passive efforts equal MuJoCo's, of a robot from a builder and of the file.
 #[test]
 fn the_numbers_of_mujoco() {
     let text = include_str!("../data/passive_mujoco.json");
@@ -160,14 +160,16 @@ fn the_numbers_of_mujoco() {
             .filter_map(|x| x.as_f64())
             .collect()
     };
-    let model = like_mujoco();
-    let (mut data, mut tau) = (Data::new(&model), vec![f64::NAN; model.nv()]);
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/passive.xml");
+    let read = Model::from_mjcf(file, &MjcfOptions { strict: true, ..MjcfOptions::default() }).unwrap();
     assert_eq!(states.len(), 4);
-    for state in &states {
+    for (model, state) in [like_mujoco(), read].iter().flat_map(|model| states.iter().map(move |state| (model, state)))
+    {
+        let (mut data, mut tau) = (Data::new(model), vec![f64::NAN; model.nv()]);
         let [q, v, M, bias, passive] = ["q", "v", "M", "bias", "passive"].map(|name| numbers(&state[name]));
-        assert!(common::relative(crba(&model, &mut data, &q).as_slice(), &M) < 1e-12);
-        assert!(common::relative(nonlinear_effects(&model, &mut data, &q, &v), &bias) < 1e-12);
-        passive_torque(&model, &q, &v, SMOOTHING, &mut tau);
+        assert!(common::relative(crba(model, &mut data, &q).as_slice(), &M) < 1e-12);
+        assert!(common::relative(nonlinear_effects(model, &mut data, &q, &v), &bias) < 1e-12);
+        passive_torque(model, &q, &v, SMOOTHING, &mut tau);
         assert!(common::relative(&tau, &passive) < 1e-12, "{tau:?}\n{passive:?}");
     }
 }
