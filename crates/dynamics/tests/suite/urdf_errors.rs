@@ -57,9 +57,9 @@ fn files() {
 
 #[test]
 fn documents() {
-    expect("", "<string>:1: not well-formed XML: the document does not have a root node");
-    expect("\nrobot", "<string>:2: not well-formed XML: unknown token at 2:1");
-    expect("\n<robot><link name='a'>", "<string>:1: not well-formed XML: the root node was opened but never closed");
+    expect("", "<string>:1: not well-formed XML: there is no element");
+    expect("\nrobot", "<string>:2: not well-formed XML: text outside of the root element");
+    expect("\n<robot>\n<link name='a'>\n", "<string>:4: not well-formed XML: <link> of line 3 is never closed");
     expect("<!-- no robot -->\n<sdf/>", "<string>:2: <sdf>: the root element of a URDF is <robot>");
     expect("<robot/>", "<string>:1: <robot>: has no links");
     let nested = format!("<robot>\n<link name='a'>{}{}</link></robot>", "<a>".repeat(1 << 16), "</a>".repeat(1 << 16));
@@ -75,7 +75,7 @@ fn xacro() {
     assert!(load(&declared, &UrdfOptions::default()).is_ok()); // expanded files often declare it still
     let used = declared.replace("</robot>", "<xacro:wheel side='left'/>\n</robot>");
     let error = load(&used, &UrdfOptions::default()).unwrap_err();
-    assert!(error.ends_with(&format!(": <wheel>: belongs to xacro: {expand}")), "{error}");
+    assert!(error.ends_with(&format!(": <xacro:wheel>: belongs to xacro: {expand}")), "{error}");
     let error = load(&with(r#"<mass value="1"/>"#, r#"<mass value="${m}"/>"#), &UrdfOptions::default()).unwrap_err();
     assert!(error.ends_with(&format!("`${{m}}` is an expression of xacro: {expand}")), "{error}");
 }
