@@ -156,6 +156,11 @@ impl Element {
         Warning::LeftOut { place: self.place(), element: self.label(), what: what.into() }
     }
 
+    /// As [`left_out`](Self::left_out), at the line of something inside this element.
+    pub(crate) fn left_out_inside(&self, inside: &Self, what: impl Into<String>) -> Warning {
+        Warning::LeftOut { place: inside.place(), element: self.label(), what: what.into() }
+    }
+
     /// Returns the warning of a default that is taken where this element says nothing.
     pub(crate) fn assumed(&self, what: impl Into<String>) -> Warning {
         Warning::Assumed { place: self.place(), element: self.label(), what: what.into() }
