@@ -1,7 +1,7 @@
 //! Things of a file beside the tree of bodies, in the order in which they depend on each other: tendons and actuators add
 //! armature, springs may follow from inertia, and limits of effort are sums.
 
-use super::attributes::{Compiler, Defaults};
+use super::Source;
 use super::keyframe;
 use super::reference::Reference;
 use super::spring::{Joints, Line, Switches};
@@ -15,18 +15,18 @@ use condyle_spatial::Se3;
 
 /// Adds what the file has beside the tree to the model, and says what is left out. `poses` has the pose of each body in the
 /// world that the file has drawn.
-pub(super) fn add(
+pub(super) fn add<'a>(
     model: &mut Model,
-    root: &Element,
-    (defaults, compiler): (&Defaults, &Compiler),
+    root: &'a Element,
+    sources: &'a [Source<'a>],
     joints: &mut Joints,
     poses: &[Se3<f64>],
 ) -> Result<Vec<Warning>, Error> {
     let mut warnings = Vec::new();
     let on = Switches::read(root)?;
     let lines: Vec<Line> = joints.all.iter().map(|joint| Line::of(model, joint.body)).collect();
-    let mut tendons = Tendons::read(root, defaults, joints, compiler.autolimits)?;
-    let drives = Drives::read(root, joints, &tendons, &on, compiler.autolimits)?;
+    let mut tendons = Tendons::read(root, sources, joints)?;
+    let drives = Drives::read(root, sources, joints, &tendons, &on)?;
     drives.load(model, joints, &mut tendons, &lines, &on);
     // armature of each column: of the joint, and of tendons
     let mut armature = vec![0.0; model.tree.columns.len()];

@@ -1,6 +1,7 @@
 //! Equality constraints: loops, and joints that follow others.
 
-use super::attributes::{Attributes, Defaults, MAIN};
+use super::Source;
+use super::attributes::{Attributes, MAIN};
 use super::spring::{Joints, Switches};
 use crate::body::FrameKind;
 use crate::builder::{BodyId, ModelBuilder};
@@ -47,7 +48,7 @@ impl<'p> Places<'p> {
 pub(super) fn add(
     builder: &mut ModelBuilder,
     root: &Element,
-    defaults: &Defaults,
+    sources: &[Source],
     joints: &Joints,
     poses: &[Se3<f64>],
     mimic: bool,
@@ -66,7 +67,7 @@ pub(super) fn add(
     }
     let mut counts = HashMap::new();
     for e in elements {
-        let a = defaults.of_kind(e, "equality", MAIN)?;
+        let a = sources[e.source].defaults.of_kind(e, "equality", MAIN)?;
         let count: &mut usize = counts.entry(&*e.tag).or_default();
         *count += 1;
         if a.flag("active", None)? == Some(false) {

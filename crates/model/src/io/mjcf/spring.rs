@@ -28,20 +28,24 @@ pub(super) struct Switches {
 
 impl Switches {
     pub(super) fn read(root: &Element) -> Result<Self, Error> {
-        let option = |name: &str| {
-            let flags = root.all("option").flat_map(|o| o.all("flag"));
-            flags.filter_map(|flag| flag.attribute(name)).last() != Some("disable")
-        };
+        let flags = || root.all("option").flat_map(|o| o.all("flag"));
+        for (flag, (name, value)) in flags().flat_map(|flag| flag.attributes.iter().map(move |a| (flag, a))) {
+            if value != "enable" && value != "disable" {
+                return Err(flag.wrong(format!("{name}: `{value}` is neither enable nor disable")));
+            }
+        }
+        let option = |name: &str| flags().filter_map(|flag| flag.attribute(name)).last() != Some("disable");
         let mut groups = Vec::new();
         for element in root.all("option") {
             groups = Attributes::plain(element).list("actuatorgroupdisable")?.unwrap_or(groups);
         }
+        let (constraint, passive) = (option("constraint"), option("passive"));
         Ok(Self {
-            spring: option("spring"),
-            damper: option("damper"),
-            friction: option("frictionloss"),
-            limit: option("limit"),
-            equality: option("equality"),
+            spring: option("spring") && passive,
+            damper: option("damper") && passive,
+            friction: option("frictionloss") && constraint,
+            limit: option("limit") && constraint,
+            equality: option("equality") && constraint,
             actuation: option("actuation"),
             clamp: option("clampctrl"),
             groups,

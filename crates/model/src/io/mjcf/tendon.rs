@@ -1,7 +1,8 @@
 //! Tendons whose length is a sum of joint positions. One that moves with a single coordinate acts as its joint does.
 
+use super::Source;
 use super::actuator::Range;
-use super::attributes::{Attributes, Defaults, MAIN};
+use super::attributes::{Attributes, MAIN};
 use super::law::fill;
 use super::spring::{Joints, Line, Switches};
 use crate::error::Error;
@@ -36,12 +37,7 @@ pub(super) struct Tendons<'a> {
 }
 
 impl<'a> Tendons<'a> {
-    pub(super) fn read(
-        root: &'a Element,
-        defaults: &'a Defaults<'a>,
-        joints: &Joints,
-        autolimits: bool,
-    ) -> Result<Self, Error> {
+    pub(super) fn read(root: &'a Element, sources: &'a [Source<'a>], joints: &Joints) -> Result<Self, Error> {
         let mut tendons = Self::default();
         for e in root.all("tendon").flat_map(|section| &section.children) {
             if !matches!(&*e.tag, "fixed" | "spatial") {
@@ -51,14 +47,16 @@ impl<'a> Tendons<'a> {
             if taken.is_some() {
                 return Err(e.wrong("the name is taken by another tendon"));
             }
-            tendons.all.push(Tendon::read(e, defaults, joints, autolimits)?);
+            tendons.all.push(Tendon::read(e, sources, joints)?);
         }
         Ok(tendons)
     }
 }
 
 impl<'a> Tendon<'a> {
-    fn read(e: &'a Element, defaults: &'a Defaults<'a>, joints: &Joints, autolimits: bool) -> Result<Self, Error> {
+    fn read(e: &'a Element, sources: &'a [Source<'a>], joints: &Joints) -> Result<Self, Error> {
+        let Source { defaults, compiler, .. } = &sources[e.source];
+        let autolimits = compiler.autolimits;
         let a = defaults.of_kind(e, "tendon", MAIN)?;
         let number = |name: &str| a.number(name).map(|x| x.unwrap_or(0.0));
         let mut over = Vec::new();

@@ -1,5 +1,6 @@
 //! Transmissions of actuators: the table of a model, and limits of effort, armature and damping at the joints.
 
+use super::Source;
 use super::actuator::{ALL, Classes, Mechanics, clipped, scaled};
 use super::law::{KINDS, Law};
 use super::reference::Reference;
@@ -53,23 +54,24 @@ impl<'a> Drives<'a> {
     /// Reads the actuators of a file.
     pub(super) fn read(
         root: &'a Element,
+        sources: &[Source<'a>],
         joints: &Joints,
         tendons: &Tendons,
         on: &Switches,
-        autolimits: bool,
     ) -> Result<Self, Error> {
         let (mut all, mut names) = (Vec::new(), HashSet::new());
         let elements = || root.all("actuator").flat_map(|section| &section.children);
         if elements().next().is_none() {
             return Ok(Self { all });
         }
-        let classes = Classes::read(root)?;
+        let classes = sources.iter().map(|source| Classes::read(source.root)).collect::<Result<Vec<_>, _>>()?;
         let mut driven = 0;
         for e in elements().filter(|e| KINDS.contains(&&*e.tag)) {
             if e.attribute("name").is_some_and(|name| !names.insert(name)) {
                 return Err(e.wrong("the name is taken by another actuator"));
             }
-            let (mechanics, law) = classes.of(e)?;
+            let (mechanics, law) = classes[e.source].of(e)?;
+            let autolimits = sources[e.source].compiler.autolimits;
             let target = target(e, joints, tendons)?;
             if let Target::Tendon(t) = target {
                 driven += tendons.all[t].joints.len();
