@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 use condyle_model::{
-    Error, Inertia, Joint, JointOptions, Mimic, MjcfOptions, Model, ModelBuilder, Se3, Sym3, UrdfOptions, Vec3, WORLD,
+    Error, Inertia, Joint, JointOptions, Mimic, Model, ModelBuilder, SdfOptions, Se3, Sym3, UrdfOptions, Vec3, WORLD,
     Warning, WarningKind,
 };
 
@@ -97,12 +97,15 @@ fn limits_that_cannot_be_meant() {
 #[test]
 fn limits_warn_in_every_format() {
     let kinds = |model: &Model| model.warnings().iter().map(Warning::kind).collect::<Vec<_>>();
-    let mjcf =
-        "<mujoco><worldbody><body><joint name='j' range='-1 1' actuatorfrcrange='0 0' actuatorfrclimited='true'/>
-<geom size='1'/></body></worldbody></mujoco>";
-    let read = Model::from_mjcf_str(mjcf, &MjcfOptions::default()).unwrap();
+    let inertial = "<inertial><mass>1</mass></inertial>";
+    let sdf = format!(
+        "<sdf version='1.9'><model name='m'><link name='a'>{inertial}</link><link name='b'>{inertial}</link>
+        <joint name='j' type='revolute'><parent>a</parent><child>b</child><axis><xyz>0 0 1</xyz>
+        <limit><effort>0</effort></limit></axis></joint></model></sdf>"
+    );
+    let read = Model::from_sdf_str(&sdf, &SdfOptions::default()).unwrap();
     assert_eq!(read.limits().effort_upper, [0.0]);
-    assert_eq!(kinds(&read), [WarningKind::Limit]);
+    assert!(kinds(&read).contains(&WarningKind::Limit));
     let mut builder = ModelBuilder::new("m");
     let options = JointOptions { velocity: Some(0.0), effort: Some((-1.0, 0.0)), ..JointOptions::default() };
     let ball = Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(1.0));
@@ -346,6 +349,14 @@ fn rotors_of_transmissions() {
     assert_eq!(said(&actuator("<rotorInertia>0.001</rotorInertia>")), [alone]);
     let coupled = "4: transmission `t`: it couples joints: M has no inertia of its rotors";
     assert_eq!(said(&format!("{}<joint name='k'/>", actuator(reduction))), [coupled]);
+    let rotor = "<rotorInertia>1</rotorInertia><mechanicalReduction>2</mechanicalReduction>";
+    for (kind, name) in [("fixed", "j"), ("floating", "j"), ("continuous", "x")] {
+        let text = transmission(&actuator(rotor)).replace("'j'", &format!("'{name}'"));
+        let none = format!("its joint `{name}` has no single degree of freedom: M has no inertia of its rotor");
+        let read = model(&robot(kind, "", &text));
+        assert!(read.warnings().last().unwrap().to_string().ends_with(&none), "{:?}", read.warnings());
+        assert!(read.armature().iter().all(|&x| x == 0.0));
+    }
     let near = "5: <mechanicalReducton>: unknown element <mechanicalReducton> in <transmission>; nearest is `mechanicalReduction`";
     assert_eq!(said("<mechanicalReducton>50</mechanicalReducton>"), [near]);
 }

@@ -127,6 +127,7 @@ impl<'a> Parser<'a> {
             children: Vec::new(),
             file: self.file.clone(),
             line,
+            source: 0,
         };
         self.at += name.len();
         let is_empty = self.attributes(name, &mut element)?;
