@@ -22,7 +22,6 @@
 //! | equals signs in them | 4 194 304 |
 //! | levels of elements, those of included files counted where they come to stand | 256 |
 //! | attributes of an element | 256 |
-//! | prefixes of namespaces in a file; declarations of them | 256; 65 536 |
 //! | included files of an SDF | 16 384 |
 //! | bytes in the names of an SDF, those of the models around each included | 67 108 864 |
 //! | attributes of all default classes of an MJCF, what they inherit included | 1 048 576 |
