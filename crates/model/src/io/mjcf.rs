@@ -4,6 +4,8 @@ mod actuator;
 mod assets;
 mod attributes;
 mod beside;
+#[cfg(feature = "meshes")]
+mod builtin;
 mod compiler;
 mod equality;
 mod expand;

@@ -292,7 +292,8 @@ fn copied(element: &Element, rename: &dyn Fn(&str) -> String, level: usize) -> R
     }
     let children = element.children.iter().map(|child| copied(child, rename, level + 1)).collect::<Result<_, _>>()?;
     let renamed = |(name, value): &(String, String)| {
-        let is_name = (name == "name" || kind_of(name).is_some()) && !value.is_empty() && value != "world";
+        let refers = kind_of(name).is_some() && value != "world";
+        let is_name = (name == "name" || refers) && !value.is_empty();
         (name.clone(), if is_name { rename(value) } else { value.clone() })
     };
     let attributes = element.attributes.iter().map(renamed).collect();
