@@ -187,7 +187,7 @@ impl<'a> Reader<'a> {
         let mut builder = ModelBuilder::new(root.attribute("model").unwrap_or("MuJoCo Model"));
         builder.gravity(self.gravity);
         builder.frame_of_kind("world", FrameKind::Link, WORLD, Se3::identity());
-        for flex in root.all("deformable").flat_map(|section| section.all("flex")) {
+        if let Some(flex) = root.all("deformable").flat_map(|section| section.all("flex")).next() {
             return Err(flex.wrong("is not supported"));
         }
         self.tree(&mut builder, root)?;

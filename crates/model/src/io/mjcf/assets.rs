@@ -158,19 +158,19 @@ impl Solids {
         }
         let path = paths.iter().find(|path| path.is_file()).unwrap_or(&paths[0]);
         let said = |what: String| format!("`{}`: {what}", path.display());
-        let about = std::fs::metadata(&path).map_err(|e| said(e.to_string()))?;
+        let about = std::fs::metadata(path).map_err(|e| said(e.to_string()))?;
         self.bytes += about.len();
         if !about.is_file() || self.bytes > MAX_MESHES {
             let what = format!("is no file, or the meshes of the robot have more than {MAX_MESHES} bytes");
             return Err(said(what));
         }
-        let bytes = std::fs::read(&path).map_err(|e| said(e.to_string()))?;
+        let bytes = std::fs::read(path).map_err(|e| said(e.to_string()))?;
         let format = match a.get("content_type").and_then(|kind| kind.rsplit_once('/')) {
             Some((_, "obj")) => Some(Format::Obj),
             Some((_, "stl")) => Some(Format::Stl),
             Some((_, "vnd.mujoco.msh")) => None,
             _ if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh")) => None,
-            _ => Some(Format::of(&path).ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?),
+            _ => Some(Format::of(path).ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?),
         };
         format.map_or_else(|| msh(&bytes), |format| condyle_meshes::triangles(format, &bytes)).map_err(said)
     }

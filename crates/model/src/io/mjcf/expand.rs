@@ -232,8 +232,15 @@ impl Expansion<'_> {
                 self.sections.push(at.0, copy);
             }
         }
-        for (section, what) in [("keyframe", "keyframes"), ("option", "options")] {
-            if file.root.child(section).is_some() {
+        let has = |section: &str, names: &[&str]| {
+            let all = file.root.all(section).flat_map(|e| std::iter::once(e).chain(&e.children));
+            all.into_iter().any(|e| names.contains(&&*e.tag) || names.iter().any(|name| e.attribute(name).is_some()))
+        };
+        for (what, found) in [
+            ("keyframes", has("keyframe", &["key"])),
+            ("gravity, medium and flags", has("option", &["gravity", "density", "viscosity", "flag"])),
+        ] {
+            if found {
                 self.files.warnings.push(element.left_out(format!("the {what} of the model `{model}` are left out")));
             }
         }
