@@ -32,7 +32,7 @@ use crate::error::Error;
 use crate::model::Model;
 use crate::warning::{Warning, WarningKind};
 use assets::{Assets, Solids};
-use attributes::{Attributes, Defaults, MAIN};
+use attributes::{Attributes, Defaults};
 use compiler::Compiler;
 use condyle_spatial::{Se3, Vec3};
 use include::Files;
@@ -131,6 +131,7 @@ struct Source<'a> {
     defaults: Defaults<'a>,
     assets: Assets<'a>,
     /// The folder of the file; a string has none.
+    #[cfg_attr(not(feature = "meshes"), allow(dead_code))]
     folder: Option<&'a Path>,
 }
 

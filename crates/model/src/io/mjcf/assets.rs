@@ -8,8 +8,9 @@ use std::collections::HashMap;
 
 #[cfg(feature = "meshes")]
 use {
+    super::Source,
+    super::attributes::MAIN,
     super::mesh::Rule,
-    super::{MAIN, Source},
     crate::io::files,
     condyle_meshes::Format,
     condyle_spatial::{Quaternion, Vec3},

@@ -1,6 +1,10 @@
 //! Volumes, centres of mass and inertias of meshes, by MuJoCo's rules (`inertia` of `<mesh>`).
 
-use condyle_spatial::{Mat3, Se3, Sym3, Vec3};
+#[cfg(feature = "meshes")]
+use super::principal::principal;
+#[cfg(feature = "meshes")]
+use condyle_spatial::Sym3;
+use condyle_spatial::{Se3, Vec3};
 
 /// Volumes (m³) and areas (m²) below this are none, as in MuJoCo.
 #[cfg(feature = "meshes")]
@@ -111,7 +115,7 @@ impl Solid {
         }
         let trace = P.xx + P.yy + P.zz;
         let I = Sym3 { xx: trace - P.xx, xy: -P.xy, yy: trace - P.yy, xz: -P.xz, yz: -P.yz, zz: trace - P.zz };
-        let (moments, R): (_, Mat3<f64>) = super::principal::principal(I);
+        let (moments, R) = principal(I);
         if !(moments[2] > 0.0 && moments.iter().all(|x| x.is_finite())) {
             return Err(format!("its least moment of inertia, {} m⁵, is not positive", moments[2]));
         }
