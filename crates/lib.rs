@@ -112,7 +112,10 @@ pub mod terms {
 
 /// Parts of a robot's description.
 pub mod tree {
-    pub use condyle_dynamics::{Body, BodyId, Frame, FrameKind, FrameParent, Mimic, Warning};
+    pub use condyle_dynamics::{
+        Actuator, Body, BodyId, Frame, FrameKind, FrameParent, GravityCompensation, Keyframe, Mimic, ModelConstraint,
+        ModelConstraintKind, Place, Spring, Transmission, Warning, WarningKind,
+    };
 }
 
 /// The Rust blocks of the book, as doctests.

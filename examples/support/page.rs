@@ -85,7 +85,7 @@ pub(crate) fn write(
             "name": body.joint_name,
             "unit": if matches!(body.joint, condyle::Joint::Prismatic { .. }) { "m" } else { "rad" },
             "lower": finite(limits.lower[body.idx_q]), "upper": finite(limits.upper[body.idx_q]),
-            "velocity": finite(limits.velocity[body.idx_v]), "effort": finite(limits.effort[body.idx_v]),
+            "velocity": finite(limits.velocity[body.idx_v]), "effort": finite(limits.effort()[body.idx_v]),
         })
     };
     let passive = model.nv() - joints.len();
@@ -111,7 +111,7 @@ pub(crate) fn write(
     let beyond = [
         violations(&joints, "position", &q, &|b| [limits.lower[b.idx_q], limits.upper[b.idx_q]]),
         violations(&joints, "velocity", &v, &|b| [-limits.velocity[b.idx_v], limits.velocity[b.idx_v]]),
-        violations(&joints, "torque", &tau, &|b| [-limits.effort[b.idx_v], limits.effort[b.idx_v]]),
+        violations(&joints, "torque", &tau, &|b| [limits.effort_lower[b.idx_v], limits.effort_upper[b.idx_v]]),
     ]
     .concat();
     let data = json!({

@@ -210,7 +210,8 @@ def to_pinocchio(ours: Model) -> Any:
     limits = ours.limits
     theirs.lowerPositionLimit, theirs.upperPositionLimit = np.array(limits.lower), np.array(limits.upper)
     theirs.upperVelocityLimit, theirs.lowerVelocityLimit = np.array(limits.velocity), -np.array(limits.velocity)
-    theirs.upperEffortLimit, theirs.lowerEffortLimit = np.array(limits.effort), -np.array(limits.effort)
+    theirs.upperEffortLimit = np.array(limits.effort_upper)
+    theirs.lowerEffortLimit = np.array(limits.effort_lower)
     theirs.damping, theirs.armature = np.array(ours.damping), np.array(ours.armature)
     theirs.upperDryFrictionLimit, theirs.lowerDryFrictionLimit = np.array(ours.friction), -np.array(ours.friction)
     return theirs

@@ -388,6 +388,10 @@ class Limits(NamedTuple):
     velocity: _Array
     """Greatest speed (rad/s, m/s), nv numbers."""
     effort: _Array
+    """Greatest magnitude of effort (N m, N), nv numbers."""
+    effort_lower: _Array
+    """Least effort (N m, N), nv numbers, as a rule negative."""
+    effort_upper: _Array
     """Greatest effort (N m, N), nv numbers."""
 
 

@@ -112,7 +112,8 @@ impl ModelBuilder {
     /// placement: the joint's frame at position zero in the parent's frame.
     /// inertia: in the body's frame, which is the joint's at position zero.
     /// position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
-    /// velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
+    /// velocity: greatest speed (rad/s, m/s); None for no limit.
+    /// effort: greatest effort (N m, N), or the least and the greatest one; None for no limits.
     /// damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
     /// armature: inertia of the rotor as seen at the joint (kg m², kg).
     #[pyo3(signature = (
@@ -129,14 +130,17 @@ impl ModelBuilder {
         joint_name: Option<&str>,
         position: Option<(f64, f64)>,
         velocity: Option<f64>,
-        effort: Option<f64>,
+        effort: Option<Bound<'_, PyAny>>,
         damping: f64,
         friction: f64,
         armature: f64,
     ) -> PyResult<BodyId> {
         let parent = self.body_of("parent", parent)?;
         let (placement, inertia) = (placed("placement", placement)?, massive(inertia)?);
-        let options = JointOptions { position, velocity, effort, damping, friction, armature };
+        let effort = effort.map(|effort| effort.extract().map(|most: f64| (-most, most)).or_else(|_| effort.extract()));
+        let effort = effort.transpose()?;
+        let options =
+            JointOptions { position, velocity, effort, damping, friction, armature, ..JointOptions::default() };
         let names = (name, joint_name.unwrap_or(name));
         let body = self.builder()?.body_with(names, parent, joint.get().0, placement, inertia, options);
         Ok(self.added(body))

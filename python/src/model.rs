@@ -145,7 +145,7 @@ impl Model {
         packages: Option<Vec<PathBuf>>,
     ) -> PyResult<Self> {
         let packages = packages.unwrap_or_default();
-        let options = UrdfOptions { root_joint: root(root_joint)?, mimic, strict, packages };
+        let options = UrdfOptions { root_joint: root(root_joint)?, mimic, strict, packages, ..UrdfOptions::default() };
         Ok(condyle::Model::from_urdf(path, &options).map_err(exception)?.into())
     }
 
@@ -157,7 +157,7 @@ impl Model {
     #[staticmethod]
     #[pyo3(signature = (text, root_joint=None, mimic=false, strict=false))]
     fn from_urdf_str(text: &str, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
-        let options = UrdfOptions { root_joint: root(root_joint)?, mimic, strict, packages: Vec::new() };
+        let options = UrdfOptions { root_joint: root(root_joint)?, mimic, strict, ..UrdfOptions::default() };
         Ok(condyle::Model::from_urdf_str(text, &options).map_err(exception)?.into())
     }
 
@@ -179,7 +179,7 @@ impl Model {
     #[staticmethod]
     #[pyo3(signature = (path, mimic=false, strict=false, weightless_meshes=false))]
     fn from_mjcf(path: PathBuf, mimic: bool, strict: bool, weightless_meshes: bool) -> PyResult<Self> {
-        let options = MjcfOptions { strict, mimic, weightless_meshes };
+        let options = MjcfOptions { strict, mimic, weightless_meshes, ..MjcfOptions::default() };
         Ok(condyle::Model::from_mjcf(path, &options).map_err(exception)?.into())
     }
 
@@ -191,7 +191,7 @@ impl Model {
     #[staticmethod]
     #[pyo3(signature = (text, mimic=false, strict=false, weightless_meshes=false))]
     fn from_mjcf_str(text: &str, mimic: bool, strict: bool, weightless_meshes: bool) -> PyResult<Self> {
-        let options = MjcfOptions { strict, mimic, weightless_meshes };
+        let options = MjcfOptions { strict, mimic, weightless_meshes, ..MjcfOptions::default() };
         Ok(condyle::Model::from_mjcf_str(text, &options).map_err(exception)?.into())
     }
 
@@ -209,7 +209,7 @@ impl Model {
     #[staticmethod]
     #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false))]
     fn from_sdf(path: PathBuf, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
-        let options = SdfOptions { root_joint: root(root_joint)?, mimic, strict };
+        let options = SdfOptions { root_joint: root(root_joint)?, mimic, strict, ..SdfOptions::default() };
         Ok(condyle::Model::from_sdf(path, &options).map_err(exception)?.into())
     }
 
@@ -222,7 +222,7 @@ impl Model {
     #[staticmethod]
     #[pyo3(signature = (text, root_joint=None, mimic=false, strict=false))]
     fn from_sdf_str(text: &str, root_joint: Option<&str>, mimic: bool, strict: bool) -> PyResult<Self> {
-        let options = SdfOptions { root_joint: root(root_joint)?, mimic, strict };
+        let options = SdfOptions { root_joint: root(root_joint)?, mimic, strict, ..SdfOptions::default() };
         Ok(condyle::Model::from_sdf_str(text, &options).map_err(exception)?.into())
     }
 
@@ -386,9 +386,11 @@ impl Model {
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.cached.value(py, Attribute::Limits, || {
-            let condyle::Limits { lower, upper, velocity, effort } = self.inner.limits();
+            let limits = self.inner.limits();
+            let condyle::Limits { lower, upper, velocity, effort_lower, effort_upper } = limits;
             let give = |numbers: &[f64]| read_only(py, numbers, "with_limits");
-            class!(py, "Limits")?.call1((give(lower)?, give(upper)?, give(velocity)?, give(effort)?))
+            let effort = (give(&limits.effort())?, give(effort_lower)?, give(effort_upper)?);
+            class!(py, "Limits")?.call1((give(lower)?, give(upper)?, give(velocity)?, effort.0, effort.1, effort.2))
         })
     }
 
@@ -476,25 +478,38 @@ impl Model {
     /// The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
     /// are, and infinite numbers are none.
     ///
-    /// Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity or effort is negative.
+    /// effort: greatest magnitude; sets both `effort_lower` and `effort_upper`, and goes with neither of them.
+    ///
+    /// Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity is negative.
     ///
     /// >>> arm = condyle.robots.arm7()
     /// >>> arm.with_limits(effort=0.5 * arm.limits.effort).limits.effort[0].item()
     /// 43.5
-    #[pyo3(signature = (lower=None, upper=None, velocity=None, effort=None))]
+    #[pyo3(signature = (lower=None, upper=None, velocity=None, effort=None, *, effort_lower=None, effort_upper=None))]
     fn with_limits(
         &self,
         lower: Option<&Bound<'_, PyAny>>,
         upper: Option<&Bound<'_, PyAny>>,
         velocity: Option<&Bound<'_, PyAny>>,
         effort: Option<&Bound<'_, PyAny>>,
+        effort_lower: Option<&Bound<'_, PyAny>>,
+        effort_upper: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
+        if effort.is_some() && (effort_lower.is_some() || effort_upper.is_some()) {
+            return Err(PyTypeError::new_err("effort: sets both sides, so effort_lower and effort_upper must be None"));
+        }
         let mut limits = self.inner.limits().clone();
+        if let Some(effort) = effort {
+            let effort = vector("effort", effort, self.inner.nv())?.to_vec();
+            limits.effort_lower = effort.iter().map(|effort| -effort).collect();
+            limits.effort_upper = effort;
+        }
         for (name, given, limit) in [
             ("lower", lower, &mut limits.lower),
             ("upper", upper, &mut limits.upper),
             ("velocity", velocity, &mut limits.velocity),
-            ("effort", effort, &mut limits.effort),
+            ("effort_lower", effort_lower, &mut limits.effort_lower),
+            ("effort_upper", effort_upper, &mut limits.effort_upper),
         ] {
             if let Some(given) = given {
                 *limit = vector(name, given, limit.len())?.to_vec();

@@ -58,7 +58,11 @@ fn own(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
         Warning::Negative { body, .. } => ("negative_moment", Kind::Body, body),
         Warning::Triangle { body, .. } => ("triangle", Kind::Body, body),
         Warning::Singular { joint } => ("singular", Kind::Joint, joint),
-        Warning::LeftOut { element, .. } => ("left_out", Kind::Joint, element),
+        _ if warning.place().is_some() => {
+            let name = warning.subject().split('`').nth(1).unwrap_or(warning.subject()).to_owned();
+            let line = warning.place().map(|place| place.line);
+            return Finding { kind: warning.kind().name(), name, line, what };
+        }
         _ => return Finding { kind: "other", name: String::new(), line: None, what },
     };
     // ``joint `loop` `` names its element; other warnings have the name alone
@@ -112,7 +116,7 @@ fn limits(model: &Model, b: &Body) -> Vec<(&'static str, String)> {
     if limits.velocity[b.idx_v] == 0.0 {
         found.push(("no_speed", format!("joint `{joint}`: its speed limit is 0")));
     }
-    if limits.effort[b.idx_v] == 0.0 {
+    if limits.effort_lower[b.idx_v] == 0.0 && limits.effort_upper[b.idx_v] == 0.0 {
         found.push(("no_effort", format!("joint `{joint}`: its effort limit is 0")));
     }
     found

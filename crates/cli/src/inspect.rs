@@ -294,7 +294,7 @@ impl BodyReport {
             lower: finite(&limits.lower[q.clone()]),
             upper: finite(&limits.upper[q]),
             velocity: finite(&limits.velocity[v.clone()]),
-            effort: finite(&limits.effort[v.clone()]),
+            effort: finite(&limits.effort()[v.clone()]),
             damping: model.damping()[v.clone()].to_vec(),
             friction: model.friction()[v.clone()].to_vec(),
             armature: model.armature()[v].to_vec(),

@@ -32,11 +32,12 @@ pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
                 all.push(Limited { what: "position", joint, index, lower, upper });
             }
         }
-        for (what, greatest) in [("velocity", &limits.velocity), ("torque", &limits.effort)] {
-            for index in body.idx_v..body.idx_v + body.joint.nv() {
-                let upper = greatest[index];
-                if upper > 0.0 && upper.is_finite() {
-                    all.push(Limited { what, joint, index, lower: -upper, upper });
+        for index in body.idx_v..body.idx_v + body.joint.nv() {
+            let speed = limits.velocity[index];
+            let (least, most) = (limits.effort_lower[index], limits.effort_upper[index]);
+            for (what, lower, upper) in [("velocity", -speed, speed), ("torque", least, most)] {
+                if lower < upper && (lower.is_finite() || upper.is_finite()) {
+                    all.push(Limited { what, joint, index, lower, upper });
                 }
             }
         }
@@ -147,11 +148,19 @@ pub(crate) fn limits_of(model: &Model, q: &[f64]) -> Vec<Limit> {
     bounded("positions and speeds", Residual::State { reference }, lower, upper)
 }
 
+/// Returns the least and greatest efforts of the last nu degrees of freedom. Where a robot leaves no range, as with an effort of
+/// 0, there is no limit.
+pub(crate) fn efforts(model: &Model, nu: usize) -> (Vec<f64>, Vec<f64>) {
+    let (limits, first) = (model.limits(), model.nv() - nu);
+    let range = |(&lower, &upper): (&f64, &f64)| {
+        if lower < upper { (lower, upper) } else { (f64::NEG_INFINITY, f64::INFINITY) }
+    };
+    limits.effort_lower[first..].iter().zip(&limits.effort_upper[first..]).map(range).unzip()
+}
+
 /// The limits of the efforts of the last nu degrees of freedom.
 pub(crate) fn efforts_of(model: &Model, nu: usize) -> Vec<Limit> {
-    let effort = |e: &f64| if *e > 0.0 { *e } else { f64::INFINITY };
-    let upper: Vec<f64> = model.limits().effort[model.nv() - nu..].iter().map(effort).collect();
-    let lower = upper.iter().map(|e| -e).collect();
+    let (lower, upper) = efforts(model, nu);
     bounded("efforts", Residual::Control { reference: vec![0.0; nu] }, lower, upper)
 }
 

@@ -104,7 +104,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
             "lower": range(&limits.lower),
             "upper": range(&limits.upper),
             "velocity": finite(limits.velocity[b.idx_v]).filter(|&v| v > 0.0),
-            "effort": finite(limits.effort[b.idx_v]).filter(|&e| e > 0.0),
+            "effort": finite(limits.effort()[b.idx_v]).filter(|&e| e > 0.0),
         })
     };
     let position = |x: &[f64], b: &condyle::tree::Body| match b.joint {

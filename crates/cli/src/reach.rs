@@ -44,10 +44,10 @@ pub(crate) fn problem(
         (lower[nv + k], upper[nv + k]) = (-speed, speed);
     }
     let within = || Activation::Barrier { lower: lower.clone(), upper: upper.clone() };
-    let bounds: Vec<f64> =
-        limits.effort[driven.clone()].iter().map(|&e| if e > 0.0 { e } else { f64::INFINITY }).collect();
-    let share = bounds.iter().map(|e| if e.is_finite() { e.powi(-2) } else { WITHOUT_LIMIT }).collect();
-    let efforts = Activation::Barrier { lower: bounds.iter().map(|e| -e).collect(), upper: bounds };
+    let (least, most) = crate::limits::efforts(model, nu);
+    let share = least.iter().zip(&most).map(|(least, most)| most.min(-least));
+    let share = share.map(|e| if e.is_finite() { e.powi(-2) } else { WITHOUT_LIMIT }).collect();
+    let efforts = Activation::Barrier { lower: least, upper: most };
     let hold = gravity(model, &mut Data::new(model), q0)[driven.clone()].to_vec();
     let position = Residual::FrameTranslation { frame: (&model.frames()[frame]).into(), target };
     let running = vec![

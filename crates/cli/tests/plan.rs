@@ -244,7 +244,10 @@ fn the_examples_hold_their_limits() {
         };
         assert!(q.iter().all(|q| within(q, &|k| limits.lower[k], &|k| limits.upper[k])), "{name}: positions");
         assert!(v.iter().all(|v| within(v, &|k| -limits.velocity[k], &|k| limits.velocity[k])), "{name}: speeds");
-        assert!(tau.iter().all(|t| within(t, &|k| -limits.effort[k], &|k| limits.effort[k])), "{name}: efforts");
+        assert!(
+            tau.iter().all(|t| within(t, &|k| limits.effort_lower[k], &|k| limits.effort_upper[k])),
+            "{name}: efforts"
+        );
         if let Some(ahead) = ahead {
             let went = q[q.len() - 1][0] - q[0][0];
             assert!((went - ahead).abs() < 0.03, "{name}: {went}");

@@ -85,9 +85,11 @@ pub use calls::second_derivatives::{
 };
 pub use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
 pub use condyle_model::{
-    Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, FrameParent, IntegrateArgument, Joint, JointOptions,
-    Limits, Mimic, Model, ModelBuilder, WORLD, Warning, difference, difference_jacobian, distance, inertial_parameters,
-    integrate, integrate_jacobian, interpolate, neutral, normalize, random_configuration, transport,
+    Actuator, Body, BodyId, DifferenceArgument, Error, Frame, FrameKind, FrameParent, GravityCompensation,
+    IntegrateArgument, Joint, JointOptions, Keyframe, Limits, Mimic, Model, ModelBuilder, ModelConstraint,
+    ModelConstraintKind, Place, Spring, Transmission, WORLD, Warning, WarningKind, difference, difference_jacobian,
+    distance, inertial_parameters, integrate, integrate_jacobian, interpolate, neutral, normalize,
+    random_configuration, transport,
 };
 #[cfg(feature = "loaders")]
 pub use condyle_model::{MjcfOptions, SdfOptions, UrdfOptions, robots};

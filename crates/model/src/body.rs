@@ -54,6 +54,8 @@ pub enum FrameKind {
     Joint,
     /// Added by the user.
     User,
+    /// One of the two frames of a [`ModelConstraint`](crate::ModelConstraint).
+    Constraint,
 }
 
 /// The body or frame on which [`Model::with_frame`](crate::Model::with_frame) puts a frame; a name is one too (`"tool".into()`).
@@ -87,9 +89,20 @@ pub struct Limits {
     /// Greatest speed, nv numbers (rad/s, m/s).
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
     pub velocity: Vec<f64>,
+    /// Least effort, nv numbers (N m, N), as a rule negative.
+    #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::lower"))]
+    pub effort_lower: Vec<f64>,
     /// Greatest effort, nv numbers (N m, N).
     #[cfg_attr(feature = "serde", serde(with = "condyle_spatial::finite::upper"))]
-    pub effort: Vec<f64>,
+    pub effort_upper: Vec<f64>,
+}
+
+impl Limits {
+    /// Returns the greatest magnitude of effort, max(|lower|, |upper|), nv numbers (N m, N). Where a limit is symmetric it is
+    /// the limit.
+    pub fn effort(&self) -> Vec<f64> {
+        self.effort_lower.iter().zip(&self.effort_upper).map(|(lower, upper)| lower.abs().max(upper.abs())).collect()
+    }
 }
 
 /// Limits, losses and rotor of a joint; the default is none of them.
@@ -99,10 +112,13 @@ pub struct JointOptions {
     pub position: Option<(f64, f64)>,
     /// Greatest speed (rad/s, m/s).
     pub velocity: Option<f64>,
-    /// Greatest effort (N m, N).
-    pub effort: Option<f64>,
-    /// Viscous damping (N m s/rad, N s/m).
+    /// Least and greatest effort (N m, N).
+    pub effort: Option<(f64, f64)>,
+    /// Viscous damping d₀ (N m s/rad, N s/m).
     pub damping: f64,
+    /// Coefficients d₁ and d₂ of damping that grows with the speed: d(v) = d₀ + d₁|v| + d₂v². They have the units of damping
+    /// per rad/s or m/s, and per its square.
+    pub damping_polynomial: [f64; 2],
     /// Coulomb friction (N m, N).
     pub friction: f64,
     /// Inertia of the rotor as seen at the joint (kg m², kg).

@@ -1,5 +1,6 @@
 //! The builder: a model, body by body.
 
+use crate::additions::Additions;
 use crate::body::{Body, Frame, FrameKind, JointOptions, Limits};
 use crate::error::Error;
 use crate::joint::{Joint, Mimic};
@@ -16,7 +17,7 @@ use condyle_spatial::{Act, Inertia, Se3, Vec3};
 
 /// The name of a body of a builder. [`WORLD`] is the one that is always there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BodyId(usize);
+pub struct BodyId(pub(crate) usize);
 
 /// The world, on which the first joints sit.
 pub const WORLD: BodyId = BodyId(0);
@@ -56,8 +57,9 @@ struct Draft {
 pub struct ModelBuilder {
     name: String,
     drafts: Vec<Draft>,
-    frames: Vec<Frame>,
+    pub(crate) frames: Vec<Frame>,
     gravity: Vec3<f64>,
+    pub(crate) additions: Additions,
 }
 
 impl ModelBuilder {
@@ -79,6 +81,7 @@ impl ModelBuilder {
             drafts: vec![Draft { body: world, options: JointOptions::default(), between: false, mimic: None }],
             frames: Vec::new(),
             gravity: Vec3::new(0.0, 0.0, -9.81),
+            additions: Additions::default(),
         }
     }
 
@@ -146,6 +149,7 @@ impl ModelBuilder {
         for draft in &mut self.drafts {
             draft.body.inertia = draft.body.inertia.scale(by);
         }
+        self.additions.scale_masses(by);
     }
 
     /// Marks a body without mass as one between the joints of a chain.
@@ -210,7 +214,7 @@ impl ModelBuilder {
             }
         }
         let between = order.iter().map(|&old| self.drafts[old].between).collect();
-        let Coordinates { nq, nv, limits, damping, friction, armature } = coordinates;
+        let Coordinates { nq, nv, limits, damping, damping_polynomial, friction, armature } = coordinates;
         let tree = Tree::new(&bodies, nq, nv);
         let mut model = Model {
             name: self.name,
@@ -219,6 +223,12 @@ impl ModelBuilder {
             limits,
             damping,
             friction,
+            damping_polynomial,
+            springs: Vec::new(),
+            gravity_compensation: Vec::new(),
+            actuators: Vec::new(),
+            keyframes: Vec::new(),
+            constraints: Vec::new(),
             armature,
             gravity: self.gravity,
             limbs: Plan::new(&tree),
@@ -228,6 +238,7 @@ impl ModelBuilder {
             warnings: Vec::new(),
             singular: Vec::new(),
         };
+        self.additions.add_to(&mut model, &number)?;
         model.validate()?;
         model.geometry = model.hash_geometry();
         Ok(model)
@@ -307,6 +318,7 @@ struct Coordinates {
     nv: usize,
     limits: Limits,
     damping: Vec<f64>,
+    damping_polynomial: Vec<[f64; 2]>,
     friction: Vec<f64>,
     armature: Vec<f64>,
 }
@@ -323,8 +335,11 @@ impl Coordinates {
         self.limits.lower.resize(self.nq, lower);
         self.limits.upper.resize(self.nq, upper);
         self.limits.velocity.resize(self.nv, options.velocity.unwrap_or(f64::INFINITY));
-        self.limits.effort.resize(self.nv, options.effort.unwrap_or(f64::INFINITY));
+        let (least, greatest) = options.effort.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        self.limits.effort_lower.resize(self.nv, least);
+        self.limits.effort_upper.resize(self.nv, greatest);
         self.damping.resize(self.nv, options.damping);
+        self.damping_polynomial.resize(self.nv, options.damping_polynomial);
         self.friction.resize(self.nv, options.friction);
         self.armature.resize(self.nv, options.armature);
     }

@@ -113,6 +113,7 @@ impl ModelBuilder {
                 self.mimic(place[i].0, place[leader].0, mimic);
             }
         }
+        let first_frame = self.frames.len();
         for frame in &model.frames {
             let (on, pXb) = place[frame.body];
             self.frame_of_kind(&format!("{prefix}{}", frame.name), frame.kind, on, pXb * frame.placement);
@@ -124,6 +125,7 @@ impl ModelBuilder {
                 self.frame_of_kind(&name, FrameKind::Joint, on, pXb);
             }
         }
+        self.append_additions(model, prefix, &place, first_frame, locked, q);
         place
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::model::Model;
 
-/// Two models are equal if they are the same robot, number by number: names, bodies, joints, frames, limits, losses, armature,
-/// gravity and inertias. All else follows from these.
+/// Two models are equal if they are the same robot, number by number: names, bodies, joints, frames, limits, losses,
+/// springs, armature, gravity, inertias, actuators, keyframes and constraints. All else follows from these.
 ///
 /// A clone is equal to its model, and so is a model that was written and read again by a format that keeps all digits. The
 /// warnings of the loader do not count, nor whether single calls compute limbs side by side
@@ -16,6 +16,12 @@ impl<R: PartialEq> PartialEq for Model<R> {
             && self.limits == other.limits
             && self.damping == other.damping
             && self.friction == other.friction
+            && self.damping_polynomial == other.damping_polynomial
+            && self.springs == other.springs
+            && self.gravity_compensation == other.gravity_compensation
+            && self.actuators == other.actuators
+            && self.keyframes == other.keyframes
+            && self.constraints == other.constraints
             && self.armature == other.armature
             && self.gravity == other.gravity
             && self.tree.nodes.iter().zip(&other.tree.nodes).all(|(a, b)| a.inertia == b.inertia)

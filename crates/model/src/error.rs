@@ -1,5 +1,6 @@
-//! Errors in a robot's description, and warnings about it.
+//! Errors in a robot's description.
 
+use crate::warning::Warning;
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -159,52 +160,6 @@ pub enum Error {
         name: String,
         /// The most similar name there is; empty if none is similar.
         nearest: String,
-    },
-}
-
-/// Something odd about a model. Loaders collect warnings, or refuse the model when they are strict.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[non_exhaustive]
-pub enum Warning {
-    /// A body that moves has neither mass nor inertia.
-    #[error("body `{body}` moves and has no mass")]
-    Massless {
-        /// The body.
-        body: String,
-    },
-    /// A body's rotational inertia about its centre of mass has a negative principal moment.
-    #[error("body `{body}`: a principal moment of inertia is {moment:e} kg m²")]
-    Negative {
-        /// The body.
-        body: String,
-        /// The least moment (kg m²).
-        moment: f64,
-    },
-    /// One principal moment is larger than the sum of the others: no distribution of mass has such an inertia.
-    #[error(
-        "body `{body}`: principal moments {} > {} + {} kg m² break the triangle inequality",
-        moments[2], moments[0], moments[1]
-    )]
-    Triangle {
-        /// The body.
-        body: String,
-        /// The principal moments (kg m²), least first.
-        moments: [f64; 3],
-    },
-    /// Nothing resists a joint: M is singular, and forward dynamics has no answer.
-    #[error("joint `{joint}` moves nothing that has inertia along it: the inertia matrix is singular")]
-    Singular {
-        /// The joint.
-        joint: String,
-    },
-    /// A loader left something out that a tree of bodies cannot have, or assumed something.
-    #[error("{element}: {what}")]
-    LeftOut {
-        /// For example ``joint `loop` ``.
-        element: String,
-        /// The thing that was left out, and why.
-        what: String,
     },
 }
 

@@ -3,9 +3,11 @@
 #[cfg(feature = "serde")]
 mod description;
 #[cfg(feature = "loaders")]
-pub(crate) mod mjcf;
+mod files;
 #[cfg(feature = "loaders")]
-mod packages;
+mod known;
+#[cfg(feature = "loaders")]
+pub(crate) mod mjcf;
 #[cfg(feature = "loaders")]
 pub(crate) mod sdf;
 #[cfg(feature = "loaders")]

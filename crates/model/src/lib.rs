@@ -44,16 +44,20 @@
 #[cfg_attr(not(any(feature = "std", test)), macro_use)]
 extern crate alloc;
 
+mod actuator;
+mod additions;
 mod body;
 mod builder;
 mod compose;
 mod configuration;
+mod constraint;
 mod equality;
 mod error;
 pub mod inertial_parameters;
 mod io;
 #[doc(hidden)]
 pub mod joint;
+mod keyframe;
 #[doc(hidden)]
 pub mod layout;
 #[doc(hidden)]
@@ -61,6 +65,7 @@ pub mod limbs;
 mod magnitude;
 mod model;
 mod names;
+mod passive;
 mod position;
 mod real;
 #[cfg(feature = "loaders")]
@@ -69,8 +74,10 @@ pub mod robots;
 pub mod tree;
 mod validate;
 mod variants;
+mod warning;
 mod with_frame;
 
+pub use actuator::{Actuator, Transmission};
 pub use body::{Body, Frame, FrameKind, FrameParent, JointOptions, Limits};
 pub use builder::{BodyId, ModelBuilder, WORLD};
 pub use condyle_spatial::{Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
@@ -80,10 +87,14 @@ pub use configuration::{
 };
 #[doc(hidden)]
 pub use configuration::{difference_jacobian_groups, integrate_jacobian_groups};
-pub use error::{Error, Warning};
+pub use constraint::{ModelConstraint, ModelConstraintKind};
+pub use error::Error;
 #[cfg(feature = "loaders")]
 pub use io::{mjcf::MjcfOptions, sdf::SdfOptions, urdf::UrdfOptions};
 pub use joint::{Joint, Mimic};
+pub use keyframe::Keyframe;
 pub use model::Model;
+pub use passive::{GravityCompensation, Spring};
 #[doc(hidden)]
 pub use position::{PositionFault, ROTATION_ROUNDING, unit_fault};
+pub use warning::{Place, Warning, WarningKind};

@@ -1,11 +1,16 @@
 //! The frozen description of a robot.
 
+use crate::actuator::Actuator;
 use crate::body::{Body, Frame, FrameKind, Limits};
-use crate::error::{Error, Warning};
+use crate::constraint::ModelConstraint;
+use crate::error::Error;
 use crate::joint::Joint;
+use crate::keyframe::Keyframe;
 use crate::limbs::Plan;
 use crate::names::nearest;
+use crate::passive::{GravityCompensation, Spring};
 use crate::tree::{Column, Node, Tree, hash};
+use crate::warning::Warning;
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -38,6 +43,12 @@ pub struct Model<R = f64> {
     pub(crate) limits: Limits,
     pub(crate) damping: Vec<f64>,
     pub(crate) friction: Vec<f64>,
+    pub(crate) damping_polynomial: Vec<[f64; 2]>,
+    pub(crate) springs: Vec<Spring>,
+    pub(crate) gravity_compensation: Vec<GravityCompensation>,
+    pub(crate) actuators: Vec<Actuator>,
+    pub(crate) keyframes: Vec<Keyframe>,
+    pub(crate) constraints: Vec<ModelConstraint>,
     pub(crate) armature: Vec<R>,
     pub(crate) gravity: Vec3<R>,
     /// The robot as passes see it.
@@ -103,6 +114,37 @@ impl<R> Model<R> {
     pub fn friction(&self) -> &[f64] {
         &self.friction
     }
+    /// Returns the coefficients d₁ and d₂ of each degree of freedom's damping d(v) = d₀ + d₁|v| + d₂v², in which d₀ is
+    /// [`damping`](Self::damping): stored, used by no algorithm unasked.
+    #[inline]
+    pub fn damping_polynomial(&self) -> &[[f64; 2]] {
+        &self.damping_polynomial
+    }
+    /// Returns the springs of joints: stored, used by no algorithm unasked.
+    #[inline]
+    pub fn springs(&self) -> &[Spring] {
+        &self.springs
+    }
+    /// Returns the bodies whose weight is carried, all of it or a part: stored, used by no algorithm unasked.
+    #[inline]
+    pub fn gravity_compensation(&self) -> &[GravityCompensation] {
+        &self.gravity_compensation
+    }
+    /// Returns the actuators.
+    #[inline]
+    pub fn actuators(&self) -> &[Actuator] {
+        &self.actuators
+    }
+    /// Returns the states that have names.
+    #[inline]
+    pub fn keyframes(&self) -> &[Keyframe] {
+        &self.keyframes
+    }
+    /// Returns the constraints beside the tree: loops and coupled joints. No algorithm of the tree knows them.
+    #[inline]
+    pub fn constraints(&self) -> &[ModelConstraint] {
+        &self.constraints
+    }
     /// Inertia of the rotor as seen at each joint (kg m², kg), part of M in every algorithm.
     #[inline(always)]
     pub fn armature(&self) -> &[R] {
@@ -123,16 +165,20 @@ impl<R> Model<R> {
         self.tree.has_mimic()
     }
 
-    /// The number of the frame with this name: a link's, else the user's, else a joint's.
+    /// The number of the frame with this name: a link's, else the user's, else a joint's, else a
+    /// constraint's.
     ///
     /// # Errors
     /// [`Error::UnknownFrame`], with the nearest name.
     pub fn frame(&self, name: &str) -> Result<usize, Error> {
         let find = |kind| self.frames.iter().position(|f| f.name == name && f.kind == kind);
-        [FrameKind::Link, FrameKind::User, FrameKind::Joint].into_iter().find_map(find).ok_or_else(|| {
-            let nearest = nearest(name, self.frames.iter().map(|f| f.name.as_str()));
-            Error::UnknownFrame { name: name.to_owned(), nearest }
-        })
+        [FrameKind::Link, FrameKind::User, FrameKind::Joint, FrameKind::Constraint]
+            .into_iter()
+            .find_map(find)
+            .ok_or_else(|| {
+                let nearest = nearest(name, self.frames.iter().map(|f| f.name.as_str()));
+                Error::UnknownFrame { name: name.to_owned(), nearest }
+            })
     }
 
     /// The number of the body that the joint with this name carries.

@@ -3,10 +3,11 @@
 
 use crate::body::{Body, Frame, JointOptions};
 use crate::configuration::random_configuration;
-use crate::error::{Error, Warning};
+use crate::error::Error;
 use crate::joint::Joint;
 use crate::layout::{Columns, Layout, Pairs, Single};
 use crate::model::Model;
+use crate::warning::Warning;
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -56,17 +57,21 @@ impl JointOptions {
     /// Says what is wrong with the numbers of a joint.
     pub(crate) fn check(&self, joint: &str) -> Result<(), Error> {
         let wrong = |what: String| Err(Error::Joint { joint: joint.to_owned(), what });
-        let (lower, upper) = self.position.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
-        if lower.is_nan() || upper.is_nan() {
-            return wrong(format!("limits of position {lower} and {upper}: expected numbers"));
-        }
-        if lower > upper || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
-            return wrong(format!("lower limit {lower} is above upper limit {upper}"));
-        }
-        for (name, x) in [("velocity", self.velocity), ("effort", self.effort)] {
-            if let Some(x) = x.filter(|x| x.is_nan() || *x < 0.0) {
-                return wrong(format!("limit of {name} is {x}, expected a number of at least 0"));
+        for (name, limits) in [("", self.position), (" of effort", self.effort)] {
+            let (lower, upper) = limits.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+            if lower.is_nan() || upper.is_nan() {
+                let name = if name.is_empty() { " of position" } else { name };
+                return wrong(format!("limits{name} {lower} and {upper}: expected numbers"));
             }
+            if lower > upper || lower == f64::INFINITY || upper == f64::NEG_INFINITY {
+                return wrong(format!("lower limit{name} {lower} is above upper limit {upper}"));
+            }
+        }
+        if let Some(x) = self.velocity.filter(|x| x.is_nan() || *x < 0.0) {
+            return wrong(format!("limit of velocity is {x}, expected a number of at least 0"));
+        }
+        if let Some(x) = self.damping_polynomial.iter().find(|x| !x.is_finite()) {
+            return wrong(format!("a coefficient of damping is {x}, expected a finite number"));
         }
         for (name, x) in [("damping", self.damping), ("friction", self.friction), ("armature", self.armature)] {
             if !(x >= 0.0 && x.is_finite()) {
@@ -117,13 +122,14 @@ impl Model {
             }
         }
         self.check_magnitudes()?;
+        self.check_additions()?;
         let mut warnings = Vec::new();
         for (body, &between) in self.bodies.iter().zip(&self.between).skip(1) {
             check_inertia(body, between, &mut warnings);
         }
         self.find_singular();
         warnings.extend(self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() }));
-        warnings.extend(self.warnings.drain(..).filter(|warning| matches!(warning, Warning::LeftOut { .. })));
+        warnings.extend(self.warnings.drain(..).filter(|warning| warning.place().is_some()));
         self.warnings = warnings;
         Ok(())
     }
@@ -133,8 +139,9 @@ impl Model {
         JointOptions {
             position: Some((self.limits.lower[q], self.limits.upper[q])),
             velocity: Some(self.limits.velocity[v]),
-            effort: Some(self.limits.effort[v]),
+            effort: Some((self.limits.effort_lower[v], self.limits.effort_upper[v])),
             damping: self.damping[v],
+            damping_polynomial: self.damping_polynomial[v],
             friction: self.friction[v],
             armature: self.armature[v],
         }

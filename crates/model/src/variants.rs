@@ -62,20 +62,21 @@ impl Model {
     /// ```
     /// let arm = condyle_model::robots::arm7();
     /// let mut limits = arm.limits().clone();
-    /// limits.effort.iter_mut().for_each(|effort| *effort *= 0.5);
-    /// assert_eq!(arm.clone().with_limits(limits)?.limits().effort[0], 0.5 * arm.limits().effort[0]);
+    /// limits.effort_upper.iter_mut().for_each(|effort| *effort *= 0.5);
+    /// assert_eq!(arm.clone().with_limits(limits)?.limits().effort_upper[0], 0.5 * arm.limits().effort_upper[0]);
     /// # Ok::<(), condyle_model::Error>(())
     /// ```
     ///
     /// # Errors
     /// [`Error::Length`] if there are not as many as coordinates, nq of position and nv of the others; [`Error::Joint`] if a
-    /// lower limit is above an upper one, or one of velocity or effort is negative.
+    /// lower limit is above an upper one, or one of velocity is negative.
     pub fn with_limits(mut self, limits: Limits) -> Result<Self, Error> {
         for (name, found, expected) in [
             ("limits.lower", limits.lower.len(), self.nq()),
             ("limits.upper", limits.upper.len(), self.nq()),
             ("limits.velocity", limits.velocity.len(), self.nv()),
-            ("limits.effort", limits.effort.len(), self.nv()),
+            ("limits.effort_lower", limits.effort_lower.len(), self.nv()),
+            ("limits.effort_upper", limits.effort_upper.len(), self.nv()),
         ] {
             if found != expected {
                 return Err(Error::Length { name, expected, found });
@@ -133,6 +134,12 @@ impl Model {
             limits: plain.limits,
             damping: plain.damping,
             friction: plain.friction,
+            damping_polynomial: plain.damping_polynomial,
+            springs: plain.springs,
+            gravity_compensation: plain.gravity_compensation,
+            actuators: plain.actuators,
+            keyframes: plain.keyframes,
+            constraints: plain.constraints,
             limbs: None,
             geometry: plain.geometry,
             between: plain.between,

@@ -24,7 +24,7 @@ pub(crate) struct Equations {
     /// The other coordinates.
     pub actuated: Vec<usize>,
     /// Coordinates with a limited motor, and the limit.
-    pub limited: Vec<(usize, f64)>,
+    pub limited: Vec<(usize, [f64; 2])>,
     pub bounds: AccelerationBounds,
     /// The coordinates of its bounds.
     bounded: Vec<usize>,
@@ -51,8 +51,9 @@ impl Equations {
         let free_flyers = model.bodies().iter().skip(1).filter(|b| b.joint == Joint::FreeFlyer);
         let free: Vec<usize> = free_flyers.flat_map(|b| b.idx_v..b.idx_v + 6).collect();
         let actuated: Vec<usize> = (0..nv).filter(|i| !free.contains(i)).collect();
-        let effort = settings.effort(model);
-        let limited: Vec<_> = actuated.iter().map(|&i| (i, effort[i])).filter(|l| l.1.is_finite()).collect();
+        let [least, greatest] = settings.effort(model);
+        let limits = actuated.iter().map(|&i| (i, [least[i], greatest[i]]));
+        let limited: Vec<_> = limits.filter(|(_, sides)| sides.iter().any(|x| x.is_finite())).collect();
         let bounds = AccelerationBounds::new(model, settings.joint_limits.as_ref());
         let bounded = bounds.bounds.iter().map(|bound| bound.0).collect();
         let rows = limited.len() + bounds.bounds.len();
@@ -112,10 +113,10 @@ impl Equations {
             contact.add_equalities(program); // J q̈ = a* − J̇ v
         }
 
-        for (row, &(i, limit)) in self.limited.iter().enumerate() {
+        for (row, &(i, [least, greatest])) in self.limited.iter().enumerate() {
             program.row_mut(row)[..unknowns].copy_from_slice(E(i));
             let h = kinematics.h[i];
-            (program.lower[row], program.upper[row]) = (-limit - h, limit - h); // −τ̄ ≤ E x + h ≤ τ̄
+            (program.lower[row], program.upper[row]) = (least - h, greatest - h); // τ_min ≤ E x + h ≤ τ_max
         }
         bounds.update(q, v);
         for (k, &(i, lower, upper)) in bounds.bounds.iter().enumerate() {

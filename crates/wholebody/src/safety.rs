@@ -17,14 +17,20 @@ pub(crate) struct Safety {
     pub v: Vec<f64>,
     /// Whether that is the current one.
     pub current: bool,
-    /// Greatest effort of each coordinate.
-    effort: Vec<f64>,
+    /// Least and greatest effort of each coordinate.
+    effort: [Vec<f64>; 2],
     damping: f64,
     hold_ticks: u32,
 }
 
 impl Safety {
-    pub(crate) fn new(kinematics: &Kinematics, q: &[f64], effort: &[f64], damping: f64, hold_ticks: u32) -> Self {
+    pub(crate) fn new(
+        kinematics: &Kinematics,
+        q: &[f64],
+        effort: [Vec<f64>; 2],
+        damping: f64,
+        hold_ticks: u32,
+    ) -> Self {
         let nv = kinematics.model.nv();
         Self {
             data: Data::new(&kinematics.model),
@@ -33,7 +39,7 @@ impl Safety {
             q: q.to_vec(),
             v: vec![0.0; nv],
             current: false,
-            effort: effort.to_vec(),
+            effort,
             damping,
             hold_ticks,
         }
@@ -54,10 +60,11 @@ impl Safety {
         self.age = Some(0);
     }
 
-    /// The greatest effort of each coordinate is not exceeded.
+    /// Clips torques to the limits of effort.
     pub(crate) fn clip(&self, tau: &mut [f64]) {
-        for (tau, &limit) in tau.iter_mut().zip(&self.effort) {
-            *tau = tau.clamp(-limit, limit);
+        let [least, greatest] = &self.effort;
+        for ((tau, &least), &greatest) in tau.iter_mut().zip(least).zip(greatest) {
+            *tau = tau.clamp(least, greatest);
         }
     }
 
@@ -77,7 +84,8 @@ impl Safety {
         self.gravity_compensation(kinematics, contacts, free, tau);
         if self.current {
             for (i, tau) in tau.iter_mut().enumerate() {
-                let scale = if self.effort[i].is_finite() { self.effort[i] } else { 1.0 };
+                let effort = self.effort[1][i].min(-self.effort[0][i]);
+                let scale = if effort.is_finite() { effort } else { 1.0 };
                 *tau -= self.damping * scale * self.v[i]; // −D v
             }
         }

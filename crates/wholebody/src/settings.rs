@@ -199,25 +199,31 @@ impl Settings {
 
     /// Refuses efforts of actuated coordinates that are not above 0, by the joint's name.
     pub(crate) fn check_effort(&self, model: &Model) -> Result<(), Error> {
+        let [least, greatest] = self.effort(model);
         let origin = match self.effort {
             Some(_) => "setting `effort`",
             None => "the model's limit of effort (the setting `effort` replaces it)",
         };
         for body in model.bodies().iter().skip(1).filter(|body| body.mimic.is_none()) {
-            let limits = &self.effort(model)[body.idx_v..body.idx_v + body.joint.nv()];
+            let coordinates = body.idx_v..body.idx_v + body.joint.nv();
+            let mut limits = coordinates.flat_map(|i| [-least[i], greatest[i]]);
             if body.joint == Joint::FreeFlyer {
-                let wrong = limits.iter().find(|&&x| x.is_nan() || x < 0.0); // no motor acts here
-                let error = |&value: &f64| Error::Setting { name: "effort", value, allowed: "at least 0" };
+                let wrong = limits.find(|&x| x.is_nan() || x < 0.0); // no motor acts here
+                let error = |value: f64| Error::Setting { name: "effort", value, allowed: "at least 0" };
                 wrong.map_or(Ok(()), |value| Err(error(value)))?;
-            } else if let Some(&value) = limits.iter().find(|&&x| x.is_nan() || x <= 0.0) {
+            } else if let Some(value) = limits.find(|&x| x.is_nan() || x <= 0.0) {
                 return Err(Error::Effort { joint: body.joint_name.clone(), value, origin });
             }
         }
         Ok(())
     }
 
-    /// Greatest effort of each coordinate.
-    pub(crate) fn effort<'s>(&'s self, model: &'s Model) -> &'s [f64] {
-        self.effort.as_deref().unwrap_or(&model.limits().effort)
+    /// Returns the least and the greatest effort of each coordinate.
+    pub(crate) fn effort(&self, model: &Model) -> [Vec<f64>; 2] {
+        let limits = model.limits();
+        match &self.effort {
+            Some(effort) => [effort.iter().map(|x| -x).collect(), effort.clone()],
+            None => [limits.effort_lower.clone(), limits.effort_upper.clone()],
+        }
     }
 }

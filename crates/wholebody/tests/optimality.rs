@@ -34,7 +34,7 @@ fn moving_anyhow() {
         let (q, v) = state(&model, seed, 0.1, 0.3);
         let command = controller.step(&q, &v, &references).solved().unwrap_or_else(|status| panic!("{seed}: {status}"));
         check(&model, &contacts, &q, &v, &references, command);
-        for (tau, limit) in command.tau[6..].iter().zip(&model.limits().effort[6..]) {
+        for (tau, limit) in command.tau[6..].iter().zip(&model.limits().effort()[6..]) {
             assert!(tau.abs() < limit + EQUALITY);
         }
     }

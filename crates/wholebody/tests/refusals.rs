@@ -98,7 +98,7 @@ fn lengths() {
 fn efforts_are_above_0() {
     let model = robots::quadruped();
     let mut limits = model.limits().clone();
-    limits.effort[7] = 0.0; // of LF_HFE
+    limits.effort_upper[7] = 0.0; // of LF_HFE
     let powerless = model.clone().with_limits(limits).unwrap();
     let new = |model, settings| WholeBodyController::new(model, &feet(0.7), &tasks(), settings).map(drop);
     let error = new(&powerless, Settings::default()).unwrap_err().to_string();

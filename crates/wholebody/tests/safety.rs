@@ -27,7 +27,7 @@ fn is_safe(command: &Command, effort: &[f64]) {
 #[test]
 fn the_last_solution_then_gravity_compensation() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
-    let effort = model.limits().effort.clone();
+    let effort = model.limits().effort();
     let mut controller = controller(&model, &feet(0.7));
     let references = controller.hold(&q).unwrap();
     let good = controller.step(&q, &v, &references).solved().unwrap().clone();
@@ -53,7 +53,7 @@ fn the_last_solution_then_gravity_compensation() {
 #[test]
 fn a_state_that_is_not_finite() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
-    let effort = model.limits().effort.clone();
+    let effort = model.limits().effort();
     let mut controller = controller(&model, &feet(0.7));
     let references = controller.hold(&q).unwrap();
     let (mut no_q, mut no_v) = (q.clone(), v.clone());
@@ -76,7 +76,7 @@ fn a_state_that_is_not_finite() {
 #[test]
 fn nothing_breaks_the_limits() {
     let model = robots::humanoid();
-    let effort = model.limits().effort.clone();
+    let effort = model.limits().effort();
     let heavy: Vec<_> = soles(0.7).into_iter().map(|c| FrictionContact { min_force: 5000.0, ..c }).collect();
     for (contacts, max_iterations) in [(heavy, 50), (soles(0.7), 2), (soles(0.7), 6), (soles(0.05), 50)] {
         let settings = Settings { max_iterations, hold_ticks: 1, ..Settings::default() };
@@ -97,7 +97,7 @@ fn nothing_breaks_the_limits() {
 #[test]
 fn too_slow_is_a_status() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
-    let effort = model.limits().effort.clone();
+    let effort = model.limits().effort();
     for backend in [Backend::InteriorPoint, Backend::Clarabel] {
         let settings = Settings { backend, time_limit: 1e-12, ..Settings::default() };
         let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();

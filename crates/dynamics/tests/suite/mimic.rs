@@ -32,7 +32,7 @@ fn as_in_pinocchio() {
     assert_eq!([limits.lower[0], limits.upper[0]], *floats(&reference["shoulder"]));
     for (name, ours) in [
         ("velocity", &limits.velocity[..]),
-        ("effort", &limits.effort),
+        ("effort", &limits.effort_upper),
         ("damping", model.damping()),
         ("friction", model.friction()),
     ] {

@@ -54,7 +54,11 @@ fn mistakes_have_names() {
         json!(-1.0),
         "joint `joint1`: limit of velocity is -1, expected a number of at least 0",
     );
-    expect("/limits/effort/6", json!(-1.0), "joint `joint7`: limit of effort is -1");
+    expect(
+        "/limits/effort_upper/6",
+        json!(-100.0),
+        "joint `joint7`: lower limit of effort -12 is above upper limit -100",
+    );
     expect("/gravity/z", json!(null), "invalid type: null, expected f64");
     let mut file = arm();
     file["nodes"] = json!([]);

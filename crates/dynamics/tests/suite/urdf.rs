@@ -200,9 +200,9 @@ fn joint_types() {
     }
     assert_eq!((model.nq(), model.nv()), (1 + 2 + 1 + 7 + 4 + 4, 1 + 1 + 1 + 6 + 3 + 3));
     let limits = model.limits();
-    assert_eq!((limits.lower[0], limits.upper[3], limits.velocity[0], limits.effort[2]), (-1.0, 1.0, 3.0, 2.0));
+    assert_eq!((limits.lower[0], limits.upper[3], limits.velocity[0], limits.effort_upper[2]), (-1.0, 1.0, 3.0, 2.0));
     assert!(limits.upper[1].is_infinite() && limits.upper[4..].iter().all(|x| x.is_infinite()));
-    assert_eq!((limits.velocity[1], limits.effort[1]), (3.0, 2.0)); // a continuous joint may have these
+    assert_eq!((limits.velocity[1], limits.effort_upper[1]), (3.0, 2.0)); // a continuous joint may have these
     // what a URDF says of joints without an axis has no unit
     assert_eq!((&model.damping()[..3], &model.friction()[..3]), (&[0.5; 3][..], &[0.25; 3][..]));
     assert!(model.damping()[3..].iter().chain(&model.friction()[3..]).all(|&x| x == 0.0));

@@ -314,7 +314,10 @@ fn builders() {
         (options(JointOptions { armature: -0.1, ..plain() }), negative("armature", "-0.1")),
         (options(JointOptions { damping: -1.0, ..plain() }), negative("damping", "-1")),
         (options(JointOptions { friction: infinite, ..plain() }), negative("friction", "inf")),
-        (options(JointOptions { effort: Some(nan), ..plain() }), limit("effort", "NaN")),
+        (
+            options(JointOptions { effort: Some((nan, 1.0)), ..plain() }),
+            "joint `j`: limits of effort NaN and 1: expected numbers".to_owned(),
+        ),
         (options(JointOptions { velocity: Some(-2.0), ..plain() }), limit("velocity", "-2")),
     ] {
         let mut builder = ModelBuilder::new("r");

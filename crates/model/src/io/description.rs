@@ -1,10 +1,15 @@
 //! Models in files of serde's formats: they have what a user may edit. All else follows from it, and is made and checked when
 //! a file is read.
 
+use crate::actuator::Actuator;
 use crate::body::{Body, Frame, Limits};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
-use crate::error::{Error, Warning};
+use crate::constraint::ModelConstraint;
+use crate::error::Error;
+use crate::keyframe::Keyframe;
 use crate::model::Model;
+use crate::passive::{GravityCompensation, Spring};
+use crate::warning::Warning;
 use alloc::collections::BTreeSet;
 use alloc::string::String;
 use alloc::vec::Vec;
@@ -21,6 +26,18 @@ struct Description {
     limits: Limits,
     damping: Vec<f64>,
     friction: Vec<f64>,
+    #[serde(default)]
+    damping_polynomial: Vec<[f64; 2]>,
+    #[serde(default)]
+    springs: Vec<Spring>,
+    #[serde(default)]
+    gravity_compensation: Vec<GravityCompensation>,
+    #[serde(default)]
+    actuators: Vec<Actuator>,
+    #[serde(default)]
+    keyframes: Vec<Keyframe>,
+    #[serde(default)]
+    constraints: Vec<ModelConstraint>,
     armature: Vec<f64>,
     gravity: Vec3<f64>,
     warnings: Vec<Warning>,
@@ -35,6 +52,12 @@ impl Serialize for Model {
             limits: self.limits.clone(),
             damping: self.damping.clone(),
             friction: self.friction.clone(),
+            damping_polynomial: self.damping_polynomial.clone(),
+            springs: self.springs.clone(),
+            gravity_compensation: self.gravity_compensation.clone(),
+            actuators: self.actuators.clone(),
+            keyframes: self.keyframes.clone(),
+            constraints: self.constraints.clone(),
             armature: self.armature.clone(),
             gravity: self.gravity,
             warnings: self.warnings.clone(),
@@ -74,6 +97,11 @@ impl Description {
         self.check_coordinates(model.tree.nq, model.tree.nv)?;
         let Self { bodies, limits, damping, friction, armature, warnings, .. } = self;
         (model.limits, model.damping, model.friction, model.armature) = (limits, damping, friction, armature);
+        if !self.damping_polynomial.is_empty() {
+            model.damping_polynomial = self.damping_polynomial;
+        }
+        (model.springs, model.gravity_compensation) = (self.springs, self.gravity_compensation);
+        (model.actuators, model.keyframes, model.constraints) = (self.actuators, self.keyframes, self.constraints);
         // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
         let warned: BTreeSet<&str> = warnings
             .iter()
@@ -121,12 +149,13 @@ impl Description {
 
     /// Checks how many numbers there are for each coordinate.
     fn check_coordinates(&self, nq: usize, nv: usize) -> Result<(), Error> {
-        let Limits { lower, upper, velocity, effort } = &self.limits;
+        let Limits { lower, upper, velocity, effort_lower, effort_upper } = &self.limits;
         for (name, numbers, expected) in [
             ("limits.lower", lower, nq),
             ("limits.upper", upper, nq),
             ("limits.velocity", velocity, nv),
-            ("limits.effort", effort, nv),
+            ("limits.effort_lower", effort_lower, nv),
+            ("limits.effort_upper", effort_upper, nv),
             ("damping", &self.damping, nv),
             ("friction", &self.friction, nv),
             ("armature", &self.armature, nv),
@@ -134,6 +163,10 @@ impl Description {
             if numbers.len() != expected {
                 return Err(Error::Length { name, expected, found: numbers.len() });
             }
+        }
+        let (name, found) = ("damping_polynomial", self.damping_polynomial.len());
+        if ![0, nv].contains(&found) {
+            return Err(Error::Length { name, expected: nv, found });
         }
         Ok(())
     }

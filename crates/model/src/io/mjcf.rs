@@ -8,21 +8,26 @@ mod include;
 use super::xml::Element;
 use crate::body::{FrameKind, JointOptions};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
-use crate::error::{Error, Warning};
+use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::Model;
+use crate::warning::{Warning, WarningKind};
 use attributes::{Attributes, Compiler, Defaults, FromGeoms, MAIN, turn};
 use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use equality::Joints;
 use include::Includes;
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Options of reading an MJCF.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct MjcfOptions {
-    /// Whether what is only odd, or left out ([`Model::warnings`]), is an error.
+    /// Whether a warning ([`Model::warnings`]) is an error.
     pub strict: bool,
+    /// Kinds of warnings that are no errors, though `strict` is set.
+    pub allow: Vec<WarningKind>,
+    /// Folders that contain packages, or are packages, for `package://` addresses; see [`UrdfOptions`](crate::UrdfOptions).
+    pub packages: Vec<PathBuf>,
     /// Whether a `<joint>` of `<equality>` lets joint1 follow joint2 ([`Mimic`](crate::Mimic)), instead of being left
     /// out; its `polycoef` must be linear.
     pub mimic: bool,
@@ -93,7 +98,7 @@ fn model(root: &Element, options: &MjcfOptions) -> Result<Model, Error> {
     let (defaults, warnings) = (&defaults, Vec::new());
     let reader = Reader { options, compiler, defaults, bodies: 0, names, joints, mass: 0.0, warnings };
     let model = reader.model(root)?;
-    root.accepted(model, options.strict)
+    root.accepted(model, options.strict, &options.allow)
 }
 
 /// The parts of a body, with those inside its `<frame>`s.
@@ -276,7 +281,7 @@ impl<'a> Reader<'a> {
             for (geom, X) in &parts.geoms {
                 if self.options.weightless_meshes && geometry::is_heavy_mesh(&self.compiler, geom)? {
                     let what = format!("the mass of a mesh on {} is left out", element.label());
-                    self.warnings.push(Warning::LeftOut { element: geom.element.label(), what });
+                    self.warnings.push(geom.element.left_out(what));
                     continue;
                 }
                 sum += X.act(geometry::geom(&self.compiler, geom)?);
@@ -325,8 +330,9 @@ impl<'a> Reader<'a> {
         let options = JointOptions {
             position: range.filter(|_| joint != Joint::Spherical),
             velocity: None,
-            effort: effort.map(|[lower, upper]| lower.abs().max(upper.abs())),
+            effort: effort.map(|[lower, upper]| (lower, upper)),
             damping: a.number("damping")?.unwrap_or(0.0),
+            damping_polynomial: [0.0; 2],
             friction: a.number("frictionloss")?.unwrap_or(0.0),
             armature: a.number("armature")?.unwrap_or(0.0),
         };

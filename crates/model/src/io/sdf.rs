@@ -6,22 +6,28 @@ mod poses;
 use super::xml::{Amount, Element};
 use crate::body::{FrameKind, JointOptions};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
-use crate::error::{Error, Warning};
+use crate::error::Error;
 use crate::joint::Joint;
 use crate::model::Model;
+use crate::warning::{Warning, WarningKind};
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use mimics::Axes;
 use poses::{Poses, optional, three};
 use std::collections::{HashMap, HashSet, VecDeque};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Options of reading an SDF.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub struct SdfOptions {
     /// The joint between the world and a root link, named `root_joint`; none fixes the root link to the world.
     pub root_joint: Option<Joint>,
-    /// Whether what is only odd, or left out ([`Model::warnings`]), is an error.
+    /// Whether a warning ([`Model::warnings`]) is an error.
     pub strict: bool,
+    /// Kinds of warnings that are no errors, though `strict` is set.
+    pub allow: Vec<WarningKind>,
+    /// Folders that contain packages, or are packages, for `package://` and `model://` addresses; see
+    /// [`UrdfOptions`](crate::UrdfOptions).
+    pub packages: Vec<PathBuf>,
     /// Whether an axis with a `<mimic>` follows another one ([`Mimic`](crate::Mimic)), instead of being free.
     pub mimic: bool,
 }
@@ -100,7 +106,7 @@ fn model(root: &Element, options: &SdfOptions) -> Result<Model, Error> {
     let gravity = world.and_then(|w| w.child("gravity")).map(|g| three(g, g)).transpose()?;
     let mut model = reader.build(gravity, options)?;
     model.warnings.append(&mut reader.warnings);
-    root.accepted(model, options.strict)
+    root.accepted(model, options.strict, &options.allow)
 }
 
 /// The name under which joints know the world.
@@ -146,7 +152,7 @@ impl<'a> Reader<'a> {
     }
 
     fn warn(&mut self, element: &Element, what: String) {
-        self.warnings.push(Warning::LeftOut { element: element.label(), what });
+        self.warnings.push(element.left_out(what));
     }
 
     /// The link on which the tree stands: the world, or the one link that is nobody's child.
@@ -319,7 +325,7 @@ impl<'a> Reader<'a> {
             self.warn(link, "<gravity> left out: all links feel it".to_owned());
         }
         let Some(inertial) = link.child("inertial") else {
-            self.warn(link, "has no <inertial>: 1 kg and 1 kg m², as SDF has it".to_owned());
+            self.warnings.push(link.assumed("has no <inertial>: 1 kg and 1 kg m², as SDF has it"));
             return Ok(Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(1.0)));
         };
         if inertial.attribute("auto").is_some_and(|a| matches!(a, "true" | "1")) {
@@ -369,8 +375,9 @@ fn limits(joint: &Element, axis: &Element, kind: Joint) -> Result<JointOptions, 
     Ok(JointOptions {
         position: (kind.nq() == 1).then_some((lower, upper)),
         velocity: bound(number(limit, "velocity", -1.0)?),
-        effort: bound(number(limit, "effort", -1.0)?),
+        effort: bound(number(limit, "effort", -1.0)?).map(|effort| (-effort, effort)),
         damping: number(dynamics, "damping", 0.0)?,
+        damping_polynomial: [0.0; 2],
         friction: number(dynamics, "friction", 0.0)?,
         armature: 0.0,
     })

@@ -2,7 +2,7 @@
 
 mod origin;
 
-use super::packages;
+use super::files;
 use super::xml::{self, Amount, Element};
 use crate::body::{FrameKind, JointOptions};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
@@ -10,6 +10,7 @@ use crate::error::Error;
 use crate::joint::{Joint, Mimic};
 use crate::model::Model;
 use crate::names::{near, nearest};
+use crate::warning::WarningKind;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use origin::Origins;
 use std::collections::{HashMap, HashSet};
@@ -23,8 +24,10 @@ pub struct UrdfOptions {
     /// Whether joints with a `<mimic>` share the coordinate of the joint they follow, instead of having their own; see
     /// [`Mimic`].
     pub mimic: bool,
-    /// Whether what is only odd ([`Model::warnings`]) is an error.
+    /// Whether a warning ([`Model::warnings`]) is an error.
     pub strict: bool,
+    /// Kinds of warnings that are no errors, though `strict` is set.
+    pub allow: Vec<WarningKind>,
     /// Folders that have packages in them, or are packages, for `package://` addresses; before those that the
     /// environment names in `ROS_PACKAGE_PATH` and, with `/share` behind them, in `AMENT_PREFIX_PATH`.
     pub packages: Vec<PathBuf>,
@@ -43,7 +46,7 @@ impl Model {
     /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), and what
     /// [`ModelBuilder::build`] finds. What a file may have at most stands at the [beginning](crate#limits-of-files).
     pub fn from_urdf(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Self, Error> {
-        let path = packages::locate(path.as_ref(), &options.packages)?;
+        let path = files::locate(path.as_ref(), &options.packages)?;
         let mut amount = Amount::default();
         let text = amount.read(&path)?;
         Reader::new(&Element::parse(&text, &path.display().to_string(), &mut amount)?)?.model(options)
@@ -210,7 +213,7 @@ impl<'a> Reader<'a> {
             self.add_mimics(&mut builder, &bodies)?;
         }
         let model = builder.build().map_err(|e| self.locate(e))?;
-        self.robot.accepted(model, options.strict)
+        self.robot.accepted(model, options.strict, &options.allow)
     }
 
     /// Lets joints follow others.
@@ -311,7 +314,7 @@ fn joint_options(joint: &Element) -> Result<JointOptions, Error> {
         }
         options.position = limited.then_some((lower, upper));
         options.velocity = with_axis.then_some(velocity);
-        options.effort = with_axis.then_some(effort);
+        options.effort = with_axis.then_some((-effort, effort));
     } else if limited {
         return Err(joint.wrong("is revolute or prismatic and has no <limit>"));
     }

@@ -5,6 +5,7 @@
 
 use crate::error::Error;
 use crate::model::Model;
+use crate::warning::{Place, Warning, WarningKind};
 use roxmltree::{Document, Node};
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -196,12 +197,37 @@ impl Element {
         self.wrong_inside(self, what)
     }
 
-    /// The model that was read from this root, unless it must have no warnings and has one.
-    pub(crate) fn accepted(&self, model: Model, is_strict: bool) -> Result<Model, Error> {
-        match model.warnings.first() {
+    /// Returns the model that was read from this root, unless it has a warning that a strict reader does not allow.
+    pub(crate) fn accepted(&self, model: Model, is_strict: bool, allow: &[WarningKind]) -> Result<Model, Error> {
+        match model.warnings.iter().find(|warning| !allow.contains(&warning.kind())) {
             Some(warning) if is_strict => Err(Error::Strict { file: self.file.to_string(), warning: warning.clone() }),
             _ => Ok(model),
         }
+    }
+
+    /// Returns the position of this element.
+    pub(crate) fn place(&self) -> Place {
+        Place { file: self.file.to_string(), line: self.line }
+    }
+
+    /// Returns the warning of an unknown, misspelt or misplaced name in this element.
+    pub(crate) fn unknown(&self, what: impl Into<String>) -> Warning {
+        Warning::Unknown { place: self.place(), element: self.label(), what: what.into() }
+    }
+
+    /// Returns the warning of something in this element that a model cannot hold.
+    pub(crate) fn left_out(&self, what: impl Into<String>) -> Warning {
+        Warning::LeftOut { place: self.place(), element: self.label(), what: what.into() }
+    }
+
+    /// Returns the warning of a default that is taken where this element says nothing.
+    pub(crate) fn assumed(&self, what: impl Into<String>) -> Warning {
+        Warning::Assumed { place: self.place(), element: self.label(), what: what.into() }
+    }
+
+    /// Returns the warning of a joint that could follow another one and is left free.
+    pub(crate) fn mimic(&self, what: impl Into<String>) -> Warning {
+        Warning::Mimic { place: self.place(), element: self.label(), what: what.into() }
     }
 
     /// An error that names this element, and the line of one inside it.

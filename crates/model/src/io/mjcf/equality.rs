@@ -2,9 +2,10 @@
 
 use super::attributes::Attributes;
 use crate::builder::{BodyId, ModelBuilder};
-use crate::error::{Error, Warning};
+use crate::error::Error;
 use crate::io::xml::{Element, words};
 use crate::joint::Mimic;
+use crate::warning::Warning;
 use std::collections::{HashMap, HashSet};
 
 /// The body that a joint carries, and the joint's position in the file's pose (`ref`).
@@ -21,7 +22,7 @@ pub(super) fn add(
     for section in root.children.iter().filter(|c| matches!(&*c.tag, "equality" | "tendon" | "deformable")) {
         for element in &section.children {
             let a = Attributes::plain(element);
-            let mut warn = |what: String| warnings.push(Warning::LeftOut { element: element.label(), what });
+            let mut warn = |what: String| warnings.push(element.left_out(what));
             if section.tag != "equality" || element.tag != "joint" {
                 warn(format!("<{}> has no part in a tree of bodies", section.tag));
                 continue;
@@ -41,7 +42,8 @@ pub(super) fn add(
             let mut coefficients = a.list("polycoef")?.unwrap_or_else(|| vec![0.0, 1.0]);
             coefficients.resize(5, 0.0);
             match (leader, &coefficients[..]) {
-                _ if !mimic => warn("a joint that follows another one is left free unless `mimic` is asked for".into()),
+                _ if !mimic => warnings
+                    .push(element.mimic("a joint that follows another one is left free unless `mimic` is asked for")),
                 (Some((_, (leader, x0))), &[a0, a1, 0.0, 0.0, 0.0]) if followers.insert(name) => {
                     // y − y₀ = a₀ + a₁ (x − x₀)
                     builder.mimic(follower, leader, Mimic { ratio: a1, offset: y0 + a0 - a1 * x0 });

@@ -2,9 +2,10 @@
 
 use super::poses::optional;
 use crate::builder::{BodyId, ModelBuilder};
-use crate::error::{Error, Warning};
+use crate::error::Error;
 use crate::io::xml::Element;
 use crate::joint::Mimic;
+use crate::warning::Warning;
 use std::collections::HashMap;
 
 /// The bodies that move about or along each axis, by the joint's name and the axis's tag, and those that follow.
@@ -28,7 +29,7 @@ impl<'a> Axes<'a> {
     pub(super) fn follow(&self, builder: &mut ModelBuilder, mimic: bool) -> Result<Vec<Warning>, Error> {
         if !mimic {
             let what = "a joint that follows another one is left free unless `mimic` is asked for";
-            let free = |joint: &Element| Warning::LeftOut { element: joint.label(), what: what.to_owned() };
+            let free = |joint: &Element| joint.mimic(what);
             return Ok(self.followers.iter().map(|(joint, ..)| free(joint)).collect());
         }
         for &(joint, mimic, follower) in &self.followers {

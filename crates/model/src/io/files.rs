@@ -1,4 +1,4 @@
-//! `package://name/path` addresses, as ROS writes them, and where packages are looked for.
+//! Files that a robot's file names: paths, and `package://name/path` addresses as ROS writes them.
 
 use crate::error::Error;
 use std::ffi::OsString;
@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 /// The beginning of the address of a file in a package.
 const SCHEME: &str = "package://";
 
-/// The file that a path or a `package://` address names.
+/// Returns the file that a path or a `package://` address names.
 pub(crate) fn locate(path: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error> {
     match path.to_str().and_then(|p| p.strip_prefix(SCHEME)) {
         None => Ok(path.to_owned()),
@@ -16,6 +16,14 @@ pub(crate) fn locate(path: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error
             find(address, &folders(packages, ros, ament))
         }
     }
+}
+
+/// Returns the file that an address in a robot's file names: a `package://` or `file://` address, an absolute path, or a path
+/// relative to the folder of the file that has the address.
+#[allow(dead_code)]
+pub(crate) fn resolve(address: &str, folder: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error> {
+    let path = address.strip_prefix("file://").unwrap_or(address);
+    Ok(folder.join(locate(Path::new(path), packages)?)) // an absolute path stays as it is
 }
 
 /// All folders in which packages may be, the most particular first.

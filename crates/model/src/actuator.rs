@@ -1,0 +1,95 @@
+//! Actuators: motors and servos, and the joints, tendons or frames that they drive.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// Actuator of a robot, as its file describes it. Its ranges are part of [`Limits`](crate::Limits) already, its armature and
+/// damping of the joint's.
+///
+/// A motor with the control u acts with the force f = u, a servo with f = kp (u − l) − kv l̇, where l is the gear times the
+/// position that it drives. The effort at the joint is gear · f.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Actuator<B = usize> {
+    /// Name, or an empty string.
+    pub name: String,
+    /// Joint, tendon or frame that is driven.
+    pub transmission: Transmission<B>,
+    /// Gear: the effort at the joint for each unit of force (1, m). Joints and tendons have the first number; a ball has three,
+    /// a free joint and a frame have six, linear first.
+    pub gear: [f64; 6],
+    /// Gain of position kp (N/m, N m/rad); 0 for a motor.
+    pub kp: f64,
+    /// Gain of velocity kv (N s/m, N m s/rad); 0 for a motor.
+    pub kv: f64,
+    /// Least and greatest control; infinite where there is no limit.
+    #[cfg_attr(feature = "serde", serde(with = "range"))]
+    pub control: (f64, f64),
+    /// Least and greatest force before the gear (N, N m); infinite where there is no limit.
+    #[cfg_attr(feature = "serde", serde(with = "range"))]
+    pub force: (f64, f64),
+}
+
+/// Thing that an [`Actuator`] drives. `B` is the type by which bodies are named: their index in a model,
+/// [`BodyId`](crate::BodyId) in a builder.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Transmission<B = usize> {
+    /// Joint of a body.
+    Joint {
+        /// Body that the joint carries.
+        body: B,
+    },
+    /// Tendon whose length is a sum of joint positions, each times a coefficient.
+    Tendon {
+        /// Name of the tendon.
+        name: String,
+        /// Bodies whose joints it runs over, each with its coefficient (1, m/rad).
+        joints: Vec<(B, f64)>,
+    },
+    /// Frame on which the force acts as a wrench, along the frame's axes at its origin.
+    Frame {
+        /// Index of the frame.
+        frame: usize,
+    },
+}
+
+impl<B: Clone> Actuator<B> {
+    /// Names bodies and frames in another way; returns none if no body that it drives is left.
+    pub(crate) fn renamed<C>(
+        &self,
+        body: impl Fn(&B) -> Option<C>,
+        frame: impl Fn(usize) -> usize,
+    ) -> Option<Actuator<C>> {
+        let transmission = match &self.transmission {
+            Transmission::Joint { body: b } => Transmission::Joint { body: body(b)? },
+            Transmission::Tendon { name, joints } => {
+                let joints: Vec<_> = joints.iter().filter_map(|(b, k)| Some((body(b)?, *k))).collect();
+                if joints.is_empty() {
+                    return None;
+                }
+                Transmission::Tendon { name: name.clone(), joints }
+            }
+            Transmission::Frame { frame: f } => Transmission::Frame { frame: frame(*f) },
+        };
+        let Self { name, gear, kp, kv, control, force, .. } = self.clone();
+        Some(Actuator { name, transmission, gear, kp, kv, control, force })
+    }
+}
+
+/// Ranges in files of serde's formats: `null` stands for an infinite side.
+#[cfg(feature = "serde")]
+mod range {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(range: &(f64, f64), to: S) -> Result<S::Ok, S::Error> {
+        let finite = |x: f64| x.is_finite().then_some(x);
+        (finite(range.0), finite(range.1)).serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<(f64, f64), D::Error> {
+        let (lower, upper) = <(Option<f64>, Option<f64>)>::deserialize(from)?;
+        Ok((lower.unwrap_or(f64::NEG_INFINITY), upper.unwrap_or(f64::INFINITY)))
+    }
+}

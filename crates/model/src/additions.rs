@@ -1,0 +1,309 @@
+//! Additions to the tree of a model: springs, gravity compensation, actuators, keyframes and constraints. How a builder takes
+//! them, how they follow a model that is changed, and how they are checked.
+
+use crate::actuator::{Actuator, Transmission};
+use crate::body::FrameKind;
+use crate::builder::{BodyId, ModelBuilder};
+use crate::configuration::neutral;
+use crate::constraint::{ModelConstraint, ModelConstraintKind};
+use crate::error::Error;
+use crate::joint::Joint;
+use crate::keyframe::Keyframe;
+use crate::model::Model;
+use crate::passive::{GravityCompensation, Spring};
+use alloc::borrow::ToOwned;
+use alloc::string::String;
+use alloc::vec::Vec;
+use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
+
+/// State of one joint in a keyframe: body, position, velocity.
+type JointState = (BodyId, Vec<f64>, Vec<f64>);
+
+/// Additions of a builder. Bodies are named by [`BodyId`], frames by their index in the builder.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Additions {
+    springs: Vec<(BodyId, [f64; 3], Vec<f64>)>,
+    compensation: Vec<(BodyId, f64, Vec3<f64>)>,
+    actuators: Vec<Actuator<BodyId>>,
+    keyframes: Vec<(String, Vec<JointState>)>,
+    constraints: Vec<(String, Draft)>,
+}
+
+/// Constraint of a builder.
+#[derive(Clone, Debug)]
+enum Draft {
+    Point([usize; 2]),
+    Rigid([usize; 2]),
+    Coupling(BodyId, Option<BodyId>, [f64; 5]),
+}
+
+impl ModelBuilder {
+    /// Adds a spring to a body's joint: see [`Spring`]. `rest` has as many numbers as q for the joint.
+    pub fn spring(&mut self, body: BodyId, stiffness: [f64; 3], rest: &[f64]) {
+        self.additions.springs.push((body, stiffness, rest.to_vec()));
+    }
+
+    /// Carries `factor` times the weight of a part of a body: see [`GravityCompensation`]. The part's inertia is in a frame at
+    /// `placement` in the body's.
+    pub fn compensate_gravity(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>, factor: f64) {
+        let carried = placement.act(Inertia { rotational: Sym3::zero(), ..inertia }.scale(factor));
+        self.add_compensation(body, carried.mass, carried.mass_com);
+    }
+
+    fn add_compensation(&mut self, body: BodyId, mass: f64, mass_com: Vec3<f64>) {
+        match self.additions.compensation.iter_mut().find(|(b, ..)| *b == body) {
+            Some((_, m, c)) => (*m, *c) = (*m + mass, *c + mass_com),
+            None => self.additions.compensation.push((body, mass, mass_com)),
+        }
+    }
+
+    /// Adds an actuator. It does not change limits, armature and damping: these are the joints' ([`JointOptions`]).
+    ///
+    /// [`JointOptions`]: crate::JointOptions
+    pub fn actuator(&mut self, actuator: Actuator<BodyId>) {
+        self.additions.actuators.push(actuator);
+    }
+
+    /// Adds a named state: for some bodies the position and velocity of their joint. The other joints are at their neutral
+    /// position and at rest.
+    pub fn keyframe(&mut self, name: &str, joints: Vec<(BodyId, Vec<f64>, Vec<f64>)>) {
+        self.additions.keyframes.push((name.to_owned(), joints));
+    }
+
+    /// Adds a constraint: a point of one body and a point of another one coincide. Each is the origin of a frame at a placement
+    /// in its body. The frames are named `name#1` and `name#2`.
+    pub fn constraint_point(&mut self, name: &str, at: [(BodyId, Se3<f64>); 2]) {
+        let frames = self.constraint_frames(name, at);
+        self.additions.constraints.push((name.to_owned(), Draft::Point(frames)));
+    }
+
+    /// Adds a constraint: a frame of one body and a frame of another one coincide. The frames are named `name#1` and `name#2`.
+    pub fn constraint_rigid(&mut self, name: &str, at: [(BodyId, Se3<f64>); 2]) {
+        let frames = self.constraint_frames(name, at);
+        self.additions.constraints.push((name.to_owned(), Draft::Rigid(frames)));
+    }
+
+    /// Adds a constraint between the positions of joints: q_f = Σ cᵢ q_lⁱ, or q_f = c₀ without a leader.
+    pub fn constraint_coupling(
+        &mut self,
+        name: &str,
+        follower: BodyId,
+        leader: Option<BodyId>,
+        coefficients: [f64; 5],
+    ) {
+        self.additions.constraints.push((name.to_owned(), Draft::Coupling(follower, leader, coefficients)));
+    }
+
+    fn constraint_frames(&mut self, name: &str, at: [(BodyId, Se3<f64>); 2]) -> [usize; 2] {
+        let first = self.frames.len();
+        for (k, (body, placement)) in at.into_iter().enumerate() {
+            self.frame_of_kind(&format!("{name}#{}", k + 1), FrameKind::Constraint, body, placement);
+        }
+        [first, first + 1]
+    }
+
+    /// Adds the additions of a model whose bodies went to `place` and whose frames begin at `first_frame`. Those of bodies that
+    /// are locked at q are left out, or act on the body that carries them.
+    pub(crate) fn append_additions(
+        &mut self,
+        model: &Model,
+        prefix: &str,
+        place: &[(BodyId, Se3<f64>)],
+        first_frame: usize,
+        locked: &[usize],
+        q: &[f64],
+    ) {
+        let body = |i: &usize| (!locked.contains(i)).then(|| place[*i].0);
+        for Spring { body: i, stiffness, rest } in &model.springs {
+            if let Some(id) = body(i) {
+                self.spring(id, *stiffness, rest);
+            }
+        }
+        for &GravityCompensation { body: i, mass, mass_com } in &model.gravity_compensation {
+            let (on, pXb) = place[i];
+            let carried = pXb.act(Inertia { mass, mass_com, rotational: Sym3::zero() });
+            self.add_compensation(on, carried.mass, carried.mass_com);
+        }
+        for actuator in &model.actuators {
+            if let Some(mut actuator) = actuator.renamed(body, |frame| first_frame + frame) {
+                actuator.name.insert_str(0, prefix);
+                self.actuator(actuator);
+            }
+        }
+        for keyframe in &model.keyframes {
+            let own = |&(i, b): &(usize, &crate::body::Body)| i > 0 && b.mimic.is_none() && !locked.contains(&i);
+            let joints = model.bodies.iter().enumerate().filter(own).map(|(i, b)| {
+                let (nq, nv) = (b.joint.nq(), b.joint.nv());
+                (place[i].0, keyframe.q[b.idx_q..][..nq].to_vec(), keyframe.v[b.idx_v..][..nv].to_vec())
+            });
+            self.keyframe(&format!("{prefix}{}", keyframe.name), joints.collect());
+        }
+        for ModelConstraint { name, kind } in &model.constraints {
+            let moved = |frames: &[usize; 2]| {
+                let frames = frames.map(|frame| first_frame + frame);
+                (self.frames[frames[0]].body != self.frames[frames[1]].body).then_some(frames)
+            };
+            let draft = match kind {
+                ModelConstraintKind::Point { frames } => moved(frames).map(Draft::Point),
+                ModelConstraintKind::Rigid { frames } => moved(frames).map(Draft::Rigid),
+                ModelConstraintKind::Coupling { follower, leader, coefficients: c } => {
+                    body(follower).map(|id| match leader {
+                        Some(i) if locked.contains(i) => {
+                            let at = model.joint_position(*i, q);
+                            let value = c.iter().rev().fold(0.0, |sum, c| sum * at + c); // Σ cᵢ qⁱ
+                            Draft::Coupling(id, None, [value, 0.0, 0.0, 0.0, 0.0])
+                        }
+                        leader => Draft::Coupling(id, leader.as_ref().and_then(body), *c),
+                    })
+                }
+            };
+            if let Some(draft) = draft {
+                self.additions.constraints.push((format!("{prefix}{name}"), draft));
+            }
+        }
+    }
+}
+
+impl Additions {
+    /// Scales the masses whose weight is carried.
+    #[cfg(feature = "loaders")]
+    pub(crate) fn scale_masses(&mut self, by: f64) {
+        for (_, mass, mass_com) in &mut self.compensation {
+            (*mass, *mass_com) = (*mass * by, mass_com.scale(by));
+        }
+    }
+
+    /// Puts the additions into the model that is built; `number` has the index of each body of the builder.
+    pub(crate) fn add_to(self, model: &mut Model, number: &[usize]) -> Result<(), Error> {
+        let Self { springs, compensation, actuators, keyframes, constraints } = self;
+        let index = |id: BodyId| number[id.0];
+        model.springs =
+            springs.into_iter().map(|(b, stiffness, rest)| Spring { body: index(b), stiffness, rest }).collect();
+        model.gravity_compensation = compensation
+            .into_iter()
+            .map(|(b, mass, mass_com)| GravityCompensation { body: index(b), mass, mass_com })
+            .filter(|c| c.body > 0 && c.mass != 0.0)
+            .collect();
+        model.actuators =
+            actuators.iter().filter_map(|actuator| actuator.renamed(|&b| Some(index(b)), |frame| frame)).collect();
+        for (name, joints) in keyframes {
+            let (mut q, mut v) = (neutral(model), vec![0.0; model.tree.nv]);
+            for (b, joint_q, joint_v) in joints {
+                let body = &model.bodies[index(b)];
+                let (nq, nv) = (body.joint.nq(), body.joint.nv());
+                if body.mimic.is_some() {
+                    continue; // its coordinate is its leader's
+                }
+                if joint_q.len() != nq || joint_v.len() != nv {
+                    let (q, v) = (joint_q.len(), joint_v.len());
+                    let what = format!("keyframe `{name}` has {q} and {v} numbers, expected {nq} and {nv}");
+                    return Err(Error::Joint { joint: body.joint_name.clone(), what });
+                }
+                q[body.idx_q..][..nq].copy_from_slice(&joint_q);
+                v[body.idx_v..][..nv].copy_from_slice(&joint_v);
+            }
+            model.keyframes.push(Keyframe { name, q, v });
+        }
+        let constraint = |(name, draft)| {
+            let kind = match draft {
+                Draft::Point(frames) => ModelConstraintKind::Point { frames },
+                Draft::Rigid(frames) => ModelConstraintKind::Rigid { frames },
+                Draft::Coupling(follower, leader, coefficients) => {
+                    ModelConstraintKind::Coupling { follower: index(follower), leader: leader.map(index), coefficients }
+                }
+            };
+            ModelConstraint { name, kind }
+        };
+        model.constraints = constraints.into_iter().map(constraint).collect();
+        Ok(())
+    }
+}
+
+impl Model {
+    /// Returns the position of a joint with one degree of freedom (rad, m): the angle of one that turns without limits.
+    fn joint_position(&self, body: usize, q: &[f64]) -> f64 {
+        let body = &self.bodies[body];
+        let q = &q[body.idx_q..];
+        let own = match body.joint {
+            Joint::Continuous { .. } => q[1].atan2(q[0]),
+            _ => q[0],
+        };
+        body.mimic.map_or(own, |mimic| mimic.ratio * own + mimic.offset)
+    }
+
+    /// Checks springs, gravity compensation, actuators, keyframes and constraints.
+    pub(crate) fn check_additions(&self) -> Result<(), Error> {
+        let there = |name: &'static str, body: usize| match self.bodies.get(body) {
+            Some(found) if body > 0 => Ok(found),
+            _ => Err(Error::Body { body: format!("{body}"), what: format!("{name} names a body that has no joint") }),
+        };
+        let joint_of_one = |name: &'static str, i: usize| {
+            let body = there(name, i)?;
+            let what = || format!("{name} is for joints of one degree of freedom");
+            if body.joint.nv() == 1 {
+                Ok(())
+            } else {
+                Err(Error::Joint { joint: body.joint_name.clone(), what: what() })
+            }
+        };
+        let frame = |i: usize| match self.frames.get(i) {
+            Some(frame) => Ok(frame.body),
+            None => Err(Error::Frame { frame: format!("{i}"), what: "there is no such frame".to_owned() }),
+        };
+        for Spring { body, stiffness, rest } in &self.springs {
+            let body = there("a spring", *body)?;
+            let wrong = |what: String| Err(Error::Joint { joint: body.joint_name.clone(), what });
+            if rest.len() != body.joint.nq() {
+                return wrong(format!("its spring rests at {} numbers, expected {}", rest.len(), body.joint.nq()));
+            }
+            if let Some(x) = stiffness.iter().chain(rest).find(|x| !x.is_finite()) {
+                return wrong(format!("its spring has the number {x}, expected finite ones"));
+            }
+        }
+        for carried in &self.gravity_compensation {
+            let body = there("a gravity compensation", carried.body)?;
+            if !carried.mass_com.to_array().into_iter().chain([carried.mass]).all(f64::is_finite) {
+                let what = "its gravity compensation is not finite".to_owned();
+                return Err(Error::Body { body: body.name.clone(), what });
+            }
+        }
+        for actuator in &self.actuators {
+            match &actuator.transmission {
+                Transmission::Joint { body } => drop(there("an actuator", *body)?),
+                Transmission::Tendon { joints, .. } => {
+                    joints.iter().try_for_each(|&(body, _)| joint_of_one("a tendon", body))?;
+                }
+                Transmission::Frame { frame: i } => drop(frame(*i)?),
+            }
+        }
+        for Keyframe { q, v, .. } in &self.keyframes {
+            for (name, found, expected) in
+                [("keyframes.q", q.len(), self.tree.nq), ("keyframes.v", v.len(), self.tree.nv)]
+            {
+                if found != expected {
+                    return Err(Error::Length { name, expected, found });
+                }
+            }
+            self.check_state(q, v)?;
+        }
+        for (k, ModelConstraint { name, kind }) in self.constraints.iter().enumerate() {
+            let wrong = |what: String| Error::Constraint { constraint: k, what: format!("`{name}`: {what}") };
+            match kind {
+                ModelConstraintKind::Point { frames } | ModelConstraintKind::Rigid { frames } => {
+                    if frame(frames[0])? == frame(frames[1])? {
+                        return Err(wrong("both frames are fixed to one body".to_owned()));
+                    }
+                }
+                ModelConstraintKind::Coupling { follower, leader, coefficients } => {
+                    for i in [Some(*follower), *leader].into_iter().flatten() {
+                        joint_of_one("a coupling", i)?;
+                    }
+                    if coefficients.iter().any(|c| !c.is_finite()) {
+                        return Err(wrong("a coefficient is not finite".to_owned()));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,16 @@
+//! Positions of a robot that have names.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+
+/// State with a name that a robot's file has, such as `home`.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Keyframe {
+    /// Name.
+    pub name: String,
+    /// Position, nq numbers.
+    pub q: Vec<f64>,
+    /// Velocity, nv numbers.
+    pub v: Vec<f64>,
+}

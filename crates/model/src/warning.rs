@@ -1,0 +1,246 @@
+//! Warnings about a robot: legal, but odd, left out or assumed.
+
+use alloc::string::String;
+use alloc::vec::Vec;
+use core::fmt;
+use core::str::FromStr;
+
+/// Fact about a model or its file that a user should know. Loaders collect warnings, or refuse the model when they are strict.
+///
+/// ```
+/// use condyle_model::{Model, SdfOptions, WarningKind};
+/// let sdf = r#"<sdf version="1.7"><model name="m"><link name="a"/></model></sdf>"#;
+/// let warning = &Model::from_sdf_str(sdf, &SdfOptions::default())?.warnings()[0];
+/// assert_eq!(warning.kind(), WarningKind::Assumed);
+/// assert_eq!(warning.to_string(), "<string>:1: link `a`: has no <inertial>: 1 kg and 1 kg m², as SDF has it");
+/// let options = SdfOptions { strict: true, allow: vec!["assumed".parse()?], ..SdfOptions::default() };
+/// assert!(Model::from_sdf_str(sdf, &options).is_ok());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[non_exhaustive]
+pub enum Warning {
+    /// A body that moves has neither mass nor inertia.
+    Massless {
+        /// Name of the body.
+        body: String,
+    },
+    /// A body's rotational inertia about its centre of mass has a negative principal moment.
+    Negative {
+        /// Name of the body.
+        body: String,
+        /// Least moment (kg m²).
+        moment: f64,
+    },
+    /// One principal moment is larger than the sum of the others: no distribution of mass has such an inertia.
+    Triangle {
+        /// Name of the body.
+        body: String,
+        /// Principal moments (kg m²), least first.
+        moments: [f64; 3],
+    },
+    /// Nothing resists a joint: M is singular, and forward dynamics has no answer.
+    Singular {
+        /// Name of the joint.
+        joint: String,
+    },
+    /// A body's inertia is possible, but cannot be meant.
+    Unlikely {
+        /// Name of the body.
+        body: String,
+        /// Fault, with the numbers.
+        what: String,
+    },
+    /// Limits of a joint are possible, but the joint cannot work with them.
+    Limit {
+        /// Name of the joint.
+        joint: String,
+        /// Fault, with the numbers.
+        what: String,
+    },
+    /// An element or attribute of a file is unknown, misspelt or misplaced. It has no effect.
+    Unknown {
+        /// Position in the file.
+        place: Place,
+        /// Element, for example ``joint `elbow` ``.
+        element: String,
+        /// Name that is unknown, and the nearest known one.
+        what: String,
+    },
+    /// A model cannot hold something that a file says.
+    LeftOut {
+        /// Position in the file.
+        place: Place,
+        /// Element, for example ``joint `loop` ``.
+        element: String,
+        /// Thing that is left out, and what becomes different.
+        what: String,
+    },
+    /// A file does not say something; a default is taken.
+    Assumed {
+        /// Position in the file.
+        place: Place,
+        /// Element, for example ``link `base` ``.
+        element: String,
+        /// Thing that is missing, and its default.
+        what: String,
+    },
+    /// A joint that could follow another one is left free.
+    Mimic {
+        /// Position in the file.
+        place: Place,
+        /// Element, for example ``joint `finger` ``.
+        element: String,
+        /// Joint that it would follow.
+        what: String,
+    },
+}
+
+/// Position in a robot's files.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Place {
+    /// Path, or `<string>`; of the included file, where it is in one.
+    pub file: String,
+    /// Line, counted from 1.
+    pub line: u32,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.file, self.line)
+    }
+}
+
+/// Kind of a [`Warning`], by which a strict reader may allow it: `"left_out".parse()` gives one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[allow(missing_docs)]
+#[non_exhaustive]
+pub enum WarningKind {
+    Massless,
+    Negative,
+    Triangle,
+    Singular,
+    Unlikely,
+    Limit,
+    Unknown,
+    LeftOut,
+    Assumed,
+    Mimic,
+}
+
+impl WarningKind {
+    /// All kinds.
+    pub const ALL: [Self; 10] = [
+        Self::Massless,
+        Self::Negative,
+        Self::Triangle,
+        Self::Singular,
+        Self::Unlikely,
+        Self::Limit,
+        Self::Unknown,
+        Self::LeftOut,
+        Self::Assumed,
+        Self::Mimic,
+    ];
+
+    /// Returns the kind's name: `massless`, `negative`, `triangle`, `singular`, `unlikely`, `limit`, `unknown`, `left_out`,
+    /// `assumed` or `mimic`.
+    pub fn name(self) -> &'static str {
+        let names = [
+            "massless", "negative", "triangle", "singular", "unlikely", "limit", "unknown", "left_out", "assumed",
+            "mimic",
+        ];
+        names[self as usize]
+    }
+}
+
+impl fmt::Display for WarningKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for WarningKind {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|kind| kind.name() == name);
+        found.ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.map(Self::name).to_vec();
+            format!("`{name}` is no kind of warning; expected one of {}", names.join(", "))
+        })
+    }
+}
+
+impl Warning {
+    /// Returns the kind of the warning.
+    pub fn kind(&self) -> WarningKind {
+        match self {
+            Self::Massless { .. } => WarningKind::Massless,
+            Self::Negative { .. } => WarningKind::Negative,
+            Self::Triangle { .. } => WarningKind::Triangle,
+            Self::Singular { .. } => WarningKind::Singular,
+            Self::Unlikely { .. } => WarningKind::Unlikely,
+            Self::Limit { .. } => WarningKind::Limit,
+            Self::Unknown { .. } => WarningKind::Unknown,
+            Self::LeftOut { .. } => WarningKind::LeftOut,
+            Self::Assumed { .. } => WarningKind::Assumed,
+            Self::Mimic { .. } => WarningKind::Mimic,
+        }
+    }
+
+    /// Returns the position in the file, if the warning is about a file.
+    pub fn place(&self) -> Option<&Place> {
+        match self {
+            Self::Unknown { place, .. }
+            | Self::LeftOut { place, .. }
+            | Self::Assumed { place, .. }
+            | Self::Mimic { place, .. } => Some(place),
+            _ => None,
+        }
+    }
+
+    /// Returns the name of the body or joint, or the element, that the warning is about.
+    pub fn subject(&self) -> &str {
+        match self {
+            Self::Massless { body }
+            | Self::Negative { body, .. }
+            | Self::Triangle { body, .. }
+            | Self::Unlikely { body, .. } => body,
+            Self::Singular { joint } | Self::Limit { joint, .. } => joint,
+            Self::Unknown { element, .. }
+            | Self::LeftOut { element, .. }
+            | Self::Assumed { element, .. }
+            | Self::Mimic { element, .. } => element,
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Massless { body } => write!(f, "body `{body}` moves and has no mass"),
+            Self::Negative { body, moment } => {
+                write!(f, "body `{body}`: a principal moment of inertia is {moment:e} kg m²")
+            }
+            Self::Triangle { body, moments: [a, b, c] } => {
+                let sum = "kg m² break the triangle inequality";
+                write!(f, "body `{body}`: principal moments {c} > {a} + {b} {sum}")
+            }
+            Self::Singular { joint } => {
+                let what = "moves nothing that has inertia along it: the inertia matrix is singular";
+                write!(f, "joint `{joint}` {what}")
+            }
+            Self::Unlikely { body, what } => write!(f, "body `{body}`: {what}"),
+            Self::Limit { joint, what } => write!(f, "joint `{joint}`: {what}"),
+            Self::Unknown { place, element, what }
+            | Self::LeftOut { place, element, what }
+            | Self::Assumed { place, element, what }
+            | Self::Mimic { place, element, what } => write!(f, "{place}: {element}: {what}"),
+        }
+    }
+}
+
+impl core::error::Error for Warning {}
