@@ -88,6 +88,11 @@ impl Model {
     }
 }
 
+/// Reads a text that stands in the place of a file.
+pub(super) fn from_text(text: &str, path: &Path, options: &MjcfOptions) -> Result<Model, Error> {
+    model(&Includes::read_text(path, text)?, options)
+}
+
 fn model(root: &Element, options: &MjcfOptions) -> Result<Model, Error> {
     if root.tag != "mujoco" {
         return Err(root.wrong("the root element of an MJCF is <mujoco>"));

@@ -17,10 +17,15 @@ pub(super) struct Includes<'a> {
 impl<'a> Includes<'a> {
     /// The root element of a file.
     pub(super) fn read(path: &'a Path) -> Result<Element, Error> {
+        let text = Amount::default().read(path)?;
+        Self::read_text(path, &text)
+    }
+
+    /// The root element of a text that stands in the place of a file.
+    pub(super) fn read_text(path: &'a Path, text: &str) -> Result<Element, Error> {
         let mut includes = Self { folder: Some(path.parent().unwrap_or(Path::new(""))), ..Self::of_string() };
         includes.is_new(path);
-        let text = includes.amount.read(path)?;
-        includes.root(&text, &path.display().to_string())
+        includes.root(text, &path.display().to_string())
     }
 
     /// The root element of a string, which includes no files.

@@ -183,7 +183,8 @@ fn links(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Ve
         let mass = |name: &str| masses.get(name).copied().unwrap_or(0.0);
         let heaviest = links.iter().copied().max_by(|a, b| mass(&a.name).total_cmp(&mass(&b.name)));
         let carried = links.iter().copied().find(|f| f.name == body.name || i == 0);
-        let Some(link) = carried.filter(|f| mass(&f.name) > 0.0).or(heaviest.filter(|f| mass(&f.name) > 0.0)).or(carried)
+        let Some(link) =
+            carried.filter(|f| mass(&f.name) > 0.0).or(heaviest.filter(|f| mass(&f.name) > 0.0)).or(carried)
         else {
             return Err(format!("body `{}` has no link of its own whose inertia could be written", body.name));
         };

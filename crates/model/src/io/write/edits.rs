@@ -155,7 +155,7 @@ mod tests {
 
     #[test]
     fn spaces_around_an_equals_sign_may_be_many() {
-        let text = format!("<a x{}='1'/>", " ".repeat(400) + "=");
+        let text = format!("<a x{}='1'/>", " ".repeat(400));
         assert_eq!(edited(&text, |e, n| e.set(n, "x", &[2.0])), text.replace('1', "2"));
     }
 

@@ -76,7 +76,7 @@ fn name(node: Node, otherwise: impl Fn() -> String) -> String {
 /// The value of a compiler's attribute; the last one counts.
 fn compiler<'a>(document: &'a Document, name: &str) -> Option<&'a str> {
     let sections = document.root_element().children().filter(|n| n.has_tag_name("compiler"));
-    sections.filter_map(|n| n.attribute(name)).last()
+    sections.filter_map(|n| n.attribute(name)).next_back()
 }
 
 impl Format for Mjcf<'_> {
@@ -89,7 +89,7 @@ impl Format for Mjcf<'_> {
         let bodies = Elements::new(&document).bodies.into_iter();
         let mass = |body: Node| match (child(body, "inertial"), child(body, "geom")) {
             (Some(inertial), _) => inertial.attribute("mass")?.trim().parse().ok(),
-            (None, geom) => geom.map(|_| 0.0), // it gives way to an <inertial>
+            (None, geom) => geom.map(|_| f64::MIN_POSITIVE), // some mass, which gives way to an <inertial>
         };
         Ok(bodies.filter_map(|(name, body)| Some((name, mass(body)?))).collect())
     }

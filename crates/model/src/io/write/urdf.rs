@@ -88,7 +88,7 @@ fn inertial(edits: &mut Edits, link: Node, I: Inertia<f64>) -> Result<(), String
                 let numbers = origin.attribute(*name).unwrap_or_default().split_whitespace();
                 numbers.map(str::parse::<f64>).any(|x| x != Ok(0.0))
             };
-            ["rpy", "quat_xyzw"].iter().filter(turned).for_each(|name| edits.remove(origin, name));
+            ["rpy", "quat_xyzw"].into_iter().filter(turned).for_each(|name| edits.remove(origin, name));
         }
         None if com == [0.0; 3] => {}
         None => edits.insert(inertial, &format!("<origin xyz=\"{}\"/>", words(&com))),
