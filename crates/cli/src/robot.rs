@@ -105,19 +105,16 @@ fn locate(name: &str) -> Option<PathBuf> {
 
 /// Reads the model of a file of known kind.
 pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Result<Model, Error> {
-    let (root_joint, mimic) = (options.root.and_then(Root::joint), options.mimic);
+    let (root_joint, mimic, packages) = (options.root.and_then(Root::joint), options.mimic, options.packages.clone());
     Ok(match format {
-        Format::Urdf => {
-            let packages = options.packages.clone();
-            Model::from_urdf(path, &UrdfOptions { root_joint, mimic, packages, ..UrdfOptions::default() })?
-        }
-        Format::Sdf => Model::from_sdf(path, &SdfOptions { root_joint, mimic, ..SdfOptions::default() })?,
+        Format::Urdf => Model::from_urdf(path, &UrdfOptions { root_joint, mimic, packages, ..UrdfOptions::default() })?,
+        Format::Sdf => Model::from_sdf(path, &SdfOptions { root_joint, mimic, packages, ..SdfOptions::default() })?,
         Format::Mjcf => {
             if options.root.is_some() {
                 let what = "an MJCF says itself how its bodies are joined to the world".to_owned();
                 return Err(Error::Option { option: "root", what });
             }
-            Model::from_mjcf(path, &MjcfOptions { mimic, ..MjcfOptions::default() })?
+            Model::from_mjcf(path, &MjcfOptions { mimic, packages, ..MjcfOptions::default() })?
         }
     })
 }

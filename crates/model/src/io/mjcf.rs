@@ -86,11 +86,15 @@ impl Model {
     pub fn from_mjcf_str(text: &str, options: &MjcfOptions) -> Result<Self, Error> {
         model(&Includes::parse(text)?, options)
     }
-}
 
-/// Reads a text that stands in the place of a file.
-pub(super) fn from_text(text: &str, path: &Path, options: &MjcfOptions) -> Result<Model, Error> {
-    model(&Includes::read_text(path, text)?, options)
+    /// Reads a text that stands in the place of a file: the path names it in errors, and includes are found beside it.
+    ///
+    /// # Errors
+    /// As [`from_mjcf`](Self::from_mjcf).
+    #[doc(hidden)]
+    pub fn from_mjcf_text(text: &str, path: impl AsRef<Path>, options: &MjcfOptions) -> Result<Self, Error> {
+        model(&Includes::read_text(path.as_ref(), text)?, options)
+    }
 }
 
 fn model(root: &Element, options: &MjcfOptions) -> Result<Model, Error> {

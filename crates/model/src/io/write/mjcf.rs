@@ -4,7 +4,7 @@ use super::Format;
 use super::changes::{Changes, JointChange};
 use super::edits::{Edits, about_com, child, words};
 use crate::error::Error;
-use crate::io::mjcf::{MjcfOptions, from_text};
+use crate::io::mjcf::MjcfOptions;
 use crate::model::Model;
 use condyle_spatial::Inertia;
 use roxmltree::{Document, Node};
@@ -81,7 +81,7 @@ fn compiler<'a>(document: &'a Document, name: &str) -> Option<&'a str> {
 
 impl Format for Mjcf<'_> {
     fn read(&self, text: &str) -> Result<Model, Error> {
-        from_text(text, self.path, &self.options)
+        Model::from_mjcf_text(text, self.path, &self.options)
     }
 
     fn masses(&self, text: &str) -> Result<HashMap<String, f64>, String> {
