@@ -142,8 +142,7 @@ impl ModelBuilder {
         let damping_polynomial = damping_polynomial.into();
         let effort = effort.map(|effort| effort.extract().map(|most: f64| (-most, most)).or_else(|_| effort.extract()));
         let effort = effort.transpose()?;
-        let options =
-            JointOptions { position, velocity, effort, damping, damping_polynomial, friction, armature };
+        let options = JointOptions { position, velocity, effort, damping, damping_polynomial, friction, armature };
         let names = (name, joint_name.unwrap_or(name));
         let body = self.builder()?.body_with(names, parent, joint.get().0, placement, inertia, options);
         Ok(self.added(body))

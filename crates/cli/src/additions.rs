@@ -98,7 +98,8 @@ impl Additions {
             }
             text += &(heading("Actuators") + &table.text());
         }
-        let spring = |s: &SpringReport| (s.joint.clone(), format!("{} at rest at {}", list(&s.stiffness), list(&s.rest)));
+        let spring =
+            |s: &SpringReport| (s.joint.clone(), format!("{} at rest at {}", list(&s.stiffness), list(&s.rest)));
         let carried = |(body, mass): &(String, f64)| (body.clone(), format!("{} kg", short(*mass)));
         for (title, lines) in [
             ("Springs", self.springs.iter().map(spring).collect::<Vec<_>>()),

@@ -98,7 +98,8 @@ pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
         let line = lines.of(Kind::Joint, &b.joint_name);
         // the library may have warned of its limits already
         if !found.iter().any(|finding| finding.kind == "limit" && finding.name == b.joint_name) {
-            found.extend(limits(model, b).into_iter().map(|(kind, what)| Finding::own(kind, &b.joint_name, line, what)));
+            found
+                .extend(limits(model, b).into_iter().map(|(kind, what)| Finding::own(kind, &b.joint_name, line, what)));
         }
     }
     found.sort_by_key(|finding| finding.line.unwrap_or(u32::MAX));

@@ -261,7 +261,9 @@ impl Report {
                 if b.nq == 1 { one(&b.upper) } else { String::new() },
                 one(&b.velocity),
                 match (&*b.effort_lower, &*b.effort_upper) {
-                    ([Some(lower)], [Some(upper)]) if *lower != -upper => format!("{} to {}", short(*lower), short(*upper)),
+                    ([Some(lower)], [Some(upper)]) if *lower != -upper => {
+                        format!("{} to {}", short(*lower), short(*upper))
+                    }
                     _ => one(&b.effort),
                 },
                 least(&b.damping),

@@ -128,7 +128,18 @@ impl Model {
                     other => unreachable!("{other:?}: a transmission without words for it"),
                 }
                 let gear = read_only(py, &a.gear[..], "")?;
-                class.call1((&*a.name, driven[0], driven[1], driven[2], coefficients, gear, a.kp, a.kv, a.control, a.force))
+                class.call1((
+                    &*a.name,
+                    driven[0],
+                    driven[1],
+                    driven[2],
+                    coefficients,
+                    gear,
+                    a.kp,
+                    a.kv,
+                    a.control,
+                    a.force,
+                ))
             };
             self.inner.actuators().iter().map(actuator).collect()
         })

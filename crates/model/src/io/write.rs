@@ -15,7 +15,7 @@ use super::urdf::UrdfOptions;
 use super::xml::Amount;
 use crate::error::Error;
 use crate::model::Model;
-use changes::Changes;
+use changes::{Changes, NO_SHARE, ROUNDING};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -101,11 +101,11 @@ fn write(model: &Model, path: &Path, original: &Path, text: &str, format: &impl 
         new = format.edit(text, &changes).map_err(not)?;
         now = format.read(&new)?;
     }
-    if changes::difference(model, &now).is_some() && changes.take_shares_off(model, &now) {
+    if changes::difference(model, &now, NO_SHARE).is_some() && changes.take_shares_off(model, &now) {
         new = format.edit(text, &changes).map_err(not)?;
         now = format.read(&new)?;
     }
-    match changes::difference(model, &now) {
+    match changes::difference(model, &now, ROUNDING) {
         Some(what) => Err(not(what)),
         None => std::fs::write(path, new).map_err(|e| wrong(path, e.to_string())),
     }

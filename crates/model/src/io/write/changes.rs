@@ -9,9 +9,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 /// Largest relative difference that is rounding: inertias go through the frames of several links.
-const ROUNDING: f64 = 1e-9;
-/// Largest difference that is rounding: the shares of several elements are added up and taken off.
-const ABSOLUTE_ROUNDING: f64 = 1e-12;
+pub(super) const ROUNDING: f64 = 1e-9;
+/// Largest relative difference that is surely rounding, and no share of another element.
+pub(super) const NO_SHARE: f64 = 1e-14;
 /// Least share of a body's mass that a link may be left with: below it, its centre of mass would have few digits.
 const LEAST_SHARE: f64 = 1e-3;
 
@@ -257,20 +257,20 @@ fn different_robot(model: &Model, file: &Model) -> Option<String> {
     others.into_iter().find(|(same, _)| !same).map(|(_, what)| format!("{what} of the model and of the file differ"))
 }
 
-/// The first difference between a model and what a file says, beyond rounding.
-pub(super) fn difference(model: &Model, file: &Model) -> Option<String> {
+/// The first difference between a model and what a file says, beyond a relative rounding.
+pub(super) fn difference(model: &Model, file: &Model, rounding: f64) -> Option<String> {
     if let Some(what) = different_robot(model, file) {
         return Some(what);
     }
     for (a, b) in model.bodies.iter().zip(&file.bodies) {
-        if !alike(a.inertia, b.inertia) {
+        if !alike(a.inertia, b.inertia, rounding) {
             let pi = |b: &Body| inertial_parameters::from_inertia(b.inertia);
             let what = "cannot be written: the file gives";
             return Some(format!("body `{}`: its inertial parameters {:?} {what} {:?}", a.name, pi(a), pi(b)));
         }
     }
     for (k, (a, b)) in numbers(model).into_iter().zip(numbers(file)).enumerate() {
-        if let Some(slot) = (0..a.len()).find(|&slot| !close(a[slot], b[slot])) {
+        if let Some(slot) = (0..a.len()).find(|&slot| !close(a[slot], b[slot], rounding)) {
             let (a, b, what) = (a[slot], b[slot], NUMBERS[k]);
             let owner = model.bodies.iter().skip(1).find(|body| slots(body, k).contains(&slot));
             let joint = owner.map_or("", |body| &body.joint_name);
@@ -280,18 +280,19 @@ pub(super) fn difference(model: &Model, file: &Model) -> Option<String> {
     None
 }
 
-/// Whether two numbers are equal up to rounding.
-fn close(a: f64, b: f64) -> bool {
-    a == b || (a - b).abs() <= ROUNDING * a.abs().max(b.abs()) + ABSOLUTE_ROUNDING
+/// Whether two numbers are equal up to rounding; of those below 0.001, such as small armatures that were added up, as if
+/// they were 0.001.
+fn close(a: f64, b: f64, rounding: f64) -> bool {
+    a == b || (a - b).abs() <= rounding * a.abs().max(b.abs()).max(1e-3)
 }
 
 /// Whether two inertias are equal up to rounding: |m c| is at most √(m tr Ī).
-fn alike(a: Inertia<f64>, b: Inertia<f64>) -> bool {
+fn alike(a: Inertia<f64>, b: Inertia<f64>, rounding: f64) -> bool {
     let size = |I: Inertia<f64>| (I.rotational.xx.abs() + I.rotational.yy.abs() + I.rotational.zz.abs()).max(1e-300);
     let (mass, size) = (a.mass.abs().max(b.mass.abs()), size(a).max(size(b)));
-    let d = a - b;
-    let h = d.mass_com.to_array().map(f64::abs).into_iter().fold(0.0, f64::max);
-    let J = d.rotational;
-    let J = [J.xx, J.xy, J.yy, J.xz, J.yz, J.zz].map(f64::abs).into_iter().fold(0.0, f64::max);
-    d.mass.abs() <= ROUNDING * mass && h <= ROUNDING * (mass * size).sqrt() && J <= ROUNDING * size
+    let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let Inertia { mass: m, mass_com: h, rotational: J } = a - b;
+    m.abs() <= rounding * mass
+        && largest(&h.to_array()) <= rounding * (mass * size).sqrt()
+        && largest(&[J.xx, J.xy, J.yy, J.xz, J.yz, J.zz]) <= rounding * size
 }
