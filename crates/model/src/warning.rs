@@ -11,7 +11,8 @@ use core::str::FromStr;
 /// ```
 /// use condyle_model::{Model, SdfOptions, WarningKind};
 /// let sdf = r#"<sdf version="1.7"><model name="m"><link name="a"/></model></sdf>"#;
-/// let warning = &Model::from_sdf_str(sdf, &SdfOptions::default())?.warnings()[0];
+/// let model = Model::from_sdf_str(sdf, &SdfOptions::default())?;
+/// let warning = &model.warnings()[0];
 /// assert_eq!(warning.kind(), WarningKind::Assumed);
 /// assert_eq!(warning.to_string(), "<string>:1: link `a`: has no <inertial>: 1 kg and 1 kg m², as SDF has it");
 /// let options = SdfOptions { strict: true, allow: vec!["assumed".parse()?], ..SdfOptions::default() };
