@@ -133,8 +133,10 @@ def test_write_urdf(tmp_path: Path) -> None:
     again = Model.from_urdf(new)
     np.testing.assert_allclose(again.inertial_parameters, other.inertial_parameters, rtol=1e-12, atol=1e-14)
     assert np.array_equal(again.limits.velocity, other.limits.velocity)
-    with pytest.raises(condyle.ParseError, match="armature"):
-        arm.with_armature(np.full(7, 0.125)).write_urdf(new, original)
+    arm.with_armature(np.full(7, 0.125)).write_urdf(new, original)
+    assert np.array_equal(Model.from_urdf(new).armature, np.full(7, 0.125))
+    with pytest.raises(condyle.ParseError, match="joint `joint1`: effort from -1.0 to 87.0: a URDF has one limit"):
+        arm.with_limits(effort_lower=-np.ones(7)).write_urdf(new, original)
     with pytest.raises(condyle.ParseError, match=r"arm7\.urdf: .*joint"):
         condyle.robots.quadruped().write_urdf(new, original)
 

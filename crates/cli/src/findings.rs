@@ -20,7 +20,7 @@ pub(crate) struct Finding {
 }
 
 /// The kinds of findings, in the order in which they are listed: the library's, then this program's.
-pub(crate) const KINDS: [&str; 16] = [
+pub(crate) const KINDS: [&str; 13] = [
     "unknown",
     "left_out",
     "assumed",
@@ -33,13 +33,10 @@ pub(crate) const KINDS: [&str; 16] = [
     "limit",
     "mass_ratio",
     "moment_ratio",
-    "locked",
-    "no_speed",
-    "no_effort",
     "neutral",
 ];
 /// The heading of each of [`KINDS`].
-const HEADINGS: [&str; 16] = [
+const HEADINGS: [&str; 13] = [
     "unknown, misspelt or misplaced: no effect",
     "left out: a model cannot hold it",
     "assumed: missing in the file",
@@ -52,9 +49,6 @@ const HEADINGS: [&str; 16] = [
     "limits with which a joint cannot work",
     "masses far from the parent's",
     "moments of inertia far from the parent's",
-    "joints that cannot move",
-    "speed limits of 0",
-    "effort limits of 0",
     "limits that exclude the neutral position",
 ];
 
@@ -96,11 +90,9 @@ pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
         let line = lines.of(Kind::Body, &b.name);
         found.extend(neighbours(model, i).map(|(kind, what)| Finding::own(kind, &b.name, line, what)));
         let line = lines.of(Kind::Joint, &b.joint_name);
-        // the library may have warned of its limits already
-        if !found.iter().any(|finding| finding.kind == "limit" && finding.name == b.joint_name) {
-            found
-                .extend(limits(model, b).into_iter().map(|(kind, what)| Finding::own(kind, &b.joint_name, line, what)));
-        }
+        found.extend(
+            neutral_outside(model, b).map(|what| Finding::own("neutral", &b.joint_name, line, what)), //
+        );
     }
     found.sort_by_key(|finding| finding.line.unwrap_or(u32::MAX));
     found
@@ -149,32 +141,15 @@ fn neighbours(model: &Model, i: usize) -> Option<(&'static str, String)> {
     apart(m, n).map(|ratio| ("moment_ratio", say(ratio, "greatest moment of inertia", m, n, "kg m²")))
 }
 
-/// What is odd about the limits of a joint with one coordinate.
-fn limits(model: &Model, b: &Body) -> Vec<(&'static str, String)> {
-    let mut found = Vec::new();
-    if b.mimic.is_some() || b.joint.nv() != 1 {
-        return found;
+/// Whether the neutral position of a joint with one coordinate is outside of its limits.
+fn neutral_outside(model: &Model, b: &Body) -> Option<String> {
+    if b.mimic.is_some() || b.joint.nq() != 1 {
+        return None;
     }
     let (limits, joint) = (model.limits(), &b.joint_name);
-    if b.joint.nq() == 1 {
-        let (lower, upper) = (limits.lower[b.idx_q], limits.upper[b.idx_q]);
-        let q = neutral(model)[b.idx_q];
-        if lower == upper {
-            found.push(("locked", format!("joint `{joint}`: both limits are {lower}: it cannot move")));
-        } else if q < lower - ROUNDING || q > upper + ROUNDING {
-            found.push((
-                "neutral",
-                format!("joint `{joint}`: the neutral position {q} is outside of its limits [{lower}, {upper}]"),
-            ));
-        }
-    }
-    if limits.velocity[b.idx_v] == 0.0 {
-        found.push(("no_speed", format!("joint `{joint}`: its speed limit is 0")));
-    }
-    if limits.effort_lower[b.idx_v] == 0.0 && limits.effort_upper[b.idx_v] == 0.0 {
-        found.push(("no_effort", format!("joint `{joint}`: its effort limit is 0")));
-    }
-    found
+    let (lower, upper, q) = (limits.lower[b.idx_q], limits.upper[b.idx_q], neutral(model)[b.idx_q]);
+    let is_outside = lower < upper && (q < lower - ROUNDING || q > upper + ROUNDING);
+    is_outside.then(|| format!("joint `{joint}`: the neutral position {q} is outside of its limits [{lower}, {upper}]"))
 }
 
 /// The centre of mass (m), and the principal moments of inertia about it, least first (kg m²).

@@ -56,7 +56,7 @@ pub enum Joint {
 
 /// A joint that follows another one: its position is ratio · q + offset, q being the leader's position.
 ///
-/// Both have one degree of freedom, and the leader follows nobody. A continuous leader has q = [cos θ, sin θ]: ratio is
+/// Both have one degree of freedom, and the leader has its own coordinate. A continuous leader has q = [cos θ, sin θ]: ratio is
 /// then a whole number, and what follows turns, by ratio · θ + offset. A continuous follower of a leader with one number
 /// turns by ratio · q + offset.
 ///

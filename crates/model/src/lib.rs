@@ -22,7 +22,6 @@
 //! | equals signs in them | 4 194 304 |
 //! | levels of elements, those of included files counted where they come to stand | 256 |
 //! | attributes of an element | 256 |
-//! | prefixes of namespaces in a file; declarations of them | 256; 65 536 |
 //! | attributes of all default classes of an MJCF, what they inherit included | 1 048 576 |
 //! | named positions (`<group_state>`) of an SRDF | 4096 |
 //! | degrees of freedom of a model, however it is made | 4096 |

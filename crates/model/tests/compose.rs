@@ -142,9 +142,13 @@ fn a_joint_that_follows_has_no_coordinate_of_its_own() {
     let said = |model: &Model, follower, leader| {
         model.with_mimic(follower, leader, Mimic { ratio: 1.0, offset: 0.0 }).unwrap_err().to_string()
     };
-    let none = "mimics a joint without a coordinate of its own";
-    assert_eq!(said(&coupled, 5, 4), format!("joint `joint5`: {none}"));
-    assert_eq!(said(&coupled, 2, 1), format!("joint `joint4`: {none}")); // it follows joint2
+    // a leader may follow another joint: q5 = 3 (-2 q2 + 0.1) + 1
+    let chained = coupled.with_mimic(5, 4, Mimic { ratio: 3.0, offset: 1.0 }).unwrap();
+    let followers: Vec<_> = chained.bodies().iter().filter_map(|b| b.mimic).collect();
+    assert_eq!(followers, [Mimic { ratio: -2.0, offset: 0.1 }, Mimic { ratio: -6.0, offset: 3.0 * 0.1 + 1.0 }]);
+    let led = coupled.with_mimic(2, 1, Mimic { ratio: 1.0, offset: 0.0 }).unwrap(); // joint4 follows joint2
+    assert_eq!(led.bodies()[4].idx_v, led.bodies()[1].idx_v);
+    assert_eq!(said(&coupled, 2, 4), "joint `joint2`: mimics itself, alone or by way of others");
     let quadruped = robots::quadruped();
     let one = "mimic works between joints of one degree of freedom only";
     assert_eq!(said(&quadruped, 2, 1), format!("joint `LF_HAA`: {one}"));

@@ -136,6 +136,30 @@ fn limits_and_losses_are_written_where_they_differ() {
 }
 
 #[test]
+fn armature_is_written_as_the_inertia_of_a_rotor() {
+    let armature = |m: &Model| m.clone().with_armature(&[0.5, 0.125]).unwrap();
+    let rotor = |x| format!("<drake:rotor_inertia xmlns:drake=\"http://drake.mit.edu\" value=\"{x}\"/>");
+    let of = |joint: &str, x| {
+        let inside = format!("<joint name=\"{joint}\"/><actuator name=\"{joint}\">{}</actuator>", rotor(x));
+        format!("\n\t<transmission name=\"{joint}\">{inside}</transmission>")
+    };
+    let begin = "xmlns:k=\"about:k\">";
+    let expected = LEG.replace(begin, &format!("{begin}{}{}", of("hip", "0.5"), of("ankle", "0.125")));
+    assert_eq!(written("armature", LEG, armature).unwrap(), expected);
+    // a transmission that exists has a rotor added, or changed by its gear ratio
+    let hip =
+        "<transmission name='t'><joint name='hip'/><actuator name='m'><mechanicalReduction>5</mechanicalReduction>";
+    let ankle = "<transmission name='u'><joint name='ankle'/><actuator name='n'><drake:gear_ratio value='2'/>";
+    let end = "</actuator></transmission>\n";
+    let inertia = "<drake:rotor_inertia value='7'/>";
+    let text = LEG.replace("</robot>", &format!("{hip}{end}{ankle}{inertia}{end}</robot>"));
+    let expected = text
+        .replace("<mechanicalReduction>", &format!("{}<mechanicalReduction>", rotor("0.5")))
+        .replace("value='7'", "value='0.03125'");
+    assert_eq!(written("armature", &text, armature).unwrap(), expected);
+}
+
+#[test]
 fn what_a_urdf_cannot_say_is_an_error() {
     let limited = |change: fn(&mut condyle_model::Limits)| {
         move |m: &Model| {
@@ -221,6 +245,23 @@ fn a_root_joint_is_found_in_the_model() {
     }
     // a file may be its own original
     model.write_urdf(&path, &path).unwrap();
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn files_that_parsers_of_robots_accept_are_edited_too() {
+    let text = "<!-- first -->\n<?xml version='1.0'?><!DOCTYPE robot>\n".to_owned() + LEG.split_once('\n').unwrap().1;
+    let text = text.replace("</robot>", "<gazebo><sensor:camera a='>'/></gazebo><!-- a -- b --></robot>");
+    assert_eq!(written("accepted", &text, Clone::clone).unwrap(), text);
+    written("accepted", &text, with_other_inertias).unwrap();
+    let folder = folder("latin");
+    let (original, path) = (folder.join("original.urdf"), folder.join("new.urdf"));
+    let text =
+        LEG.replace("version=\"1.0\"", "version=\"1.0\" encoding=\"ISO-8859-1\"").replace("a leg", "ein Fu\u{df}");
+    let latin: Vec<u8> = text.chars().map(|c| c as u32 as u8).collect();
+    fs::write(&original, latin).unwrap();
+    let said = Model::from_urdf(&original, &UrdfOptions::default()).unwrap().write_urdf(&path, &original).unwrap_err();
+    assert!(said.to_string().ends_with("is not in UTF-8, so a copy of it cannot keep all else as it is"), "{said}");
     fs::remove_dir_all(folder).unwrap();
 }
 

@@ -8,22 +8,22 @@ use std::path::PathBuf;
 
 #[pymethods]
 impl Model {
-    /// Writes inertias, limits, damping and friction into a copy of the URDF `original`, and all else as it is there.
+    /// Writes inertias, limits, damping, friction and armature into a copy of the URDF `original`, and all else as it is
+    /// there.
     ///
     /// Only what differs from the original is edited, so an unchanged robot gives the same bytes. Reading the new file
     /// gives this model back, up to rounding. `original` may be `path`. Of several links that fixed joints merge, the one
-    /// that the joint carries takes the difference.
+    /// that the joint carries takes the difference. An armature becomes the rotor inertia of a `<transmission>`.
     ///
     /// path: the new file. original: the file that the robot was read from.
     ///
-    /// Raises `ParseError` with the thing and both numbers if the file cannot say it, such as armature, or is that of
+    /// Raises `ParseError` with the thing and both numbers if the file cannot say it, as an infinite limit, or is that of
     /// another robot.
     fn write_urdf(&self, path: PathBuf, original: PathBuf) -> PyResult<()> {
         self.inner.write_urdf(path, original).map_err(exception)
     }
 
-    /// Writes inertias, limits, damping, friction and armature into a copy of the MJCF `original`, and all else as it is
-    /// there; see `write_urdf`.
+    /// Writes the same into a copy of the MJCF `original`; see `write_urdf`.
     ///
     /// Bodies and joints that differ must be in the file itself, not in one that it includes. Limits of effort are written
     /// as `actuatorfrcrange` of the joint.

@@ -16,7 +16,6 @@ use std::collections::HashMap;
 ///
 /// The type of a child is its tag, unless `=type` names another one. `*` marks a child that is known and whose inside is not
 /// looked at. A child whose type has no line has neither attributes nor children.
-#[allow(dead_code)]
 pub(crate) struct Known {
     types: HashMap<&'static str, Type>,
 }
@@ -55,7 +54,6 @@ impl Known {
     }
 
     /// Warns of all that is not known in an element, whose type is its tag, and of what a model cannot hold.
-    #[allow(dead_code)]
     pub(crate) fn check(&self, root: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
         if let Some((&name, _)) = self.types.get_key_value(root.tag.as_str()) {
             self.check_as(name, root, left_out, warnings);

@@ -1,7 +1,7 @@
 //! Edits of an XML text by byte ranges: all that is not edited stays byte for byte.
 
+use crate::io::xml::Element;
 use condyle_spatial::{Inertia, Sym3, Vec3};
-use roxmltree::Node;
 use std::ops::Range;
 
 /// The pieces of a text that are replaced, each a byte range with its new text.
@@ -17,52 +17,46 @@ impl<'a> Edits<'a> {
     }
 
     /// Sets an attribute of an element to numbers, in as few digits as give each number back.
-    pub(super) fn set(&mut self, node: Node, name: &str, numbers: &[f64]) {
-        self.set_text(node, name, &words(numbers));
+    pub(super) fn set(&mut self, element: &Element, name: &str, numbers: &[f64]) {
+        self.set_text(element, name, &words(numbers));
     }
 
     /// Sets an attribute of an element to a text without characters that XML escapes.
-    pub(super) fn set_text(&mut self, node: Node, name: &str, value: &str) {
-        match node.attribute_node(name) {
-            // the attribute as a whole: its quotes and the spaces around its equals sign are found from both ends
+    pub(super) fn set_text(&mut self, element: &Element, name: &str, value: &str) {
+        let tag = StartTag::new(self.text, element);
+        match tag.attribute(name) {
             Some(old) => {
-                let quotes = self.text[old.range()].find(['"', '\'']).map_or(0, |at| at + 1);
-                let (start, end) = (old.range().start + quotes, old.range().end - 1);
-                self.pieces.push((start..end, value.to_owned()));
+                let quotes = self.text[old.clone()].find(['"', '\'']).map_or(0, |at| at + 1);
+                self.pieces.push((old.start + quotes..old.end - 1, value.to_owned()));
             }
-            None => {
-                let (end, _) = self.start_tag(node);
-                self.pieces.push((end..end, format!(" {name}=\"{value}\"")));
-            }
+            None => self.pieces.push((tag.content_end..tag.content_end, format!(" {name}=\"{value}\""))),
         }
     }
 
     /// Removes an attribute of an element, with the white space before it.
-    pub(super) fn remove(&mut self, node: Node, name: &str) {
-        if let Some(old) = node.attribute_node(name) {
-            let start = self.text[..old.range().start].trim_end().len();
-            self.pieces.push((start..old.range().end, String::new()));
+    pub(super) fn remove(&mut self, element: &Element, name: &str) {
+        if let Some(old) = StartTag::new(self.text, element).attribute(name) {
+            let start = self.text[..old.start].trim_end().len();
+            self.pieces.push((start..old.end, String::new()));
         }
     }
 
     /// Inserts an element as the first child of another one, on a line of its own where the other children have one.
     ///
     /// An element without an end tag gets one, so it takes one child only.
-    pub(super) fn insert(&mut self, node: Node, xml: &str) {
-        let (attributes, end) = self.start_tag(node);
-        let own = self.indent(node);
-        let child = node.first_element_child().map(|child| self.indent(child));
+    pub(super) fn insert(&mut self, element: &Element, xml: &str) {
+        let (tag, own) = (StartTag::new(self.text, element), self.indent(element));
+        let child = element.children.first().map(|child| self.indent(child));
         let (before, after) = match (own, child) {
             (_, Some(None)) | (None, None) => (String::new(), String::new()),
             (own, Some(Some(child))) => (child.to_owned(), own.unwrap_or_default().to_owned()),
             (Some(own), None) => (format!("{own}  "), own.to_owned()),
         };
-        if self.text[..end].ends_with("/>") {
-            let tag = &self.text[node.range().start + 1..];
-            let tag = &tag[..tag.find(|c: char| c.is_whitespace() || matches!(c, '/' | '>')).unwrap_or(0)];
-            self.pieces.push((attributes..end, format!(">{before}{xml}{after}</{tag}>")));
+        if self.text[..tag.end].ends_with("/>") {
+            let name = &element.tag;
+            self.pieces.push((tag.content_end..tag.end, format!(">{before}{xml}{after}</{name}>")));
         } else {
-            self.pieces.push((end..end, format!("{before}{xml}")));
+            self.pieces.push((tag.end..tag.end, format!("{before}{xml}")));
         }
     }
 
@@ -78,30 +72,50 @@ impl<'a> Edits<'a> {
         new + &self.text[end..]
     }
 
-    /// The byte indices after the last attribute of an element and after its start tag.
-    fn start_tag(&self, node: Node) -> (usize, usize) {
-        let (start, mut quote) = (node.range().start, None);
-        let closes = |&(_, c): &(usize, char)| {
-            match quote {
-                None if c == '>' => return true,
-                None if matches!(c, '"' | '\'') => quote = Some(c),
-                Some(open) if open == c => quote = None,
-                _ => {}
-            }
-            false
-        };
-        let end = self.text[start..].char_indices().find(closes).map_or(self.text.len(), |(i, _)| start + i + 1);
-        let inside = self.text[..end].trim_end_matches('>');
-        (inside.strip_suffix('/').unwrap_or(inside).trim_end().len(), end)
-    }
-
     /// The line break and the white space before an element; none if something else stands before it on its line.
-    fn indent(&self, node: Node) -> Option<&'a str> {
-        let before = &self.text[..node.range().start];
-        let spaces = &before[before.trim_end_matches([' ', '\t']).len()..];
-        let line = &before[..before.len() - spaces.len()];
+    fn indent(&self, element: &Element) -> Option<&'a str> {
+        let before = &self.text[..element.at];
+        let line = before.trim_end_matches([' ', '\t']);
         let line_break = if line.ends_with("\r\n") { 2 } else { usize::from(line.ends_with('\n')) };
         (line_break > 0).then(|| &before[line.len() - line_break..])
+    }
+}
+
+/// The start tag of an element in its text.
+struct StartTag {
+    /// Name and byte range of each attribute, from its name to its closing quote.
+    attributes: Vec<(String, Range<usize>)>,
+    /// Byte index after the last attribute, or after the name of the tag.
+    content_end: usize,
+    /// Byte index after the `>`.
+    end: usize,
+}
+
+impl StartTag {
+    /// Finds the parts of a tag that a parser has accepted.
+    fn new(text: &str, element: &Element) -> Self {
+        let (mut at, mut attributes) = (element.at + 1 + element.tag.len(), Vec::new());
+        let mut content_end = at;
+        let blanks = |at: usize| text[at..].len() - text[at..].trim_start().len();
+        loop {
+            at += blanks(at);
+            let rest = &text[at..];
+            let length = rest.find(|c: char| c.is_whitespace() || matches!(c, '=' | '>' | '/')).unwrap_or(rest.len());
+            if length == 0 {
+                break;
+            }
+            let value = at + length + rest[length..].find(['"', '\'']).unwrap_or(0);
+            let quote = &text[value..value + 1];
+            let end = value + 2 + text[value + 1..].find(quote).unwrap_or(0);
+            attributes.push((rest[..length].to_owned(), at..end));
+            (at, content_end) = (end, end);
+        }
+        let end = at + text[at..].find('>').map_or(0, |end| end + 1);
+        Self { attributes, content_end, end }
+    }
+
+    fn attribute(&self, name: &str) -> Option<Range<usize>> {
+        self.attributes.iter().find(|(own, _)| own == name).map(|(_, range)| range.clone())
     }
 }
 
@@ -112,11 +126,6 @@ pub(super) fn words(numbers: &[f64]) -> String {
         text.strip_suffix(".0").map(str::to_owned).unwrap_or(text)
     };
     numbers.iter().map(word).collect::<Vec<_>>().join(" ")
-}
-
-/// The first child of an element that has a tag.
-pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
-    node.children().find(|n| n.is_element() && n.tag_name().name() == tag)
 }
 
 /// Mass (kg), centre of mass (m), and inertia about it (kg m²), as files have them.
@@ -135,12 +144,12 @@ pub(super) fn about_com(I: Inertia<f64>) -> Result<(f64, [f64; 3], Sym3<f64>), S
 #[cfg(test)]
 mod tests {
     use super::{Edits, words};
-    use roxmltree::Document;
+    use crate::io::xml::{Amount, Element};
 
-    fn edited(text: &str, edit: impl Fn(&mut Edits, roxmltree::Node)) -> String {
-        let document = Document::parse(text).expect("is XML");
+    fn edited(text: &str, edit: impl Fn(&mut Edits, &Element)) -> String {
+        let root = Element::parse(text, "text", &mut Amount::default()).expect("is XML");
         let mut edits = Edits::new(text);
-        edit(&mut edits, document.root_element());
+        edit(&mut edits, &root);
         edits.apply()
     }
 
@@ -161,7 +170,7 @@ mod tests {
 
     #[test]
     fn children_stand_on_lines_of_their_own_where_others_do() {
-        let insert = |text: &str| edited(text, |e, n| e.insert(n.first_element_child().expect("has a child"), "<b/>"));
+        let insert = |text: &str| edited(text, |e, n| e.insert(&n.children[0], "<b/>"));
         assert_eq!(insert("<r>\n\t<a/>\n</r>"), "<r>\n\t<a>\n\t  <b/>\n\t</a>\n</r>");
         assert_eq!(insert("<r>\r\n  <a>\r\n    <c/></a></r>"), "<r>\r\n  <a>\r\n    <b/>\r\n    <c/></a></r>");
         assert_eq!(insert("<r><a><c/></a></r>"), "<r><a><b/><c/></a></r>");

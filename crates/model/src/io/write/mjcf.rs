@@ -2,12 +2,12 @@
 
 use super::Format;
 use super::changes::{Changes, JointChange};
-use super::edits::{Edits, about_com, child, words};
+use super::edits::{Edits, about_com, words};
 use crate::error::Error;
 use crate::io::mjcf::MjcfOptions;
+use crate::io::xml::Element;
 use crate::model::Model;
 use condyle_spatial::Inertia;
-use roxmltree::{Document, Node};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -20,25 +20,21 @@ pub(super) struct Mjcf<'a> {
 /// Bodies and joints of a document, by the names that the reader gives them.
 #[derive(Default)]
 struct Elements<'a> {
-    bodies: HashMap<String, Node<'a, 'a>>,
-    joints: HashMap<String, Node<'a, 'a>>,
+    bodies: HashMap<String, &'a Element>,
+    joints: HashMap<String, &'a Element>,
     /// Number of bodies so far.
     count: usize,
 }
 
 impl<'a> Elements<'a> {
-    fn new(document: &'a Document) -> Self {
+    fn new(root: &'a Element) -> Self {
         let mut elements = Self::default();
-        let sections = document.root_element().children().filter(|n| n.has_tag_name("worldbody"));
-        let mut waiting: Vec<Node> = sections.collect();
+        let mut waiting: Vec<&Element> = root.all("worldbody").collect();
         waiting.reverse();
-        while let Some(node) = waiting.pop() {
-            let body = match node.tag_name().name() {
-                "body" => elements.add(node),
-                _ => String::new(),
-            };
+        while let Some(element) = waiting.pop() {
+            let body = if element.tag == "body" { elements.add(element) } else { String::new() };
             let (mut joints, mut inside) = (Vec::new(), Vec::new());
-            gather(node, &mut joints, &mut inside);
+            gather(element, &mut joints, &mut inside);
             for (k, &joint) in joints.iter().enumerate() {
                 let number = if joints.len() == 1 { String::new() } else { format!("{}", k + 1) };
                 elements.joints.insert(name(joint, || format!("{body}_joint{number}")), joint);
@@ -48,7 +44,7 @@ impl<'a> Elements<'a> {
         elements
     }
 
-    fn add(&mut self, body: Node<'a, 'a>) -> String {
+    fn add(&mut self, body: &'a Element) -> String {
         self.count += 1;
         let name = name(body, || format!("body{}", self.count));
         self.bodies.insert(name.clone(), body);
@@ -57,9 +53,9 @@ impl<'a> Elements<'a> {
 }
 
 /// Finds the joints and the bodies of a body, those in its frames too.
-fn gather<'a>(node: Node<'a, 'a>, joints: &mut Vec<Node<'a, 'a>>, bodies: &mut Vec<Node<'a, 'a>>) {
-    for child in node.children().filter(Node::is_element) {
-        match child.tag_name().name() {
+fn gather<'a>(element: &'a Element, joints: &mut Vec<&'a Element>, bodies: &mut Vec<&'a Element>) {
+    for child in &element.children {
+        match &*child.tag {
             "joint" | "freejoint" => joints.push(child),
             "body" => bodies.push(child),
             "frame" => gather(child, joints, bodies),
@@ -69,14 +65,14 @@ fn gather<'a>(node: Node<'a, 'a>, joints: &mut Vec<Node<'a, 'a>>, bodies: &mut V
 }
 
 /// An element's own name, or another one.
-fn name(node: Node, otherwise: impl Fn() -> String) -> String {
-    node.attribute("name").filter(|n| !n.is_empty()).map_or_else(otherwise, str::to_owned)
+fn name(element: &Element, otherwise: impl Fn() -> String) -> String {
+    element.attribute("name").filter(|n| !n.is_empty()).map_or_else(otherwise, str::to_owned)
 }
 
 /// The value of a compiler's attribute; the last one counts.
-fn compiler<'a>(document: &'a Document, name: &str) -> Option<&'a str> {
-    let sections = document.root_element().children().filter(|n| n.has_tag_name("compiler"));
-    sections.filter_map(|n| n.attribute(name)).next_back()
+fn compiler<'a>(root: &'a Element, name: &str) -> Option<&'a str> {
+    let sections = root.children.iter().filter(|section| section.tag == "compiler");
+    sections.rev().find_map(|section| section.attribute(name))
 }
 
 impl Format for Mjcf<'_> {
@@ -84,52 +80,49 @@ impl Format for Mjcf<'_> {
         Model::from_mjcf_text(text, self.path, &self.options)
     }
 
-    fn masses(&self, text: &str) -> Result<HashMap<String, f64>, String> {
-        let document = Document::parse(text).map_err(|e| e.to_string())?;
-        let bodies = Elements::new(&document).bodies.into_iter();
-        let mass = |body: Node| match (child(body, "inertial"), child(body, "geom")) {
+    fn masses(&self, root: &Element) -> HashMap<String, f64> {
+        let mass = |body: &Element| match (body.child("inertial"), body.child("geom")) {
             (Some(inertial), _) => inertial.attribute("mass")?.trim().parse().ok(),
             (None, geom) => geom.map(|_| f64::MIN_POSITIVE), // some mass, which gives way to an <inertial>
         };
-        Ok(bodies.filter_map(|(name, body)| Some((name, mass(body)?))).collect())
+        let bodies = Elements::new(root).bodies.into_iter();
+        bodies.filter_map(|(name, body)| Some((name, mass(body)?))).collect()
     }
 
-    fn edit(&self, text: &str, changes: &Changes) -> Result<String, String> {
-        let document = Document::parse(text).map_err(|e| e.to_string())?;
-        let elements = Elements::new(&document);
+    fn edit(&self, edits: &mut Edits, root: &Element, changes: &Changes) -> Result<(), String> {
+        let elements = Elements::new(root);
         let elsewhere = "is in an included file, or made by `replicate` or `attach`: write a file that has it itself";
-        let mut edits = Edits::new(text);
-        if let (Some("true"), Some(change)) = (compiler(&document, "inertiafromgeom"), changes.links.first()) {
+        if let (Some("true"), Some(change)) = (compiler(root, "inertiafromgeom"), changes.links.first()) {
             let what = "inertiafromgeom=\"true\" of the compiler replaces its inertia by that of its geoms";
             return Err(format!("body `{}`: {what}", change.link));
         }
         let body = |name: &str| elements.bodies.get(name).copied().ok_or_else(|| format!("body `{name}` {elsewhere}"));
         for change in &changes.links {
-            inertial(&mut edits, body(&change.link)?, change.inertia())
-                .map_err(|what| format!("body `{}`: {what}", change.link))?;
+            let of_body = |what| format!("body `{}`: {what}", change.link);
+            inertial(edits, body(&change.link)?, change.inertia()).map_err(of_body)?;
             for name in &change.emptied {
-                inertial(&mut edits, body(name)?, Inertia::zero())?;
+                inertial(edits, body(name)?, Inertia::zero())?;
             }
         }
-        let degrees = compiler(&document, "angle") != Some("radian");
+        let degrees = compiler(root, "angle") != Some("radian");
         for change in &changes.joints {
             let name = &change.name;
-            let joint = elements.joints.get(name).ok_or_else(|| format!("joint `{name}` {elsewhere}"))?;
-            edit_joint(&mut edits, *joint, change, degrees).map_err(|what| format!("joint `{name}`: {what}"))?;
+            let joint = elements.joints.get(name).copied().ok_or_else(|| format!("joint `{name}` {elsewhere}"))?;
+            edit_joint(edits, joint, change, degrees).map_err(|what| format!("joint `{name}`: {what}"))?;
         }
-        Ok(edits.apply())
+        Ok(())
     }
 }
 
 /// Gives a body an inertia, in the body's frame.
-fn inertial(edits: &mut Edits, body: Node, I: Inertia<f64>) -> Result<(), String> {
+fn inertial(edits: &mut Edits, body: &Element, I: Inertia<f64>) -> Result<(), String> {
     let (mass, com, J) = about_com(I)?;
     // MuJoCo takes a full inertia only if it is positive definite
     let (moments, numbers) = match [J.xy, J.xz, J.yz] {
         [0.0, 0.0, 0.0] => ("diaginertia", vec![J.xx, J.yy, J.zz]),
         [xy, xz, yz] => ("fullinertia", vec![J.xx, J.yy, J.zz, xy, xz, yz]),
     };
-    let Some(inertial) = child(body, "inertial") else {
+    let Some(inertial) = body.child("inertial") else {
         let (mass, com, numbers) = (words(&[mass]), words(&com), words(&numbers));
         edits.insert(body, &format!("<inertial pos=\"{com}\" mass=\"{mass}\" {moments}=\"{numbers}\"/>"));
         return Ok(());
@@ -144,8 +137,8 @@ fn inertial(edits: &mut Edits, body: Node, I: Inertia<f64>) -> Result<(), String
 }
 
 /// Gives a joint its limits, losses and armature.
-fn edit_joint(edits: &mut Edits, joint: Node, change: &JointChange, degrees: bool) -> Result<(), String> {
-    if joint.tag_name().name() == "freejoint" {
+fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange, degrees: bool) -> Result<(), String> {
+    if joint.tag == "freejoint" {
         return Err("a <freejoint> has neither limits, losses nor armature: write <joint type=\"free\">".to_owned());
     }
     let mut range = |name: &str, limited: &str, [lower, upper]: [f64; 2], unit: f64| {

@@ -2,12 +2,12 @@
 
 use super::Format;
 use super::changes::{Changes, JointChange};
-use super::edits::{Edits, about_com, child, words};
+use super::edits::{Edits, about_com, words};
 use crate::error::Error;
 use crate::io::urdf::UrdfOptions;
+use crate::io::xml::Element;
 use crate::model::Model;
 use condyle_spatial::Inertia;
-use roxmltree::{Document, Node};
 use std::collections::{HashMap, HashSet};
 
 /// A URDF, and how it is read.
@@ -16,18 +16,15 @@ pub(super) struct Urdf {
 }
 
 /// Returns the name of the link that is the child of no joint.
-pub(super) fn root(text: &str) -> Option<String> {
-    let document = Document::parse(text).ok()?;
+pub(super) fn root(robot: &Element) -> Option<&str> {
     let children: HashSet<&str> =
-        named(&document, "joint").into_values().filter_map(|j| child(j, "child")?.attribute("link")).collect();
-    named(&document, "link").into_keys().find(|link| !children.contains(link)).map(str::to_owned)
+        named(robot, "joint").into_values().filter_map(|j| j.child("child")?.attribute("link")).collect();
+    named(robot, "link").into_keys().find(|link| !children.contains(link))
 }
 
 /// The links or joints of a robot by name.
-fn named<'a>(document: &'a Document, tag: &str) -> HashMap<&'a str, Node<'a, 'a>> {
-    let robot = document.root_element();
-    let elements = robot.children().filter(|n| n.is_element() && n.tag_name().name() == tag);
-    elements.filter_map(|n| Some((n.attribute("name")?, n))).collect()
+fn named<'a>(robot: &'a Element, tag: &'a str) -> HashMap<&'a str, &'a Element> {
+    robot.all(tag).filter_map(|element| Some((element.attribute("name")?, element))).collect()
 }
 
 impl Format for Urdf {
@@ -35,57 +32,52 @@ impl Format for Urdf {
         Model::from_urdf_str(text, &self.options)
     }
 
-    fn masses(&self, text: &str) -> Result<HashMap<String, f64>, String> {
-        let document = Document::parse(text).map_err(|e| e.to_string())?;
-        let mass = |link: Node| {
-            let mass = child(child(link, "inertial")?, "mass")?;
-            mass.attribute("value")?.trim().parse().ok()
-        };
-        let links = named(&document, "link").into_iter();
-        Ok(links.filter_map(|(name, link)| Some((name.to_owned(), mass(link)?))).collect())
+    fn masses(&self, robot: &Element) -> HashMap<String, f64> {
+        let mass = |link: &Element| link.child("inertial")?.child("mass")?.attribute("value")?.trim().parse().ok();
+        named(robot, "link").into_iter().filter_map(|(name, link)| Some((name.to_owned(), mass(link)?))).collect()
     }
 
-    fn edit(&self, text: &str, changes: &Changes) -> Result<String, String> {
-        let document = Document::parse(text).map_err(|e| e.to_string())?;
-        let (links, joints) = (named(&document, "link"), named(&document, "joint"));
-        let mut edits = Edits::new(text);
-        let link = |name: &str| links.get(name).copied().ok_or_else(|| format!("has no link `{name}`"));
+    fn edit(&self, edits: &mut Edits, robot: &Element, changes: &Changes) -> Result<(), String> {
+        let (links, joints) = (named(robot, "link"), named(robot, "joint"));
+        let link = |name: &str| links.get(name).copied().ok_or_else(|| format!("there is no link `{name}`"));
         for change in &changes.links {
-            inertial(&mut edits, link(&change.link)?, change.inertia()).map_err(|what| {
-                format!("link `{}`: {what}", change.link) //
-            })?;
+            let of_link = |what| format!("link `{}`: {what}", change.link);
+            inertial(edits, link(&change.link)?, change.inertia()).map_err(of_link)?;
             for name in &change.emptied {
-                inertial(&mut edits, link(name)?, Inertia::zero())?;
+                inertial(edits, link(name)?, Inertia::zero())?;
             }
         }
         for change in &changes.joints {
             let name = &change.name;
-            let joint = joints.get(&**name).ok_or_else(|| {
-                format!("has no joint `{name}`: limits and losses of a root joint cannot be written") //
-            })?;
-            edit_joint(&mut edits, *joint, change).map_err(|what| format!("joint `{name}`: {what}"))?;
+            let none =
+                || format!("there is no joint `{name}`: a root joint has no limits, losses and armature in a URDF");
+            let joint = joints.get(&**name).copied().ok_or_else(none)?;
+            edit_joint(edits, joint, change).map_err(|what| format!("joint `{name}`: {what}"))?;
+            if let Some(armature) = change.armature() {
+                transmission(edits, robot, name, armature);
+            }
         }
-        Ok(edits.apply())
+        Ok(())
     }
 }
 
 /// Gives a link an inertia, in the link's frame.
-fn inertial(edits: &mut Edits, link: Node, I: Inertia<f64>) -> Result<(), String> {
+fn inertial(edits: &mut Edits, link: &Element, I: Inertia<f64>) -> Result<(), String> {
     let (mass, com, J) = about_com(I)?;
     let moments = [("ixx", J.xx), ("ixy", J.xy), ("ixz", J.xz), ("iyy", J.yy), ("iyz", J.yz), ("izz", J.zz)];
-    let Some(inertial) = child(link, "inertial") else {
+    let Some(inertial) = link.child("inertial") else {
         let moments: String = moments.map(|(name, x)| format!(" {name}=\"{}\"", words(&[x]))).concat();
         let (mass, com) = (words(&[mass]), words(&com));
         let inside = format!("<origin xyz=\"{com}\"/><mass value=\"{mass}\"/><inertia{moments}/>");
         edits.insert(link, &format!("<inertial>{inside}</inertial>"));
         return Ok(());
     };
-    match child(inertial, "origin") {
+    match inertial.child("origin") {
         Some(origin) => {
             edits.set(origin, "xyz", &com);
             // the new inertia is along the axes of the link
             let turned = |name: &&str| {
-                let numbers = origin.attribute(*name).unwrap_or_default().split_whitespace();
+                let numbers = origin.attribute(name).unwrap_or_default().split_whitespace();
                 numbers.map(str::parse::<f64>).any(|x| x != Ok(0.0))
             };
             ["rpy", "quat_xyzw"].into_iter().filter(turned).for_each(|name| edits.remove(origin, name));
@@ -93,7 +85,7 @@ fn inertial(edits: &mut Edits, link: Node, I: Inertia<f64>) -> Result<(), String
         None if com == [0.0; 3] => {}
         None => edits.insert(inertial, &format!("<origin xyz=\"{}\"/>", words(&com))),
     }
-    let part = |tag: &str| child(inertial, tag).ok_or_else(|| format!("its <inertial> has no <{tag}>"));
+    let part = |tag: &str| inertial.child(tag).ok_or_else(|| format!("its <inertial> has no <{tag}>"));
     edits.set(part("mass")?, "value", &[mass]);
     let inertia = part("inertia")?;
     moments.into_iter().for_each(|(name, x)| edits.set(inertia, name, &[x]));
@@ -101,7 +93,7 @@ fn inertial(edits: &mut Edits, link: Node, I: Inertia<f64>) -> Result<(), String
 }
 
 /// Gives a joint its limits and losses.
-fn edit_joint(edits: &mut Edits, joint: Node, change: &JointChange) -> Result<(), String> {
+fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange) -> Result<(), String> {
     let finite = |name: &'static str, x: f64| match x.is_finite() {
         true => Ok((name, x)),
         false => Err(format!("{name} {x}: a URDF has no infinite limits")),
@@ -115,7 +107,7 @@ fn edit_joint(edits: &mut Edits, joint: Node, change: &JointChange) -> Result<()
         false => Err(format!("effort from {lower} to {upper}: a URDF has one limit for both directions")),
     };
     let (velocity, effort) = change.all_limits();
-    let limit = child(joint, "limit");
+    let limit = joint.child("limit");
     if let Some(velocity) = change.velocity() {
         limits.push(finite("velocity", velocity)?);
     }
@@ -138,14 +130,35 @@ fn edit_joint(edits: &mut Edits, joint: Node, change: &JointChange) -> Result<()
         None => {}
     }
     dynamics.extend(change.friction().map(|friction| ("friction", friction)));
-    match child(joint, "dynamics") {
+    match joint.child("dynamics") {
         _ if dynamics.is_empty() => {}
         Some(old) => dynamics.into_iter().for_each(|(name, x)| edits.set(old, name, &[x])),
         None => edits.insert(joint, &element("dynamics", &dynamics)),
     }
-    match change.armature() {
-        Some(armature) => Err(format!("its armature {armature} cannot be written: a URDF has none")),
-        None => Ok(()),
+    Ok(())
+}
+
+/// Rotor inertia of a transmission, as Drake and our reader have it.
+const ROTOR: &str = "drake:rotor_inertia";
+/// Turns of the rotor for one turn of its joint; 1 where a transmission says nothing.
+const RATIO: &str = "drake:gear_ratio";
+
+/// Gives a joint an armature: the rotor inertia J of its transmission, with the armature n² J.
+fn transmission(edits: &mut Edits, robot: &Element, joint: &str, armature: f64) {
+    let drives = |t: &&Element| t.all("joint").map(|j| j.attribute("name")).eq([Some(joint)]);
+    let own = robot.all("transmission").filter(drives).find(|t| t.all("actuator").count() == 1);
+    let actuator = own.and_then(|t| t.child("actuator"));
+    let value = |of: &Element| of.attribute("value")?.trim().parse().ok().filter(|n: &f64| *n != 0.0);
+    let ratio = actuator.and_then(|a| value(a.child(RATIO)?)).unwrap_or(1.0);
+    let inertia = armature / (ratio * ratio);
+    let rotor = format!("<{ROTOR} xmlns:drake=\"http://drake.mit.edu\" value=\"{}\"/>", words(&[inertia]));
+    match (actuator, actuator.and_then(|a| a.child(ROTOR))) {
+        (_, Some(old)) => edits.set(old, "value", &[inertia]),
+        (Some(actuator), None) => edits.insert(actuator, &rotor),
+        (None, None) => {
+            let inside = format!("<joint name=\"{joint}\"/><actuator name=\"{joint}\">{rotor}</actuator>");
+            edits.insert(robot, &format!("<transmission name=\"{joint}\">{inside}</transmission>"));
+        }
     }
 }
 
