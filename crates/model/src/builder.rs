@@ -231,6 +231,7 @@ impl ModelBuilder {
             keyframes: Vec::new(),
             constraints: Vec::new(),
             armature,
+            free_armature: Vec::new(),
             gravity: self.gravity,
             limbs: Plan::new(&tree),
             tree,

@@ -60,8 +60,8 @@ pub enum Joint {
 /// then a whole number, and what follows turns, by ratio · θ + offset. A continuous follower of a leader with one number
 /// turns by ratio · q + offset.
 ///
-/// The follower's armature counts, as ratio² · armature of the leader's coordinate. Its limits, damping and friction do
-/// not: as in Pinocchio, those of a coordinate are its leader's alone.
+/// The follower's armature counts, as ratio² · armature of the leader's coordinate, and so does its spring. Its limits, damping and
+/// friction do not: as in Pinocchio, those of a coordinate are its leader's alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]

@@ -151,6 +151,7 @@ impl Model {
                 self.joint_options(q, v).check(&body.joint_name)?;
             }
         }
+        self.find_free_armature()?;
         self.check_magnitudes()?;
         self.check_additions()?;
         let mut warnings = Vec::new();
@@ -261,6 +262,25 @@ impl Placed {
 }
 
 impl Model {
+    /// Finds the free joints with armature along their linear coordinates: a mass in the axes of the parent, so one number.
+    fn find_free_armature(&mut self) -> Result<(), Error> {
+        self.free_armature.clear();
+        for body in self.bodies[1..].iter().filter(|body| body.joint == Joint::FreeFlyer) {
+            let [x, y, z] = [0, 1, 2].map(|k| self.armature[body.idx_v + k]);
+            if x != y || y != z {
+                let what = format!(
+                    "armature is {x}, {y} and {z} along its linear coordinates, expected three equal numbers: \
+                     the armature of a free joint is a mass in the axes of its parent"
+                );
+                return Err(Error::Joint { joint: body.joint_name.clone(), what });
+            }
+            if x > 0.0 {
+                self.free_armature.push(body.idx_v);
+            }
+        }
+        Ok(())
+    }
+
     /// M, by composite rigid bodies: Featherstone (2008), table 6.2, in the world's frame.
     fn inertia_matrix(&self, Placed { oX, S }: &Placed) -> DMatrix<f64> {
         let l = Single::<f64, f64>::new(self);
