@@ -123,6 +123,16 @@ fn long_texts() {
     refused(sdf(&signs), &format!("4194305 equals signs, at most 4194304 {end}"));
 }
 
+/// Unknown names are listed up to a limit: each is compared with the known ones.
+#[test]
+fn unknown_names() {
+    let tags = "<linkjoint linkjoint='1'/>".repeat(500_000);
+    let model = urdf(&format!("<robot><link name='a'/>{tags}</robot>")).unwrap();
+    assert_eq!(model.warnings().len(), 1001);
+    let last = model.warnings()[1000].to_string();
+    assert!(last.ends_with("more than 1000 names are unknown or left out: the rest is not listed"), "{last}");
+}
+
 /// The nearest name is looked for among long names, and among many.
 #[test]
 fn long_names() {

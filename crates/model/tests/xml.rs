@@ -91,7 +91,7 @@ fn prologs() {
         "<!DOCTYPE robot SYSTEM 'robot.dtd'>",
         "<!DOCTYPE robot [ <!ELEMENT robot (link)> <!-- ]> ' --> <!ENTITY a \"]>\"> ]>",
     ] {
-        let model = urdf(&format!("{prolog}{ROBOT}<!-- end -->\n")).unwrap_or_else(|e| panic!("{prolog}: {e}"));
+        let model = urdf(&format!("{prolog}{ROBOT}<!-- end -->\n\0")).unwrap_or_else(|e| panic!("{prolog}: {e}"));
         assert_eq!(model.nv(), 1);
     }
     let mjcf = "<!DOCTYPE mujoco><mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>";

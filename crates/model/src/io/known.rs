@@ -28,6 +28,9 @@ struct Type {
     children: Vec<(&'static str, &'static str)>,
 }
 
+/// Maximum number of warnings about one file; chosen because a nearest name is looked for in each.
+const MAX_WARNINGS: usize = 1000;
+
 /// Type of a child whose inside is not looked at.
 const OPEN: &str = "";
 
@@ -57,15 +60,23 @@ impl Known {
     pub(crate) fn check(&self, root: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
         if let Some((&name, _)) = self.types.get_key_value(root.tag.as_str()) {
             self.check_as(name, root, left_out, warnings);
+            if warnings.len() >= MAX_WARNINGS {
+                warnings.push(root.unknown(format!(
+                    "more than {MAX_WARNINGS} names are unknown or left out: the rest is not listed"
+                )));
+            }
         }
     }
 
     /// Warns of all that is not known in an element of a type.
     fn check_as(&self, name: &'static str, element: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
-        let none = Type::default();
+        let (none, is_full) = (Type::default(), |warnings: &[Warning]| warnings.len() >= MAX_WARNINGS);
         let known = self.types.get(name).unwrap_or(&none);
         let said = |what: &str| left_out.iter().find(|(of, inside, _)| *of == name && *inside == what);
         for (attribute, _) in &element.attributes {
+            if is_full(warnings) {
+                return;
+            }
             if let Some((.., what)) = said(attribute) {
                 warnings.push(element.left_out(format!("{attribute}: {what}")));
             } else if !known.attributes.contains(&attribute.as_str()) && !attribute.contains(':') {
@@ -74,6 +85,9 @@ impl Known {
             }
         }
         for child in &element.children {
+            if is_full(warnings) {
+                return;
+            }
             let tag = child.tag.as_str();
             if let Some((.., what)) = said(tag) {
                 warnings.push(child.left_out(*what));

@@ -6,6 +6,9 @@ mod known;
 mod origin;
 mod reader;
 mod transmission;
+#[cfg(feature = "urdf-rs")]
+mod urdf_rs;
+mod xacro;
 
 use super::files;
 use super::xml::{Amount, Element};
@@ -31,25 +34,61 @@ pub struct UrdfOptions {
     /// Folders that have packages in them, or are packages, for `package://` addresses; before those that the
     /// environment names in `ROS_PACKAGE_PATH` and, with `/share` behind them, in `AMENT_PREFIX_PATH`.
     pub packages: Vec<PathBuf>,
+    /// Arguments of a file whose name ends in `.xacro`, by name and value (`name:=value`).
+    pub arguments: Vec<(String, String)>,
 }
 
 impl Model {
     /// Reads a URDF file, given by its path or as `package://name/path/in/the/package`
     /// ([`UrdfOptions::packages`]).
     ///
-    /// Shapes are not read, and the meshes that they name need not be there. Versions 1.0 to 1.2 are; where there is
-    /// none, 1.0, in which an `<origin>` has no quaternion.
     /// Fixed joints are merged into the body that they sit on and stay as frames; siblings are numbered in the order of
-    /// their joints' names (bytes), as Pinocchio does.
+    /// their joints' names (bytes), as Pinocchio does. Versions 1.0 to 1.2 are read; where there is none, 1.0, in which an
+    /// `<origin>` has no quaternion.
+    ///
+    /// - A planar joint moves in the plane normal to its axis, 1 0 0 if it is missing, as the format and Drake have it: the z of
+    ///   its frame is the axis, by the shortest rotation. Pinocchio's plane is always normal to z.
+    /// - A revolute or prismatic joint needs a limit with effort and velocity. A continuous one may have either. A negative effort
+    ///   or velocity is no limit, and neither are position limits in reverse order; both warn.
+    /// - A `<transmission>` with a rotor's inertia J (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a reduction n
+    ///   (`mechanicalReduction`, `drake:gear_ratio`) gives armature n² J. A reduction alone warns.
+    /// - Drake's `<frame>`s are frames, its joints `ball`, `screw` and `planar` are joints.
+    ///
+    /// What is unknown, misspelt or misplaced is a warning, and so is what a model cannot hold ([`Model::warnings`]). Shapes,
+    /// materials, sensors, controllers, calibrations, soft limits of a `<safety_controller>` and entries of `<gazebo>` about
+    /// contact, looks and numerics have no effect and no warning; the meshes that are named need not be there.
+    ///
+    /// A file whose name ends in `.xacro` is expanded first: by the program `xacro`, or else `xacrodoc`, which must be installed and
+    /// may take a minute. It gets [`UrdfOptions::arguments`] and the folders of packages (`ROS_PACKAGE_PATH`). xacro evaluates
+    /// expressions of Python: expand files of those only whom you trust. Lines in messages are those of the expanded text.
     ///
     /// # Errors
     /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), and what
-    /// [`ModelBuilder::build`] finds. What a file may have at most stands at the [beginning](crate#limits-of-files).
+    /// [`ModelBuilder::build`](crate::ModelBuilder::build) finds. What a file may have at most stands at the
+    /// [beginning](crate#limits-of-files).
     pub fn from_urdf(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Self, Error> {
         let path = files::locate(path.as_ref(), &options.packages)?;
+        let name = path.display().to_string();
+        if xacro::is_xacro(&path) {
+            return Self::from_urdf_text(&Self::expand_xacro(&path, options)?, &format!("{name} (expanded)"), options);
+        }
+        check_arguments(&name, options)?;
         let mut amount = Amount::default();
         let text = amount.read(&path)?;
-        Reader::new(&Element::parse(&text, &path.display().to_string(), &mut amount)?)?.model(options)
+        Reader::new(&Element::parse(&text, &name, &mut amount)?)?.model(options)
+    }
+
+    /// Returns the URDF of a file of xacro.
+    #[doc(hidden)]
+    pub fn expand_xacro(path: &Path, options: &UrdfOptions) -> Result<String, Error> {
+        Amount::default().read(path)?; // a file that can be one
+        xacro::expand(path, &options.arguments, &options.packages)
+    }
+
+    /// Reads a URDF from a string, which errors and warnings call by the name of a file.
+    #[doc(hidden)]
+    pub fn from_urdf_text(text: &str, file: &str, options: &UrdfOptions) -> Result<Self, Error> {
+        Reader::new(&Element::parse(text, file, &mut Amount::default())?)?.model(options)
     }
 
     /// Reads a URDF from a string; see [`from_urdf`](Self::from_urdf).
@@ -72,6 +111,13 @@ impl Model {
     /// # Errors
     /// As [`from_urdf`](Self::from_urdf).
     pub fn from_urdf_str(text: &str, options: &UrdfOptions) -> Result<Self, Error> {
-        Reader::new(&Element::parse(text, "<string>", &mut Amount::default())?)?.model(options)
+        check_arguments("<string>", options)?;
+        Self::from_urdf_text(text, "<string>", options)
     }
+}
+
+/// Refuses arguments for a file that has no use for them.
+fn check_arguments(file: &str, options: &UrdfOptions) -> Result<(), Error> {
+    let what = || "has arguments of xacro, but its name does not end in `.xacro`".to_owned();
+    if options.arguments.is_empty() { Ok(()) } else { Err(Error::File { file: file.to_owned(), what: what() }) }
 }
