@@ -97,7 +97,7 @@ ARGUMENTS = {
     "Force": "_SpelledData._leave.hg",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
-    "str": "_generate.language contact function joint_name name prefix tendon text FrictionContact.frame Task.frame",
+    "str": "_generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon text FrictionContact.frame Task.frame",
     "str | int": """
         body frame Model.with_mimic.follower Model.with_mimic.leader getVelocity.joint getAcceleration.joint
         getClassicalAcceleration.joint getJointJacobian.joint""",
@@ -132,6 +132,7 @@ ARGUMENTS = {
     "Sequence[_Path]": "packages",
     "_RootJoint": "root_joint",
     "BodyId": "follower leader parent ModelBuilder.body",
+    "dict[str, str | float | bool]": "arguments",
     "BodyId | Sequence[tuple[BodyId, float]]": "ModelBuilder.actuator.joint",
     "Joint": "joint",
     "_Joints": "ModelBuilder.joints",

@@ -7,7 +7,7 @@ use crate::joint::root;
 use condyle::{MjcfOptions, SdfOptions, UrdfOptions, tree::WarningKind};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBool, PyDict};
 use std::path::PathBuf;
 
 /// The kinds of warnings that a strict reader accepts.
@@ -20,11 +20,23 @@ fn kinds(allow: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<WarningKind>> {
     members_of("allow", "kinds of warnings", allow)?.iter().map(kind).collect()
 }
 
+/// The values of xacro's arguments, as xacro writes them.
+fn values(arguments: &Bound<'_, PyDict>) -> PyResult<Vec<(String, String)>> {
+    let value = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+        let text = value.str()?.to_str()?.to_owned();
+        let is_bool = value.is_instance_of::<PyBool>();
+        Ok((name.extract()?, if is_bool { text.to_lowercase() } else { text }))
+    };
+    arguments.iter().map(value).collect()
+}
+
 #[pymethods]
 impl Model {
     /// A model from a URDF file.
     ///
-    /// Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
+    /// Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at. A file whose
+    /// name ends in `.xacro` is expanded by the installed program `xacro` or `xacrodoc`, which evaluates expressions of
+    /// the file: expand files of people that you trust only.
     ///
     /// path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
     /// root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
@@ -36,10 +48,11 @@ impl Model {
     ///     `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
     /// allow: kinds of warnings that are no errors, though `strict` is set: 'massless', 'negative', 'triangle',
     ///     'singular', 'unlikely', 'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
+    /// arguments: values of xacro's `<xacro:arg>`s by name, for files that end in `.xacro`.
     ///
     /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
     #[staticmethod]
-    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None))]
+    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None, arguments=None))]
     fn from_urdf(
         path: PathBuf,
         root_joint: Option<&str>,
@@ -47,9 +60,11 @@ impl Model {
         strict: bool,
         packages: Option<Vec<PathBuf>>,
         allow: Option<&Bound<'_, PyAny>>,
+        arguments: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let (packages, allow, root_joint) = (packages.unwrap_or_default(), kinds(allow)?, root(root_joint)?);
-        let options = UrdfOptions { root_joint, mimic, strict, packages, allow };
+        let arguments = arguments.map_or(Ok(Vec::new()), values)?;
+        let options = UrdfOptions { root_joint, mimic, strict, packages, allow, arguments };
         Ok(condyle::Model::from_urdf(path, &options).map_err(exception)?.into())
     }
 
@@ -69,7 +84,7 @@ impl Model {
         allow: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<Self> {
         let (packages, allow, root_joint) = (packages.unwrap_or_default(), kinds(allow)?, root(root_joint)?);
-        let options = UrdfOptions { root_joint, mimic, strict, packages, allow };
+        let options = UrdfOptions { root_joint, mimic, strict, packages, allow, ..UrdfOptions::default() };
         Ok(condyle::Model::from_urdf_str(text, &options).map_err(exception)?.into())
     }
 
@@ -124,20 +139,22 @@ impl Model {
         Ok(condyle::Model::from_mjcf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// A model from an SDF file (Gazebo) that holds one model.
+    /// A model from an SDF file (Gazebo), with the models that it includes.
     ///
-    /// Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
-    /// parent closes a loop. Universal joints become two revolute ones.
+    /// All models of a file, or of its first world, become one robot, whose names then begin with the model's:
+    /// `robot::arm`. Joints are walked breadth first from the root, in the order of the file; one that would give a link a
+    /// second parent closes a loop. Universal joints become two revolute ones.
     ///
     /// path: a path, as text or `os.PathLike`.
     /// root_joint: as for `from_urdf`.
     /// mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
     /// strict: whether a warning (`warnings`) is an error.
     /// packages, allow: as for `from_urdf`; `model://` addresses are looked for in `packages` too.
+    /// model: the name of the one model to read; None reads all models of the file.
     ///
     /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
     #[staticmethod]
-    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None))]
+    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None, model=None))]
     fn from_sdf(
         path: PathBuf,
         root_joint: Option<&str>,
@@ -145,9 +162,10 @@ impl Model {
         strict: bool,
         packages: Option<Vec<PathBuf>>,
         allow: Option<&Bound<'_, PyAny>>,
+        model: Option<String>,
     ) -> PyResult<Self> {
         let (packages, allow, root_joint) = (packages.unwrap_or_default(), kinds(allow)?, root(root_joint)?);
-        let options = SdfOptions { root_joint, mimic, strict, packages, allow };
+        let options = SdfOptions { root_joint, mimic, strict, packages, allow, model };
         Ok(condyle::Model::from_sdf(path, &options).map_err(exception)?.into())
     }
 
@@ -158,7 +176,7 @@ impl Model {
     /// >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
     /// 6
     #[staticmethod]
-    #[pyo3(signature = (text, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None))]
+    #[pyo3(signature = (text, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None, model=None))]
     fn from_sdf_str(
         text: &str,
         root_joint: Option<&str>,
@@ -166,9 +184,10 @@ impl Model {
         strict: bool,
         packages: Option<Vec<PathBuf>>,
         allow: Option<&Bound<'_, PyAny>>,
+        model: Option<String>,
     ) -> PyResult<Self> {
         let (packages, allow, root_joint) = (packages.unwrap_or_default(), kinds(allow)?, root(root_joint)?);
-        let options = SdfOptions { root_joint, mimic, strict, packages, allow };
+        let options = SdfOptions { root_joint, mimic, strict, packages, allow, model };
         Ok(condyle::Model::from_sdf_str(text, &options).map_err(exception)?.into())
     }
 

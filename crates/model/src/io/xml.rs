@@ -99,6 +99,17 @@ fn too_many(found: u64, what: &str, limit: usize) -> String {
     format!("{found} {what}, at most {limit} are allowed in the files of a robot")
 }
 
+impl Model {
+    /// Reads the text of a robot's file, in any of the encodings that its readers know.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    #[doc(hidden)]
+    pub fn file_text(path: &Path) -> Result<String, Error> {
+        Amount::default().read(path)
+    }
+}
+
 impl Element {
     /// The root element of a text.
     pub(crate) fn parse(text: &str, file: &str, amount: &mut Amount) -> Result<Self, Error> {
