@@ -181,6 +181,7 @@ impl Element {
             children: Vec::new(),
             file: self.file.clone(),
             line: self.line,
+            at: self.at,
         }
     }
 }
