@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 use condyle_model::{
-    Error, Inertia, Joint, JointOptions, Mimic, MjcfOptions, Model, ModelBuilder, Se3, Sym3, UrdfOptions, Vec3, WORLD,
+    Error, Inertia, Joint, JointOptions, Mimic, Model, ModelBuilder, SdfOptions, Se3, Sym3, UrdfOptions, Vec3, WORLD,
     Warning, WarningKind,
 };
 
@@ -97,10 +97,11 @@ fn limits_that_cannot_be_meant() {
 #[test]
 fn limits_warn_in_every_format() {
     let kinds = |model: &Model| model.warnings().iter().map(Warning::kind).collect::<Vec<_>>();
-    let mjcf =
-        "<mujoco><worldbody><body><joint name='j' range='-1 1' actuatorfrcrange='0 0' actuatorfrclimited='true'/>
-<geom size='1'/></body></worldbody></mujoco>";
-    let read = Model::from_mjcf_str(mjcf, &MjcfOptions::default()).unwrap();
+    let link = |name: &str| format!("<link name='{name}'><inertial><mass>1</mass></inertial></link>");
+    let axis = "<axis><xyz>0 0 1</xyz><limit><lower>-1</lower><upper>1</upper><effort>0</effort></limit></axis>";
+    let joint = format!("<joint name='j' type='revolute'><parent>a</parent><child>b</child>{axis}</joint>");
+    let sdf = format!("<sdf version='1.9'><model name='m'>{}{}{joint}</model></sdf>", link("a"), link("b"));
+    let read = Model::from_sdf_str(&sdf, &SdfOptions::default()).unwrap();
     assert_eq!(read.limits().effort_upper, [0.0]);
     assert_eq!(kinds(&read), [WarningKind::Limit]);
     let mut builder = ModelBuilder::new("m");

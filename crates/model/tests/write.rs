@@ -342,8 +342,8 @@ fn what_an_mjcf_cannot_say_is_an_error() {
     });
     let free = "<mujoco><worldbody><body name='b'><freejoint name='f'/><geom size='1'/></body></worldbody></mujoco>";
     refused(free, "joint `f`: a <freejoint> has neither", &|m| m.clone().with_armature(&[0.1; 6]).unwrap());
-    refused(free, "joint `f`: armature [0.1, 0.2, 0.1, 0.1, 0.1, 0.1]: a file has one for a joint", &|m| {
-        m.clone().with_armature(&[0.1, 0.2, 0.1, 0.1, 0.1, 0.1]).unwrap()
+    refused(free, "joint `f`: armature [0.1, 0.1, 0.1, 0.2, 0.2, 0.2]: a file has one for a joint", &|m| {
+        m.clone().with_armature(&[0.1, 0.1, 0.1, 0.2, 0.2, 0.2]).unwrap()
     });
 }
 

@@ -27,7 +27,7 @@ const MAX_ATTRIBUTES: usize = 256;
 pub(crate) const MAX_DEPTH: usize = 256;
 
 /// Element, with all that is in it. A prefix is part of a name (`gz:note`); declarations of prefixes are left out.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Element {
     pub(crate) tag: String,
     pub(crate) attributes: Vec<(String, String)>,
@@ -39,6 +39,8 @@ pub(crate) struct Element {
     pub(crate) line: u32,
     /// Byte index of its `<` in the text of the file.
     pub(crate) at: usize,
+    /// The index of the file with settings of its own that the element is from; 0 for the main one.
+    pub(crate) source: usize,
 }
 
 /// The amount of text that has been read for one robot.
@@ -77,6 +79,23 @@ impl Amount {
             return Err(wrong(too_many(self.bytes as u64 + found, "bytes", MAX_BYTES)));
         }
         Ok(encoding::decode(bytes))
+    }
+
+    /// Counts copies of an element that a file asks for, as if they stood in it.
+    pub(crate) fn add_copies(&mut self, element: &Element, count: usize) -> Result<(), Error> {
+        let (mut tags, mut equals, mut waiting) = (0usize, 0usize, vec![element]);
+        while let Some(e) = waiting.pop() {
+            (tags, equals) = (tags + 1, equals + e.attributes.len());
+            waiting.extend(&e.children);
+        }
+        self.tags = self.tags.saturating_add(tags.saturating_mul(count));
+        self.equals = self.equals.saturating_add(equals.saturating_mul(count));
+        for (found, what, limit) in [(self.tags, "tags", MAX_TAGS), (self.equals, "equals signs", MAX_EQUALS)] {
+            if found > limit {
+                return Err(element.wrong(format!("{}, copies counted", too_many(found as u64, what, limit))));
+            }
+        }
+        Ok(())
     }
 
     /// Counts what is in a text, and says which limit it is above.

@@ -182,6 +182,7 @@ impl Element {
             file: self.file.clone(),
             line: self.line,
             at: self.at,
+            source: self.source,
         }
     }
 }

@@ -128,6 +128,7 @@ impl<'a> Parser<'a> {
             file: self.file.clone(),
             line,
             at: self.at - 1,
+            source: 0,
         };
         self.at += name.len();
         let is_empty = self.attributes(name, &mut element)?;
