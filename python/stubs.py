@@ -109,7 +109,7 @@ ARGUMENTS = {
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
         Plan.contact _generate.shares _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        damping dt eps1 eps1eps2 eps2 epsilon factor greatest kp kv least mu offset passive pitch ratio re regularisation
+        bias damping dt eps1 eps1eps2 eps2 epsilon factor gain greatest kp kv least mu offset passive pitch ratio re regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",

@@ -318,14 +318,19 @@ impl ModelBuilder {
     ///
     /// joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
     /// tendon: the name of the tendon, if it drives one.
-    /// gear: a number, or up to six. control, force: least and greatest; None for no limits.
-    #[pyo3(signature = (name, joint, *, tendon=None, gear=None, kp=0.0, kv=0.0, control=None, force=None))]
+    /// gear: a number, or up to six; None is 1. gain: the force for each unit of control; None is kp, or kv where kp is 0, or
+    /// 1 for a motor without both. control, force: least and greatest; None for no limits.
+    #[pyo3(signature = (
+        name, joint, *, tendon=None, gear=None, gain=None, bias=0.0, kp=0.0, kv=0.0, control=None, force=None
+    ))]
     fn actuator(
         &mut self,
         name: &str,
         joint: &Bound<'_, PyAny>,
         tendon: Option<&str>,
         gear: Option<&Bound<'_, PyAny>>,
+        gain: Option<f64>,
+        bias: f64,
         kp: f64,
         kv: f64,
         control: Option<(f64, f64)>,
@@ -354,7 +359,9 @@ impl ModelBuilder {
         gear[..given.len()].copy_from_slice(&given);
         let free = (f64::NEG_INFINITY, f64::INFINITY);
         let (control, force) = (control.unwrap_or(free), force.unwrap_or(free));
-        self.builder()?.actuator(Actuator { name: name.to_owned(), transmission, gear, kp, kv, control, force });
+        let gain = gain.or([kp, kv, 1.0].into_iter().find(|gain| *gain != 0.0)).unwrap_or(1.0);
+        let name = name.to_owned();
+        self.builder()?.actuator(Actuator { name, transmission, gear, gain, bias, kp, kv, control, force });
         Ok(())
     }
 

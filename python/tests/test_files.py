@@ -44,9 +44,9 @@ def test_additions_of_a_builder() -> None:
     assert (carried.body, carried.mass) == ("upper", 1.0)
     motor, servo = model.actuators
     assert (motor.joint, motor.tendon, motor.gear.tolist()) == ("upper", None, [50.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert (motor.force, motor.control) == ((-3.0, 3.0), (-np.inf, np.inf))
+    assert (motor.force, motor.control, motor.gain, motor.bias) == ((-3.0, 3.0), (-np.inf, np.inf), 1.0, 0.0)
     assert (servo.joint, servo.tendon, servo.coefficients) == (None, "cord", {"upper": 1.0, "lower": -2.0})
-    assert (servo.kp, servo.kv, servo.control) == (100.0, 10.0, (-1.0, 1.0))
+    assert (servo.gain, servo.kp, servo.kv, servo.control) == (100.0, 100.0, 10.0, (-1.0, 1.0))
     assert model.keyframes == {}
     with pytest.raises(ValueError, match="read-only"):
         first.rest[0] = 1.0

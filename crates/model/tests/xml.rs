@@ -129,6 +129,18 @@ fn prefixes() {
     refused(&renamed, &format!("2: x:wheel `w`: belongs to xacro: {expand}"));
 }
 
+/// The text for other parsers has the same elements on the same lines.
+#[test]
+fn texts_for_other_parsers() {
+    let text = "<!------ a -->\n<?xml version='1.0'?><!DOCTYPE robot><robot name='a&amp;&lt;&quot;'>\n<gz:a b:c='1'\n/>\n\
+                <link name='b'>1 &lt; 2</link></robot>";
+    let expected =
+        "\n<robot name=\"a&amp;&lt;&quot;\">\n<gz-a b-c=\"1\"></gz-a>\n\n<link name=\"b\">1 &lt; 2</link></robot>";
+    assert_eq!(Model::well_formed(text).unwrap(), expected);
+    assert_eq!(Model::well_formed(expected).unwrap(), expected);
+    assert!(Model::well_formed("<robot>").is_err());
+}
+
 #[test]
 fn entities() {
     let name = |text: &str| urdf(&format!("<robot name='{text}'><link name='a'/></robot>")).unwrap().name().to_owned();

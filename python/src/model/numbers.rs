@@ -5,7 +5,7 @@ use crate::arrays::{class, read_only};
 use crate::cached::Attribute;
 use crate::inertial_parameters::model_inertia;
 use condyle::regressors::inertial_parameters;
-use condyle::tree::Transmission;
+use condyle::tree::{Actuator, Transmission};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -116,7 +116,7 @@ impl Model {
         self.cached.list(py, Attribute::Actuators, || {
             let class = class!(py, "Actuator")?;
             let joint = |body: usize| &*self.inner.bodies()[body].joint_name;
-            let actuator = |a: &condyle::tree::Actuator| {
+            let actuator = |a: &Actuator| {
                 let (mut driven, coefficients) = ([None; 3], PyDict::new(py));
                 match &a.transmission {
                     Transmission::Joint { body } => driven[0] = Some(joint(*body)),
@@ -128,18 +128,9 @@ impl Model {
                     other => unreachable!("{other:?}: a transmission without words for it"),
                 }
                 let gear = read_only(py, &a.gear[..], "")?;
-                class.call1((
-                    &*a.name,
-                    driven[0],
-                    driven[1],
-                    driven[2],
-                    coefficients,
-                    gear,
-                    a.kp,
-                    a.kv,
-                    a.control,
-                    a.force,
-                ))
+                let [joint, tendon, frame] = driven;
+                let Actuator { name, gain, bias, kp, kv, control, force, .. } = a;
+                class.call1((name, joint, tendon, frame, coefficients, gear, gain, bias, kp, kv, control, force))
             };
             self.inner.actuators().iter().map(actuator).collect()
         })
