@@ -1,12 +1,15 @@
-"""Every robot file below some folders, here and in the libraries that read it: a table of what is equal and what is not.
+"""Every robot file below some folders, here and in the libraries that read it: a table of what is equal and what not.
 
     python tests/peers/robots.py FOLDER… [--only PATTERN] [--list] [--table FILE] [--jobs N]
 
-URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, SDFs with Drake. Peers that are not installed are left
-out. Each file is read in a process of its own with a time limit, so that a crash of a library is a row of the table. A path
-`…/owner+repository/…` counts as a file of that repository; `SOURCES.tsv` in FOLDER names commits, a line `owner/repository`,
-tab, commit for each. `--table VALIDATION.md` replaces the section on public robots there, which `pytest tests/peers/pinocchio
---validation VALIDATION.md` keeps. The exit status is 1 if a robot differs or a process crashes.
+URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, SDFs with Drake, which may be missing. Each file
+is read in a process of its own with a time limit, so that a crash of a library is a row of the table.
+
+A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER names commits: each line has
+`owner/repository`, a tab and the commit. `--table VALIDATION.md` replaces the section on public robots in that file;
+`pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest and keeps the section.
+
+The exit status is 1 if a robot differs or a process crashes.
 """
 
 import argparse

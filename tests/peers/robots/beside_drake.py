@@ -7,7 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from comparison import STATES, Joint, Quantities, Refused, Unlike, state_of, there
+from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there
 from files import text_of
 from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
@@ -36,7 +36,7 @@ REPLACED = ("While parsing inertia matrix", "While re-expressing as central iner
 """Warnings after which Drake takes another inertia than that of the file."""
 TOLERANCE = 1e-10
 UNLIMITED = 1e16
-"""SDF's default of limits of position."""
+"""SDF's default of limits of position, and a common one of URDFs: no limit."""
 LENGTHS = {
     "revolute": (1, 1),
     "prismatic": (1, 1),
@@ -61,7 +61,7 @@ def packages(folder: Path) -> PackageMap:
     return found
 
 
-IRRELEVANT = {"sensor", "plugin", "visual", "collision", "light", "gui", "scene", "physics", "audio", "wind", "spherical_coordinates"}
+IRRELEVANT = {"sensor", "plugin", "visual", "collision", "light", "gui", "scene", "physics", "audio", "wind"}
 """Elements of SDF without effect on what is compared; Drake refuses files for some of them."""
 
 
@@ -95,17 +95,11 @@ def read(path: Path, folder: Path) -> MultibodyPlant:
         else:
             parser.AddModelsFromString(text, "sdf")
         plant.Finalize()
-    except (RuntimeError, ValueError, MemoryError) as error:
-        raise Refused(str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__) from None
+    except (RuntimeError, ValueError, MemoryError, SystemExit) as error:  # an assertion of Drake's is a SystemExit
+        raise RefusedError(str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__) from None
     if plant.num_bodies() < 2:
-        raise Refused("no bodies")
+        raise RefusedError("no bodies")
     return plant
-
-
-def floats(plant: MultibodyPlant) -> int:
-    """Returns the number of bodies that move freely without a joint of the file."""
-    joints = (plant.get_joint(i) for i in plant.GetJointIndices())
-    return sum(joint.is_ephemeral() and joint.num_velocities() == 6 for joint in joints)
 
 
 def compare(plant: MultibodyPlant, model: condyle.Model) -> Quantities:
@@ -151,7 +145,7 @@ def matched(found: Quantities, plant: MultibodyPlant) -> list[Joint] | None:
         joint = plant.get_joint(JointIndex(i))
         kind = joint.type_name()
         if LENGTHS.get(kind) != (joint.num_positions(), joint.num_velocities()):
-            raise Unlike(f"{kind} joints have other coordinates there")
+            raise UnlikeError(f"{kind} joints have other coordinates there")
         if joint.num_velocities():
             theirs.setdefault(joint.name(), []).append(joint)
             carriers.setdefault(joint.child_body().name(), []).append(joint)
@@ -188,7 +182,7 @@ def limits(found: Quantities, joint: object, plant: MultibodyPlant, body: int) -
         theirs = unlimited((joint.position_lower_limits()[0], joint.position_upper_limits()[0]))
         if limits.lower[at] == limits.upper[at] == 0.0 and np.isinf(theirs).all():
             found.left_out["limits: position"] = "Drake takes missing limits of a URDF for none"
-        expect("limits: position", (limits.lower[at], limits.upper[at]), theirs)
+        expect("limits: position", unlimited((limits.lower[at], limits.upper[at])), theirs)
     expect("limits: velocity", limits.velocity[column], joint.velocity_upper_limits()[0])
     expect("damping", model.damping[column], joint.default_damping_vector()[0])
     for i in plant.GetJointActuatorIndices():

@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
-from comparison import STATES, Joint, Quantities, Refused, Unlike, state_of, there
+from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there
 from mujoco_actuators import acts, efforts
 
 import condyle
@@ -28,7 +28,7 @@ def read(path: Path) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError, MemoryError) as error:
-        raise Refused(str(error).strip().splitlines()[0]) from None
+        raise RefusedError(str(error).strip().splitlines()[0]) from None
 
 
 def read_urdf(path: Path) -> mujoco.MjModel:
@@ -36,7 +36,7 @@ def read_urdf(path: Path) -> mujoco.MjModel:
     try:
         tree = ElementTree.fromstring(path.read_bytes())
     except (ElementTree.ParseError, LookupError, ValueError) as error:
-        raise Refused(str(error)) from None
+        raise RefusedError(str(error)) from None
     for link in tree.iter("link"):
         for part in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(part)
@@ -45,7 +45,7 @@ def read_urdf(path: Path) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
     except (ValueError, RuntimeError, MemoryError) as error:
-        raise Refused(str(error).strip().splitlines()[0]) from None
+        raise RefusedError(str(error).strip().splitlines()[0]) from None
 
 
 def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
@@ -80,9 +80,9 @@ def weightless_moments(path: Path) -> bool:
     """Returns whether a link of a URDF has the mass 0 and moments."""
     for inertial in ElementTree.fromstring(path.read_bytes()).iter("inertial"):
         mass, inertia = inertial.find("mass"), inertial.find("inertia")
-        if mass is not None and inertia is not None and float(mass.get("value", "0")) == 0.0:
-            if any(float(number) for number in inertia.attrib.values()):
-                return True
+        weightless = mass is not None and inertia is not None and float(mass.get("value", "0")) == 0.0
+        if weightless and any(float(number) for number in inertia.attrib.values()):
+            return True
     return False
 
 
@@ -93,7 +93,7 @@ def compare_urdf(path: Path, mj: mujoco.MjModel, model: condyle.Model) -> Quanti
     for i in range(1, model.nbodies):
         j = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_JOINT, model.names[i])
         if model.joint_types[i] in ("planar", "free_flyer"):
-            raise Unlike(f"{model.joint_types[i]} joints are other joints in MuJoCo's reading of URDF")
+            raise UnlikeError(f"{model.joint_types[i]} joints are other joints in MuJoCo's reading of URDF")
         if j < 0:
             found.add("joints", np.inf, f"joint `{model.names[i]}` is none of MuJoCo's")
             return found
@@ -230,5 +230,3 @@ def keyframes(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> Non
         q = np.asarray(model.keyframes[name], float)
         state = there("mujoco", model, joints, q, np.zeros(model.nv), mj.nq, mj.nv)
         found.expect("keyframes", state.q, mj.key_qpos[i], lambda _, name=name: f"keyframe `{name}`")
-
-

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from comparison import STATES, Joint, Quantities, Refused, Unlike, state_of, there
+from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there
 
 import condyle
 
@@ -45,14 +45,14 @@ def read(path: Path, root_joint: str | None) -> pin.Model:
         said[:] = texts
         return model
     except (ValueError, RuntimeError, IndexError) as error:
-        raise Refused(str(error).strip().splitlines()[0]) from None
+        raise RefusedError(str(error).strip().splitlines()[0]) from None
 
 
 def compare(theirs: pin.Model, model: condyle.Model) -> Quantities:
     """Compares everything that both have."""
     found = Quantities(model, TOLERANCE)
     if "planar" in model.joint_types:
-        raise Unlike("planar joints: Pinocchio leaves out their axes")
+        raise UnlikeError("planar joints: Pinocchio leaves out their axes")
     if (theirs.nq, theirs.nv) != (model.nq, model.nv):
         found.add("nq, nv", np.inf, f"{model.nq}, {model.nv}, theirs {theirs.nq}, {theirs.nv}")
         return found

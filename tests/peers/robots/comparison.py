@@ -19,11 +19,11 @@ UNLIMITED = 2.0
 STATES = 2
 
 
-class Refused(Exception):
+class RefusedError(Exception):
     """A robot that a peer does not read."""
 
 
-class Unlike(Exception):
+class UnlikeError(Exception):
     """A robot that a peer reads, and that cannot be compared, for a named reason."""
 
 
@@ -100,7 +100,7 @@ def block(library: str, kind: str, q: Array, v: Array) -> tuple[Array, Array, Ar
         return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])]), R, np.zeros(3)
     if kind == "planar":
         if library == "mujoco":
-            raise Unlike("planar joints are other joints in MuJoCo")
+            raise UnlikeError("planar joints are other joints in MuJoCo")
         angle = np.arctan2(q[3], q[2])
         T = np.eye(3)
         T[:2, :2] = turned(angle)

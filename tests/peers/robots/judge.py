@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import beside_mujoco
 import beside_pinocchio
-from comparison import Difference, Quantities, Refused, Unlike
+from comparison import Difference, Quantities, RefusedError, UnlikeError
 from files import Robot
 
 import condyle
@@ -49,6 +49,14 @@ class Verdict(NamedTuple):
     """Reasons why quantities were not compared, by peer."""
 
 
+FREE = "free_flyer"
+
+
+def nv(plant: Any) -> int:
+    """Returns the number of degrees of freedom of Drake's plant."""
+    return int(plant.num_velocities())
+
+
 class Trial:
     """Condyle and the peers on one file."""
 
@@ -62,8 +70,8 @@ class Trial:
         self.warnings: list[str] = []
         self.read = False
 
-    def ours(self, root_joint: str | None) -> condyle.Model | None:
-        """Returns our model; None if we refuse the file."""
+    def ours(self, root_joint: str | None) -> condyle.Model | str:
+        """Returns our model, or the error if we refuse the file."""
         path = self.robot.path
         try:
             if self.robot.format == "mjcf":
@@ -75,10 +83,19 @@ class Trial:
             else:
                 model = condyle.Model.from_sdf(path, root_joint=root_joint)
         except condyle.Error as error:
-            self.errors.append(str(error).replace(f"{path}:", "").strip())
+            return str(error).replace(f"{path}:", "").strip()
+        return model
+
+    def chosen(self, roots: tuple[str | None, ...], nv: int | None) -> condyle.Model | None:
+        """Returns our model with the first root joint that gives nv degrees of freedom, else with any."""
+        tried = [self.ours(root) for root in roots]
+        models = [model for model in tried if not isinstance(model, str)]
+        if not models:
+            self.errors.append(str(tried[0]))
             return None
+        model = next((model for model in models if model.nv == nv), models[0])
         self.read = True
-        self.warnings = [str(w).replace(f"{path}:", "") for w in model.warnings]
+        self.warnings = [str(w).replace(f"{self.robot.path}:", "") for w in model.warnings]
         return model
 
     def beside(
@@ -86,21 +103,22 @@ class Trial:
         peer: str,
         read: Callable[[], Any],
         compare: Callable[[Any, condyle.Model], Quantities],
-        root_joint: Callable[[Any], str | None] = lambda _: None,
+        roots: tuple[str | None, ...] = (None,),
+        nv: Callable[[Any], int] | None = None,
     ) -> None:
-        """Compares with one peer."""
+        """Compares with one peer; of several root joints the first with which nv is the peer's."""
         try:
             theirs = read()
-        except Refused as error:
+        except RefusedError as error:
             self.peers[peer] = f"refuses: {error}"
             return
-        model = self.ours(root_joint(theirs))
+        model = self.chosen(roots, nv(theirs) if nv else None)
         if model is None:
             self.peers[peer] = "reads"
             return
         try:
             found = compare(theirs, model)
-        except Unlike as error:
+        except UnlikeError as error:
             self.peers[peer] = f"unlike: {error}"
             return
         self.compared |= found.compared
@@ -118,7 +136,7 @@ class Trial:
         states = set(self.peers.values())
         reads = states & {"equal", "different", "reads"}
         if not self.errors and not self.read:
-            self.ours("free_flyer" if self.robot.format != "mjcf" else None)
+            self.chosen((FREE, None) if self.robot.format != "mjcf" else (None,), None)
         unread = all(state.startswith("refuses") for state in states)
         if self.robot.included and unread and not any("opening file" in state for state in states):
             return Verdict("fragment", [], "included by other files, and read alone by no peer", self.peers, {}, [], {})
@@ -129,7 +147,8 @@ class Trial:
         else:
             verdict = "equal" if "equal" in reads else "only ours"
         error = self.errors[0] if self.errors else ""
-        return Verdict(verdict, self.warnings, error, self.peers, self.differences, sorted(self.compared), self.left_out)
+        compared = sorted(self.compared)
+        return Verdict(verdict, self.warnings, error, self.peers, self.differences, compared, self.left_out)
 
     def mjcf(self) -> None:
         """MuJoCo, whose format it is; Drake only where MuJoCo refuses."""
@@ -139,19 +158,13 @@ class Trial:
     def urdf(self) -> None:
         """Pinocchio and Drake with a free root, MuJoCo with a fixed one."""
         path, folder = self.robot.path, self.folder
-        free = "free_flyer"
-        self.beside("Pinocchio", lambda: beside_pinocchio.read(path, free), beside_pinocchio.compare, lambda _: free)
+        self.beside("Pinocchio", lambda: beside_pinocchio.read(path, FREE), beside_pinocchio.compare, (FREE,))
         if beside_drake is not None:
-            self.beside("Drake", lambda: beside_drake.read(path, folder), beside_drake.compare, self.root)
+            self.beside("Drake", lambda: beside_drake.read(path, folder), beside_drake.compare, (FREE, None), nv)
         self.beside("MuJoCo", lambda: beside_mujoco.read_urdf(path), partial(beside_mujoco.compare_urdf, path))
 
     def sdf(self) -> None:
         """Drake."""
         path, folder = self.robot.path, self.folder
         if beside_drake is not None:
-            self.beside("Drake", lambda: beside_drake.read(path, folder), beside_drake.compare, self.root)
-
-    @staticmethod
-    def root(plant: Any) -> str | None:
-        """Returns the root joint with which our model moves as Drake's plant."""
-        return "free_flyer" if beside_drake.floats(plant) else None
+            self.beside("Drake", lambda: beside_drake.read(path, folder), beside_drake.compare, (FREE, None), nv)

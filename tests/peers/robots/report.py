@@ -26,19 +26,18 @@ BEGIN, END = "<!-- public robots -->", "<!-- end of public robots -->"
 
 HEAD = """## Public robots
 
-Every robot file of the repositories below, read here and by MuJoCo (MJCF, URDF), Pinocchio (URDF) and Drake (URDF, SDF). This
-section is written by `{command}`.
+Every robot file of the repositories below, read here and by MuJoCo (MJCF, URDF), Pinocchio (URDF) and Drake (URDF, SDF).
+This section is written by `{command}`, with condyle {condyle}, MuJoCo {mujoco}, Pinocchio {pin},
+Drake {drake} and Python {python}. Robots are not committed. Meshes of 4 MB and more were not at hand: a
+tetrahedron replaces each of them, for both libraries.
 
-Versions: condyle {condyle}, MuJoCo {mujoco}, Pinocchio {pin}, Drake {drake}, Python {python}. Robots are not committed. A
-snapshot of a repository lacks files of 4 MB and more: a tetrahedron replaces such a mesh of an MJCF, for both libraries.
+The numbers of coordinates, M, the bias, placements of frames, total mass, limits of position, velocity and effort,
+damping, friction and armature are compared at two random states. To these come, with MuJoCo, springs and damping of
+`passive_torque`, actuators, keyframes and sites; with Drake, springs. A result may differ by {tolerances} of
+1 + the largest number of it. Exceptions are listed below, with their reasons; `tests/peers/robots/` applies them.
 
-Compared are the numbers of coordinates, M, the bias, placements of frames, total mass, limits of position, velocity and effort,
-damping, friction and armature; with MuJoCo also springs and damping of `passive_torque`, actuators, keyframes and sites, with
-Drake also springs. Two random states are taken. A result may differ by {tolerances} of 1 + the largest number of it.
-`tests/peers/robots/` names each exception, and a robot counts as equal only if all other quantities are equal.
-
-*Parts* are files that are no robot alone: parts of others, templates, worlds without a model. *Alone* is read here and by no
-peer. *Nobody* is refused by all. *Warned* counts robots with a warning among the equal ones.
+*Parts* are files that are no robot alone: parts of others, templates, worlds without a model. *Warned* counts the equal
+robots with a warning. *Refused* are read by a peer. *Alone* are read here and by no peer. *Nobody* reads the rest.
 """
 
 
@@ -131,8 +130,8 @@ def table(results: Results, commits: dict[str, str], command: str, tolerances: s
     names = ("condyle", "mujoco", "pin", "drake")
     versions = {name: installed(name) for name in names}
     lines = [HEAD.format(command=command, python=platform.python_version(), tolerances=tolerances, **versions)]
-    lines += ["| Repository | Commit | Format | Files | Parts | Equal | Warned | Different | Refused | Alone | Nobody |"]
-    lines += ["| --- | --- | --- |" + " ---: |" * 8]
+    columns = "Files | Parts | Equal | Warned | Different | Refused | Alone | Nobody"
+    lines += [f"| Repository | Commit | Format | {columns} |", "| --- | --- | --- |" + " ---: |" * 8]
     groups: dict[tuple[str, str], Results] = defaultdict(list)
     for robot, verdict in results:
         groups[robot.collection, robot.format].append((robot, verdict))
