@@ -1,7 +1,10 @@
 """Robots beside Drake: SDF, URDF, and MJCF that MuJoCo does not read."""
 
+import atexit
 import logging
 import re
+import shutil
+import tempfile
 from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
@@ -50,35 +53,63 @@ LENGTHS = {
 """Numbers of positions and velocities of the kinds of joints whose coordinates are known here."""
 
 
+IRRELEVANT = {
+    *("sensor", "plugin", "visual", "collision", "light", "gui", "scene", "physics", "audio", "wind", "state", "road"),
+    *("population", "atmosphere", "magnetic_field", "projector", "battery", "particle_emitter", "material", "contact"),
+    *("velocity_decay", "kinematic", "audio_sink", "audio_source", "actor", "spherical_coordinates"),
+}
+"""Elements of SDF without effect on what is compared. Drake refuses files for some of them."""
+
+
+class Copies:
+    """Copies of the SDFs below a folder without irrelevant elements, and the packages that Drake finds among them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.place = folder, Path(tempfile.mkdtemp(prefix="robots-"))
+        atexit.register(shutil.rmtree, self.place, ignore_errors=True)
+        self.packages = PackageMap.MakeEmpty()
+        for mark in ("package.xml", "model.config"):
+            for path in sorted(folder.rglob(mark)):
+                if not self.packages.Contains(path.parent.name):
+                    home = self.of(path).parent
+                    home.mkdir(parents=True, exist_ok=True)
+                    shutil.copy(path, home)
+                    self.packages.Add(path.parent.name, str(home))
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in (".sdf", ".world") and path.is_file():
+                copy = self.of(path)
+                copy.parent.mkdir(parents=True, exist_ok=True)
+                copy.write_text(self.plain(path), encoding="utf-8")
+
+    def of(self, path: Path) -> Path:
+        """Returns the path of a copy, with a suffix that Drake knows."""
+        copy = self.place / path.relative_to(self.folder)
+        return copy.with_name(copy.name + ".sdf") if copy.suffix == ".world" else copy
+
+    def plain(self, path: Path) -> str:
+        """Returns the text of an SDF without irrelevant elements; as it is if its inertias depend on shapes."""
+        text = text_of(path)
+        if re.search(r"\bauto\s*=\s*[\"'](?:true|1)", text):
+            return text
+        try:
+            tree = ElementTree.fromstring(text)
+        except (ElementTree.ParseError, ValueError):
+            return text
+        for parent in list(tree.iter()):
+            for child in list(parent):
+                if child.tag in IRRELEVANT:
+                    parent.remove(child)
+        for uri in tree.iterfind(".//include/uri"):
+            name = (uri.text or "").strip()
+            if "://" not in name and not (path.parent / name).exists() and self.packages.Contains(name.split("/")[0]):
+                uri.text = f"model://{name}"
+        return ElementTree.tostring(tree, encoding="unicode")
+
+
 @cache
-def packages(folder: Path) -> PackageMap:
-    """Returns all packages and models below a folder, by the names of their folders."""
-    found = PackageMap.MakeEmpty()
-    for mark in ("package.xml", "model.config"):
-        for path in sorted(folder.rglob(mark)):
-            if not found.Contains(path.parent.name):
-                found.Add(path.parent.name, str(path.parent))
-    return found
-
-
-IRRELEVANT = {"sensor", "plugin", "visual", "collision", "light", "gui", "scene", "physics", "audio", "wind"}
-"""Elements of SDF without effect on what is compared; Drake refuses files for some of them."""
-
-
-def plain(path: Path) -> str | None:
-    """Returns the text of an SDF without irrelevant elements; None if it has to be read as it is."""
-    text = text_of(path)
-    if re.search(r"auto\s*=\s*[\"']|<uri>(?!\w+://)|<merge|:\w+ ", text):
-        return None
-    try:
-        tree = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError):
-        return None
-    for parent in list(tree.iter()):
-        for child in list(parent):
-            if child.tag in IRRELEVANT:
-                parent.remove(child)
-    return ElementTree.tostring(tree, encoding="unicode")
+def copies(folder: Path) -> Copies:
+    """Returns the copies of a folder's SDFs."""
+    return Copies(folder)
 
 
 def read(path: Path, folder: Path) -> MultibodyPlant:
@@ -87,13 +118,11 @@ def read(path: Path, folder: Path) -> MultibodyPlant:
     plant = MultibodyPlant(0.0)
     parser = Parser(plant)
     parser.SetAutoRenaming(True)
-    parser.package_map().AddMap(packages(folder))
-    text = plain(path) if path.suffix in (".sdf", ".world") else None
+    here = copies(folder)
+    parser.package_map().AddMap(here.packages)
+    copy = here.of(path)
     try:
-        if text is None:
-            parser.AddModels(str(path))
-        else:
-            parser.AddModelsFromString(text, "sdf")
+        parser.AddModels(str(copy if copy.exists() else path))
         plant.Finalize()
     except (RuntimeError, ValueError, MemoryError, SystemExit) as error:  # an assertion of Drake's is a SystemExit
         raise RefusedError(str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__) from None

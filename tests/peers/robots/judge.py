@@ -29,7 +29,7 @@ def prepare(folder: Path) -> None:
     """Does once what every file needs, before processes are forked."""
     packages(folder)
     if beside_drake is not None:
-        beside_drake.packages(folder)
+        beside_drake.copies(folder)
 
 
 class Verdict(NamedTuple):

@@ -26,7 +26,7 @@ BEGIN, END = "<!-- public robots -->", "<!-- end of public robots -->"
 
 HEAD = """## Public robots
 
-Every robot file of the repositories below, read here and by MuJoCo (MJCF, URDF), Pinocchio (URDF) and Drake (URDF, SDF).
+Every robot file of these repositories, read here and by MuJoCo (MJCF, URDF), Pinocchio (URDF) and Drake (URDF, SDF).
 This section is written by `{command}`, with condyle {condyle}, MuJoCo {mujoco}, Pinocchio {pin},
 Drake {drake} and Python {python}. Robots are not committed. Meshes of 4 MB and more were not at hand: a
 tetrahedron replaces each of them, for both libraries.
