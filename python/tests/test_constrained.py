@@ -141,7 +141,7 @@ LOOPS = """
 <mujoco>
   <worldbody>
     <body name="crank"><joint name="one" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 1" size="0.05"/>
-      <body name="coupler" pos="0 0 1"><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 1 0 0" size="0.05"/></body>
+      <body name="coupler" pos="0 0 1"><joint axis="0 1 0"/><geom type="sphere" size="0.05"/></body>
     </body>
     <body name="rocker" pos="1 0 0"><joint name="two" axis="0 1 0"/><geom type="sphere" size="0.05"/></body>
   </worldbody>
