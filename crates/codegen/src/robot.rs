@@ -188,7 +188,7 @@ impl<'s> Robot<'s> {
         let lifted = |I: Inertia<f64>| -> Inertia<Expression> { I.lift() };
         let mut model = model.clone().without_residues().with_inertias(|i, I| given(i).unwrap_or_else(|| lifted(I)))?;
         if settings.armature_is_input {
-            let armature = r.input("armature", model.nv(), "inertia of the rotors, added to the diagonal of M");
+            let armature = r.input("armature", model.nv(), "inertia of the rotors, added to the diagonal of M; one number along the linear coordinates of a free joint");
             model = model.with_scalar_armature(&armature);
         }
         if settings.gravity_is_input {
