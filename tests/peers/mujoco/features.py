@@ -352,9 +352,9 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
     a = there.acceleration_from(d.qpos, d.qvel, np.zeros(m.nv))
     tau = condyle.rnea(model, data, q, v, a)
     expect("bias", there.effort(q, tau), effect["bias"])
-    passive = condyle.passive_torque(model, q, v, 1e-3)
-    passive = passive + model.friction * np.tanh(v / 1e-3)  # MuJoCo's friction is a constraint
-    expect("passive", there.effort(q, passive), effect["passive"])
+    passive = there.effort(q, condyle.passive_torque(model, q, v, 1e-3))
+    passive = passive + model.friction * np.tanh(d.qvel / 1e-3)  # MuJoCo's friction is a constraint
+    expect("passive", passive, effect["passive"])
     expect("gravity", model.gravity, effect["gravity"] if not effect["disabled"][0] & 128 else 0 * effect["gravity"])
     frames = {f.name for f in model.frames}
     for name, pose in effect.items():
