@@ -3,7 +3,7 @@
 use super::convert::convert;
 use super::schema::{KNOWN, LEFT_OUT};
 use super::scopes::MERGED;
-use super::values::{attribute, flag, text};
+use super::values::{attribute, flag, text, trim_numbers};
 use crate::error::Error;
 use crate::io::files::{Search, find_model};
 use crate::io::known::Known;
@@ -14,6 +14,9 @@ use std::path::{Path, PathBuf};
 /// Name of the file that says which file of a folder is its model, and its older name.
 const CONFIGS: [&str; 2] = ["model.config", "manifest.xml"];
 
+/// Maximum number of included files: opening more takes longer than a second.
+const MAX_INCLUDES: usize = 16_384;
+
 /// Reader of a robot's files.
 pub(super) struct Includes<'o> {
     amount: Amount,
@@ -21,6 +24,8 @@ pub(super) struct Includes<'o> {
     packages: &'o [PathBuf],
     /// Files that are being read, each one included by the one before it.
     open: Vec<PathBuf>,
+    /// Number of includes so far.
+    count: usize,
     pub(super) warnings: Vec<Warning>,
     /// Fault of the first model of a world that was left out since its file could not be found.
     pub(super) missing: Option<Error>,
@@ -29,7 +34,7 @@ pub(super) struct Includes<'o> {
 impl<'o> Includes<'o> {
     pub(super) fn new(packages: &'o [PathBuf]) -> Self {
         let (amount, known) = (Amount::default(), Known::new(KNOWN));
-        Self { amount, known, packages, open: Vec::new(), warnings: Vec::new(), missing: None }
+        Self { amount, known, packages, open: Vec::new(), count: 0, warnings: Vec::new(), missing: None }
     }
 
     /// Reads a file and all that it includes; its root stands at a level.
@@ -52,6 +57,7 @@ impl<'o> Includes<'o> {
     fn expand(&mut self, mut root: Element, folder: Option<&Path>, level: usize) -> Result<Element, Error> {
         convert(&mut root)?;
         self.known.check(&root, LEFT_OUT, &mut self.warnings);
+        trim_numbers(&mut root, &mut self.warnings);
         self.children(&mut root, folder, level)?;
         Ok(root)
     }
@@ -92,6 +98,10 @@ impl<'o> Includes<'o> {
         level: usize,
     ) -> Result<Option<Element>, Fault> {
         let wrong = |what: String| Fault::Other(include.wrong(what));
+        self.count += 1;
+        if self.count > MAX_INCLUDES {
+            return Err(wrong(format!("{} files are included, at most {MAX_INCLUDES} are allowed", self.count)));
+        }
         let uri = text(include, "uri").ok_or_else(|| wrong("has no uri".to_owned()))?;
         let found = find_model(uri, &Search { folder, packages: self.packages });
         let found = found.map_err(|e| Fault::Missing(e.to_string()))?;
