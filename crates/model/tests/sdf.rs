@@ -504,6 +504,7 @@ fn what_a_model_does_not_hold() {
             turn("<axis/><physics><ode><suspension><cfm>1</cfm></suspension></ode></physics>"),
             "the suspension is left out",
         ),
+        (axis("").replace("</axis>", "</axis><axis2/>"), "axis2 is left out: a revolute joint has none"),
         (axis("") + "<enable_wind>true</enable_wind>", "enable_wind is left out"),
         (
             axis("").replace("revolute", "continuous").replace("</xyz>", "</xyz><limit><lower>0</lower></limit>"),
@@ -558,6 +559,8 @@ fn values_that_are_none() {
             "<link name='a'><pose rotation_format='quat_xyzw' degrees='true'>0 0 0 0 0 0 1</pose></link>",
             "pose: a quaternion is not in degrees",
         ),
+        ("", "model `m`: has no links"),
+        ("<link name='a'/><model name='n'/>", "model `n`: has no links"),
         ("<link name='a'/><link name='world'/>", "link `world`: the name belongs to SDF"),
         (
             "<link name='a'/><joint name='j' type='hinge'><parent>world</parent><child>a</child></joint>",
@@ -635,6 +638,8 @@ fn the_frame_of_a_model_moves_with_its_link() {
     };
     assert_eq!(read(""), (1, [0.0, 0.0, 1.0]));
     assert_eq!(read(" canonical_link='b'"), (2, [-1.0, 0.0, 1.0]));
+    let wrong = format!("<sdf version='1.9'><model name='m' canonical_link='c'>{}</model></sdf>", link("a"));
+    assert!(fault(&wrong).contains("model `m`: canonical_link: no link is named `c`"));
 }
 
 /// Old files wrote nested models flat: names and frames with `::`.
@@ -839,6 +844,16 @@ fn numbers_with_something_behind() {
         let what = format!("<velocity>: `{text}` is no number; it is read as ");
         assert!(said(&m)[0].contains(&what), "{:?}", said(&m));
     }
+    let twice = "<link name='a'><inertial><mass>1</mass><mass>2</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial></link>";
+    let m = model("1.9", twice);
+    assert_eq!(m.bodies()[0].inertia.mass, 1.0);
+    assert_eq!(said(&m), ["<string>:1: <mass>: is the second <mass> here, and is left out"]);
+    let physics = |version: &str| {
+        let world = format!("<physics><gravity>0 0 -1</gravity></physics><model name='m'>{}</model>", link("a"));
+        let m = read(&format!("<sdf version='{version}'><world name='w'>{world}</world></sdf>")).unwrap();
+        (m.gravity().z, said(&m).len())
+    };
+    assert_eq!((physics("1.5"), physics("1.6")), ((-1.0, 0), (-9.81, 1)));
     assert!(limit("fast").unwrap_err().to_string().ends_with("joint `j`: velocity: `fast` is no number"));
 }
 
