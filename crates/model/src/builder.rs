@@ -182,7 +182,15 @@ impl ModelBuilder {
     /// are none; numbers that are not finite, or so large that their products are not (above 1e30); what a mimic joint
     /// follows. Every other way to make a model is checked alike. [`Error::Size`]: more than 4096 degrees of freedom, or
     /// 1024 coordinates where joints follow others.
-    pub fn build(mut self) -> Result<Model, Error> {
+    pub fn build(self) -> Result<Model, Error> {
+        self.build_with(&mut |_| Ok(()))
+    }
+
+    /// Builds the model, which `complete` may change before it is checked.
+    pub(crate) fn build_with(
+        mut self,
+        complete: &mut dyn FnMut(&mut Model) -> Result<(), Error>,
+    ) -> Result<Model, Error> {
         self.check_size()?;
         self.check()?;
         let order = self.depth_first();
@@ -241,6 +249,7 @@ impl ModelBuilder {
             singular: Vec::new(),
         };
         self.additions.add_to(&mut model, &number)?;
+        complete(&mut model)?;
         model.validate()?;
         model.geometry = model.hash_geometry();
         Ok(model)

@@ -38,7 +38,7 @@
 //! # Features
 //! All are on by default. `loaders`: files of robots, and [`robots`]. `serde`: models to and from its formats. `threads`: those of
 //! rayon. `std`: the standard library, which the first and the last need; without it the crate needs `alloc` and, for the
-//! functions of floats, the feature `libm`.
+//! functions of floats, the feature `libm`. Off by default is `urdf-rs`: models from `urdf_rs::Robot`.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
 

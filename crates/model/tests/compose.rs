@@ -47,6 +47,24 @@ fn positions_have_names() {
     assert_eq!(positions[0].1, standing);
 }
 
+/// Names that are unknown have no effect, or are errors of a strict reader.
+#[test]
+fn positions_with_unknown_names() {
+    let text = |state: &str| format!("<robot name='r'><disable_collisions link1='a'/>\n{state}</robot>");
+    let positions = |text: &str, strict| robots::quadruped().reference_configurations_str(text, strict);
+    let odd = text("<group_state nam='x' name='a'><jont name='LF_KFE' value='1'/></group_state>");
+    assert_eq!(positions(&odd, false).unwrap().len(), 1);
+    let said = "<string>: <string>:2: group_state `a`: unknown attribute `nam`; nearest is `name`";
+    refused(&odd, true, said);
+    let odd = odd.replace(" nam='x'", "");
+    refused(
+        &odd,
+        true,
+        "<string>: <string>:2: jont `LF_KFE`: unknown element <jont> in <group_state>; nearest is `joint`",
+    );
+    assert!(positions(&text("<group name='g'><joint nam='x'/></group>"), true).unwrap().is_empty());
+}
+
 #[test]
 fn positions_of_a_robot_with_fewer_joints() {
     let quadruped = robots::quadruped();

@@ -91,7 +91,7 @@ fn prologs() {
         "<!DOCTYPE robot SYSTEM 'robot.dtd'>",
         "<!DOCTYPE robot [ <!ELEMENT robot (link)> <!-- ]> ' --> <!ENTITY a \"]>\"> ]>",
     ] {
-        let model = urdf(&format!("{prolog}{ROBOT}<!-- end -->\n")).unwrap_or_else(|e| panic!("{prolog}: {e}"));
+        let model = urdf(&format!("{prolog}{ROBOT}<!-- end -->\n\0")).unwrap_or_else(|e| panic!("{prolog}: {e}"));
         assert_eq!(model.nv(), 1);
     }
     let mjcf = "<!DOCTYPE mujoco><mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>";
@@ -127,6 +127,18 @@ fn prefixes() {
     refused(&with("<xacro:wheel/>"), &format!("2: <xacro:wheel>: belongs to xacro: {expand}"));
     let renamed = with("<x:wheel name='w'/>").replace("<robot ", "<robot xmlns:x='http://www.ros.org/wiki/xacro' ");
     refused(&renamed, &format!("2: x:wheel `w`: belongs to xacro: {expand}"));
+}
+
+/// The text for other parsers has the same elements on the same lines.
+#[test]
+fn texts_for_other_parsers() {
+    let text = "<!------ a -->\n<?xml version='1.0'?><!DOCTYPE robot><robot name='a&amp;&lt;&quot;'>\n<gz:a b:c='1'\n/>\n\
+                <link name='b'>1 &lt; 2</link></robot>";
+    let expected =
+        "\n<robot name=\"a&amp;&lt;&quot;\">\n<gz-a b-c=\"1\"></gz-a>\n\n<link name=\"b\">1 &lt; 2</link></robot>";
+    assert_eq!(Model::well_formed(text).unwrap(), expected);
+    assert_eq!(Model::well_formed(expected).unwrap(), expected);
+    assert!(Model::well_formed("<robot>").is_err());
 }
 
 #[test]

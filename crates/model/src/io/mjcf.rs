@@ -1,17 +1,25 @@
 //! Robots from MJCF, the format of MuJoCo: kinematics, inertias, limits.
 
+mod actuator;
 mod assets;
 mod attributes;
+mod beside;
 mod compiler;
 mod equality;
 mod expand;
 mod geometry;
 mod include;
 mod joint;
+mod keyframe;
+mod law;
 mod mesh;
 mod options;
 mod principal;
+mod reference;
 mod sections;
+mod spring;
+mod tendon;
+mod transmission;
 mod tree;
 
 use super::known::Known;
@@ -24,10 +32,9 @@ use crate::warning::{Warning, WarningKind};
 use assets::{Assets, Solids};
 use attributes::{Attributes, Defaults, MAIN};
 use compiler::Compiler;
-use condyle_spatial::Se3;
-use equality::Joints;
+use condyle_spatial::{Se3, Vec3};
 use include::Files;
-use options::Options;
+use spring::Joints;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use tree::Placed;
@@ -117,6 +124,7 @@ impl Model {
 
 /// A file with settings of its own.
 struct Source<'a> {
+    root: &'a Element,
     compiler: Compiler,
     defaults: Defaults<'a>,
     assets: Assets<'a>,
@@ -130,18 +138,19 @@ fn model(files: &Files, options: &MjcfOptions) -> Result<Model, Error> {
     for file in &all {
         let (defaults, compiler) = (Defaults::read(&file.root)?, Compiler::read(&file.root)?);
         let (assets, folder) = (Assets::read(&file.root), file.folder.as_deref());
-        sources.push(Source { compiler, defaults, assets, folder });
+        sources.push(Source { root: &file.root, compiler, defaults, assets, folder });
     }
     let root = &all[0].root;
     let mut warnings = files.warnings.clone();
-    let flags = Options::read(root, &mut warnings)?;
+    let gravity = options::gravity(root, &mut warnings)?;
     let reader = Reader {
         options,
-        flags,
+        gravity,
         sources: &sources,
         bodies: 0,
         names: HashMap::new(),
-        joints: HashMap::new(),
+        joints: Joints::default(),
+        poses: vec![Se3::identity()],
         solids: Solids::default(),
         mass: 0.0,
         placed: Vec::new(),
@@ -152,14 +161,17 @@ fn model(files: &Files, options: &MjcfOptions) -> Result<Model, Error> {
 
 struct Reader<'a> {
     options: &'a MjcfOptions,
-    flags: Options,
+    /// m/s².
+    gravity: Vec3<f64>,
     /// The files with settings of their own, the main one first.
     sources: &'a [Source<'a>],
     /// The number of bodies so far: MuJoCo's number of the last one.
     bodies: usize,
     /// The elements that have names, by kind and name.
     names: HashMap<(&'static str, String), &'a Element>,
-    joints: Joints,
+    joints: Joints<'a>,
+    /// Pose in the world that the file has drawn, for each body of the builder.
+    poses: Vec<Se3<f64>>,
     solids: Solids,
     /// The mass of all bodies so far (kg).
     mass: f64,
@@ -171,7 +183,7 @@ struct Reader<'a> {
 impl<'a> Reader<'a> {
     fn model(mut self, root: &'a Element) -> Result<Model, Error> {
         let mut builder = ModelBuilder::new(root.attribute("model").unwrap_or("MuJoCo Model"));
-        builder.gravity(self.flags.gravity);
+        builder.gravity(self.gravity);
         builder.frame_of_kind("world", FrameKind::Link, WORLD, Se3::identity());
         for flex in root.all("deformable").flat_map(|section| section.all("flex")) {
             return Err(flex.wrong("is not supported"));
@@ -181,14 +193,21 @@ impl<'a> Reader<'a> {
         if let Some(total) = self.sources[0].compiler.total_mass.filter(|_| self.mass > 0.0) {
             builder.scale_inertias(total / self.mass);
         }
-        let warnings = equality::add(&mut builder, root, &self.joints, self.options.mimic)?;
+        let mimic = self.options.mimic;
+        let warnings = equality::add(&mut builder, root, self.sources, &self.joints, &self.poses, mimic)?;
+        self.warnings.extend(warnings);
         let place = |kind, name: &String| self.names.get(&(kind, name.clone()));
-        let mut model = builder.build().map_err(|e| match &e {
+        let (joints, warnings) = (&mut self.joints, &mut self.warnings);
+        let mut complete = |model: &mut Model| {
+            warnings.extend(beside::add(model, root, self.sources, joints, &self.poses)?);
+            Ok(())
+        };
+        let mut model = builder.build_with(&mut complete).map_err(|e| match &e {
             Error::Body { body, what } => place("body", body).map_or(e.clone(), |at| at.wrong(what.clone())),
             Error::Joint { joint, what } => place("joint", joint).map_or(e.clone(), |at| at.wrong(what.clone())),
             _ => e,
         })?;
-        model.warnings.extend(self.warnings.into_iter().chain(warnings));
+        model.warnings.append(&mut self.warnings);
         Ok(model)
     }
 

@@ -6,6 +6,8 @@ mod known;
 mod origin;
 mod reader;
 mod transmission;
+#[cfg(feature = "urdf-rs")]
+mod urdf_rs;
 mod xacro;
 
 use super::files;

@@ -4,6 +4,7 @@
 
 mod encoding;
 mod parse;
+mod write;
 
 use crate::error::Error;
 use crate::model::Model;

@@ -67,6 +67,17 @@ impl<'a> Defaults<'a> {
         Ok(Attributes { element, class: self.classes[name].get(element.tag.as_str()) })
     }
 
+    /// Returns the element with the defaults that its class has for another kind of element.
+    pub(super) fn of_kind<'e>(
+        &'e self,
+        element: &'e Element,
+        kind: &str,
+        around: &'e str,
+    ) -> Result<Attributes<'e>, Error> {
+        let name = self.known(element, element.attribute("class").unwrap_or(around))?;
+        Ok(Attributes { element, class: self.classes[name].get(kind) })
+    }
+
     /// The class's name, if there is such a class.
     pub(super) fn known<'e>(&self, element: &Element, name: &'e str) -> Result<&'e str, Error> {
         if self.classes.contains_key(name) {
@@ -93,6 +104,12 @@ impl<'a> Attributes<'a> {
 
     pub(super) fn get(&self, name: &str) -> Option<&'a str> {
         self.element.attribute(name).or_else(|| self.class?.get(name).copied())
+    }
+
+    /// Returns the texts of an attribute, the class's first: an element may replace only the first numbers of a list.
+    pub(super) fn layers(&self, name: &str) -> impl Iterator<Item = &'a str> + use<'a> {
+        let class = self.class.and_then(|class| class.get(name).copied());
+        class.into_iter().chain(self.element.attribute(name))
     }
 
     /// The value of an attribute, as a reader of text understands it, if it is there.

@@ -1,4 +1,4 @@
-//! Joints: kind, poses, limits and losses.
+//! Joints: kind, poses and limits.
 
 use super::Reader;
 use super::attributes::Attributes;
@@ -29,12 +29,8 @@ impl Reader<'_> {
             _ => return Err(wrong(format!("type: `{kind}` is none of hinge, slide, ball and free"))),
         };
         let joint = joint.normalized().map_err(wrong)?;
-        let mut options = JointOptions {
-            damping: if self.flags.damper { number("damping")? } else { 0.0 },
-            friction: if self.flags.friction { number("frictionloss")? } else { 0.0 },
-            armature: number("armature")?,
-            ..JointOptions::default()
-        };
+        // limits of effort, damping and friction: see beside.rs
+        let mut options = JointOptions { armature: number("armature")?, ..JointOptions::default() };
         if joint == Joint::FreeFlyer {
             return Ok((joint, Se3::identity(), Se3::identity(), options));
         }
@@ -47,16 +43,12 @@ impl Reader<'_> {
             _ => Se3::new(Mat3::identity(), anchor),
         };
         let jXl = Se3::new(Mat3::identity(), -anchor);
-        let range = self.limits(a, "range", "limited", kind == "ball")?.filter(|_| self.flags.limit);
+        let range = self.limits(a, "range", "limited", kind == "ball")?;
         if let (Some([_, upper]), "ball") = (range, kind) {
             let what = format!("range: the limit of {} rad on the angle of a ball joint is left out", upper * unit);
             self.warnings.push(a.element.left_out(what));
         } else {
             options.position = range.map(|[lower, upper]| (lower * unit, upper * unit));
-            if kind != "ball" {
-                let effort = self.limits(a, "actuatorfrcrange", "actuatorfrclimited", false)?;
-                options.effort = effort.map(|[lower, upper]| (lower, upper));
-            }
         }
         Ok((joint, lXj, jXl, options))
     }

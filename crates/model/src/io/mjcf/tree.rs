@@ -1,9 +1,11 @@
 //! Bodies: their joints, inertias and frames.
 
+use super::Reader;
 use super::attributes::{Attributes, MAIN};
 use super::compiler::{FromGeoms, from_to};
 use super::geometry::{self, Weight};
-use super::{Reader, mesh::Solid};
+use super::mesh::Solid;
+use super::spring::FileJoint;
 use crate::body::FrameKind;
 use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::Error;
@@ -136,9 +138,11 @@ impl<'a> Reader<'a> {
             let between = format!("{name}#{}", k + 1);
             let (called, inertia) = if last { (&name, jXl.act(inertia)) } else { (&between, Inertia::zero()) };
             body = builder.body_with((called, &joint_name), body, joint, placement, inertia, options);
-            let unit = if matches!(joint, Joint::Revolute { .. }) { self.compiler(a.element).angle } else { 1.0 };
-            let at_zero = a.number("ref")?.unwrap_or(0.0) * unit;
-            self.joints.insert(joint_name.clone(), (body, at_zero));
+            let drawn = self.poses[w.on.0] * w.placement * jXl.inverse();
+            self.poses.push(drawn);
+            let compiler = self.compiler(a.element);
+            let found = FileJoint::read(a, joint, compiler.angle, compiler.autolimits)?;
+            self.joints.add(joint_name.clone(), found.on(body.0, drawn));
             if !last {
                 builder.between(body);
             }
@@ -150,6 +154,10 @@ impl<'a> Reader<'a> {
         }
         if count == 0 {
             builder.merge(body, bXl, inertia);
+        }
+        let compensated = Attributes::plain(w.element).number("gravcomp")?.unwrap_or(0.0);
+        if compensated != 0.0 && moves {
+            builder.compensate_gravity(body, bXl, inertia, compensated);
         }
         if !parts.joints.iter().any(|(a, _)| is_free(a)) {
             builder.frame_of_kind(&name, FrameKind::Link, body, bXl);

@@ -35,6 +35,7 @@ struct Parser<'a> {
 
 /// Returns the root element of a text.
 pub(super) fn parse(text: &str, file: &str) -> Result<Element, Error> {
+    let text = text.trim_end_matches('\0'); // the end of a text in C
     let mut parser = Parser {
         text,
         at: if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 },
