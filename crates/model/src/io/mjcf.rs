@@ -122,6 +122,17 @@ impl Model {
         files.parse(text, "<string>", None)?;
         model(&files, options)
     }
+
+    /// Reads a text that stands in the place of a file: the path names it in errors, and includes are found beside it.
+    ///
+    /// # Errors
+    /// As [`from_mjcf`](Self::from_mjcf).
+    #[doc(hidden)]
+    pub fn from_mjcf_text(text: &str, path: impl AsRef<Path>, options: &MjcfOptions) -> Result<Self, Error> {
+        let mut files = Files::new(Known::new(ELEMENTS));
+        files.read_text(path.as_ref(), text)?;
+        model(&files, options)
+    }
 }
 
 /// A file with settings of its own.

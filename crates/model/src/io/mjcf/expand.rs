@@ -253,7 +253,16 @@ impl Expansion<'_> {
 fn wrapper(element: &Element, class: Option<&str>) -> Element {
     let (file, line, source) = (element.file.clone(), element.line, element.source);
     let attributes = class.map(|class| ("childclass".to_owned(), class.to_owned())).into_iter().collect();
-    Element { tag: "frame".to_owned(), attributes, text: String::new(), children: Vec::new(), file, line, source }
+    Element {
+        tag: "frame".to_owned(),
+        attributes,
+        text: String::new(),
+        children: Vec::new(),
+        file,
+        line,
+        at: element.at,
+        source,
+    }
 }
 
 /// Returns a body or frame that has the class around it as its own, unless it names another one.
@@ -305,5 +314,5 @@ fn copied(element: &Element, rename: &dyn Fn(&str) -> String, level: usize) -> R
     };
     let attributes = element.attributes.iter().map(renamed).collect();
     let (tag, text, file) = (element.tag.clone(), element.text.clone(), element.file.clone());
-    Ok(Element { tag, attributes, text, children, file, line: element.line, source: element.source })
+    Ok(Element { tag, attributes, text, children, file, line: element.line, at: element.at, source: element.source })
 }
