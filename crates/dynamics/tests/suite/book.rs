@@ -2,7 +2,7 @@
 
 use crate::common;
 
-use common::{State, Worst, all_models, rng};
+use common::{State, Worst, all_models, armature_torque, rng};
 use condyle_dynamics::ReferenceFrame::Local;
 use condyle_dynamics::{Act, Cross, Data, Force, Model, Motion, Se3, Vec3, forward_kinematics, rnea};
 use nalgebra::{DMatrix, DVector};
@@ -44,7 +44,7 @@ fn book(model: &Model, State { q, v, a, f_ext, .. }: &State) -> Vec<f64> {
             f[i] -= *external;
         }
     }
-    let mut tau = qdd.component_mul(&DVector::from_column_slice(model.armature()));
+    let mut tau = DVector::from(armature_torque(model, qd.as_slice(), qdd.as_slice()));
     for i in (1..bodies).rev() {
         tau += S[i].transpose() * DVector::from_column_slice(&f[i].to_array()); // τ_i = S_iᵀ f_i
         let (up, parent) = (X[i].act(f[i]), model.bodies()[i].parent);
