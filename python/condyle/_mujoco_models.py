@@ -1,7 +1,7 @@
 """Models of MuJoCo as plain MJCF: what its compiler has made, without anything that needs a compiler or other files.
 
-`Model.from_mujoco` reads the text as it reads any MJCF, so the rules for limits, springs, actuators and warnings are the
-same. Numbers keep all digits.
+`Model.from_mujoco` reads the text as it reads any MJCF, so the rules for limits, springs, actuators and warnings are
+the same. Numbers keep all digits.
 """
 
 import sys
@@ -161,12 +161,16 @@ class _Text:
         elif m.jnt_stiffness[joint]:
             places = slice(q, q + (7 if kind == FREE else 4))
             if not np.array_equal(m.qpos_spring[places], m.qpos0[places]):
-                raise ModelError(f"joint `{name}`: its spring rests at {m.qpos_spring[places]}, not where it is at first")
+                raise ModelError(
+                    f"joint `{name}`: its spring rests at {m.qpos_spring[places]}, not where it is at first"
+                )
         stiffness = _polynomial(m.jnt_stiffness[joint], _row(m, "jnt_stiffnesspoly", joint))
         freedoms = range(v, v + (6, 3, 1, 1)[kind])
         damping = [_polynomial(m.dof_damping[k], _row(m, "dof_dampingpoly", k)) for k in freedoms]
         losses = {"damping": damping}
-        losses |= {what: [[float(getattr(m, f"dof_{what}")[k])] for k in freedoms] for what in ("frictionloss", "armature")}
+        losses |= {
+            what: [[float(getattr(m, f"dof_{what}")[k])] for k in freedoms] for what in ("frictionloss", "armature")
+        }
         for what, found in losses.items():
             if any(numbers != found[0] for numbers in found):
                 raise ModelError(f"joint `{name}`: expected one {what} for all its degrees of freedom, found {found}")
@@ -232,7 +236,9 @@ class _Text:
             driven = self._word("mjtTrn", "mjTRN_", m.actuator_trntype[a], tuple(TRANSMISSIONS))
             attributes: _Attributes = {"name": name} if name else {}
             target = int(m.actuator_trnid[a][0])
-            attributes |= {attribute: getattr(self, names)[target] for attribute, names in TRANSMISSIONS.get(driven, ())}
+            attributes |= {
+                attribute: getattr(self, names)[target] for attribute, names in TRANSMISSIONS.get(driven, ())
+            }
             if driven == "site" and m.actuator_trnid[a][1] >= 0:
                 attributes["refsite"] = self.sites[m.actuator_trnid[a][1]]
             attributes["gear"] = m.actuator_gear[a]

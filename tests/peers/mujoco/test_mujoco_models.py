@@ -1,4 +1,4 @@
-"""`Model.from_mujoco`: models that MuJoCo has compiled, beside our reader of the same files and beside MuJoCo's numbers."""
+"""`Model.from_mujoco`: models that MuJoCo has compiled, beside our reader of the same files and MuJoCo's numbers."""
 
 import re
 import sys
@@ -109,14 +109,16 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
       <joint name="j" axis="0 1 0" ref="10" springref="20" stiffness="1 2 3" damping="0.5 0.1 0.2" range="-10 20"/>
       <joint name="k" type="ball" stiffness="2" actuatorgravcomp="true" range="0 60"/>
       <geom size="0.1"/><site name="s"/><body name="c" pos="0 0 1">
-      <joint name="l" type="slide" springdamper="0.5 1" actuatorfrcrange="-2 5"/><geom size="0.2"/><site name="t"/></body>
+      <joint name="l" type="slide" springdamper="0.5 1" actuatorfrcrange="-2 5"/>
+      <geom size="0.2"/><site name="t"/></body>
     </body><body mocap="true" name="target"/>"""
     beside = """<tendon><fixed name="f" armature="0.5" stiffness="3" damping="0.1" frictionloss="0.2" range="-1 1">
       <joint joint="j" coef="2"/><joint joint="l" coef="-1"/></fixed>
       <spatial name="cord"><site site="s"/><site site="t"/></spatial></tendon>
     <equality><connect name="c" body1="b" body2="c" anchor="0 0 1"/><weld site1="s" site2="t" active="false"/>
       <joint joint1="j" joint2="l" polycoef="1 2 3 0 0"/><tendon tendon1="f"/></equality>
-    <actuator><motor joint="j" gear="50" ctrlrange="-1 1"/><position name="p" joint="l" kp="100" kv="10" forcerange="-3 3"/>
+    <actuator><motor joint="j" gear="50" ctrlrange="-1 1"/>
+      <position name="p" joint="l" kp="100" kv="10" forcerange="-3 3"/>
       <general tendon="f" gear="3" gainprm="2" biastype="affine" biasprm="1 -3 -0.5" armature="0.01" damping="0.1"/>
       <general site="s" refsite="t" gear="1 2 3 4 5 6"/><intvelocity joint="j" kp="2" actrange="-1 1"/></actuator>
     <keyframe><key name="home" qpos="1 0 1 0 0 0.3"/><key qvel="1 2 3 4 5"/></keyframe>"""
