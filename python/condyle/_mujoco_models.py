@@ -91,19 +91,12 @@ class _Text:
     def _name_the_unnamed(self) -> None:
         """Names bodies and joints as the reader of MJCF does, so that they can be referred to."""
         taken = {*self.bodies}, {*self.joints}
-
-        def free(name: str, among: set[str]) -> str:
-            while name in among:
-                name += "_"
-            among.add(name)
-            return name
-
         for body in range(1, self.m.nbody):
-            name = self.bodies[body] = self.bodies[body] or free(f"body{body}", taken[0])
+            name = self.bodies[body] = self.bodies[body] or _free(f"body{body}", taken[0])
             first, count = int(self.m.body_jntadr[body]), int(self.m.body_jntnum[body])
             for k, joint in enumerate(range(first, first + count), start=1):
                 number = "" if count == 1 else str(k)
-                self.joints[joint] = self.joints[joint] or free(f"{name}_joint{number}", taken[1])
+                self.joints[joint] = self.joints[joint] or _free(f"{name}_joint{number}", taken[1])
 
     def _word(self, enumeration: str, prefix: str, number: int, otherwise: tuple[str, ...]) -> str:
         """The word for a number of an enumeration, in the version of MuJoCo that the model is of."""
@@ -261,9 +254,11 @@ class _Text:
             yield _element("general", attributes | {what: numbers for what, numbers in found.items() if any(numbers)})
 
     def _keyframes(self) -> Iterator[str]:
-        for k, name in enumerate(self._names("key", self.m.nkey)):
-            attributes: _Attributes = {"name": name} if name else {}
-            yield _element("key", {**attributes, "qpos": self.m.key_qpos[k], "qvel": self.m.key_qvel[k]})
+        names = self._names("key", self.m.nkey)
+        for k, name in enumerate(names):
+            q, v = self.m.key_qpos[k], self.m.key_qvel[k]
+            if name or np.any(v) or not np.array_equal(q, self.m.qpos0):  # else room that a file has asked for
+                yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q, "qvel": v})
 
 
 TRANSMISSIONS = {
@@ -275,6 +270,14 @@ TRANSMISSIONS = {
     "body": (("body", "bodies"),),
 }
 """The attribute that names the thing that an actuator drives, and the list of the things' names."""
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """The name, or one like it that is not taken; it is taken then."""
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
 
 
 def _row(model: Any, field: str, number: int) -> Any:

@@ -14,6 +14,7 @@ from condyle import _mujoco_models
 sys.path.append(str(Path(__file__).parents[1] / "pinocchio"))
 from random_mjcf import RandomMjcf
 
+PACKAGES = ("dm_control", "gymnasium", "robosuite")
 SAME = 1e-11
 """Masses, poses and M of both, to this part of the largest one; quaternions of files are rounded twice."""
 
@@ -57,6 +58,23 @@ def same_robot(ours: condyle.Model, other: condyle.Model) -> None:
         assert frame.body == others[key].body
         close(frame.placement, others[key].placement)
     close(ours.gravity, other.gravity)
+    for found, expected in zip(ours.springs, other.springs, strict=True):
+        assert found.joint == expected.joint
+        close(np.append(found.stiffness, found.rest), np.append(expected.stiffness, expected.rest))
+    for found, expected in zip(ours.gravity_compensation, other.gravity_compensation, strict=True):
+        assert found.body == expected.body
+        close(np.append(found.mass_com, found.mass), np.append(expected.mass_com, expected.mass))
+    for found, expected in zip(ours.actuators, other.actuators, strict=True):
+        assert found[:5] == expected[:5]
+        finite = np.isfinite([*expected.control, *expected.force])
+        assert np.array_equal(np.isfinite([*found.control, *found.force]), finite)
+        close(*(np.array([*a.control, *a.force])[finite] for a in (found, expected)))
+        close(*(np.array([*a.gear, a.gain, a.bias, a.kp, a.kv]) for a in (found, expected)))
+    assert ours.keyframes.keys() == other.keyframes.keys()
+    for name, q in ours.keyframes.items():
+        close(q, other.keyframes[name])
+        close(ours.keyframe_velocities[name], other.keyframe_velocities[name])
+    assert ours.constraints() == other.constraints()
 
 
 def agrees(ours: condyle.Model, theirs: mujoco.MjModel, seed: int) -> None:
@@ -66,7 +84,12 @@ def agrees(ours: condyle.Model, theirs: mujoco.MjModel, seed: int) -> None:
     data, scratch = mujoco.MjData(theirs), condyle.Data(ours)
     data.qpos[:], data.qvel[:], data.qacc[:] = there.position(q), there.velocity(q, v), 0.0
     theirs.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    theirs.dof_damping[:] = theirs.dof_frictionloss[:] = theirs.jnt_stiffness[:] = theirs.body_gravcomp[:] = 0.0
+    for force in (
+        theirs.dof_damping, theirs.dof_dampingpoly, theirs.dof_frictionloss, theirs.jnt_stiffness, theirs.body_gravcomp,
+        theirs.jnt_stiffnesspoly, theirs.tendon_damping, theirs.tendon_stiffness, theirs.actuator_damping,
+    ):  # fmt: skip
+        force[:] = 0.0
+    theirs.opt.density = theirs.opt.viscosity = 0.0
     mujoco.mj_inverse(theirs, data)
     a = there.acceleration_from(data.qpos, data.qvel, data.qacc)
     close(there.effort(q, condyle.rnea(ours, scratch, q, v, a)), data.qfrc_inverse)
@@ -143,6 +166,36 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13, err_msg=field)
         compared += 1
     assert compared > 80
+
+
+def robots_of_packages() -> list[Path]:
+    """The MJCFs of the packages that the comparison of robots reads, where these are installed."""
+    folder = Path(__file__).parents[3] / ".venv" / "robots"
+    files = sorted(file for package in PACKAGES for file in (folder / package).rglob("*.xml"))
+    return [file for file in files if "<mujoco" in file.read_text(encoding="utf-8", errors="ignore")]
+
+
+@pytest.mark.skipif(not robots_of_packages(), reason="no packages of robots in .venv/robots")
+def test_robots_of_packages() -> None:
+    """Each model that MuJoCo compiles is its own, and the robot that our reader makes of the file, where it reads it."""
+    compared = read = 0
+    for file in robots_of_packages():
+        try:
+            theirs = mujoco.MjModel.from_xml_path(str(file))
+        except ValueError:  # parts of models, and files that the package leaves out
+            continue
+        ours = condyle.Model.from_mujoco(theirs)
+        try:
+            other = condyle.Model.from_mjcf(file)
+        except condyle.Error:  # meshes of formats that we do not read
+            other = None
+        if other is not None:
+            same_robot(ours, other)
+            read += 1
+        agrees(ours, theirs, 1)
+        compared += 1
+    assert compared > 100
+    assert read > 90
 
 
 def test_words_for_what_has_none() -> None:
