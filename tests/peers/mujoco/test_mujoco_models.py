@@ -177,7 +177,7 @@ def robots_of_packages() -> list[Path]:
 
 @pytest.mark.skipif(not robots_of_packages(), reason="no packages of robots in .venv/robots")
 def test_robots_of_packages() -> None:
-    """Each model that MuJoCo compiles is its own, and the robot that our reader makes of the file, where it reads it."""
+    """Each model is MuJoCo's own, and the robot that our reader makes of the file, where it reads it."""
     compared = read = 0
     for file in robots_of_packages():
         try:

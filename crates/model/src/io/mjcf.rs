@@ -4,6 +4,8 @@ mod actuator;
 mod assets;
 mod attributes;
 mod beside;
+#[cfg(feature = "meshes")]
+mod builtin;
 mod compiler;
 mod equality;
 mod expand;
@@ -30,7 +32,7 @@ use crate::error::Error;
 use crate::model::Model;
 use crate::warning::{Warning, WarningKind};
 use assets::{Assets, Solids};
-use attributes::{Attributes, Defaults, MAIN};
+use attributes::{Attributes, Defaults};
 use compiler::Compiler;
 use condyle_spatial::{Se3, Vec3};
 use include::Files;
@@ -140,6 +142,7 @@ struct Source<'a> {
     defaults: Defaults<'a>,
     assets: Assets<'a>,
     /// The folder of the file; a string has none.
+    #[cfg_attr(not(feature = "meshes"), allow(dead_code))]
     folder: Option<&'a Path>,
 }
 
@@ -196,7 +199,7 @@ impl<'a> Reader<'a> {
         let mut builder = ModelBuilder::new(root.attribute("model").unwrap_or("MuJoCo Model"));
         builder.gravity(self.gravity);
         builder.frame_of_kind("world", FrameKind::Link, WORLD, Se3::identity());
-        for flex in root.all("deformable").flat_map(|section| section.all("flex")) {
+        if let Some(flex) = root.all("deformable").flat_map(|section| section.all("flex")).next() {
             return Err(flex.wrong("is not supported"));
         }
         self.tree(&mut builder, root)?;
