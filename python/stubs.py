@@ -33,8 +33,8 @@ ALIASES = {
     "_Controls": "ArrayLike | Sequence[ArrayLike]",
     "_Joints": "Sequence[tuple[Joint, ArrayLike | None]]",
     "_RootJoint": 'Literal["free_flyer", "planar", "spherical", "translation"]',
-    "_Kinds": 'Sequence[Literal["massless", "negative", "triangle", "singular", "unlikely", "limit", "unknown",'
-    ' "left_out", "assumed", "mimic"]]',
+    "_Kind": 'Literal["massless", "negative", "triangle", "singular", "unlikely", "limit"]'
+    ' | Literal["unknown", "left_out", "assumed", "mimic"]',
     "_Reference": 'Literal["local", "world", "local_world_aligned"]',
     "_Input": 'Literal["gravity", "armature", "damping"]'
     ' | tuple[Literal["force", "inertia"], str | int] | tuple[Literal["friction"], float]',
@@ -131,7 +131,7 @@ ARGUMENTS = {
     'Literal["position", "velocity"]': "integrate_jacobian.argument",
     'Literal["from", "to"]': "difference_jacobian.argument",
     "_Path": "path original",
-    "_Kinds": "allow",
+    "Sequence[_Kind]": "allow",
     "Sequence[_Path]": "packages",
     "_RootJoint": "root_joint",
     "BodyId": "follower leader parent ModelBuilder.body",

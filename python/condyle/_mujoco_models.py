@@ -104,7 +104,7 @@ class _Text:
         members = getattr(getattr(package, enumeration, None), "__members__", {})
         words = {int(value): name.removeprefix(prefix).lower() for name, value in members.items()}
         words = words or dict(enumerate(otherwise))
-        return words.get(int(number), str(number))
+        return str(words.get(int(number), number))
 
     def _flags(self) -> list[str]:
         package = sys.modules.get(type(self.m).__module__.partition(".")[0])
@@ -167,8 +167,8 @@ class _Text:
         for what, found in losses.items():
             if any(numbers != found[0] for numbers in found):
                 raise ModelError(f"joint `{name}`: expected one {what} for all its degrees of freedom, found {found}")
-        found = {"stiffness": stiffness} | {what: numbers[0] for what, numbers in losses.items()}
-        attributes |= {what: numbers for what, numbers in found.items() if any(numbers)}
+        own = {"stiffness": stiffness} | {what: numbers[0] for what, numbers in losses.items()}
+        attributes |= {what: numbers for what, numbers in own.items() if any(numbers)}
         if m.jnt_actgravcomp[joint]:
             attributes["actuatorgravcomp"] = True
         if _row(m, "jnt_springyield", joint) > 0:
@@ -225,7 +225,8 @@ class _Text:
 
     def _actuators(self) -> Iterator[str]:
         m = self.m
-        for a, name in enumerate(self._names("actuator", m.nu)):
+        for a, name in enumerate(self._names("actuator", len(m.actuator_trntype))):
+            control, output = (int(getattr(m, f"actuator_{of}adr", range(m.nu))[a]) for of in ("ctrl", "out"))
             driven = self._word("mjtTrn", "mjTRN_", m.actuator_trntype[a], tuple(TRANSMISSIONS))
             attributes: _Attributes = {"name": name} if name else {}
             target = int(m.actuator_trnid[a][0])
@@ -234,8 +235,10 @@ class _Text:
             }
             if driven == "site" and m.actuator_trnid[a][1] >= 0:
                 attributes["refsite"] = self.sites[m.actuator_trnid[a][1]]
-            attributes["gear"] = m.actuator_gear[a]
-            attributes |= _range("ctrlrange", "ctrllimited", m.actuator_ctrllimited[a], m.actuator_ctrlrange[a])
+            attributes["gear"] = m.actuator_gear[output]
+            attributes |= _range(
+                "ctrlrange", "ctrllimited", m.actuator_ctrllimited[control], m.actuator_ctrlrange[control]
+            )
             attributes |= _range("forcerange", "forcelimited", m.actuator_forcelimited[a], m.actuator_forcerange[a])
             if m.nplugin and m.actuator_plugin[a] >= 0:
                 yield self._plugin(int(m.actuator_plugin[a]), attributes)
@@ -268,6 +271,7 @@ TRANSMISSIONS = {
     "tendon": (("tendon", "tendons"),),
     "site": (("site", "sites"),),
     "body": (("body", "bodies"),),
+    "so3": (("joint", "joints"),),
 }
 """The attribute that names the thing that an actuator drives, and the list of the things' names."""
 
