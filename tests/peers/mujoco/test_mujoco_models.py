@@ -216,3 +216,36 @@ def test_losses_that_differ_within_a_joint() -> None:
     expected = "joint `j`: expected one armature for all its degrees of freedom, found [[0.0], [0.5], [0.0]]"
     with pytest.raises(condyle.ModelError, match=re.escape(expected)):
         condyle.Model.from_mujoco(theirs)
+
+
+PLAIN = re.sub("</?replicate[^>]*>| settotalmass=.7.", "", LOADED)
+"""The robot without what only an expanded file can be written for."""
+
+
+@pytest.mark.parametrize("text", [PLAIN, *(RandomMjcf(k).text for k in range(8))])
+def test_written_numbers(text: str, tmp_path: Path) -> None:
+    """Other inertias, limits and armature in a copy of a file are those of the robot that MuJoCo reads there."""
+    original, new = tmp_path / "original.xml", tmp_path / "new.xml"
+    original.write_text(text, encoding="utf-8")
+    model, rng = condyle.Model.from_mjcf(original), np.random.default_rng(1)
+    model.write_mjcf(new, original)
+    assert new.read_text(encoding="utf-8") == text
+    inertias = list(model.inertias)
+    for i, inertia in enumerate(inertias):
+        if inertia.mass > 0.0 and i > 0:
+            spread = 0.1 * rng.standard_normal((3, 3))
+            moments = spread @ spread.T + 1e-3 * np.eye(3)
+            inertias[i] = condyle.Inertia.from_com(
+                rng.uniform(0.5, 3.0), rng.uniform(-0.1, 0.1, 3), np.trace(moments) * np.eye(3) - moments
+            )
+    armature, lower = model.armature.copy(), model.limits.lower.copy()
+    for i, kind in enumerate(model.joint_types):
+        if kind in ("revolute", "prismatic"):
+            armature[model.idx_vs[i]] += 0.25
+            lower[model.idx_qs[i]] *= 0.5
+    changed = model.with_inertias(inertias).with_armature(armature).with_limits(lower=lower)
+    changed.write_mjcf(new, original)
+    theirs = mujoco.MjModel.from_xml_path(str(new))
+    same_robot(condyle.Model.from_mujoco(theirs), condyle.Model.from_mjcf(new))
+    close(condyle.Model.from_mjcf(new).inertial_parameters, changed.inertial_parameters)
+    agrees(changed, theirs, 2)
