@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ._condyle import WORLD, Joint, ModelBuilder
 from ._inertia import Inertia
+from ._pinocchio_models import warn_of_armature
 
 _Array = NDArray[np.float64]
 
@@ -47,6 +48,7 @@ class Robot:
             self._names.append(f"{frame.name} ({k})" if frame.name in self._names else frame.name)
             builder.frame(self._names[k], bodies[frame.parentJoint], frame.placement.homogeneous)
         self.model = builder.build().with_armature(theirs.armature + armature)
+        warn_of_armature(self.model)
         users = {frame.name: k for k, frame in enumerate(self.model.frames) if frame.kind == "user"}
         self._numbers = [users[name] for name in self._names]
 

@@ -73,11 +73,11 @@ def from_pinocchio(theirs: Any) -> Model:
         _limits(lower), _limits(upper), _limits(theirs.upperVelocityLimit), _limits(theirs.upperEffortLimit)
     )
     model = model.with_armature(theirs.armature)
-    _warn_of_armature(model)
+    warn_of_armature(model)
     return model
 
 
-def _warn_of_armature(model: Model) -> None:
+def warn_of_armature(model: Model) -> None:
     """Warns of armature that the libraries take along different axes."""
     for name, kind, at in zip(model.names, model.joint_types, model.idx_vs, strict=True):
         if kind == "free_flyer" and model.armature[at : at + 3].any():
@@ -224,7 +224,7 @@ def to_pinocchio(ours: Model) -> Any:
     theirs.upperEffortLimit = np.array(limits.effort_upper)
     theirs.lowerEffortLimit = np.array(limits.effort_lower)
     theirs.damping, theirs.armature = np.array(ours.damping), np.array(ours.armature)
-    _warn_of_armature(ours)
+    warn_of_armature(ours)
     theirs.upperDryFrictionLimit, theirs.lowerDryFrictionLimit = np.array(ours.friction), -np.array(ours.friction)
     return theirs
 

@@ -91,7 +91,11 @@ class Pair:
         sizes[self.name] = (self.root_joint or "none", ours.nbodies - 1, ours.nq, ours.nv)
 
     def with_armature(self, armature: np.ndarray) -> "Pair":
-        """The same robot, with armature for both."""
+        """The same robot, with armature for both; none along the linear coordinates of free joints, where meanings differ."""
+        armature = armature.copy()
+        for kind, first in zip(self.ours.joint_types, self.ours.idx_vs, strict=True):
+            if kind == "free_flyer":
+                armature[first : first + 3] = 0.0
         theirs = self.theirs.copy()
         theirs.armature = armature
         return Pair(self.name, theirs, self.ours.with_armature(armature), self.root_joint, self.chains)

@@ -97,7 +97,7 @@ for _ in range(3):
     )
 (here / "gripper_mujoco.json").write_text(json.dumps(out))
 
-# Springs, polynomial damping, gravity compensation and the armature of a free joint, for tests/suite/passive.rs: here in the
+# Springs, polynomial damping, gravity compensation and the armature of a free joint, for tests/suite/springs.rs: here in the
 # conventions of this library (quaternions w last, the linear velocity of a free joint in the body's axes).
 model = mujoco.MjModel.from_xml_path(str(here / "passive.xml"))
 data = mujoco.MjData(model)

@@ -41,6 +41,7 @@ mod sdf;
 mod second_order;
 mod simulation;
 mod single_calls_f32;
+mod springs;
 mod urdf;
 mod urdf_errors;
 mod validity;
