@@ -33,6 +33,8 @@ ALIASES = {
     "_Controls": "ArrayLike | Sequence[ArrayLike]",
     "_Joints": "Sequence[tuple[Joint, ArrayLike | None]]",
     "_RootJoint": 'Literal["free_flyer", "planar", "spherical", "translation"]',
+    "_Kinds": 'Sequence[Literal["massless", "negative", "triangle", "singular", "unlikely", "limit", "unknown", "left_out",'
+    ' "assumed", "mimic"]]',
     "_Reference": 'Literal["local", "world", "local_world_aligned"]',
     "_Input": 'Literal["gravity", "armature", "damping"]'
     ' | tuple[Literal["force", "inertia"], str | int] | tuple[Literal["friction"], float]',
@@ -78,7 +80,8 @@ SPELLED = [  # the first two have no `data`
 # The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
 ARGUMENTS = {
     "ArrayLike": """
-        A B M Q R S X a acceleration actuation armature axis b d f f_ext gravity lambda_ lower pi placement point
+        A B M Q R S X a acceleration actuation armature axis b d effort_lower effort_upper f f_ext gear gravity lambda_
+        lower pi placement point rest stiffness
         q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
         Plan.controls corners normal states times touches FrictionContact.size Plan.gains Task.joints
         _check_pose.pose _controller_from_numbers.numbers""",
@@ -94,7 +97,7 @@ ARGUMENTS = {
     "Force": "_SpelledData._leave.hg",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
-    "str": "_generate.language contact function joint_name name prefix text FrictionContact.frame Task.frame",
+    "str": "_generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon text FrictionContact.frame Task.frame",
     "str | int": """
         body frame Model.with_mimic.follower Model.with_mimic.leader getVelocity.joint getAcceleration.joint
         getClassicalAcceleration.joint getJointJacobian.joint""",
@@ -106,7 +109,7 @@ ARGUMENTS = {
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
         Plan.contact _generate.shares _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        damping dt effort eps1 eps1eps2 eps2 epsilon greatest least mu offset passive pitch ratio re regularisation
+        bias damping dt eps1 eps1eps2 eps2 epsilon factor gain greatest kp kv least mu offset passive pitch ratio re regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
@@ -124,16 +127,21 @@ ARGUMENTS = {
     "_Method": "method",
     'Literal["position", "velocity"]': "integrate_jacobian.argument",
     'Literal["from", "to"]': "difference_jacobian.argument",
-    "_Path": "path",
+    "_Path": "path original",
+    "_Kinds": "allow",
     "Sequence[_Path]": "packages",
     "_RootJoint": "root_joint",
     "BodyId": "follower leader parent ModelBuilder.body",
+    "dict[str, str | float | bool]": "arguments",
+    "BodyId | Sequence[tuple[BodyId, float]]": "ModelBuilder.actuator.joint",
     "Joint": "joint",
     "_Joints": "ModelBuilder.joints",
     "Sequence[str | int]": "Model.joints",
     "Inertia": "inertia",
     "Sequence[Inertia]": "inertias",
-    "tuple[float, float]": "position Unicycle.weights",
+    "tuple[float, float]": """
+        damping_polynomial position Unicycle.weights ModelBuilder.actuator.control ModelBuilder.actuator.force""",
+    "float | tuple[float, float]": "ModelBuilder.body.effort",
     "_Integrator": "Simulation.integrator",
     "Callable[[Control], None]": "control",
     "_Number": "value HyperDual.other HyperDual.x",
@@ -181,7 +189,9 @@ ARGUMENTS = {
     "Sequence[tuple[str, int, int]]": "rotations",
     "Plan": "plan",
     "References": "references",
-    "Any": "_borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model",
+    "Any": """
+        _borrowed.capsule _casadi_hold_knot.of _lend.owner Model.from_pinocchio.model
+        Model.from_mujoco.model""",
     "int | None": "_casadi_hold_knot.t",
     "list[str]": "names _generate.frames inputs",
     "list[ContactConstraint]": "_generate.constraints",
@@ -195,7 +205,8 @@ RESULTS = {
     "_Array": """
         ContactDynamics.quasi_static FreeDynamics.quasi_static ImpulseDynamics.quasi_static
         InverseDynamics.quasi_static ContactInverseDynamics.quasi_static FrictionCone.rows WrenchCone.rows
-        Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.friction
+        Problem.rollout Problem.x0 Cholesky.lower Ltdl.diagonal Model.armature Model.damping Model.damping_polynomial
+        Model.friction
         Model.gravity Model.inertial_parameters Model.joint_placements Simulation.q Simulation.v
         from_inertia log_cholesky log_cholesky_jacobian neutral pseudo_inertia random_configuration
         FrictionContact.normal Task.joints
@@ -226,7 +237,7 @@ RESULTS = {
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Model.tree Problem.to_json _casadi_hold _casadi_hold_knot FrictionContact.frame Task.kind",
+    "str": "Model.name Model.to_json Model.tree Problem.to_json _casadi_hold _casadi_hold_knot FrictionContact.frame Task.kind",
     "str | None": "Task.frame",
     'Literal["world", "frame"]': "FrictionContact.axes",
     'Literal["wrench", "corners"] | None': "FrictionContact.forces",
@@ -241,13 +252,18 @@ RESULTS = {
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
         Simulation.__setstate__
         AugmentedLagrangian.shift Cholesky.factorize ConstraintSet.set_target Fddp.shift Ltdl.factorize
-        ModelBuilder.append ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic
+        Model.write_mjcf Model.write_urdf ModelBuilder.actuator ModelBuilder.append ModelBuilder.compensate_gravity
+        ModelBuilder.frame ModelBuilder.gravity ModelBuilder.merge ModelBuilder.mimic ModelBuilder.spring
         Problem.set_costs Problem.set_weight Problem.set_x0 Simulation.set_state WholeBodyController.track
         _check_pose _check_rotations check""",
     "WholeBodyController": "_controller_from_numbers",
     "slice": "ConstraintSet.range",
     "list[int]": "Ltdl.order Model.idx_qs Model.idx_vs Model.nqs Model.nvs Model.parents Model.singular_joints",
-    "list[str]": "Model.body_names Model.joint_types Model.names Model.warnings",
+    "list[str]": "Model.body_names Model.joint_types Model.names",
+    "list[ModelWarning]": "Model.warnings",
+    "list[Spring]": "Model.springs",
+    "list[GravityCompensation]": "Model.gravity_compensation",
+    "list[Actuator]": "Model.actuators",
     "list[tuple[int, float]]": "Ltdl.row",
     "tuple[Any, ...]": "HyperDual.__reduce__ Model.__reduce__ Simulation.__reduce__",
     "HyperDual": "HyperDual",
@@ -257,7 +273,8 @@ RESULTS = {
         ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
     "Any": "Model.to_pinocchio _lend",
-    "dict[str, _Array]": "Model.reference_configurations Model.reference_configurations_str",
+    "dict[str, _Array]": """
+        Model.keyframes Model.keyframe_velocities Model.reference_configurations Model.reference_configurations_str""",
     "list[Frame]": "Model.frames",
     "list[Inertia]": "Model.inertias",
     "list[Joint | None]": "Model.joints",

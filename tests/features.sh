@@ -21,12 +21,13 @@ check() {
 
 check condyle-spatial libm serde std
 check condyle-linalg libm std threads
-check condyle-model libm loaders serde std threads urdf-rs
-check condyle-dynamics libm loaders serde std threads urdf-rs
+check condyle-model libm loaders meshes serde std threads urdf-rs
+check condyle-dynamics libm loaders meshes serde std threads urdf-rs
 check condyle-optimal "" loaders serde threads
 check condyle-wholebody "" clarabel loaders threads
 check condyle-codegen "" cuda
-check condyle "" clarabel loaders optimal serde threads urdf-rs wholebody
+check condyle-meshes "" page
+check condyle "" clarabel loaders meshes optimal serde threads urdf-rs wholebody
 
 cargo test --locked --package condyle-model --no-default-features --features libm --lib
 cargo test --locked --package condyle-model --features urdf-rs --test urdf_rs

@@ -44,7 +44,8 @@ Derivatives of one's own function of the state are exact, by `HyperDual` numbers
 By theme; `help(condyle.rnea)` says more of each:
 
 Robots: `Model` (from URDF, MJCF, SDF), `ModelBuilder`, `Joint`, `Inertia`, `Mimic`, `BodyId`, `WORLD`, `Frame`,
-    `Limits`, `load` (by a robot's name), `robots`, `inertial_parameters`; `Data`, the scratch
+    `Limits`, `Spring`, `GravityCompensation`, `Actuator`, `ModelWarning`, `load` (by a robot's name), `robots`,
+    `inertial_parameters`; `Data`, the scratch
 Dynamics: `rnea`, `aba`, `crba`, `minv`, `nonlinear_effects`, `gravity`, `static_torque`, `coriolis_matrix`,
     `forward_dynamics`, `compute_all_terms` (`AllTerms`), `passive_torque`; `DivideConquer` (`AssemblySize`)
 Derivatives of dynamics: `rnea_derivatives` (`RneaDerivatives`), `aba_derivatives` (`AbaDerivatives`),
@@ -178,6 +179,7 @@ from ._sweep import Variations, sweep
 from ._types import (
     AbaDerivatives,
     AbaHessian,
+    Actuator,
     AllTerms,
     AssemblySize,
     CentroidalDerivatives,
@@ -191,14 +193,17 @@ from ._types import (
     Coupling,
     EnergyDerivatives,
     Frame,
+    GravityCompensation,
     Impulse,
     ImpulseDerivatives,
     Limits,
     Mimic,
+    ModelWarning,
     PassiveDerivatives,
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
+    Spring,
 )
 from .algebra import SE3, Force, Jexp6, Jlog6, Motion, exp3, exp6, log3, log6
 
@@ -208,6 +213,7 @@ __all__ = [
     "WORLD",
     "AbaDerivatives",
     "AbaHessian",
+    "Actuator",
     "AllTerms",
     "AssemblySize",
     "BodyId",
@@ -228,6 +234,7 @@ __all__ = [
     "Error",
     "Force",
     "Frame",
+    "GravityCompensation",
     "HyperDual",
     "Impulse",
     "ImpulseDerivatives",
@@ -238,6 +245,7 @@ __all__ = [
     "Limits",
     "Ltdl",
     "Mimic",
+    "ModelWarning",
     "Model",
     "ModelBuilder",
     "ModelError",
@@ -248,6 +256,7 @@ __all__ = [
     "RneaDerivatives",
     "RneaHessian",
     "RneaSecondDerivatives",
+    "Spring",
     "Variations",
     "__version__",
     "aba",

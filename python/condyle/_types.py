@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
-    from typing_extensions import disjoint_base
+    from typing_extensions import Self, disjoint_base
 else:
 
     def disjoint_base(cls: type) -> type:
@@ -373,7 +373,7 @@ class Frame(NamedTuple):
 
     name: str
     """The name of the link or joint."""
-    kind: Literal["link", "joint", "user"]
+    kind: Literal["link", "joint", "user", "constraint"]
     """The source of the frame."""
     body: int
     """The body to which it is fixed; 0 is the world."""
@@ -413,6 +413,88 @@ class Limits(NamedTuple):
     """Least effort (N m, N), nv numbers, as a rule negative."""
     effort_upper: _Array
     """Greatest effort (N m, N), nv numbers."""
+
+
+class Spring(NamedTuple):
+    """A spring of a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest."""
+
+    joint: str
+    """The joint's name."""
+    stiffness: _Array
+    """k₀, k₁ and k₂ (N m/rad, N/m, and these per rad or m, and per its square)."""
+    rest: _Array
+    """The position of the joint at which the spring is at rest, as many numbers as q has for the joint."""
+
+
+class GravityCompensation(NamedTuple):
+    """A part of a body's weight that is carried by an unseen hand: the force −mass g acts at mass_com / mass."""
+
+    body: str
+    """The body's name."""
+    mass: float
+    """The mass whose weight is carried (kg)."""
+    mass_com: _Array
+    """That mass times its centre, in the body's frame (kg m), 3 numbers."""
+
+
+class Actuator(NamedTuple):
+    """An actuator of a robot, as its file describes it.
+
+    With the control u, and the length l, which is the gear times the position that it drives, it acts with the force
+    f = gain u + bias − kp l − kv l̇. The effort at the joint is gear · f. A motor has the gain 1 and nothing else; a servo
+    of position has the gain kp, one of velocity the gain kv.
+    """
+
+    name: str
+    """The name, or an empty string."""
+    joint: str | None
+    """The name of the joint that it drives; None if it drives none."""
+    tendon: str | None
+    """The name of the tendon that it drives; None if it drives none."""
+    frame: str | None
+    """The name of the frame on which it acts; None if it acts on none."""
+    coefficients: dict[str, float]
+    """The joints of the tendon by name, each with its coefficient (1, m/rad)."""
+    gear: _Array
+    """The effort at the joint for each unit of force (1, m), 6 numbers. Joints of one degree of freedom and tendons have
+    the first one. A ball has three: an axis in its body. A frame has six, linear first, along its axes. A free joint has
+    six too: a force along the world's axes and a torque along the body's."""
+    gain: float
+    """The force for each unit of control."""
+    bias: float
+    """The force without control, at length 0 and at rest (N, N m)."""
+    kp: float
+    """The gain of position (N/m, N m/rad); 0 for a motor."""
+    kv: float
+    """The gain of velocity (N s/m, N m s/rad); 0 for a motor."""
+    control: tuple[float, float]
+    """The least and greatest control; infinite where there is no limit."""
+    force: tuple[float, float]
+    """The least and greatest force before the gear (N, N m); infinite where there is no limit."""
+
+
+class ModelWarning(str):
+    """A warning about a robot or its file: the text, with its parts as attributes."""
+
+    kind: str
+    """The kind, by which a strict reader may allow it: 'massless', 'negative', 'triangle', 'singular', 'unlikely',
+    'limit', 'unknown', 'left_out', 'assumed' or 'mimic'."""
+    subject: str
+    """The name of the body or joint, or the element of the file."""
+    file: str | None
+    """The path of the file; None if the warning is not about a file."""
+    line: int | None
+    """The line in the file, counted from 1; None if the warning is not about a file."""
+
+    def __new__(cls, text: str, kind: str, subject: str, file: str | None = None, line: int | None = None) -> "Self":
+        """A warning of these parts."""
+        warning = super().__new__(cls, text)
+        warning.kind, warning.subject, warning.file, warning.line = kind, subject, file, line
+        return warning
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The parts of a pickle."""
+        return type(self), (str(self), self.kind, self.subject, self.file, self.line)
 
 
 class Mimic(NamedTuple):
@@ -722,3 +804,4 @@ _MODULES = {
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and issubclass(_item, tuple)]:
     setattr(_class, "__repr__", _repr)  # noqa: B010 - a type checker would not let a method be replaced
     _class.__module__ = f"condyle.{_MODULES[_class.__name__]}" if _class.__name__ in _MODULES else "condyle"
+ModelWarning.__module__ = "condyle"

@@ -1,15 +1,15 @@
 //! Models made body by body.
 
-use crate::arrays::{pose, three};
+use crate::arrays::{numbers, pose, three};
 use crate::exceptions::{exception, wrong_word};
 use crate::inertial_parameters::read_inertia;
 use crate::joint::Joint;
 use crate::model::Model;
 use condyle::{
     Inertia, JointOptions, Se3,
-    tree::{FrameKind, Mimic},
+    tree::{Actuator, FrameKind, Mimic, Transmission},
 };
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -115,10 +115,11 @@ impl ModelBuilder {
     /// velocity: greatest speed (rad/s, m/s); None for no limit.
     /// effort: greatest effort (N m, N), or the least and the greatest one; None for no limits.
     /// damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
+    /// damping_polynomial: (d₁, d₂) of damping that grows with the speed, d₀ + d₁|v| + d₂v², with d₀ = damping.
     /// armature: inertia of the rotor as seen at the joint (kg m², kg).
     #[pyo3(signature = (
         name, parent, joint, placement=None, inertia=None, *, joint_name=None, position=None, velocity=None,
-        effort=None, damping=0.0, friction=0.0, armature=0.0
+        effort=None, damping=0.0, friction=0.0, armature=0.0, damping_polynomial=(0.0, 0.0)
     ))]
     fn body(
         &mut self,
@@ -134,13 +135,14 @@ impl ModelBuilder {
         damping: f64,
         friction: f64,
         armature: f64,
+        damping_polynomial: (f64, f64),
     ) -> PyResult<BodyId> {
         let parent = self.body_of("parent", parent)?;
         let (placement, inertia) = (placed("placement", placement)?, massive(inertia)?);
+        let damping_polynomial = damping_polynomial.into();
         let effort = effort.map(|effort| effort.extract().map(|most: f64| (-most, most)).or_else(|_| effort.extract()));
         let effort = effort.transpose()?;
-        let options =
-            JointOptions { position, velocity, effort, damping, friction, armature, ..JointOptions::default() };
+        let options = JointOptions { position, velocity, effort, damping, damping_polynomial, friction, armature };
         let names = (name, joint_name.unwrap_or(name));
         let body = self.builder()?.body_with(names, parent, joint.get().0, placement, inertia, options);
         Ok(self.added(body))
@@ -260,6 +262,106 @@ impl ModelBuilder {
     ) -> PyResult<()> {
         let (parent, placement) = (self.body_of("parent", parent)?, placed("placement", placement)?);
         self.builder()?.append(parent, placement, &model.get().inner, prefix);
+        Ok(())
+    }
+
+    /// Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
+    ///
+    /// body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the position of the joint at which the
+    /// spring is at rest, as many numbers as q has for the joint.
+    ///
+    /// >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
+    /// >>> robot = ModelBuilder("door")
+    /// >>> door = robot.body("door", WORLD, Joint.revolute([0.0, 0.0, 1.0]), inertia=Inertia.from_sphere(5.0, 0.5))
+    /// >>> robot.spring(door, 2.0, rest=[0.1])
+    /// >>> robot.build().springs
+    /// [Spring(joint='door', stiffness=[2., 0., 0.], rest=[0.1])]
+    fn spring(
+        &mut self,
+        body: &Bound<'_, BodyId>,
+        stiffness: &Bound<'_, PyAny>,
+        rest: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let body = self.body_of("body", body)?;
+        let stiffness = match stiffness.extract::<f64>() {
+            Ok(stiffness) => [stiffness, 0.0, 0.0],
+            Err(_) => three("stiffness", stiffness)?.to_array(),
+        };
+        let rest: Vec<f64> = match rest.extract::<f64>() {
+            Ok(rest) => vec![rest],
+            Err(_) => numbers("rest", rest)?,
+        };
+        self.builder()?.spring(body, stiffness, &rest);
+        Ok(())
+    }
+
+    /// Carries a part of a body's weight, as MuJoCo's `gravcomp` does: the force −factor m g acts at the part's centre of
+    /// mass.
+    ///
+    /// inertia: the part's, in a frame that is at `placement` in the body's frame. factor: the share that is carried.
+    #[pyo3(signature = (body, inertia, factor=1.0, placement=None))]
+    fn compensate_gravity(
+        &mut self,
+        body: &Bound<'_, BodyId>,
+        inertia: &Bound<'_, PyAny>,
+        factor: f64,
+        placement: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let (body, placement) = (self.body_of("body", body)?, placed("placement", placement)?);
+        let inertia = read_inertia("inertia", inertia)?;
+        self.builder()?.compensate_gravity(body, placement, inertia, factor);
+        Ok(())
+    }
+
+    /// Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. It does not change limits,
+    /// armature and damping: these are the joints'.
+    ///
+    /// joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
+    /// tendon: the name of the tendon, if it drives one.
+    /// gear: a number, or up to six; None is 1. gain: the force for each unit of control; None is kp, or kv where kp is 0, or
+    /// 1 for a motor without both. control, force: least and greatest; None for no limits.
+    #[pyo3(signature = (
+        name, joint, *, tendon=None, gear=None, gain=None, bias=0.0, kp=0.0, kv=0.0, control=None, force=None
+    ))]
+    fn actuator(
+        &mut self,
+        name: &str,
+        joint: &Bound<'_, PyAny>,
+        tendon: Option<&str>,
+        gear: Option<&Bound<'_, PyAny>>,
+        gain: Option<f64>,
+        bias: f64,
+        kp: f64,
+        kv: f64,
+        control: Option<(f64, f64)>,
+        force: Option<(f64, f64)>,
+    ) -> PyResult<()> {
+        let transmission = match tendon {
+            None => {
+                let body = joint.cast::<BodyId>().map_err(|_| PyTypeError::new_err("joint: expected a BodyId"))?;
+                Transmission::Joint { body: self.body_of("joint", body)? }
+            }
+            Some(tendon) => {
+                let joints: Vec<(Bound<'_, BodyId>, f64)> = joint.extract()?;
+                let joints = joints.iter().map(|(body, by)| Ok((self.body_of("joint", body)?, *by)));
+                Transmission::Tendon { name: tendon.to_owned(), joints: joints.collect::<PyResult<_>>()? }
+            }
+        };
+        let given: Vec<f64> = match gear.map(|gear| gear.extract::<f64>().map_err(|_| gear)) {
+            None => vec![1.0],
+            Some(Ok(gear)) => vec![gear],
+            Some(Err(gear)) => numbers("gear", gear)?,
+        };
+        let mut gear = [0.0; 6];
+        if given.len() > 6 {
+            return Err(PyValueError::new_err(format!("gear: expected at most 6 numbers, found {}", given.len())));
+        }
+        gear[..given.len()].copy_from_slice(&given);
+        let free = (f64::NEG_INFINITY, f64::INFINITY);
+        let (control, force) = (control.unwrap_or(free), force.unwrap_or(free));
+        let gain = gain.or([kp, kv, 1.0].into_iter().find(|gain| *gain != 0.0)).unwrap_or(1.0);
+        let name = name.to_owned();
+        self.builder()?.actuator(Actuator { name, transmission, gear, gain, bias, kp, kv, control, force });
         Ok(())
     }
 

@@ -22,9 +22,14 @@ pub(crate) enum Attribute {
     InertialParameters,
     Limits,
     Damping,
+    DampingPolynomial,
+    Springs,
+    GravityCompensation,
+    Actuators,
     Friction,
     Armature,
     Gravity,
+    Warnings,
     Frames,
 }
 

@@ -10,8 +10,8 @@
 //   target            [x, y, z] that it is to reach, m, or null
 //   miss, tolerance   distance at the last knot, and what counts as reached, m, or null
 //   dt, times         step (s); [N + 1] times of the knots (s), increasing
-//   joints            [J] of { name, unit: "rad" | "m", lower, upper, velocity, effort }: one per coordinate of v that is
-//                     shown; its limits, or null each (|v| ≤ velocity, |tau| ≤ effort)
+//   joints            [J] of { name, unit: "rad" | "m", lower, upper, velocity, effort_lower, effort_upper }: one per
+//                     coordinate of v that is shown; its limits, or null each (|v| ≤ velocity)
 //   q, v, tau         [N + 1][J], [N + 1][J], [N][J]: rad, rad/s, N·m, or m, m/s, N
 //   iterations        [] of { iteration, cost, gap, step, regularisation, stop }; step and stop may be null
 //   budget            { budget_ms, knots, per, rows: [] of { name, us_per_knot, ms_per_horizon }, total_ms,

@@ -21,7 +21,7 @@ function quantitiesOf(data) {
   return [
     { id: "q", what: "position", rows: data.q, unit: (u) => u, limits: (joint) => [joint.lower, joint.upper] },
     { id: "v", what: "velocity", rows: data.v, unit: rate, limits: ({ velocity: m }) => [m == null ? null : -m, m] },
-    { id: "tau", what: "torque", rows: data.tau, unit: effort, limits: ({ effort: m }) => [m == null ? null : -m, m], held: true },
+    { id: "tau", what: "torque", rows: data.tau, unit: effort, limits: (j) => [j.effort_lower, j.effort_upper], held: true },
   ];
 }
 

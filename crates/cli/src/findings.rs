@@ -1,20 +1,80 @@
-//! What is odd about a robot: the model's own warnings, and what makes its numbers hard to work with.
+//! Findings about a robot: the model's own warnings, and what makes its numbers hard to work with.
 
 use crate::lines::{Kind, Lines};
+use crate::terminal::{Style, styled};
 use condyle::{Inertia, Model, neutral, tree::Body, tree::Warning};
 use nalgebra::Matrix3;
 use serde::Serialize;
 
-/// Something odd, and where the file says it.
+/// A warning of the library, or of this program.
 #[derive(Serialize)]
 pub(crate) struct Finding {
-    /// `massless`, `negative_moment`, `triangle`, `singular`, `unlikely`, `limit`, `unknown`, `left_out`, `assumed`, `mimic`,
-    /// `mass_ratio`, `moment_ratio` or `neutral`.
+    /// One of [`KINDS`].
     pub kind: &'static str,
-    /// The body, joint or element.
+    /// Name of the body or joint, or the element.
     pub name: String,
+    /// File, where it is not the robot's own; a robot may include others.
+    pub file: Option<String>,
     pub line: Option<u32>,
     pub what: String,
+}
+
+/// The kinds of findings, in the order in which they are listed: the library's, then this program's.
+pub(crate) const KINDS: [&str; 13] = [
+    "unknown",
+    "left_out",
+    "assumed",
+    "mimic",
+    "massless",
+    "negative",
+    "triangle",
+    "singular",
+    "unlikely",
+    "limit",
+    "mass_ratio",
+    "moment_ratio",
+    "neutral",
+];
+/// The heading of each of [`KINDS`].
+const HEADINGS: [&str; 13] = [
+    "unknown, misspelt or misplaced: no effect",
+    "left out: a model cannot hold it",
+    "assumed: missing in the file",
+    "joints that could follow another one and are free",
+    "bodies that move and have no mass",
+    "negative moments of inertia",
+    "moments of inertia that no body has",
+    "joints that move nothing with inertia",
+    "inertias that cannot be meant",
+    "limits with which a joint cannot work",
+    "masses far from the parent's",
+    "moments of inertia far from the parent's",
+    "limits that exclude the neutral position",
+];
+
+impl Finding {
+    /// A finding about the robot's own file.
+    fn own(kind: &'static str, name: &str, line: Option<u32>, what: String) -> Self {
+        Self { kind, name: name.to_owned(), file: None, line, what }
+    }
+}
+
+/// The findings as text, those of each kind under a heading; `source` is the robot's file.
+pub(crate) fn text(findings: &[Finding], source: &str) -> String {
+    let mut text = String::new();
+    for (kind, heading) in KINDS.into_iter().zip(HEADINGS) {
+        let of_kind: Vec<&Finding> = findings.iter().filter(|finding| finding.kind == kind).collect();
+        if of_kind.is_empty() {
+            continue;
+        }
+        text += &format!("  {kind} ({}): {heading}\n", of_kind.len());
+        for finding in of_kind {
+            let file = finding.file.as_deref().unwrap_or(source);
+            let place = finding.line.map_or(String::new(), |line| format!("{file}:{line}: "));
+            text += &format!("    {}{}\n", styled(Style::Warn, &place), finding.what);
+        }
+    }
+    text
 }
 
 /// Masses, or moments of inertia, of a body and its parent so many times apart are suspicious: a wrong unit, or a tip that
@@ -23,54 +83,39 @@ const APART: f64 = 1e3;
 /// Beyond a limit by less than this is rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// All that is odd, in the order of the file.
+/// All findings, in the order of the file.
 pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
-    let mut found: Vec<Finding> = model.warnings().iter().map(|warning| own(model, warning, lines)).collect();
+    let mut found: Vec<Finding> = model.warnings().iter().map(|warning| warned(model, warning, lines)).collect();
     for (i, b) in model.bodies().iter().enumerate().skip(1) {
-        found.extend(neighbours(model, i).map(|(kind, what)| Finding {
-            kind,
-            name: b.name.clone(),
-            line: lines.of(Kind::Body, &b.name),
-            what,
-        }));
-        found.extend(neutral_outside(model, b).map(|what| Finding {
-            kind: "neutral",
-            name: b.joint_name.clone(),
-            line: lines.of(Kind::Joint, &b.joint_name),
-            what,
-        }));
+        let line = lines.of(Kind::Body, &b.name);
+        found.extend(neighbours(model, i).map(|(kind, what)| Finding::own(kind, &b.name, line, what)));
+        let line = lines.of(Kind::Joint, &b.joint_name);
+        found.extend(
+            neutral_outside(model, b).map(|what| Finding::own("neutral", &b.joint_name, line, what)), //
+        );
     }
     found.sort_by_key(|finding| finding.line.unwrap_or(u32::MAX));
     found
 }
 
 /// A warning of the model, with its line.
-fn own(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
-    let mut what = warning.to_string();
-    let (kind, sort, name) = match warning {
-        Warning::Massless { body } => {
-            let number = model.bodies().iter().position(|b| b.name == *body);
-            if number.is_some_and(|i| model.bodies().iter().all(|b| b.parent != i)) {
-                what += ", at the tip of its limb";
-            }
-            ("massless", Kind::Body, body)
+fn warned(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
+    let (kind, subject, mut what) = (warning.kind().name(), warning.subject(), warning.to_string());
+    if let Some(place) = warning.place() {
+        // ``joint `loop` `` names its element
+        let name = subject.split('`').nth(1).unwrap_or(subject).to_owned();
+        what.drain(..format!("{place}: ").len());
+        return Finding { kind, name, file: Some(place.file.clone()), line: Some(place.line), what };
+    }
+    if let Warning::Massless { body } = warning {
+        let number = model.bodies().iter().position(|b| b.name == *body);
+        if number.is_some_and(|i| model.bodies().iter().all(|b| b.parent != i)) {
+            what += ", at the tip of its limb";
         }
-        Warning::Negative { body, .. } => ("negative_moment", Kind::Body, body),
-        Warning::Triangle { body, .. } => ("triangle", Kind::Body, body),
-        Warning::Unlikely { body, .. } => ("unlikely", Kind::Body, body),
-        Warning::Singular { joint } => ("singular", Kind::Joint, joint),
-        Warning::Limit { joint, .. } => ("limit", Kind::Joint, joint),
-        _ if warning.place().is_some() => {
-            let name = warning.subject().split('`').nth(1).unwrap_or(warning.subject()).to_owned();
-            let line = warning.place().map(|place| place.line);
-            return Finding { kind: warning.kind().name(), name, line, what };
-        }
-        _ => return Finding { kind: "other", name: String::new(), line: None, what },
-    };
-    // ``joint `loop` `` names its element; other warnings have the name alone
-    let bare = name.split('`').nth(1).unwrap_or(name);
-    let line = lines.of(sort, bare).or_else(|| lines.of(Kind::Body, bare));
-    Finding { kind, name: bare.to_owned(), line, what }
+    }
+    let line = lines.of(Kind::Body, subject).or_else(|| lines.of(Kind::Joint, subject));
+    let line = if kind == "singular" || kind == "limit" { lines.of(Kind::Joint, subject).or(line) } else { line };
+    Finding::own(kind, subject, line, what)
 }
 
 /// Whether a body's mass, or else its greatest moment of inertia, is far from its parent's.

@@ -1,11 +1,12 @@
 //! `condyle inspect`: what a robot's file says, and what is odd about it.
 
+use crate::additions::Additions;
 use crate::error::Error;
 use crate::findings::{self, Finding};
 use crate::limits::LimitCounts;
 use crate::lines::{Kind, Lines};
 use crate::robot::{self, Robot, RobotArguments};
-use crate::terminal::{Style, Table, heading, say, say_json, styled};
+use crate::terminal::{Style, Table, heading, say, say_json, short, styled};
 use condyle::{Data, Model, forward_kinematics, neutral, tree::Body, tree::FrameKind};
 use serde::Serialize;
 use std::fmt::Write;
@@ -16,7 +17,8 @@ use std::fmt::Write;
   condyle inspect robot.urdf
   condyle inspect anymal.urdf --root free
   condyle inspect scene.xml --json | jq '.warnings'
-  condyle inspect humanoid --strict        # status 1 if something is odd")]
+  condyle inspect humanoid --strict        # status 1 if something is odd
+  condyle inspect robot.urdf --strict --allow left_out,assumed")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     robot: RobotArguments,
@@ -26,6 +28,9 @@ pub(crate) struct Arguments {
     /// End with status 1 if there is a warning
     #[arg(long)]
     strict: bool,
+    /// Kinds of warnings that --strict accepts
+    #[arg(long, value_name = "KIND", value_delimiter = ',', value_parser = findings::KINDS, requires = "strict")]
+    allow: Vec<String>,
 }
 
 /// All that is told about a robot.
@@ -48,6 +53,8 @@ struct Report {
     bodies: Vec<BodyReport>,
     limbs: Limbs,
     mimics: Vec<Follower>,
+    #[serde(flatten)]
+    additions: Additions,
     warnings: Vec<Finding>,
 }
 
@@ -68,7 +75,10 @@ struct BodyReport {
     lower: Vec<Option<f64>>,
     upper: Vec<Option<f64>>,
     velocity: Vec<Option<f64>>,
+    /// Greatest magnitude of effort.
     effort: Vec<Option<f64>>,
+    effort_lower: Vec<Option<f64>>,
+    effort_upper: Vec<Option<f64>>,
     damping: Vec<f64>,
     friction: Vec<f64>,
     armature: Vec<f64>,
@@ -111,7 +121,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     } else {
         say(&report.text(&robot.model));
     }
-    match report.warnings.len() {
+    match report.warnings.iter().filter(|finding| !arguments.allow.iter().any(|kind| kind == finding.kind)).count() {
         n if n > 0 && arguments.strict => Err(Error::No(format!("{} has {n} warnings", robot.source))),
         _ => Ok(()),
     }
@@ -143,6 +153,7 @@ impl Report {
                 bodies: model.bodies().len() - 1,
             },
             mimics: followers(robot, arguments, &lines),
+            additions: Additions::new(model),
             warnings: findings::of(model, &lines),
         }
     }
@@ -191,15 +202,12 @@ impl Report {
                 let _ = writeln!(out, "  {} = {} · {} + {}{now}", f.joint, short(f.ratio), f.leader, short(f.offset));
             }
         }
+        *out += &self.additions.text();
         *out += &heading("Warnings");
         if self.warnings.is_empty() {
             *out += &format!("  {}\n", styled(Style::Good, "none"));
         }
-        for finding in &self.warnings {
-            let place = finding.line.map_or(String::new(), |line| format!("{}:{line}: ", self.source));
-            let _ = writeln!(out, "  {}{}", styled(Style::Warn, &place), finding.what);
-        }
-        text
+        text + &findings::text(&self.warnings, &self.source)
     }
 
     /// The bodies under each other, with the joints that carry them.
@@ -252,7 +260,12 @@ impl Report {
                 if b.nq == 1 { lower } else { String::new() },
                 if b.nq == 1 { one(&b.upper) } else { String::new() },
                 one(&b.velocity),
-                one(&b.effort),
+                match (&*b.effort_lower, &*b.effort_upper) {
+                    ([Some(lower)], [Some(upper)]) if *lower != -upper => {
+                        format!("{} to {}", short(*lower), short(*upper))
+                    }
+                    _ => one(&b.effort),
+                },
                 least(&b.damping),
                 least(&b.armature),
             ]);
@@ -295,6 +308,8 @@ impl BodyReport {
             upper: finite(&limits.upper[q]),
             velocity: finite(&limits.velocity[v.clone()]),
             effort: finite(&limits.effort()[v.clone()]),
+            effort_lower: finite(&limits.effort_lower[v.clone()]),
+            effort_upper: finite(&limits.effort_upper[v.clone()]),
             damping: model.damping()[v.clone()].to_vec(),
             friction: model.friction()[v.clone()].to_vec(),
             armature: model.armature()[v].to_vec(),
@@ -330,21 +345,5 @@ fn range(first: usize, n: usize) -> String {
         0 => String::new(),
         1 => first.to_string(),
         _ => format!("{first}–{}", first + n - 1),
-    }
-}
-
-/// A number in as few digits as tell it from its neighbours by a part in 10⁵.
-pub(crate) fn short(x: f64) -> String {
-    if x == 0.0 {
-        return "0".to_owned();
-    }
-    if !(1e-4..1e6).contains(&x.abs()) {
-        return format!("{x:.2e}");
-    }
-    let digits = (4 - x.abs().log10().floor() as i32).clamp(0, 8) as usize;
-    let text = format!("{x:.digits$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
     }
 }

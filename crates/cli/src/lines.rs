@@ -1,9 +1,8 @@
 //! The lines of a robot's file on which its links and joints stand.
 
-use condyle::Model;
 use std::collections::HashMap;
 
-/// What has a name and a line in a robot's file.
+/// Things that have a name and a line in a robot's file.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Kind {
     Body,
@@ -11,25 +10,27 @@ pub(crate) enum Kind {
 }
 
 /// The line of each link (body) and joint, by name, as far as the file itself has them: those of a file that it includes
-/// are not there.
+/// are missing.
 pub(crate) struct Lines(HashMap<(Kind, String), u32>);
 
 impl Lines {
-    /// Looks them up in the text of a URDF, MJCF or SDF.
+    /// Looks them up in the text of a URDF, MJCF or SDF, which need not be well-formed.
     pub(crate) fn new(text: &str) -> Self {
-        let Ok(text) = Model::well_formed(text) else { return Self(HashMap::new()) };
-        let Ok(document) = roxmltree::Document::parse(&text) else { return Self(HashMap::new()) };
-        let mut lines = HashMap::new();
-        for node in document.descendants().filter(roxmltree::Node::is_element) {
-            let kind = match node.tag_name().name() {
-                "link" | "body" => Kind::Body,
-                "joint" | "freejoint" => Kind::Joint,
-                _ => continue,
+        let (mut lines, mut line, mut is_comment) = (HashMap::new(), 1, false);
+        for piece in text.split('<') {
+            is_comment |= piece.starts_with("!--");
+            let tag = piece.split('>').next().unwrap_or(piece);
+            let kind = match tag.split(|c: char| c.is_whitespace() || c == '/').next() {
+                Some("link" | "body") => Some(Kind::Body),
+                Some("joint" | "freejoint") => Some(Kind::Joint),
+                _ => None,
             };
-            if let Some(name) = node.attribute("name") {
+            if let (Some(kind), Some(name), false) = (kind, name(tag), is_comment) {
                 // The same tag names a link inside of a joint's <parent> in an SDF: the first one with a name counts.
-                lines.entry((kind, name.to_owned())).or_insert_with(|| document.text_pos_at(node.range().start).row);
+                lines.entry((kind, name.to_owned())).or_insert(line);
             }
+            is_comment &= !piece.contains("-->");
+            line += piece.matches('\n').count() as u32;
         }
         Self(lines)
     }
@@ -38,4 +39,14 @@ impl Lines {
     pub(crate) fn of(&self, kind: Kind, name: &str) -> Option<u32> {
         self.0.get(&(kind, name.to_owned())).copied()
     }
+}
+
+/// The value of the attribute `name` in a start tag.
+fn name(tag: &str) -> Option<&str> {
+    let value = tag.split("name").skip(1).zip(tag.split("name")).find_map(|(rest, before)| {
+        let value = rest.trim_start().strip_prefix('=')?.trim_start();
+        before.ends_with(char::is_whitespace).then_some(value)
+    })?;
+    let quote = value.chars().next().filter(|c| matches!(c, '"' | '\''))?;
+    value[1..].split(quote).next()
 }

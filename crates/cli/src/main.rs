@@ -2,6 +2,7 @@
 
 #![allow(non_snake_case)] // the names of the literature
 
+mod additions;
 mod budget;
 mod check;
 mod error;

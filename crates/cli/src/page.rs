@@ -96,6 +96,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
     let (nq, limits) = (model.nq(), model.limits());
     let knots = with_time(plan);
     let finite = |x: f64| x.is_finite().then_some(x);
+    let (least, most) = crate::limits::efforts(model, model.nv());
     let joint = |b: &condyle::tree::Body| {
         let range = |limit: &[f64]| if b.joint.nq() == 1 { finite(limit[b.idx_q]) } else { None };
         json!({
@@ -104,7 +105,8 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
             "lower": range(&limits.lower),
             "upper": range(&limits.upper),
             "velocity": finite(limits.velocity[b.idx_v]).filter(|&v| v > 0.0),
-            "effort": finite(limits.effort()[b.idx_v]).filter(|&e| e > 0.0),
+            "effort_lower": finite(least[b.idx_v]),
+            "effort_upper": finite(most[b.idx_v]),
         })
     };
     let position = |x: &[f64], b: &condyle::tree::Body| match b.joint {

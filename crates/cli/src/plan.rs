@@ -392,6 +392,6 @@ fn options(arguments: &Arguments, task: Option<&Task>) -> ReadingOptions {
     ReadingOptions {
         root: flags.root.or(task.and_then(|task| task.root)),
         mimic: flags.mimic || task.is_some_and(|task| task.mimic),
-        packages: flags.packages.clone(),
+        ..flags.clone()
     }
 }

@@ -30,6 +30,27 @@ pub(crate) struct ReadingOptions {
     /// A folder with packages in it, for package:// addresses; may be given several times
     #[arg(long, value_name = "FOLDER")]
     pub packages: Vec<PathBuf>,
+    /// A value for an argument of a .xacro file, which the installed program xacro expands; may be given several times
+    #[arg(long = "argument", value_name = "NAME=VALUE", value_parser = argument)]
+    pub arguments: Vec<(String, String)>,
+    /// The one model of an SDF to read. Default: all of them
+    #[arg(long, value_name = "MODEL")]
+    pub model: Option<String>,
+}
+
+impl ReadingOptions {
+    /// Returns the library's options for a URDF.
+    fn urdf(&self) -> UrdfOptions {
+        let (root_joint, mimic) = (self.root.and_then(Root::joint), self.mimic);
+        let (packages, arguments) = (self.packages.clone(), self.arguments.clone());
+        UrdfOptions { root_joint, mimic, packages, arguments, ..UrdfOptions::default() }
+    }
+}
+
+/// Reads an argument of xacro, which it also writes as `name:=value`.
+fn argument(text: &str) -> Result<(String, String), &'static str> {
+    let (name, value) = text.split_once(":=").or_else(|| text.split_once('=')).ok_or("expected NAME=VALUE")?;
+    Ok((name.to_owned(), value.to_owned()))
 }
 
 /// The joint of a root link.
@@ -91,8 +112,14 @@ pub(crate) fn load(name: &str, options: &ReadingOptions) -> Result<Robot, Error>
         return embedded(name, options);
     };
     let found = if name.starts_with("package://") { places(Path::new("")).find(name).unwrap_or(path) } else { path };
-    let (format, text) = sniff(&found)?;
-    let model = read(name, format, options)?;
+    let (format, mut text) = sniff(&found)?;
+    let model = if format == Format::Urdf && found.extension().is_some_and(|extension| extension == "xacro") {
+        let urdf = options.urdf();
+        text = Model::expand_xacro(&found, &urdf)?;
+        Model::from_urdf_text(&text, &format!("{name} (expanded)"), &urdf)?
+    } else {
+        read(name, format, options)?
+    };
     Ok(Robot { model, source: name.to_owned(), format, text, places: places(&found) })
 }
 
@@ -105,19 +132,19 @@ fn locate(name: &str) -> Option<PathBuf> {
 
 /// Reads the model of a file of known kind.
 pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Result<Model, Error> {
-    let (root_joint, mimic) = (options.root.and_then(Root::joint), options.mimic);
+    let (root_joint, mimic, packages) = (options.root.and_then(Root::joint), options.mimic, options.packages.clone());
     Ok(match format {
-        Format::Urdf => {
-            let packages = options.packages.clone();
-            Model::from_urdf(path, &UrdfOptions { root_joint, mimic, packages, ..UrdfOptions::default() })?
+        Format::Urdf => Model::from_urdf(path, &options.urdf())?,
+        Format::Sdf => {
+            let model = options.model.clone();
+            Model::from_sdf(path, &SdfOptions { root_joint, mimic, packages, model, ..SdfOptions::default() })?
         }
-        Format::Sdf => Model::from_sdf(path, &SdfOptions { root_joint, mimic, ..SdfOptions::default() })?,
         Format::Mjcf => {
             if options.root.is_some() {
                 let what = "an MJCF says itself how its bodies are joined to the world".to_owned();
                 return Err(Error::Option { option: "root", what });
             }
-            Model::from_mjcf(path, &MjcfOptions { mimic, ..MjcfOptions::default() })?
+            Model::from_mjcf(path, &MjcfOptions { mimic, packages, ..MjcfOptions::default() })?
         }
     })
 }
@@ -141,7 +168,7 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
 
 /// An error for a name that is neither a file's nor that of a robot that comes along; with what it could have meant.
 fn unknown(name: &str) -> Error {
-    let kinds = ["urdf", "xml", "mjcf", "sdf"];
+    let kinds = ["urdf", "xacro", "xml", "mjcf", "sdf"];
     if name.contains(['.', '/', '\\']) {
         return no_such_file(name, &kinds);
     }
@@ -172,24 +199,13 @@ fn files_beside(name: &str, kinds: &[&str]) -> Vec<String> {
     files.take(1000).collect()
 }
 
-/// The most that is read of a file that is looked at beside the library's reader, which has the same limit (bytes).
-const LARGEST: u64 = 64 << 20;
-
 /// The text of a file, and by its first element the kind of it.
 fn sniff(path: &Path) -> Result<(Format, String), Error> {
     let wrong = |what: String| Error::File { file: path.display().to_string(), what };
     if path.to_str().is_some_and(|name| name.starts_with("package://")) {
         return Ok((Format::Urdf, String::new()));
     }
-    let about = std::fs::metadata(path).map_err(|error| wrong(error.to_string()))?;
-    if !about.is_file() {
-        return Err(wrong("is no regular file".to_owned()));
-    }
-    if about.len() > LARGEST {
-        return Err(wrong(format!("has {} bytes, at most {LARGEST} are read", about.len())));
-    }
-    let bytes = std::fs::read(path).map_err(|error| wrong(error.to_string()))?;
-    let text = String::from_utf8(bytes).map_err(|_| wrong("is no text in UTF-8".to_owned()))?;
+    let text = Model::file_text(path)?;
     let format = match first_tag(&text) {
         Some("robot") => Format::Urdf,
         Some("mujoco") => Format::Mjcf,

@@ -53,6 +53,22 @@ pub(crate) fn heading(text: &str) -> String {
     format!("\n{}\n", styled(Style::Bold, text))
 }
 
+/// A number in as few digits as tell it from its neighbours by a part in 10⁵.
+pub(crate) fn short(x: f64) -> String {
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    if !(1e-4..1e6).contains(&x.abs()) {
+        return format!("{x:.2e}");
+    }
+    let digits = (4 - x.abs().log10().floor() as i32).clamp(0, 8) as usize;
+    let text = format!("{x:.digits$}");
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
 /// A table with its columns in line: what looks like a number, or stands over numbers, to the right.
 pub(crate) struct Table {
     head: Vec<String>,

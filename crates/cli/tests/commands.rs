@@ -91,6 +91,54 @@ fn inspect_finds_what_is_odd_and_says_the_line() {
 }
 
 #[test]
+fn inspect_lists_warnings_by_kind_and_strict_allows_some() {
+    let folder = folder("kinds_of_warnings");
+    let file = folder.join("light.urdf");
+    std::fs::write(&file, chain(&[1.0, 1e-4, 0.0])).unwrap();
+    let path = file.to_str().unwrap();
+    let text = said(&["inspect", path], 0);
+    let at = |line: &str| text.find(line).unwrap_or_else(|| panic!("{line}\n{text}"));
+    assert!(at("massless (1): bodies that move and have no mass") < at("mass_ratio (1): masses far from the parent's"));
+    said(&["inspect", path, "--strict", "--allow", "massless"], 1);
+    let all = "massless,singular,mass_ratio,moment_ratio";
+    said(&["inspect", path, "--strict", "--allow", all], 0);
+    let wrong = condyle(&["inspect", path, "--strict", "--allow", "masless"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    let wrong = String::from_utf8(wrong.stderr).unwrap();
+    assert!(wrong.contains("masless") && wrong.contains("massless"), "{wrong}");
+}
+
+#[test]
+fn inspect_finds_lines_beside_comments() {
+    let folder = folder("comments");
+    let file = folder.join("old.urdf");
+    let urdf = chain(&[1.0, 0.0]);
+    let (head, rest) = urdf.split_once("<link name=\"link1\"").unwrap();
+    let text = format!("{head}<!-- before 2020:\n<link name=\"link1\"/> -->\n<link\n  name = 'link1'{rest}");
+    std::fs::write(&file, &text).unwrap();
+    let report = json(&["inspect", file.to_str().unwrap(), "--json"], 0);
+    let massless = report["warnings"].as_array().unwrap().iter().find(|w| w["kind"] == "massless").unwrap();
+    let line = text.lines().position(|line| line == "<link").unwrap() as u64 + 1;
+    assert_eq!((massless["name"].as_str(), massless["line"].as_u64()), (Some("link1"), Some(line)));
+}
+
+#[test]
+fn inspect_shows_both_sides_of_an_effort_limit() {
+    let folder = folder("efforts");
+    let file = folder.join("arm.xml");
+    let joint = "<joint name=\"j\" axis=\"0 1 0\" actuatorfrcrange=\"-2 5\"/>";
+    let body = format!("<body name=\"b\">{joint}<geom size=\"0.1\"/></body>");
+    std::fs::write(&file, format!("<mujoco><worldbody>{body}</worldbody></mujoco>")).unwrap();
+    let path = file.to_str().unwrap();
+    let report = json(&["inspect", path, "--json"], 0);
+    let [effort, lower, upper] =
+        ["effort", "effort_lower", "effort_upper"].map(|side| report["bodies"][0][side][0].as_f64());
+    assert_eq!((effort, lower, upper), (Some(5.0), Some(-2.0), Some(5.0)));
+    assert!(said(&["inspect", path], 0).contains("-2 to 5"));
+    assert_eq!(report["actuators"].as_array().map(Vec::len), Some(0));
+}
+
+#[test]
 fn inspect_reads_every_kind_of_file() {
     let folder = folder("kinds");
     let mjcf = "<!-- a <robot> in words -->\n<mujoco model=\"m\"><worldbody><body name=\"b\"><joint name=\"j\" axis=\"0 0 1\"/>\

@@ -15,8 +15,8 @@
 //! ran before. `CONVENTIONS` below says in which frames and order numbers are.
 //!
 //! # Features
-//! All are on by default. `loaders`: files of robots, and `robots`. `serde`: models and constraints to and from its formats.
-//! `threads`: those of rayon. `std`: the standard library, which the first and the last need, and derivatives of functions of
+//! All are on by default. `loaders`: files of robots, and `robots`. `meshes`: masses and inertias of meshes in MJCF. `serde`:
+//! models and constraints to and from its formats. `threads`: those of rayon. `std`: the standard library, which all but `serde` need, and derivatives of functions of
 //! your own (`jacobian`, `LaneJacobian`, …). Without it the crate needs `alloc` and, for the functions of floats, the feature
 //! `libm`: so it runs where there is no operating system (`examples/embedded` in the repository).
 #![doc = include_str!("../CONVENTIONS.md")]

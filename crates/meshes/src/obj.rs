@@ -51,21 +51,36 @@ fn parse(
                     let known = index != 0 && (0..points.len() as i64).contains(&from_zero);
                     Some(if known { Ok(from_zero as u32) } else { Err(wrong(&format!("no vertex is `{word}`"))) })
                 };
-                let (Some(first), Some(second)) = (corner().transpose()?, corner().transpose()?) else {
-                    return Err(wrong("a face has at least three corners"));
-                };
-                let mut before = second;
+                let mut corners = Vec::new();
                 while let Some(next) = corner().transpose()? {
-                    count += 1;
-                    full(count)?;
-                    groups[group].1.push([first, before, next]);
-                    before = next;
+                    corners.push(next);
+                    full(count + corners.len())?;
                 }
+                if corners.len() < 2 {
+                    return Err(wrong("a face has at least three corners"));
+                }
+                if only_first && across(&points, &corners) {
+                    corners.rotate_left(1);
+                }
+                count += corners.len() - 2;
+                full(count)?;
+                groups[group].1.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
             }
             _ => {}
         }
     }
     Ok((points, groups))
+}
+
+/// Whether a face has four corners, of which the second and the fourth are not farther apart than the others: tinyobj, by which
+/// MuJoCo reads, cuts it there.
+fn across(points: &[[f64; 3]], corners: &[u32]) -> bool {
+    let &[a, b, c, d] = corners else { return false };
+    let square = |p: u32, q: u32| {
+        let [p, q] = [p, q].map(|k| points[k as usize].map(|x| x as f32));
+        (0..3).map(|k| (q[k] - p[k]) * (q[k] - p[k])).sum::<f32>()
+    };
+    square(a, c) >= square(b, d)
 }
 
 /// The diffuse colours of a material file, by name.
@@ -102,7 +117,9 @@ mod tests {
     fn first_object_with_the_points_of_all() {
         let text = TEXT.replace("usemtl none", "o second\nv 5 5 5");
         let (points, triangles) = first(&text).unwrap();
-        assert_eq!((points.len(), triangles), (5, vec![[0, 1, 2], [0, 2, 3]]));
+        assert_eq!((points.len(), triangles), (5, vec![[1, 2, 3], [1, 3, 0]])); // both diagonals are as long
+        let long = first(&TEXT.replace("v 0 1 0", "v -9 9 0")).unwrap();
+        assert_eq!(long.1[..2], [[0, 1, 2], [0, 2, 3]]); // along the shorter diagonal
         assert_eq!(first(TEXT).unwrap().1.len(), 3); // a material is no object
     }
 

@@ -16,6 +16,7 @@ pub(super) struct Part {
     /// By their corners' numbers, counter-clockwise from outside.
     pub triangles: Vec<Triangle>,
     /// Red, green and blue from 0 to 1, where the file has a colour.
+    #[cfg_attr(not(feature = "page"), allow(dead_code))]
     pub color: Option<[f64; 3]>,
 }
 

@@ -15,6 +15,8 @@ mod srdf;
 #[cfg(feature = "loaders")]
 pub(crate) mod urdf;
 #[cfg(feature = "loaders")]
+mod write;
+#[cfg(feature = "loaders")]
 mod xml;
 
 #[cfg(feature = "loaders")]

@@ -24,6 +24,9 @@
 //! | attributes of an element | 256 |
 //! | included files of an SDF | 16 384 |
 //! | bytes in the names of an SDF, those of the models around each included | 67 108 864 |
+//! | tags and equals signs of an MJCF with the copies of `<replicate>` and `<attach>` | as above |
+//! | `<attach>` elements of an MJCF, and of the files that it attaches | 256 |
+//! | bytes in the files of meshes that give an MJCF mass | 536 870 912 |
 //! | attributes of all default classes of an MJCF, what they inherit included | 1 048 576 |
 //! | named positions (`<group_state>`) of an SRDF | 4096 |
 //! | degrees of freedom of a model, however it is made | 4096 |
@@ -36,8 +39,8 @@
 //! (`layout`), the tree of its turned frames and columns (`tree`), the schedule of its limbs (`limbs`).
 //!
 //! # Features
-//! All are on by default. `loaders`: files of robots, and [`robots`]. `serde`: models to and from its formats. `threads`: those of
-//! rayon. `std`: the standard library, which the first and the last need; without it the crate needs `alloc` and, for the
+//! All are on by default. `loaders`: files of robots, and [`robots`]. `meshes`: masses and inertias of meshes in MJCF. `serde`:
+//! models to and from its formats. `threads`: those of rayon. `std`: the standard library, which all but `serde` need; without it the crate needs `alloc` and, for the
 //! functions of floats, the feature `libm`. Off by default is `urdf-rs`: models from `urdf_rs::Robot`.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]

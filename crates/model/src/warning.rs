@@ -1,7 +1,8 @@
 //! Warnings about a robot: legal, but odd, left out or assumed.
 
+use crate::error::near_or;
+use crate::names::nearest;
 use alloc::string::String;
-use alloc::vec::Vec;
 use core::fmt;
 use core::str::FromStr;
 
@@ -169,8 +170,9 @@ impl FromStr for WarningKind {
     fn from_str(name: &str) -> Result<Self, String> {
         let found = Self::ALL.into_iter().find(|kind| kind.name() == name);
         found.ok_or_else(|| {
-            let names: Vec<&str> = Self::ALL.map(Self::name).to_vec();
-            format!("`{name}` is no kind of warning; expected one of {}", names.join(", "))
+            let names = Self::ALL.map(Self::name);
+            let near = near_or(&nearest(name, names.into_iter()), "");
+            format!("`{name}` is no kind of warning{near}; expected one of {}", names.join(", "))
         })
     }
 }

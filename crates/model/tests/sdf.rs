@@ -188,6 +188,7 @@ fn static_models() {
     let what = "<string>:3: joint `j`: does not move: its model is static, and all links of it are fixed to the world";
     assert_eq!(said(&m).len(), 1);
     assert!(said(&m)[0].ends_with(what.split_once(": ").unwrap().1), "{:?}", said(&m));
+    assert!(said(&model("1.9", "<static>true</static><link name='wall'/>")).is_empty());
     let free = SdfOptions { root_joint: Some(Joint::FreeFlyer), ..SdfOptions::default() };
     let text = format!("<sdf version='1.9'><model name='m'>{inside}</model></sdf>");
     assert_eq!(Model::from_sdf_str(&text, &free).unwrap().nv(), 0);
@@ -822,6 +823,44 @@ fn joints_named_as_links() {
     let turn = joint("b", "revolute", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");
     let m = model("1.6", &format!("{}{turn}{}", link("a"), link_at("b", "0 0 1 0 0 0")));
     assert_eq!((m.nv(), m.bodies()[1].joint_name.as_str(), m.bodies()[1].name.as_str()), (1, "b", "b"));
+}
+
+/// What stands behind a number is dropped, with a warning; something else than a number is an error.
+#[test]
+fn numbers_with_something_behind() {
+    let limit = |text: &str| {
+        let axis = format!("<axis><xyz>0 0 1</xyz><limit><velocity>{text}</velocity></limit></axis>");
+        let joint = joint("j", "revolute", ["a", "b"], &axis);
+        read(&format!("<sdf version='1.9'><model name='m'>{}{}{joint}</model></sdf>", link("a"), link("b")))
+    };
+    for (text, value) in [("2.5\"", 2.5), ("2.5 rad/s", 2.5), ("1e1x", 10.0), ("7,5", 7.0)] {
+        let m = limit(text).unwrap();
+        assert_eq!(m.limits().velocity[0], value);
+        let what = format!("<velocity>: `{text}` is no number; it is read as ");
+        assert!(said(&m)[0].contains(&what), "{:?}", said(&m));
+    }
+    assert!(limit("fast").unwrap_err().to_string().ends_with("joint `j`: velocity: `fast` is no number"));
+}
+
+/// Elements of Drake: a rotor is armature, ratio² times its inertia; a joint of its own kinds is an error.
+#[test]
+fn elements_of_drake() {
+    let of = |inside: &str, model: &str| {
+        let axis = format!("<axis><xyz>0 0 1</xyz></axis>{inside}");
+        let joint = joint("j", "revolute", ["a", "b"], &axis);
+        read(&format!(
+            "<sdf version='1.9' xmlns:drake='x'><model name='m'>{}{}{joint}{model}</model></sdf>",
+            link("a"),
+            link("b")
+        ))
+    };
+    let rotor = "<drake:rotor_inertia>0.02</drake:rotor_inertia><drake:gear_ratio>10</drake:gear_ratio>";
+    let m = of(rotor, "<other:thing/>").unwrap();
+    assert_eq!((m.armature()[0], said(&m)), (2.0, Vec::new()));
+    let m = of("", "<drake:linear_bushing_rpy/>").unwrap();
+    assert!(said(&m)[0].ends_with("a force or constraint of Drake's own is left out"));
+    let error = of("", "<drake:joint name='k' type='planar'/>").unwrap_err().to_string();
+    assert!(error.ends_with("drake:joint `k`: joints of Drake's own are not supported: `planar`"), "{error}");
 }
 
 /// A screw without a pitch turns once for each metre.

@@ -349,6 +349,14 @@ fn rotors_of_transmissions() {
     assert_eq!(said(&actuator("<rotorInertia>0.001</rotorInertia>")), [alone]);
     let coupled = "4: transmission `t`: it couples joints: M has no inertia of its rotors";
     assert_eq!(said(&format!("{}<joint name='k'/>", actuator(reduction))), [coupled]);
+    let rotor = "<rotorInertia>1</rotorInertia><mechanicalReduction>2</mechanicalReduction>";
+    for (kind, name) in [("fixed", "j"), ("floating", "j"), ("continuous", "x")] {
+        let text = transmission(&actuator(rotor)).replace("'j'", &format!("'{name}'"));
+        let none = format!("its joint `{name}` has no single degree of freedom: M has no inertia of its rotor");
+        let read = model(&robot(kind, "", &text));
+        assert!(read.warnings().last().unwrap().to_string().ends_with(&none), "{:?}", read.warnings());
+        assert!(read.armature().iter().all(|&x| x == 0.0));
+    }
     let near = "5: <mechanicalReducton>: unknown element <mechanicalReducton> in <transmission>; nearest is `mechanicalReduction`";
     assert_eq!(said("<mechanicalReducton>50</mechanicalReducton>"), [near]);
 }

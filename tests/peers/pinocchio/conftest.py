@@ -21,7 +21,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, exitstatu
         )
     path = config.getoption("--validation")
     if path and exitstatus == pytest.ExitCode.OK:
-        Path(path).write_text(validation.report(), encoding="utf-8")
+        before = Path(path).read_text(encoding="utf-8") if Path(path).exists() else ""
+        Path(path).write_text(validation.report() + validation.kept(before), encoding="utf-8")
         terminalreporter.write_line(f"written to {path}")
     elif path:
         terminalreporter.write_line(f"{path} is not written, as some tests failed")

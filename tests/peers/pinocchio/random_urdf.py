@@ -57,6 +57,8 @@ class RandomUrdf:
     def _joint(self, name: str, kind: str, parent: int, child: int, follows: str | None) -> str:
         axes = (f'<axis xyz="{self._numbers(3, 1.0)}"/>', "", *(f'<axis xyz="{axis}"/>' for axis in AXES))
         axis = axes[self.rng.integers(len(axes))] if kind in ("revolute", "continuous", "prismatic") else ""
+        if kind == "planar":
+            axis = '<axis xyz="0 0 1"/>'  # the one plane in which Pinocchio's joint moves
         lower, upper, velocity, effort = self.rng.uniform((-3, 0, 0, 0), (0, 3, 10, 100))
         limited = kind in ("revolute", "prismatic") or (kind == "continuous" and self.rng.random() < 0.5)
         limit = f'<limit lower="{lower}" upper="{upper}" velocity="{velocity}" effort="{effort}"/>' if limited else ""

@@ -75,6 +75,16 @@ joint, with mimic joints, armature and external forces (`crates/dynamics/tests/s
 | --- | --- | ---: | ---: |"""
 
 
+PUBLIC = re.compile(r"<!-- public robots -->.*<!-- end of public robots -->\n", re.DOTALL)
+"""The section that `tests/peers/robots.py --table` writes."""
+
+
+def kept(text: str) -> str:
+    """Returns the section on public robots of a file, which is another program's, with a line before it."""
+    section = PUBLIC.search(text)
+    return "\n" + section.group() if section else ""
+
+
 def report() -> str:
     """The whole file."""
     head = HEAD.format(

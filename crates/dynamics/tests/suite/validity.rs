@@ -154,7 +154,7 @@ fn chains_stay_without_warnings() {
 fn warnings_keep_their_order() {
     let text = r#"<mujoco><worldbody><body name="a"><joint axis="0 1 0"/><geom type="sphere" size="0.1" mass="1"/>
         <body name="b" pos="0 0 1"><joint axis="0 0 1"/><site name="s"/></body></body></worldbody>
-        <equality><weld body1="a" body2="b"/></equality></mujoco>"#;
+        <equality><tendon tendon1="t"/></equality></mujoco>"#;
     let model = Model::from_mjcf_str(text, &condyle_dynamics::MjcfOptions::default()).unwrap();
     let said = model.warnings().to_vec();
     assert!(

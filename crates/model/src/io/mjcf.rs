@@ -4,6 +4,8 @@ mod actuator;
 mod assets;
 mod attributes;
 mod beside;
+#[cfg(feature = "meshes")]
+mod builtin;
 mod compiler;
 mod equality;
 mod expand;
@@ -30,7 +32,7 @@ use crate::error::Error;
 use crate::model::Model;
 use crate::warning::{Warning, WarningKind};
 use assets::{Assets, Solids};
-use attributes::{Attributes, Defaults, MAIN};
+use attributes::{Attributes, Defaults};
 use compiler::Compiler;
 use condyle_spatial::{Se3, Vec3};
 use include::Files;
@@ -120,6 +122,17 @@ impl Model {
         files.parse(text, "<string>", None)?;
         model(&files, options)
     }
+
+    /// Reads a text that stands in the place of a file: the path names it in errors, and includes are found beside it.
+    ///
+    /// # Errors
+    /// As [`from_mjcf`](Self::from_mjcf).
+    #[doc(hidden)]
+    pub fn from_mjcf_text(text: &str, path: impl AsRef<Path>, options: &MjcfOptions) -> Result<Self, Error> {
+        let mut files = Files::new(Known::new(ELEMENTS));
+        files.read_text(path.as_ref(), text)?;
+        model(&files, options)
+    }
 }
 
 /// A file with settings of its own.
@@ -129,6 +142,7 @@ struct Source<'a> {
     defaults: Defaults<'a>,
     assets: Assets<'a>,
     /// The folder of the file; a string has none.
+    #[cfg_attr(not(feature = "meshes"), allow(dead_code))]
     folder: Option<&'a Path>,
 }
 
@@ -185,7 +199,7 @@ impl<'a> Reader<'a> {
         let mut builder = ModelBuilder::new(root.attribute("model").unwrap_or("MuJoCo Model"));
         builder.gravity(self.gravity);
         builder.frame_of_kind("world", FrameKind::Link, WORLD, Se3::identity());
-        for flex in root.all("deformable").flat_map(|section| section.all("flex")) {
+        if let Some(flex) = root.all("deformable").flat_map(|section| section.all("flex")).next() {
             return Err(flex.wrong("is not supported"));
         }
         self.tree(&mut builder, root)?;

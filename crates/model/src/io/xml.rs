@@ -38,6 +38,8 @@ pub(crate) struct Element {
     pub(crate) file: Rc<str>,
     /// Counted from 1.
     pub(crate) line: u32,
+    /// Byte index of its `<` in the text of the file.
+    pub(crate) at: usize,
     /// The index of the file with settings of its own that the element is from; 0 for the main one.
     pub(crate) source: usize,
 }
@@ -115,6 +117,17 @@ impl Amount {
 
 fn too_many(found: u64, what: &str, limit: usize) -> String {
     format!("{found} {what}, at most {limit} are allowed in the files of a robot")
+}
+
+impl Model {
+    /// Reads the text of a robot's file, in any of the encodings that its readers know.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    #[doc(hidden)]
+    pub fn file_text(path: &Path) -> Result<String, Error> {
+        Amount::default().read(path)
+    }
 }
 
 impl Element {

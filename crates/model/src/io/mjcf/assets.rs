@@ -8,12 +8,13 @@ use std::collections::HashMap;
 
 #[cfg(feature = "meshes")]
 use {
+    super::Source,
+    super::attributes::MAIN,
     super::mesh::Rule,
-    super::{MAIN, Source},
     crate::io::files,
     condyle_meshes::Format,
     condyle_spatial::{Quaternion, Vec3},
-    std::path::PathBuf,
+    std::path::{Path, PathBuf},
 };
 
 /// Maximum size of the meshes' files of a robot together (bytes).
@@ -97,17 +98,19 @@ impl Solids {
     fn read(&mut self, source: &Source, mesh: &Element, packages: &[PathBuf]) -> Result<Solid, String> {
         let said = |e: Error| e.to_string();
         let a = source.defaults.of(mesh, MAIN).map_err(said)?;
-        if let Some(builtin) = a.get("builtin").filter(|b| *b != "none") {
-            return Err(format!("builtin: the shape `{builtin}` is not supported"));
-        }
         if mesh.child("plugin").is_some() {
             return Err("plugin: meshes of plugins are not supported".to_owned());
         }
-        let (mut points, mut triangles) = match a.get("file") {
-            Some(file) => self.file(source, &a, file, packages)?,
-            None => (Vec::new(), Vec::new()),
-        };
         let list = |name: &str| a.list(name).map(Option::unwrap_or_default).map_err(said);
+        let builtin = a.get("builtin").filter(|kind| *kind != "none");
+        if builtin.is_some() && (a.get("file").is_some() || a.get("vertex").is_some()) {
+            return Err("builtin goes with neither file nor vertex".to_owned());
+        }
+        let (mut points, mut triangles) = match (builtin, a.get("file")) {
+            (Some(kind), _) => super::builtin::shape(kind, &list("params")?)?,
+            (None, Some(file)) => self.file(source, &a, file, packages)?,
+            (None, None) => (Vec::new(), Vec::new()),
+        };
         if points.is_empty() {
             let numbers = list("vertex")?;
             points = numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
@@ -132,7 +135,7 @@ impl Solids {
             triangles.iter_mut().for_each(|t| t.swap(1, 2)); // a mirror turns triangles inside out
         }
         let exact = if source.compiler.exact_meshes { "exact" } else { "legacy" };
-        let rule = a.get("inertia").unwrap_or(exact);
+        let rule = if builtin == Some("plate") { "shell" } else { a.get("inertia").unwrap_or(exact) };
         let rule = Rule::of(rule).ok_or_else(|| format!("inertia: no rule is named `{rule}`"))?;
         Solid::new(&points, triangles, rule)
     }
@@ -145,24 +148,30 @@ impl Solids {
         file: &str,
         packages: &[PathBuf],
     ) -> Result<condyle_meshes::Triangles, String> {
-        let folder = source.folder.as_deref().ok_or_else(|| format!("a string has no folder to find `{file}` in"))?;
+        let folder = source.folder.ok_or_else(|| format!("a string has no folder to find `{file}` in"))?;
         let name = if source.compiler.strip_path { file.rsplit(['/', '\\']).next().unwrap_or(file) } else { file };
-        let folder = folder.join(&source.compiler.mesh_folder);
-        let path = files::resolve(name, &folder, packages).map_err(|e| e.to_string())?;
+        // as MuJoCo: in the folder of meshes, or else beside the file that has the element
+        let beside = Path::new(&*a.element.file).parent().unwrap_or(folder);
+        let meshes = &source.compiler.mesh_folder;
+        let mut paths = Vec::new();
+        for folder in [folder.join(meshes), beside.to_owned(), beside.join(meshes)] {
+            paths.push(files::resolve(name, &folder, packages).map_err(|e| e.to_string())?);
+        }
+        let path = paths.iter().find(|path| path.is_file()).unwrap_or(&paths[0]);
         let said = |what: String| format!("`{}`: {what}", path.display());
-        let about = std::fs::metadata(&path).map_err(|e| said(e.to_string()))?;
+        let about = std::fs::metadata(path).map_err(|e| said(e.to_string()))?;
         self.bytes += about.len();
         if !about.is_file() || self.bytes > MAX_MESHES {
             let what = format!("is no file, or the meshes of the robot have more than {MAX_MESHES} bytes");
             return Err(said(what));
         }
-        let bytes = std::fs::read(&path).map_err(|e| said(e.to_string()))?;
+        let bytes = std::fs::read(path).map_err(|e| said(e.to_string()))?;
         let format = match a.get("content_type").and_then(|kind| kind.rsplit_once('/')) {
             Some((_, "obj")) => Some(Format::Obj),
             Some((_, "stl")) => Some(Format::Stl),
             Some((_, "vnd.mujoco.msh")) => None,
             _ if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh")) => None,
-            _ => Some(Format::of(&path).ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?),
+            _ => Some(Format::of(path).ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?),
         };
         format.map_or_else(|| msh(&bytes), |format| condyle_meshes::triangles(format, &bytes)).map_err(said)
     }

@@ -232,8 +232,15 @@ impl Expansion<'_> {
                 self.sections.push(at.0, copy);
             }
         }
-        for (section, what) in [("keyframe", "keyframes"), ("option", "options")] {
-            if file.root.child(section).is_some() {
+        let has = |section: &str, names: &[&str]| {
+            let all = file.root.all(section).flat_map(|e| std::iter::once(e).chain(&e.children));
+            all.into_iter().any(|e| names.contains(&&*e.tag) || names.iter().any(|name| e.attribute(name).is_some()))
+        };
+        for (what, found) in [
+            ("keyframes", has("keyframe", &["key"])),
+            ("gravity, medium and flags", has("option", &["gravity", "density", "viscosity", "flag"])),
+        ] {
+            if found {
                 self.files.warnings.push(element.left_out(format!("the {what} of the model `{model}` are left out")));
             }
         }
@@ -246,7 +253,16 @@ impl Expansion<'_> {
 fn wrapper(element: &Element, class: Option<&str>) -> Element {
     let (file, line, source) = (element.file.clone(), element.line, element.source);
     let attributes = class.map(|class| ("childclass".to_owned(), class.to_owned())).into_iter().collect();
-    Element { tag: "frame".to_owned(), attributes, text: String::new(), children: Vec::new(), file, line, source }
+    Element {
+        tag: "frame".to_owned(),
+        attributes,
+        text: String::new(),
+        children: Vec::new(),
+        file,
+        line,
+        at: element.at,
+        source,
+    }
 }
 
 /// Returns a body or frame that has the class around it as its own, unless it names another one.
@@ -292,10 +308,11 @@ fn copied(element: &Element, rename: &dyn Fn(&str) -> String, level: usize) -> R
     }
     let children = element.children.iter().map(|child| copied(child, rename, level + 1)).collect::<Result<_, _>>()?;
     let renamed = |(name, value): &(String, String)| {
-        let is_name = (name == "name" || kind_of(name).is_some()) && !value.is_empty() && value != "world";
+        let refers = kind_of(name).is_some() && value != "world";
+        let is_name = (name == "name" || refers) && !value.is_empty();
         (name.clone(), if is_name { rename(value) } else { value.clone() })
     };
     let attributes = element.attributes.iter().map(renamed).collect();
     let (tag, text, file) = (element.tag.clone(), element.text.clone(), element.file.clone());
-    Ok(Element { tag, attributes, text, children, file, line: element.line, source: element.source })
+    Ok(Element { tag, attributes, text, children, file, line: element.line, at: element.at, source: element.source })
 }

@@ -43,13 +43,18 @@ impl Files {
     /// Reads a file with settings of its own, and returns its index.
     pub(super) fn read(&mut self, path: &Path) -> Result<usize, Error> {
         let text = self.amount.read(path)?;
+        self.read_text(path, &text)
+    }
+
+    /// As [`read`](Self::read), of a text that stands in the place of the file.
+    pub(super) fn read_text(&mut self, path: &Path, text: &str) -> Result<usize, Error> {
         let own = path.canonicalize().unwrap_or(path.to_owned());
         if self.open.contains(&own) {
             let what = "is attached inside of itself".to_owned();
             return Err(Error::File { file: path.display().to_string(), what });
         }
         self.open.push(own);
-        let index = self.parse(&text, &path.display().to_string(), Some(path.parent().unwrap_or(Path::new(""))))?;
+        let index = self.parse(text, &path.display().to_string(), Some(path.parent().unwrap_or(Path::new(""))))?;
         self.open.pop();
         Ok(index)
     }

@@ -1,6 +1,10 @@
 //! Volumes, centres of mass and inertias of meshes, by MuJoCo's rules (`inertia` of `<mesh>`).
 
-use condyle_spatial::{Mat3, Se3, Sym3, Vec3};
+#[cfg(feature = "meshes")]
+use super::principal::principal;
+#[cfg(feature = "meshes")]
+use condyle_spatial::Sym3;
+use condyle_spatial::{Se3, Vec3};
 
 /// Volumes (m³) and areas (m²) below this are none, as in MuJoCo.
 #[cfg(feature = "meshes")]
@@ -17,6 +21,8 @@ pub(super) struct Solid {
     pub(super) moments: [f64; 3],
     /// The least and greatest coordinates of the points in its principal axes (m).
     pub(super) bounds: [[f64; 3]; 2],
+    /// Number of corners of the hull that it is, if it is one.
+    pub(super) corners: Option<usize>,
 }
 
 impl Solid {
@@ -61,7 +67,8 @@ impl Rule {
 impl Solid {
     /// The inertia of triangles, which are counter-clockwise from outside; of the hull of the points where there are none.
     pub(super) fn new(points: &[Vec3<f64>], mut triangles: Vec<[u32; 3]>, rule: Rule) -> Result<Self, String> {
-        if triangles.is_empty() || rule == Rule::Convex {
+        let is_hull = triangles.is_empty() || rule == Rule::Convex;
+        if is_hull {
             let plain: Vec<_> = points.iter().map(|p| p.to_array()).collect();
             triangles = condyle_meshes::hull(&plain).ok_or("its points lie in a plane")?;
         }
@@ -108,10 +115,11 @@ impl Solid {
         }
         let trace = P.xx + P.yy + P.zz;
         let I = Sym3 { xx: trace - P.xx, xy: -P.xy, yy: trace - P.yy, xz: -P.xz, yz: -P.yz, zz: trace - P.zz };
-        let (moments, R): (_, Mat3<f64>) = super::principal::principal(I);
+        let (moments, R) = principal(I);
         if !(moments[2] > 0.0 && moments.iter().all(|x| x.is_finite())) {
             return Err(format!("its least moment of inertia, {} m⁵, is not positive", moments[2]));
         }
+        let corners = is_hull.then(|| triangles.len() / 2 + 2); // Euler: C = T/2 + 2
         let pose = Se3::new(R, com);
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for p in points {
@@ -120,6 +128,6 @@ impl Solid {
                 (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k]));
             }
         }
-        Ok(Self { volume, pose, moments: moments.map(|x| x / volume), bounds: [low, high] })
+        Ok(Self { volume, pose, moments: moments.map(|x| x / volume), bounds: [low, high], corners })
     }
 }

@@ -261,7 +261,18 @@ impl<'a> Reader<'a> {
             None => Err("there is no such mesh".to_owned()),
         };
         match solid {
-            Ok(solid) => geometry::geom(&source.compiler, a, Some(&solid), field),
+            Ok(solid) => {
+                let most = mesh.map_or(Ok(None), |e| source.defaults.of(e, MAIN)?.number("maxhullvert"))?;
+                if let (Some(most), Some(found)) = (most.filter(|&most| most >= 0.0), solid.corners)
+                    && (found as f64) > most
+                {
+                    let name = a.get("mesh").unwrap_or_default();
+                    let what =
+                        format!("maxhullvert of mesh `{name}`: its hull has all its {found} corners, not {most}");
+                    self.warnings.push(a.element.left_out(what));
+                }
+                geometry::geom(&source.compiler, a, Some(&solid), field)
+            }
             Err(why) => {
                 let name = a.get("mesh").unwrap_or_default();
                 if self.options.weightless_meshes || !moves {

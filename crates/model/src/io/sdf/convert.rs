@@ -181,7 +181,8 @@ impl Element {
             children: Vec::new(),
             file: self.file.clone(),
             line: self.line,
-            source: 0,
+            at: self.at,
+            source: self.source,
         }
     }
 }

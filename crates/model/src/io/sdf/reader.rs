@@ -129,9 +129,11 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Fixes a link to the world where it stands.
+    /// Fixes a link to the world where it stands. The inertia of a static one has no part in anything, and is not warned of.
     fn fix(&mut self, builder: &mut ModelBuilder, link: usize) -> Result<(), Error> {
-        let inertia = inertia(&self.scopes, link, &mut self.warnings)?;
+        let mut unsaid = Vec::new();
+        let warnings = if self.scopes.is_static(link) { &mut unsaid } else { &mut self.warnings };
+        let inertia = inertia(&self.scopes, link, warnings)?;
         let oXl = self.scopes.in_world(link);
         builder.merge(WORLD, oXl, inertia);
         self.put(builder, link, (WORLD, oXl), inertia)

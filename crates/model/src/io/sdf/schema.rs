@@ -43,7 +43,6 @@ pub(super) const LEFT_OUT: &LeftOut = &[
     ("axis", "initial_position", "initial_position is left out: a model has no position of its own"),
     ("joint_ode", "suspension", "the suspension is left out: the joint is rigid along it"),
     ("limit", "drake:acceleration", "the limit of acceleration is left out"),
-    ("model", "drake:joint", "a joint of Drake's own is left out: its child is free of it"),
     ("model", "drake:linear_bushing_rpy", FORCE),
     ("model", "drake:linear_spring_damper", FORCE),
     ("model", "drake:ball_constraint", FORCE),

@@ -117,6 +117,10 @@ impl<'a> Scopes<'a> {
             match &*child.tag {
                 "model" => self.model(child, scope)?,
                 "link" | "joint" | "frame" => drop(self.insert(child, scope)?),
+                "drake:joint" => {
+                    let kind = child.attribute("type").unwrap_or_default();
+                    return Err(child.wrong(format!("joints of Drake's own are not supported: `{kind}`")));
+                }
                 _ => {}
             }
         }

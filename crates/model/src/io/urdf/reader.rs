@@ -112,7 +112,7 @@ impl<'a> Reader<'a> {
     pub(super) fn model(&self, options: &UrdfOptions) -> Result<Model, Error> {
         let mut warnings = Vec::new();
         known::check(self.robot, &mut warnings);
-        let armatures = armatures(self.robot, &mut warnings);
+        let mut armatures = armatures(self.robot, &mut warnings);
         let mut builder = ModelBuilder::new(self.robot.attribute("name").unwrap_or_default());
         let own = self.inertia(self.links[self.root], &mut warnings)?;
         let root = match options.root_joint {
@@ -148,7 +148,9 @@ impl<'a> Reader<'a> {
                 }
                 Some(Moving { joint, rotation }) => {
                     let mut options = joints::options(element, joint, &mut warnings)?;
-                    options.armature = armatures.get(name).copied().unwrap_or(0.0);
+                    if joint.nv() == 1 {
+                        options.armature = armatures.remove(name).map_or(0.0, |(armature, _)| armature);
+                    }
                     let (pXb, bXl) = match rotation.map(|rotation| Se3::new(rotation, Vec3::zero())) {
                         None => (pXl, Se3::identity()),
                         Some(lXb) => (pXl * lXb, lXb.inverse()),
@@ -163,6 +165,10 @@ impl<'a> Reader<'a> {
             builder.frame_of_kind(link, FrameKind::Link, body, bXl);
             links.insert(link, (body, bXl));
             wait(&mut waiting, link, body, bXl);
+        }
+        for (name, (_, transmission)) in armatures {
+            let what = format!("its joint `{name}` has no single degree of freedom: M has no inertia of its rotor");
+            warnings.push(transmission.left_out(what));
         }
         self.add_frames(&mut builder, &links)?;
         self.add_mimics(&mut builder, &bodies, options.mimic, &mut warnings)?;

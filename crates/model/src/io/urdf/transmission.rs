@@ -2,17 +2,20 @@
 
 use crate::io::xml::{Element, array};
 use crate::warning::Warning;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 /// Tags of a rotor's inertia about its axis (kg m²).
 const ROTOR: [&str; 5] = ["drake:rotor_inertia", "rotorInertia", "rotor_inertia", "motorInertia", "motor_inertia"];
 /// Tags of the turns of a rotor for one turn of its joint.
 const RATIO: [&str; 5] = ["drake:gear_ratio", "mechanicalReduction", "mechanical_reduction", "gearRatio", "gear_ratio"];
 
+/// Armatures by the name of the joint (kg m²), each with its transmission.
+pub(super) type Armatures<'a> = BTreeMap<&'a str, (f64, &'a Element)>;
+
 /// Returns the armature n² J of each joint whose transmission has both a reduction n and a rotor's inertia J. Others warn, unless
 /// their reduction is 1 and they have no rotor.
-pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> HashMap<&'a str, f64> {
-    let mut found = HashMap::new();
+pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> Armatures<'a> {
+    let mut found = BTreeMap::new();
     for transmission in robot.all("transmission") {
         let (mut joints, mut actuators) = (transmission.all("joint"), transmission.all("actuator"));
         let (joint, actuator) = (joints.next(), actuators.next());
@@ -38,7 +41,7 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
                 }
                 match (ratio, name) {
                     (Some(n), Some(name)) if inertia >= 0.0 => {
-                        *found.entry(name).or_insert(0.0) += n * n * inertia;
+                        found.entry(name).or_insert((0.0, transmission)).0 += n * n * inertia;
                         None
                     }
                     _ => Some(format!(

@@ -59,7 +59,16 @@ fn set_file(element: &mut Element, file: &Rc<str>) {
 
 fn element(tag: &str, attributes: &[(&str, &str)], children: Vec<Element>) -> Element {
     let attributes = attributes.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
-    Element { tag: tag.to_owned(), attributes, text: String::new(), children, file: "".into(), line: 1 }
+    Element {
+        tag: tag.to_owned(),
+        attributes,
+        text: String::new(),
+        children,
+        file: "".into(),
+        line: 1,
+        at: 0,
+        source: 0,
+    }
 }
 
 /// Returns an element whose attributes are numbers, each written such that it is read as the same one.

@@ -127,6 +127,7 @@ impl<'a> Parser<'a> {
             children: Vec::new(),
             file: self.file.clone(),
             line,
+            at: self.at - 1,
             source: 0,
         };
         self.at += name.len();

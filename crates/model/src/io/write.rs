@@ -1,0 +1,145 @@
+//! Robots written into a copy of their file: inertias, limits, losses and armature. All else stays byte for byte.
+//!
+//! A format edits the text of the original at the elements that differ. The new text is then read again: the reader is the
+//! judge of what a file says. Where other elements have a share (links that fixed joints merge, the armature of an
+//! actuator), the share is the difference between the number written and the number read. It is taken off once. A file that
+//! then does not give the model back is not written.
+
+mod changes;
+mod edits;
+mod mjcf;
+mod urdf;
+
+use super::mjcf::MjcfOptions;
+use super::urdf::UrdfOptions;
+use super::xml::{Amount, Element};
+use crate::error::Error;
+use crate::model::Model;
+use changes::{Changes, NO_SHARE, ROUNDING};
+use edits::Edits;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Files of one kind: how they are read, and where their numbers stand.
+trait Format {
+    /// Reads a text that stands in the place of the original.
+    fn read(&self, text: &str) -> Result<Model, Error>;
+    /// Returns the mass of each link that the file gives an inertia (kg), by the link's name.
+    fn masses(&self, root: &Element) -> HashMap<String, f64>;
+    /// Edits the elements of a text.
+    fn edit(&self, edits: &mut Edits, root: &Element, changes: &Changes) -> Result<(), String>;
+}
+
+impl Model {
+    /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the URDF `original`, and all else
+    /// of the file as it is there.
+    ///
+    /// Only what differs from the original is edited, so an unchanged robot gives the same bytes. `original` may be `path`.
+    /// Reading the new file gives this model back, up to rounding.
+    ///
+    /// A body of several links, merged by fixed joints, has their sum. The link that its joint carries takes all of the
+    /// difference; if that link has no mass, the heaviest one does. If a link would be left with less than a thousandth of
+    /// the body's mass, it takes the whole inertia and the others get none.
+    ///
+    /// ```
+    /// use condyle_model::{Model, UrdfOptions, robots};
+    /// # let folder = std::env::temp_dir().join("condyle_write_urdf");
+    /// # std::fs::create_dir_all(&folder)?;
+    /// # let (original, path) = (folder.join("arm7.urdf"), folder.join("identified.urdf"));
+    /// std::fs::write(&original, robots::ARM7)?;
+    /// let arm = Model::from_urdf(&original, &UrdfOptions::default())?;
+    /// let identified = arm.with_inertias(|_, I| I.scale(1.1))?;
+    /// identified.write_urdf(&path, &original)?;
+    /// let written = Model::from_urdf(&path, &UrdfOptions::default())?;
+    /// assert!((written.total_mass() - 1.1 * arm.total_mass()).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// An armature is written as the rotor inertia of the joint's `<transmission>`, in the words of Drake.
+    ///
+    /// # Errors
+    /// [`Error::File`], with the thing and both numbers, if the file cannot say it or the two are different robots: joints,
+    /// frames and gravity must be those of the original. A URDF has one number for the efforts in both directions, and no
+    /// infinite limits. The file must be in UTF-8, and no xacro. Errors of [`from_urdf`](Self::from_urdf).
+    pub fn write_urdf(&self, path: impl AsRef<Path>, original: impl AsRef<Path>) -> Result<(), Error> {
+        let original = Original::read(original.as_ref())?;
+        let root = urdf::root(&original.root).and_then(|root| self.bodies.iter().skip(1).find(|b| b.name == root));
+        let mimic = self.bodies.iter().any(|b| b.mimic.is_some());
+        let options = UrdfOptions { root_joint: root.map(|b| b.joint), mimic, ..UrdfOptions::default() };
+        write(self, path.as_ref(), &original, &urdf::Urdf { options })
+    }
+
+    /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the MJCF `original`, and all else
+    /// of the file as it is there; see [`write_urdf`](Self::write_urdf).
+    ///
+    /// Attributes of elements go before those of their classes, so defaults stay as they are. A changed inertia is written
+    /// as an `<inertial>`, also where geoms gave it before. Limits of effort are written as `actuatorfrcrange` of the joint.
+    ///
+    /// # Errors
+    /// As [`write_urdf`](Self::write_urdf). The file itself must have the bodies and joints that differ: those of an
+    /// included file, or made by `replicate` or `attach`, have no element to edit. An MJCF has no speed limits, and its
+    /// compiler must not replace inertias (`inertiafromgeom`) or scale them (`settotalmass`). Errors of
+    /// [`from_mjcf`](Self::from_mjcf).
+    pub fn write_mjcf(&self, path: impl AsRef<Path>, original: impl AsRef<Path>) -> Result<(), Error> {
+        let original = Original::read(original.as_ref())?;
+        let mimic = self.bodies.iter().any(|b| b.mimic.is_some());
+        let mut format = mjcf::Mjcf { path: original.path, options: MjcfOptions { mimic, ..MjcfOptions::default() } };
+        // a mesh without a file has no mass
+        format.options.weightless_meshes = format.read(&original.text).is_err();
+        write(self, path.as_ref(), &original, &format)
+    }
+}
+
+/// The file that is copied.
+struct Original<'a> {
+    path: &'a Path,
+    text: String,
+    root: Element,
+}
+
+impl<'a> Original<'a> {
+    fn read(path: &'a Path) -> Result<Self, Error> {
+        let mut amount = Amount::default();
+        let text = amount.read(path)?;
+        let root = Element::parse(&text, &path.display().to_string(), &mut amount)?;
+        let original = Self { path, text, root };
+        match std::fs::read(path) {
+            Ok(bytes) if bytes == original.text.as_bytes() => Ok(original),
+            Ok(_) => Err(original.wrong("is not in UTF-8, so a copy of it cannot keep all else as it is".to_owned())),
+            Err(error) => Err(original.wrong(error.to_string())),
+        }
+    }
+
+    fn wrong(&self, what: String) -> Error {
+        Error::File { file: self.path.display().to_string(), what }
+    }
+
+    /// Returns the text with other numbers.
+    fn edited(&self, format: &impl Format, changes: &Changes) -> Result<String, Error> {
+        let mut edits = Edits::new(&self.text);
+        format.edit(&mut edits, &self.root, changes).map_err(|what| self.wrong(what))?;
+        Ok(edits.apply())
+    }
+}
+
+/// Writes a model into a copy of a file.
+fn write(model: &Model, path: &Path, original: &Original, format: &impl Format) -> Result<(), Error> {
+    let mut now = format.read(&original.text)?;
+    let masses = format.masses(&original.root);
+    let mut changes = Changes::new(model, &now, &masses).map_err(|what| original.wrong(what))?;
+    let mut new = original.text.clone();
+    if !changes.is_empty() {
+        new = original.edited(format, &changes)?;
+        now = format.read(&new)?;
+    }
+    if changes::difference(model, &now, NO_SHARE).is_some() && changes.take_shares_off(model, &now) {
+        new = original.edited(format, &changes)?;
+        now = format.read(&new)?;
+    }
+    match changes::difference(model, &now, ROUNDING) {
+        Some(what) => Err(original.wrong(what)),
+        None => std::fs::write(path, new).map_err(|e| {
+            Error::File { file: path.display().to_string(), what: e.to_string() } //
+        }),
+    }
+}

@@ -1,0 +1,298 @@
+//! Numbers of a model that differ from those of its file.
+
+use crate::body::{Body, FrameKind};
+use crate::inertial_parameters;
+use crate::joint::Joint;
+use crate::model::Model;
+use condyle_spatial::{Act, Inertia, Se3};
+use std::collections::HashMap;
+use std::ops::Range;
+
+/// Largest relative difference that is rounding: inertias go through the frames of several links.
+pub(super) const ROUNDING: f64 = 1e-9;
+/// Largest relative difference that is surely rounding, and no share of another element.
+pub(super) const NO_SHARE: f64 = 1e-14;
+/// Least share of a body's mass that a link may be left with: below it, its centre of mass would have few digits.
+const LEAST_SHARE: f64 = 1e-3;
+
+/// Numbers that a file is to say otherwise.
+pub(super) struct Changes {
+    pub(super) links: Vec<LinkChange>,
+    pub(super) joints: Vec<JointChange>,
+}
+
+/// New inertia of a body, as its links have it.
+pub(super) struct LinkChange {
+    body: usize,
+    /// Name of the link that takes the difference.
+    pub(super) link: String,
+    /// Pose of that link in the body.
+    placement: Se3<f64>,
+    /// New inertia of the link, in the body's frame.
+    inertia: Inertia<f64>,
+    /// Names of the body's other links that have an inertia.
+    others: Vec<String>,
+    /// Names of the links that get no inertia.
+    pub(super) emptied: Vec<String>,
+}
+
+/// New numbers of a joint.
+pub(super) struct JointChange {
+    body: usize,
+    pub(super) name: String,
+    /// Whether positions are lengths.
+    pub(super) is_prismatic: bool,
+    /// Numbers of the joint, in the order of [`NUMBERS`].
+    values: [f64; 10],
+    /// Whether each differs from the file's.
+    differs: [bool; 10],
+}
+
+/// Numbers that a file has for each joint; the first two belong to q, the others to v.
+const NUMBERS: [&str; 10] = [
+    "lower limit",
+    "upper limit",
+    "velocity limit",
+    "lower effort limit",
+    "upper effort limit",
+    "damping",
+    "damping with the speed",
+    "damping with the square of the speed",
+    "friction",
+    "armature",
+];
+/// Position of the damping in [`NUMBERS`]: from here on, elements of a file add up.
+const LOSSES: usize = 5;
+
+/// The numbers of a model, in the order of [`NUMBERS`].
+fn numbers(model: &Model) -> [Vec<f64>; 10] {
+    let limits = model.limits.clone();
+    let polynomial = |k: usize| model.damping_polynomial.iter().map(|d| d[k]).collect();
+    [
+        limits.lower,
+        limits.upper,
+        limits.velocity,
+        limits.effort_lower,
+        limits.effort_upper,
+        model.damping.clone(),
+        polynomial(0),
+        polynomial(1),
+        model.friction.clone(),
+        model.armature.clone(),
+    ]
+}
+
+/// The slots of a joint in the k-th of its [`numbers`].
+fn slots(body: &Body, k: usize) -> Range<usize> {
+    if k < 2 { body.idx_q..body.idx_q + body.joint.nq() } else { body.idx_v..body.idx_v + body.joint.nv() }
+}
+
+impl JointChange {
+    /// Some of the numbers, if one of them differs.
+    fn some<const N: usize>(&self, first: usize) -> Option<[f64; N]> {
+        let differs = self.differs[first..first + N].contains(&true);
+        differs.then(|| std::array::from_fn(|k| self.values[first + k]))
+    }
+
+    /// Least and greatest position (rad, m).
+    pub(super) fn position(&self) -> Option<[f64; 2]> {
+        self.some(0)
+    }
+
+    /// Greatest speed (rad/s, m/s).
+    pub(super) fn velocity(&self) -> Option<f64> {
+        self.some(2).map(|[x]| x)
+    }
+
+    /// Least and greatest effort (N m, N).
+    pub(super) fn effort(&self) -> Option<[f64; 2]> {
+        self.some(3)
+    }
+
+    /// Viscous damping, and its coefficients with the speed.
+    pub(super) fn damping(&self) -> Option<[f64; 3]> {
+        self.some(LOSSES)
+    }
+
+    /// Coulomb friction (N m, N).
+    pub(super) fn friction(&self) -> Option<f64> {
+        self.some(8).map(|[x]| x)
+    }
+
+    /// Inertia of the rotor as seen at the joint (kg m², kg).
+    pub(super) fn armature(&self) -> Option<f64> {
+        self.some(9).map(|[x]| x)
+    }
+
+    /// Greatest speed, and least and greatest effort, whether they differ or not.
+    pub(super) fn all_limits(&self) -> (f64, [f64; 2]) {
+        (self.values[2], [self.values[3], self.values[4]])
+    }
+}
+
+impl LinkChange {
+    /// The new inertia in the frame of the link.
+    pub(super) fn inertia(&self) -> Inertia<f64> {
+        self.placement.act_inv(self.inertia)
+    }
+}
+
+impl Changes {
+    /// Compares two models of one robot; `masses` are those of its links (kg).
+    pub(super) fn new(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Self, String> {
+        match different_robot(model, was) {
+            Some(what) => Err(what),
+            None => Ok(Self { links: links(model, was, masses)?, joints: joints(model, was)? }),
+        }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.links.is_empty() && self.joints.is_empty()
+    }
+
+    /// Takes the shares of other elements off, given what the file says with the changes; returns whether there are changes.
+    pub(super) fn take_shares_off(&mut self, model: &Model, now: &Model) -> bool {
+        for change in &mut self.links {
+            let (wanted, found) = (model.bodies[change.body].inertia, now.bodies[change.body].inertia);
+            let rest = wanted - (found - change.inertia);
+            if rest.mass > LEAST_SHARE * wanted.mass {
+                change.inertia = rest;
+            } else {
+                change.emptied.clone_from(&change.others);
+            }
+        }
+        let (wanted, found) = (numbers(model), numbers(now));
+        for change in &mut self.joints {
+            for k in LOSSES..NUMBERS.len() {
+                let slot = slots(&model.bodies[change.body], k).start;
+                change.values[k] += wanted[k][slot] - found[k][slot];
+            }
+        }
+        !self.is_empty()
+    }
+}
+
+/// Finds the bodies with other inertias.
+fn links(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Vec<LinkChange>, String> {
+    let mut changes = Vec::new();
+    for (i, (body, before)) in model.bodies.iter().zip(&was.bodies).enumerate() {
+        if body.inertia == before.inertia {
+            continue;
+        }
+        let links: Vec<_> = model.frames.iter().filter(|f| f.body == i && f.kind == FrameKind::Link).collect();
+        let mass = |name: &str| masses.get(name).copied().unwrap_or(0.0);
+        let heaviest = links.iter().copied().max_by(|a, b| mass(&a.name).total_cmp(&mass(&b.name)));
+        let carried = links.iter().copied().find(|f| f.name == body.name || i == 0);
+        let Some(link) =
+            carried.filter(|f| mass(&f.name) > 0.0).or(heaviest.filter(|f| mass(&f.name) > 0.0)).or(carried)
+        else {
+            return Err(format!("body `{}` has no link of its own whose inertia could be written", body.name));
+        };
+        let others = links.iter().filter(|f| f.name != link.name && masses.contains_key(&f.name));
+        changes.push(LinkChange {
+            body: i,
+            link: link.name.clone(),
+            placement: link.placement,
+            inertia: body.inertia,
+            others: others.map(|f| f.name.clone()).collect(),
+            emptied: Vec::new(),
+        });
+    }
+    Ok(changes)
+}
+
+/// Finds the joints with other limits, losses or armature.
+fn joints(model: &Model, was: &Model) -> Result<Vec<JointChange>, String> {
+    let (new, old, mut changes) = (numbers(model), numbers(was), Vec::new());
+    for (i, body) in model.bodies.iter().enumerate().skip(1).filter(|(_, b)| b.mimic.is_none()) {
+        let (mut values, mut differs) = ([0.0; 10], [false; 10]);
+        for (k, name) in NUMBERS.iter().enumerate() {
+            let slots = slots(body, k);
+            let found = &new[k][slots.clone()];
+            (values[k], differs[k]) = (found[0], *found != old[k][slots]);
+            if differs[k] && found.iter().any(|x| *x != found[0]) {
+                return Err(format!("joint `{}`: {name} {found:?}: a file has one for a joint", body.joint_name));
+            }
+        }
+        if differs.contains(&true) {
+            let (name, is_prismatic) = (body.joint_name.clone(), matches!(body.joint, Joint::Prismatic { .. }));
+            changes.push(JointChange { body: i, name, is_prismatic, values, differs });
+        }
+    }
+    Ok(changes)
+}
+
+/// The first thing by which two models are different robots, whatever their numbers.
+fn different_robot(model: &Model, file: &Model) -> Option<String> {
+    let alike = |a: &Body, b: &Body| {
+        let names = (&a.name, &a.joint_name) == (&b.name, &b.joint_name);
+        names && (a.parent, a.joint, a.placement, a.mimic) == (b.parent, b.joint, b.placement, b.mimic)
+    };
+    let counts = (model.bodies.len(), file.bodies.len());
+    if let Some((a, b)) = model.bodies.iter().zip(&file.bodies).find(|(a, b)| !alike(a, b)) {
+        let differ = if a.joint_name == b.joint_name { "placed or coupled in another way" } else { "another one" };
+        return Some(format!("joint `{}` of the file is {differ} in the model, `{}`", b.joint_name, a.joint_name));
+    }
+    if counts.0 != counts.1 {
+        return Some(format!("the model has {} bodies and the file {}", counts.0 - 1, counts.1 - 1));
+    }
+    if let Some((a, b)) = model.frames.iter().zip(&file.frames).find(|(a, b)| a != b) {
+        return Some(format!("frame `{}` of the file is `{}` in the model, or elsewhere", b.name, a.name));
+    }
+    if model.frames.len() != file.frames.len() {
+        return Some(format!("the model has {} frames and the file {}", model.frames.len(), file.frames.len()));
+    }
+    if model.gravity != file.gravity {
+        let (a, b) = (model.gravity.to_array(), file.gravity.to_array());
+        return Some(format!("gravity is {a:?} m/s² in the model and {b:?} m/s² in the file"));
+    }
+    let others = [
+        (model.name == file.name, "name"),
+        (model.springs == file.springs, "springs"),
+        (model.gravity_compensation.len() == file.gravity_compensation.len(), "gravity compensation"),
+        (model.actuators == file.actuators, "actuators"),
+        (model.keyframes == file.keyframes, "keyframes"),
+        (model.constraints == file.constraints, "constraints"),
+    ];
+    others.into_iter().find(|(same, _)| !same).map(|(_, what)| format!("{what} of the model and of the file differ"))
+}
+
+/// The first difference between a model and what a file says, beyond a relative rounding.
+pub(super) fn difference(model: &Model, file: &Model, rounding: f64) -> Option<String> {
+    if let Some(what) = different_robot(model, file) {
+        return Some(what);
+    }
+    for (a, b) in model.bodies.iter().zip(&file.bodies) {
+        if !alike(a.inertia, b.inertia, rounding) {
+            let pi = |b: &Body| inertial_parameters::from_inertia(b.inertia);
+            let what = "cannot be written: the file gives";
+            return Some(format!("body `{}`: its inertial parameters {:?} {what} {:?}", a.name, pi(a), pi(b)));
+        }
+    }
+    for (k, (a, b)) in numbers(model).into_iter().zip(numbers(file)).enumerate() {
+        if let Some(slot) = (0..a.len()).find(|&slot| !close(a[slot], b[slot], rounding)) {
+            let (a, b, what) = (a[slot], b[slot], NUMBERS[k]);
+            let owner = model.bodies.iter().skip(1).find(|body| slots(body, k).contains(&slot));
+            let joint = owner.map_or("", |body| &body.joint_name);
+            return Some(format!("joint `{joint}`: its {what} {a} cannot be written: the file gives {b}"));
+        }
+    }
+    None
+}
+
+/// Whether two numbers are equal up to rounding; of those below 0.001, such as small armatures that were added up, as if
+/// they were 0.001.
+fn close(a: f64, b: f64, rounding: f64) -> bool {
+    a == b || (a - b).abs() <= rounding * a.abs().max(b.abs()).max(1e-3)
+}
+
+/// Whether two inertias are equal up to rounding: |m c| is at most √(m tr Ī).
+fn alike(a: Inertia<f64>, b: Inertia<f64>, rounding: f64) -> bool {
+    let size = |I: Inertia<f64>| (I.rotational.xx.abs() + I.rotational.yy.abs() + I.rotational.zz.abs()).max(1e-300);
+    let (mass, size) = (a.mass.abs().max(b.mass.abs()), size(a).max(size(b)));
+    let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let Inertia { mass: m, mass_com: h, rotational: J } = a - b;
+    m.abs() <= rounding * mass
+        && largest(&h.to_array()) <= rounding * (mass * size).sqrt()
+        && largest(&[J.xx, J.xy, J.yy, J.xz, J.yz, J.zz]) <= rounding * size
+}

@@ -1,0 +1,196 @@
+//! Numbers of a model: inertias, limits, losses, springs, actuators, keyframes.
+
+use super::Model;
+use crate::arrays::{class, read_only};
+use crate::cached::Attribute;
+use crate::inertial_parameters::model_inertia;
+use condyle::regressors::inertial_parameters;
+use condyle::tree::{Actuator, Transmission};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+impl Model {
+    /// Numbers of the model, in an array that nobody can write to.
+    fn numbers<'py>(
+        &self,
+        py: Python<'py>,
+        attribute: Attribute,
+        instead: &str,
+        numbers: impl FnOnce() -> Vec<f64>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.cached.value(py, attribute, || read_only(py, &numbers()[..], instead))
+    }
+
+    /// Keyframes in a new dictionary, each by one of its parts.
+    fn keyframe_parts<'py>(
+        &self,
+        py: Python<'py>,
+        part: impl Fn(&condyle::tree::Keyframe) -> &[f64],
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let parts = PyDict::new(py);
+        for keyframe in self.inner.keyframes() {
+            parts.set_item(&keyframe.name, read_only(py, part(keyframe), "")?)?;
+        }
+        Ok(parts)
+    }
+}
+
+#[pymethods]
+impl Model {
+    /// The pose of each joint's frame, at position zero, in its parent body: (nbodies, 4, 4).
+    #[getter]
+    fn joint_placements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.cached.value(py, Attribute::JointPlacements, || read_only(py, &self.of_bodies(|b| b.placement)[..], ""))
+    }
+
+    /// The inertia of each body in the body's frame, with all that fixed joints merge into it, as `Inertia`.
+    #[getter]
+    fn inertias<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Inertias, || {
+            self.inner.bodies().iter().map(|b| model_inertia(py, b.inertia)).collect()
+        })
+    }
+
+    /// The inertial parameters π, which regressors are multiplied with: ten numbers for each body but the world, 10
+    /// (nbodies − 1) in all. They are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
+    /// inertia about the origin of the body's frame.
+    #[getter]
+    fn inertial_parameters<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let bodies = || self.inner.bodies()[1..].iter();
+        let pi = || bodies().flat_map(|b| inertial_parameters::from_inertia(b.inertia)).collect();
+        self.numbers(py, Attribute::InertialParameters, "with_inertias", pi)
+    }
+
+    /// The limits of position, velocity and effort, as `Limits`; infinite where there are none. `effort` is the greatest
+    /// magnitude of `effort_lower` and `effort_upper`.
+    #[getter]
+    fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.cached.value(py, Attribute::Limits, || {
+            let limits = self.inner.limits();
+            let condyle::Limits { lower, upper, velocity, effort_lower, effort_upper } = limits;
+            let give = |numbers: &[f64]| read_only(py, numbers, "with_limits");
+            let effort = (give(&limits.effort())?, give(effort_lower)?, give(effort_upper)?);
+            class!(py, "Limits")?.call1((give(lower)?, give(upper)?, give(velocity)?, effort.0, effort.1, effort.2))
+        })
+    }
+
+    /// The coefficients d₁ and d₂ of damping that grows with the speed, (nv, 2): the damping is d₀ + d₁|v| + d₂v², with
+    /// d₀ in `damping`. It acts where `damping` does.
+    #[getter]
+    fn damping_polynomial<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.cached.value(py, Attribute::DampingPolynomial, || read_only(py, self.inner.damping_polynomial(), ""))
+    }
+
+    /// The springs of joints, as `Spring(joint, stiffness, rest)`. They act in `passive_torque` and where a
+    /// `Simulation` is asked for them.
+    #[getter]
+    fn springs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Springs, || {
+            let class = class!(py, "Spring")?;
+            let spring = |s: &condyle::tree::Spring| {
+                let joint = &*self.inner.bodies()[s.body].joint_name;
+                class.call1((joint, read_only(py, &s.stiffness[..], "")?, read_only(py, &s.rest[..], "")?))
+            };
+            self.inner.springs().iter().map(spring).collect()
+        })
+    }
+
+    /// The weights that are carried by an unseen hand, as `GravityCompensation(body, mass, mass_com)`: MuJoCo's
+    /// `gravcomp`. They act in `passive_torque` and where a `Simulation` is asked for them.
+    #[getter]
+    fn gravity_compensation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::GravityCompensation, || {
+            let class = class!(py, "GravityCompensation")?;
+            let carried = |c: &condyle::tree::GravityCompensation| {
+                let body = &*self.inner.bodies()[c.body].name;
+                class.call1((body, c.mass, read_only(py, &c.mass_com.to_array()[..], "")?))
+            };
+            self.inner.gravity_compensation().iter().map(carried).collect()
+        })
+    }
+
+    /// The actuators of the file, as `Actuator`, in its order. Their ranges are part of `limits` already, their armature
+    /// and damping of the joints'.
+    #[getter]
+    fn actuators<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.cached.list(py, Attribute::Actuators, || {
+            let class = class!(py, "Actuator")?;
+            let joint = |body: usize| &*self.inner.bodies()[body].joint_name;
+            let actuator = |a: &Actuator| {
+                let (mut driven, coefficients) = ([None; 3], PyDict::new(py));
+                match &a.transmission {
+                    Transmission::Joint { body } => driven[0] = Some(joint(*body)),
+                    Transmission::Tendon { name, joints } => {
+                        driven[1] = Some(name);
+                        joints.iter().try_for_each(|&(body, by)| coefficients.set_item(joint(body), by))?;
+                    }
+                    Transmission::Frame { frame } => driven[2] = Some(&self.inner.frames()[*frame].name),
+                    other => unreachable!("{other:?}: a transmission without words for it"),
+                }
+                let gear = read_only(py, &a.gear[..], "")?;
+                let [joint, tendon, frame] = driven;
+                let Actuator { name, gain, bias, kp, kv, control, force, .. } = a;
+                class.call1((name, joint, tendon, frame, coefficients, gear, gain, bias, kp, kv, control, force))
+            };
+            self.inner.actuators().iter().map(actuator).collect()
+        })
+    }
+
+    /// The named positions of the file: a dictionary of q by name, nq numbers each.
+    #[getter]
+    fn keyframes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.keyframe_parts(py, |keyframe| &keyframe.q)
+    }
+
+    /// The velocities of the `keyframes`: a dictionary of v by name, nv numbers each.
+    #[getter]
+    fn keyframe_velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.keyframe_parts(py, |keyframe| &keyframe.v)
+    }
+
+    /// The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
+    /// and where a `Simulation` is asked for it.
+    #[getter]
+    fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, Attribute::Damping, "", || self.inner.damping().to_vec())
+    }
+
+    /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and where
+    /// a `Simulation` is asked for it.
+    #[getter]
+    fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, Attribute::Friction, "", || self.inner.friction().to_vec())
+    }
+
+    /// The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm.
+    #[getter]
+    fn armature<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, Attribute::Armature, "with_armature", || self.inner.armature().to_vec())
+    }
+
+    /// The constraints of the robot's file beside its tree, by name: loops as `ContactConstraint`, without stabilisation, and
+    /// coupled joints as `Coupling`.
+    ///
+    /// The algorithms of a tree leave loops open. `constrained_dynamics` closes those that a `ConstraintSet` has:
+    ///
+    /// >>> robot = condyle.robots.quadruped()
+    /// >>> loops = [c for c in robot.constraints().values() if isinstance(c, condyle.ContactConstraint)]
+    /// >>> stiff = [c._replace(kp=400.0, kd=40.0) for c in loops]  # an error of position decays within 0.1 s
+    /// >>> condyle.ConstraintSet(robot, stiff, mu=1e-8, iterations=5)
+    /// <condyle.ConstraintSet of 'quadruped': 0 constraints, 0 rows>
+    fn constraints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        crate::constrained::of_model(py, &self.inner)
+    }
+
+    /// The acceleration of free fall, in the world's frame (m/s²), 3 numbers.
+    #[getter]
+    fn gravity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.numbers(py, Attribute::Gravity, "with_gravity", || self.inner.gravity().to_array().to_vec())
+    }
+
+    /// The mass of all bodies, with that of what is fixed to the world (kg).
+    #[getter]
+    fn total_mass(&self) -> f64 {
+        self.inner.total_mass()
+    }
+}

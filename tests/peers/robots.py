@@ -1,0 +1,67 @@
+"""Every robot file below some folders, here and in the libraries that read it: a table of what is equal and what not.
+
+    python tests/peers/robots.py FOLDER… [--only PATTERN] [--list] [--table FILE] [--jobs N]
+
+URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, SDFs with Drake, which may be missing. Each file
+is read in a process of its own with a time limit, so that a crash of a library is a row of the table.
+
+A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER names commits: each line has
+`owner/repository`, a tab and the commit. `--table VALIDATION.md` replaces the section on public robots in that file;
+`pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest and keeps the section.
+
+The exit status is 1 if a robot differs or a process crashes.
+"""
+
+import argparse
+import json
+import os
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent / "robots"))
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import files
+import report
+from processes import run
+
+COMMAND = "python tests/peers/robots.py FOLDER --table VALIDATION.md"
+
+
+def main() -> int:
+    """Reads the command line, compares, prints."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="+", help="folder with robots")
+    parser.add_argument("--only", metavar="PATTERN", help="only paths below a folder that match, such as '*anymal*'")
+    parser.add_argument("--jobs", type=int, default=2, help="processes at once (2)")
+    parser.add_argument("--seconds", type=float, default=120.0, help="time limit of a file (120)")
+    parser.add_argument("--list", action="store_true", help="print each file with its verdict")
+    parser.add_argument("--table", type=Path, metavar="FILE", help="put the table into a Markdown file")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all results")
+    arguments = parser.parse_args()
+    results: report.Results = []
+    commits: dict[str, str] = {}
+    for folder in arguments.folder:
+        if not folder.is_dir():
+            parser.error(f"{folder} is no folder")
+        robots = files.find(folder.resolve(), arguments.only)
+        results += run(robots, folder.resolve(), arguments.jobs, arguments.seconds)
+        sources = folder / "SOURCES.tsv"
+        if sources.exists():
+            lines = sources.read_text(encoding="utf-8").splitlines()
+            commits |= {line.split("\t")[0]: line.split("\t")[1] for line in lines if "\t" in line}
+    if not results:
+        parser.error("no robot files are below these folders")
+    if arguments.json:
+        rows = [{**r._asdict(), "path": str(r.path), **v._asdict()} for r, v in results]
+        arguments.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    if arguments.list:
+        print(report.listing(results))
+    print(report.summary(results))
+    if arguments.table:
+        report.put(arguments.table, report.table(results, commits, COMMAND, "1e-10 (MuJoCo: 1e-8)"))
+    return int(any(verdict.verdict in ("different", "crash") for _, verdict in results))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,232 @@
+"""Robots beside MuJoCo: MJCF, whose coordinates are in the same order, and URDF, whose joints are found by name."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+import mujoco
+import numpy as np
+from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there
+from mujoco_actuators import acts, efforts
+
+import condyle
+
+TOLERANCE = 1e-8
+"""MuJoCo keeps inertias as principal moments and a quaternion, and reads meshes in single precision."""
+KINDS = {
+    int(mujoco.mjtJoint.mjJNT_FREE): {"free_flyer"},
+    int(mujoco.mjtJoint.mjJNT_BALL): {"spherical"},
+    int(mujoco.mjtJoint.mjJNT_SLIDE): {"prismatic"},
+    int(mujoco.mjtJoint.mjJNT_HINGE): {"revolute", "continuous"},
+}
+NEW = hasattr(condyle.Model, "springs")
+EASE = 1e12
+"""Smoothing of Coulomb friction that takes it out of `passive_torque`; MuJoCo has it among its constraints."""
+
+
+def read(path: Path) -> mujoco.MjModel:
+    """Returns MuJoCo's model of a file."""
+    try:
+        return mujoco.MjModel.from_xml_path(str(path))
+    except (ValueError, RuntimeError, MemoryError) as error:
+        raise RefusedError(str(error).strip().splitlines()[0]) from None
+
+
+def read_urdf(path: Path) -> mujoco.MjModel:
+    """Returns MuJoCo's model of a URDF without its geometry, which changes nothing and needs meshes."""
+    try:
+        tree = ElementTree.fromstring(path.read_bytes())
+    except (ElementTree.ParseError, LookupError, ValueError) as error:
+        raise RefusedError(str(error)) from None
+    for link in tree.iter("link"):
+        for part in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(part)
+    for part in tree.findall("mujoco"):
+        tree.remove(part)
+    try:
+        return mujoco.MjModel.from_xml_string(ElementTree.tostring(tree, encoding="unicode"))
+    except (ValueError, RuntimeError, MemoryError) as error:
+        raise RefusedError(str(error).strip().splitlines()[0]) from None
+
+
+def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
+    """Compares an MJCF: coordinates are MuJoCo's, one by one."""
+    found = Quantities(model, TOLERANCE)
+    if (mj.nq, mj.nv) != (model.nq, model.nv):
+        found.add("nq, nv", np.inf, f"{model.nq}, {model.nv}, theirs {mj.nq}, {mj.nv}")
+        return found
+    joints, carried = [], {}
+    bodies = [i for i in range(1, model.nbodies) if model.nvs[i]]
+    for i, j in zip(bodies, range(mj.njnt), strict=True):
+        name = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_JOINT, j)
+        if model.joint_types[i] not in KINDS[int(mj.jnt_type[j])]:
+            found.add("kind of joint", np.inf, f"joint `{name}`: {model.joint_types[i]}")
+            return found
+        joints.append(Joint(i, int(mj.jnt_qposadr[j]), int(mj.jnt_dofadr[j])))
+        carried[i] = int(mj.jnt_bodyid[j])
+    found.expect("gravity", model.gravity, gravity(mj))
+    compare(found, mj, joints, carried)
+    found.expect("armature", model.armature, mj.dof_armature, found.coordinate)
+    found.expect("friction", model.friction, mj.dof_frictionloss, found.coordinate)
+    if NEW:
+        ours = np.stack([model.limits.effort_lower, model.limits.effort_upper], 1)
+        found.expect("limits: effort", ours, efforts(mj), found.coordinate)
+        actuators(found, mj)
+        passive(found, mj, joints)
+        keyframes(found, mj, joints)
+    return found
+
+
+def weightless_moments(path: Path) -> bool:
+    """Returns whether a link of a URDF has the mass 0 and moments."""
+    for inertial in ElementTree.fromstring(path.read_bytes()).iter("inertial"):
+        mass, inertia = inertial.find("mass"), inertial.find("inertia")
+        weightless = mass is not None and inertia is not None and float(mass.get("value", "0")) == 0.0
+        if weightless and any(float(number) for number in inertia.attrib.values()):
+            return True
+    return False
+
+
+def compare_urdf(path: Path, mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
+    """Compares a URDF: the root link is fixed to the world in MuJoCo, and joints are found by name."""
+    found = Quantities(model, TOLERANCE)
+    joints, bodies = [], {}
+    for i in range(1, model.nbodies):
+        j = mujoco.mj_name2id(mj, mujoco.mjtObj.mjOBJ_JOINT, model.names[i])
+        if model.joint_types[i] in ("planar", "free_flyer"):
+            raise UnlikeError(f"{model.joint_types[i]} joints are other joints in MuJoCo's reading of URDF")
+        if j < 0:
+            found.add("joints", np.inf, f"joint `{model.names[i]}` is none of MuJoCo's")
+            return found
+        joints.append(Joint(i, int(mj.jnt_qposadr[j]), int(mj.jnt_dofadr[j])))
+        bodies[i] = int(mj.jnt_bodyid[j])
+    if mj.nv != model.nv:
+        found.add("nq, nv", np.inf, f"{model.nq}, {model.nv}, theirs {mj.nq}, {mj.nv}")
+        return found
+    found.leave_out("MuJoCo leaves the mass of links on the world out", "total mass")
+    if weightless_moments(path):
+        found.leave_out("MuJoCo leaves moments of links of mass 0 out", "M", "bias")
+    compare(found, mj, joints, bodies)
+    return found
+
+
+def gravity(mj: mujoco.MjModel) -> np.ndarray:
+    """Returns the acceleration of free fall; zero where it is disabled."""
+    off = mj.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    return np.zeros(3) if off else mj.opt.gravity.copy()
+
+
+def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: dict[int, int]) -> None:
+    """Compares mass, limits of position, M, bias, poses of bodies, frames of bodies and sites."""
+    model, data = found.model, mujoco.MjData(mj)
+    found.expect("total mass", model.total_mass, mj.body_mass.sum())
+    positions(found, mj, joints)
+    if mj.neq:
+        found.spoken("equality", "follow", "connect", "weld", held=bool(NEW and found.model.constraints()))
+    mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
+    for seed in range(STATES):
+        q, v = state_of(model, seed)
+        state = there("mujoco", model, joints, q, v, mj.nq, mj.nv)
+        data.qpos[:], data.qvel[:] = state.q, state.v
+        mujoco.mj_forward(mj, data)
+        M = np.zeros((mj.nv, mj.nv))
+        if mj.nv:
+            mujoco.mj_fullM(mj, data, M)
+            found.inertia(q, v, state, M, data.qfrc_bias)
+        frames(found, mj, data, q, bodies)
+
+
+def pose(found: Quantities, what: str, name: str, ours: np.ndarray, p: np.ndarray, R: np.ndarray) -> None:
+    """Compares one pose."""
+    theirs = np.concatenate([R.reshape(3, 3), p[:, None]], 1)
+    found.expect(what, ours[:3], theirs, lambda _: name)
+
+
+def frames(found: Quantities, mj: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, bodies: dict[int, int]) -> None:
+    """Compares frames: those of bodies that a joint carries, with or without a name, and bodies and sites by name."""
+    own = {(frame.name, frame.body): i for i, frame in enumerate(found.model.frames) if frame.kind == "link"}
+    for i, body in bodies.items():
+        name = found.model.body_names[i]
+        if (name, i) in own:
+            placed = condyle.frame_placement(found.model, found.data, q, own[name, i])
+            pose(found, "frames of bodies", f"body `{name}`", placed, data.xpos[body], data.xmat[body])
+    kinds = (
+        ("frames of bodies", mujoco.mjtObj.mjOBJ_BODY, data.xpos, data.xmat, ("link",)),
+        ("sites", mujoco.mjtObj.mjOBJ_SITE, data.site_xpos, data.site_xmat, ("user",)),
+    )
+    for i, frame in enumerate(found.model.frames):
+        for what, kind, p, R, ours in kinds:
+            there = mujoco.mj_name2id(mj, kind, frame.name) if frame.kind in ours and frame.name else -1
+            if there >= 0:
+                placed = condyle.frame_placement(found.model, found.data, q, i)
+                pose(found, what, f"frame `{frame.name}`", placed, p[there], R[there])
+    names = {frame.name for frame in found.model.frames}
+    for i in range(mj.nsite):
+        name = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_SITE, i)
+        if name and name not in names:
+            found.add("sites", np.inf, f"site `{name}` is no frame")
+
+
+def positions(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
+    """Compares limits of positions of hinges and slides."""
+    model, limits = found.model, found.model.limits
+    by_address = {int(mj.jnt_qposadr[j]): j for j in range(mj.njnt)}
+    for joint in joints:
+        j, at = by_address[joint.q], model.idx_qs[joint.body]
+        same = limits.lower[at] == limits.upper[at]
+        if same and not mj.jnt_limited[j]:
+            found.left_out["limits: position"] = "MuJoCo takes equal limits for none"
+        elif model.nqs[joint.body] == 1:
+            lower, upper = mj.jnt_range[j] if mj.jnt_limited[j] else (-np.inf, np.inf)
+            ours, name = (limits.lower[at], limits.upper[at]), f"joint `{model.names[joint.body]}`"
+            found.expect("limits: position", ours, (lower, upper), lambda _, name=name: name)
+
+
+def actuators(found: Quantities, mj: mujoco.MjModel) -> None:
+    """Compares gains and gears of actuators with names; a warning has to name those that the model does not have."""
+    ours = {actuator.name: actuator for actuator in found.model.actuators}
+    warnings = " ".join(map(str, found.model.warnings))
+    for i in range(mj.nu):
+        name = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_ACTUATOR, i)
+        if not name or not acts(mj, i):
+            continue
+        if name not in ours:
+            if name not in warnings:
+                found.add("actuators", np.inf, f"actuator `{name}` is missing, without a warning")
+            continue
+        where = f"actuator `{name}`"
+        affine = mj.actuator_biastype[i] == int(mujoco.mjtBias.mjBIAS_AFFINE)
+        bias = mj.actuator_biasprm[i, 1:3] if affine else np.zeros(2)
+        found.expect("actuators", (ours[name].kp, ours[name].kv), -bias, lambda _, where=where: where)
+        found.expect("actuators", ours[name].gear, mj.actuator_gear[i], lambda _, where=where: where)
+
+
+def passive(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
+    """Compares springs, damping and gravity compensation, without friction (a constraint there) and fluids."""
+    model, data = found.model, mujoco.MjData(mj)
+    if not mj.nv:
+        return
+    for seed in range(STATES):
+        q, v = state_of(model, 100 + seed)
+        state = there("mujoco", model, joints, q, v, mj.nq, mj.nv)
+        data.qpos[:], data.qvel[:] = state.q, state.v
+        mujoco.mj_forward(mj, data)
+        theirs = state.T.T @ (data.qfrc_spring + data.qfrc_damper + data.qfrc_gravcomp)
+        if data.qfrc_fluid.any():
+            found.spoken("fluid", "density", "viscosity")
+        ours = condyle.passive_torque(model, q=q, v=v, smoothing=EASE)
+        found.expect("passive efforts", ours, theirs, found.coordinate)
+
+
+def keyframes(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
+    """Compares keyframes by name."""
+    model = found.model
+    for i in range(mj.nkey):
+        name = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_KEY, i)
+        if not name:
+            continue
+        if name not in model.keyframes:
+            found.add("keyframes", np.inf, f"keyframe `{name}` is missing")
+            continue
+        q = np.asarray(model.keyframes[name], float)
+        state = there("mujoco", model, joints, q, np.zeros(model.nv), mj.nq, mj.nv)
+        found.expect("keyframes", state.q, mj.key_qpos[i], lambda _, name=name: f"keyframe `{name}`")

@@ -1,0 +1,99 @@
+"""Robot files below a folder: formats by root elements, and fragments apart."""
+
+import re
+from collections.abc import Iterator
+from fnmatch import fnmatch
+from pathlib import Path
+from typing import NamedTuple
+
+SUFFIXES = {".xml", ".urdf", ".sdf", ".world", ".mjcf"}
+ROOTS = {"robot": "urdf", "sdf": "sdf", "gazebo": "sdf", "mujoco": "mjcf", "mujocoinclude": "mjcf"}
+"""Format of each root element; `gazebo` is that of SDF 1.0 to 1.2."""
+XACRO = re.compile(r"<xacro:|\$\((?:find|arg|optenv|env|dirname|eval) |\$\{")
+COMMENTS = re.compile(r"<!--.*?-->", re.DOTALL)
+ROOT = re.compile(r"<(?![?!])\s*([\w:.-]+)")
+INCLUDED = re.compile(r"<include\b[^>]*\bfile\s*=\s*[\"']([^\"']+)[\"']")
+
+
+class Robot(NamedTuple):
+    """A file that may describe a robot."""
+
+    path: Path
+    format: str
+    """`urdf`, `mjcf` or `sdf`."""
+    collection: str
+    """Name of the collection: `owner/repository`, or the folder's first part below the root."""
+    fragment: str
+    """Reason why the file is no robot on its own; empty for a robot."""
+    included: bool
+    """Whether another file includes this one."""
+
+
+def text_of(path: Path) -> str:
+    """Returns the text of a file, which may declare UTF-16 or Latin-1."""
+    data = path.read_bytes()
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return data.decode("utf-16", "replace")
+    return data.decode("utf-8", "replace")
+
+
+def format_of(text: str) -> str | None:
+    """Returns the format of a file by its root element; None for other files."""
+    root = ROOT.search(COMMENTS.sub("", text))
+    return ROOTS.get(root.group(1)) if root else None
+
+
+def fragment(text: str, kind: str) -> str:
+    """Returns the reason why a file is no robot on its own; empty if it may be one."""
+    bare = COMMENTS.sub("", text)
+    if kind == "mjcf":
+        if "<mujocoinclude" in bare:
+            return "root <mujocoinclude>: a part of other files"
+        if not re.search(r"<(worldbody|include|body|replicate)\b", bare):
+            return "no <worldbody> and no <include>: a part of other files"
+    if kind == "urdf":
+        if XACRO.search(bare):
+            return "xacro: has to be expanded first"
+        if not re.search(r"<link\b", bare):
+            return "no <link>: a part of other files"
+    if kind == "sdf":
+        if re.search(r"<xacro:|<%|\{%|@\(", bare):
+            return "template: has to be expanded first"
+        if not re.search(r"<(model|include)\b", bare):
+            return "no <model>: a light, an actor or an empty world"
+    return ""
+
+
+def collection(folder: Path, path: Path) -> str:
+    """Returns the repository's name of a path `…/owner+repository/…`, else its first folders below the root."""
+    parts = path.relative_to(folder).parts
+    for part in (*folder.parts[-2:], *parts):
+        if "+" in part and not part.endswith(tuple(SUFFIXES)):
+            return part.replace("+", "/", 1)
+    return parts[0] if len(parts) > 1 else folder.name
+
+
+def find(folder: Path, only: str | None = None) -> list[Robot]:
+    """Returns all robot files below a folder, by path; `only` is a pattern for paths relative to it."""
+    found: list[tuple[Path, str, str]] = []
+    included: set[Path] = set()
+    for path in walk(folder):
+        text = text_of(path)
+        kind = format_of(text)
+        if kind is None:
+            continue
+        if kind == "mjcf":
+            bare = COMMENTS.sub("", text)
+            included |= {(path.parent / name).resolve() for name in INCLUDED.findall(bare)}
+        found.append((path, kind, fragment(text, kind)))
+    robots = [Robot(p, k, collection(folder, p), why, p.resolve() in included) for p, k, why in found]
+    if only is None:
+        return robots
+    return [robot for robot in robots if fnmatch(str(robot.path.relative_to(folder)), only)]
+
+
+def walk(folder: Path) -> Iterator[Path]:
+    """Yields files with a suffix of robots, in order."""
+    for path in sorted(folder.rglob("*")):
+        if path.suffix.lower() in SUFFIXES and path.is_file():
+            yield path

@@ -1,0 +1,170 @@
+"""Verdict on one file: Condyle beside every peer that reads it."""
+
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import beside_mujoco
+import beside_pinocchio
+from comparison import Difference, Quantities, RefusedError, UnlikeError
+from files import Robot
+
+import condyle
+
+try:
+    import beside_drake
+except ImportError:  # Drake is left out by `./test`
+    beside_drake = None  # type: ignore[assignment]
+
+
+@cache
+def packages(folder: Path) -> list[Path]:
+    """Returns the folders below a folder that hold packages or models."""
+    marks = (mark for name in ("package.xml", "model.config") for mark in folder.rglob(name))
+    return sorted({mark.parent.parent for mark in marks})
+
+
+def prepare(folder: Path) -> None:
+    """Does once what every file needs, before processes are forked."""
+    packages(folder)
+    if beside_drake is not None:
+        beside_drake.copies(folder)
+
+
+class Verdict(NamedTuple):
+    """Result of one file."""
+
+    verdict: str
+    """`equal`, `different`, `refused`, `only ours`, `nobody`, `fragment`, `crash`."""
+    warnings: list[str]
+    error: str
+    """Our error; empty if the file was read."""
+    peers: dict[str, str]
+    """`equal`, `different`, or the reason why there is no comparison, by peer."""
+    differences: dict[str, list[Difference]]
+    """By peer."""
+    compared: list[str]
+    left_out: dict[str, list[str]]
+    """Reasons why quantities were not compared, by peer."""
+
+
+FREE = "free_flyer"
+
+
+def nv(plant: Any) -> int:
+    """Returns the number of degrees of freedom of Drake's plant."""
+    return int(plant.num_velocities())
+
+
+class Trial:
+    """Condyle and the peers on one file."""
+
+    def __init__(self, robot: Robot, folder: Path) -> None:
+        self.robot, self.folder = robot, folder
+        self.peers: dict[str, str] = {}
+        self.differences: dict[str, list[Difference]] = {}
+        self.compared: set[str] = set()
+        self.left_out: dict[str, list[str]] = {}
+        self.errors: list[str] = []
+        self.warnings: list[str] = []
+        self.read = False
+
+    def ours(self, root_joint: str | None) -> condyle.Model | str:
+        """Returns our model, or the error if we refuse the file."""
+        path = self.robot.path
+        try:
+            if self.robot.format == "mjcf":
+                model = condyle.Model.from_mjcf(path)
+            elif self.robot.format == "urdf":
+                model = condyle.Model.from_urdf(path, root_joint=root_joint, packages=packages(self.folder))
+            elif "packages" in (condyle.Model.from_sdf.__doc__ or ""):
+                model = condyle.Model.from_sdf(path, root_joint=root_joint, packages=packages(self.folder))
+            else:
+                model = condyle.Model.from_sdf(path, root_joint=root_joint)
+        except condyle.Error as error:
+            return str(error).replace(f"{path}:", "").strip()
+        return model
+
+    def chosen(self, roots: tuple[str | None, ...], nv: int | None) -> condyle.Model | None:
+        """Returns our model with the first root joint that gives nv degrees of freedom, else with any."""
+        tried = [self.ours(root) for root in roots]
+        models = [model for model in tried if not isinstance(model, str)]
+        if not models:
+            self.errors.append(str(tried[0]))
+            return None
+        model = next((model for model in models if model.nv == nv), models[0])
+        self.read = True
+        self.warnings = [str(w).replace(f"{self.robot.path}:", "") for w in model.warnings]
+        return model
+
+    def beside(
+        self,
+        peer: str,
+        read: Callable[[], Any],
+        compare: Callable[[Any, condyle.Model], Quantities],
+        roots: tuple[str | None, ...] = (None,),
+        nv: Callable[[Any], int] | None = None,
+    ) -> None:
+        """Compares with one peer; of several root joints the first with which nv is the peer's."""
+        try:
+            theirs = read()
+        except RefusedError as error:
+            self.peers[peer] = f"refuses: {error}"
+            return
+        model = self.chosen(roots, nv(theirs) if nv else None)
+        if model is None:
+            self.peers[peer] = "reads"
+            return
+        try:
+            found = compare(theirs, model)
+        except UnlikeError as error:
+            self.peers[peer] = f"unlike: {error}"
+            return
+        self.compared |= found.compared
+        if found.left_out:
+            self.left_out[peer] = sorted(set(found.left_out.values()))
+        self.peers[peer] = "different" if found.differences else "equal"
+        if found.differences:
+            self.differences[peer] = sorted(found.differences.values(), key=lambda d: -d.size)
+
+    def verdict(self) -> Verdict:
+        """Returns what the comparisons say together."""
+        if self.robot.fragment:
+            return Verdict("fragment", [], self.robot.fragment, {}, {}, [], {})
+        {"mjcf": self.mjcf, "urdf": self.urdf, "sdf": self.sdf}[self.robot.format]()
+        states = set(self.peers.values())
+        reads = states & {"equal", "different", "reads"}
+        if not self.errors and not self.read:
+            self.chosen((FREE, None) if self.robot.format != "mjcf" else (None,), None)
+        unread = all(state.startswith("refuses") for state in states)
+        if self.robot.included and unread and not any("opening file" in state for state in states):
+            return Verdict("fragment", [], "included by other files, and read alone by no peer", self.peers, {}, [], {})
+        if self.errors:
+            verdict = "nobody" if unread else "refused"
+        elif "different" in reads:
+            verdict = "different"
+        else:
+            verdict = "equal" if "equal" in reads else "only ours"
+        error = self.errors[0] if self.errors else ""
+        compared = sorted(self.compared)
+        return Verdict(verdict, self.warnings, error, self.peers, self.differences, compared, self.left_out)
+
+    def mjcf(self) -> None:
+        """MuJoCo, whose format it is; Drake only where MuJoCo refuses."""
+        path = self.robot.path
+        self.beside("MuJoCo", lambda: beside_mujoco.read(path), beside_mujoco.compare_mjcf)
+
+    def urdf(self) -> None:
+        """Pinocchio and Drake with a free root, MuJoCo with a fixed one."""
+        path, folder = self.robot.path, self.folder
+        self.beside("Pinocchio", lambda: beside_pinocchio.read(path, FREE), beside_pinocchio.compare, (FREE,))
+        if beside_drake is not None:
+            self.beside("Drake", lambda: beside_drake.read(path, folder), beside_drake.compare, (FREE, None), nv)
+        self.beside("MuJoCo", lambda: beside_mujoco.read_urdf(path), partial(beside_mujoco.compare_urdf, path))
+
+    def sdf(self) -> None:
+        """Drake."""
+        path, folder = self.robot.path, self.folder
+        if beside_drake is not None:
+            self.beside("Drake", lambda: beside_drake.read(path, folder), beside_drake.compare, (FREE, None), nv)
