@@ -56,8 +56,8 @@ pub struct MjcfOptions {
     /// Whether a `<joint>` of `<equality>` with a linear `polycoef` lets joint1 follow joint2 ([`Mimic`](crate::Mimic)),
     /// instead of being a [constraint](Model::constraints) beside the tree.
     pub mimic: bool,
-    /// Whether the mass of a mesh, on a moving body without `<inertial>`, is left out and reported in
-    /// [`Model::warnings`], instead of being an error.
+    /// Whether a mesh with mass that cannot be read weighs nothing and is reported in [`Model::warnings`], instead of being
+    /// an error.
     pub weightless_meshes: bool,
 }
 
