@@ -155,7 +155,7 @@ def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
 
     tag = path[-1]
     inside = {
-        "joint": ["<joint name='x' {}/>".format(kind) for kind in ("", "type='slide'", "type='ball'")],
+        "joint": [f"<joint name='x' {kind}/>" for kind in ("", "type='slide'", "type='ball'")],
         "geom": [
             f"<geom name='x' {shape}/>"
             for shape in ("size='0.1 0.2 0.3'", "type='box' size='0.1 0.2 0.3'", "type='mesh' mesh='mesh'")
@@ -272,13 +272,40 @@ def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
     limited, forced = m.jnt_limited.astype(bool), m.jnt_actfrclimited.astype(bool)
     effect["range"] = np.where(limited[:, None], m.jnt_range, [-np.inf, np.inf])
     effect["actfrcrange"] = np.where(forced[:, None], m.jnt_actfrcrange, [-np.inf, np.inf])
-    for field in (
-        "dof_frictionloss dof_damping dof_dampingpoly jnt_stiffness jnt_stiffnesspoly qpos_spring body_gravcomp body_mocapid "
-        "tendon_type tendon_stiffness tendon_damping tendon_armature tendon_frictionloss tendon_lengthspring "
-        "eq_type eq_obj1id eq_obj2id eq_data eq_active0 key_qpos key_qvel actuator_trntype actuator_trnid actuator_gear "
-        "actuator_gaintype actuator_gainprm actuator_biastype actuator_biasprm actuator_dyntype actuator_dynprm "
-        "actuator_forcelimited actuator_ctrllimited"
-    ).split():
+    for field in [
+        "dof_frictionloss",
+        "dof_damping",
+        "dof_dampingpoly",
+        "jnt_stiffness",
+        "jnt_stiffnesspoly",
+        "qpos_spring",
+        "body_gravcomp",
+        "body_mocapid",
+        "tendon_type",
+        "tendon_stiffness",
+        "tendon_damping",
+        "tendon_armature",
+        "tendon_frictionloss",
+        "tendon_lengthspring",
+        "eq_type",
+        "eq_obj1id",
+        "eq_obj2id",
+        "eq_data",
+        "eq_active0",
+        "key_qpos",
+        "key_qvel",
+        "actuator_trntype",
+        "actuator_trnid",
+        "actuator_gear",
+        "actuator_gaintype",
+        "actuator_gainprm",
+        "actuator_biastype",
+        "actuator_biasprm",
+        "actuator_dyntype",
+        "actuator_dynprm",
+        "actuator_forcelimited",
+        "actuator_ctrllimited",
+    ]:
         effect[field] = getattr(m, field).copy()
     for name in ("tendon_range", "actuator_forcerange", "actuator_ctrlrange"):
         on = getattr(m, {"tendon_range": "tendon_limited"}.get(name, name.replace("range", "limited"))).astype(bool)
@@ -352,9 +379,9 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
     a = there.acceleration_from(d.qpos, d.qvel, np.zeros(m.nv))
     tau = condyle.rnea(model, data, q, v, a)
     expect("bias", there.effort(q, tau), effect["bias"])
-    passive = condyle.passive_torque(model, q, v, 1e-3)
-    passive = passive + model.friction * np.tanh(v / 1e-3)  # MuJoCo's friction is a constraint
-    expect("passive", there.effort(q, passive), effect["passive"])
+    passive = there.effort(q, condyle.passive_torque(model, q, v, 1e-3))
+    passive = passive + model.friction * np.tanh(d.qvel / 1e-3)  # MuJoCo's friction is a constraint
+    expect("passive", passive, effect["passive"])
     expect("gravity", model.gravity, effect["gravity"] if not effect["disabled"][0] & 128 else 0 * effect["gravity"])
     frames = {f.name for f in model.frames}
     for name, pose in effect.items():
