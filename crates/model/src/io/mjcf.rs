@@ -66,7 +66,7 @@ impl Model {
     ///
     /// Joints keep MuJoCo's order, so q and v read as its `qpos` and `qvel`, but that our quaternions are x, y, z, w
     /// and a free joint's velocity is in the body's frame (MuJoCo: linear velocity in the world's). A hinge has one
-    /// number, limits or not ([`Joint::Revolute`]). Several joints on one body become a chain, with bodies without
+    /// number, limits or not ([`Joint::Revolute`](crate::Joint::Revolute)). Several joints on one body become a chain, with bodies without
     /// mass, `name#1`, `name#2`, …, between them. A body without joints is merged into its parent and stays as a
     /// frame, as do sites ([`FrameKind::User`]).
     ///

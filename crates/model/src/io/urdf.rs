@@ -25,7 +25,7 @@ pub struct UrdfOptions {
     /// The joint between the world and the root link, named `root_joint`; none fixes the root link to the world.
     pub root_joint: Option<Joint>,
     /// Whether joints with a `<mimic>` share the coordinate of the joint they follow, instead of having their own; see
-    /// [`Mimic`].
+    /// [`Mimic`](crate::Mimic).
     pub mimic: bool,
     /// Whether a warning ([`Model::warnings`]) is an error.
     pub strict: bool,
