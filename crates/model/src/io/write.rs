@@ -38,8 +38,8 @@ impl Model {
     /// Reading the new file gives this model back, up to rounding.
     ///
     /// A body of several links, merged by fixed joints, has their sum. The link that its joint carries takes all of the
-    /// difference; if that link has no mass, the heaviest one does. If a link would be left with less than a thousandth of
-    /// the body's mass, it takes the whole inertia and the others get none.
+    /// difference; if that link has no mass, the heaviest one does. If that would leave it an inertia that no body has, or
+    /// less than a thousandth of the body's mass, it takes the whole inertia and the others get none.
     ///
     /// ```
     /// use condyle_model::{Model, UrdfOptions, robots};
