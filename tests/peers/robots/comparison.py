@@ -169,6 +169,8 @@ class Quantities:
 
     def add(self, quantity: str, size: float, detail: str) -> None:
         """Records a difference, the largest of each quantity."""
+        if quantity in self.left_out:
+            return
         if quantity not in self.differences or self.differences[quantity].size < size:
             self.differences[quantity] = Difference(quantity, size, detail)
 
