@@ -2,8 +2,8 @@
 
     python benches/loading.py [--beside FOLDER] [--rounds N]
 
-FOLDER has another `condyle` package, for example of an earlier version. Both load each file in turn, in processes of their own;
-a time is the median over the rounds. Prints a line for each robot and the ratio of the sums.
+FOLDER has another `condyle` package, for example of an earlier version. Both load each file in turn, in processes of
+their own; a time is the median over the rounds. Prints a line for each robot and the ratio of the sums.
 """
 
 import argparse

@@ -154,7 +154,8 @@ def test_mjcf_mimic() -> None:
 
 SDF = """<sdf version="1.7"><model name="pendulum">
   <link name="rod"><inertial><pose>0 0 -1 0 0 0</pose><mass>2</mass>
-    <inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial></link><link name="bob"><inertial><mass>1</mass></inertial></link>
+    <inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial></link>
+  <link name="bob"><inertial><mass>1</mass></inertial></link>
   <joint name="pivot" type="revolute"><parent>rod</parent><child>bob</child><axis><xyz>0 1 0</xyz></axis></joint>
 </model></sdf>"""
 
