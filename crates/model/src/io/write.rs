@@ -74,6 +74,7 @@ impl Model {
     ///
     /// Attributes of elements go before those of their classes, so defaults stay as they are. A changed inertia is written
     /// as an `<inertial>`, also where geoms gave it before. Limits of effort are written as `actuatorfrcrange` of the joint.
+    /// The weight that `gravcomp` carries is a factor of the mass, so it follows the new masses.
     ///
     /// # Errors
     /// As [`write_urdf`](Self::write_urdf). The file itself must have the bodies and joints that differ: those of an
