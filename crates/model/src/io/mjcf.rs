@@ -66,8 +66,8 @@ impl Model {
     ///
     /// Joints keep MuJoCo's order, so q and v read as its `qpos` and `qvel`, but that our quaternions are x, y, z, w
     /// and a free joint's velocity is in the body's frame (MuJoCo: linear velocity in the world's). A hinge has one
-    /// number, limits or not ([`Joint::Revolute`]). Several joints on one body become a chain, with bodies without
-    /// mass, `name#1`, `name#2`, …, between them. A body without joints is merged into its parent and stays as a
+    /// number, limits or not ([`Joint::Revolute`](crate::Joint::Revolute)). Several joints on one body become a chain,
+    /// with bodies without mass, `name#1`, `name#2`, …, between them. A body without joints is merged into its parent and stays as a
     /// frame, as do sites ([`FrameKind::User`]).
     ///
     /// A body of the model sits where its last joint is: the frame of the MJCF body, of kind [`FrameKind::Link`] and
@@ -77,8 +77,8 @@ impl Model {
     /// `camera:name`.
     ///
     /// Read are `<compiler>` (all that has an effect on a model), default classes, `<include>`, `<replicate>`, `<attach>`
-    /// with files that have settings of their own, gravity and flags, `<frame>`, `<inertial>`, masses of geoms. Included files are looked for in
-    /// the main file's folder, then beside the file that includes them. Masses and inertias of meshes follow MuJoCo's
+    /// with files that have settings of their own, gravity and flags, `<frame>`, `<inertial>`, masses of geoms. Included
+    /// files are looked for in the main file's folder, then beside the file that includes them. Masses and inertias of meshes follow MuJoCo's
     /// rules (`inertia` of `<mesh>`), with the feature `meshes`; so do primitives that are fitted to meshes.
     ///
     /// Springs ([`springs`](Self::springs)), damping, friction and armature are those of the compiled MuJoCo model:
