@@ -77,8 +77,8 @@ impl Model {
     /// `camera:name`.
     ///
     /// Read are `<compiler>` (all that has an effect on a model), default classes, `<include>`, `<replicate>`, `<attach>`
-    /// with files that have settings of their own, gravity and flags, `<frame>`, `<inertial>`, masses of geoms. Included files are looked for in
-    /// the main file's folder, then beside the file that includes them. Masses and inertias of meshes follow MuJoCo's
+    /// with files that have settings of their own, gravity and flags, `<frame>`, `<inertial>`, masses of geoms. Included
+    /// files are looked for in the main file's folder, then beside the file that includes them. Masses and inertias of meshes follow MuJoCo's
     /// rules (`inertia` of `<mesh>`), with the feature `meshes`; so do primitives that are fitted to meshes.
     ///
     /// Springs ([`springs`](Self::springs)), damping, friction and armature are those of the compiled MuJoCo model:
