@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
-from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there
+from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there, without_rotors
 from mujoco_actuators import acts, efforts
 
 import condyle
@@ -18,7 +18,6 @@ KINDS = {
     int(mujoco.mjtJoint.mjJNT_SLIDE): {"prismatic"},
     int(mujoco.mjtJoint.mjJNT_HINGE): {"revolute", "continuous"},
 }
-NEW = hasattr(condyle.Model, "springs")
 EASE = 1e12
 """Smoothing of Coulomb friction that takes it out of `passive_torque`; MuJoCo has it among its constraints."""
 
@@ -80,14 +79,12 @@ def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
     compare(found, mj, joints, carried)
     found.expect("armature", model.armature, mj.dof_armature, found.coordinate)
     found.expect("friction", model.friction, mj.dof_frictionloss, found.coordinate)
-    if NEW:
-        ours = np.stack([model.limits.effort_lower, model.limits.effort_upper], 1)
-        theirs = efforts(mj)
-        ours[np.isnan(theirs)] = np.nan
-        found.expect("limits: effort", ours, theirs, found.coordinate)
-        actuators(found, mj)
-        passive(found, mj, joints)
-        keyframes(found, mj, joints)
+    ours, theirs = np.stack([model.limits.effort_lower, model.limits.effort_upper], 1), efforts(mj)
+    ours[np.isnan(theirs)] = np.nan
+    found.expect("limits: effort", ours, theirs, found.coordinate)
+    actuators(found, mj)
+    passive(found, mj, joints)
+    keyframes(found, mj, joints)
     return found
 
 
@@ -103,6 +100,7 @@ def weightless_moments(path: Path) -> bool:
 
 def compare_urdf(path: Path, mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
     """Compares a URDF: the root link is fixed to the world in MuJoCo, and joints are found by name."""
+    model = without_rotors(model)
     found = Quantities(model, TOLERANCE)
     joints, bodies = [], {}
     for i in range(1, model.nbodies):
@@ -140,7 +138,7 @@ def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: 
         if words in warnings:
             found.leave_out(why, *quantities)
     if mj.neq:
-        found.spoken("equality", "follow", "connect", "weld", held=bool(NEW and found.model.constraints()))
+        found.spoken("equality", "follow", "connect", "weld", held=bool(found.model.constraints()))
     mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     for seed in range(STATES):
         q, v = state_of(model, seed)
