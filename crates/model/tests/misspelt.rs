@@ -51,7 +51,8 @@ fn names(text: &str) -> Vec<Vec<Range<usize>>> {
     let mut places = Vec::new();
     for node in document.descendants().filter(|node| node.is_element() && node.parent_element().is_some()) {
         let (whole, tag) = (node.range(), node.tag_name().name());
-        let mut tags = Vec::from([(whole.start + 1)..(whole.start + 1 + tag.len())]);
+        let mut tags = Vec::new();
+        tags.push(whole.start + 1..whole.start + 1 + tag.len());
         if let Some(end) =
             text[whole.clone()].rfind(&format!("</{tag}>")).filter(|end| end + tag.len() + 3 == whole.len())
         {
