@@ -311,7 +311,7 @@ class ContactConstraint(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """Two coupled joints of a robot's file: the follower's position is Σ cᵢ qⁱ, with q the leader's position."""
+    """Two coupled joints of a robot's file: the follower is at Σ cᵢ qⁱ, with q the position of the leader."""
 
     follower: str
     """The joint that follows."""

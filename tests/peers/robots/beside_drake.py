@@ -222,8 +222,6 @@ def limits(found: Quantities, joint: object, plant: MultibodyPlant, body: int) -
 
 def springs(found: Quantities, plant: MultibodyPlant, context: object, q: np.ndarray, T: np.ndarray) -> None:
     """Compares springs of joints, at rest."""
-    if not hasattr(condyle.Model, "springs"):
-        return
     nv = plant.num_velocities()
     plant.SetVelocities(context, np.zeros(nv))
     forces = MultibodyForces(plant)

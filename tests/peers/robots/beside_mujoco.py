@@ -5,7 +5,7 @@ from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
-from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there
+from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there, without_rotors
 from mujoco_actuators import acts, efforts
 
 import condyle
@@ -18,9 +18,21 @@ KINDS = {
     int(mujoco.mjtJoint.mjJNT_SLIDE): {"prismatic"},
     int(mujoco.mjtJoint.mjJNT_HINGE): {"revolute", "continuous"},
 }
-NEW = hasattr(condyle.Model, "springs")
 EASE = 1e12
 """Smoothing of Coulomb friction that takes it out of `passive_torque`; MuJoCo has it among its constraints."""
+
+
+WARNED = (
+    ("spatial", "a spatial tendon is left out, as a warning says", ("passive efforts", "M", "bias")),
+    (
+        "the tendon runs over several joints",
+        "a tendon over several joints has no spring and no damping, as a warning says",
+        ("passive efforts",),
+    ),
+    ("armature: it is missing in M", "armature of a tendon is left out, as a warning says", ("M", "bias")),
+    ("the keyframes of the model", "keyframes of an attached model are left out, as a warning says", ("keyframes",)),
+)
+"""Words of warnings, and what becomes different as they say."""
 
 
 def read(path: Path) -> mujoco.MjModel:
@@ -67,12 +79,12 @@ def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
     compare(found, mj, joints, carried)
     found.expect("armature", model.armature, mj.dof_armature, found.coordinate)
     found.expect("friction", model.friction, mj.dof_frictionloss, found.coordinate)
-    if NEW:
-        ours = np.stack([model.limits.effort_lower, model.limits.effort_upper], 1)
-        found.expect("limits: effort", ours, efforts(mj), found.coordinate)
-        actuators(found, mj)
-        passive(found, mj, joints)
-        keyframes(found, mj, joints)
+    ours, theirs = np.stack([model.limits.effort_lower, model.limits.effort_upper], 1), efforts(mj)
+    ours[np.isnan(theirs)] = np.nan
+    found.expect("limits: effort", ours, theirs, found.coordinate)
+    actuators(found, mj)
+    passive(found, mj, joints)
+    keyframes(found, mj, joints)
     return found
 
 
@@ -88,6 +100,7 @@ def weightless_moments(path: Path) -> bool:
 
 def compare_urdf(path: Path, mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
     """Compares a URDF: the root link is fixed to the world in MuJoCo, and joints are found by name."""
+    model = without_rotors(model)
     found = Quantities(model, TOLERANCE)
     joints, bodies = [], {}
     for i in range(1, model.nbodies):
@@ -120,8 +133,12 @@ def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: 
     model, data = found.model, mujoco.MjData(mj)
     found.expect("total mass", model.total_mass, mj.body_mass.sum())
     positions(found, mj, joints)
+    warnings = " ".join(map(str, model.warnings))
+    for words, why, quantities in WARNED:
+        if words in warnings:
+            found.leave_out(why, *quantities)
     if mj.neq:
-        found.spoken("equality", "follow", "connect", "weld", held=bool(NEW and found.model.constraints()))
+        found.spoken("equality", "follow", "connect", "weld", held=bool(found.model.constraints()))
     mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     for seed in range(STATES):
         q, v = state_of(model, seed)
@@ -185,19 +202,21 @@ def actuators(found: Quantities, mj: mujoco.MjModel) -> None:
     """Compares gains and gears of actuators with names; a warning has to name those that the model does not have."""
     ours = {actuator.name: actuator for actuator in found.model.actuators}
     warnings = " ".join(map(str, found.model.warnings))
-    for i in range(mj.nu):
+    for i in range(mj.nactuator):
         name = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_ACTUATOR, i)
-        if not name or not acts(mj, i):
+        if not name or not acts(mj, i) or mj.actuator_outnum[i] != 1:
             continue
         if name not in ours:
-            if name not in warnings:
+            if f"`{name}`" not in warnings and f"`{name.rstrip('0123456789')}`" not in warnings:  # a replica's
                 found.add("actuators", np.inf, f"actuator `{name}` is missing, without a warning")
             continue
         where = f"actuator `{name}`"
-        affine = mj.actuator_biastype[i] == int(mujoco.mjtBias.mjBIAS_AFFINE)
-        bias = mj.actuator_biasprm[i, 1:3] if affine else np.zeros(2)
-        found.expect("actuators", (ours[name].kp, ours[name].kv), -bias, lambda _, where=where: where)
-        found.expect("actuators", ours[name].gear, mj.actuator_gear[i], lambda _, where=where: where)
+        if mj.actuator_gaintype[i] == int(mujoco.mjtGain.mjGAIN_FIXED):
+            affine = mj.actuator_biastype[i] == int(mujoco.mjtBias.mjBIAS_AFFINE)
+            bias = mj.actuator_biasprm[i, 1:3] if affine else np.zeros(2)
+            found.expect("actuators", (ours[name].kp, ours[name].kv), -bias, lambda _, where=where: where)
+        gear = mj.actuator_gear[mj.actuator_outadr[i]]
+        found.expect("actuators", ours[name].gear, gear, lambda _, where=where: where)
 
 
 def passive(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there
+from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, state_of, there, without_rotors
 
 import condyle
 
@@ -50,7 +50,10 @@ def read(path: Path, root_joint: str | None) -> pin.Model:
 
 def compare(theirs: pin.Model, model: condyle.Model) -> Quantities:
     """Compares everything that both have."""
+    rotors, model = model.armature, without_rotors(model)
     found = Quantities(model, TOLERANCE)
+    if rotors.any():
+        found.leave_out("Pinocchio leaves the inertia of rotors out", "armature")
     if "planar" in model.joint_types:
         raise UnlikeError("planar joints: Pinocchio leaves out their axes")
     if (theirs.nq, theirs.nv) != (model.nq, model.nv):

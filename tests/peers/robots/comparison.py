@@ -57,6 +57,11 @@ class Difference(NamedTuple):
     detail: str
 
 
+def without_rotors(model: condyle.Model) -> condyle.Model:
+    """Returns the model without armature, which no peer but Drake reads from a URDF."""
+    return model.with_armature(np.zeros(model.nv)) if model.armature.any() else model
+
+
 def state_of(model: condyle.Model, seed: int) -> tuple[Array, Array]:
     """Returns a random state; positions are within their limits."""
     rng = np.random.default_rng(seed)
@@ -169,6 +174,8 @@ class Quantities:
 
     def add(self, quantity: str, size: float, detail: str) -> None:
         """Records a difference, the largest of each quantity."""
+        if quantity in self.left_out:
+            return
         if quantity not in self.differences or self.differences[quantity].size < size:
             self.differences[quantity] = Difference(quantity, size, detail)
 

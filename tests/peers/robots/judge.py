@@ -78,10 +78,8 @@ class Trial:
                 model = condyle.Model.from_mjcf(path)
             elif self.robot.format == "urdf":
                 model = condyle.Model.from_urdf(path, root_joint=root_joint, packages=packages(self.folder))
-            elif "packages" in (condyle.Model.from_sdf.__doc__ or ""):
-                model = condyle.Model.from_sdf(path, root_joint=root_joint, packages=packages(self.folder))
             else:
-                model = condyle.Model.from_sdf(path, root_joint=root_joint)
+                model = condyle.Model.from_sdf(path, root_joint=root_joint, packages=packages(self.folder))
         except condyle.Error as error:
             return str(error).replace(f"{path}:", "").strip()
         return model

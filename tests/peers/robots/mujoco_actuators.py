@@ -31,10 +31,10 @@ FILTERS = (DYN_FILTER, DYN_FILTEREXACT)
 
 
 def efforts(mj: mujoco.MjModel) -> np.ndarray:
-    """Returns the least and the greatest effort of each coordinate, (nv, 2)."""
+    """Returns the least and the greatest effort of each coordinate, (nv, 2); not a number where it is unknown here."""
     sums: dict[int, Range] = {}
-    alone = [int(mj.actuator_trnid[i, 0]) for i in range(mj.nu) if mj.actuator_trntype[i] == TRN_TENDON]
-    for i in range(mj.nu):
+    alone = [int(mj.actuator_trnid[i, 0]) for i in range(mj.nactuator) if mj.actuator_trntype[i] == TRN_TENDON]
+    for i in range(mj.nactuator):
         if not acts(mj, i):
             continue
         force = clip(constant(mj, i), ALL)
@@ -42,6 +42,10 @@ def efforts(mj: mujoco.MjModel) -> np.ndarray:
         if mj.actuator_trntype[i] == TRN_TENDON and alone.count(tendon) == 1:
             force = clip(force, mj.tendon_actfrcrange[tendon] if mj.tendon_actfrclimited[tendon] else ALL)
         force = clip(force, mj.actuator_forcerange[i] if mj.actuator_forcelimited[i] else ALL)
+        if mj.actuator_outnum[i] != 1:  # a controller of a ball's orientation
+            first = int(mj.jnt_dofadr[mj.actuator_trnid[i, 0]])
+            sums |= {first + k: np.full(2, np.nan) for k in range(3)}
+            continue
         for column, moment in moments(mj, i):
             sums[column] = sums.get(column, np.zeros(2)) + times(moment, force)
     found = np.tile(ALL, (mj.nv, 1))
@@ -96,7 +100,7 @@ def activation(mj: mujoco.MjModel, i: int) -> Range:
 
 def moments(mj: mujoco.MjModel, i: int) -> list[tuple[int, float]]:
     """Returns coordinates on which an actuator acts with a constant moment."""
-    gear, target = mj.actuator_gear[i], int(mj.actuator_trnid[i, 0])
+    gear, target = mj.actuator_gear[mj.actuator_outadr[i]], int(mj.actuator_trnid[i, 0])
     kind = mj.actuator_trntype[i]
     if kind in (TRN_JOINT, TRN_JOINTINPARENT):
         column, joint = int(mj.jnt_dofadr[target]), mj.jnt_type[target]

@@ -1,0 +1,128 @@
+"""Verdicts on small robots: what is equal, different, refused, a part, or never ends."""
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import comparison
+import files
+import judge
+import report
+from mujoco import MjModel
+from mujoco_actuators import efforts
+from processes import run
+
+import condyle
+
+BODY = """<body name="a" pos="0 0 1"><joint name="hinge" axis="0 1 0" range="-1 2" limited="true"/>
+  <inertial pos="0.1 0 -0.2" mass="2" diaginertia="0.1 0.2 0.15"/><site name="tip" pos="0 0 -0.4"/></body>"""
+MJCF = f"<mujoco><worldbody>{BODY}</worldbody></mujoco>"
+LINK = """<link name="{}"><inertial><origin xyz="0.1 0 0"/><mass value="1"/>
+  <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+URDF = f"""<robot name="r">{LINK.format("a")}{LINK.format("b")}<joint name="j" type="revolute"><parent link="a"/>
+  <child link="b"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="3" velocity="2"/></joint></robot>"""
+
+
+def judged(folder: Path, name: str, text: str) -> judge.Verdict:
+    """Writes a file and judges it in this process."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text(text, encoding="utf-8")
+    (robot,) = files.find(folder, name)
+    return judge.Trial(robot, folder).verdict()
+
+
+@pytest.mark.parametrize(("name", "text", "peer"), [("r.xml", MJCF, "MuJoCo"), ("r.urdf", URDF, "Pinocchio")])
+def test_equal(tmp_path: Path, name: str, text: str, peer: str) -> None:
+    verdict = judged(tmp_path, name, text)
+    assert verdict.verdict == "equal" and verdict.peers[peer] == "equal"
+    assert {"M", "bias", "total mass", "limits: position"} <= set(verdict.compared)
+
+
+@pytest.mark.parametrize("wrong", ["crba", "nonlinear_effects", "frame_placement"])
+def test_different(tmp_path: Path, wrong: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    right = getattr(condyle, wrong)
+    monkeypatch.setattr(comparison.condyle, wrong, lambda *args: right(*args) + 1e-6)
+    for name, text in (("r.xml", MJCF), ("r.urdf", URDF)):
+        verdict = judged(tmp_path / wrong, name, text)
+        assert verdict.verdict == "different" and verdict.differences, name
+
+
+def test_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: Path) -> condyle.Model:
+        raise condyle.ParseError(f"{path}:3: body `a`: is odd")
+
+    monkeypatch.setattr(
+        judge, "condyle", type("Broken", (), {"Model": type("M", (), {"from_mjcf": refuse}), "Error": condyle.Error})
+    )
+    verdict = judged(tmp_path, "r.xml", MJCF)
+    assert verdict.verdict == "refused" and report.kind(verdict.error) == "<body>: is odd"
+    assert judged(tmp_path / "both", "r.xml", MJCF.replace("axis", "type='odd' axis")).verdict == "nobody"
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("r.xml", f"<mujocoinclude>{BODY}</mujocoinclude>"),
+        ("r.xml", "<mujoco><option gravity='0 0 0'/></mujoco>"),
+        ("r.urdf", "<robot name='r' xmlns:xacro='x'><xacro:arm/><link name='a'/></robot>"),
+        ("r.sdf", "<sdf version='1.7'><light name='sun'/></sdf>"),
+    ],
+)
+def test_part(tmp_path: Path, name: str, text: str) -> None:
+    verdict = judged(tmp_path, name, text)
+    assert verdict.verdict == "fragment" and verdict.error
+
+
+def test_files(tmp_path: Path) -> None:
+    """Formats follow from root elements, collections from folders."""
+    here = tmp_path / "owner+repository" / "models"
+    here.mkdir(parents=True)
+    (here / "a.xml").write_text("<!-- <sdf> --><robot name='r'><link name='a'/></robot>")
+    (here / "b.world").write_text("<?xml version='1.0'?><gazebo version='1.0'><model name='m'/></gazebo>", "utf-16")
+    (here / "package.xml").write_text("<package/>")
+    found = files.find(tmp_path)
+    assert [(robot.format, robot.collection) for robot in found] == [
+        ("urdf", "owner/repository"),
+        ("sdf", "owner/repository"),
+    ]
+
+
+def test_crash_and_time_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "r.xml").write_text(MJCF)
+    robots = files.find(tmp_path)
+    for action, text in (
+        (lambda _: os.kill(os.getpid(), signal.SIGSEGV), "SIGSEGV"),
+        (lambda _: time.sleep(60), "no result"),
+        (lambda _: 1 / 0, "ZeroDivisionError"),
+    ):
+        monkeypatch.setattr(judge.Trial, "verdict", action)
+        ((_, verdict),) = run(robots, tmp_path, 1, 2.0)
+        assert verdict.verdict == "crash" and text in verdict.error
+
+
+def test_efforts() -> None:
+    """Sums over actuators, within the joint's range: a motor by its control, a servo by its force."""
+    text = """<mujoco><worldbody><body>
+        <joint name="x" type="slide" axis="1 0 0" actuatorfrcrange="-30 8"/><joint name="y" type="slide" axis="0 1 0"/>
+        <joint name="z" type="slide" axis="0 0 1"/><geom size="1"/></body></worldbody><actuator>
+        <motor joint="x" ctrlrange="-1 2" gear="-10"/><position joint="x" kp="5" forcerange="-3 4" gear="2"/>
+        <motor joint="y" ctrlrange="-1 2" forcerange="-9 1"/><velocity joint="z"/></actuator></mujoco>"""
+    found = efforts(MjModel.from_xml_string(text))
+    # x: −10 · [−1, 2] + 2 · [−3, 4] = [−26, 18], within [−30, 8]
+    assert found.tolist() == [[-26.0, 8.0], [-1.0, 1.0], [-float("inf"), float("inf")]]
+
+
+def test_section_of_a_file(tmp_path: Path) -> None:
+    """The section is put at the end, and replaced where it is."""
+    path = tmp_path / "V.md"
+    path.write_text("# Title\n")
+    report.put(path, f"{report.BEGIN}\none\n{report.END}\n")
+    path.write_text(path.read_text() + "after\n")
+    report.put(path, f"{report.BEGIN}\ntwo\n{report.END}\n")
+    assert path.read_text() == f"# Title\n\n{report.BEGIN}\ntwo\n{report.END}\nafter\n"
