@@ -138,7 +138,7 @@ def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: 
         if words in warnings:
             found.leave_out(why, *quantities)
     if mj.neq:
-        found.spoken("equality", "follow", "connect", "weld", held=bool(found.model.constraints()))
+        found.spoken("equality", "follow", "mimic", "connect", "weld", held=bool(found.model.constraints()))
     mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     for seed in range(STATES):
         q, v = state_of(model, seed)
