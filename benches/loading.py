@@ -2,8 +2,8 @@
 
     python benches/loading.py [--beside FOLDER] [--rounds N]
 
-FOLDER has another `condyle` package, for example of an earlier version. Both load each file in turn, in processes of their own;
-a time is the median over the rounds. Prints a line for each robot and the ratio of the sums.
+FOLDER has another `condyle` package, for example of an earlier version. Both load each file in turn, in processes of
+their own; a time is the median over the rounds. Prints a line for each robot and the ratio of the sums.
 """
 
 import argparse
@@ -34,7 +34,8 @@ def robots() -> list[Path]:
     """The URDFs of example-robot-data, wherever the package is installed."""
     import example_robot_data
 
-    [root] = [p for base in Path(example_robot_data.__file__).parents for p in base.glob("**/example-robot-data/robots")][:1]
+    folders = (base / "share" / "example-robot-data" / "robots" for base in Path(example_robot_data.__file__).parents)
+    root = next(folder for folder in folders if folder.is_dir())
     return sorted(root.glob("**/*.urdf"))
 
 

@@ -33,8 +33,8 @@ ALIASES = {
     "_Controls": "ArrayLike | Sequence[ArrayLike]",
     "_Joints": "Sequence[tuple[Joint, ArrayLike | None]]",
     "_RootJoint": 'Literal["free_flyer", "planar", "spherical", "translation"]',
-    "_Kinds": 'Sequence[Literal["massless", "negative", "triangle", "singular", "unlikely", "limit", "unknown", "left_out",'
-    ' "assumed", "mimic"]]',
+    "_Kind": 'Literal["massless", "negative", "triangle", "singular", "unlikely", "limit"]'
+    ' | Literal["unknown", "left_out", "assumed", "mimic"]',
     "_Reference": 'Literal["local", "world", "local_world_aligned"]',
     "_Input": 'Literal["gravity", "armature", "damping"]'
     ' | tuple[Literal["force", "inertia"], str | int] | tuple[Literal["friction"], float]',
@@ -97,7 +97,9 @@ ARGUMENTS = {
     "Force": "_SpelledData._leave.hg",
     "ConstraintSet": "constraints",
     "Sequence[ContactConstraint]": "ConstraintSet.constraints _casadi_hold.constraints",
-    "str": "_generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon text FrictionContact.frame Task.frame",
+    "str": """
+        _generate.language Model.from_sdf.model Model.from_sdf_str.model contact function joint_name name prefix tendon
+        text FrictionContact.frame Task.frame""",
     "str | int": """
         body frame Model.with_mimic.follower Model.with_mimic.leader getVelocity.joint getAcceleration.joint
         getClassicalAcceleration.joint getJointJacobian.joint""",
@@ -109,7 +111,8 @@ ARGUMENTS = {
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
         Plan.contact _generate.shares _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        bias damping dt eps1 eps1eps2 eps2 epsilon factor gain greatest kp kv least mu offset passive pitch ratio re regularisation
+        bias damping dt eps1 eps1eps2 eps2 epsilon factor gain greatest kp kv least mu offset passive pitch ratio re
+        regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
         fade max_force min_force yaw_friction FrictionContact.friction""",
@@ -128,7 +131,7 @@ ARGUMENTS = {
     'Literal["position", "velocity"]': "integrate_jacobian.argument",
     'Literal["from", "to"]': "difference_jacobian.argument",
     "_Path": "path original",
-    "_Kinds": "allow",
+    "Sequence[_Kind]": "allow",
     "Sequence[_Path]": "packages",
     "_RootJoint": "root_joint",
     "BodyId": "follower leader parent ModelBuilder.body",
@@ -237,7 +240,9 @@ RESULTS = {
     "bool": """
         HyperDual.__bool__ HyperDual.__eq__ HyperDual.__ge__ HyperDual.__gt__ HyperDual.__le__
         HyperDual.__lt__ HyperDual.__ne__""",
-    "str": "Model.name Model.to_json Model.tree Problem.to_json _casadi_hold _casadi_hold_knot FrictionContact.frame Task.kind",
+    "str": """
+        Model.name Model.to_json Model.tree Problem.to_json _casadi_hold _casadi_hold_knot FrictionContact.frame
+        Task.kind""",
     "str | None": "Task.frame",
     'Literal["world", "frame"]': "FrictionContact.axes",
     'Literal["wrench", "corners"] | None': "FrictionContact.forces",

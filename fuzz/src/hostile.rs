@@ -53,6 +53,14 @@ macro_rules! mesh {
     };
 }
 
+/// An MJCF that copies parts of its tree, and has meshes with mass.
+const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default class="c"><joint damping="1"/></default></default>
+<asset><mesh name="m" inertia="exact" scale="1 -2 3" vertex="0 0 0 1 0 0 0 2 0 0 0 3" face="0 2 1 0 1 3 0 3 2 1 2 3"/>
+<mesh name="s" builtin="supersphere" params="5 0.5 1.5"/></asset><worldbody><replicate count="3" offset="1 0 0" euler="0 0 30" sep="-">
+<body name="b" childclass="c"><joint name="j" range="-9 9"/><geom type="mesh" mesh="m"/><frame name="f" pos="0 0 1"><camera name="v"/>
+<site name="p" type="capsule" size="0.1" fromto="0 0 0 1 1 1"/></frame></body></replicate><body name="o"><freejoint align="true"/>
+<geom type="box" mesh="s"/></body><attach body="b-1" prefix="x"/></worldbody><actuator><motor joint="j" gear="2"/></actuator></mujoco>"#;
+
 impl Kind {
     /// The seeds: all good.
     pub fn seeds(self) -> Vec<Vec<u8>> {
@@ -73,7 +81,7 @@ impl Kind {
                 let defaults = file!("arm_defaults.xml").replace("<mujoco>", "").replace("</mujoco>", "");
                 let arm = file!("arm.xml").replace("<include file=\"arm_defaults.xml\"/>", &defaults);
                 let others = [file!("quadruped.xml"), file!("gripper.xml"), mesh!("boxes.xml")];
-                [arm].into_iter().chain(others.map(str::to_owned)).collect()
+                [arm, COPIES.to_owned()].into_iter().chain(others.map(str::to_owned)).collect()
             }
             Self::Sdf => vec![file!("linkage.sdf").to_owned()],
             Self::Srdf => vec![file!("quadruped.srdf").to_owned()],

@@ -15,6 +15,7 @@ from ._spelling import Force, Motion, ReferenceFrame
 from ._types import (
     AbaDerivatives,
     AbaHessian,
+    Actuator,
     AllTerms,
     AssemblySize,
     CentroidalDerivatives,
@@ -26,9 +27,11 @@ from ._types import (
     ContactConstraint,
     Control,
     CoriolisDerivatives,
+    Coupling,
     EnergyDerivatives,
     Evaluation,
     Frame,
+    GravityCompensation,
     Ground,
     GroundContacts,
     Impulse,
@@ -37,11 +40,14 @@ from ._types import (
     Limits,
     LqNode,
     Mimic,
+    ModelWarning,
     Outcome,
+    PassiveDerivatives,
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
     Solution,
+    Spring,
     SweepResult,
 )
 from ._wholebody import Command, Gains, Optimality, References, Settings
@@ -195,7 +201,7 @@ __all__ = [
     "nonlinear_effects",
     "normalize",
     "passive_torque",
-    "passive_torque_derivative",
+    "passive_torque_derivatives",
     "potential_energy",
     "potential_energy_regressor",
     "pseudo_inertia",
@@ -220,6 +226,10 @@ _Size: TypeAlias = tuple[float, float] | Sequence[float]
 _Controls: TypeAlias = ArrayLike | Sequence[ArrayLike]
 _Joints: TypeAlias = Sequence[tuple[Joint, ArrayLike | None]]
 _RootJoint: TypeAlias = Literal["free_flyer", "planar", "spherical", "translation"]
+_Kind: TypeAlias = (
+    Literal["massless", "negative", "triangle", "singular", "unlikely", "limit"]
+    | Literal["unknown", "left_out", "assumed", "mimic"]
+)
 _Reference: TypeAlias = Literal["local", "world", "local_world_aligned"]
 _Input: TypeAlias = (
     Literal["gravity", "armature", "damping"]
@@ -481,10 +491,11 @@ class ModelBuilder:
         joint_name: str | None = None,
         position: tuple[float, float] | None = None,
         velocity: float | None = None,
-        effort: float | None = None,
+        effort: float | tuple[float, float] | None = None,
         damping: float = 0.0,
         friction: float = 0.0,
         armature: float = 0.0,
+        damping_polynomial: tuple[float, float] = ...,
     ) -> BodyId:
         """Adds a body and its joint.
 
@@ -493,8 +504,10 @@ class ModelBuilder:
         placement: the joint's frame at position zero in the parent's frame.
         inertia: in the body's frame, which is the joint's at position zero.
         position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
-        velocity, effort: greatest speed (rad/s, m/s) and effort (N m, N); None for no limits.
+        velocity: greatest speed (rad/s, m/s); None for no limit.
+        effort: greatest effort (N m, N), or the least and the greatest one; None for no limits.
         damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
+        damping_polynomial: (d₁, d₂) of damping that grows with the speed, d₀ + d₁|v| + d₂v², with d₀ = damping.
         armature: inertia of the rotor as seen at the joint (kg m², kg).
         """
 
@@ -545,6 +558,52 @@ class ModelBuilder:
         ...     two.append(WORLD, at, condyle.robots.arm7(), side)
         >>> two.build().nv
         14
+        """
+
+    def spring(self, body: BodyId, stiffness: ArrayLike, rest: ArrayLike) -> None:
+        """Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
+
+        body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the position of the joint at which the
+        spring is at rest, as many numbers as q has for the joint.
+
+        >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
+        >>> robot = ModelBuilder("door")
+        >>> door = robot.body("door", WORLD, Joint.revolute([0.0, 0.0, 1.0]), inertia=Inertia.from_sphere(5.0, 0.5))
+        >>> robot.spring(door, 2.0, rest=[0.1])
+        >>> robot.build().springs
+        [Spring(joint='door', stiffness=[2., 0., 0.], rest=[0.1])]
+        """
+
+    def compensate_gravity(
+        self, body: BodyId, inertia: Inertia, factor: float = 1.0, placement: ArrayLike | None = None
+    ) -> None:
+        """Carries a part of a body's weight, as MuJoCo's `gravcomp` does: the force −factor m g acts at the part's centre of
+        mass.
+
+        inertia: the part's, in a frame that is at `placement` in the body's frame. factor: the share that is carried.
+        """
+
+    def actuator(
+        self,
+        name: str,
+        joint: BodyId | Sequence[tuple[BodyId, float]],
+        *,
+        tendon: str | None = None,
+        gear: ArrayLike | None = None,
+        gain: float | None = None,
+        bias: float = 0.0,
+        kp: float = 0.0,
+        kv: float = 0.0,
+        control: tuple[float, float] | None = None,
+        force: tuple[float, float] | None = None,
+    ) -> None:
+        """Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. It does not change limits,
+        armature and damping: these are the joints'.
+
+        joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
+        tendon: the name of the tendon, if it drives one.
+        gear: a number, or up to six; None is 1. gain: the force for each unit of control; None is kp, or kv where kp is 0, or
+        1 for a motor without both. control, force: least and greatest; None for no limits.
         """
 
     def gravity(self, gravity: ArrayLike) -> None:
@@ -1910,6 +1969,12 @@ class Model:
     """
 
     @property
+    def actuators(self) -> list[Actuator]:
+        """The actuators of the file, as `Actuator`, in its order. Their ranges are part of `limits` already, their armature
+        and damping of the joints'.
+        """
+
+    @property
     def armature(self) -> _Array:
         """The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm."""
 
@@ -1921,6 +1986,12 @@ class Model:
     def damping(self) -> _Array:
         """The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
         and where a `Simulation` is asked for it.
+        """
+
+    @property
+    def damping_polynomial(self) -> _Array:
+        """The coefficients d₁ and d₂ of damping that grows with the speed, (nv, 2): the damping is d₀ + d₁|v| + d₂v², with
+        d₀ in `damping`. It acts where `damping` does.
         """
 
     @property
@@ -1938,6 +2009,12 @@ class Model:
     @property
     def gravity(self) -> _Array:
         """The acceleration of free fall, in the world's frame (m/s²), 3 numbers."""
+
+    @property
+    def gravity_compensation(self) -> list[GravityCompensation]:
+        """The weights that are carried by an unseen hand, as `GravityCompensation(body, mass, mass_com)`: MuJoCo's
+        `gravcomp`. They act in `passive_torque` and where a `Simulation` is asked for them.
+        """
 
     @property
     def idx_qs(self) -> list[int]:
@@ -1973,8 +2050,18 @@ class Model:
         """The joints, as `Joint`; None for the world."""
 
     @property
+    def keyframe_velocities(self) -> dict[str, _Array]:
+        """The velocities of the `keyframes`: a dictionary of v by name, nv numbers each."""
+
+    @property
+    def keyframes(self) -> dict[str, _Array]:
+        """The named positions of the file: a dictionary of q by name, nq numbers each."""
+
+    @property
     def limits(self) -> Limits:
-        """The limits of position, velocity and effort, as `Limits`; infinite where there are none."""
+        """The limits of position, velocity and effort, as `Limits`; infinite where there are none. `effort` is the greatest
+        magnitude of `effort_lower` and `effort_upper`.
+        """
 
     @property
     def mimics(self) -> list[Mimic | None]:
@@ -2019,134 +2106,21 @@ class Model:
         """The bodies whose joints make M singular: `aba`, `minv` and `aba_derivatives` raise `ModelError`."""
 
     @property
+    def springs(self) -> list[Spring]:
+        """The springs of joints, as `Spring(joint, stiffness, rest)`. They act in `passive_torque` and where a
+        `Simulation` is asked for them.
+        """
+
+    @property
     def total_mass(self) -> float:
         """The mass of all bodies, with that of what is fixed to the world (kg)."""
 
     @property
-    def warnings(self) -> list[str]:
-        """Warnings: what is odd about the robot although it could be loaded.
+    def warnings(self) -> list[ModelWarning]:
+        """The warnings about the robot and its file, as `ModelWarning`: text that also has `kind`, `file` and `line`.
 
-        Inertias that no body has, joints along which the inertia matrix is singular, what a loader left out.
-        """
-
-    @staticmethod
-    def from_urdf(
-        path: _Path,
-        root_joint: _RootJoint | None = None,
-        mimic: bool = False,
-        strict: bool = False,
-        packages: Sequence[_Path] | None = None,
-    ) -> Model:
-        """A model from a URDF file.
-
-        Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at.
-
-        path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
-        root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
-            'spherical' or 'translation'; None fixes the root link to the world.
-        mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
-            their own.
-        strict: whether what is only odd (`warnings`) is an error.
-        packages: folders that have packages in them, or are packages; before those that the environment names in
-            `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-
-    @staticmethod
-    def from_urdf_str(
-        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
-    ) -> Model:
-        """A model from a URDF in a string; see `from_urdf`.
-
-        >>> text = condyle.robots.QUADRUPED
-        >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
-        18
-        """
-
-    @staticmethod
-    def from_mjcf(path: _Path, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
-        """A model from an MJCF file (MuJoCo) and the files that it includes.
-
-        q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
-        in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
-        bodies without mass, `name#1`, `name#2`, …, between them. What a tree of bodies cannot have is left out and
-        stands in `warnings`.
-
-        path: a path, as text or `os.PathLike`.
-        mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being left out; its `polycoef`
-            must be linear.
-        strict: whether what is only odd, or left out (`warnings`), is an error.
-        weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and stands in
-            `warnings`, instead of being an error.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-
-    @staticmethod
-    def from_mjcf_str(text: str, mimic: bool = False, strict: bool = False, weightless_meshes: bool = False) -> Model:
-        """A model from an MJCF in a string, which may not include files; see `from_mjcf`.
-
-        >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
-        >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
-        2.0
-        """
-
-    @staticmethod
-    def from_sdf(path: _Path, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False) -> Model:
-        """A model from an SDF file (Gazebo) that holds one model.
-
-        Joints are walked breadth first from the root, in the order of the file; one that would give a link a second
-        parent closes a loop: it is left out and stands in `warnings`. Universal joints become two revolute ones.
-
-        path: a path, as text or `os.PathLike`.
-        root_joint: as for `from_urdf`.
-        mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
-        strict: whether what is only odd, or left out (`warnings`), is an error.
-
-        Raises `ParseError`, with file, line and element, or `ModelError`.
-        """
-
-    @staticmethod
-    def from_sdf_str(
-        text: str, root_joint: _RootJoint | None = None, mimic: bool = False, strict: bool = False
-    ) -> Model:
-        """A model from an SDF in a string; see `from_sdf`.
-
-        >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
-        >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
-        >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
-        6
-        """
-
-    @staticmethod
-    def from_pinocchio(model: Any) -> Model:
-        """A model from Pinocchio's, a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that numbers are
-        equal; `to_pinocchio` is the way back.
-
-        Composite, universal and spherical ZYX joints become several ones, with bodies without mass between them. Limits of
-        quaternions, cosines and sines are left out, and so are geometry and reference configurations.
-
-        Raises `ModelError` if its joints do not stand depth first, as Pinocchio's readers of files number them, or are of a
-        kind that is not here.
-        """
-
-    def to_pinocchio(self) -> Any:
-        """The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
-
-        What follows another joint does so there too, unless it turns without limits.
-        """
-
-    def frame(self, name: str) -> int:
-        """The number of the frame with this name: a link's, else the user's, else a joint's.
-
-        Raises `ModelError`, with the nearest name.
-        """
-
-    def joint(self, name: str) -> int:
-        """The number of the body that the joint with this name carries.
-
-        Raises `ModelError`, with the nearest name.
+        They tell of inertias and limits that cannot be meant, joints along which the inertia matrix is singular, names in
+        the file that are unknown, and what a model cannot hold.
         """
 
     def with_gravity(self, gravity: ArrayLike) -> Model:
@@ -2167,11 +2141,16 @@ class Model:
         upper: ArrayLike | None = None,
         velocity: ArrayLike | None = None,
         effort: ArrayLike | None = None,
+        *,
+        effort_lower: ArrayLike | None = None,
+        effort_upper: ArrayLike | None = None,
     ) -> Model:
         """The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
         are, and infinite numbers are none.
 
-        Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity or effort is negative.
+        effort: greatest magnitude; sets both `effort_lower` and `effort_upper`, and goes with neither of them.
+
+        Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity is negative.
 
         >>> arm = condyle.robots.arm7()
         >>> arm.with_limits(effort=0.5 * arm.limits.effort).limits.effort[0].item()
@@ -2255,6 +2234,237 @@ class Model:
         Raises `ModelError` if they are not of one degree of freedom, or a joint would follow one that follows.
         """
 
+    def write_urdf(self, path: _Path, original: _Path) -> None:
+        """Writes inertias, limits, damping, friction and armature into a copy of the URDF `original`, and all else as it is
+        there.
+
+        Only what differs from the original is edited, so an unchanged robot gives the same bytes. Reading the new file
+        gives this model back, up to rounding. `original` may be `path`. Of several links that fixed joints merge, the one
+        that the joint carries takes the difference. An armature becomes the rotor inertia of a `<transmission>`.
+
+        path: the new file. original: the file that the robot was read from.
+
+        Raises `ParseError` with the thing and both numbers if the file cannot say it, as an infinite limit, or is that of
+        another robot.
+        """
+
+    def write_mjcf(self, path: _Path, original: _Path) -> None:
+        """Writes the same into a copy of the MJCF `original`; see `write_urdf`.
+
+        Bodies and joints that differ must be in the file itself, not in one that it includes. Limits of effort are written
+        as `actuatorfrcrange` of the joint.
+
+        path: the new file. original: the file that the robot was read from.
+
+        Raises `ParseError` as `write_urdf` does.
+        """
+
+    def to_json(self) -> str:
+        """The model as JSON, with all digits; `from_json` gives an equal one. `null` stands for a limit that is infinite.
+
+        The text may be edited: what it says is checked when it is read.
+
+        >>> arm = condyle.robots.arm7()
+        >>> condyle.Model.from_json(arm.to_json()).to_json() == arm.to_json()
+        True
+        """
+
+    @staticmethod
+    def from_json(text: str) -> Model:
+        """A model from the JSON that `to_json` gives.
+
+        Raises `ParseError`, with line and column.
+        """
+
+    def to_pinocchio(self) -> Any:
+        """The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
+
+        What follows another joint does so there too, unless it turns without limits.
+        """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Returns the parts of a pickle."""
+
+    def constraints(self) -> dict[str, ContactConstraint | Coupling]:
+        """The constraints of the robot's file beside its tree, by name: loops as `ContactConstraint`, without stabilisation, and
+        coupled joints as `Coupling`.
+
+        The algorithms of a tree leave loops open. `constrained_dynamics` closes those that a `ConstraintSet` has:
+
+        >>> robot = condyle.robots.quadruped()
+        >>> loops = [c for c in robot.constraints().values() if isinstance(c, condyle.ContactConstraint)]
+        >>> stiff = [c._replace(kp=400.0, kd=40.0) for c in loops]  # an error of position decays within 0.1 s
+        >>> condyle.ConstraintSet(robot, stiff, mu=1e-8, iterations=5)
+        <condyle.ConstraintSet of 'quadruped': 0 constraints, 0 rows>
+        """
+
+    @staticmethod
+    def from_urdf(
+        path: _Path,
+        root_joint: _RootJoint | None = None,
+        mimic: bool = False,
+        strict: bool = False,
+        packages: Sequence[_Path] | None = None,
+        *,
+        allow: Sequence[_Kind] | None = None,
+        arguments: dict[str, str | float | bool] | None = None,
+    ) -> Model:
+        """A model from a URDF file.
+
+        Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at. A file whose
+        name ends in `.xacro` is expanded by the installed program `xacro` or `xacrodoc`, which evaluates expressions of
+        the file: expand files of people that you trust only.
+
+        path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
+        root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
+            'spherical' or 'translation'; None fixes the root link to the world.
+        mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
+            their own.
+        strict: whether a warning (`warnings`) is an error.
+        packages: folders that contain packages, or are packages; before those that the environment names in
+            `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
+        allow: kinds of warnings that are no errors, though `strict` is set: 'massless', 'negative', 'triangle',
+            'singular', 'unlikely', 'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
+        arguments: values of xacro's `<xacro:arg>`s by name, for files that end in `.xacro`.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+        """
+
+    @staticmethod
+    def from_urdf_str(
+        text: str,
+        root_joint: _RootJoint | None = None,
+        mimic: bool = False,
+        strict: bool = False,
+        packages: Sequence[_Path] | None = None,
+        *,
+        allow: Sequence[_Kind] | None = None,
+    ) -> Model:
+        """A model from a URDF in a string; see `from_urdf`.
+
+        >>> text = condyle.robots.QUADRUPED
+        >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
+        18
+        """
+
+    @staticmethod
+    def from_mjcf(
+        path: _Path,
+        mimic: bool = False,
+        strict: bool = False,
+        weightless_meshes: bool = False,
+        packages: Sequence[_Path] | None = None,
+        *,
+        allow: Sequence[_Kind] | None = None,
+    ) -> Model:
+        """A model from an MJCF file (MuJoCo) and the files that it includes.
+
+        q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
+        in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
+        bodies without mass, `name#1`, `name#2`, …, between them. A thing that a model cannot hold is left out and
+        reported in `warnings`.
+
+        path: a path, as text or `os.PathLike`.
+        mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being a constraint beside the
+            model; its `polycoef` must be linear.
+        strict: whether a warning (`warnings`) is an error.
+        weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and reported in
+            `warnings`, instead of being an error.
+        packages, allow: as for `from_urdf`.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+        """
+
+    @staticmethod
+    def from_mjcf_str(
+        text: str,
+        mimic: bool = False,
+        strict: bool = False,
+        weightless_meshes: bool = False,
+        packages: Sequence[_Path] | None = None,
+        *,
+        allow: Sequence[_Kind] | None = None,
+    ) -> Model:
+        """A model from an MJCF in a string, which may not include files; see `from_mjcf`.
+
+        >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
+        >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
+        2.0
+        """
+
+    @staticmethod
+    def from_sdf(
+        path: _Path,
+        root_joint: _RootJoint | None = None,
+        mimic: bool = False,
+        strict: bool = False,
+        packages: Sequence[_Path] | None = None,
+        *,
+        allow: Sequence[_Kind] | None = None,
+        model: str | None = None,
+    ) -> Model:
+        """A model from an SDF file (Gazebo), with the models that it includes.
+
+        All models of a file, or of its first world, become one robot, whose names then begin with the model's:
+        `robot::arm`. Joints are walked breadth first from the root, in the order of the file; one that would give a link a
+        second parent closes a loop. Universal joints become two revolute ones.
+
+        path: a path, as text or `os.PathLike`.
+        root_joint: as for `from_urdf`.
+        mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
+        strict: whether a warning (`warnings`) is an error.
+        packages, allow: as for `from_urdf`; `model://` addresses are looked for in `packages` too.
+        model: the name of the one model to read; None reads all models of the file.
+
+        Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
+        """
+
+    @staticmethod
+    def from_sdf_str(
+        text: str,
+        root_joint: _RootJoint | None = None,
+        mimic: bool = False,
+        strict: bool = False,
+        packages: Sequence[_Path] | None = None,
+        *,
+        allow: Sequence[_Kind] | None = None,
+        model: str | None = None,
+    ) -> Model:
+        """A model from an SDF in a string; see `from_sdf`.
+
+        >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
+        >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
+        >>> condyle.Model.from_sdf_str(text, root_joint="free_flyer").nv
+        6
+        """
+
+    @staticmethod
+    def from_mujoco(
+        model: Any, mimic: bool = False, strict: bool = False, *, allow: Sequence[_Kind] | None = None
+    ) -> Model:
+        """A model from MuJoCo's, a `mujoco.MjModel`: the robot that MuJoCo has compiled, number for number.
+
+        The names, q and v are those of `from_mjcf`. All that MuJoCo's compiler does is done already: meshes, `replicate`,
+        `attach`, composites, `settotalmass`. Numbers that were changed after compiling count too. What a model cannot hold
+        is reported in `warnings` or refused as by `from_mjcf`. MuJoCo itself is not imported.
+
+        mimic, strict, allow: as for `from_mjcf`.
+
+        Raises `ParseError` or `ModelError`; `ValueError` for an unknown kind.
+        """
+
+    @staticmethod
+    def from_pinocchio(model: Any) -> Model:
+        """A model from Pinocchio's, a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that numbers are
+        equal; `to_pinocchio` is the way back.
+
+        Composite, universal and spherical ZYX joints become several ones, with bodies without mass between them. Limits of
+        quaternions, cosines and sines are left out, and so are geometry and reference configurations.
+
+        Raises `ModelError` if its joints do not stand depth first, as Pinocchio's readers of files number them, or are of a
+        kind that is not here.
+        """
+
     def reference_configurations(self, path: _Path, strict: bool = False) -> dict[str, _Array]:
         """The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.
 
@@ -2262,7 +2472,7 @@ class Model:
         of one name, of several groups, are one position. All else in the file is ignored.
 
         path: a path, as text or `os.PathLike`.
-        strict: whether joints that the robot has not are errors; SRDFs are often shared by robots with fewer joints.
+        strict: whether joints that the robot does not have are errors; SRDFs are often shared by robots with fewer joints.
 
         Raises `ParseError`, with file, line and element.
         """
@@ -2274,6 +2484,18 @@ class Model:
         >>> srdf = f'<robot name="arm7"><group_state name="bent" group="arm">{joint}</group_state></robot>'
         >>> condyle.robots.arm7().reference_configurations_str(srdf)
         {'bent': array([ 0. ,  0. ,  0. , -1.2,  0. ,  0. ,  0. ])}
+        """
+
+    def frame(self, name: str) -> int:
+        """The number of the frame with this name: a link's, else the user's, else a joint's.
+
+        Raises `ModelError`, with the nearest name.
+        """
+
+    def joint(self, name: str) -> int:
+        """The number of the body that the joint with this name carries.
+
+        Raises `ModelError`, with the nearest name.
         """
 
     def tree(self, frames: bool = False) -> str:
@@ -2290,9 +2512,6 @@ class Model:
 
     def __deepcopy__(self, memo: object) -> Model:
         """The model itself: it never changes."""
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """The parts of a pickle."""
 
 def _model_from_bytes(data: bytes) -> Model:
     """The model that a pickle holds."""
@@ -3256,7 +3475,8 @@ def joint_torque_regressor(
     """The joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
     `Model.inertial_parameters`; O(n depth).
 
-    q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
+    q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a, and for the
+    linear coordinates of a free joint armature (a + ω × v) in place of armature a.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -3272,24 +3492,32 @@ def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLik
     q: nq numbers; v: nv.
     """
 
-def passive_torque(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """The passive torque τ = −d v − f tanh(v/ε) of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
-    O(n).
+def passive_torque(model: Model, q: ArrayLike, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
+    """The passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N): damping d, which may be
+    d₀ + d₁ |v| + d₂ v², smoothed friction f, and what acts by itself in the robot; O(n).
 
-    v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function adds
-    them: add them to τ where they should act.
+    q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. A spring acts with
+    −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest (joints of several degrees of freedom: |Δ| in the brackets). The laws are those of MuJoCo's `qfrc_passive`. No other
+    function adds them: add them to τ where they should act.
 
     >>> arm = condyle.robots.arm7()
-    >>> v = np.ones(7)
-    >>> np.allclose(condyle.passive_torque(arm, v, 1e-3), -arm.damping - arm.friction)
+    >>> q, v = np.zeros(7), np.ones(7)
+    >>> np.allclose(condyle.passive_torque(arm, q, v, 1e-3), -arm.damping - arm.friction)
     True
     """
 
-def passive_torque_derivative(model: Model, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """The derivative ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`, nv numbers: the diagonal of a matrix without
-    other entries; O(n).
+def passive_torque_derivatives(
+    model: Model, q: ArrayLike, v: ArrayLike, smoothing: float, out: tuple[_Array, _Array] | list[_Array] | None = None
+) -> PassiveDerivatives:
+    """The derivatives of `passive_torque`, exact, as `PassiveDerivatives(dtau_dq, dtau_dv)`, each (nv, nv).
 
-    v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
+    q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal but for free joints with friction or polynomial
+    damping; ∂τ/∂q has a block for each spring, and couples joints where gravity is compensated.
+
+    >>> arm = condyle.robots.arm7()
+    >>> d = condyle.passive_torque_derivatives(arm, np.zeros(7), np.ones(7), 1e-3)
+    >>> np.allclose(d.dtau_dv, -np.diag(arm.damping)), np.any(d.dtau_dq)
+    (True, False)
     """
 
 def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
@@ -3333,8 +3561,8 @@ class Simulation:
         whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
         is conserved to rounding.
     dt: h, the length of a step (s), above 0.
-    passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
-        none of either.
+    passive: the smoothing ε of `passive_torque` (rad/s, m/s), if damping, friction, springs and gravity compensation are to
+        act; None for none of these.
     tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
     max_iterations: Newton's method gives up after this number of iterations.
     ground: a `Ground` on which the robot stands, slides and lands, with 'semi_implicit_euler' only; None for none.

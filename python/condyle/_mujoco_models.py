@@ -1,7 +1,7 @@
 """Models of MuJoCo as plain MJCF: what its compiler has made, without anything that needs a compiler or other files.
 
-`Model.from_mujoco` reads the text as it reads any MJCF, so the rules for limits, springs, actuators and warnings are the
-same. Numbers keep all digits.
+`Model.from_mujoco` reads the text as it reads any MJCF, so the rules for limits, springs, actuators and warnings are
+the same. Numbers keep all digits.
 """
 
 import sys
@@ -91,19 +91,12 @@ class _Text:
     def _name_the_unnamed(self) -> None:
         """Names bodies and joints as the reader of MJCF does, so that they can be referred to."""
         taken = {*self.bodies}, {*self.joints}
-
-        def free(name: str, among: set[str]) -> str:
-            while name in among:
-                name += "_"
-            among.add(name)
-            return name
-
         for body in range(1, self.m.nbody):
-            name = self.bodies[body] = self.bodies[body] or free(f"body{body}", taken[0])
+            name = self.bodies[body] = self.bodies[body] or _free(f"body{body}", taken[0])
             first, count = int(self.m.body_jntadr[body]), int(self.m.body_jntnum[body])
             for k, joint in enumerate(range(first, first + count), start=1):
                 number = "" if count == 1 else str(k)
-                self.joints[joint] = self.joints[joint] or free(f"{name}_joint{number}", taken[1])
+                self.joints[joint] = self.joints[joint] or _free(f"{name}_joint{number}", taken[1])
 
     def _word(self, enumeration: str, prefix: str, number: int, otherwise: tuple[str, ...]) -> str:
         """The word for a number of an enumeration, in the version of MuJoCo that the model is of."""
@@ -111,7 +104,7 @@ class _Text:
         members = getattr(getattr(package, enumeration, None), "__members__", {})
         words = {int(value): name.removeprefix(prefix).lower() for name, value in members.items()}
         words = words or dict(enumerate(otherwise))
-        return words.get(int(number), str(number))
+        return str(words.get(int(number), number))
 
     def _flags(self) -> list[str]:
         package = sys.modules.get(type(self.m).__module__.partition(".")[0])
@@ -161,17 +154,21 @@ class _Text:
         elif m.jnt_stiffness[joint]:
             places = slice(q, q + (7 if kind == FREE else 4))
             if not np.array_equal(m.qpos_spring[places], m.qpos0[places]):
-                raise ModelError(f"joint `{name}`: its spring rests at {m.qpos_spring[places]}, not where it is at first")
+                raise ModelError(
+                    f"joint `{name}`: its spring rests at {m.qpos_spring[places]}, not where it is at first"
+                )
         stiffness = _polynomial(m.jnt_stiffness[joint], _row(m, "jnt_stiffnesspoly", joint))
         freedoms = range(v, v + (6, 3, 1, 1)[kind])
         damping = [_polynomial(m.dof_damping[k], _row(m, "dof_dampingpoly", k)) for k in freedoms]
         losses = {"damping": damping}
-        losses |= {what: [[float(getattr(m, f"dof_{what}")[k])] for k in freedoms] for what in ("frictionloss", "armature")}
+        losses |= {
+            what: [[float(getattr(m, f"dof_{what}")[k])] for k in freedoms] for what in ("frictionloss", "armature")
+        }
         for what, found in losses.items():
             if any(numbers != found[0] for numbers in found):
                 raise ModelError(f"joint `{name}`: expected one {what} for all its degrees of freedom, found {found}")
-        found = {"stiffness": stiffness} | {what: numbers[0] for what, numbers in losses.items()}
-        attributes |= {what: numbers for what, numbers in found.items() if any(numbers)}
+        own = {"stiffness": stiffness} | {what: numbers[0] for what, numbers in losses.items()}
+        attributes |= {what: numbers for what, numbers in own.items() if any(numbers)}
         if m.jnt_actgravcomp[joint]:
             attributes["actuatorgravcomp"] = True
         if _row(m, "jnt_springyield", joint) > 0:
@@ -228,15 +225,20 @@ class _Text:
 
     def _actuators(self) -> Iterator[str]:
         m = self.m
-        for a, name in enumerate(self._names("actuator", m.nu)):
+        for a, name in enumerate(self._names("actuator", len(m.actuator_trntype))):
+            control, output = (int(getattr(m, f"actuator_{of}adr", range(m.nu))[a]) for of in ("ctrl", "out"))
             driven = self._word("mjtTrn", "mjTRN_", m.actuator_trntype[a], tuple(TRANSMISSIONS))
             attributes: _Attributes = {"name": name} if name else {}
             target = int(m.actuator_trnid[a][0])
-            attributes |= {attribute: getattr(self, names)[target] for attribute, names in TRANSMISSIONS.get(driven, ())}
+            attributes |= {
+                attribute: getattr(self, names)[target] for attribute, names in TRANSMISSIONS.get(driven, ())
+            }
             if driven == "site" and m.actuator_trnid[a][1] >= 0:
                 attributes["refsite"] = self.sites[m.actuator_trnid[a][1]]
-            attributes["gear"] = m.actuator_gear[a]
-            attributes |= _range("ctrlrange", "ctrllimited", m.actuator_ctrllimited[a], m.actuator_ctrlrange[a])
+            attributes["gear"] = m.actuator_gear[output]
+            attributes |= _range(
+                "ctrlrange", "ctrllimited", m.actuator_ctrllimited[control], m.actuator_ctrlrange[control]
+            )
             attributes |= _range("forcerange", "forcelimited", m.actuator_forcelimited[a], m.actuator_forcerange[a])
             if m.nplugin and m.actuator_plugin[a] >= 0:
                 yield self._plugin(int(m.actuator_plugin[a]), attributes)
@@ -255,9 +257,11 @@ class _Text:
             yield _element("general", attributes | {what: numbers for what, numbers in found.items() if any(numbers)})
 
     def _keyframes(self) -> Iterator[str]:
-        for k, name in enumerate(self._names("key", self.m.nkey)):
-            attributes: _Attributes = {"name": name} if name else {}
-            yield _element("key", {**attributes, "qpos": self.m.key_qpos[k], "qvel": self.m.key_qvel[k]})
+        names = self._names("key", self.m.nkey)
+        for k, name in enumerate(names):
+            q, v = self.m.key_qpos[k], self.m.key_qvel[k]
+            if name or np.any(v) or not np.array_equal(q, self.m.qpos0):  # else room that a file has asked for
+                yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q, "qvel": v})
 
 
 TRANSMISSIONS = {
@@ -267,8 +271,17 @@ TRANSMISSIONS = {
     "tendon": (("tendon", "tendons"),),
     "site": (("site", "sites"),),
     "body": (("body", "bodies"),),
+    "so3": (("joint", "joints"),),
 }
 """The attribute that names the thing that an actuator drives, and the list of the things' names."""
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """The name, or one like it that is not taken; it is taken then."""
+    while name in taken:
+        name += "_"
+    taken.add(name)
+    return name
 
 
 def _row(model: Any, field: str, number: int) -> Any:

@@ -81,7 +81,7 @@ def warn_of_armature(model: Model) -> None:
     """Warns of armature that the libraries take along different axes."""
     for name, kind, at in zip(model.names, model.joint_types, model.idx_vs, strict=True):
         if kind == "free_flyer" and model.armature[at : at + 3].any():
-            text = f"joint `{name}`: its armature {model.armature[at]} is a mass along the axes of its parent in Condyle"
+            text = f"joint `{name}`: its armature {model.armature[at]} is along the axes of its parent in Condyle"
             warnings.warn(f"{text}, along those of its body in Pinocchio", stacklevel=3)
 
 

@@ -311,7 +311,7 @@ class ContactConstraint(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """Two coupled joints of a robot's file: the position of the follower is Σ cᵢ qⁱ, with q the position of the leader."""
+    """Two coupled joints of a robot's file: the follower is at Σ cᵢ qⁱ, with q the position of the leader."""
 
     follower: str
     """The joint that follows."""
@@ -441,8 +441,8 @@ class Actuator(NamedTuple):
     """An actuator of a robot, as its file describes it.
 
     With the control u, and the length l, which is the gear times the position that it drives, it acts with the force
-    f = gain u + bias − kp l − kv l̇. The effort at the joint is gear · f. A motor has the gain 1 and nothing else; a servo
-    of position has the gain kp, one of velocity the gain kv.
+    f = gain u + bias − kp l − kv l̇. The effort at the joint is gear · f. A motor has the gain 1 and nothing else; a
+    servo of position has the gain kp, one of velocity the gain kv.
     """
 
     name: str
@@ -456,9 +456,9 @@ class Actuator(NamedTuple):
     coefficients: dict[str, float]
     """The joints of the tendon by name, each with its coefficient (1, m/rad)."""
     gear: _Array
-    """The effort at the joint for each unit of force (1, m), 6 numbers. Joints of one degree of freedom and tendons have
-    the first one. A ball has three: an axis in its body. A frame has six, linear first, along its axes. A free joint has
-    six too: a force along the world's axes and a torque along the body's."""
+    """The effort at the joint for each unit of force (1, m), 6 numbers. Joints of one degree of freedom and tendons
+    have the first one. A ball has three: an axis in its body. A frame has six, linear first, along its axes. A free
+    joint has six too: a force along the world's axes and a torque along the body's."""
     gain: float
     """The force for each unit of control."""
     bias: float

@@ -84,6 +84,7 @@ def test_parameters_are_inputs(quadruped: Robot) -> None:
     rnea = condyle.codegen.compile(model, "rnea", inputs=["inertia", "armature", "gravity"])
     rng = np.random.default_rng(3)
     armature = rng.random(model.nv)
+    armature[:3] = 0.3  # one number along the linear coordinates of a free joint
     inertias = [
         condyle.Inertia.from_com(i.mass + 1.0, rng.uniform(-0.1, 0.1, 3), 0.1 * np.eye(3)) for i in model.inertias
     ]

@@ -135,3 +135,36 @@ def test_what_is_refused(quadruped: Robot) -> None:
         condyle.constrained_dynamics(arm.model, arm.data, feet, arm.q, arm.v, arm.tau)
     with pytest.raises(ValueError, match=r"^tau: expected shape \(18,\), found \(17,\)$"):
         condyle.constrained_dynamics(model, data, feet, q, v, tau[1:])
+
+
+LOOPS = """
+<mujoco>
+  <worldbody>
+    <body name="crank"><joint name="one" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 1" size="0.05"/>
+      <body name="coupler" pos="0 0 1"><joint axis="0 1 0"/><geom type="sphere" size="0.05"/></body>
+    </body>
+    <body name="rocker" pos="1 0 0"><joint name="two" axis="0 1 0"/><geom type="sphere" size="0.05"/></body>
+  </worldbody>
+  <equality>
+    <connect name="pin" body1="coupler" body2="rocker" anchor="1 0 0"/>
+    <weld name="glue" body1="coupler" body2="rocker"/>
+    <joint name="gear" joint1="one" joint2="two" polycoef="0.1 -2 0.5 0 0"/>
+  </equality>
+</mujoco>"""
+
+
+def test_constraints_of_a_model() -> None:
+    model = condyle.Model.from_mjcf_str(LOOPS)
+    constraints = model.constraints()
+    pin, glue, gear = (constraints[name] for name in ("pin", "glue", "gear"))
+    assert isinstance(pin, condyle.ContactConstraint)
+    assert (pin.kind, pin.frame, pin.other, pin.kp) == ("point", "pin#1", "pin#2", 0.0)
+    assert isinstance(glue, condyle.ContactConstraint)
+    assert (glue.kind, glue.frame, glue.other) == ("rigid", "glue#1", "glue#2")
+    assert gear == condyle.Coupling("one", "two", (0.1, -2.0, 0.5, 0.0, 0.0))
+    loops = condyle.ConstraintSet(model, [pin._replace(kp=9.0)], mu=1e-8, iterations=5)
+    data, q, v = condyle.Data(model), np.zeros(3), np.array([0.3, -0.3, 0.3])  # the pin holds, as does its velocity
+    found = condyle.constrained_dynamics(model, data, loops, q, v, np.ones(3))
+    assert loops.rows == 3
+    assert found.residual < 1e-6
+    assert condyle.robots.quadruped().constraints() == {}

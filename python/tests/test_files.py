@@ -135,7 +135,7 @@ def test_write_urdf(tmp_path: Path) -> None:
     assert np.array_equal(again.limits.velocity, other.limits.velocity)
     arm.with_armature(np.full(7, 0.125)).write_urdf(new, original)
     assert np.array_equal(Model.from_urdf(new).armature, np.full(7, 0.125))
-    with pytest.raises(condyle.ParseError, match="joint `joint1`: effort from -1.0 to 87.0: a URDF has one limit"):
+    with pytest.raises(condyle.ParseError, match="joint `joint1`: effort from -1 to 87: a URDF has one limit"):
         arm.with_limits(effort_lower=-np.ones(7)).write_urdf(new, original)
     with pytest.raises(condyle.ParseError, match=r"arm7\.urdf: .*joint"):
         condyle.robots.quadruped().write_urdf(new, original)

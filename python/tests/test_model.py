@@ -154,7 +154,8 @@ def test_mjcf_mimic() -> None:
 
 SDF = """<sdf version="1.7"><model name="pendulum">
   <link name="rod"><inertial><pose>0 0 -1 0 0 0</pose><mass>2</mass>
-    <inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial></link><link name="bob"><inertial><mass>1</mass></inertial></link>
+    <inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial></link>
+  <link name="bob"><inertial><mass>1</mass></inertial></link>
   <joint name="pivot" type="revolute"><parent>rod</parent><child>bob</child><axis><xyz>0 1 0</xyz></axis></joint>
 </model></sdf>"""
 
@@ -303,11 +304,16 @@ def test_gravity_and_armature(robot: Robot) -> None:
     weightless = model.with_gravity([0, 0, 0])
     assert np.array_equal(condyle.gravity(weightless, data, q), np.zeros(model.nv))
     assert np.array_equal(model.gravity, [0, 0, -9.81])  # the model itself does not change
-    armature = np.arange(model.nv) / 10
+    armature, acceleration = np.arange(model.nv) / 10, a.copy()
+    if model.joint_types[1] == "free_flyer":
+        with pytest.raises(condyle.ModelError, match="armature is 0, 0.1 and 0.2 along its linear coordinates"):
+            model.with_armature(armature)
+        armature[:3] = 0.7
+        acceleration[:3] += np.cross(v[3:6], v[:3])  # along the axes of the world
     geared = model.with_armature(armature)
     assert np.array_equal(geared.armature, armature)
     difference = condyle.rnea(geared, data, q, v, a) - condyle.rnea(model, data, q, v, a)
-    np.testing.assert_allclose(difference, armature * a, atol=1e-12)
+    np.testing.assert_allclose(difference, armature * acceleration, atol=1e-12)
     with pytest.raises(ValueError, match=r"^gravity: expected shape \(3,\)"):
         model.with_gravity([0, 0])
     with pytest.raises(ValueError, match="^armature: expected shape "):

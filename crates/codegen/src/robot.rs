@@ -188,7 +188,8 @@ impl<'s> Robot<'s> {
         let lifted = |I: Inertia<f64>| -> Inertia<Expression> { I.lift() };
         let mut model = model.clone().without_residues().with_inertias(|i, I| given(i).unwrap_or_else(|| lifted(I)))?;
         if settings.armature_is_input {
-            let armature = r.input("armature", model.nv(), "inertia of the rotors, added to the diagonal of M");
+            let about = "inertia of the rotors, added to the diagonal of M; the same along x, y and z of a free joint";
+            let armature = r.input("armature", model.nv(), about);
             model = model.with_scalar_armature(&armature);
         }
         if settings.gravity_is_input {

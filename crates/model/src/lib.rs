@@ -29,6 +29,9 @@
 //! | bytes in the files of meshes that give an MJCF mass | 536 870 912 |
 //! | attributes of all default classes of an MJCF, what they inherit included | 1 048 576 |
 //! | named positions (`<group_state>`) of an SRDF | 4096 |
+//! | numbers in the keyframes of an MJCF | 4 194 304 |
+//! | joints of the tendons that actuators of an MJCF drive | 1 048 576 |
+//! | actuators of an MJCF with `dampratio` | 4096 |
 //! | degrees of freedom of a model, however it is made | 4096 |
 //! | coordinates of a model whose joints follow others | 1024 |
 //!

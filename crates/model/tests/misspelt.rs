@@ -51,7 +51,8 @@ fn names(text: &str) -> Vec<Vec<Range<usize>>> {
     let mut places = Vec::new();
     for node in document.descendants().filter(|node| node.is_element() && node.parent_element().is_some()) {
         let (whole, tag) = (node.range(), node.tag_name().name());
-        let mut tags = vec![whole.start + 1..whole.start + 1 + tag.len()];
+        let mut tags = Vec::new();
+        tags.push(whole.start + 1..whole.start + 1 + tag.len());
         if let Some(end) =
             text[whole.clone()].rfind(&format!("</{tag}>")).filter(|end| end + tag.len() + 3 == whole.len())
         {
@@ -70,7 +71,7 @@ fn check(read: &dyn Fn(&str) -> Result<Model, Error>, text: &str) {
     for places in names(text) {
         let mut changed = text.to_owned();
         for place in places.iter().rev() {
-            changed.insert_str(place.end - 1, "q");
+            changed.insert(place.end - 1, 'q');
         }
         let first = &places[0];
         let name = format!("{}q{}", &text[first.start..first.end - 1], &text[first.end - 1..first.end]);

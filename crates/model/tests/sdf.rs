@@ -413,7 +413,7 @@ fn inertias_of_shapes() {
         ("<box><size>0.2 0.3 0.4</size></box>", [12.0, 1.2, 2.4, 3.6, 1.762329301569, 1.411913478072, 0.765757220359, -0.219106986365, -0.410424888811, -0.727800659467]),
         ("<sphere><radius>0.2</radius></sphere>", [16.755160819146, 1.675516081915, 3.351032163829, 5.026548245744, 2.446253479595, 1.943598655021, 1.105840614064, -0.335103216383, -0.502654824574, -1.005309649149]),
         ("<ellipsoid><radii>0.1 0.2 0.3</radii></ellipsoid>", [12.566370614359, 1.256637061436, 2.513274122872, 3.769911184308, 1.881602913175, 1.525825153989, 0.814872459261, -0.218974806926, -0.462526642125, -0.76457414061]),
-        (cylinder, [6.28318530718, 0.628318530718, 1.256637061436, 1.884955592154, 0.893056352371, 0.72744878805, 0.369170206853, -0.12279733123, -0.220645448819, -0.373026072392]),
+        (cylinder, [core::f64::consts::TAU, 0.628318530718, 1.256637061436, 1.884955592154, 0.893056352371, 0.72744878805, 0.369170206853, -0.12279733123, -0.220645448819, -0.373026072392]),
         ("<cone><radius>0.1</radius><length>0.4</length></cone>", [2.094395102393, 0.08705688944, 0.433972469686, 0.45902709453, 0.20301650876, 0.119882318798, 0.103090802624, -0.017641878617, -0.023531720113, -0.094564433128]),
         ("<capsule><radius>0.1</radius><length>0.4</length></capsule>", [8.377580409573, 0.837758040957, 1.675516081915, 2.513274122872, 1.249565249156, 1.059859361584, 0.522197567695, -0.159834444963, -0.337884807374, -0.491979700625]),
     ];
@@ -468,7 +468,7 @@ fn missing_inertias() {
     warned(&frame, "inertial: the pose is in the link's frame, not relative to `a`");
 }
 
-/// What is misspelt, misplaced, or known and not held is a warning; what is only drawn or sensed is none.
+/// Misspelt and misplaced elements warn, and so do known ones that a model cannot hold. Drawn and sensed things do not.
 #[test]
 fn what_a_model_does_not_hold() {
     let turn = |inside: &str| joint("j", "revolute", ["a", "b"], inside);
@@ -504,6 +504,7 @@ fn what_a_model_does_not_hold() {
             turn("<axis/><physics><ode><suspension><cfm>1</cfm></suspension></ode></physics>"),
             "the suspension is left out",
         ),
+        (axis("").replace("</axis>", "</axis><axis2/>"), "axis2 is left out: a revolute joint has none"),
         (axis("") + "<enable_wind>true</enable_wind>", "enable_wind is left out"),
         (
             axis("").replace("revolute", "continuous").replace("</xyz>", "</xyz><limit><lower>0</lower></limit>"),
@@ -558,6 +559,8 @@ fn values_that_are_none() {
             "<link name='a'><pose rotation_format='quat_xyzw' degrees='true'>0 0 0 0 0 0 1</pose></link>",
             "pose: a quaternion is not in degrees",
         ),
+        ("", "model `m`: has no links"),
+        ("<link name='a'/><model name='n'/>", "model `n`: has no links"),
         ("<link name='a'/><link name='world'/>", "link `world`: the name belongs to SDF"),
         (
             "<link name='a'/><joint name='j' type='hinge'><parent>world</parent><child>a</child></joint>",
@@ -635,6 +638,8 @@ fn the_frame_of_a_model_moves_with_its_link() {
     };
     assert_eq!(read(""), (1, [0.0, 0.0, 1.0]));
     assert_eq!(read(" canonical_link='b'"), (2, [-1.0, 0.0, 1.0]));
+    let wrong = format!("<sdf version='1.9'><model name='m' canonical_link='c'>{}</model></sdf>", link("a"));
+    assert!(fault(&wrong).contains("model `m`: canonical_link: no link is named `c`"));
 }
 
 /// Old files wrote nested models flat: names and frames with `::`.
@@ -817,7 +822,7 @@ fn chains_of_followers() {
     assert!(chain(&mimic("l")).unwrap_err().to_string().ends_with("mimic: follows itself, through others"));
 }
 
-/// Of two links and a joint of one name, as older files have them, references mean the link.
+/// References mean the link where a link and a joint share a name, as in older files.
 #[test]
 fn joints_named_as_links() {
     let turn = joint("b", "revolute", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");
@@ -825,7 +830,7 @@ fn joints_named_as_links() {
     assert_eq!((m.nv(), m.bodies()[1].joint_name.as_str(), m.bodies()[1].name.as_str()), (1, "b", "b"));
 }
 
-/// What stands behind a number is dropped, with a warning; something else than a number is an error.
+/// Text behind a number is dropped, with a warning; text without a number is an error.
 #[test]
 fn numbers_with_something_behind() {
     let limit = |text: &str| {
@@ -839,6 +844,16 @@ fn numbers_with_something_behind() {
         let what = format!("<velocity>: `{text}` is no number; it is read as ");
         assert!(said(&m)[0].contains(&what), "{:?}", said(&m));
     }
+    let twice = "<link name='a'><inertial><mass>1</mass><mass>2</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial></link>";
+    let m = model("1.9", twice);
+    assert_eq!(m.bodies()[0].inertia.mass, 1.0);
+    assert_eq!(said(&m), ["<string>:1: <mass>: is the second <mass> here, and is left out"]);
+    let physics = |version: &str| {
+        let world = format!("<physics><gravity>0 0 -1</gravity></physics><model name='m'>{}</model>", link("a"));
+        let m = read(&format!("<sdf version='{version}'><world name='w'>{world}</world></sdf>")).unwrap();
+        (m.gravity().z, said(&m).len())
+    };
+    assert_eq!((physics("1.5"), physics("1.6")), ((-1.0, 0), (-9.81, 1)));
     assert!(limit("fast").unwrap_err().to_string().ends_with("joint `j`: velocity: `fast` is no number"));
 }
 

@@ -210,9 +210,12 @@ fn links_that_fixed_joints_merge_keep_their_inertias() {
     };
     let bolts = fixed("bolt", "thigh", 0.25, 0.5) + &fixed("nut", "bolt", 0.125, -0.5);
     let text = LEG.replace("</robot>", &(bolts.clone() + "</robot>"));
-    let new = written("merged", &text, with_other_inertias).unwrap();
+    let more = |m: &Model| m.with_inertias(|i, I| if i == 0 { I } else { I + other(i) }).unwrap();
+    let new = written("merged", &text, more).unwrap();
     assert!(new.contains(&bolts), "{new}");
-    // the rest would be negative: the moving link takes all
+    // the rest would be negative, or the inertia of no body: the moving link takes all
+    let new = written("merged", &text, with_other_inertias).unwrap();
+    assert_eq!(new.matches("<mass value='0'/>").count(), 2, "{new}");
     let small = |m: &Model| m.with_inertias(|i, I| if i == 1 { other(1).scale(0.1) } else { I }).unwrap();
     let new = written("merged", &text, small).unwrap();
     assert!(!new.contains(&bolts) && new.matches("<mass value='0'/>").count() == 2, "{new}");
@@ -309,7 +312,11 @@ fn an_mjcf_keeps_all_but_the_numbers_that_differ() {
 
 #[test]
 fn inertias_of_an_mjcf_come_back() {
-    let new = written("fingers", HAND, with_other_inertias).unwrap();
+    let more = |m: &Model| {
+        let keeps = |i: usize| i == 0 || m.bodies()[i].name.contains('#');
+        m.with_inertias(|i, I| if keeps(i) { I } else { I + other(i) }).unwrap()
+    };
+    let new = written("fingers", HAND, more).unwrap();
     // one that geoms gave becomes an <inertial>; the fixed body keeps its own
     assert!(new.contains("<body name='palm'>\n      <inertial pos=\""), "{new}");
     assert!(new.contains("mass='0.25' diaginertia='0.01 0.02 0.025' euler='0 45 0'"), "{new}");

@@ -56,7 +56,7 @@ fn encodings() {
 #[test]
 fn bytes_that_are_not_in_the_encoding() {
     let robot = latin(ROBOT);
-    let comment = [b"<!-- \xe4 \x81 -->", &*ROBOT.as_bytes()].concat();
+    let comment = [b"<!-- \xe4 \x81 -->", ROBOT.as_bytes()].concat();
     assert!(file("comment", &comment).is_ok());
     let known = "expected UTF-8, UTF-16, US-ASCII, ISO-8859-1 or windows-1252";
     let said = file("bare", &robot).unwrap_err().to_string();

@@ -99,8 +99,8 @@ impl Model {
     /// mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being a constraint beside the
     ///     model; its `polycoef` must be linear.
     /// strict: whether a warning (`warnings`) is an error.
-    /// weightless_meshes: whether the mass of a mesh, on a moving body without `<inertial>`, is left out and reported in
-    ///     `warnings`, instead of being an error.
+    /// weightless_meshes: whether a mesh with mass that cannot be read weighs nothing and is reported in `warnings`,
+    ///     instead of being an error.
     /// packages, allow: as for `from_urdf`.
     ///
     /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.

@@ -1,4 +1,4 @@
-"""`Model.from_mujoco`: models that MuJoCo has compiled, beside our reader of the same files and beside MuJoCo's numbers."""
+"""`Model.from_mujoco`: models that MuJoCo has compiled, beside our reader of the same files and MuJoCo's numbers."""
 
 import re
 import sys
@@ -14,6 +14,7 @@ from condyle import _mujoco_models
 sys.path.append(str(Path(__file__).parents[1] / "pinocchio"))
 from random_mjcf import RandomMjcf
 
+PACKAGES = ("dm_control", "gymnasium", "robosuite")
 SAME = 1e-11
 """Masses, poses and M of both, to this part of the largest one; quaternions of files are rounded twice."""
 
@@ -57,6 +58,23 @@ def same_robot(ours: condyle.Model, other: condyle.Model) -> None:
         assert frame.body == others[key].body
         close(frame.placement, others[key].placement)
     close(ours.gravity, other.gravity)
+    for found, expected in zip(ours.springs, other.springs, strict=True):
+        assert found.joint == expected.joint
+        close(np.append(found.stiffness, found.rest), np.append(expected.stiffness, expected.rest))
+    for found, expected in zip(ours.gravity_compensation, other.gravity_compensation, strict=True):
+        assert found.body == expected.body
+        close(np.append(found.mass_com, found.mass), np.append(expected.mass_com, expected.mass))
+    for found, expected in zip(ours.actuators, other.actuators, strict=True):
+        assert found[:5] == expected[:5]
+        finite = np.isfinite([*expected.control, *expected.force])
+        assert np.array_equal(np.isfinite([*found.control, *found.force]), finite)
+        close(*(np.array([*a.control, *a.force])[finite] for a in (found, expected)))
+        close(*(np.array([*a.gear, a.gain, a.bias, a.kp, a.kv]) for a in (found, expected)))
+    assert ours.keyframes.keys() == other.keyframes.keys()
+    for name, q in ours.keyframes.items():
+        close(q, other.keyframes[name])
+        close(ours.keyframe_velocities[name], other.keyframe_velocities[name])
+    assert ours.constraints() == other.constraints()
 
 
 def agrees(ours: condyle.Model, theirs: mujoco.MjModel, seed: int) -> None:
@@ -66,7 +84,12 @@ def agrees(ours: condyle.Model, theirs: mujoco.MjModel, seed: int) -> None:
     data, scratch = mujoco.MjData(theirs), condyle.Data(ours)
     data.qpos[:], data.qvel[:], data.qacc[:] = there.position(q), there.velocity(q, v), 0.0
     theirs.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
-    theirs.dof_damping[:] = theirs.dof_frictionloss[:] = theirs.jnt_stiffness[:] = theirs.body_gravcomp[:] = 0.0
+    for force in (
+        theirs.dof_damping, theirs.dof_dampingpoly, theirs.dof_frictionloss, theirs.jnt_stiffness, theirs.body_gravcomp,
+        theirs.jnt_stiffnesspoly, theirs.tendon_damping, theirs.tendon_stiffness, theirs.actuator_damping,
+    ):  # fmt: skip
+        force[:] = 0.0
+    theirs.opt.density = theirs.opt.viscosity = 0.0
     mujoco.mj_inverse(theirs, data)
     a = there.acceleration_from(data.qpos, data.qvel, data.qacc)
     close(there.effort(q, condyle.rnea(ours, scratch, q, v, a)), data.qfrc_inverse)
@@ -109,14 +132,16 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
       <joint name="j" axis="0 1 0" ref="10" springref="20" stiffness="1 2 3" damping="0.5 0.1 0.2" range="-10 20"/>
       <joint name="k" type="ball" stiffness="2" actuatorgravcomp="true" range="0 60"/>
       <geom size="0.1"/><site name="s"/><body name="c" pos="0 0 1">
-      <joint name="l" type="slide" springdamper="0.5 1" actuatorfrcrange="-2 5"/><geom size="0.2"/><site name="t"/></body>
+      <joint name="l" type="slide" springdamper="0.5 1" actuatorfrcrange="-2 5"/>
+      <geom size="0.2"/><site name="t"/></body>
     </body><body mocap="true" name="target"/>"""
     beside = """<tendon><fixed name="f" armature="0.5" stiffness="3" damping="0.1" frictionloss="0.2" range="-1 1">
       <joint joint="j" coef="2"/><joint joint="l" coef="-1"/></fixed>
       <spatial name="cord"><site site="s"/><site site="t"/></spatial></tendon>
     <equality><connect name="c" body1="b" body2="c" anchor="0 0 1"/><weld site1="s" site2="t" active="false"/>
       <joint joint1="j" joint2="l" polycoef="1 2 3 0 0"/><tendon tendon1="f"/></equality>
-    <actuator><motor joint="j" gear="50" ctrlrange="-1 1"/><position name="p" joint="l" kp="100" kv="10" forcerange="-3 3"/>
+    <actuator><motor joint="j" gear="50" ctrlrange="-1 1"/>
+      <position name="p" joint="l" kp="100" kv="10" forcerange="-3 3"/>
       <general tendon="f" gear="3" gainprm="2" biastype="affine" biasprm="1 -3 -0.5" armature="0.01" damping="0.1"/>
       <general site="s" refsite="t" gear="1 2 3 4 5 6"/><intvelocity joint="j" kp="2" actrange="-1 1"/></actuator>
     <keyframe><key name="home" qpos="1 0 1 0 0 0.3"/><key qvel="1 2 3 4 5"/></keyframe>"""
@@ -143,6 +168,36 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
     assert compared > 80
 
 
+def robots_of_packages() -> list[Path]:
+    """The MJCFs of the packages that the comparison of robots reads, where these are installed."""
+    folder = Path(__file__).parents[3] / ".venv" / "robots"
+    files = sorted(file for package in PACKAGES for file in (folder / package).rglob("*.xml"))
+    return [file for file in files if "<mujoco" in file.read_text(encoding="utf-8", errors="ignore")]
+
+
+@pytest.mark.skipif(not robots_of_packages(), reason="no packages of robots in .venv/robots")
+def test_robots_of_packages() -> None:
+    """Each model is MuJoCo's own, and the robot that our reader makes of the file, where it reads it."""
+    compared = read = 0
+    for file in robots_of_packages():
+        try:
+            theirs = mujoco.MjModel.from_xml_path(str(file))
+        except ValueError:  # parts of models, and files that the package leaves out
+            continue
+        ours = condyle.Model.from_mujoco(theirs)
+        try:
+            other = condyle.Model.from_mjcf(file)
+        except condyle.Error:  # meshes of formats that we do not read
+            other = None
+        if other is not None:
+            same_robot(ours, other)
+            read += 1
+        agrees(ours, theirs, 1)
+        compared += 1
+    assert compared > 100
+    assert read > 90
+
+
 def test_words_for_what_has_none() -> None:
     """Names that files do not give are those that our reader gives."""
     text = """<mujoco><worldbody><body><joint/><joint axis="1 0 0"/><geom size="1"/>
@@ -161,3 +216,36 @@ def test_losses_that_differ_within_a_joint() -> None:
     expected = "joint `j`: expected one armature for all its degrees of freedom, found [[0.0], [0.5], [0.0]]"
     with pytest.raises(condyle.ModelError, match=re.escape(expected)):
         condyle.Model.from_mujoco(theirs)
+
+
+PLAIN = re.sub("</?replicate[^>]*>| settotalmass=.7.", "", LOADED)
+"""The robot without what only an expanded file can be written for."""
+
+
+@pytest.mark.parametrize("text", [PLAIN, *(RandomMjcf(k).text for k in range(8))])
+def test_written_numbers(text: str, tmp_path: Path) -> None:
+    """Other inertias, limits and armature in a copy of a file are those of the robot that MuJoCo reads there."""
+    original, new = tmp_path / "original.xml", tmp_path / "new.xml"
+    original.write_text(text, encoding="utf-8")
+    model, rng = condyle.Model.from_mjcf(original), np.random.default_rng(1)
+    model.write_mjcf(new, original)
+    assert new.read_text(encoding="utf-8") == text
+    inertias = list(model.inertias)
+    for i, inertia in enumerate(inertias):
+        if inertia.mass > 0.0 and i > 0:
+            spread = 0.1 * rng.standard_normal((3, 3))
+            moments = spread @ spread.T + 1e-3 * np.eye(3)
+            inertias[i] = condyle.Inertia.from_com(
+                rng.uniform(0.5, 3.0), rng.uniform(-0.1, 0.1, 3), np.trace(moments) * np.eye(3) - moments
+            )
+    armature, lower = model.armature.copy(), model.limits.lower.copy()
+    for i, kind in enumerate(model.joint_types):
+        if kind in ("revolute", "prismatic"):
+            armature[model.idx_vs[i]] += 0.25
+            lower[model.idx_qs[i]] *= 0.5
+    changed = model.with_inertias(inertias).with_armature(armature).with_limits(lower=lower)
+    changed.write_mjcf(new, original)
+    theirs = mujoco.MjModel.from_xml_path(str(new))
+    same_robot(condyle.Model.from_mujoco(theirs), condyle.Model.from_mjcf(new))
+    close(condyle.Model.from_mjcf(new).inertial_parameters, changed.inertial_parameters)
+    agrees(changed, theirs, 2)

@@ -91,7 +91,7 @@ class Pair:
         sizes[self.name] = (self.root_joint or "none", ours.nbodies - 1, ours.nq, ours.nv)
 
     def with_armature(self, armature: np.ndarray) -> "Pair":
-        """The same robot, with armature for both; none along the linear coordinates of free joints, where meanings differ."""
+        """The same robot, with armature for both, except along a free joint's linear coordinates: meanings differ."""
         armature = armature.copy()
         for kind, first in zip(self.ours.joint_types, self.ours.idx_vs, strict=True):
             if kind == "free_flyer":

@@ -175,8 +175,11 @@ impl Tree {
             let id =
                 builder.body_with((&name, &name), ids[part.parent], part.joint, part.placement, part.inertia, options);
             if i % 2 == 1 {
-                let stiffness =
-                    [2.0, if i % 4 == 1 && !self.smooth { 0.5 } else { 0.0 }, if i % 3 == 0 { 0.3 } else { 0.0 }];
+                let stiffness = [
+                    2.0,
+                    if i % 4 == 1 && !self.smooth { 0.5 } else { 0.0 },
+                    if i.is_multiple_of(3) { 0.3 } else { 0.0 },
+                ];
                 builder.spring(id, stiffness, rest(part.joint));
             }
             if i % 3 == 2 {
@@ -198,7 +201,7 @@ impl Tree {
 /// Damping, with a polynomial or without, and friction of the i-th joint.
 fn losses(i: usize, smooth: bool) -> JointOptions {
     let damping_polynomial = if i.is_multiple_of(2) { [if smooth { 0.0 } else { 0.02 }, 0.03] } else { [0.0; 2] };
-    let friction = if i % 3 == 0 { 0.2 } else { 0.0 };
+    let friction = if i.is_multiple_of(3) { 0.2 } else { 0.0 };
     JointOptions { damping: 0.1 + 0.05 * (i % 3) as f64, damping_polynomial, friction, ..JointOptions::default() }
 }
 

@@ -120,7 +120,6 @@ fn joints() {
     expect(&with(axis, r#"<axis xyz="0 1"/>"#), "<string>:9: joint `j`: axis xyz: expected 3 numbers, found 2");
     expect(&with(axis, r#"<axis xyz="0 x 0 1"/>"#), "<string>:9: joint `j`: axis xyz: `x` is no finite number");
     expect(&with(axis, "<axis/>"), "<string>:9: joint `j`: axis has no xyz");
-    expect(&with(axis, &format!("{axis}\n{axis}")), "<string>:10: joint `j`: has a second <axis>");
     let origin = |what: &str, value: &str| format!(r#"<origin {what}="{value}"/>"#);
     let said = "is no finite number";
     expect(&with(axis, &origin("xyz", "0 inf 0")), &format!("<string>:9: joint `j`: origin xyz: `inf` {said}"));

@@ -53,11 +53,11 @@ pub struct MjcfOptions {
     pub allow: Vec<WarningKind>,
     /// Folders that contain packages, or are packages, for `package://` addresses; see [`UrdfOptions`](crate::UrdfOptions).
     pub packages: Vec<PathBuf>,
-    /// Whether a `<joint>` of `<equality>` lets joint1 follow joint2 ([`Mimic`](crate::Mimic)), instead of being left
-    /// out; its `polycoef` must be linear.
+    /// Whether a `<joint>` of `<equality>` with a linear `polycoef` lets joint1 follow joint2 ([`Mimic`](crate::Mimic)),
+    /// instead of being a [constraint](Model::constraints) beside the tree.
     pub mimic: bool,
-    /// Whether the mass of a mesh, on a moving body without `<inertial>`, is left out and reported in
-    /// [`Model::warnings`], instead of being an error.
+    /// Whether a mesh with mass that cannot be read weighs nothing and is reported in [`Model::warnings`], instead of being
+    /// an error.
     pub weightless_meshes: bool,
 }
 
@@ -66,7 +66,7 @@ impl Model {
     ///
     /// Joints keep MuJoCo's order, so q and v read as its `qpos` and `qvel`, but that our quaternions are x, y, z, w
     /// and a free joint's velocity is in the body's frame (MuJoCo: linear velocity in the world's). A hinge has one
-    /// number, limits or not ([`Joint::Revolute`]). Several joints on one body become a chain, with bodies without
+    /// number, limits or not ([`Joint::Revolute`](crate::Joint::Revolute)). Several joints on one body become a chain, with bodies without
     /// mass, `name#1`, `name#2`, …, between them. A body without joints is merged into its parent and stays as a
     /// frame, as do sites ([`FrameKind::User`]).
     ///
@@ -77,13 +77,28 @@ impl Model {
     /// `camera:name`.
     ///
     /// Read are `<compiler>` (all that has an effect on a model), default classes, `<include>`, `<replicate>`, `<attach>`
-    /// with files that have settings of their own, gravity and flags, `<frame>`, `<inertial>`, masses of geoms, and of
-    /// joints: pos, axis, ref, range, armature, damping, frictionloss, actuatorfrcrange. Included files are looked for in
-    /// the main file's folder, then beside the file that includes them. Masses and inertias of meshes follow MuJoCo's
+    /// with files that have settings of their own, gravity and flags, `<frame>`, `<inertial>`, masses of geoms. Included
+    /// files are looked for in the main file's folder, then beside the file that includes them. Masses and inertias of meshes follow MuJoCo's
     /// rules (`inertia` of `<mesh>`), with the feature `meshes`; so do primitives that are fitted to meshes.
     ///
+    /// Springs ([`springs`](Self::springs)), damping, friction and armature are those of the compiled MuJoCo model:
+    /// `springdamper` and `dampratio` follow from the inertia in the pose that the file has drawn, and actuators add
+    /// armature and damping, gear² times. A `<fixed>` tendon that moves with one coordinate adds its spring, losses,
+    /// armature and range to that coordinate. `gravcomp` becomes a [gravity compensation](Self::gravity_compensation).
+    ///
+    /// Limits of effort are sums over the actuators of a joint, clipped to its `actuatorfrcrange`. An actuator gives its
+    /// `forcerange`, and the range of its control times gain if its force depends on nothing else, both times gear. A joint
+    /// without actuators has its `actuatorfrcrange`, or no limit; forces at sites limit no joint. Several actuators of a
+    /// ball or a tendon over several joints give a box around what they can reach. [`actuators`](Self::actuators) has
+    /// those of joints, fixed tendons and sites, but muscles, plugins and dampers.
+    ///
+    /// `connect`, `weld` and `joint` of `<equality>` become [`constraints`](Self::constraints), if they are active. One
+    /// without a name is named by its kind and number: `weld1`. With [`MjcfOptions::mimic`], joints follow others in the
+    /// tree instead; damping, friction, springs and efforts of a follower then act on its leader's coordinate. Keyframes
+    /// without a name are named `key0`, `key1`, … by their number.
+    ///
     /// An unknown, misspelt or misplaced name is a [warning](Model::warnings), and so is everything with an effect that a
-    /// model cannot hold: equality constraints (but see [`MjcfOptions::mimic`]) and tendons, the range of a ball joint,
+    /// model cannot hold: tendons over several coordinates, activations and delays of actuators, the range of a ball joint,
     /// forces of a medium, bodies that a program moves (`mocap`). Sensors, visuals and contacts have no part in a model.
     /// `composite`, `flexcomp`, flexes and plugins of bodies are errors, and so is a mesh with mass that cannot be read,
     /// unless it is on a body fixed to the world (but see [`MjcfOptions::weightless_meshes`]). Contradictions are errors,

@@ -10,6 +10,7 @@ mod poses;
 mod reader;
 mod schema;
 mod scopes;
+mod tidy;
 mod tree;
 mod values;
 

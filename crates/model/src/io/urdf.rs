@@ -22,10 +22,11 @@ use std::path::{Path, PathBuf};
 /// Options of reading a URDF.
 #[derive(Clone, Debug, Default)]
 pub struct UrdfOptions {
-    /// The joint between the world and the root link, named `root_joint`; none fixes the root link to the world.
+    /// The joint between the world and the root link, named `root_joint` (`root_joint_2`, … where the file has a joint of that
+    /// name); none fixes the root link to the world.
     pub root_joint: Option<Joint>,
     /// Whether joints with a `<mimic>` share the coordinate of the joint they follow, instead of having their own; see
-    /// [`Mimic`].
+    /// [`Mimic`](crate::Mimic).
     pub mimic: bool,
     /// Whether a warning ([`Model::warnings`]) is an error.
     pub strict: bool,

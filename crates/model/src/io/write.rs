@@ -38,8 +38,8 @@ impl Model {
     /// Reading the new file gives this model back, up to rounding.
     ///
     /// A body of several links, merged by fixed joints, has their sum. The link that its joint carries takes all of the
-    /// difference; if that link has no mass, the heaviest one does. If a link would be left with less than a thousandth of
-    /// the body's mass, it takes the whole inertia and the others get none.
+    /// difference; if that link has no mass, the heaviest one does. If that would leave it an inertia that no body has, or
+    /// less than a thousandth of the body's mass, it takes the whole inertia and the others get none.
     ///
     /// ```
     /// use condyle_model::{Model, UrdfOptions, robots};
@@ -74,6 +74,7 @@ impl Model {
     ///
     /// Attributes of elements go before those of their classes, so defaults stay as they are. A changed inertia is written
     /// as an `<inertial>`, also where geoms gave it before. Limits of effort are written as `actuatorfrcrange` of the joint.
+    /// The weight that `gravcomp` carries is a factor of the mass, so it follows the new masses.
     ///
     /// # Errors
     /// As [`write_urdf`](Self::write_urdf). The file itself must have the bodies and joints that differ: those of an

@@ -235,6 +235,11 @@ fn what_actuators_lose_is_said() {
             "pid",
             "its integral and the limit of its setpoint's rate are left out",
         ),
+        (
+            "<plugin joint='j' plugin='p' ctrlrange='-1 1'/>",
+            "plugin",
+            "it is left out of the table of actuators: it is a plugin",
+        ),
         ("<motor joint='j' delay='0.01' nsample='5'/>", "motor", "delay: the control acts at once"),
         ("<dcmotor joint='j' motorconst='1' resistance='1' cogging='1 2 3'/>", "dcmotor", "cogging"),
     ];

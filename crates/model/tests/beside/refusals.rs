@@ -26,6 +26,10 @@ fn errors() {
         (actuator("<position joint='j' kv='-1'/>"), "<position>: kv or dampratio -1 is negative"),
         (actuator("<dcmotor joint='j'/>"), "<dcmotor>: motor constant 0 or resistance 0 is not positive"),
         (
+            actuator("<dcmotor joint='j' motorconst='1e200' resistance='1e-200'/>"),
+            "<dcmotor>: its gain, bias or gear is inf, which is not finite",
+        ),
+        (
             actuator("<motor name='m' joint='j'/><motor name='m' joint='j'/>"),
             "motor `m`: the name is taken by another actuator",
         ),

@@ -89,6 +89,9 @@ fn tendons_over_one_joint() {
     close(&[excluded.limits().lower[0], excluded.limits().upper[0]], &[-30f64.to_radians(), 60f64.to_radians()]);
     let what = "range: its length has no limits, for they exclude those of its joint";
     assert_eq!(said(&excluded), [format!("<string>:1: fixed `t`: {what}")]);
+    let yields = model("", HINGE, &fixed("stiffness='3' springyield='0.1'"));
+    let what = "springyield: the spring does not yield, however far it is stretched";
+    assert_eq!(said(&yields), [format!("<string>:1: fixed `t`: {what}")]);
     let slack = model("", HINGE, &fixed("stiffness='3' springlength='0.2 0.3'"));
     assert!(slack.springs().is_empty());
     let what = "stiffness: its spring does not act, for its spring is slack between two lengths";

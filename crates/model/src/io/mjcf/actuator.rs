@@ -190,6 +190,7 @@ impl Law<'_> {
             ("dcmotor", _) => Ok([self.gainprm[1] / g, 0.0, 0.0, self.gainprm[1] * self.gainprm[1] / g]),
             ("affine", _) => Err("its gain depends on length or velocity"),
             ("muscle", _) | (_, "muscle") => Err("it is a muscle"),
+            ("plugin", _) => Err("it is a plugin"),
             ("so3", _) => Err("it drives three directions at once"),
             _ => Err("its law is the user's own"),
         }

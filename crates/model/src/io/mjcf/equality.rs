@@ -101,10 +101,9 @@ pub(super) fn add(
                 let mut p = [0.0, 1.0, 0.0, 0.0, 0.0];
                 super::law::fill(&Attributes::plain(e), "polycoef", &mut p)?;
                 match (leader, p) {
-                    (Some((leader, _, x0)), [a0, a1, 0.0, 0.0, 0.0])
+                    (Some((leader, leads, x0)), [a0, a1, 0.0, 0.0, 0.0]) if mimic && followers.add(index, leader) => {
                         // y − y₀ = a₀ + a₁ (x − x₀)
-                        if mimic && followers.add(index, leader, Mimic { ratio: a1, offset: y0 + a0 - a1 * x0 }) =>
-                    {
+                        builder.mimic(follower, leads, Mimic { ratio: a1, offset: y0 + a0 - a1 * x0 });
                         continue;
                     }
                     (Some(_), [_, _, 0.0, 0.0, 0.0]) if !mimic => {
@@ -129,45 +128,32 @@ pub(super) fn add(
             _ => warnings.push(e.left_out("it is not held: the model's constraints have bodies and joints alone")),
         }
     }
-    let id = |joint: usize| BodyId(joints.all[joint].body);
-    for &follower in &followers.order {
-        let (leader, mimic) = followers.root(follower);
-        builder.mimic(id(follower), id(leader), mimic);
-    }
     Ok(warnings)
 }
 
 /// Joints that follow others, which may follow others too.
 #[derive(Default)]
 struct Followers {
-    leaders: HashMap<usize, (usize, Mimic)>,
-    order: Vec<usize>,
+    leaders: HashMap<usize, usize>,
     refused: HashSet<usize>,
 }
 
 impl Followers {
     /// Lets a joint follow another one, and returns whether it can: it follows none yet, and does not lead that one.
-    fn add(&mut self, follower: usize, leader: usize, mimic: Mimic) -> bool {
+    fn add(&mut self, follower: usize, leader: usize) -> bool {
         if self.leaders.contains_key(&follower) || self.refused.contains(&follower) {
             return false;
         }
-        if self.root(leader).0 == follower {
+        let mut root = leader;
+        while let Some(&next) = self.leaders.get(&root) {
+            root = next;
+        }
+        if root == follower {
             self.refused.insert(follower);
             return false;
         }
-        self.leaders.insert(follower, (leader, mimic));
-        self.order.push(follower);
+        self.leaders.insert(follower, leader);
         true
-    }
-
-    /// Returns the joint that follows none, and how a joint follows it.
-    fn root(&self, joint: usize) -> (usize, Mimic) {
-        let (mut at, mut mimic) = (joint, Mimic { ratio: 1.0, offset: 0.0 });
-        while let Some(&(leader, next)) = self.leaders.get(&at) {
-            mimic = Mimic { ratio: mimic.ratio * next.ratio, offset: mimic.ratio * next.offset + mimic.offset };
-            at = leader;
-        }
-        (at, mimic)
     }
 }
 

@@ -151,6 +151,9 @@ impl<'a> Law<'a> {
                 fill(&a, "dynprm", &mut self.dynprm)?;
                 fill(&a, "gainprm", &mut self.gainprm)?;
                 fill(&a, "biasprm", &mut self.biasprm)?;
+                if kind == "plugin" {
+                    self.gain = "plugin";
+                }
             }
             "motor" => *self = Self::default(),
             "position" | "intvelocity" | "orientation" => {

@@ -23,6 +23,8 @@ pub(super) struct Tendon<'a> {
     pub(super) damping: [f64; 3],
     friction: f64,
     pub(super) armature: f64,
+    /// Whether the spring yields.
+    is_plastic: bool,
     pub(super) range: [f64; 2],
     limits: Option<[f64; 2]>,
     /// Least and greatest force that actuators may have together.
@@ -104,6 +106,7 @@ impl<'a> Tendon<'a> {
             damping,
             friction: number("frictionloss")?,
             armature,
+            is_plastic: number("springyield")? > 0.0,
             range: range.numbers,
             limits: range.bounds(e, "range", autolimits)?,
             effort: effort.bounds(e, "actuatorfrcrange", autolimits)?,
@@ -167,6 +170,9 @@ impl<'a> Tendon<'a> {
             (.., true) => "they exclude those of its joint",
             _ => "its spring is slack between two lengths",
         };
+        if springs && self.is_plastic {
+            warnings.push(self.element.left_out("springyield: the spring does not yield, however far it is stretched"));
+        }
         for (_, what, effect) in left.into_iter().filter(|(is_left, ..)| *is_left) {
             warnings.push(self.element.left_out(format!("{what}: {effect}, for {why}")));
         }

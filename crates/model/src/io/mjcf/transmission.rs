@@ -215,7 +215,10 @@ impl<'a> Drives<'a> {
                     _ => reference.response(&drive.moments(model, joints, tendons)),
                 });
                 // kv = 2 ratio √(kp m) with 1/m = J M⁻¹ Jᵀ
-                kv = if inverse > 0.0 { -kv * 2.0 * (kp / inverse).sqrt() } else { 0.0 };
+                kv = if inverse > 0.0 { -kv * 2.0 * (kp / inverse).max(0.0).sqrt() } else { 0.0 };
+            }
+            if let Some(x) = [gain, bias, kp, kv].iter().chain(gear).find(|x| !x.is_finite()) {
+                return Err(e.wrong(format!("its gain, bias or gear is {x}, which is not finite")));
             }
             table.push(Actuator {
                 name: e.attribute("name").unwrap_or_default().to_owned(),

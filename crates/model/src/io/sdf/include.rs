@@ -3,7 +3,8 @@
 use super::convert::convert;
 use super::schema::{KNOWN, LEFT_OUT};
 use super::scopes::MERGED;
-use super::values::{attribute, flag, text, trim_numbers};
+use super::tidy::tidy;
+use super::values::{attribute, flag, text};
 use crate::error::Error;
 use crate::io::files::{Search, find_model};
 use crate::io::known::Known;
@@ -57,7 +58,7 @@ impl<'o> Includes<'o> {
     fn expand(&mut self, mut root: Element, folder: Option<&Path>, level: usize) -> Result<Element, Error> {
         convert(&mut root)?;
         self.known.check(&root, LEFT_OUT, &mut self.warnings);
-        trim_numbers(&mut root, &mut self.warnings);
+        tidy(&mut root, &mut self.warnings);
         self.children(&mut root, folder, level)?;
         Ok(root)
     }

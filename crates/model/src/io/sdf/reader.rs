@@ -208,6 +208,9 @@ impl<'a> Reader<'a> {
         }
         let (mut body, mut at) = (parent, bXj);
         let count = motions.len();
+        if count == 1 && element.child("axis2").is_some() {
+            self.warnings.push(element.left_out(format!("axis2 is left out: a {} joint has none", edge.kind)));
+        }
         for (k, Motion { joint, tag }) in motions.into_iter().enumerate() {
             let joint = joint.normalized().map_err(|_| element.wrong(format!("{tag}: xyz is no direction")))?;
             let joint = if is_reversed { reversed(joint) } else { joint };
@@ -242,10 +245,13 @@ impl<'a> Reader<'a> {
     fn frames(&mut self, builder: &mut ModelBuilder) -> Result<(), Error> {
         for item in 0..self.scopes.items.len() {
             let element = self.scopes.items[item].element;
-            if !matches!(&*element.tag, "frame" | "model") || self.scopes.is_hidden(item) {
+            if !matches!(&*element.tag, "frame" | "model") {
                 continue;
             }
             let link = self.scopes.attached(Some(item), element)?;
+            if self.scopes.is_hidden(item) {
+                continue;
+            }
             let scope = self.scopes.items[item].scope;
             let (body, bXl) = self.place(link);
             let mXl = self.scopes.in_scope(link, scope);

@@ -124,6 +124,9 @@ impl<'a> Scopes<'a> {
                 _ => {}
             }
         }
+        if self.scopes[scope].first == [None; 2] && !is_static {
+            return Err(element.wrong("has no links"));
+        }
         Ok(())
     }
 

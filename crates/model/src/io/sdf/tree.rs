@@ -56,7 +56,7 @@ pub(super) struct Tree {
 
 impl Tree {
     /// Walks the joints breadth first in the order of the file: from the world and the links that are fixed to it, then from
-    /// each link that is nobody's child. A joint is walked from its child only where its parent is met in no other way.
+    /// each link that is the child of no joint. A joint is walked from its child only where no other walk meets its parent.
     pub(super) fn new(edges: &[Edge], links: &[usize], fixed: &[usize]) -> Self {
         let (mut below, mut above): (HashMap<Place, Vec<usize>>, HashMap<usize, Vec<usize>>) = Default::default();
         for (i, edge) in edges.iter().enumerate() {

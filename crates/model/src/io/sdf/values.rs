@@ -3,7 +3,6 @@
 use crate::error::Error;
 use crate::io::from_rpy;
 use crate::io::xml::{self, Element};
-use crate::warning::Warning;
 use condyle_spatial::{Quaternion, Se3, Vec3};
 
 /// Reads a truth as the format has it: `true`, `false`, `1` or `0`, in any case.
@@ -86,30 +85,3 @@ pub(super) fn number(of: &Element, inside: Option<&Element>, tag: &str, otherwis
     let Some(e) = child else { return Ok(otherwise) };
     xml::bound(&e.text).map_err(|what| of.wrong_inside(e, format!("{tag}: {what}")))
 }
-
-/// Tags of elements that have one number.
-const NUMBERS: &str = " mass density ixx ixy ixz iyy iyz izz lower upper effort velocity damping friction spring_stiffness \
-  spring_reference multiplier offset reference screw_thread_pitch thread_pitch gearbox_ratio ";
-
-/// Drops what stands behind a number in its element, as the format's own library does, and warns of it.
-pub(super) fn trim_numbers(element: &mut Element, warnings: &mut Vec<Warning>) {
-    for child in &mut element.children {
-        if matches!(&*child.tag, "visual" | "collision" | "sensor" | "plugin" | "physics") {
-            continue;
-        }
-        trim_numbers(child, warnings);
-        if !NUMBERS.contains(&format!(" {} ", child.tag)) || xml::bound(&child.text).is_ok() {
-            continue;
-        }
-        let text = child.text.trim();
-        let is_end = |&(at, _): &(usize, char)| xml::numbers(&text[..at]).is_ok_and(|x| x.len() == 1);
-        if let Some((end, _)) = text.char_indices().take(MAX_NUMBER).filter(is_end).last() {
-            let number = text[..end].to_owned();
-            warnings.push(child.unknown(format!("`{text}` is no number; it is read as {number}")));
-            child.text = number;
-        }
-    }
-}
-
-/// Maximum number of characters of a number with something behind it.
-const MAX_NUMBER: usize = 32;

@@ -1,23 +1,38 @@
-//! Children and attributes of elements. Errors name the link or joint (`of`), and the line inside it.
+//! Children and attributes of elements. Errors name the link or joint (`of`), and the line inside it. Of several children with one
+//! tag the first counts, as in urdfdom; [`check_repeated`] warns of the others.
 
 use crate::error::Error;
 use crate::io::xml::{self, Element};
+use crate::warning::Warning;
 use condyle_spatial::Vec3;
 
-/// Returns the child with a tag. There is at most one, or others are equal to it.
-pub(super) fn only<'a>(of: &'a Element, tag: &str) -> Result<Option<&'a Element>, Error> {
-    only_inside(of, of, tag)
-}
-
-/// As [`only`], of something inside the link or joint that errors name.
-pub(super) fn only_inside<'a>(of: &Element, inside: &'a Element, tag: &str) -> Result<Option<&'a Element>, Error> {
-    let mut found = inside.children.iter().filter(|c| c.tag == tag);
-    let first = found.next();
-    match first.and_then(|first| found.find(|other| !is_equal(first, other))) {
-        Some(second) => Err(of.wrong_inside(second, format!("has a second <{tag}>"))),
-        None => Ok(first),
+/// Warns of the second child with a tag, unless it is equal to the first.
+pub(super) fn check_repeated(of: &Element, element: &Element, warnings: &mut Vec<Warning>) {
+    for tag in REPEATED {
+        let mut all = element.all(tag);
+        if let Some(first) = all.next()
+            && let Some(other) = all.find(|other| !is_equal(first, other))
+        {
+            warnings.push(of.left_out_inside(other, format!("a second <{tag}> is left out")));
+        }
     }
 }
+
+/// Elements of which a link, joint or inertia has one.
+const REPEATED: [&str; 12] = [
+    "inertial",
+    "origin",
+    "mass",
+    "inertia",
+    "parent",
+    "child",
+    "axis",
+    "limit",
+    "dynamics",
+    "mimic",
+    "safety_controller",
+    "calibration",
+];
 
 /// Whether two elements say the same.
 fn is_equal(a: &Element, b: &Element) -> bool {
@@ -27,7 +42,7 @@ fn is_equal(a: &Element, b: &Element) -> bool {
 
 /// Returns the child with a tag, of which there is one.
 pub(super) fn needed<'a>(of: &'a Element, tag: &str) -> Result<&'a Element, Error> {
-    only(of, tag)?.ok_or_else(|| of.wrong(format!("has no <{tag}>")))
+    of.child(tag).ok_or_else(|| of.wrong(format!("has no <{tag}>")))
 }
 
 /// Returns the attribute, which must be there.

@@ -1,6 +1,6 @@
 //! Joints of a URDF: kinds, axes, limits, losses.
 
-use super::elements::{array, only, read, text, vector};
+use super::elements::{array, read, text, vector};
 use crate::body::JointOptions;
 use crate::error::Error;
 use crate::io::xml::{self, Element};
@@ -17,7 +17,7 @@ pub(super) struct Moving {
 
 /// Returns the joint, or none if it is fixed.
 pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Option<Moving>, Error> {
-    let axis = || match only(joint, "axis")? {
+    let axis = || match joint.child("axis") {
         Some(axis) => vector(joint, axis, "xyz")?.ok_or_else(|| joint.wrong_inside(axis, "axis has no xyz")),
         None => Ok(Vec3::new(1.0, 0.0, 0.0)),
     };
@@ -32,7 +32,7 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
         "floating" if !is_drakes => Joint::FreeFlyer,
         "ball" if is_drakes => Joint::Spherical,
         "screw" if is_drakes => {
-            let screw = only(joint, "drake:screw_thread_pitch")?.ok_or_else(|| joint.wrong("has no thread pitch"))?;
+            let screw = joint.child("drake:screw_thread_pitch").ok_or_else(|| joint.wrong("has no thread pitch"))?;
             let [turn] = array(joint, screw, "value")?.ok_or_else(|| joint.wrong_inside(screw, "has no value"))?;
             Joint::Helical { axis: axis()?, pitch: turn / core::f64::consts::TAU } // metres of a turn, of a radian
         }
@@ -42,7 +42,7 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
             let turned = from_z_to(axis);
             if turned != Mat3::identity() {
                 rotation = Some(turned);
-                let given = if only(joint, "axis")?.is_some() { "its" } else { "no axis is given: its" };
+                let given = if joint.child("axis").is_some() { "its" } else { "no axis is given: its" };
                 let Vec3 { x, y, z } = axis;
                 let what = format!("{given} plane is normal to the axis ({x}, {y}, {z}); Pinocchio's is normal to z");
                 warnings.push(joint.assumed(what));
@@ -75,7 +75,7 @@ fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
 
 /// Returns the limits and losses of a joint that moves.
 pub(super) fn options(joint: &Element, kind: Joint, warnings: &mut Vec<Warning>) -> Result<JointOptions, Error> {
-    let (limit, dynamics) = (only(joint, "limit")?, only(joint, "dynamics")?);
+    let (limit, dynamics) = (joint.child("limit"), joint.child("dynamics"));
     let mut options = JointOptions::default();
     // the numbers of joints with several degrees of freedom have no unit
     if kind.nv() > 1 {

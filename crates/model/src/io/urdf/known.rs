@@ -2,6 +2,7 @@
 //! read them (ROS control, Gazebo, Drake, Bullet, MuJoCo). Shapes, sensors, controllers, soft limits and calibrations have no
 //! effect on a model: they are known, and there is no warning.
 
+use super::elements::check_repeated;
 use crate::io::known::{Known, LeftOut};
 use crate::io::xml::Element;
 use crate::warning::Warning;
@@ -68,6 +69,10 @@ pub(super) fn check(robot: &Element, warnings: &mut Vec<Warning>) {
     static TABLE: OnceLock<Known> = OnceLock::new();
     TABLE.get_or_init(|| Known::new(KNOWN)).check(robot, LEFT_OUT, warnings);
     check_text(robot, warnings);
+    for element in robot.children.iter().filter(|child| matches!(&*child.tag, "link" | "joint" | "drake:joint")) {
+        check_repeated(element, element, warnings);
+        element.all("inertial").for_each(|inertial| check_repeated(element, inertial, warnings));
+    }
     for gazebo in robot.all("gazebo") {
         warnings.extend(gazebo.children.iter().filter_map(changed_by_gazebo));
     }
@@ -81,13 +86,15 @@ fn check_text(element: &Element, warnings: &mut Vec<Warning>) {
         warnings.push(element.unknown(format!("text `{begin}` has no effect: values are attributes")));
     }
     let parts = |tag: &str| match &*element.tag {
-        "robot" => matches!(tag, "link" | "joint"),
+        "robot" => matches!(tag, "link" | "joint" | "drake:joint"),
         "link" => tag == "inertial",
         "inertial" => true,
-        "joint" => !matches!(tag, "controller_gains" | "hardwareInterface"),
+        "joint" | "drake:joint" => !matches!(tag, "controller_gains" | "hardwareInterface"),
         _ => false,
     };
-    element.children.iter().filter(|child| parts(&child.tag)).for_each(|child| check_text(child, warnings));
+    for child in element.children.iter().filter(|child| parts(&child.tag)) {
+        check_text(child, warnings);
+    }
 }
 
 /// Warns of an entry of `<gazebo>` by which the robot is another one there. All others concern contact, looks and numerics.

@@ -1,6 +1,6 @@
 //! Placements in a URDF: `<origin>`, which has had quaternions since version 1.1.
 
-use super::elements::{array, only_inside, vector};
+use super::elements::{array, vector};
 use crate::error::Error;
 use crate::io::from_rpy;
 use crate::io::xml::Element;
@@ -28,7 +28,7 @@ impl Origins {
 
     /// The `<origin>` inside something, or none. Errors name `of`.
     pub(super) fn pose(self, of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
-        only_inside(of, inside, "origin")?.map_or(Ok(Se3::identity()), |origin| self.pose_of(of, origin))
+        inside.child("origin").map_or(Ok(Se3::identity()), |origin| self.pose_of(of, origin))
     }
 
     /// Returns the placement that the attributes of an element name. Errors name `of`.

@@ -1,7 +1,7 @@
 //! The tree of a URDF: links, joints and frames, and the model that they make.
 
 use super::UrdfOptions;
-use super::elements::{array, needed, only, only_inside, text};
+use super::elements::{array, needed, text};
 use super::joints::{self, Moving};
 use super::known;
 use super::origin::Origins;
@@ -217,7 +217,7 @@ impl<'a> Reader<'a> {
     ) -> Result<(), Error> {
         for &name in &self.order {
             let joint = self.joints[name].element;
-            let (Some(element), Some(&follower)) = (only(joint, "mimic")?, bodies.get(name)) else { continue };
+            let (Some(element), Some(&follower)) = (joint.child("mimic"), bodies.get(name)) else { continue };
             let leader = text(joint, element, "joint")?;
             if !mimic {
                 let what = format!("has a <mimic> of joint `{leader}`: it is left free unless `mimic` is asked for");
@@ -236,9 +236,9 @@ impl<'a> Reader<'a> {
 
     /// Returns the link's inertia in the link's frame. Parts that are missing are 0, as Drake has it, with a warning.
     fn inertia(&self, link: &Element, warnings: &mut Vec<Warning>) -> Result<Inertia<f64>, Error> {
-        let Some(inertial) = only(link, "inertial")? else { return Ok(Inertia::zero()) };
+        let Some(inertial) = link.child("inertial") else { return Ok(Inertia::zero()) };
         let mut missing = Vec::new();
-        let (mass, inertia) = (only_inside(link, inertial, "mass")?, only_inside(link, inertial, "inertia")?);
+        let (mass, inertia) = (inertial.child("mass"), inertial.child("inertia"));
         let mut number =
             |inside: Option<&Element>, name: &str| match inside.map_or(Ok(None), |e| array(link, e, name))? {
                 Some([x]) => Ok(x),

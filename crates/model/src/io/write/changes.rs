@@ -155,7 +155,8 @@ impl Changes {
         for change in &mut self.links {
             let (wanted, found) = (model.bodies[change.body].inertia, now.bodies[change.body].inertia);
             let rest = wanted - (found - change.inertia);
-            if rest.mass > LEAST_SHARE * wanted.mass {
+            let possible = |I: Inertia<f64>| inertial_parameters::check(I).is_ok();
+            if rest.mass > LEAST_SHARE * wanted.mass && (possible(rest) || !possible(wanted)) {
                 change.inertia = rest;
             } else {
                 change.emptied.clone_from(&change.others);

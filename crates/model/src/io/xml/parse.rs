@@ -241,13 +241,13 @@ impl<'a> Parser<'a> {
     fn decoded(&self, text: &str, is_attribute: bool) -> Result<String, Error> {
         let special = |b: &u8| *b == b'&' || *b == b'\r' || is_attribute && matches!(*b, b'\n' | b'\t');
         self.check_encoding(text)?;
-        if !text.as_bytes().iter().any(|b| special(b)) {
+        if !text.as_bytes().iter().any(&special) {
             return Ok(text.to_owned());
         }
         let mut decoded = String::with_capacity(text.len());
         let text = text.replace("\r\n", "\n");
         let mut rest = &*text;
-        while let Some(at) = rest.as_bytes().iter().position(|b| special(b)) {
+        while let Some(at) = rest.as_bytes().iter().position(&special) {
             decoded.push_str(&rest[..at]);
             let from = &rest[at + 1..];
             let name = from.bytes().take(MAX_ENTITY).position(|b| b == b';').map(|end| &from[..end]);

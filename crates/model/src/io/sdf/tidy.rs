@@ -1,0 +1,51 @@
+//! Small faults of an SDF that its own library reads over: each is a warning here.
+
+use crate::io::xml::{self, Element};
+use crate::warning::Warning;
+
+/// Tags of elements in which these faults change a robot.
+const PARENTS: &str = " sdf world model include link inertial inertia joint axis axis2 dynamics limit mimic ";
+
+/// Tags of elements that have one number.
+const NUMBERS: &str = " mass density ixx ixy ixz iyy iyz izz lower upper effort velocity damping friction spring_stiffness \
+  spring_reference multiplier offset reference screw_thread_pitch thread_pitch gearbox_ratio ";
+
+/// Tags of other elements that stand once in their parent.
+const SINGLE: &str = " pose static gravity kinematic self_collide enable_wind inertial inertia parent child axis axis2 xyz dynamics \
+  limit mimic uri name placement_frame gearbox_reference_body ";
+
+/// Maximum number of characters of a number with something behind it.
+const MAX_NUMBER: usize = 32;
+
+/// Warns of elements that stand twice, of which the first counts, and of gravity in the physics of a world. Drops what stands
+/// behind a number in its element, with a warning.
+pub(super) fn tidy(element: &mut Element, warnings: &mut Vec<Warning>) {
+    let is_in = |tag: &str, tags: &str| tags.contains(&format!(" {tag} "));
+    let mut seen: Vec<String> = Vec::new();
+    for child in &mut element.children {
+        let is_number = is_in(&child.tag, NUMBERS);
+        if is_number || is_in(&child.tag, SINGLE) {
+            if seen.contains(&child.tag) {
+                warnings.push(child.left_out(format!("is the second <{}> here, and is left out", child.tag)));
+            } else {
+                seen.push(child.tag.clone());
+            }
+        }
+        if is_in(&child.tag, PARENTS) {
+            tidy(child, warnings);
+        }
+        if let Some(gravity) = child.child("gravity").filter(|_| child.tag == "physics") {
+            warnings.push(gravity.unknown("is misplaced in <physics>: it is the world's since version 1.6"));
+        }
+        if !is_number || xml::bound(&child.text).is_ok() {
+            continue;
+        }
+        let text = child.text.trim();
+        let is_end = |&(at, _): &(usize, char)| xml::numbers(&text[..at]).is_ok_and(|x| x.len() == 1);
+        if let Some((end, _)) = text.char_indices().take(MAX_NUMBER).filter(is_end).last() {
+            let number = text[..end].trim_end().to_owned();
+            warnings.push(child.unknown(format!("`{text}` is no number; it is read as {number}")));
+            child.text = number;
+        }
+    }
+}
