@@ -5,9 +5,9 @@
 URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, SDFs with Drake, which may be missing. Each file
 is read in a process of its own with a time limit, so that a crash of a library is a row of the table.
 
-A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER names commits: each line has
-`owner/repository`, a tab and the commit. `--table VALIDATION.md` replaces the section on public robots in that file;
-`pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest and keeps the section.
+A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER, or beside it, names commits: a
+line has `owner/repository`, a tab and the commit. `--table VALIDATION.md` replaces the section on public robots in that
+file; `pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest and keeps the section.
 
 The exit status is 1 if a robot differs or a process crashes.
 """
@@ -46,9 +46,8 @@ def main() -> int:
             parser.error(f"{folder} is no folder")
         robots = files.find(folder.resolve(), arguments.only)
         results += run(robots, folder.resolve(), arguments.jobs, arguments.seconds)
-        sources = folder / "SOURCES.tsv"
-        if sources.exists():
-            lines = sources.read_text(encoding="utf-8").splitlines()
+        for sources in (folder.resolve().parent / "SOURCES.tsv", folder / "SOURCES.tsv"):
+            lines = sources.read_text(encoding="utf-8").splitlines() if sources.exists() else []
             commits |= {line.split("\t")[0]: line.split("\t")[1] for line in lines if "\t" in line}
     if not results:
         parser.error("no robot files are below these folders")
@@ -59,7 +58,10 @@ def main() -> int:
         print(report.listing(results))
     print(report.summary(results))
     if arguments.table:
-        report.put(arguments.table, report.table(results, commits, COMMAND, "1e-10 (MuJoCo: 1e-8)"))
+        report.put(
+            arguments.table,
+            report.table(results, commits, COMMAND, "1e-10 (MuJoCo: 1e-8, with meshes 1e-6; SDF before 1.7: 1e-8)"),
+        )
     return int(any(verdict.verdict in ("different", "crash") for _, verdict in results))
 
 

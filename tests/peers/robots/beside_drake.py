@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from functools import cache
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -14,7 +15,7 @@ from comparison import STATES, Joint, Quantities, RefusedError, UnlikeError, sta
 from files import text_of
 from pydrake.multibody.parsing import PackageMap, Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import JointIndex, MultibodyForces
+from pydrake.multibody.tree import BodyIndex, FrameIndex, JointIndex, MultibodyForces, world_model_instance
 
 import condyle
 
@@ -38,6 +39,8 @@ logger.propagate = False
 REPLACED = ("While parsing inertia matrix", "While re-expressing as central inertia")
 """Warnings after which Drake takes another inertia than that of the file."""
 TOLERANCE = 1e-10
+CONVERTED = 1e-8
+"""Tolerance of SDFs before 1.7, which Drake converts to later ones with rounded numbers."""
 UNLIMITED = 1e16
 """SDF's default of limits of position, and a common one of URDFs: no limit."""
 LENGTHS = {
@@ -95,6 +98,8 @@ class Copies:
             tree = ElementTree.fromstring(text)
         except (ElementTree.ParseError, ValueError):
             return text
+        for prefix, uri in re.findall(r"xmlns:(\w+)\s*=\s*[\"']([^\"']+)[\"']", text):
+            ElementTree.register_namespace(prefix, uri)  # Drake knows its own elements by the prefix
         for parent in list(tree.iter()):
             for child in list(parent):
                 if child.tag in IRRELEVANT:
@@ -131,10 +136,12 @@ def read(path: Path, folder: Path) -> MultibodyPlant:
     return plant
 
 
-def compare(plant: MultibodyPlant, model: condyle.Model) -> Quantities:
+def compare(plant: MultibodyPlant, model: condyle.Model, tolerance: float = TOLERANCE) -> Quantities:
     """Compares everything that both have; gravity's efforts apart from the others."""
-    found = Quantities(model, TOLERANCE)
+    found = Quantities(model, tolerance)
     if plant.num_velocities() != model.nv:
+        if any("::" in frame.name for frame in model.frames) and model.nv < plant.num_velocities():
+            raise UnlikeError("Drake lets models inside of a static model move")
         found.add("nv", np.inf, f"{model.nv}, theirs {plant.num_velocities()}")
         return found
     if any(mark in text for text in warnings.texts for mark in REPLACED):
@@ -167,24 +174,48 @@ def compare(plant: MultibodyPlant, model: condyle.Model) -> Quantities:
     return found
 
 
+class Names:
+    """Things of a plant by their names, with the names of the models around them."""
+
+    def __init__(self) -> None:
+        self.all: dict[str, list[Any]] = {}
+
+    def add(self, plant: MultibodyPlant, thing: Any, name: str) -> None:
+        """Adds a thing with a name inside of its model."""
+        instance = thing.model_instance()
+        around = "" if instance == world_model_instance() else f"{plant.GetModelInstanceName(instance)}::"
+        self.all.setdefault(around + name, []).append(thing)
+
+    def find(self, name: str) -> list[Any]:
+        """Returns the things of a name of ours, of which the outermost models may be left out, or several of them."""
+        ends = [full for full in self.all if f"::{full}".endswith(f"::{name}")]
+        if not ends:  # a joint between nested models is in another model there
+            ends = [full for full in self.all if full.split("::")[-1] == name.split("::")[-1]]
+            ends = ends if len(ends) == 1 else []
+        return self.all[min(ends, key=len)] if ends else []
+
+
 def matched(found: Quantities, plant: MultibodyPlant) -> list[Joint] | None:
     """Returns the joints that move, ours beside theirs by names; the floating ones by the body that they carry."""
-    model, theirs, carriers = found.model, {}, {}
+    model, theirs, carriers = found.model, Names(), Names()
     for i in range(plant.num_joints()):
         joint = plant.get_joint(JointIndex(i))
         kind = joint.type_name()
         if LENGTHS.get(kind) != (joint.num_positions(), joint.num_velocities()):
             raise UnlikeError(f"{kind} joints have other coordinates there")
-        if joint.num_velocities():
-            theirs.setdefault(joint.name(), []).append(joint)
-            carriers.setdefault(joint.child_body().name(), []).append(joint)
+        if joint.is_ephemeral() and joint.num_velocities():
+            carriers.add(plant, joint.child_body(), joint.child_body().name())
+            carriers.all[f"joint {joint.child_body().index()}"] = [joint]
+        elif joint.num_velocities():
+            theirs.add(plant, joint, joint.name())
     joints, i = [], 1
     while i < model.nbodies:
-        name, body = model.names[i].split("#")[0], model.body_names[i]
-        options = theirs.get(name) or theirs.get(name.split("::")[-1])
-        options = options or carriers.get(body) or carriers.get(body.split("::")[-1])
+        options = theirs.find(model.names[i].split("#")[0])
         if not options:
-            found.add("joints", np.inf, f"joint `{name}` is none of theirs")
+            carried = carriers.find(model.body_names[i])
+            options = carriers.all.get(f"joint {carried[0].index()}", []) if carried else []
+        if not options or LENGTHS[options[0].type_name()][1] not in (model.nvs[i], 2):
+            found.add("joints", np.inf, f"joint `{model.names[i]}` is none of theirs")
             return None
         joint = options.pop(0)
         at_q, at_v = joint.position_start(), joint.velocity_start()
@@ -226,7 +257,8 @@ def springs(found: Quantities, plant: MultibodyPlant, context: object, q: np.nda
     plant.SetVelocities(context, np.zeros(nv))
     forces = MultibodyForces(plant)
     plant.CalcForceElementsContribution(context, forces)
-    ours = condyle.passive_torque(found.model, q=q, v=np.zeros(found.model.nv), smoothing=1.0)
+    weightless = found.model.with_gravity([0.0, 0.0, 0.0])  # Drake lets all links feel it
+    ours = condyle.passive_torque(weightless, q=q, v=np.zeros(found.model.nv), smoothing=1.0)
     found.expect("springs", ours, T.T @ forces.generalized_forces(), found.coordinate)
 
 
@@ -237,23 +269,18 @@ def unlimited(numbers: object) -> np.ndarray:
 
 
 def frames(found: Quantities, plant: MultibodyPlant, context: object, q: np.ndarray) -> None:
-    """Compares frames that both have by a name that is Drake's once."""
-    model = found.model
-    for i, frame in enumerate(model.frames):
-        name = frame.name.split("::")[-1]
-        if frame.kind == "link" and plant.NumBodiesWithName(name) == 1:
-            pose = plant.EvalBodyPoseInWorld(context, plant.GetBodyByName(name)).GetAsMatrix4()
-        elif frame.kind == "user" and has_frame(plant, name):
-            pose = plant.GetFrameByName(name).CalcPoseInWorld(context).GetAsMatrix4()
+    """Compares frames that both have by their names."""
+    bodies, others = Names(), Names()
+    for body in (plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())):
+        bodies.add(plant, body, body.name())
+    for frame in (plant.get_frame(FrameIndex(i)) for i in range(plant.num_frames())):
+        others.add(plant, frame, frame.name())
+    for i, frame in enumerate(found.model.frames):
+        if frame.kind == "link":
+            options = [body.body_frame() for body in bodies.find(frame.name)]
         else:
-            continue
-        ours = condyle.frame_placement(model, found.data, q, i)
-        found.expect("frames", ours, pose, lambda _, name=name: f"frame `{name}`")
-
-
-def has_frame(plant: MultibodyPlant, name: str) -> bool:
-    """Returns whether Drake has one frame of a name."""
-    try:
-        return bool(plant.HasFrameNamed(name))
-    except RuntimeError:
-        return False
+            options = others.find(frame.name) if frame.kind == "user" else []
+        if len(options) == 1:
+            ours = condyle.frame_placement(found.model, found.data, q, i)
+            pose = options[0].CalcPoseInWorld(context).GetAsMatrix4()
+            found.expect("frames", ours, pose, lambda _, name=frame.name: f"frame `{name}`")

@@ -11,7 +11,9 @@ from mujoco_actuators import acts, efforts
 import condyle
 
 TOLERANCE = 1e-8
-"""MuJoCo keeps inertias as principal moments and a quaternion, and reads meshes in single precision."""
+"""MuJoCo keeps inertias as principal moments and a quaternion."""
+MESHES = 1e-6
+"""Tolerance of robots with meshes, whose vertices MuJoCo keeps in single precision."""
 KINDS = {
     int(mujoco.mjtJoint.mjJNT_FREE): {"free_flyer"},
     int(mujoco.mjtJoint.mjJNT_BALL): {"spherical"},
@@ -30,6 +32,11 @@ WARNED = (
         ("passive efforts",),
     ),
     ("armature: it is missing in M", "armature of a tendon is left out, as a warning says", ("M", "bias")),
+    (
+        "meshes of plugins are not supported",
+        "mass of a mesh of a plugin is left out, as a warning says",
+        ("total mass", "M", "bias", "passive efforts"),
+    ),
     ("the keyframes of the model", "keyframes of an attached model are left out, as a warning says", ("keyframes",)),
 )
 """Words of warnings, and what becomes different as they say."""
@@ -62,7 +69,7 @@ def read_urdf(path: Path) -> mujoco.MjModel:
 
 def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
     """Compares an MJCF: coordinates are MuJoCo's, one by one."""
-    found = Quantities(model, TOLERANCE)
+    found = Quantities(model, MESHES if mj.nmesh else TOLERANCE)
     if (mj.nq, mj.nv) != (model.nq, model.nv):
         found.add("nq, nv", np.inf, f"{model.nq}, {model.nv}, theirs {mj.nq}, {mj.nv}")
         return found
@@ -138,7 +145,9 @@ def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: 
         if words in warnings:
             found.leave_out(why, *quantities)
     if mj.neq:
-        found.spoken("equality", "follow", "connect", "weld", held=bool(found.model.constraints()))
+        found.spoken(
+            "equality", "follow", "mimic", "connect", "weld", "it is not held", held=bool(found.model.constraints())
+        )
     mj.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     for seed in range(STATES):
         q, v = state_of(model, seed)

@@ -1,5 +1,6 @@
 """Verdict on one file: Condyle beside every peer that reads it."""
 
+import re
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -8,7 +9,7 @@ from typing import Any, NamedTuple
 import beside_mujoco
 import beside_pinocchio
 from comparison import Difference, Quantities, RefusedError, UnlikeError
-from files import Robot
+from files import Robot, text_of
 
 import condyle
 
@@ -91,7 +92,11 @@ class Trial:
         if not models:
             self.errors.append(str(tried[0]))
             return None
-        model = next((model for model in models if model.nv == nv), models[0])
+        fits = [model for model in models if model.nv == nv]
+        if not fits and isinstance(tried[0], str):
+            self.errors.append(tried[0])
+            return None
+        model = (fits or models)[0]
         self.read = True
         self.warnings = [str(w).replace(f"{self.robot.path}:", "") for w in model.warnings]
         return model
@@ -165,4 +170,7 @@ class Trial:
         """Drake."""
         path, folder = self.robot.path, self.folder
         if beside_drake is not None:
-            self.beside("Drake", lambda: beside_drake.read(path, folder), beside_drake.compare, (FREE, None), nv)
+            old = re.search(r"<(?:sdf|gazebo)[^>]*version\s*=\s*[\"']1\.[0-6]\b", text_of(path))
+            tolerance = beside_drake.CONVERTED if old else beside_drake.TOLERANCE
+            compare = partial(beside_drake.compare, tolerance=tolerance)
+            self.beside("Drake", lambda: beside_drake.read(path, folder), compare, (FREE, None), nv)

@@ -52,6 +52,7 @@ class Kinds(NamedTuple):
 def kind(text: str) -> str:
     """Returns a message without its names and numbers."""
     text = text.splitlines()[0] if text else ""
+    text = re.sub(r"\b(https?|model|package|file)://.*?(?=: |$)", "`…`", text)
     text = re.sub(r"(/[\w.+-]+)+/[\w.+-]+(:\d+)?:?\s*", "", text)
     text = re.sub(r"^\d+:\s*", "", text)
     text = re.sub(r"`[^`]*`", "`…`", text)
@@ -74,11 +75,11 @@ def kinds(results: Results, format_: str) -> list[Kinds]:
             pairs[name].append((path, kind(verdict.error)))
         if verdict.verdict == "crash":
             pairs["crash"].append((path, verdict.error))
-        for peer, reasons in verdict.left_out.items():
-            pairs["exceptions"] += [(path, f"{peer}: {reason}") for reason in reasons]
-        for peer, state in verdict.peers.items():
+        for reasons in verdict.left_out.values():
+            pairs["exceptions"] += [(path, reason) for reason in reasons]
+        for state in verdict.peers.values():
             if state.startswith("unlike"):
-                pairs["exceptions"].append((path, f"{peer}: {state.removeprefix('unlike: ')}"))
+                pairs["exceptions"].append((path, state.removeprefix("unlike: ")))
         pairs["warned"] += [(path, text) for text in {kind(warning) for warning in verdict.warnings}]
     found = []
     for name in ("different", "crash", "refused, read by a peer", "refused by all", "exceptions", "warned"):
