@@ -122,6 +122,12 @@ fn keyframes() {
     let refused = |keys: &str, expected: &str| assert_eq!(read(&text(keys)).unwrap_err().to_string(), expected);
     refused("<key qpos='1 2'/>", "<string>:2: <key>: qpos: expected 12 numbers, found 2");
     refused("<key name='k' qvel='1'/>", "<string>:2: key `k`: qvel: expected 10 numbers, found 1");
+    // the numbers of the first joints alone, as in MuJoCo
+    let short = read(&text("<key name='k' qpos='1 2 3 2 0 0 2' qvel='0 0 0 0 0 1'/>")).unwrap();
+    close(&short.keyframes()[0].q, &[1.0, 2.0, 3.0, 0.0, 0.0, half, half, 0.0, 0.0, 0.0, 1.0, 0.25]);
+    close(&short.keyframes()[0].v, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
+    let expected = "<string>:2: key `k`: qpos: has 7 of 12 numbers; the other joints are as drawn";
+    assert_eq!(short.warnings()[0].to_string(), expected);
     refused("<key name='k'/><key name='k'/>", "<string>:1: <mujoco>: two keyframes have the same name");
     // coordinates of joints that follow are left out
     let hinges = format!(

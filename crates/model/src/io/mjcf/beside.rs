@@ -56,6 +56,6 @@ pub(super) fn add<'a>(
     if !on.spring && !on.damper {
         model.gravity_compensation.clear(); // MuJoCo has no passive forces then
     }
-    keyframe::add(model, root, joints)?;
+    keyframe::add(model, root, joints, &mut warnings)?;
     Ok(warnings)
 }

@@ -8,14 +8,20 @@ use crate::io::xml::Element;
 use crate::joint::Joint;
 use crate::keyframe::Keyframe;
 use crate::model::Model;
+use crate::warning::Warning;
 use condyle_spatial::{Quaternion, Vec3};
 use std::collections::HashSet;
 
 /// Most numbers that all keyframes may have together.
 const MAX_NUMBERS: usize = 1 << 22;
 
-/// Adds the keyframes of a file.
-pub(super) fn add(model: &mut Model, root: &Element, joints: &Joints) -> Result<(), Error> {
+/// Adds the keyframes of a file. As in MuJoCo, joints for which a list has no numbers are as the file draws them, and at rest.
+pub(super) fn add(
+    model: &mut Model,
+    root: &Element,
+    joints: &Joints,
+    warnings: &mut Vec<Warning>,
+) -> Result<(), Error> {
     let [nq, nv] = [Joint::nq, Joint::nv].map(|count| joints.all.iter().map(|j| count(j.joint)).sum::<usize>());
     let keys: Vec<_> = root.all("keyframe").flat_map(|section| section.all("key")).collect();
     if keys.len() * (nq + nv) > MAX_NUMBERS {
@@ -32,22 +38,38 @@ pub(super) fn add(model: &mut Model, root: &Element, joints: &Joints) -> Result<
         while own(e).is_none() && !names.insert(name.clone()) {
             name.push('_');
         }
-        let numbers = |attribute: &str, count: usize| match Attributes::plain(e).list(attribute)? {
-            Some(found) if found.len() != count => {
-                Err(e.wrong(format!("{attribute}: expected {count} numbers, found {}", found.len())))
+        let mut numbers = |attribute: &str, count: usize, size: fn(Joint) -> usize| {
+            let Some(found) = Attributes::plain(e).list(attribute)? else { return Ok(Vec::new()) };
+            let mut end = 0;
+            let is_whole = joints.all.iter().any(|joint| {
+                end += size(joint.joint);
+                end == found.len()
+            });
+            if !is_whole && !found.is_empty() {
+                return Err(e.wrong(format!("{attribute}: expected {count} numbers, found {}", found.len())));
             }
-            found => Ok(found),
+            if found.len() < count {
+                let what =
+                    format!("{attribute}: has {} of {count} numbers; the other joints are as drawn", found.len());
+                warnings.push(e.assumed(what));
+            }
+            Ok(found)
         };
-        let (given, velocity) = (numbers("qpos", nq)?, numbers("qvel", nv)?.unwrap_or_else(|| vec![0.0; nv]));
-        let mut positions = &given.clone().unwrap_or_else(|| drawn.clone())[..];
-        let mut velocities = &velocity[..];
+        let given = numbers("qpos", nq, Joint::nq)?;
+        let mut velocity = numbers("qvel", nv, Joint::nv)?;
+        velocity.resize(nv, 0.0);
+        let at_home = &drawn[given.len()..];
+        let (mut positions, mut velocities) = (&[&given[..], at_home].concat()[..], &velocity[..]);
+        let mut left = given.len();
         let (mut q, mut v) = (neutral(model), vec![0.0; nv]);
         v.truncate(model.tree.nv);
         for joint in &joints.all {
             let (mut position, mut velocity);
             (position, positions) = (positions[..joint.joint.nq()].to_vec(), &positions[joint.joint.nq()..]);
             (velocity, velocities) = (velocities[..joint.joint.nv()].to_vec(), &velocities[joint.joint.nv()..]);
-            if let (Joint::Spherical | Joint::FreeFlyer, true) = (joint.joint, given.is_some()) {
+            let is_given = left > 0;
+            left = left.saturating_sub(joint.joint.nq());
+            if let (Joint::Spherical | Joint::FreeFlyer, true) = (joint.joint, is_given) {
                 let at = position.len() - 4;
                 let unit = unit(&position[at..]);
                 position[at..].copy_from_slice(&unit);
