@@ -24,7 +24,8 @@ Every function that both libraries have, called with the same numbers. This file
 ```
 
 with condyle {ours}, Pinocchio {theirs}, NumPy {numpy} and Python {python}; `./test` makes the environment, installs
-condyle into it and runs the same comparisons. Nothing here is edited by hand.
+condyle into it and runs the same comparisons. Another program writes the last section, on public robots. Nothing here
+is edited by hand.
 
 The relative difference is max |ours − theirs| / (1 + max |theirs|), over all entries of a result. It must stay below
 the bound, {tolerance:.0e}; what contains M⁻¹ may instead be {factor:.0f} times as far from Pinocchio as Pinocchio's

@@ -274,7 +274,8 @@ def frames(found: Quantities, plant: MultibodyPlant, context: object, q: np.ndar
     for body in (plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())):
         bodies.add(plant, body, body.name())
     for frame in (plant.get_frame(FrameIndex(i)) for i in range(plant.num_frames())):
-        others.add(plant, frame, frame.name())
+        if not frame.is_body_frame():
+            others.add(plant, frame, frame.name())
     for i, frame in enumerate(found.model.frames):
         if frame.kind == "link":
             options = [body.body_frame() for body in bodies.find(frame.name)]

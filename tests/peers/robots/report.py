@@ -52,6 +52,7 @@ class Kinds(NamedTuple):
 def kind(text: str) -> str:
     """Returns a message without its names and numbers."""
     text = text.splitlines()[0] if text else ""
+    text = text.split("; looked for ")[0]
     text = re.sub(r"\b(https?|model|package|file)://.*?(?=: |$)", "`…`", text)
     text = re.sub(r"(/[\w.+-]+)+/[\w.+-]+(:\d+)?:?\s*", "", text)
     text = re.sub(r"^\d+:\s*", "", text)
