@@ -263,7 +263,7 @@ fn what_is_wrong_is_named_in_one_line() {
         (&["inspect", &html], "page.urdf: begins with <html>, expected <robot> (URDF)"),
         (&["check", &empty], "empty.urdf: has no XML element"),
         (&["budget", &negative], "negative.urdf:"),
-        (&["inspect", folder.to_str().unwrap()], "is no regular file"),
+        (&["inspect", folder.to_str().unwrap()], "expected a file, found a folder"),
         (&["inspect", &mjcf, "--root", "free"], "--root: an MJCF says itself"),
         (&["inspect", "arm7", "--root", "fre"], "'free'"),
         (&["budget", "quadruped", "--contacts", "LF_fot"], "unknown frame `LF_fot`; nearest is `LF_foot`"),

@@ -171,7 +171,11 @@ impl Solids {
             Some((_, "stl")) => Some(Format::Stl),
             Some((_, "vnd.mujoco.msh")) => None,
             _ if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh")) => None,
-            _ => Some(Format::of(path).ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?),
+            _ => {
+                // COLLADA is read for pages alone: MuJoCo has no reader of it
+                let known = Format::of(path).filter(|format| [Format::Obj, Format::Stl].contains(format));
+                Some(known.ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?)
+            }
         };
         format.map_or_else(|| msh(&bytes), |format| condyle_meshes::triangles(format, &bytes)).map_err(said)
     }
