@@ -79,10 +79,11 @@ def test_numbers_of_joints_and_gravity_are_checked() -> None:
         robot.body("b", condyle.WORLD, condyle.Joint.revolute([0, 0, 1]), **{name: -1.0})
         with pytest.raises(ModelError, match=f"^joint `b`: {name} is -1, expected a finite number of at least 0$"):
             robot.build()
-    for name in ("velocity", "effort"):
+    said = {"velocity": "limit of velocity is -1", "effort": "lower limit of effort 1 is above upper limit -1"}
+    for name, what in said.items():
         robot = condyle.ModelBuilder("r")
         robot.body("b", condyle.WORLD, condyle.Joint.revolute([0, 0, 1]), **{name: -1.0})
-        with pytest.raises(ModelError, match=f"^joint `b`: limit of {name} is -1"):
+        with pytest.raises(ModelError, match=f"^joint `b`: {what}"):
             robot.build()
     with pytest.raises(ModelError, match=r"^joint `joint2`: q\[1\] is NaN"):
         ARM.lock(["joint2"], [0.0, np.nan, 0.0, 0.0, 0.0, 0.0, 0.0])

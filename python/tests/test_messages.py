@@ -109,7 +109,7 @@ def test_texts_paths_and_macros(tmp_path: Path) -> None:
         assert len(message) < 200
     for read in (Model.from_urdf_str, Model.from_mjcf_str, Model.from_sdf_str):
         assert "this is a path" in told(lambda read=read: read("robots/arm.urdf"), condyle.ParseError)
-    path = tmp_path / "robot.urdf.xacro"
+    path = tmp_path / "robot.urdf"
     path.write_text(
         '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n<xacro:property name="a" value="1"/>\n'
         '<link name="base"/>\n</robot>'

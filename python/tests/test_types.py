@@ -100,6 +100,10 @@ def conforms(value: Any, kind: Any) -> bool:
         return isinstance(value, list) and all(conforms(item, parts[0]) for item in value)
     if origin is typing.Literal:
         return value in parts
+    if origin is dict:
+        return isinstance(value, dict) and all(
+            conforms(k, parts[0]) and conforms(v, parts[1]) for k, v in value.items()
+        )
     if origin is np.ndarray:
         return isinstance(value, np.ndarray) and value.dtype == typing.get_args(parts[1])[0]
     if origin is list:
