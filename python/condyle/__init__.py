@@ -44,8 +44,8 @@ Derivatives of one's own function of the state are exact, by `HyperDual` numbers
 By theme; `help(condyle.rnea)` says more of each:
 
 Robots: `Model` (from URDF, MJCF, SDF), `ModelBuilder`, `Joint`, `Inertia`, `Mimic`, `Coupling`, `BodyId`, `WORLD`,
-    `Frame`, `Limits`, `Spring`, `GravityCompensation`, `Actuator`, `ModelWarning`, `load` (by a robot's name), `robots`,
-    `inertial_parameters`; `Data`, the scratch
+    `Frame`, `Limits`, `Spring`, `GravityCompensation`, `Actuator`, `ModelWarning`, `load` (by a robot's name),
+    `robots`, `inertial_parameters`; `Data`, the scratch
 Dynamics: `rnea`, `aba`, `crba`, `minv`, `nonlinear_effects`, `gravity`, `static_torque`, `coriolis_matrix`,
     `forward_dynamics`, `compute_all_terms` (`AllTerms`), `passive_torque`; `DivideConquer` (`AssemblySize`)
 Derivatives of dynamics: `rnea_derivatives` (`RneaDerivatives`), `aba_derivatives` (`AbaDerivatives`),
