@@ -126,8 +126,8 @@ def test_mdbook(tmp_path: Path) -> None:
     assert "<math" in (tmp_path / "book" / "rnea.html").read_text(encoding="utf-8")
 
 
-# For each worked example: the block that defines the algorithm, the block of the example, and mistakes in the former, each
-# as (right, wrong).
+# For each worked example: the block that defines the algorithm, the block of the example, and mistakes in the former,
+# each as (right, wrong).
 MISTAKES = {
     "rnea.md": (
         "def rnea(",
