@@ -2400,7 +2400,7 @@ class Model:
     def to_pinocchio(self) -> Any:
         """The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
 
-        What follows another joint does so there too, unless it turns without limits.
+        Joints that follow others do so there too, unless they turn without limits.
         """
 
     def tree(self, frames: bool = False) -> str:

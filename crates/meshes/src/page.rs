@@ -46,7 +46,7 @@ impl Meshes {
         Self { places, ..Self::default() }
     }
 
-    /// What is to be drawn for a mesh; nothing where its file is missing or wrong.
+    /// Returns the parts to draw for a mesh; none where its file is missing or wrong.
     pub fn get(&mut self, address: &str) -> Vec<Drawn> {
         self.wanted += 1;
         let parts = match self.load(address) {
@@ -59,10 +59,10 @@ impl Meshes {
         self.drawn(parts)
     }
 
-    /// What is to be drawn for a mesh that is in memory; `library` gives the text of a file of materials by its name.
+    /// Returns the parts to draw for a mesh that is in memory; `library` gives the text of a file of materials by its name.
     ///
     /// # Errors
-    /// What is wrong with it, with the line if it is an OBJ or an STL of text.
+    /// The fault of the file, with the line if it is an OBJ or an STL of text.
     pub fn add(
         &mut self,
         format: Format,

@@ -281,7 +281,7 @@ fn unknown_elements_and_attributes() {
     }
 }
 
-/// What has no effect on dynamics, kinematics and limits is known.
+/// Elements without effect on dynamics, kinematics and limits are known.
 #[test]
 fn elements_without_effect() {
     let joint = "<calibration rising='1'/><safety_controller k_velocity='10' k_position='15' soft_lower_limit='-1' \

@@ -9,6 +9,9 @@ use std::process::Command;
 
 const ROBOT: &str = "<robot name='$*'><link name='$ROS_PACKAGE_PATH'/></robot>";
 
+/// Variable that has the arguments of the second process.
+const ARGUMENTS: &str = "CONDYLE_TEST_XACRO_ARGUMENTS";
+
 fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("condyle-xacro-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
@@ -25,21 +28,21 @@ fn read(name: &str, programs: &[(&str, &str)], arguments: &str) -> String {
     }
     std::fs::write(folder.join("robot.xacro"), "<robot/>").unwrap();
     let mut child = Command::new(std::env::current_exe().unwrap());
-    child
-        .args(["--exact", "in_a_process", "--ignored", "--nocapture"])
-        .env("PATH", &folder)
-        .env("ARGUMENTS", arguments);
+    child.args(["--exact", "in_a_process", "--nocapture"]).env("PATH", &folder).env(ARGUMENTS, arguments);
     child.env("ROS_PACKAGE_PATH", "/ros").current_dir(&folder);
     let said = String::from_utf8(child.output().unwrap().stdout).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     said.split_once('[').unwrap().1.rsplit_once(']').unwrap().0.to_owned()
 }
 
-/// The process of [`read`].
+/// Reads in the process that [`read`] starts. The test itself starts one, whose program is found by its PATH alone.
 #[test]
-#[ignore = "runs in a process of the other tests"]
 fn in_a_process() {
-    let Ok(arguments) = std::env::var("ARGUMENTS") else { return };
+    let Ok(arguments) = std::env::var(ARGUMENTS) else {
+        let echo = format!("echo \"{ROBOT}\"");
+        assert_eq!(read("process", &[("xacro", &echo)], "a=b"), "./robot.xacro a:=b|/one:/two:/ros");
+        return;
+    };
     let pairs = arguments.split_whitespace().map(|pair| pair.split_once('=').unwrap());
     let arguments = pairs.map(|(name, value)| (name.to_owned(), value.to_owned())).collect();
     let options = UrdfOptions { arguments, packages: vec!["/one".into(), "/two".into()], ..UrdfOptions::default() };

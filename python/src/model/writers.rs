@@ -58,7 +58,7 @@ impl Model {
 
     /// The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
     ///
-    /// What follows another joint does so there too, unless it turns without limits.
+    /// Joints that follow others do so there too, unless they turn without limits.
     fn to_pinocchio<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("condyle._pinocchio_models")?;
         module.call_method1("to_pinocchio", (slf,))

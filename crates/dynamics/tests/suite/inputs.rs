@@ -61,7 +61,7 @@ fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [V
     [eps(&effort), eps(aba(&seeded, &mut data, &q, &v, &tau, &f_ext))]
 }
 
-/// What a unit of damping or friction of a coordinate loses, for a law of one component: a free joint loses along the axes of its
+/// Loss of a coordinate for a unit of damping or friction, by a law of one component. A free joint loses along the axes of its
 /// parent.
 fn lost(model: &Model, s: &State, k: usize, law: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut loss = vec![0.0; model.nv()];

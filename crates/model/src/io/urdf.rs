@@ -55,7 +55,8 @@ impl Model {
     ///   (`mechanicalReduction`, `drake:gear_ratio`) gives armature n² J. A reduction alone warns.
     /// - Drake's `<frame>`s are frames, its joints `ball`, `screw` and `planar` are joints.
     ///
-    /// What is unknown, misspelt or misplaced is a warning, and so is what a model cannot hold ([`Model::warnings`]). Shapes,
+    /// A name that is unknown, misspelt or misplaced is a warning, and so is all that a model cannot hold
+    /// ([`Model::warnings`]). Shapes,
     /// materials, sensors, controllers, calibrations, soft limits of a `<safety_controller>` and entries of `<gazebo>` about
     /// contact, looks and numerics have no effect and no warning; the meshes that are named need not be there.
     ///

@@ -17,7 +17,7 @@ pub(super) struct File {
     pub(super) root: Element,
     /// The folder of the file; a string has none.
     pub(super) folder: Option<PathBuf>,
-    /// What was in its sections, once it has been attached.
+    /// Elements of its sections, once it has been attached.
     pub(super) sections: Option<Sections>,
 }
 

@@ -39,7 +39,7 @@ pub(super) struct Law<'a> {
     pub(super) bias: &'a str,
     pub(super) dynprm: [f64; PARAMETERS],
     pub(super) gainprm: [f64; PARAMETERS],
-    /// Of an affine bias b₀ + b₁ l + b₂ l̇, the numbers b. A positive b₂ of a servo is a damping ratio.
+    /// Numbers b of an affine bias b₀ + b₁ l + b₂ l̇. A positive b₂ of a servo is a damping ratio.
     pub(super) biasprm: [f64; PARAMETERS],
     /// Share of the target's range that the control has, or 0.
     pub(super) inherit: f64,

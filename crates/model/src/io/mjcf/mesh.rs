@@ -46,7 +46,7 @@ impl Solid {
 pub(super) enum Rule {
     /// The convex hull.
     Convex,
-    /// What is inside of the surface.
+    /// Volume inside of the surface.
     Exact,
     /// The pyramids over all triangles from the centroid of the surface, each counted as positive.
     Legacy,
