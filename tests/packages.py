@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-ORDER = ["spatial", "linalg", "model", "dynamics", "optimal", "wholebody", "meshes", "", "codegen", "cli"]
+ORDER = ["spatial", "linalg", "meshes", "model", "dynamics", "optimal", "wholebody", "", "codegen", "cli"]
 """Each crate after those that it needs; the one without a name of its own is the façade."""
 LARGEST = 10 * 1024 * 1024
 """The limit of crates.io on a package, in bytes."""
