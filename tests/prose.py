@@ -1,0 +1,189 @@
+#!/usr/bin/env python3
+"""Finds comments and paragraphs that are hard to read, by patterns that are seldom right.
+
+    python3 tests/prose.py [PATH…]       check the files below these paths (all files of the repository, if none)
+    python3 tests/prose.py --sample      print 100 comments and 50 paragraphs, chosen at random with a fixed seed
+    python3 tests/prose.py --count       print the number of findings per folder
+
+Covered are the comments of Rust and C++, the docstrings and comments of Python, and the paragraphs of Markdown. Files below
+TO_DO are not checked unless they are named. Exit status 1: there are findings.
+"""
+
+import argparse
+import ast
+import io
+import random
+import re
+import subprocess
+import sys
+import tokenize
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[1]
+TO_DO: tuple[str, ...] = ("crates/optimal/src/robot",)
+"""Paths that are not yet rewritten."""
+EXCLUDED = ("crates/cli/page/vendor", "python/condyle/_condyle.pyi", "VALIDATION.md", "crates/model/robots")
+"""Paths of vendored or generated text."""
+LONGEST = 30
+"""Maximum number of words of a sentence; the rule is 25, but a count cannot tell a formula from a word."""
+SEED = 20261127
+
+PARTICIPLE = r"(?:\w+ed|\w+en|been|had|done|got|run|set|read|put|found|met|made|kept|built|sent|left|held|lost|led|cut|come|gone)"
+PATTERNS = [
+    (r"\b\w*manieth\b", "write `index` or `ordinal`"),
+    (r"\bso (?:many|often)\b(?! that)", "name the quantity: `number of …`"),
+    (rf"\b(?:has|have|had) not\b(?! (?:yet |to )?{PARTICIPLE}\b)", "write `does not have` or `lacks`"),
+    (r"\b(?:that|which) there (?:is|are)\b", "write `existing` or leave it out"),
+    (r"\b(?:is|are|was|were) none\b(?! of)", "write `does not exist` or `is missing`"),
+    (r"\b[Bb]y this much\b", "write `Maximum …` or `Margin of …`"),
+    (r"\b(?:that|those) of\b", "repeat the noun"),
+    (r"\bnobody\b", "name the caller or the thread"),
+    (r"\b(?:[Bb]ut for|[Bb]eside)\b", "write `except`, `besides` or `next to`"),
+    (r"\bare had\b|\bis had\b", "write `are available` or `are computed`"),
+    (r"\bit is no\b|\bthere is no one\b", "write `does not …`"),
+]
+"""Patterns of the worst sentences, with what to write instead."""
+DOC_START = re.compile(r"(?:What|Of|Who|Whose|How)\b")
+"""First words that a doc comment may not have: it begins with a noun or a verb."""
+
+
+class Passage(NamedTuple):
+    path: str
+    line: int
+    kind: str
+    """`doc` (of an item), `comment` or `paragraph`."""
+    text: str
+
+
+def rust(path: str, text: str) -> Iterator[Passage]:
+    """Yields the blocks of comments of a file of Rust or C++, without their code blocks."""
+    block: list[str] = []
+    start, marker, code = 0, "", False
+    for number, line in enumerate([*text.splitlines(), ""], 1):
+        match = re.match(r"\s*(//[/!]?)(?!/)(.*)", line)
+        if match and (not block or match[1] == marker):
+            if not block:
+                start, marker, code = number, match[1], False
+            if match[2].strip().startswith("```"):
+                code = not code
+            elif code:
+                block.append("")
+            else:
+                block.append(re.sub(r"^# .*", "", match[2].strip()))
+            continue
+        if block:
+            kind = "comment" if marker == "//" else "doc"
+            yield from (Passage(path, start + at, kind, part) for at, part in paragraphs(block))
+            block = []
+        if match:
+            start, marker, block, code = number, match[1], [match[2].strip()], False
+
+
+def python(path: str, text: str) -> Iterator[Passage]:
+    """Yields the docstrings and comments of a file of Python."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
+            lines = [line.strip() for line in node.value.value.splitlines()]
+            yield from (Passage(path, node.lineno + at, "doc", part) for at, part in paragraphs(lines))
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT and not token.string.startswith("#!"):
+            yield Passage(path, token.start[0], "comment", token.string.lstrip("# "))
+
+
+def markdown(path: str, text: str) -> Iterator[Passage]:
+    """Yields the paragraphs of a page, without code, tables and headings."""
+    lines, code = [], False
+    for line in text.splitlines():
+        if line.lstrip().startswith("```"):
+            code = not code
+            lines.append("")
+        else:
+            skipped = code or re.match(r"\s*(?:\||#|<|!\[|\$\$)", line)
+            lines.append("" if skipped else re.sub(r"^\s*(?:[-*>]|\d+\.)\s+", "\0", line).strip())
+    yield from (Passage(path, 1 + at, "paragraph", part) for at, part in paragraphs(lines))
+
+
+def paragraphs(lines: list[str]) -> Iterator[tuple[int, str]]:
+    """Joins lines into paragraphs, each with the index of its first line; `\\0` and list markers begin one."""
+    start, held = 0, ""
+    for at, line in enumerate([*lines, ""]):
+        begins = line.startswith(("\0", "- ", "* ", "# ")) or line == ""
+        if begins and held:
+            yield start, held
+            held = ""
+        if line:
+            if not held:
+                start = at
+            held = f"{held} {line.lstrip(chr(0))}".strip()
+
+
+def passages(path: str) -> list[Passage]:
+    file = ROOT / path
+    if not file.is_file():  # deleted, and not yet committed
+        return []
+    text = file.read_text(encoding="utf-8")
+    reader = {".rs": rust, ".cpp": rust, ".h": rust, ".py": python, ".md": markdown}[file.suffix]
+    return [passage for passage in reader(path, text) if re.search(r"[a-z]{3}", passage.text)]
+
+
+def sentences(text: str) -> list[str]:
+    """Splits a passage where a sentence or its clause ends; code and formulas count as one word."""
+    text = re.sub(r"`[^`]*`|\$[^$]*\$|\[[^\]]*\]\([^)]*\)|\([^()]*\)", "x", text)
+    return re.split(r"(?<=[.;:!?])\s+", text)
+
+
+def findings(passage: Passage) -> Iterator[str]:
+    prose = re.sub(r"`[^`]*`|\$[^$]*\$", "x", passage.text)
+    for pattern, advice in PATTERNS:
+        if match := re.search(pattern, prose):
+            yield f"`{match[0]}`: {advice}"
+    if passage.kind == "doc" and (match := DOC_START.match(passage.text)):
+        yield f"begins with `{match[0]}`: begin with the noun or verb it describes"
+    longest = max(len(re.findall(r"[^\W\d_]{2,}", sentence)) for sentence in sentences(passage.text))
+    if longest > LONGEST:
+        yield f"a sentence of {longest} words: split it"
+
+
+def below(path: str, roots: tuple[str, ...]) -> bool:
+    return any(path == root or path.startswith(root.rstrip("/") + "/") for root in roots)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("paths", nargs="*", help="files and folders, relative to the repository")
+    parser.add_argument("--sample", action="store_true", help="print a random sample, for a reader")
+    parser.add_argument("--count", action="store_true", help="print the number of findings per folder")
+    arguments = parser.parse_args()
+    roots = tuple(arguments.paths)
+    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True).stdout.split()
+    files = [
+        path for path in tracked if path.endswith((".rs", ".cpp", ".h", ".py", ".md")) and not below(path, EXCLUDED)
+    ]
+    files = [path for path in files if (below(path, roots) if roots else not below(path, TO_DO))]
+    found = [passage for path in files for passage in passages(path)]
+    if arguments.sample:
+        chance = random.Random(SEED)
+        comments = [passage for passage in found if passage.kind != "paragraph" and len(passage.text.split()) > 4]
+        pages = [passage for passage in found if passage.kind == "paragraph" and len(passage.text.split()) > 4]
+        for part in (chance.sample(comments, min(100, len(comments))), chance.sample(pages, min(50, len(pages)))):
+            for number, passage in enumerate(part, 1):
+                print(f"{number}. {passage.path}:{passage.line} ({passage.kind})\n   {passage.text}")
+        return 0
+    total: Counter[str] = Counter()
+    for passage in found:
+        for finding in findings(passage):
+            total["/".join(passage.path.split("/")[:3])] += 1
+            if not arguments.count:
+                print(f"{passage.path}:{passage.line}: {finding}\n    {passage.text[:160]}")
+    if arguments.count:
+        for folder, number in total.most_common():
+            print(f"{number:5} {folder}")
+    print(f"prose: {total.total()} findings in {len(found)} passages of {len(files)} files")
+    return total.total() > 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
