@@ -5,8 +5,8 @@
     python3 tests/prose.py --sample      print 100 comments and 50 paragraphs, chosen at random with a fixed seed
     python3 tests/prose.py --count       print the number of findings per folder
 
-Covered are the comments of Rust and C++, the docstrings and comments of Python, and the paragraphs of Markdown. Files below
-TO_DO are not checked unless they are named. Exit status 1: there are findings.
+Covered are the comments of Rust and C++, the docstrings and comments of Python, and the paragraphs of Markdown.
+Files below TO_DO are not checked unless they are named. Exit status 1: there are findings.
 """
 
 import argparse
