@@ -31,7 +31,8 @@ LONGEST = 30
 """Maximum number of words of a sentence; the rule is 25, but a count cannot tell a formula from a word."""
 SEED = 20261127
 
-PARTICIPLE = r"(?:\w+ed|\w+en|been|had|done|got|run|set|read|put|found|met|made|kept|built|sent|left|held|lost|led|cut|come|gone)"
+IRREGULAR = "been|had|done|got|run|set|read|put|found|met|made|kept|built|sent|left|held|lost|led|cut|come|gone"
+PARTICIPLE = rf"(?:\w+ed|\w+en|{IRREGULAR})"
 PATTERNS = [
     (r"\b\w*manieth\b", "write `index` or `ordinal`"),
     (r"\bso (?:many|often)\b(?! that)", "name the quantity: `number of …`"),
