@@ -1,6 +1,8 @@
 """The book in `docs`: its Python blocks run and print what the pages say, its links lead somewhere."""
 
+import contextlib
 import importlib.util
+import io
 import os
 import re
 import shutil
@@ -9,6 +11,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
@@ -121,3 +124,90 @@ def test_mdbook(tmp_path: Path) -> None:
     command = [program, "build", "--dest-dir", tmp_path / "book", ROOT / "docs"]
     subprocess.run(command, check=True, env=environment)
     assert "<math" in (tmp_path / "book" / "rnea.html").read_text(encoding="utf-8")
+
+
+# For each worked example: the block that defines the algorithm, the block of the example, and mistakes in the former, each
+# as (right, wrong).
+MISTAKES = {
+    "rnea.md": (
+        "def rnea(",
+        "tau, vel, acc, alone, f = rnea(Tree(arm, q), v, a)\nper_link(vel",
+        [
+            (" + cross(vel[i]) @ vJ", ""),
+            (" + cross_dual(vel[i]) @ I[i] @ vel[i]", ""),
+            ("f[i] = I[i] @ acc[i] + ", "f[i] = "),
+            ("up[i] @ acc[tree.parent[i]] + ", ""),
+            ("        f[tree.parent[i]] += up[i].T @ f[i]  # λX*_i = (iXλ)ᵀ\n", ""),
+            ("acc[0] = -tree.gravity", "acc[0] = tree.gravity"),
+        ],
+    ),
+    "crba.md": (
+        "def composite(",
+        "arm = planar_arm([1.0, 1.0], [3.0, 2.0])",
+        [
+            ("        I[tree.parent[i]] += tree.up[i].T @ I[i] @ tree.up[i]\n", "        pass\n"),
+            ("F, j = tree.up[j].T @ F, tree.parent[j]", "F, j = F, tree.parent[j]"),
+        ],
+    ),
+    "aba.md": (
+        "def articulated(",
+        "q = np.array([0.3, 0.9])",
+        [
+            ("p[i] + Ia @ c[i] + ", "p[i] + "),
+            ("p[i] + Ia @ c[i]", "Ia @ c[i]"),
+            ("p[i] + Ia @ c[i]", "p[i] + IA[i] @ c[i]"),
+            ("p[i] = cross_dual(vel[i]) @ tree.I[i] @ vel[i]", "p[i] = 0.0"),
+            (" + U[i] @ np.linalg.solve(D[i], u[i])", ""),
+            ("IA[i] - U[i] @ np.linalg.solve(D[i], U[i].T)", "IA[i]"),
+            ("        p[parent] += up.T @ pa\n", ""),
+            ("        IA[parent] += up.T @ Ia @ up\n", ""),
+            ("tree.up[i] @ acc[tree.parent[i]] + c[i]", "tree.up[i] @ acc[tree.parent[i]]"),
+            ("u[i] - U[i].T @ before", "u[i]"),
+        ],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("chapter", MISTAKES)
+def test_examples_detect_mistakes(chapter: str) -> None:
+    """An example by hand fails if one term of its algorithm is dropped."""
+    definition, example, mistakes = MISTAKES[chapter]
+    text = (ROOT / "docs" / chapter).read_text()
+    [defining] = [block.code for block in BOOK.blocks(text) if definition in block.code]
+    [shown] = [block for block in BOOK.blocks(text) if example in block.code]
+    helpers = BOOK.run(chapter)
+
+    def fails(code: str) -> bool:
+        names, printed = dict(helpers), io.StringIO()
+        exec(code, names)
+        try:
+            with contextlib.redirect_stdout(printed), np.errstate(all="ignore"):
+                exec(shown.code, names)
+        except (AssertionError, np.linalg.LinAlgError):
+            return True
+        return printed.getvalue() != shown.expected
+
+    helpers |= {"v": np.array([1.0, 2.0]), "tau": np.array([5.0, 3.0])}
+    if chapter == "aba.md":
+        helpers["arm"] = helpers["planar_arm"]([1.0, 0.8], [2.0, 1.0])
+    assert not fails(defining)
+    for right, wrong in mistakes:
+        assert right in defining, right
+        assert fails(defining.replace(right, wrong)), f"{chapter}: {right!r} as {wrong!r} passes"
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("p[i] + Ia @ c[i]", "p[i] + IA[i] @ c[i]"),
+        ("p[i] = cross_dual(vel[i]) @ tree.I[i] @ vel[i]", "p[i] = 0.0"),
+    ],
+)
+def test_mistakes_of_aba_have_the_size_that_the_page_says(right: str, wrong: str) -> None:
+    text = (ROOT / "docs" / "aba.md").read_text()
+    [defining] = [block.code for block in BOOK.blocks(text) if "def articulated(" in block.code]
+    names = BOOK.run("aba.md")
+    exec(defining.replace(right, wrong), names)
+    arm = names["planar_arm"]([1.0, 0.8], [2.0, 1.0])
+    found = names["aba"](names["Tree"](arm, np.array([0.3, 0.9])), np.array([1.0, 2.0]), np.array([5.0, 3.0]))
+    assert f"({found[0]:.4f}, {found[1]:.4f})" in " ".join(text.split())
