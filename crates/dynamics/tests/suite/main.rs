@@ -16,6 +16,7 @@ mod compose;
 mod constrained;
 mod constrained_derivatives;
 mod coriolis;
+mod counted;
 mod derivatives;
 mod divide_conquer;
 mod energy;
