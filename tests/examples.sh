@@ -4,8 +4,8 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-short=(energy_drift own_cost reach wholebody_clarabel wholebody_stand)
-long=(mpc trot walk wholebody_humanoid wholebody_trot)
+short=(own_cost reach wholebody_clarabel wholebody_stand)
+long=(energy_drift mpc trot walk wholebody_humanoid wholebody_trot)
 diff <(printf '%s\n' "${short[@]}" "${long[@]}" | sort) <(basename --suffix .rs --multiple examples/*.rs | sort) ||
     { echo "the list of examples in tests/examples.sh is not that of the folder"; exit 1; }
 
