@@ -94,9 +94,8 @@ fn dynamics(c: &mut Criterion) {
 /// Stay where you are, with little effort.
 fn problem(model: &Arc<Model>, knots: usize) -> (Problem, Vec<f64>) {
     let x0 = [neutral(model), vec![0.0; model.nv()]].concat();
-    let state = |weight: f64| {
-        Cost::new("state", weight, Residual::State { reference: x0.clone() }, Activation::Quadratic)
-    };
+    let state =
+        |weight: f64| Cost::new("state", weight, Residual::State { reference: x0.clone() }, Activation::Quadratic);
     let effort = Residual::Control { reference: vec![0.0; Actuation::joints(model).nu()] };
     let costs = vec![state(1e0), Cost::new("effort", 1e-3, effort, Activation::Quadratic)];
     let mut knot = FreeDynamics::running(model.clone(), DT, costs).expect("the costs are those of this robot");

@@ -11,8 +11,10 @@ pub(crate) struct Operations {
     pub(crate) products: u64,
     /// Sums and differences.
     pub(crate) sums: u64,
-    /// Quotients, roots, and sines with their cosines.
-    pub(crate) others: u64,
+    /// Quotients and roots.
+    pub(crate) quotients: u64,
+    /// Angles: sines with their cosines, and angles of points.
+    pub(crate) angles: u64,
     /// Fused multiply-adds among the products and sums.
     pub(crate) fused: u64,
 }
@@ -20,17 +22,19 @@ pub(crate) struct Operations {
 impl Operations {
     /// All operations. A fused multiply-add is one.
     pub(crate) fn all(self) -> u64 {
-        self.flops() - self.fused
+        self.flops() + self.angles - self.fused
     }
 
-    /// All operations. A fused multiply-add is two.
+    /// All operations but angles. A fused multiply-add is two.
     pub(crate) fn flops(self) -> u64 {
-        self.products + self.sums + self.others
+        self.products + self.sums + self.quotients
     }
 }
 
 thread_local! {
-    static OPERATIONS: Cell<Operations> = const { Cell::new(Operations { products: 0, sums: 0, others: 0, fused: 0 }) };
+    static OPERATIONS: Cell<Operations> = const {
+        Cell::new(Operations { products: 0, sums: 0, quotients: 0, angles: 0, fused: 0 })
+    };
 }
 
 /// A number that knows how many operations had to be done one after the other for it, and counts all of them.
@@ -59,7 +63,7 @@ macro_rules! operators {
         }
     )*};
 }
-operators!(Add add sums, Sub sub sums, Mul mul products, Div div others);
+operators!(Add add sums, Sub sub sums, Mul mul products, Div div quotients);
 
 impl Neg for Counted {
     type Output = Self;
@@ -92,18 +96,18 @@ impl Scalar for Counted {
         })
     }
     fn recip(self) -> Self {
-        Self::after(self.value.recip(), &[self], |n| n.others += 1)
+        Self::after(self.value.recip(), &[self], |n| n.quotients += 1)
     }
     fn sqrt(self) -> Self {
-        Self::after(self.value.sqrt(), &[self], |n| n.others += 1)
+        Self::after(self.value.sqrt(), &[self], |n| n.quotients += 1)
     }
     fn sin_cos(self) -> (Self, Self) {
         let (sin, cos) = self.value.sin_cos();
-        let sin = Self::after(sin, &[self], |n| n.others += 1);
+        let sin = Self::after(sin, &[self], |n| n.angles += 1);
         (sin, Self { value: cos, ..sin })
     }
     fn atan2(self, x: Self) -> Self {
-        Self::after(self.value.atan2(x.value), &[self, x], |n| n.others += 1)
+        Self::after(self.value.atan2(x.value), &[self, x], |n| n.angles += 1)
     }
     fn abs(self) -> Self {
         Self { value: self.value.abs(), ..self }

@@ -12,6 +12,7 @@ mod allocations;
 mod book;
 mod centroidal;
 mod closed_forms;
+mod complexity;
 mod compose;
 mod constrained;
 mod constrained_derivatives;
