@@ -4,8 +4,11 @@ use crate::common;
 use crate::counted::{Counted, Operations, counted};
 
 use common::{State, lift, random_inertia, random_pose, rng, tree};
-use condyle_dynamics::{Data, ForwardDynamicsMethod, Joint, Model, ModelBuilder, Vec3, WORLD, aba, crba};
-use condyle_dynamics::{forward_dynamics, minv, nonlinear_effects, rnea, robots};
+use condyle_dynamics::{
+    Cholesky, Data, ForwardDynamicsMethod, Joint, Ltdl, Model, ModelBuilder, Se3, Vec3, WORLD, aba,
+    centroidal_map_rate, compute_all_terms, crba, forward_dynamics, forward_velocities, minv, nonlinear_effects, rnea,
+    robots,
+};
 
 /// n hinges, each body on the one that `parent` names.
 fn hinges(n: usize, parent: impl Fn(usize) -> usize) -> Model {
@@ -125,13 +128,57 @@ fn forward(model: &Model, method: ForwardDynamicsMethod) -> Operations {
     counted(|| forward_dynamics(model, &mut data, &q, &v, &tau, &[], Some(method))).0
 }
 
-/// The table of the book's page on complexity is what is counted here.
+/// Operations of all terms at once, and of the same terms by a call each.
+fn terms(model: &Model) -> [Operations; 2] {
+    let State { q, v, .. } = State::random(model, &mut rng(0));
+    let [q, v]: [Vec<Counted>; 2] = [&q, &v].map(|x| lift(x));
+    let mut data = Data::new(model);
+    let together = counted(|| {
+        _ = compute_all_terms(model, &mut data, &q, &v);
+        &[]
+    });
+    let apart = counted(|| {
+        _ = crba(model, &mut data, &q);
+        _ = nonlinear_effects(model, &mut data, &q, &v);
+        _ = centroidal_map_rate(model, &mut data, &q, &v);
+        let velocities = forward_velocities(model, &mut data, &q, &v);
+        _ = (velocities.kinetic_energy(), velocities.potential_energy());
+        &[]
+    });
+    [together.0, apart.0]
+}
+
+/// Operations of the dense and of the sparse factor of M.
+fn factors(model: &Model) -> [Operations; 2] {
+    let q = lift(&State::random(model, &mut rng(0)).q);
+    let M = crba::<Counted, f64>(model, &mut Data::new(model), &q).clone();
+    let (mut dense, mut sparse) = (Cholesky::new(model.nv()), Ltdl::new(model));
+    let dense = counted(|| {
+        dense.factorize(&M);
+        &[]
+    });
+    let sparse = counted(|| {
+        sparse.factorize(&M);
+        &[]
+    });
+    [dense.0, sparse.0]
+}
+
+/// Several humanoids in one model.
+fn humanoids(n: usize) -> Model {
+    let (one, mut builder) = (robots::humanoid(), ModelBuilder::new("crowd"));
+    for k in 0..n {
+        builder.append(WORLD, Se3::identity(), &one, &format!("{k}_"));
+    }
+    builder.build().expect("robots side by side are one")
+}
+
+/// The tables of the book's page on complexity are what is counted here.
 #[test]
 fn the_book_has_these_figures() {
     let page = include_str!("../../../../docs/complexity.md");
-    let robots = [("arm7", robots::arm7()), ("quadruped", robots::quadruped()), ("humanoid", robots::humanoid())];
-    let mut columns = Vec::new();
-    for (_, model) in &robots {
+    let robots = [robots::arm7(), robots::quadruped(), robots::humanoid()];
+    let counts = robots.each_ref().map(|model| {
         let [rnea, crba, aba] = work(model);
         let State { q, v, .. } = State::random(model, &mut rng(0));
         let [q, v]: [Vec<Counted>; 2] = [&q, &v].map(|x| lift(x));
@@ -139,9 +186,10 @@ fn the_book_has_these_figures() {
         let h = counted(|| nonlinear_effects(model, &mut data, &q, &v)).0;
         let inverse = counted(|| minv(model, &mut data, &q).as_slice()).0;
         let [dense, sparse] = [ForwardDynamicsMethod::Dense, ForwardDynamicsMethod::Sparse].map(|m| forward(model, m));
-        columns.push([rnea, h, crba, aba, dense, sparse, inverse].map(Operations::flops));
-    }
-    let rows = [
+        let [together, apart] = terms(model);
+        [rnea, h, crba, aba, dense, sparse, inverse, together, apart].map(Operations::flops)
+    });
+    let names = [
         "`rnea`",
         "`nonlinear_effects`",
         "`crba`",
@@ -149,9 +197,16 @@ fn the_book_has_these_figures() {
         "$h$, $M$, dense factor",
         "$h$, $M$, sparse factor",
         "`minv`",
+        "`compute_all_terms`",
+        "the same, a call each",
     ];
-    let rows = rows.iter().enumerate().map(|(k, name)| {
-        let cells: Vec<String> = columns.iter().map(|column| column[k].to_string()).collect();
+    let rows = names.iter().enumerate().map(|(k, name)| (*name, counts.iter().map(|c| c[k]).collect::<Vec<u64>>()));
+    let crowds = robots.into_iter().chain([4, 8].map(humanoids));
+    let factors: Vec<[u64; 2]> = crowds.map(|model| factors(&model).map(Operations::flops)).collect();
+    let of = |k: usize| factors.iter().map(|f| f[k]).collect();
+    let rows = rows.chain([("dense factor", of(0)), ("sparse factor", of(1))]);
+    let rows = rows.map(|(name, counts)| {
+        let cells: Vec<String> = counts.iter().map(u64::to_string).collect();
         format!("| {name} | {} |", cells.join(" | "))
     });
     let missing: Vec<String> = rows.filter(|row| !page.contains(row)).collect();
