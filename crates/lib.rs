@@ -74,7 +74,7 @@ pub mod derivatives {
     pub use condyle_dynamics::{
         AbaDerivatives, AbaHessian, CoriolisDerivatives, EnergyDerivatives, Input, LaneJacobian, RneaDerivatives,
         RneaHessian, RneaSecondDerivatives, StateFunction, aba_hessian, coriolis_derivatives, energy_derivatives,
-        passive_torque_derivative, rnea_hessian, rnea_second_derivatives, static_torque_derivative,
+        passive_torque_derivatives, rnea_hessian, rnea_second_derivatives, static_torque_derivative,
     };
 }
 

@@ -285,6 +285,8 @@ RESULTS = {
     "CentroidalDerivatives": "centroidal_derivatives",
     "EnergyDerivatives": "energy_derivatives",
     "CoriolisDerivatives": "coriolis_derivatives",
+    "PassiveDerivatives": "passive_torque_derivatives",
+    "dict[str, ContactConstraint | Coupling]": "Model.constraints",
     "Constrained": "constrained_dynamics",
     "ConstrainedDerivatives": "constrained_dynamics_derivatives",
     "ConstrainedEquations": "constrained_dynamics_equations",

@@ -21,14 +21,16 @@ check() {
 
 check condyle-spatial libm serde std
 check condyle-linalg libm std threads
-check condyle-model libm loaders serde std threads
-check condyle-dynamics libm loaders serde std threads
+check condyle-model libm loaders serde std threads urdf-rs
+check condyle-dynamics libm loaders serde std threads urdf-rs
 check condyle-optimal "" loaders serde threads
 check condyle-wholebody "" clarabel loaders threads
 check condyle-codegen "" cuda
-check condyle "" clarabel loaders optimal serde threads wholebody
+check condyle "" clarabel loaders optimal serde threads urdf-rs wholebody
 
 cargo test --locked --package condyle-model --no-default-features --features libm --lib
+cargo test --locked --package condyle-model --features urdf-rs --test urdf_rs
+cargo test --locked --package condyle-model --features urdf-rs --doc from_urdf_robot
 cargo test --locked --package condyle-spatial --no-default-features --features libm --test storage
 cargo test --locked --package condyle-model --no-default-features --features libm --test validate
 cargo test --locked --package condyle-linalg --no-default-features --features libm --tests

@@ -67,7 +67,7 @@ impl Kind {
                 let quaternions = robots::ARM7.replacen("<robot name=\"arm7\">", version, 1);
                 let quaternions = quaternions.replace("rpy=\"1.5707963267948966 0 0\"", "quat_xyzw=\"0.6 0 0 0.8\"");
                 let others = [robots::ARM7, robots::QUADRUPED, robots::HUMANOID, file!("mimic.urdf")];
-                others.map(str::to_owned).into_iter().chain([quaternions]).collect()
+                others.map(str::to_owned).into_iter().chain([quaternions, URDF.to_owned()]).collect()
             }
             Self::Mjcf => {
                 let defaults = file!("arm_defaults.xml").replace("<mujoco>", "").replace("</mujoco>", "");
@@ -96,12 +96,19 @@ impl Kind {
     /// # Panics
     /// If what could be read cannot be used.
     pub fn check(self, input: &[u8]) -> bool {
-        let text = String::from_utf8_lossy(input);
+        let text = match self {
+            // as the text of a file, in any encoding
+            Self::Urdf | Self::Mjcf | Self::Sdf | Self::Srdf => Model::decoded(input.to_vec()).into(),
+            _ => String::from_utf8_lossy(input),
+        };
         // what a user may ask for, by a bit that a mutation changes as well
         let (some, other) = (input.len().is_multiple_of(2), input.len().is_multiple_of(3));
         let root_joint = some.then_some(Joint::FreeFlyer);
         let said = match self {
             Self::Urdf => {
+                if let Ok(plain) = Model::well_formed(&text) {
+                    assert_eq!(Model::well_formed(&plain).as_ref(), Ok(&plain), "a text for other parsers");
+                }
                 let options = UrdfOptions { root_joint, mimic: other, ..UrdfOptions::default() };
                 Model::from_urdf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
             }
@@ -134,6 +141,29 @@ impl Kind {
         said.is_ok()
     }
 }
+
+/// Robot with what the format has besides links and joints, and what programs add to it.
+const URDF: &str = r#"<!------ a robot ------>
+<?xml version="1.0" encoding="windows-1252"?>
+<!DOCTYPE robot [<!ELEMENT robot (link)>]>
+<robot name="r" version="1.2" xmlns:drake="http://drake.mit.edu">
+  <link name="world"/>
+  <link name="a"><inertial><mass value="2"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/></inertial></link>
+  <link name="b"><inertial><mass value="1"/><inertia ixx="0.02" iyy="0.03" izz="0.04"/></inertial></link>
+  <link name="c"><inertial><mass value="1"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/></inertial></link>
+  <link name="d"><inertial><mass value="1"/><inertia ixx="0.02" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.04"/></inertial></link>
+  <joint name="root_joint" type="planar"><parent link="world"/><child link="a"/><axis xyz="1 -2 0.5"/></joint>
+  <joint name="j" type="revolute"><parent link="a"/><child link="b"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="3" velocity="2" acceleration="4" drake:acceleration="5"/>
+    <safety_controller k_velocity="1"/><calibration rising="0"/><dynamics damping="0.1" friction="0.2"/></joint>
+  <joint name="k" type="continuous"><parent link="b"/><child link="c"/><mimic joint="j" multiplier="2"/></joint>
+  <drake:joint name="s" type="screw"><parent link="c"/><child link="d"/><axis xyz="0 0 1"/>
+    <drake:screw_thread_pitch value="0.01"/><mimic joint="k" offset="0.5"/></drake:joint>
+  <frame name="f" link="d" xyz="1 2 3" rpy="0 0.1 0"/>
+  <transmission name="t"><type>transmission_interface/SimpleTransmission</type><joint name="j"/>
+    <actuator name="m"><mechanicalReduction>50</mechanicalReduction><rotorInertia>0.001</rotorInertia></actuator></transmission>
+  <gazebo reference="b"><turnGravityOff>true</turnGravityOff><sensor:camera name="x"/></gazebo>
+</robot>"#;
 
 /// Robots with all that a file of a model can have.
 fn models() -> Vec<Model> {
@@ -346,6 +376,16 @@ const PIECES: &[&str] = &[
     "universe",
     "root_joint",
     "__model__",
+    " encoding='utf-16'",
+    "gz:",
+    "xacro:",
+    "drake:joint",
+    "mimic",
+    "transmission",
+    "replicate",
+    "frame",
+    "include",
+    "static",
     "floating",
     "planar",
     "ball",

@@ -48,8 +48,8 @@ Robots: `Model` (from URDF, MJCF, SDF), `ModelBuilder`, `Joint`, `Inertia`, `Mim
 Dynamics: `rnea`, `aba`, `crba`, `minv`, `nonlinear_effects`, `gravity`, `static_torque`, `coriolis_matrix`,
     `forward_dynamics`, `compute_all_terms` (`AllTerms`), `passive_torque`; `DivideConquer` (`AssemblySize`)
 Derivatives of dynamics: `rnea_derivatives` (`RneaDerivatives`), `aba_derivatives` (`AbaDerivatives`),
-    `static_torque_derivative`, `coriolis_derivatives` (`CoriolisDerivatives`), `passive_torque_derivative`,
-    `rnea_input_derivative`, `aba_input_derivative`
+    `static_torque_derivative`, `coriolis_derivatives` (`CoriolisDerivatives`),
+    `passive_torque_derivatives` (`PassiveDerivatives`), `rnea_input_derivative`, `aba_input_derivative`
 Second derivatives: `rnea_hessian` (`RneaHessian`), `aba_hessian` (`AbaHessian`), `rnea_second_derivatives`
     (`RneaSecondDerivatives`)
 Derivatives of one's own functions: `gradient`, `jacobian`, `hessian`, `HyperDual`
@@ -158,7 +158,7 @@ from ._condyle import (
     nonlinear_effects,
     normalize,
     passive_torque,
-    passive_torque_derivative,
+    passive_torque_derivatives,
     potential_energy,
     potential_energy_regressor,
     random_configuration,
@@ -188,12 +188,14 @@ from ._types import (
     ConstrainedEquations,
     ContactConstraint,
     CoriolisDerivatives,
+    Coupling,
     EnergyDerivatives,
     Frame,
     Impulse,
     ImpulseDerivatives,
     Limits,
     Mimic,
+    PassiveDerivatives,
     RneaDerivatives,
     RneaHessian,
     RneaSecondDerivatives,
@@ -219,6 +221,7 @@ __all__ = [
     "ConstraintSet",
     "ContactConstraint",
     "CoriolisDerivatives",
+    "Coupling",
     "Data",
     "DivideConquer",
     "EnergyDerivatives",
@@ -241,6 +244,7 @@ __all__ = [
     "Motion",
     "NotPhysicalError",
     "ParseError",
+    "PassiveDerivatives",
     "RneaDerivatives",
     "RneaHessian",
     "RneaSecondDerivatives",
@@ -319,7 +323,7 @@ __all__ = [
     "normalize",
     "optimal",
     "passive_torque",
-    "passive_torque_derivative",
+    "passive_torque_derivatives",
     "potential_energy",
     "potential_energy_regressor",
     "random_configuration",

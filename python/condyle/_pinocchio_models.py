@@ -1,5 +1,6 @@
 """Models of Pinocchio as ours, and ours as Pinocchio's."""
 
+import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any
@@ -71,7 +72,17 @@ def from_pinocchio(theirs: Any) -> Model:
     model = model.with_limits(
         _limits(lower), _limits(upper), _limits(theirs.upperVelocityLimit), _limits(theirs.upperEffortLimit)
     )
-    return model.with_armature(theirs.armature)
+    model = model.with_armature(theirs.armature)
+    _warn_of_armature(model)
+    return model
+
+
+def _warn_of_armature(model: Model) -> None:
+    """Warns of armature that the libraries take along different axes."""
+    for name, kind, at in zip(model.names, model.joint_types, model.idx_vs, strict=True):
+        if kind == "free_flyer" and model.armature[at : at + 3].any():
+            text = f"joint `{name}`: its armature {model.armature[at]} is a mass along the axes of its parent in Condyle"
+            warnings.warn(f"{text}, along those of its body in Pinocchio", stacklevel=3)
 
 
 TURNS = {"free_flyer": 3, "planar": 2}
@@ -202,7 +213,7 @@ def to_pinocchio(ours: Model) -> Any:
     moving: dict[int, int] = {}
     for f in sorted(ours.frames, key=lambda f: f.kind != "joint"):
         moves = f.kind == "joint" and f.name == ours.names[f.body] and f.body > 0
-        kind = {"link": "BODY", "joint": "JOINT" if moves else "FIXED_JOINT", "user": "OP_FRAME"}[f.kind]
+        kind = {"link": "BODY", "joint": "JOINT" if moves else "FIXED_JOINT"}.get(f.kind, "OP_FRAME")
         place = pin.SE3(np.array(f.placement))
         number = theirs.addFrame(pin.Frame(f.name, f.body, moving.get(f.body, 0), place, getattr(pin.FrameType, kind)))
         if moves:
@@ -213,6 +224,7 @@ def to_pinocchio(ours: Model) -> Any:
     theirs.upperEffortLimit = np.array(limits.effort_upper)
     theirs.lowerEffortLimit = np.array(limits.effort_lower)
     theirs.damping, theirs.armature = np.array(ours.damping), np.array(ours.armature)
+    _warn_of_armature(ours)
     theirs.upperDryFrictionLimit, theirs.lowerDryFrictionLimit = np.array(ours.friction), -np.array(ours.friction)
     return theirs
 

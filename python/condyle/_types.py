@@ -163,6 +163,15 @@ class EnergyDerivatives(NamedTuple):
     """∂V/∂q = g(q)."""
 
 
+class PassiveDerivatives(NamedTuple):
+    """The derivatives of `passive_torque`, each (nv, nv)."""
+
+    dtau_dq: _Array
+    """∂τ/∂q in the tangent space: the change of τ when q moves to integrate(q, δ), per δ."""
+    dtau_dv: _Array
+    """∂τ/∂v."""
+
+
 class CoriolisDerivatives(NamedTuple):
     """The derivatives of C(q, v) v, each (nv, nv)."""
 
@@ -299,6 +308,17 @@ class ContactConstraint(NamedTuple):
     """a*, six numbers along the axes of `reference` (m/s², rad/s²)."""
     axes: ArrayLike | None = None
     """The axes of a line or a plane as columns along those of `reference`, a rotation (3, 3); None are the same."""
+
+
+class Coupling(NamedTuple):
+    """Two coupled joints of a robot's file: the position of the follower is Σ cᵢ qⁱ, with q the position of the leader."""
+
+    follower: str
+    """The joint that follows."""
+    leader: str | None
+    """The joint that leads; without one the follower is at c₀."""
+    coefficients: tuple[float, ...]
+    """c₀ to c₄."""
 
 
 class CentroidalMap(NamedTuple):

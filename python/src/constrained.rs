@@ -9,12 +9,14 @@ use crate::made_for::MadeFor;
 use crate::model::{Model, frame_index, members_of};
 use condyle::{
     ContactConstraint, Motion, Scalar,
-    constraints::{Proximal, Target},
+    constraints::{ConstraintKind, Proximal, Target},
+    tree::ModelConstraintKind,
 };
 use nalgebra::DMatrix;
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PySlice;
+use pyo3::types::{PyDict, PySlice, PyTuple};
 use std::sync::Arc;
 
 named_tuples! {
@@ -56,6 +58,32 @@ pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> Py
     let (placement, velocity) = (optional("placement")?, optional("velocity")?);
     aim(&mut constraint.target, placement.as_ref(), velocity.as_ref(), optional("acceleration")?.as_ref())?;
     Ok(constraint)
+}
+
+/// The constraints of a model by their names: `ContactConstraint`s and `Coupling`s of `condyle._types`.
+pub(crate) fn of_model<'py>(py: Python<'py>, model: &condyle::Model) -> PyResult<Bound<'py, PyDict>> {
+    let constraints = PyDict::new(py);
+    let joint = |body: usize| &*model.bodies()[body].joint_name;
+    // by its number where another frame has the same name
+    let frame = |index: usize| -> PyResult<Bound<'py, PyAny>> {
+        let name = &*model.frames()[index].name;
+        if model.frame(name) == Ok(index) { name.into_bound_py_any(py) } else { index.into_bound_py_any(py) }
+    };
+    for constraint in model.constraints() {
+        let given = match (ContactConstraint::of(constraint), &constraint.kind) {
+            (Some(ContactConstraint { frame: one, other, kind, .. }), _) => {
+                let kind = if kind == ConstraintKind::Rigid { "rigid" } else { "point" };
+                class!(py, "ContactConstraint")?.call1((frame(one)?, kind, other.map(frame).transpose()?))?
+            }
+            (None, &ModelConstraintKind::Coupling { follower, leader, coefficients }) => {
+                let coefficients = PyTuple::new(py, coefficients)?;
+                class!(py, "Coupling")?.call1((joint(follower), leader.map(joint), coefficients))?
+            }
+            (None, _) => continue,
+        };
+        constraints.set_item(&constraint.name, given)?;
+    }
+    Ok(constraints)
 }
 
 /// Changes those parts of a target that are given.

@@ -122,7 +122,7 @@ mod _condyle {
     };
     #[pymodule_export]
     use regressors::{
-        joint_torque_regressor, kinetic_energy_regressor, passive_torque, passive_torque_derivative,
+        joint_torque_regressor, kinetic_energy_regressor, passive_torque, passive_torque_derivatives,
         potential_energy_regressor,
     };
     #[pymodule_export]

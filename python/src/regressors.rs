@@ -1,15 +1,18 @@
-//! Dynamics and energies as linear functions of the inertial parameters, and the losses of joints: the library's
-//! functions one to one.
+//! Dynamics and energies as linear functions of the inertial parameters, and passive efforts: the library's functions one to
+//! one.
 
+use crate::arrays::{Give, Number, give_named};
 use crate::functions::{any, functions};
 use condyle::Scalar;
+use nalgebra::DMatrix;
 use pyo3::prelude::*;
 
 functions! {
 /// The joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
 /// `Model.inertial_parameters`; O(n depth).
 ///
-/// q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a.
+/// q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a, and for the
+/// linear coordinates of a free joint armature (a + ω × v) in place of armature a.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -39,33 +42,50 @@ fn potential_energy_regressor(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 
-/// The passive torque τ = −d v − f tanh(v/ε) of the joints' own damping d and smoothed friction f, nv numbers (N m, N);
-/// O(n).
+/// The passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N): damping d, which may be
+/// d₀ + d₁ |v| + d₂ v², smoothed friction f, and what acts by itself in the robot; O(n).
 ///
-/// v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. No other function adds
-/// them: add them to τ where they should act.
+/// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. A spring acts with
+/// −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest (joints of several degrees of freedom: |Δ| in the brackets). The laws are those of MuJoCo's `qfrc_passive`. No other
+/// function adds them: add them to τ where they should act.
 ///
 /// >>> arm = condyle.robots.arm7()
-/// >>> v = np.ones(7)
-/// >>> np.allclose(condyle.passive_torque(arm, v, 1e-3), -arm.damping - arm.friction)
+/// >>> q, v = np.zeros(7), np.ones(7)
+/// >>> np.allclose(condyle.passive_torque(arm, q, v, 1e-3), -arm.damping - arm.friction)
 /// True
-fn passive_torque(model; v: Tangent, smoothing: Speed; out) {
+fn passive_torque(model; q: Position, v: Tangent, smoothing: Speed; out) {
     let mut tau = vec![Scalar::zero(); model.nv()];
-    condyle::terms::passive_torque(model, &v, smoothing, &mut tau);
+    condyle::terms::passive_torque(model, &q, &v, smoothing, &mut tau);
     tau
 }
-each(v: Tangent; smoothing: Speed) -> [nv] |tau| { condyle::terms::passive_torque(model, v, smoothing, tau); }
+each(q: Position, v: Tangent; smoothing: Speed) -> [nv] |tau| {
+    condyle::terms::passive_torque(model, q, v, smoothing, tau)
+}
 
-/// The derivative ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of `passive_torque`, nv numbers: the diagonal of a matrix without
-/// other entries; O(n).
+/// The derivatives of `passive_torque`, exact, as `PassiveDerivatives(dtau_dq, dtau_dv)`, each (nv, nv).
 ///
-/// v: nv numbers; smoothing: ε > 0 (rad/s, m/s).
-fn passive_torque_derivative(model; v: Tangent, smoothing: Speed; out) {
-    let mut slope = vec![Scalar::zero(); model.nv()];
-    condyle::derivatives::passive_torque_derivative(model, &v, smoothing, &mut slope);
-    slope
+/// q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal but for free joints with friction or polynomial
+/// damping; ∂τ/∂q has a block for each spring, and couples joints where gravity is compensated.
+///
+/// >>> arm = condyle.robots.arm7()
+/// >>> d = condyle.passive_torque_derivatives(arm, np.zeros(7), np.ones(7), 1e-3)
+/// >>> np.allclose(d.dtau_dv, -np.diag(arm.damping)), np.any(d.dtau_dq)
+/// (True, False)
+fn passive_torque_derivatives(model; q: Position, v: Tangent, smoothing: Speed; out) {
+    let [mut dtau_dq, mut dtau_dv] = [(); 2].map(|()| DMatrix::from_element(model.nv(), model.nv(), Scalar::zero()));
+    condyle::derivatives::passive_torque_derivatives(model, &q, &v, smoothing, &mut dtau_dq, &mut dtau_dv);
+    PassiveDerivatives { dtau_dq, dtau_dv }
 }
-each(v: Tangent; smoothing: Speed) -> [nv] |slope| {
-    condyle::derivatives::passive_torque_derivative(model, v, smoothing, slope)
 }
+
+/// The derivatives of passive efforts.
+struct PassiveDerivatives<S> {
+    dtau_dq: DMatrix<S>,
+    dtau_dv: DMatrix<S>,
+}
+
+impl<S: Number + Give> Give for PassiveDerivatives<S> {
+    fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
+        give_named!(py, out, "PassiveDerivatives", { "dtau_dq" => self.dtau_dq, "dtau_dv" => self.dtau_dv })
+    }
 }

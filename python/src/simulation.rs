@@ -23,8 +23,8 @@ use std::sync::Arc;
 ///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
 ///     is conserved to rounding.
 /// dt: h, the length of a step (s), above 0.
-/// passive: the smoothing ε of `passive_torque` (rad/s, m/s), if the joints' damping and friction are to act; None for
-///     none of either.
+/// passive: the smoothing ε of `passive_torque` (rad/s, m/s), if damping, friction, springs and gravity compensation are to
+///     act; None for none of these.
 /// tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
 /// max_iterations: Newton's method gives up after this number of iterations.
 /// ground: a `Ground` on which the robot stands, slides and lands, with 'semi_implicit_euler' only; None for none.

@@ -231,10 +231,17 @@ def test_passive_torque() -> None:
     text = condyle.robots.ARM7.replace("<dynamics", "<ignored").replace("</joint>", joint + "</joint>")
     model = condyle.Model.from_urdf_str(text)
     assert np.array_equal(model.friction, np.full(7, 2.0))
-    v = np.linspace(-0.1, 0.2, 7)
-    np.testing.assert_allclose(condyle.passive_torque(model, v, 0.1), -0.5 * v - 2 * np.tanh(v / 0.1), **CLOSE)
-    slope = central(lambda e: condyle.passive_torque(model, v + e, 0.1), 7)
-    np.testing.assert_allclose(np.diag(condyle.passive_torque_derivative(model, v, 0.1)), slope, **DIFFERENCES)
+    q, v = np.full(7, 0.3), np.linspace(-0.1, 0.2, 7)
+    tau = condyle.passive_torque(model, q=q, v=v, smoothing=0.1)
+    np.testing.assert_allclose(tau, -0.5 * v - 2 * np.tanh(v / 0.1), **CLOSE)
+    slope = central(lambda e: condyle.passive_torque(model, q, v + e, 0.1), 7)
+    derivatives = condyle.passive_torque_derivatives(model, q, v, 0.1)
+    np.testing.assert_allclose(derivatives.dtau_dv, slope, **DIFFERENCES)
+    assert not derivatives.dtau_dq.any()  # it has no springs
+    many = condyle.passive_torque_derivatives(model, np.stack([q, -q]), np.stack([v, -v]), 0.1)
+    np.testing.assert_allclose(many.dtau_dv[0], derivatives.dtau_dv, **CLOSE)
+    both = condyle.passive_torque(model, np.stack([q, -q]), np.stack([v, -v]), 0.1)
+    np.testing.assert_allclose(both, [tau, -tau], **CLOSE)
 
 
 def test_frames_by_name_and_number(quadruped: Robot) -> None:

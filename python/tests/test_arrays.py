@@ -51,8 +51,7 @@ def calls(robot: Robot) -> dict[str, Call]:
         "joint_torque_regressor": lambda **k: condyle.joint_torque_regressor(model, data, q, v, a, **k),
         "kinetic_energy_regressor": lambda **k: condyle.kinetic_energy_regressor(model, data, q, v, **k),
         "potential_energy_regressor": lambda **k: condyle.potential_energy_regressor(model, data, q, **k),
-        "passive_torque": lambda **k: condyle.passive_torque(model, v, 0.01, **k),
-        "passive_torque_derivative": lambda **k: condyle.passive_torque_derivative(model, v, 0.01, **k),
+        "passive_torque": lambda **k: condyle.passive_torque(model, q, v, 0.01, **k),
         "interpolate": lambda **k: condyle.interpolate(model, q, q, 0.5, **k),
         "normalize": lambda **k: condyle.normalize(model, q, **k),
         "transport": lambda **k: condyle.transport(model, v, np.outer(v, [1.0, 2.0]), **k),
@@ -69,6 +68,7 @@ def several(robot: Robot) -> dict[str, Call]:
     return {
         "rnea_derivatives": lambda **k: condyle.rnea_derivatives(model, data, q, v, a, f_ext, **k),
         "aba_derivatives": lambda **k: condyle.aba_derivatives(model, data, q, v, tau, f_ext, **k),
+        "passive_torque_derivatives": lambda **k: condyle.passive_torque_derivatives(model, q, v, 0.01, **k),
         "centroidal_map": lambda **k: condyle.centroidal_map(model, data, q, **k),
         "centroidal_map_rate": lambda **k: condyle.centroidal_map_rate(model, data, q, v, **k),
     }
@@ -112,7 +112,6 @@ def test_shapes(robot: Robot) -> None:
         "kinetic_energy_regressor": (10 * (nb - 1),),
         "potential_energy_regressor": (10 * (nb - 1),),
         "passive_torque": (nv,),
-        "passive_torque_derivative": (nv,),
         "interpolate": (nq,),
         "normalize": (nq,),
         "transport": (nv, 2),
@@ -264,7 +263,7 @@ def test_wrong_words(quadruped: Robot) -> None:
     with pytest.raises(ValueError, match="^argument: expected 'from' or 'to', found 'q'"):
         condyle.difference_jacobian(model, v, "q")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="^smoothing: expected a positive speed, found 0$"):
-        condyle.passive_torque(model, v, 0.0)
+        condyle.passive_torque(model, q, v, 0.0)
     with pytest.raises(ValueError, match=r"^X: expected shape \(18, 2\), found \(17, 2\)$"):
         condyle.transport(model, v, np.zeros((17, 2)))
     with pytest.raises(ValueError, match=r"^X: expected shape \(18, 1\), found \(18,\)$"):

@@ -115,7 +115,7 @@ def test_texts_paths_and_macros(tmp_path: Path) -> None:
         '<link name="base"/>\n</robot>'
     )
     message = told(lambda: Model.from_urdf(path), condyle.ParseError)
-    assert message.startswith(f"{path}:2: property `a`: belongs to xacro: expand the file first (`xacro ")
+    assert message.startswith(f"{path}:2: xacro:property `a`: belongs to xacro: expand the file first (`xacro ")
 
 
 def test_settings_that_are_not_there_are_told_those_that_are() -> None:

@@ -104,7 +104,7 @@ def test_passive_torques_act_where_asked_for() -> None:
         simulation = Simulation(model, passive=passive)
         simulation.set_state(q, v)
         assert simulation.step(tau) == "done"
-        acting = tau if passive is None else tau + condyle.passive_torque(model, v, passive)
+        acting = tau if passive is None else tau + condyle.passive_torque(model, q, v, passive)
         expected = v + 1e-3 * condyle.aba(model, data, q, v, acting)
         np.testing.assert_allclose(simulation.v, expected, **CLOSE)
 

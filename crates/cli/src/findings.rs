@@ -8,8 +8,8 @@ use serde::Serialize;
 /// Something odd, and where the file says it.
 #[derive(Serialize)]
 pub(crate) struct Finding {
-    /// `massless`, `negative_moment`, `triangle`, `singular`, `left_out`, `mass_ratio`, `moment_ratio`, `locked`,
-    /// `no_speed`, `no_effort` or `neutral`.
+    /// `massless`, `negative_moment`, `triangle`, `singular`, `unlikely`, `limit`, `unknown`, `left_out`, `assumed`, `mimic`,
+    /// `mass_ratio`, `moment_ratio` or `neutral`.
     pub kind: &'static str,
     /// The body, joint or element.
     pub name: String,
@@ -33,8 +33,8 @@ pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
             line: lines.of(Kind::Body, &b.name),
             what,
         }));
-        found.extend(limits(model, b).into_iter().map(|(kind, what)| Finding {
-            kind,
+        found.extend(neutral_outside(model, b).map(|what| Finding {
+            kind: "neutral",
             name: b.joint_name.clone(),
             line: lines.of(Kind::Joint, &b.joint_name),
             what,
@@ -57,7 +57,9 @@ fn own(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
         }
         Warning::Negative { body, .. } => ("negative_moment", Kind::Body, body),
         Warning::Triangle { body, .. } => ("triangle", Kind::Body, body),
+        Warning::Unlikely { body, .. } => ("unlikely", Kind::Body, body),
         Warning::Singular { joint } => ("singular", Kind::Joint, joint),
+        Warning::Limit { joint, .. } => ("limit", Kind::Joint, joint),
         _ if warning.place().is_some() => {
             let name = warning.subject().split('`').nth(1).unwrap_or(warning.subject()).to_owned();
             let line = warning.place().map(|place| place.line);
@@ -94,32 +96,15 @@ fn neighbours(model: &Model, i: usize) -> Option<(&'static str, String)> {
     apart(m, n).map(|ratio| ("moment_ratio", say(ratio, "greatest moment of inertia", m, n, "kg m²")))
 }
 
-/// What is odd about the limits of a joint with one coordinate.
-fn limits(model: &Model, b: &Body) -> Vec<(&'static str, String)> {
-    let mut found = Vec::new();
-    if b.mimic.is_some() || b.joint.nv() != 1 {
-        return found;
+/// Whether the neutral position of a joint with one coordinate is outside of its limits.
+fn neutral_outside(model: &Model, b: &Body) -> Option<String> {
+    if b.mimic.is_some() || b.joint.nq() != 1 {
+        return None;
     }
     let (limits, joint) = (model.limits(), &b.joint_name);
-    if b.joint.nq() == 1 {
-        let (lower, upper) = (limits.lower[b.idx_q], limits.upper[b.idx_q]);
-        let q = neutral(model)[b.idx_q];
-        if lower == upper {
-            found.push(("locked", format!("joint `{joint}`: both limits are {lower}: it cannot move")));
-        } else if q < lower - ROUNDING || q > upper + ROUNDING {
-            found.push((
-                "neutral",
-                format!("joint `{joint}`: the neutral position {q} is outside of its limits [{lower}, {upper}]"),
-            ));
-        }
-    }
-    if limits.velocity[b.idx_v] == 0.0 {
-        found.push(("no_speed", format!("joint `{joint}`: its speed limit is 0")));
-    }
-    if limits.effort_lower[b.idx_v] == 0.0 && limits.effort_upper[b.idx_v] == 0.0 {
-        found.push(("no_effort", format!("joint `{joint}`: its effort limit is 0")));
-    }
-    found
+    let (lower, upper, q) = (limits.lower[b.idx_q], limits.upper[b.idx_q], neutral(model)[b.idx_q]);
+    let is_outside = lower < upper && (q < lower - ROUNDING || q > upper + ROUNDING);
+    is_outside.then(|| format!("joint `{joint}`: the neutral position {q} is outside of its limits [{lower}, {upper}]"))
 }
 
 /// The centre of mass (m), and the principal moments of inertia about it, least first (kg m²).

@@ -1,5 +1,6 @@
 //! The lines of a robot's file on which its links and joints stand.
 
+use condyle::Model;
 use std::collections::HashMap;
 
 /// What has a name and a line in a robot's file.
@@ -16,8 +17,8 @@ pub(crate) struct Lines(HashMap<(Kind, String), u32>);
 impl Lines {
     /// Looks them up in the text of a URDF, MJCF or SDF.
     pub(crate) fn new(text: &str) -> Self {
-        let options = roxmltree::ParsingOptions { allow_dtd: true, ..roxmltree::ParsingOptions::default() };
-        let Ok(document) = roxmltree::Document::parse_with_options(text, options) else { return Self(HashMap::new()) };
+        let Ok(text) = Model::well_formed(text) else { return Self(HashMap::new()) };
+        let Ok(document) = roxmltree::Document::parse(&text) else { return Self(HashMap::new()) };
         let mut lines = HashMap::new();
         for node in document.descendants().filter(roxmltree::Node::is_element) {
             let kind = match node.tag_name().name() {

@@ -1,7 +1,7 @@
 //! The visuals of a URDF: what its author wants to be seen of each link.
 
-use condyle::Se3;
-use roxmltree::{Document, Node, ParsingOptions};
+use condyle::{Model, Se3};
+use roxmltree::{Document, Node};
 
 /// A shape on a link, where it stands in the link's frame, and its colour.
 #[derive(Debug, PartialEq)]
@@ -35,8 +35,8 @@ pub(crate) enum Geometry {
 
 /// The visuals of all links, in the file's order. What cannot be read is left out: a picture is no reason to refuse a robot.
 pub(crate) fn read(urdf: &str) -> Vec<Visual> {
-    let options = ParsingOptions { allow_dtd: true, ..ParsingOptions::default() };
-    let Ok(document) = Document::parse_with_options(urdf, options) else { return Vec::new() };
+    let Ok(urdf) = Model::well_formed(urdf) else { return Vec::new() };
+    let Ok(document) = Document::parse(&urdf) else { return Vec::new() };
     let robot = document.root_element();
     let mut visuals = Vec::new();
     for link in children(robot, "link") {
@@ -133,6 +133,14 @@ mod tests {
         let turned = visuals[0].origin.rotation.columns()[0];
         assert!((turned.y - 1.0).abs() < 1e-15, "yaw turns x to y");
         assert_eq!(visuals[0].origin.translation.to_array(), [1.0, 2.0, 3.0]);
+    }
+
+    /// A robot that the reader takes has visuals, though its text is not strict XML.
+    #[test]
+    fn of_robots_that_are_not_strict() {
+        let prolog = "<!------ a ------>\n<?xml version='1.0'?><!DOCTYPE robot>";
+        let text = format!("{prolog}{}", ROBOT.replace("<link name=\"b\">", "<gz:a/><link name=\"b\">"));
+        assert_eq!(read(&text), read(ROBOT));
     }
 
     /// What is no file of a robot has no visuals.

@@ -84,7 +84,7 @@ fn inspect_finds_what_is_odd_and_says_the_line() {
     assert_eq!(find("mass_ratio", "link1"), Some(Some(line("<link name=\"link1\""))));
     assert_eq!(find("massless", "link2"), Some(Some(line("<link name=\"link2\""))));
     assert_eq!(find("singular", "joint2"), Some(Some(line("<joint name=\"joint2\""))));
-    assert_eq!(find("locked", "joint0"), Some(Some(line("<joint name=\"joint0\""))));
+    assert_eq!(find("limit", "joint0"), Some(Some(line("<joint name=\"joint0\""))));
     let text = said(&["inspect", path, "--strict"], 1);
     assert!(text.contains(&format!("{path}:{}:", line("<link name=\"link1\""))), "{text}");
     assert!(text.contains("at the tip of its limb"), "{text}");

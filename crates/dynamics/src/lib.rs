@@ -48,7 +48,7 @@ pub use batch::constrained::{
 pub use batch::constraints::BatchConstraints;
 pub use batch::derivatives::{
     BatchAbaDerivatives, BatchAbaHessian, BatchCentroidalDerivatives, BatchCoriolisDerivatives, BatchEnergyDerivatives,
-    BatchRneaDerivatives, BatchRneaHessian,
+    BatchPassiveDerivatives, BatchRneaDerivatives, BatchRneaHessian,
 };
 pub use batch::kinematics::BatchAccelerationDerivatives;
 pub use batch::results::{Matrices, Poses};
@@ -120,4 +120,6 @@ pub use passes::centroidal::{CentroidalMap, CentroidalMapRate};
 pub use passes::energy::EnergyDerivatives;
 pub use passes::factored_dynamics::ForwardDynamicsMethod;
 pub use passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities};
-pub use passes::passive::{passive_torque, passive_torque_derivative};
+#[doc(hidden)]
+pub use passes::free_armature::{add_armature_bias, subtract_armature_bias};
+pub use passes::passive::{passive_torque, passive_torque_derivatives};

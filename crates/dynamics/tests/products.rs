@@ -274,6 +274,10 @@ fn single_calls(model: &Model) {
     sparse.factorize(crba(m, d, q));
     sparse.inverse(&mut square);
     multiply("inverse by Ltdl", &square);
+    let mut by_v = DMatrix::zeros(nv, nv);
+    passive_torque_derivatives(m, q, v, 0.1, &mut square, &mut by_v);
+    multiply("passive_torque_derivatives by q", &square);
+    multiply("passive_torque_derivatives by v", &by_v);
     let mut dense = Cholesky::new(nv);
     dense.factorize(crba(m, d, q));
     multiply("factor of Cholesky", dense.lower());
@@ -313,6 +317,7 @@ fn batches(model: &Model) -> BTreeSet<&'static str> {
         aba_derivatives(q, v, x, f_ext) [da_dq, da_dv, da_dtau];
         static_torque_derivative(q, f_ext);
         coriolis_derivatives(q, v) [dq, dv];
+        passive_torque_derivatives(q, v, 0.1) [dtau_dq, dtau_dv];
         rnea_hessian(q, v, x, f_ext, lambda) [dqdq, dvdq, dvdv, dadq];
         aba_hessian(q, v, x, f_ext, lambda) [dqdq, dvdq, dvdv, dtaudq];
         rnea_second_derivatives(q, v, x, f_ext) [dqdq, dvdq, dvdv, dadq];

@@ -14,6 +14,7 @@
 
 mod dae;
 mod find;
+mod hull;
 pub mod mjcf;
 mod obj;
 mod part;
@@ -21,6 +22,7 @@ mod simplify;
 mod stl;
 
 pub use find::Places;
+pub use hull::hull;
 use part::Part;
 use serde_json::{Value, json};
 use std::collections::HashMap;
@@ -189,9 +191,36 @@ pub enum Format {
     Dae,
 }
 
+/// The points of a mesh, and its triangles by the points' indices, counter-clockwise from outside; nothing is made smaller. Of
+/// an OBJ with several objects or groups, triangles of the first one and points of all: as MuJoCo reads it.
+///
+/// # Errors
+/// The fault of the file, with the line if it is an OBJ or an STL of text.
+pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
+    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    if format == Format::Obj {
+        (points, triangles) = obj::first(&text(bytes))?;
+    } else {
+        for part in format.read(bytes, &|_| None)? {
+            let first = points.len() as u32;
+            points.extend(part.points);
+            triangles.extend(part.triangles.into_iter().map(|t| t.map(|corner| first + corner)));
+        }
+    }
+    Ok((points, triangles))
+}
+
+/// A text without the mark of byte order that some editors put first.
+fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
+    String::from_utf8_lossy(bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes))
+}
+
+/// Corners, and triangles by the corners' indices.
+pub type Triangles = (Vec<[f64; 3]>, Vec<[u32; 3]>);
+
 impl Format {
     /// The format that a file's ending says it has.
-    fn of(path: &Path) -> Option<Self> {
+    pub fn of(path: &Path) -> Option<Self> {
         match &*path.extension()?.to_str()?.to_lowercase() {
             "stl" => Some(Self::Stl),
             "obj" => Some(Self::Obj),
@@ -202,12 +231,10 @@ impl Format {
 
     /// The parts of a file, whose points are numbers.
     fn read(self, bytes: &[u8], library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
-        // without the mark of byte order that some editors put first
-        let text = || String::from_utf8_lossy(bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes));
         let parts = match self {
             Self::Stl => stl::read(bytes)?,
-            Self::Obj => obj::read(&text(), library)?,
-            Self::Dae => dae::read(&text())?,
+            Self::Obj => obj::read(&text(bytes), library)?,
+            Self::Dae => dae::read(&text(bytes))?,
         };
         match parts.iter().flat_map(|part| &part.points).flatten().all(|x| x.abs() < 1e30) {
             true => Ok(parts),

@@ -8,9 +8,26 @@ type Group = (Option<[f64; 3]>, Vec<Triangle>);
 
 /// The triangles of an OBJ, a part for each material; `library` gives the text of a material file by its name.
 pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
+    let (points, groups) = parse(text, library, false)?;
+    let part = |(color, triangles): Group| Part::of(&points, triangles, color);
+    Ok(groups.into_iter().filter(|group| !group.1.is_empty()).map(part).collect())
+}
+
+/// All points of an OBJ, and the triangles of its first object or group.
+pub(super) fn first(text: &str) -> Result<(Vec<[f64; 3]>, Vec<Triangle>), String> {
+    let (points, groups) = parse(text, &|_| None, true)?;
+    Ok((points, groups.into_iter().flat_map(|group| group.1).collect()))
+}
+
+/// The points of an OBJ, and its triangles by material: all, or those of its first object or group.
+fn parse(
+    text: &str,
+    library: &dyn Fn(&str) -> Option<String>,
+    only_first: bool,
+) -> Result<(Vec<[f64; 3]>, Vec<Group>), String> {
     let (mut points, mut colours) = (Vec::new(), HashMap::new());
     let mut groups: Vec<Group> = vec![(None, Vec::new())];
-    let (mut of_material, mut group, mut count) = (HashMap::new(), 0, 0);
+    let (mut of_material, mut group, mut count, mut skipped) = (HashMap::new(), 0, 0, false);
     for (number, line) in text.lines().enumerate() {
         let wrong = |what: &str| format!("line {}: {what}", number + 1);
         let mut words = Words::new(line);
@@ -24,7 +41,8 @@ pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Resu
                     groups.len() - 1
                 });
             }
-            Some("f") => {
+            Some("o" | "g") => skipped |= only_first && count > 0,
+            Some("f") if !skipped => {
                 let mut corner = || -> Option<Result<u32, String>> {
                     let word = words.next()?;
                     let index = word.split('/').next().and_then(|i| i.parse::<i64>().ok()).unwrap_or(0);
@@ -47,8 +65,7 @@ pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Resu
             _ => {}
         }
     }
-    let part = |(color, triangles): Group| Part::of(&points, triangles, color);
-    Ok(groups.into_iter().filter(|group| !group.1.is_empty()).map(part).collect())
+    Ok((points, groups))
 }
 
 /// The diffuse colours of a material file, by name.
@@ -67,7 +84,7 @@ fn materials(text: &str) -> HashMap<String, [f64; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::read;
+    use super::{first, read};
 
     const TEXT: &str =
         "mtllib a b.mtl\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nusemtl red\nf 1/1/1 2//3 3 -1\nusemtl none\nf 1 2 3\n";
@@ -79,6 +96,14 @@ mod tests {
         assert_eq!(parts.len(), 2);
         assert_eq!((parts[0].triangles.len(), parts[0].color), (2, Some([1.0, 0.0, 0.5])));
         assert_eq!((parts[1].points.len(), parts[1].color), (3, None));
+    }
+
+    #[test]
+    fn first_object_with_the_points_of_all() {
+        let text = TEXT.replace("usemtl none", "o second\nv 5 5 5");
+        let (points, triangles) = first(&text).unwrap();
+        assert_eq!((points.len(), triangles), (5, vec![[0, 1, 2], [0, 2, 3]]));
+        assert_eq!(first(TEXT).unwrap().1.len(), 3); // a material is no object
     }
 
     #[test]

@@ -6,8 +6,14 @@ use alloc::vec::Vec;
 /// Actuator of a robot, as its file describes it. Its ranges are part of [`Limits`](crate::Limits) already, its armature and
 /// damping of the joint's.
 ///
-/// A motor with the control u acts with the force f = u, a servo with f = kp (u − l) − kv l̇, where l is the gear times the
-/// position that it drives. The effort at the joint is gear · f.
+/// With the control u, and the length l, which is the gear times the position that it drives, the actuator acts with the force
+///
+/// ```text
+/// f = gain u + bias − kp l − kv l̇
+/// ```
+///
+/// A motor has the gain 1 and nothing else; a servo of position has the gain kp, one of velocity the gain kv. The effort at the
+/// joint is gear · f.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Actuator<B = usize> {
@@ -15,9 +21,14 @@ pub struct Actuator<B = usize> {
     pub name: String,
     /// Joint, tendon or frame that is driven.
     pub transmission: Transmission<B>,
-    /// Gear: the effort at the joint for each unit of force (1, m). Joints and tendons have the first number; a ball has three,
-    /// a free joint and a frame have six, linear first.
+    /// Gear: the effort at the joint for each unit of force (1, m). Hinges, slides and tendons have the first number. A ball has
+    /// three: an axis in its body. A frame has six, linear first, along its axes. A free joint has six too: a force along the
+    /// world's axes and a torque along the body's.
     pub gear: [f64; 6],
+    /// Force for each unit of control.
+    pub gain: f64,
+    /// Force without control, at length 0 and at rest (N, N m).
+    pub bias: f64,
     /// Gain of position kp (N/m, N m/rad); 0 for a motor.
     pub kp: f64,
     /// Gain of velocity kv (N s/m, N m s/rad); 0 for a motor.
@@ -73,8 +84,8 @@ impl<B: Clone> Actuator<B> {
             }
             Transmission::Frame { frame: f } => Transmission::Frame { frame: frame(*f) },
         };
-        let Self { name, gear, kp, kv, control, force, .. } = self.clone();
-        Some(Actuator { name, transmission, gear, kp, kv, control, force })
+        let Self { name, gear, gain, bias, kp, kv, control, force, .. } = self.clone();
+        Some(Actuator { name, transmission, gear, gain, bias, kp, kv, control, force })
     }
 }
 

@@ -121,6 +121,7 @@ pub struct JointOptions {
     pub damping_polynomial: [f64; 2],
     /// Coulomb friction (N m, N).
     pub friction: f64,
-    /// Inertia of the rotor as seen at the joint (kg m², kg).
+    /// Inertia of the rotor as seen at the joint (kg m², kg). For a free joint it is also an apparent mass without weight, along the
+    /// axes of its parent: see [`Model::with_armature`](crate::Model::with_armature).
     pub armature: f64,
 }

@@ -157,7 +157,8 @@ impl ModelBuilder {
         self.drafts[body.0].between = true;
     }
 
-    /// Lets a joint follow another one, in place of a coordinate of its own; see [`Mimic`].
+    /// Lets a joint follow another one, in place of a coordinate of its own; see [`Mimic`]. A leader may follow a third joint: ratio
+    /// and offset are then composed.
     ///
     /// # Panics
     /// If the follower is not one of this builder's bodies.
@@ -181,7 +182,15 @@ impl ModelBuilder {
     /// are none; numbers that are not finite, or so large that their products are not (above 1e30); what a mimic joint
     /// follows. Every other way to make a model is checked alike. [`Error::Size`]: more than 4096 degrees of freedom, or
     /// 1024 coordinates where joints follow others.
-    pub fn build(mut self) -> Result<Model, Error> {
+    pub fn build(self) -> Result<Model, Error> {
+        self.build_with(&mut |_| Ok(()))
+    }
+
+    /// Builds the model, which `complete` may change before it is checked.
+    pub(crate) fn build_with(
+        mut self,
+        complete: &mut dyn FnMut(&mut Model) -> Result<(), Error>,
+    ) -> Result<Model, Error> {
         self.check_size()?;
         self.check()?;
         let order = self.depth_first();
@@ -230,6 +239,7 @@ impl ModelBuilder {
             keyframes: Vec::new(),
             constraints: Vec::new(),
             armature,
+            free_armature: Vec::new(),
             gravity: self.gravity,
             limbs: Plan::new(&tree),
             tree,
@@ -239,6 +249,7 @@ impl ModelBuilder {
             singular: Vec::new(),
         };
         self.additions.add_to(&mut model, &number)?;
+        complete(&mut model)?;
         model.validate()?;
         model.geometry = model.hash_geometry();
         Ok(model)
@@ -274,10 +285,58 @@ impl ModelBuilder {
         Ok(())
     }
 
+    /// Names the world `universe`, or `universe_2`, … where a body or joint has that name.
+    fn name_world(&mut self) {
+        let taken = |name: &str, drafts: &[Draft]| {
+            drafts.iter().skip(1).any(|d| d.body.name == name || d.body.joint_name == name)
+        };
+        for k in 1.. {
+            let name = match k {
+                1 => "universe".to_owned(),
+                _ => format!("universe_{k}"),
+            };
+            if !taken(&name, &self.drafts) {
+                let world = &mut self.drafts[0].body;
+                (world.name, world.joint_name) = (name.clone(), name);
+                break;
+            }
+        }
+    }
+
+    /// Lets each joint that follows a follower follow that one's leader: q_f = r₁ (r₂ q + o₂) + o₁.
+    fn compose_mimics(&mut self) -> Result<(), Error> {
+        for i in 1..self.drafts.len() {
+            // the joints on the way to the last leader; from there on each one's own mimic is composed already
+            let mut way = Vec::new();
+            let mut at = i;
+            while let Some((leader, _)) = self.drafts[at].mimic {
+                if self.drafts[leader].mimic.is_none() {
+                    break;
+                }
+                way.push(at);
+                if way.len() >= self.drafts.len() {
+                    let joint = self.drafts[i].body.joint_name.clone();
+                    return Err(Error::Joint { joint, what: "mimics itself, alone or by way of others".to_owned() });
+                }
+                at = leader;
+            }
+            for at in way.into_iter().rev() {
+                if let Some((leader, own)) = self.drafts[at].mimic
+                    && let Some((first, next)) = self.drafts[leader].mimic
+                {
+                    let mimic = Mimic { ratio: own.ratio * next.ratio, offset: own.ratio * next.offset + own.offset };
+                    self.drafts[at].mimic = Some((first, mimic));
+                }
+            }
+        }
+        Ok(())
+    }
+
     /// Checks names, bodies, joints and frames, and makes axes unit vectors.
     fn check(&mut self) -> Result<(), Error> {
+        self.name_world();
+        self.compose_mimics()?;
         let (mut bodies, mut joints, mut frames) = (BTreeSet::new(), BTreeSet::new(), BTreeSet::new());
-        let mimics: Vec<bool> = self.drafts.iter().map(|d| d.mimic.is_some()).collect();
         let kinds: Vec<Joint> = self.drafts.iter().map(|d| d.body.joint).collect();
         for Draft { body, options, mimic, .. } in &mut self.drafts {
             if !bodies.insert(body.name.clone()) {
@@ -295,7 +354,7 @@ impl ModelBuilder {
                 if !(mimic.ratio.is_finite() && mimic.offset.is_finite()) {
                     return Err(wrong(format!("mimic ratio {} or offset {} is not finite", mimic.ratio, mimic.offset)));
                 }
-                if mimics[leader] || leader == 0 {
+                if leader == 0 {
                     return Err(wrong("mimics a joint without a coordinate of its own".to_owned()));
                 }
                 body.joint.as_follower(kinds[leader], mimic).map_err(wrong)?;

@@ -56,12 +56,12 @@ pub enum Joint {
 
 /// A joint that follows another one: its position is ratio · q + offset, q being the leader's position.
 ///
-/// Both have one degree of freedom, and the leader follows nobody. A continuous leader has q = [cos θ, sin θ]: ratio is
+/// Both have one degree of freedom, and the leader has its own coordinate. A continuous leader has q = [cos θ, sin θ]: ratio is
 /// then a whole number, and what follows turns, by ratio · θ + offset. A continuous follower of a leader with one number
 /// turns by ratio · q + offset.
 ///
-/// The follower's armature counts, as ratio² · armature of the leader's coordinate. Its limits, damping and friction do
-/// not: as in Pinocchio, those of a coordinate are its leader's alone.
+/// The follower's armature counts, as ratio² · armature of the leader's coordinate, and so does its spring. Its limits, damping and
+/// friction do not: as in Pinocchio, those of a coordinate are its leader's alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]

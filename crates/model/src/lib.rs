@@ -22,13 +22,14 @@
 //! | equals signs in them | 4 194 304 |
 //! | levels of elements, those of included files counted where they come to stand | 256 |
 //! | attributes of an element | 256 |
-//! | prefixes of namespaces in a file; declarations of them | 256; 65 536 |
+//! | included files of an SDF | 16 384 |
+//! | bytes in the names of an SDF, those of the models around each included | 67 108 864 |
 //! | attributes of all default classes of an MJCF, what they inherit included | 1 048 576 |
 //! | named positions (`<group_state>`) of an SRDF | 4096 |
 //! | degrees of freedom of a model, however it is made | 4096 |
 //! | coordinates of a model whose joints follow others | 1024 |
 //!
-//! A `package://` address stays in its package, but for links there; the files that an MJCF includes may be anywhere. The
+//! A `package://` address stays in its package, but for links there; the files that an MJCF or SDF includes may be anywhere. The
 //! nearest name in an error is looked for by the first 128 characters of names, and among as many as that takes a moment.
 //!
 //! What the crates of algorithms need beside it is hidden from the documentation: the verbs by which a pass sees a model
@@ -37,7 +38,7 @@
 //! # Features
 //! All are on by default. `loaders`: files of robots, and [`robots`]. `serde`: models to and from its formats. `threads`: those of
 //! rayon. `std`: the standard library, which the first and the last need; without it the crate needs `alloc` and, for the
-//! functions of floats, the feature `libm`.
+//! functions of floats, the feature `libm`. Off by default is `urdf-rs`: models from `urdf_rs::Robot`.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
 

@@ -50,6 +50,8 @@ pub struct Model<R = f64> {
     pub(crate) keyframes: Vec<Keyframe>,
     pub(crate) constraints: Vec<ModelConstraint>,
     pub(crate) armature: Vec<R>,
+    /// First coordinates of the free joints with armature along their linear coordinates. Written by: `validate`.
+    pub(crate) free_armature: Vec<usize>,
     pub(crate) gravity: Vec3<R>,
     /// The robot as passes see it.
     pub(crate) tree: Tree<R>,
@@ -225,6 +227,12 @@ impl<R> Model<R> {
     pub fn floating(&self) -> impl Iterator<Item = usize> {
         let floats = |&i: &usize| self.nodes()[i].parent == 0 && self.nodes()[i].joint == Joint::FreeFlyer;
         (1..self.nodes().len()).filter(floats)
+    }
+    /// First coordinates of the free joints with armature along their linear coordinates: an apparent mass in the axes of the
+    /// parent.
+    #[inline(always)]
+    pub fn free_armature(&self) -> &[usize] {
+        &self.free_armature
     }
     /// The bodies, children before parents, in the order in which their subtrees are closed.
     #[inline(always)]

@@ -3,13 +3,15 @@
 use alloc::vec::Vec;
 use condyle_spatial::Vec3;
 
-/// Spring of a joint. With the displacement Δ = q ⊖ rest it acts with
+/// Spring of a joint. With the displacement Δ from its rest it acts with
 ///
 /// ```text
-/// τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ
+/// τ = −(k₀ + k₁ Δ + k₂ Δ²) Δ           (joints of one degree of freedom)
+/// τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ       (others)
 /// ```
 ///
-/// on the joint's degrees of freedom. It acts in [`passive_torque`](https://docs.rs/condyle-dynamics) and in simulations.
+/// on the joint's degrees of freedom, as in MuJoCo. A spherical joint has a rotation vector Δ. A free or planar joint has a
+/// displacement of its origin, along the axes of the parent, and a rotation, each with its own |Δ|. It acts in [`passive_torque`](https://docs.rs/condyle-dynamics) and in simulations.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Spring {

@@ -227,6 +227,11 @@ impl Tree<f64> {
 }
 
 impl<R> Tree<R> {
+    /// First coordinates of the free joints.
+    pub(crate) fn free_joints(&self) -> impl Iterator<Item = usize> {
+        self.nodes[1..].iter().filter(|node| node.joint == Joint::FreeFlyer).map(|node| node.idx_v)
+    }
+
     /// Whether some joints share a coordinate.
     #[inline(always)]
     pub(crate) fn has_mimic(&self) -> bool {

@@ -1,7 +1,7 @@
 //! The validation of a model, by whatever way it is made: numbers that none can have are errors; inertias that no body has
 //! and degrees of freedom along which M is singular are warnings.
 
-use crate::body::{Body, Frame, JointOptions};
+use crate::body::{Body, Frame, JointOptions, Limits};
 use crate::configuration::random_configuration;
 use crate::error::Error;
 use crate::joint::Joint;
@@ -23,6 +23,9 @@ const PIVOT_ROUNDING: f64 = 1e-13;
 const LEAST_PIVOT: f64 = 1e-200;
 /// Positions at which M is looked at. A joint is called singular if it is so at all of them.
 const SAMPLES: usize = 3;
+/// Greatest radius of gyration that a body may have without a warning (m). The largest ships and cranes have less; of public
+/// robots, those beyond have a wrong unit.
+const LARGEST_RADIUS: f64 = 100.0;
 
 /// Says what is wrong with a body's inertia or placement.
 pub(crate) fn check_body(Body { name, inertia: I, placement, .. }: &Body) -> Result<(), Error> {
@@ -97,11 +100,38 @@ fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     let moments = Matrix3::new(c.xx, c.xy, c.xz, c.xy, c.yy, c.yz, c.xz, c.yz, c.zz).symmetric_eigenvalues();
     let mut moments = [moments[0], moments[1], moments[2]];
     moments.sort_by(f64::total_cmp);
-    let rounding = MOMENT_ROUNDING * moments[2].abs();
+    let [.., greatest] = moments;
+    let unlikely = |what: String| Warning::Unlikely { body: name(), what };
+    if I.mass == 0.0 {
+        warnings.push(unlikely(format!("has no mass and a moment of inertia of {greatest:e} kg m²")));
+    } else if greatest > I.mass * LARGEST_RADIUS * LARGEST_RADIUS {
+        let radius = (greatest / I.mass).sqrt();
+        let what = format!("{} kg and {greatest:e} kg m² are a radius of gyration of {radius:.0} m", I.mass);
+        warnings.push(unlikely(format!("{what}, expected at most {LARGEST_RADIUS} m")));
+    }
+    let rounding = MOMENT_ROUNDING * greatest.abs();
     if moments[0] < -rounding {
         warnings.push(Warning::Negative { body: name(), moment: moments[0] });
     } else if moments[2] > moments[0] + moments[1] + rounding {
         warnings.push(Warning::Triangle { body: name(), moments });
+    }
+}
+
+/// Says with which limits a joint of one degree of freedom cannot work. A joint that follows has none of its own.
+fn check_limits(body: &Body, limits: &Limits, warnings: &mut Vec<Warning>) {
+    if body.mimic.is_some() || body.joint.nv() != 1 {
+        return;
+    }
+    let mut warn = |what: String| warnings.push(Warning::Limit { joint: body.joint_name.clone(), what });
+    let (q, v) = (body.idx_q, body.idx_v);
+    if body.joint.nq() == 1 && limits.lower[q] == limits.upper[q] {
+        warn(format!("both limits of position are {}: it cannot move", limits.lower[q]));
+    }
+    if limits.velocity[v] == 0.0 {
+        warn("its limit of velocity is 0: it cannot move".to_owned());
+    }
+    if limits.effort_lower[v] == limits.effort_upper[v] {
+        warn(format!("both limits of effort are {}: it cannot be driven", limits.effort_upper[v]));
     }
 }
 
@@ -121,11 +151,15 @@ impl Model {
                 self.joint_options(q, v).check(&body.joint_name)?;
             }
         }
+        self.find_free_armature()?;
         self.check_magnitudes()?;
         self.check_additions()?;
         let mut warnings = Vec::new();
         for (body, &between) in self.bodies.iter().zip(&self.between).skip(1) {
             check_inertia(body, between, &mut warnings);
+        }
+        for body in self.bodies.iter().skip(1) {
+            check_limits(body, &self.limits, &mut warnings);
         }
         self.find_singular();
         warnings.extend(self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() }));
@@ -228,6 +262,25 @@ impl Placed {
 }
 
 impl Model {
+    /// Finds the free joints with armature along their linear coordinates: a mass in the axes of the parent, so one number.
+    fn find_free_armature(&mut self) -> Result<(), Error> {
+        self.free_armature.clear();
+        for body in self.bodies[1..].iter().filter(|body| body.joint == Joint::FreeFlyer) {
+            let [x, y, z] = [0, 1, 2].map(|k| self.armature[body.idx_v + k]);
+            if x != y || y != z {
+                let what = format!(
+                    "armature is {x}, {y} and {z} along its linear coordinates, expected three equal numbers: \
+                     the armature of a free joint is a mass in the axes of its parent"
+                );
+                return Err(Error::Joint { joint: body.joint_name.clone(), what });
+            }
+            if x > 0.0 {
+                self.free_armature.push(body.idx_v);
+            }
+        }
+        Ok(())
+    }
+
     /// M, by composite rigid bodies: Featherstone (2008), table 6.2, in the world's frame.
     fn inertia_matrix(&self, Placed { oX, S }: &Placed) -> DMatrix<f64> {
         let l = Single::<f64, f64>::new(self);

@@ -37,6 +37,7 @@ impl<R: Scalar> Model<R> {
     pub fn with_scalar_armature(mut self, armature: &[R]) -> Self {
         check("armature", armature.len(), self.nv());
         self.armature.copy_from_slice(armature);
+        self.free_armature = self.tree.free_joints().collect();
         self
     }
 }
@@ -44,8 +45,11 @@ impl<R: Scalar> Model<R> {
 impl Model {
     /// The same robot with another armature, one number for each degree of freedom (kg m², kg).
     ///
+    /// Armature adds armature · q̈ to the efforts. Along the linear coordinates of a free joint it is an apparent mass without
+    /// weight: it resists the acceleration v̇ + ω × v of the body's origin in the axes of the joint's parent, as in MuJoCo.
+    ///
     /// # Errors
-    /// [`Error::Joint`] if one is negative or not finite.
+    /// [`Error::Joint`] if one is negative or not finite, or if the three along the linear coordinates of a free joint differ.
     ///
     /// # Panics
     /// If `armature` has not nv numbers.
@@ -127,6 +131,7 @@ impl Model {
         let mut model = Model {
             tree,
             armature: plain.armature.iter().map(|&a| T::of(a)).collect(),
+            free_armature: plain.free_armature,
             gravity: plain.gravity.lift(),
             name: plain.name,
             bodies: plain.bodies,

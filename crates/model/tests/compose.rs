@@ -47,6 +47,24 @@ fn positions_have_names() {
     assert_eq!(positions[0].1, standing);
 }
 
+/// Names that are unknown have no effect, or are errors of a strict reader.
+#[test]
+fn positions_with_unknown_names() {
+    let text = |state: &str| format!("<robot name='r'><disable_collisions link1='a'/>\n{state}</robot>");
+    let positions = |text: &str, strict| robots::quadruped().reference_configurations_str(text, strict);
+    let odd = text("<group_state nam='x' name='a'><jont name='LF_KFE' value='1'/></group_state>");
+    assert_eq!(positions(&odd, false).unwrap().len(), 1);
+    let said = "<string>: <string>:2: group_state `a`: unknown attribute `nam`; nearest is `name`";
+    refused(&odd, true, said);
+    let odd = odd.replace(" nam='x'", "");
+    refused(
+        &odd,
+        true,
+        "<string>: <string>:2: jont `LF_KFE`: unknown element <jont> in <group_state>; nearest is `joint`",
+    );
+    assert!(positions(&text("<group name='g'><joint nam='x'/></group>"), true).unwrap().is_empty());
+}
+
 #[test]
 fn positions_of_a_robot_with_fewer_joints() {
     let quadruped = robots::quadruped();
@@ -142,9 +160,13 @@ fn a_joint_that_follows_has_no_coordinate_of_its_own() {
     let said = |model: &Model, follower, leader| {
         model.with_mimic(follower, leader, Mimic { ratio: 1.0, offset: 0.0 }).unwrap_err().to_string()
     };
-    let none = "mimics a joint without a coordinate of its own";
-    assert_eq!(said(&coupled, 5, 4), format!("joint `joint5`: {none}"));
-    assert_eq!(said(&coupled, 2, 1), format!("joint `joint4`: {none}")); // it follows joint2
+    // a leader may follow another joint: q5 = 3 (-2 q2 + 0.1) + 1
+    let chained = coupled.with_mimic(5, 4, Mimic { ratio: 3.0, offset: 1.0 }).unwrap();
+    let followers: Vec<_> = chained.bodies().iter().filter_map(|b| b.mimic).collect();
+    assert_eq!(followers, [Mimic { ratio: -2.0, offset: 0.1 }, Mimic { ratio: -6.0, offset: 3.0 * 0.1 + 1.0 }]);
+    let led = coupled.with_mimic(2, 1, Mimic { ratio: 1.0, offset: 0.0 }).unwrap(); // joint4 follows joint2
+    assert_eq!(led.bodies()[4].idx_v, led.bodies()[1].idx_v);
+    assert_eq!(said(&coupled, 2, 4), "joint `joint2`: mimics itself, alone or by way of others");
     let quadruped = robots::quadruped();
     let one = "mimic works between joints of one degree of freedom only";
     assert_eq!(said(&quadruped, 2, 1), format!("joint `LF_HAA`: {one}"));

@@ -10,6 +10,7 @@ use condyle::{
     centroidal::centroidal_map_rate,
     crba,
     derivatives::energy_derivatives,
+    dynamics::add_armature_bias,
     forward_accelerations, forward_kinematics, forward_velocities, integrate, minv, nonlinear_effects,
     regressors::{inertial_parameters, joint_torque_regressor},
     rnea,
@@ -52,10 +53,11 @@ pub(super) fn spectrum(M: &Matrix<f64>) -> (f64, f64) {
     (values.min(), if values.min() > 0.0 { values.max() / values.min() } else { f64::INFINITY })
 }
 
-/// Whether the first body floats, and all others hang on it.
+/// Whether the first body floats, and all others hang on it. A base with armature does not: it has a mass without weight.
 fn floats(model: &Model) -> bool {
     let bodies = model.bodies();
-    bodies.len() > 1 && bodies[1].joint == Joint::FreeFlyer && bodies[2..].iter().all(|b| b.parent > 0)
+    let floats = bodies.len() > 1 && bodies[1].joint == Joint::FreeFlyer && bodies[2..].iter().all(|b| b.parent > 0);
+    floats && model.armature()[..3] == [0.0; 3]
 }
 
 /// The identities of rigid-body dynamics, at so many random states.
@@ -134,7 +136,8 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
             + d.dT_dv.iter().zip(&qdd).map(|(x, y)| (x * y).abs()).sum::<f64>();
         power.compare(&[terms.iter().sum()], &[vector(tau).dot(&vector(v))], size, bound);
 
-        let rotors = vector(a).component_mul(&vector(model.armature()));
+        let mut rotors = vector(a).component_mul(&vector(model.armature()));
+        add_armature_bias(model, v, rotors.as_mut_slice());
         let Y = joint_torque_regressor(model, &mut data, q, v, a);
         let size = largest((Y.abs() * pi.abs()).as_slice());
         regressor.compare((Y * &pi + rotors).as_slice(), &tau_of_a, size, ROUNDING);

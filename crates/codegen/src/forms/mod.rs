@@ -11,7 +11,7 @@ pub(crate) mod joint_placement;
 
 use branches::Branches;
 use condyle_dynamics::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
-use condyle_dynamics::{Data, forward_kinematics, rnea, rnea_derivatives};
+use condyle_dynamics::{Data, forward_kinematics, rnea, rnea_derivatives, subtract_armature_bias};
 use condyle_linalg::gauss_jordan::gauss_jordan;
 use condyle_linalg::tree_product::minus_products;
 use condyle_linalg::{Ltdl, check};
@@ -70,7 +70,9 @@ pub fn aba<S: Scalar, R: Constant<S>>(
     assert!(found == 0 || found == bodies, "f_ext: expected no force or {bodies} (one for each body), found {found}");
     model.check_regular();
     let mut a = vec![S::zero(); model.nv()];
-    aba::pass(&Single::<S, R>::new(model), q, v, tau, f_ext, &mut a);
+    let mut tau = tau.to_vec();
+    subtract_armature_bias(model, v, &mut tau);
+    aba::pass(&Single::<S, R>::new(model), q, v, &tau, f_ext, &mut a);
     a
 }
 

@@ -11,8 +11,10 @@ use crate::calls::derivatives::{
 use crate::calls::parameter_derivatives::Input;
 use crate::calls::second_derivatives::{AbaHessian, RneaHessian, aba_hessian, each_unit_hessian, rnea_hessian};
 use crate::derivatives::centroidal_derivatives::CentroidalDerivatives;
+use crate::derivatives::rnea_derivatives::Workspace;
 use crate::lanes::limbs::pass::Arguments;
 use crate::passes::energy::EnergyDerivatives;
+use crate::passes::passive::{PassiveDerivatives, slopes};
 use condyle_spatial::block::Real;
 
 results! {
@@ -44,6 +46,15 @@ results! {
         dq: Matrices<'b, T> = [NV, NV];
         /// ∂(C v)/∂v, nv × nv.
         dv: Matrices<'b, T> = [NV, NV];
+    }
+
+    /// The derivatives of passive efforts in many states: see
+    /// [`passive_torque_derivatives`](crate::passive_torque_derivatives()).
+    BatchPassiveDerivatives of PassiveDerivatives {
+        /// ∂τ/∂q in the tangent space, nv × nv.
+        dtau_dq: Matrices<'b, T> = [NV, NV];
+        /// ∂τ/∂v, nv × nv.
+        dtau_dv: Matrices<'b, T> = [NV, NV];
     }
 
     /// The derivatives of the energies in many states: see [`EnergyDerivatives`](crate::EnergyDerivatives).
@@ -147,6 +158,18 @@ batched! {
     /// As [`rnea`](Self::rnea).
     fn coriolis_derivatives(model, data; q, v) -> BatchCoriolisDerivatives<'_, T> {
         coriolis_derivatives(model, data, q, v)
+    }
+
+    /// [`passive_torque_derivatives`](crate::passive_torque_derivatives()) of each state, two matrices nv × nv.
+    ///
+    /// q: nq numbers a state; v: nv; smoothing: ε > 0.
+    ///
+    /// # Panics
+    /// As [`passive_torque`](Self::passive_torque).
+    fn passive_torque_derivatives(model, data; q, v; smoothing: f64) -> BatchPassiveDerivatives<'_, T> {
+        let Workspace { dtau_dq, dtau_dv, .. } = &mut data.rnea_derivatives;
+        slopes(model, q, v, smoothing, dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice());
+        PassiveDerivatives { dtau_dq, dtau_dv }
     }
 
     /// [`energy_derivatives`](crate::energy_derivatives) of each state, nv numbers each.

@@ -8,7 +8,7 @@ use crate::calls::inertia::{crba, minv};
 use crate::calls::inverse_dynamics::{coriolis_matrix, gravity, nonlinear_effects, rnea, static_torque};
 use crate::calls::regressor::{joint_torque_regressor, kinetic_energy_regressor, potential_energy_regressor};
 use crate::passes::factored_dynamics::ForwardDynamicsMethod;
-use crate::passes::passive::{passive_torque, passive_torque_derivative};
+use crate::passes::passive::passive_torque;
 
 batched! {
     /// [`rnea`](crate::rnea()): τ of each state, nv numbers.
@@ -88,26 +88,14 @@ batched! {
 
     /// [`passive_torque`](crate::passive_torque): τ of each state, nv numbers.
     ///
-    /// v: nv numbers a state; smoothing: ε > 0.
+    /// q: nq numbers a state; v: nv; smoothing: ε > 0.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if `smoothing` is not positive.
-    fn passive_torque(model, data; v; smoothing: f64) with wide -> &[T] [[NV]] {
+    fn passive_torque(model, data; q, v; smoothing: f64) with wide -> &[T] [[NV]] {
         let tau = &mut wide[..v.len()];
-        passive_torque(model, v, smoothing, tau);
+        passive_torque(model, q, v, smoothing, tau);
         &*tau
-    }
-
-    /// [`passive_torque_derivative`](crate::passive_torque_derivative): the diagonal of ∂τ/∂v of each state, nv numbers.
-    ///
-    /// v: nv numbers a state; smoothing: ε > 0.
-    ///
-    /// # Panics
-    /// As [`passive_torque`](Self::passive_torque).
-    fn passive_torque_derivative(model, data; v; smoothing: f64) with wide -> &[T] [[NV]] {
-        let slope = &mut wide[..v.len()];
-        passive_torque_derivative(model, v, smoothing, slope);
-        &*slope
     }
 
     /// [`joint_torque_regressor`](crate::joint_torque_regressor): Y of each state, nv × 10 (bodies − 1).

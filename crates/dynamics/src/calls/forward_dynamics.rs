@@ -7,6 +7,7 @@ use crate::data::Data;
 use crate::lanes::limbs::pass::Arguments;
 use crate::passes::aba;
 use crate::passes::factored_dynamics::{ForwardDynamicsMethod, run_dense, run_sparse};
+use crate::passes::free_armature::without_bias;
 use crate::passes::kinematics::positions;
 use crate::selection;
 use condyle_model::Model;
@@ -62,7 +63,13 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut
     }
     let Arguments { q, v, x: tau, f_ext } = arguments;
     positions(model, &mut data.world, q);
-    aba::run(model, &data.world, &mut data.aba, v, tau, f_ext);
+    if model.free_armature().is_empty() {
+        return aba::run(model, &data.world, &mut data.aba, v, tau, f_ext);
+    }
+    let mut effort = core::mem::take(&mut data.aba.effort);
+    without_bias(model, v, tau, &mut effort);
+    aba::run(model, &data.world, &mut data.aba, v, &effort, f_ext);
+    data.aba.effort = effort;
 }
 
 impl ForwardDynamicsMethod {

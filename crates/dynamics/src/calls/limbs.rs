@@ -7,7 +7,7 @@ use crate::lanes::limbs::lanes::Limbs;
 use crate::lanes::limbs::pass::{Arguments, Scratch, load, scatter};
 use crate::lanes::limbs::{LaneView, Plan};
 use crate::passes::kinematics::{PlacementCache, World, place};
-use crate::passes::{aba, crba, rnea};
+use crate::passes::{aba, crba, free_armature, rnea};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::gate::{Fused, Level, is, level, same};
@@ -27,11 +27,20 @@ pub(crate) enum Task {
 
 register_kernel! {
     /// τ by steps.
-    fn rnea_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, a: &[Fused], f_ext: bool, tau: &mut [Fused]) {
+    fn rnea_by_steps<V>(
+        model: &Model,
+        plan: &Plan,
+        s: &mut Scratch,
+        moving: [&[Fused]; 2],
+        f_ext: bool,
+        tau: &mut [Fused],
+    ) {
         let l = Limbs::new(plan, model);
         rnea::pass(&l, &mut s.world.sin_cos, &mut s.rnea, &s.q, &s.v, &s.x, given(f_ext, &s.f_ext));
         scatter(plan, &s.rnea.tau, tau);
+        let [v, a] = moving;
         Single::<Fused, f64>::new(model).add_armature_torque(a, tau);
+        free_armature::add_armature_bias(model, v, tau);
     }
 }
 
@@ -89,13 +98,17 @@ register_kernel! {
         plan: &Plan,
         s: &mut Scratch,
         after_aba: bool,
+        v: &[Fused],
         f_ext: bool,
         matrices: [&mut [Fused]; 3],
     ) {
         let l = Limbs::new(plan, model);
         let a = if after_aba { &s.aba.qdd } else { &s.x };
         let f_ext = given(f_ext, &s.f_ext);
-        rnea_derivatives::pass(&l, &s.world, (&mut s.bodies, matrices), &s.v, a, f_ext, l.minus_gravity(), false);
+        let [dq, dv, da] = matrices;
+        let to = (&mut s.bodies, [dq, &mut *dv, da]);
+        rnea_derivatives::pass(&l, &s.world, to, &s.v, a, f_ext, l.minus_gravity(), false);
+        free_armature::add_slope(model, v, dv);
     }
 }
 
@@ -134,10 +147,14 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
 fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments: Arguments<'_>) {
     let Some(s) = data.limbs.as_deref_mut() else { return };
     let f_ext = !arguments.f_ext.is_empty();
-    load_steps(plan, s, arguments);
+    match task {
+        Task::Aba | Task::AbaDerivatives => load_free(model, plan, s, &mut data.aba, arguments),
+        _ => load_steps(plan, s, arguments),
+    }
     if let Task::Rnea = task {
         data.world.placed = PlacementCache::Nowhere;
-        return rnea_by_steps(model, plan, s, arguments.x, f_ext, Fused::of_mut(&mut data.rnea.tau));
+        let [v, a] = [arguments.v, arguments.x];
+        return rnea_by_steps(model, plan, s, [v, a], f_ext, Fused::of_mut(&mut data.rnea.tau));
     }
     place_steps(model, plan, s);
     data.world.placed = PlacementCache::Limbs(model.geometry_hash());
@@ -152,8 +169,25 @@ fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments
     }
     if let Task::RneaDerivatives | Task::AbaDerivatives = task {
         let matrices = data.rnea_derivatives.parts().1.map(Fused::of_mut);
-        rnea_derivatives_by_steps(model, plan, s, matches!(task, Task::AbaDerivatives), f_ext, matrices);
+        let after_aba = matches!(task, Task::AbaDerivatives);
+        rnea_derivatives_by_steps(model, plan, s, after_aba, arguments.v, f_ext, matrices);
     }
+}
+
+/// Arguments of forward dynamics in lanes, the efforts without the bias of free joints with armature.
+pub(super) fn load_free(
+    model: &Model,
+    plan: &Plan,
+    s: &mut Scratch,
+    d: &mut aba::Workspace<f64>,
+    arguments: Arguments<'_>,
+) {
+    if model.free_armature().is_empty() {
+        return load_steps(plan, s, arguments);
+    }
+    let effort = Fused::of_mut(&mut d.effort);
+    free_armature::without_bias(model, arguments.v, arguments.x, effort);
+    load_steps(plan, s, Arguments { x: effort, ..arguments });
 }
 
 /// Takes the placements that a call left in lanes to where those of single bodies stand.

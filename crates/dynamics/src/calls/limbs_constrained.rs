@@ -1,7 +1,7 @@
 //! Dynamics under constraints with the limbs of a robot side by side.
 #![allow(unsafe_code)]
 
-use super::limbs::{load_steps, place_steps, ready};
+use super::limbs::{load_free, place_steps, ready};
 use crate::constraints::constraint_lanes::{ConstraintLanes, WIDE};
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::data::Data;
@@ -101,7 +101,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
 /// The call, for arguments that fit.
 fn enter(model: &Model, plan: &Plan, data: &mut Data<f64>, set: &mut ConstraintSet<Fused>, arguments: Arguments<'_>) {
     let (Some(s), Some(mut lanes)) = (data.limbs.as_deref_mut(), set.limbs.take()) else { return };
-    load_steps(plan, s, arguments);
+    load_free(model, plan, s, &mut data.aba, arguments);
     place_steps(model, plan, s);
     data.world.placed = PlacementCache::Limbs(model.geometry_hash());
     articulate(model, plan, s, !arguments.f_ext.is_empty());

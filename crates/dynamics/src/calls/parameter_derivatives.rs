@@ -5,8 +5,9 @@
 //!
 //! ```text
 //! ∂τ/∂f_b = −J_bᵀ                        ∂τ_c/∂π_b = y(S_c, a_b) − y(v_b × S_c, v_b)     (regressor.rs)
-//! ∂τ_c/∂g = −(Iᶜ S_c)_linear             ∂τ/∂armature = diag(q̈)
+//! ∂τ_c/∂g = −(Iᶜ S_c)_linear             ∂τ/∂armature = diag(q̈), + ω × v of a free joint
 //! ∂τ/∂damping = diag(q̇)                  ∂τ/∂friction = diag(tanh(q̇/ε))                  (where passive efforts act)
+//! ∂τ/∂damping = Rᵀ diag(R v)             ∂τ/∂friction = Rᵀ diag(tanh(R v/ε))             (v of a free joint)
 //! ```
 //!
 //! Of forward dynamics, M q̈ + h = τ gives ∂q̈/∂· = −M⁻¹ B.
@@ -17,8 +18,9 @@ use crate::passes::passive::check_smoothing;
 use crate::passes::regressor::{PARAMETERS, effort};
 use condyle_linalg::check_index;
 use condyle_model::Model;
+use condyle_model::joint::Joint;
 use condyle_spatial::elementary::tanh;
-use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Matrix, Scalar, alike, kernel};
+use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Mat3, Matrix, Scalar, Vec3, alike, kernel};
 
 /// An input of the dynamics beside position, velocity, acceleration and effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,18 +141,62 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
                 for k in 0..model.nv() {
                     to.add(k, k, pass.qdd[k]);
                 }
-            }
-            Input::Damping => {
-                for k in 0..model.nv() {
-                    to.add(k, k, pass.qd[k]);
+                for node in model.nodes()[1..].iter().filter(|node| node.joint == Joint::FreeFlyer) {
+                    let part = |k: usize| Vec3::new(pass.qd[k], pass.qd[k + 1], pass.qd[k + 2]);
+                    let turned = part(node.idx_v + 3).cross(part(node.idx_v)).to_array(); // ω × v of a free joint
+                    for k in 0..3 {
+                        to.add(node.idx_v + k, node.idx_v + k, turned[k]);
+                    }
                 }
             }
-            Input::Friction { smoothing } => {
-                for k in 0..model.nv() {
-                    to.add(k, k, tanh(pass.qd[k] * S::splat(1.0 / smoothing)));
+            Input::Damping => self.losses(None, to),
+            Input::Friction { smoothing } => self.losses(Some(smoothing), to),
+        }
+    }
+}
+
+impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
+    /// Gives what a unit of damping, or with a smoothing of friction, loses on each coordinate. A free joint loses along the axes
+    /// of its parent: in the body's axes Rᵀ diag(x(R v)).
+    #[inline(always)]
+    fn losses(&self, smoothing: Option<f64>, to: &mut Entries<'_, S>) {
+        let (model, qd) = (self.model, &self.pass.qd[..]);
+        let lost = |v: S| match smoothing {
+            None => v,
+            Some(smoothing) => tanh(v * S::splat(1.0 / smoothing)),
+        };
+        for (i, node) in model.nodes().iter().enumerate().skip(1) {
+            if node.mimic.is_some() {
+                continue; // its coordinate is its leader's
+            }
+            let (first, nv) = (node.idx_v, node.joint.nv());
+            let turned = if node.joint == Joint::FreeFlyer { 3 } else { 0 };
+            if turned > 0 {
+                let rotation = self.free_rotation(i);
+                let u = rotation * Vec3::new(qd[first], qd[first + 1], qd[first + 2]);
+                let rows = rotation.transpose().columns();
+                for (c, u) in u.to_array().into_iter().enumerate() {
+                    let column = rows[c].scale(lost(u)).to_array(); // Rᵀ e_c x(u_c)
+                    for k in 0..turned {
+                        to.add(first + k, first + c, column[k]);
+                    }
                 }
+            }
+            for k in first + turned..first + nv {
+                to.add(k, k, lost(qd[k]));
             }
         }
+    }
+
+    /// The rotation of a free joint: from the axes of its body to those of its parent.
+    #[inline(always)]
+    fn free_rotation(&self, i: usize) -> Mat3<S> {
+        let body = &self.model.bodies()[i];
+        let mut rotation: Mat3<S> = body.placement.rotation.lift();
+        if body.parent > 0 {
+            rotation = self.pose(body.parent).rotation * rotation;
+        }
+        rotation.transpose() * self.pose(i).rotation
     }
 }
 

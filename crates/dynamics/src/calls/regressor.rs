@@ -10,7 +10,8 @@ use condyle_spatial::{Constant, Matrix, Scalar};
 ///
 /// q: nq numbers; v, a: nv. Returns the nv × 10 (bodies − 1) matrix whose columns 10 (i − 1) … 10 i − 1 belong to body i,
 /// in the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). With the
-/// rotors it reads τ = Y π + armature a. Allocates nothing. Source: Atkeson, An, Hollerbach (1986).
+/// rotors it reads τ = Y π + armature a; armature is no inertial parameter. Along the linear coordinates of a free joint the
+/// rotors' part is armature (v̇ + ω × v). Allocates nothing. Source: Atkeson, An, Hollerbach (1986).
 ///
 /// ```
 /// use condyle_dynamics::{Data, inertial_parameters, joint_torque_regressor, rnea, robots};

@@ -15,6 +15,7 @@ use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_motion::FramePair;
 use crate::constraints::constraint_set::ConstraintSet;
 use crate::passes::crba;
+use crate::passes::free_armature::add_armature_bias;
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_linalg::Ltdl;
@@ -143,6 +144,7 @@ kernel! {
         f_ext: &[Force<S>],
     ) {
         bias(&Single::new(model), world, d, v, f_ext);
+        add_armature_bias(model, v, &mut d.effort);
         for k in 0..tau.len() {
             d.effort[k] = tau[k] - d.effort[k]; // τ − h
         }

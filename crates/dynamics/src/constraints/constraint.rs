@@ -2,8 +2,7 @@
 
 use crate::passes::frames::ReferenceFrame;
 use alloc::borrow::ToOwned;
-use condyle_model::Error;
-use condyle_model::Model;
+use condyle_model::{Error, Model, ModelConstraint, ModelConstraintKind};
 use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, alike};
 use core::any::Any;
 
@@ -160,6 +159,51 @@ impl ContactConstraint {
     /// A rigid contact of a frame with the world, in `Local`, without stabilisation.
     pub fn rigid(frame: usize) -> Self {
         Self { kind: ConstraintKind::Rigid, ..Self::point(frame) }
+    }
+
+    /// The constraint of a model's file, in `Local`, without stabilisation; `None` for a coupling of joints, which holds no frame.
+    ///
+    /// A model lists the loops of its file ([`Model::constraints`]) and leaves them open: the algorithms of a tree do not know
+    /// them. With [`constrained_dynamics`](crate::constrained_dynamics()) they are closed. An error of position, as the first state
+    /// may have it, decays with the gains kp and kd.
+    ///
+    /// ```
+    /// use condyle_dynamics::{ConstraintSet, ContactConstraint, Data, Inertia, Joint, ModelBuilder, Proximal, Se3, Sym3};
+    /// use condyle_dynamics::{Vec3, WORLD, constrained_dynamics, forward_kinematics, integrate};
+    /// // a four-bar linkage: two cranks on the world, and a coupler on the first one that a pin holds to the second one
+    /// let at = |x, z| Se3 { translation: Vec3::new(x, 0.0, z), ..Se3::identity() };
+    /// let hinge = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
+    /// let bar = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, 0.5), Sym3::diagonal(0.1));
+    /// let mut robot = ModelBuilder::new("four-bar");
+    /// let crank = robot.body("crank", WORLD, hinge, at(0.0, 0.0), bar);
+    /// let coupler = robot.body("coupler", crank, hinge, at(0.0, 1.0), bar);
+    /// let rocker = robot.body("rocker", WORLD, hinge, at(1.0, 0.0), bar);
+    /// robot.constraint_point("pin", [(coupler, at(1.0, 0.0)), (rocker, at(0.0, 1.0))]);
+    /// let robot = robot.build()?;
+    ///
+    /// let stiff = |loop_: ContactConstraint| ContactConstraint { kp: 400.0, kd: 40.0, ..loop_ };
+    /// let loops: Vec<_> = robot.constraints().iter().filter_map(ContactConstraint::of).map(stiff).collect();
+    /// let (mut loops, mut data) = (ConstraintSet::new(&robot, &loops)?, Data::new(&robot));
+    /// loops.proximal = Proximal { mu: 1e-8, iterations: 5 }; // the third row of a pin in a plane is redundant
+    /// let (mut q, mut v, dt) = (vec![0.0; 3], vec![0.0; 3], 1e-3);
+    /// for _ in 0..1000 {
+    ///     let a = constrained_dynamics(&robot, &mut data, &mut loops, &q, &v, &[1.0, 0.0, 0.0], &[]).a;
+    ///     v.iter_mut().zip(a).for_each(|(v, a)| *v += dt * a);
+    ///     let (way, before): (Vec<f64>, _) = (v.iter().map(|v| dt * v).collect(), q.clone());
+    ///     integrate(&robot, &before, &way, &mut q);
+    /// }
+    /// let placements = forward_kinematics(&robot, &mut data, &q);
+    /// let ends = ["pin#1", "pin#2"].map(|name| placements.frame(robot.frame(name).unwrap()).translation);
+    /// assert!(q[0].abs() > 0.1 && (ends[0] - ends[1]).norm_squared() < 1e-6); // it has moved, and the loop is closed
+    /// # Ok::<(), condyle_dynamics::Error>(())
+    /// ```
+    pub fn of(constraint: &ModelConstraint) -> Option<Self> {
+        let (frames, kind) = match constraint.kind {
+            ModelConstraintKind::Point { frames } => (frames, ConstraintKind::Point),
+            ModelConstraintKind::Rigid { frames } => (frames, ConstraintKind::Rigid),
+            _ => return None,
+        };
+        Some(Self { kind, other: Some(frames[1]), ..Self::point(frames[0]) })
     }
 
     /// The bodies of both frames, unless something is wrong with this constraint or with it beside the ones before.

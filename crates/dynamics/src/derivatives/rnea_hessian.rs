@@ -31,6 +31,7 @@
 
 use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
+use crate::passes::free_armature;
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
@@ -147,5 +148,6 @@ kernel! {
         lambda: &[S],
     ) {
         pass(&Single::new(model), world, first, d, lambda);
+        free_armature::add_curvature(model, lambda, d.dvdv.as_mut_slice());
     }
 }

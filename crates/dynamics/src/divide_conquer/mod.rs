@@ -18,6 +18,7 @@ use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Assembly, AssemblySize, HANDLE, Kind, Link};
 use crate::divide_conquer::mimic::Ties;
 use crate::divide_conquer::scratch::{Body, Dof, Part};
+use crate::passes::free_armature::subtract_armature_bias;
 use alloc::vec::Vec;
 use condyle_linalg::{check, threads};
 use condyle_model::Model;
@@ -126,12 +127,14 @@ impl<S: Scalar> DivideConquer<S> {
         check("tau", tau.len(), model.nv());
         check_forces(f_ext.len(), bodies);
         let l = Single::<S, R>::new(model);
+        self.qdd.copy_from_slice(tau);
+        subtract_armature_bias(model, v, &mut self.qdd); // efforts, until the accelerations take their place
         let mut dofs = self.dofs.iter_mut();
         for link in &self.assembly.links {
             let node = &model.nodes()[link.body];
             for (k, dof) in dofs.by_ref().take(node.joint.nv()).enumerate() {
                 let leads = node.mimic.is_none(); // efforts and armature of a shared coordinate act at its leader
-                dof.tau = if leads { tau[node.idx_v + k] } else { S::zero() };
+                dof.tau = if leads { self.qdd[node.idx_v + k] } else { S::zero() };
                 dof.rotor = if leads { l.armature(link.body, k) } else { S::zero() };
             }
         }

@@ -34,6 +34,8 @@ workspace! {
         pub u: Array<S> = filled(S::zero, size.columns),
         /// Joint accelerations. Written by: `outward`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
+        /// τ without the bias of free joints with armature. Written by: `aba`.
+        pub effort: Array<S> = filled(S::zero, size.nv),
     }
 }
 

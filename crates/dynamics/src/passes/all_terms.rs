@@ -8,6 +8,7 @@ use crate::passes::centroidal::{self, CentroidalMapRate};
 use crate::passes::coriolis::Coriolis;
 use crate::passes::energy::rotors;
 use crate::passes::frames::{ReferenceFrame, Velocities, classical};
+use crate::passes::free_armature::add_armature_bias;
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
@@ -167,6 +168,7 @@ kernel! {
     ) {
         let l = Single::new(model);
         pass(&l, world, moving, centroidal, d);
+        add_armature_bias(model, &moving.qd, &mut d.h);
         d.kinetic_energy = (d.kinetic_energy + rotors(model, &moving.qd)) * S::splat(0.5);
         d.potential_energy = l.minus_gravity().dot(centroidal.IC[0].mass_com); // −gᵀ Σ m c
         centroidal::shift_rate(model, centroidal);

@@ -11,6 +11,7 @@
 //! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 numbers other than zero, given by the momentum
 //! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
+use crate::passes::free_armature;
 use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
@@ -133,5 +134,6 @@ kernel! {
     /// For bodies whose velocities are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
+        free_armature::add_coriolis(model, &moving.qd, d.C.as_mut_slice());
     }
 }

@@ -1,27 +1,49 @@
-//! What joints lose by themselves: viscous damping and Coulomb friction, the latter smoothed.
+//! Efforts that a robot exerts on itself: damping and friction of joints, springs, and gravity compensation.
 //!
 //! ```text
-//! τ_k = −d_k v_k − f_k tanh(v_k/ε)
+//! τ_k = −(d + d₁ |v_k| + d₂ v_k²) v_k − f tanh(v_k/ε) − (spring of the joint)_k + (gravity compensation)_k
 //! ```
 //!
-//! d and f are the model's [`damping`](Model::damping) and [`friction`](Model::friction) (a URDF's
-//! `<dynamics damping friction>`). No other algorithm knows of them: whoever wants them adds them to τ.
+//! d and f are the model's [`damping`](Model::damping) and [`friction`](Model::friction) (a URDF's `<dynamics damping
+//! friction>`), d₁ and d₂ its [`damping_polynomial`](Model::damping_polynomial). Springs are in `springs.rs`, gravity
+//! compensation is in `gravity_compensation.rs`. No other algorithm knows of them: a caller adds them to τ.
 //!
 //! Coulomb's law jumps at v = 0. tanh replaces the jump by the slope f/ε: the law is right to 1 % from |v| = 2.65 ε on
 //! and to 1e-6 from 7.25 ε, and at rest a joint creeps (a load below f moves it with less than ε artanh(load/f))
 //! instead of sticking. An explicit integrator needs steps shorter than 2 ε m/f, m the inertia that the joint feels.
+//!
+//! The linear coordinates of a free joint lose along the axes of its parent, as in MuJoCo: with the rotation R of the joint,
+//! u = R v, and the loss L of each component of u, τ = −Rᵀ L(u). Plain damping with three equal numbers is the same along any
+//! axes. When the body turns by δ, u changes by R (δ × v) and Rᵀ by −δ× Rᵀ. With A = Rᵀ diag(L′) R
+//!
+//! ```text
+//! ∂τ/∂v = −A     ∂τ/∂δ = τ× + A v×
+//! ```
 
+use super::{gravity_compensation, springs};
 use condyle_linalg::check;
 use condyle_model::Model;
+use condyle_model::joint::Joint;
+use condyle_model::layout::Single;
 use condyle_spatial::elementary::tanh;
-use condyle_spatial::{Scalar, kernel};
+use condyle_spatial::{Constant, Dense, DenseMatrix, Mat3, Matrix, Quaternion, Scalar, Vec3, kernel};
 
-/// τ = −d v − f tanh(v/ε): the efforts of damping and smoothed friction, in O(n).
+/// τ = −d v − f tanh(v/ε) + springs + gravity compensation: the efforts that a robot exerts on itself.
 ///
-/// v: nv numbers; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv (N m, N), overwritten.
-/// They always take power: vᵀ τ ≤ 0. The smoothed law is right to 1 % from |v| = 2.65 ε on. At rest a joint creeps instead of
-/// sticking: a load below f moves it with less than ε artanh(load/f). An explicit integrator needs steps shorter than 2 ε m/f,
-/// with m the inertia that the joint feels. Allocates nothing.
+/// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv (N m, N), overwritten.
+///
+/// - Damping and friction take power. Damping may be a polynomial, d = d₀ + d₁ |v| + d₂ v²
+///   ([`Model::damping_polynomial`]). The smoothed friction is right to 1 % from |v| = 2.65 ε on. At rest a joint creeps instead
+///   of sticking: a load below f moves it with less than ε artanh(load/f). An explicit integrator needs steps shorter than
+///   2 ε m/f, with m the inertia that the joint feels.
+/// - A spring ([`Spring`](crate::Spring)) acts against the displacement Δ from its rest: with −(k₀ + k₁ Δ + k₂ Δ²) Δ on a joint
+///   of one degree of freedom, with −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ on others. Of a spherical joint Δ is a rotation vector in the
+///   body's axes. Free and planar joints have a displacement of the origin and a rotation, each with its own |Δ|. The spring of
+///   a joint that follows another one acts on the leader's coordinate.
+/// - Gravity compensation ([`GravityCompensation`](crate::GravityCompensation)) carries a part of the weight of bodies:
+///   τ = −Σ Jᵀ m g.
+///
+/// In O(n), and O(depth) for each body whose weight is carried. Allocates nothing. The laws are those of MuJoCo (`mj_passive`).
 ///
 /// ```
 /// use condyle_dynamics::{Joint, JointOptions, ModelBuilder, Inertia, Se3, Sym3, Vec3, WORLD, passive_torque};
@@ -29,67 +51,202 @@ use condyle_spatial::{Scalar, kernel};
 /// let I = Inertia::from_com(1.0, Vec3::zero(), Sym3::zero());
 /// let losses = JointOptions { damping: 0.5, friction: 2.0, ..JointOptions::default() };
 /// let x = Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) };
-/// robot.body_with(("cart", "rail"), WORLD, x, Se3::identity(), I, losses);
+/// let cart = robot.body_with(("cart", "rail"), WORLD, x, Se3::identity(), I, losses);
+/// robot.spring(cart, [10.0, 0.0, 0.0], &[0.2]); // 10 N/m, at rest at 0.2 m
 /// let mut tau = [0.0];
-/// passive_torque(&robot.build()?, &[3.0], 0.01, &mut tau);
-/// assert!(f64::abs(tau[0] + 0.5 * 3.0 + 2.0) < 1e-15);
+/// passive_torque(&robot.build()?, &[0.3], &[3.0], 0.01, &mut tau);
+/// assert!(f64::abs(tau[0] + 0.5 * 3.0 + 2.0 + 10.0 * 0.1) < 1e-14);
 /// # Ok::<(), condyle_dynamics::Error>(())
 /// ```
 ///
 /// # Panics
 /// If an argument has the wrong length, or `smoothing` is not positive.
 #[track_caller]
-pub fn passive_torque<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, tau: &mut [S]) {
-    check_arguments(model, v, smoothing, "tau", tau.len());
-    losses(model.damping(), model.friction(), v, smoothing, tau);
+pub fn passive_torque<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, tau: &mut [S]) {
+    check("q", q.len(), model.nq());
+    check("v", v.len(), model.nv());
+    check("tau", tau.len(), model.nv());
+    check_smoothing(smoothing);
+    efforts(model, q, v, smoothing, tau);
 }
 
-kernel! {
-    /// −d v − f tanh(v/ε).
-    fn losses<S>(damping: &[f64], friction: &[f64], v: &[S], smoothing: f64, tau: &mut [S]) {
-        for k in 0..tau.len() {
-            let friction = tanh(v[k] * S::splat(1.0 / smoothing)) * S::splat(friction[k]);
-            tau[k] = v[k].mul_add(S::splat(-damping[k]), -friction); // −d v − f tanh(v/ε)
-        }
-    }
-}
-
-/// ∂τ/∂v = −d − f/ε (1 − tanh²(v/ε)) of [`passive_torque`]: the diagonal of a matrix without other entries, in O(n).
+/// The derivatives of [`passive_torque`] with respect to q and v, exact.
 ///
-/// v: nv numbers; smoothing: ε > 0 (rad/s, m/s); dtau_dv: nv (N m s/rad, N s/m), overwritten. Allocates nothing.
+/// q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s); dtau_dq, in the tangent space, and dtau_dv: nv × nv (N m/rad, N/m;
+/// N m s/rad, N s/m), overwritten. ∂τ/∂v is diagonal but for free joints with friction or polynomial damping. ∂τ/∂q has a
+/// block for each spring, and couples joints where gravity is compensated. Allocates nothing.
 ///
 /// ```
-/// use condyle_dynamics::{passive_torque_derivative, robots};
+/// use condyle_dynamics::{passive_torque_derivatives, robots};
+/// use nalgebra::DMatrix;
 /// let humanoid = robots::humanoid();
-/// let mut dtau_dv = vec![0.0; humanoid.nv()];
-/// passive_torque_derivative(&humanoid, &vec![0.1; humanoid.nv()], 0.01, &mut dtau_dv);
-/// assert!(dtau_dv.iter().all(|&x| x <= 0.0));
+/// let (nv, q) = (humanoid.nv(), condyle_dynamics::neutral(&humanoid));
+/// let [mut dtau_dq, mut dtau_dv] = [(); 2].map(|()| DMatrix::zeros(nv, nv));
+/// passive_torque_derivatives(&humanoid, &q, &vec![0.1; nv], 0.01, &mut dtau_dq, &mut dtau_dv);
+/// assert!(dtau_dv.diagonal().iter().all(|&x: &f64| x <= 0.0) && dtau_dq.amax() == 0.0); // it has no springs
 /// ```
 ///
 /// # Panics
-/// If an argument has the wrong length, or `smoothing` is not positive.
+/// If an argument has the wrong shape, or `smoothing` is not positive.
 #[track_caller]
-pub fn passive_torque_derivative<S: Scalar, R>(model: &Model<R>, v: &[S], smoothing: f64, dtau_dv: &mut [S]) {
-    check_arguments(model, v, smoothing, "dtau_dv", dtau_dv.len());
-    slopes(model.damping(), model.friction(), v, smoothing, dtau_dv);
+pub fn passive_torque_derivatives<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    q: &[S],
+    v: &[S],
+    smoothing: f64,
+    dtau_dq: &mut DenseMatrix<S, impl Dense<S>>,
+    dtau_dv: &mut DenseMatrix<S, impl Dense<S>>,
+) {
+    let nv = model.nv();
+    check("q", q.len(), model.nq());
+    check("v", v.len(), nv);
+    for (name, found) in [("dtau_dq", dtau_dq.shape()), ("dtau_dv", dtau_dv.shape())] {
+        assert!(found == (nv, nv), "{name}: expected {nv} × {nv}, found {found:?}");
+    }
+    check_smoothing(smoothing);
+    slopes(model, q, v, smoothing, dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice());
 }
 
-kernel! {
-    /// −d − f/ε (1 − tanh²(v/ε)).
-    fn slopes<S>(damping: &[f64], friction: &[f64], v: &[S], smoothing: f64, dtau_dv: &mut [S]) {
-        for k in 0..dtau_dv.len() {
-            let t = tanh(v[k] * S::splat(1.0 / smoothing));
-            let slope = (S::one() - t * t) * S::splat(friction[k] / smoothing);
-            dtau_dv[k] = -S::splat(damping[k]) - slope; // −d − f/ε (1 − tanh²)
+/// The derivatives of passive efforts, for batches.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PassiveDerivatives<'d, S> {
+    pub dtau_dq: &'d Matrix<S>,
+    pub dtau_dv: &'d Matrix<S>,
+}
+
+/// Loss of a coordinate: damping, its polynomial, friction.
+#[derive(Clone, Copy)]
+struct Loss {
+    damping: f64,
+    polynomial: [f64; 2],
+    friction: f64,
+    smoothing: f64,
+}
+
+impl Loss {
+    #[inline(always)]
+    fn of<R>(model: &Model<R>, k: usize, smoothing: f64) -> Self {
+        let (damping, friction) = (model.damping()[k], model.friction()[k]);
+        Self { damping, polynomial: model.damping_polynomial()[k], friction, smoothing }
+    }
+
+    /// −(d + d₁ |v| + d₂ v²) v − f tanh(v/ε).
+    #[inline(always)]
+    fn effort<S: Scalar>(self, v: S) -> S {
+        let friction = tanh(v * S::splat(1.0 / self.smoothing)) * S::splat(self.friction);
+        if self.polynomial == [0.0; 2] {
+            return v.mul_add(S::splat(-self.damping), -friction);
         }
+        let ([d1, d2], speed) = (self.polynomial, v.abs());
+        let d = speed.mul_add(speed.mul_add(S::splat(d2), S::splat(d1)), S::splat(self.damping)); // d + d₁ |v| + d₂ v²
+        v.mul_add(-d, -friction)
+    }
+
+    /// −d − 2 d₁ |v| − 3 d₂ v² − f/ε (1 − tanh²(v/ε)).
+    #[inline(always)]
+    fn slope<S: Scalar>(self, v: S) -> S {
+        let t = tanh(v * S::splat(1.0 / self.smoothing));
+        let friction = (S::one() - t * t) * S::splat(self.friction / self.smoothing);
+        if self.polynomial == [0.0; 2] {
+            return -S::splat(self.damping) - friction;
+        }
+        let ([d1, d2], speed) = (self.polynomial, v.abs());
+        let d = speed.mul_add(speed.mul_add(S::splat(3.0 * d2), S::splat(2.0 * d1)), S::splat(self.damping));
+        -d - friction
     }
 }
 
-#[track_caller]
-fn check_arguments<S, R>(model: &Model<R>, v: &[S], smoothing: f64, name: &str, out: usize) {
-    check("v", v.len(), model.nv());
-    check(name, out, model.nv());
-    check_smoothing(smoothing);
+/// Whether a free joint loses in another way along the axes of its parent than along the body's.
+#[inline(always)]
+fn is_turned<R>(model: &Model<R>, first: usize) -> bool {
+    let (d, of) = (model.damping(), first..first + 3);
+    let uneven = d[first] != d[first + 1] || d[first] != d[first + 2];
+    uneven
+        || model.friction()[of.clone()] != [0.0; 3]
+        || model.damping_polynomial()[of].iter().any(|&polynomial| polynomial != [0.0; 2])
+}
+
+/// Rotation of a free joint, and the velocity of its origin along the axes of the body.
+#[inline(always)]
+fn turn<S: Scalar>(q: &[S], v: &[S]) -> (Mat3<S>, Vec3<S>) {
+    (Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation(), Vec3::new(v[0], v[1], v[2]))
+}
+
+/// A function of each component of a vector u, which is a free joint's velocity along the axes of its parent.
+#[inline(always)]
+fn each<S: Scalar, R>(model: &Model<R>, first: usize, smoothing: f64, u: Vec3<S>, slope: bool) -> Vec3<S> {
+    let mut x = u.to_array();
+    for k in 0..3 {
+        let loss = Loss::of(model, first + k, smoothing);
+        x[k] = if slope { loss.slope(x[k]) } else { loss.effort(x[k]) };
+    }
+    Vec3::from(x)
+}
+
+kernel! {
+    /// All efforts.
+    pub(crate) fn efforts<S, R>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, tau: &mut [S]) {
+        for k in 0..tau.len() {
+            tau[k] = Loss::of(model, k, smoothing).effort(v[k]);
+        }
+        for node in &model.nodes()[1..] {
+            if node.joint == Joint::FreeFlyer && is_turned(model, node.idx_v) {
+                let (rotation, velocity) = turn(&q[node.idx_q..], &v[node.idx_v..]);
+                let effort = each(model, node.idx_v, smoothing, rotation * velocity, false);
+                let effort = rotation.transpose_mul(effort).to_array(); // τ = −Rᵀ L(R v)
+                tau[node.idx_v..node.idx_v + 3].copy_from_slice(&effort);
+            }
+        }
+        if model.springs().is_empty() && model.gravity_compensation().is_empty() {
+            return;
+        }
+        let l = Single::new(model);
+        springs::add_efforts(&l, model, q, tau);
+        gravity_compensation::add_efforts(&l, model, q, tau);
+    }
+}
+
+kernel! {
+    /// All slopes, matrices by columns.
+    pub(crate) fn slopes<S, R>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, dtau_dq: &mut [S], dtau_dv: &mut [S]) {
+        let nv = model.nv();
+        dtau_dq.fill(S::zero());
+        dtau_dv.fill(S::zero());
+        for k in 0..nv {
+            dtau_dv[k * (nv + 1)] = Loss::of(model, k, smoothing).slope(v[k]);
+        }
+        for node in &model.nodes()[1..] {
+            if node.joint == Joint::FreeFlyer && is_turned(model, node.idx_v) {
+                let first = node.idx_v;
+                let (rotation, velocity) = turn(&q[node.idx_q..], &v[first..]);
+                let u = rotation * velocity;
+                let effort = rotation.transpose_mul(each(model, first, smoothing, u, false));
+                let slope = each(model, first, smoothing, u, true).to_array(); // −L′(u)
+                let (by_turn, moved) = (effort.skew().columns(), velocity.skew().columns());
+                for k in 0..3 {
+                    let mut unit = [S::zero(); 3];
+                    unit[k] = S::one();
+                    let by_v = stretched(rotation, slope, Vec3::from(unit)); // ∂τ/∂v = −A
+                    let by_q = by_turn[k] - stretched(rotation, slope, moved[k]); // ∂τ/∂δ = τ× + A v×
+                    dtau_dv[(first + k) * nv + first..][..3].copy_from_slice(&by_v.to_array());
+                    dtau_dq[(first + 3 + k) * nv + first..][..3].copy_from_slice(&by_q.to_array());
+                }
+            }
+        }
+        if model.springs().is_empty() && model.gravity_compensation().is_empty() {
+            return;
+        }
+        let l = Single::new(model);
+        springs::add_slopes(&l, model, q, dtau_dq);
+        gravity_compensation::add_slopes(&l, model, q, dtau_dq);
+    }
+}
+
+/// Rᵀ diag(s) R x.
+#[inline(always)]
+fn stretched<S: Scalar>(R: Mat3<S>, s: [S; 3], x: Vec3<S>) -> Vec3<S> {
+    let u = R * x;
+    R.transpose_mul(Vec3::new(s[0] * u.x, s[1] * u.y, s[2] * u.z))
 }
 
 /// Panics unless a smoothing is positive.

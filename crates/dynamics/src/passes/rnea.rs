@@ -18,6 +18,7 @@
 //! The two loops of the book are one here: a body's subtree is finished when the pass has gone down to its last body, and
 //! its force then goes to the parent. The test `the_book_gives_the_same` runs the book's form beside it.
 
+use crate::passes::free_armature::add_armature_bias;
 use crate::passes::kinematics::{PlacementCache, World};
 use crate::workspace::{filled, workspace};
 use condyle_model::Model;
@@ -105,5 +106,6 @@ kernel! {
     ) {
         world.placed = PlacementCache::Nowhere;
         pass(&Single::new(model), &mut world.sin_cos, d, q, v, a, f_ext);
+        add_armature_bias(model, v, &mut d.tau);
     }
 }

@@ -47,7 +47,7 @@ pub use status::Status;
 
 /// The method by which a step is computed. τ and the external forces stay as they are during a step, forces in the body's
 /// frame;
-/// [passive torques](crate::passive_torque) follow the velocity within it.
+/// [passive torques](crate::passive_torque) follow position and velocity within it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -77,8 +77,8 @@ pub struct Settings {
     pub integrator: Integrator,
     /// h, the length of a step (s), above 0.
     pub dt: f64,
-    /// The smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s), if the joints' damping and friction
-    /// are to act; `None` for none of either.
+    /// The smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s), if the joints' damping and friction,
+    /// springs and gravity compensation are to act; `None` for none of these.
     pub passive: Option<f64>,
     /// Newton's method makes its last iteration, which squares the error, once the momenta balance to within this part of
     /// their sum.
@@ -373,7 +373,7 @@ fn acceleration<'d, S: Scalar, R: Constant<S>>(
     match input.passive {
         None => aba(model, data, q, v, input.tau, input.f_ext),
         Some(smoothing) => {
-            passive_torque(model, v, smoothing, effort);
+            passive_torque(model, q, v, smoothing, effort);
             for (effort, &tau) in effort.iter_mut().zip(input.tau) {
                 *effort += tau;
             }

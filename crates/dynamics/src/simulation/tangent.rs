@@ -94,6 +94,11 @@ fn twists<R>(model: &Model<R>) -> impl Iterator<Item = (&'static [usize], usize)
     joints(model).filter(|(joint, _)| !joint.commutes()).map(|(joint, at)| (joint.axes(), at))
 }
 
+/// The armature of a coordinate whose momentum stays along the body's axes: that of a free joint's linear coordinates does not.
+fn rotor<S: Scalar, R: Constant<S>>(model: &Model<R>, axes: &[usize], at: usize, k: usize) -> S {
+    if axes.len() == SIX && k < 3 { S::zero() } else { model.armature()[at + k].lift() }
+}
+
 /// The coordinates of a joint among the six of a twist.
 fn embed<S: Scalar>(axes: &[usize], x: impl Fn(usize) -> S) -> [S; SIX] {
     let mut six = [S::zero(); SIX];
@@ -105,12 +110,13 @@ fn embed<S: Scalar>(axes: &[usize], x: impl Fn(usize) -> S) -> [S; SIX] {
 
 /// f += w ×* (D w) with the armature D, block by block.
 ///
-/// Armature is D q̈ and nothing else in every algorithm. A Lagrangian with ½ wᵀ D w would turn the momentum D w with the
-/// body, on joints where that makes a difference: this force undoes it. It does no work.
+/// Armature is D q̈ and nothing else in every algorithm, but along the linear coordinates of free joints (`free_armature.rs`). A
+/// Lagrangian with ½ wᵀ D w would turn the momentum D w with the body, on joints where that makes a difference: this force
+/// undoes it. It does no work.
 pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
-        let momentum = Force::from(embed(axes, |k| w[at + k] * model.armature()[at + k].lift()));
+        let momentum = Force::from(embed(axes, |k| w[at + k] * rotor(model, axes, at, k)));
         let force = twist.cross(momentum).to_array();
         for (k, &axis) in axes.iter().enumerate() {
             f[at + k] += force[axis];
@@ -122,10 +128,10 @@ pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f
 pub(super) fn add_rotors_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], A: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
-        let momentum = Force::from(embed(axes, |k| w[at + k] * model.armature()[at + k].lift()));
+        let momentum = Force::from(embed(axes, |k| w[at + k] * rotor(model, axes, at, k)));
         for j in 0..axes.len() {
             let unit = embed(axes, |k| if k == j { S::one() } else { S::zero() });
-            let turned = Force::from(unit).scale(model.armature()[at + j].lift());
+            let turned = Force::from(unit).scale(rotor(model, axes, at, j));
             let column = (Motion::from(unit).cross(momentum) + twist.cross(turned)).to_array();
             for (i, &axis) in axes.iter().enumerate() {
                 A[(at + j) * model.nv() + at + i] += column[axis];

@@ -16,6 +16,8 @@
 //! M + h/2 ∂p/∂q J(y/2) − h ∂(J(−y)ᵀ p)/∂y − h²/4 ∂(J(−x)ᵀ f)/∂x − h/2 J(−y/2)ᵀ (h/2 ∂²L/∂q∂q J(y/2) + (∂p/∂q)ᵀ + ∂τ/∂v)
 //! ```
 //!
+//! where passive efforts, which depend on q too, add ∂τ/∂q to ∂²L/∂q∂q.
+//!
 //! The map (q, p) → (q', p') is symplectic, its own inverse when h changes sign, and keeps the momentum of whatever
 //! moves freely: Ad(y)ᵀ only expresses it in the body's new frame. Source: Marsden and West (2001), section 2.3, for the
 //! midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. In coordinates v = M(q)⁻¹ p.
@@ -24,7 +26,7 @@ use super::{Input, Settings, Status, lagrangian, lu, tangent};
 use crate::calls::inertia::crba;
 use crate::data::Data;
 use crate::passes::kinematics::place;
-use crate::passes::passive::{passive_torque, passive_torque_derivative};
+use crate::passes::passive::{efforts, slopes};
 use crate::workspace::{filled, workspace};
 use condyle_linalg::Ltdl;
 use condyle_model::Model;
@@ -46,9 +48,10 @@ workspace! {
         minus_x: Array<S> = filled(S::zero, size.nv),
         /// f = ∂L/∂q + τ. Written by: `evaluate`.
         f: Array<S> = filled(S::zero, size.nv),
-        /// The passive efforts of the joints, and their slope. Written by: `evaluate`.
+        /// The passive efforts of the joints, and their slopes in q and v. Written by: `evaluate`.
         passive: Array<S> = filled(S::zero, size.nv),
-        passive_slope: Array<S> = filled(S::zero, size.nv),
+        passive_q: Array<S> = filled(S::zero, size.nv * size.nv),
+        passive_v: Array<S> = filled(S::zero, size.nv * size.nv),
         /// J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
         carried: Array<S> = filled(S::zero, size.nv),
         pushed: Array<S> = filled(S::zero, size.nv),
@@ -88,11 +91,12 @@ fn evaluate<S: Scalar, R: Constant<S>>(
     match input.passive {
         None => {
             d.passive.fill(S::zero());
-            d.passive_slope.fill(S::zero());
+            d.passive_q.fill(S::zero());
+            d.passive_v.fill(S::zero());
         }
         Some(smoothing) => {
-            passive_torque(model, &d.w, smoothing, &mut d.passive);
-            passive_torque_derivative(model, &d.w, smoothing, &mut d.passive_slope);
+            efforts(model, q_m, &d.w, smoothing, &mut d.passive);
+            slopes(model, q_m, &d.w, smoothing, &mut d.passive_q, &mut d.passive_v);
         }
     }
     for k in 0..model.nv() {
@@ -111,12 +115,15 @@ fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S
     let half = h * S::splat(0.5);
     let lagrangian::Workspace { M, p_q, L_qq, .. } = &mut d.lagrangian;
     let A = &mut d.slope;
+    for (L_qq, passive_q) in L_qq.iter_mut().zip(&d.passive_q) {
+        *L_qq += *passive_q; // ∂τ/∂q, which acts as ∂²L/∂q∂q does
+    }
     tangent::multiply_right(model, Exp, &d.x, L_qq);
     for j in 0..nv {
         for i in 0..nv {
-            A[j * nv + i] = L_qq[j * nv + i].mul_add(half, p_q[i * nv + j]); // h/2 ∂²L/∂q∂q J + (∂p/∂q)ᵀ
+            let k = j * nv + i;
+            A[k] = L_qq[k].mul_add(half, p_q[i * nv + j]) + d.passive_v[k]; // h/2 ∂²L/∂q∂q J + (∂p/∂q)ᵀ + ∂τ/∂v
         }
-        A[j * nv + j] += d.passive_slope[j]; // + ∂τ/∂v
     }
     tangent::add_rotors_slope(model, &d.w, A);
     tangent::multiply_left_transposed(model, Exp, &d.minus_x, A);

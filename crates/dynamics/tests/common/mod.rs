@@ -80,6 +80,8 @@ pub(crate) struct Part {
 pub(crate) struct Tree {
     pub(crate) parts: Vec<Part>,
     pub(crate) gravity: Vec3<f64>,
+    /// Whether its passive efforts have all derivatives: no |v| and no |Δ|.
+    pub(crate) smooth: bool,
 }
 
 impl Tree {
@@ -102,7 +104,7 @@ impl Tree {
             Joint::FreeFlyer,
         ];
         kinds.shuffle(rng);
-        let mut tree = Self { parts: Vec::new(), gravity: normal3(rng).scale(5.0) };
+        let mut tree = Self { parts: Vec::new(), gravity: normal3(rng).scale(5.0), smooth: false };
         for joint in kinds {
             // half of the bodies on the last one, so that some branches are long
             let n = tree.parts.len();
@@ -169,9 +171,17 @@ impl Tree {
         let mut ids = vec![WORLD];
         for (i, part) in self.parts.iter().enumerate() {
             let name = format!("b{}", i + 1);
-            let options = JointOptions { armature: part.armature, ..JointOptions::default() };
+            let options = JointOptions { armature: part.armature, ..losses(i, self.smooth) };
             let id =
                 builder.body_with((&name, &name), ids[part.parent], part.joint, part.placement, part.inertia, options);
+            if i % 2 == 1 {
+                let stiffness =
+                    [2.0, if i % 4 == 1 && !self.smooth { 0.5 } else { 0.0 }, if i % 3 == 0 { 0.3 } else { 0.0 }];
+                builder.spring(id, stiffness, rest(part.joint));
+            }
+            if i % 3 == 2 {
+                builder.compensate_gravity(id, part.frame, part.inertia, 0.7);
+            }
             builder.frame(&format!("f{}", i + 1), id, part.frame);
             ids.push(id);
         }
@@ -185,6 +195,39 @@ impl Tree {
     }
 }
 
+/// Damping, with a polynomial or without, and friction of the i-th joint.
+fn losses(i: usize, smooth: bool) -> JointOptions {
+    let damping_polynomial = if i.is_multiple_of(2) { [if smooth { 0.0 } else { 0.02 }, 0.03] } else { [0.0; 2] };
+    let friction = if i % 3 == 0 { 0.2 } else { 0.0 };
+    JointOptions { damping: 0.1 + 0.05 * (i % 3) as f64, damping_polynomial, friction, ..JointOptions::default() }
+}
+
+/// A position at which the spring of a joint rests.
+fn rest(joint: Joint) -> &'static [f64] {
+    match joint {
+        Joint::Continuous { .. } => &[0.6, 0.8],
+        Joint::Spherical => &[0.1, -0.5, 0.5, 0.7],
+        Joint::Planar => &[0.4, -0.3, 0.8, -0.6],
+        Joint::Translation => &[0.1, -0.2, 0.3],
+        Joint::FreeFlyer => &[-0.5, 0.2, 0.4, 0.1, -0.5, 0.5, 0.7],
+        _ => &[0.3],
+    }
+}
+
+/// Efforts of armature: a q̈, and for a free joint's linear coordinates a (v̇ + ω × v).
+#[allow(dead_code)] // by some of the tests
+pub(crate) fn armature_torque(model: &Model, v: &[f64], a: &[f64]) -> Vec<f64> {
+    let mut tau: Vec<f64> = model.armature().iter().zip(a).map(|(armature, a)| armature * a).collect();
+    for body in model.bodies()[1..].iter().filter(|body| body.joint == Joint::FreeFlyer) {
+        let k = body.idx_v;
+        let (linear, angular) = (Vec3::new(v[k], v[k + 1], v[k + 2]), Vec3::new(v[k + 3], v[k + 4], v[k + 5]));
+        for (axis, x) in angular.cross(linear).to_array().into_iter().enumerate() {
+            tau[k + axis] += model.armature()[k + axis] * x;
+        }
+    }
+    tau
+}
+
 /// A robot that does not move: two bodies that are fixed to the world, and a frame.
 #[allow(dead_code)] // by some of the tests
 pub(crate) fn fixed() -> Model {
@@ -196,9 +239,10 @@ pub(crate) fn fixed() -> Model {
     builder.build().expect("a robot need not move")
 }
 
-/// The embedded robots, and random trees without and with mimic joints.
+/// The embedded robots, one of them with an apparent mass of its base as well, and random trees without and with mimic joints.
 pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     let mut models = embedded().to_vec();
+    models.push(robots::quadruped().with_armature(&[0.7; 18]).expect("three equal numbers"));
     for seed in 0..trees {
         models.push(Tree::random(&mut rng(seed)).build());
         models.push(Tree::random_with_mimics(&mut rng(100 + seed)).build());

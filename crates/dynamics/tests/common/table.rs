@@ -14,7 +14,7 @@ use condyle_dynamics::{
     difference_jacobian, distance, energy_derivatives, forward_accelerations, forward_dynamics, forward_kinematics,
     forward_velocities, frame_jacobian, gravity, impulse_dynamics, impulse_dynamics_derivatives, integrate,
     integrate_jacobian, interpolate, joint_torque_regressor, kinetic_energy_regressor, minv, nonlinear_effects,
-    normalize, passive_torque, passive_torque_derivative, potential_energy_regressor, random_configuration, rnea,
+    normalize, passive_torque, passive_torque_derivatives, potential_energy_regressor, random_configuration, rnea,
     rnea_derivatives, rnea_hessian, rnea_second_derivatives, static_torque, static_torque_derivative, transport,
 };
 use nalgebra::DMatrix;
@@ -57,6 +57,7 @@ pub(crate) struct Output<S: Scalar> {
     q: Vec<S>,
     v: Vec<S>,
     square: DMatrix<S>,
+    square2: DMatrix<S>,
     three: DMatrix<S>,
     six: DMatrix<S>,
     six2: DMatrix<S>,
@@ -78,6 +79,7 @@ impl<S: Scalar> Output<S> {
             q: vec![o; model.nq()],
             v: vec![o; nv],
             square: DMatrix::from_element(nv, nv, o),
+            square2: DMatrix::from_element(nv, nv, o),
             three: DMatrix::from_element(3, nv, o),
             six: DMatrix::from_element(6, nv, o),
             six2: DMatrix::from_element(6, nv, o),
@@ -388,10 +390,11 @@ pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
             o.numbers.extend_from_slice(potential_energy_regressor(m, d, &i.q));
         }),
         ("passive_torque", |m, _, i, o| {
-            passive_torque(m, &i.v, 0.1, &mut o.v);
+            passive_torque(m, &i.q, &i.v, 0.1, &mut o.v);
             o.numbers.extend_from_slice(&o.v);
-            passive_torque_derivative(m, &i.v, 0.1, &mut o.v);
-            o.numbers.extend_from_slice(&o.v);
+            passive_torque_derivatives(m, &i.q, &i.v, 0.1, &mut o.square, &mut o.square2);
+            o.numbers.extend_from_slice(o.square.as_slice());
+            o.numbers.extend_from_slice(o.square2.as_slice());
         }),
         ("log-Cholesky parameters", |_, _, i, o| {
             let theta = core::array::from_fn(|k| i.v.get(k % i.v.len().max(1)).copied().unwrap_or(S::zero()));

@@ -96,3 +96,36 @@ for _ in range(3):
         }
     )
 (here / "gripper_mujoco.json").write_text(json.dumps(out))
+
+# Springs, polynomial damping, gravity compensation and the armature of a free joint, for tests/suite/passive.rs: here in the
+# conventions of this library (quaternions w last, the linear velocity of a free joint in the body's axes).
+model = mujoco.MjModel.from_xml_path(str(here / "passive.xml"))
+data = mujoco.MjData(model)
+rng = np.random.default_rng(1)
+states = []
+for _ in range(4):
+    mujoco.mj_resetData(model, data)
+    mujoco.mj_integratePos(model, data.qpos, rng.standard_normal(model.nv), 1.0)
+    data.qvel[:] = rng.standard_normal(model.nv)
+    mujoco.mj_forward(model, data)
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    T = np.eye(model.nv)  # their velocity = T times ours
+    T[:3, :3] = data.body("base").xmat.reshape(3, 3)
+    v = T.T @ data.qvel
+    turned = np.zeros(model.nv)
+    turned[:3] = np.cross(v[3:6], v[:3])  # their acceleration = T (ours + ω × v)
+    q = data.qpos.copy()
+    for joint in ["float", "ball"]:
+        at = model.joint(joint).qposadr[0] + (3 if joint == "float" else 0)
+        q[at : at + 4] = np.roll(q[at : at + 4], -1)
+    states.append(
+        {
+            "q": q.tolist(),
+            "v": v.tolist(),
+            "M": (T.T @ M @ T).tolist(),
+            "bias": (T.T @ (data.qfrc_bias + M @ T @ turned)).tolist(),
+            "passive": (T.T @ data.qfrc_passive).tolist(),
+        }
+    )
+(here / "passive_mujoco.json").write_text(json.dumps(states) + "\n")

@@ -3,7 +3,7 @@
 
 use crate::common;
 
-use common::{State, Worst, all_models, rng};
+use common::{State, Worst, all_models, armature_torque, rng};
 use condyle_dynamics::ReferenceFrame::Local;
 use condyle_dynamics::{
     Act, Cross, Data, Force, Model, Motion, Se3, Vec3, aba, crba, forward_dynamics, forward_kinematics, rnea,
@@ -97,7 +97,7 @@ impl<'a> Book<'a> {
                 f[i] -= *external;
             }
         }
-        let mut tau = qdd.component_mul(&DVector::from_column_slice(model.armature()));
+        let mut tau = DVector::from(armature_torque(model, v, a));
         for i in (1..self.X.len()).rev() {
             tau += self.S[i].transpose() * Vector6::from(f[i].to_array()); // τ_i = S_iᵀ f_i
             let up = self.X[i].act(f[i]);
@@ -132,6 +132,7 @@ impl<'a> Book<'a> {
         let at = |i: usize| (model.bodies()[i].idx_v, model.bodies()[i].joint.nv());
         let vector = Vector6::<f64>::from;
         let [vel, vJ] = self.velocities(v);
+        let rotors = DVector::from(armature_torque(model, v, &vec![0.0; model.nv()])); // at q̈ = 0
         let mut IA = self.inertias();
         let [mut c, mut pA] = [(); 2].map(|()| vec![Vector6::zeros(); bodies]);
         for i in 1..bodies {
@@ -150,6 +151,7 @@ impl<'a> Book<'a> {
             U[i] = IA[i] * S; // U_i = IA_i S_i
             D[i] = S.transpose() * &U[i] + DMatrix::from_diagonal(&armature); // D_i = S_iᵀ U_i
             u[i] = DVector::from_column_slice(&tau[first..first + n]) - S.transpose() * pA[i]; // u_i = τ_i − S_iᵀ pA_i
+            u[i] -= rotors.rows(first, n);
             let D = D[i].clone().cholesky().expect("D is positive definite");
             let Ia = IA[i] - &U[i] * D.solve(&U[i].transpose()); // Ia = IA − U D⁻¹ Uᵀ
             let pa = pA[i] + Ia * c[i] + &U[i] * D.solve(&u[i]); // pa = pA + Ia c + U D⁻¹ u
@@ -200,5 +202,5 @@ fn the_book_gives_the_same() {
             shared.see(model, found, expected.as_slice());
         }
     }
-    assert_eq!(recursions, 3 + TREES);
+    assert_eq!(recursions, 4 + TREES);
 }

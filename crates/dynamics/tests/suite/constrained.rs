@@ -5,10 +5,10 @@ use crate::common;
 use common::contacts::{cases, random_constraint};
 use common::{State, Worst, all_models, dual, lift, moved, normal, rng};
 use condyle_dynamics::{
-    Act, ConstraintKind, ConstraintSet, ContactConstraint, Data, Error, Force, Model, ModelBuilder, Motion, Proximal,
-    ReferenceFrame, Se3, Target, aba, constrained_dynamics, constrained_dynamics_derivatives, crba,
-    forward_accelerations, forward_kinematics, forward_velocities, impulse_dynamics, impulse_dynamics_derivatives, lie,
-    minv, rnea, robots,
+    Act, ConstraintKind, ConstraintSet, ContactConstraint, Data, Error, Force, Inertia, Joint, Model, ModelBuilder,
+    Motion, Proximal, ReferenceFrame, Se3, Sym3, Target, Vec3, WORLD, aba, constrained_dynamics,
+    constrained_dynamics_derivatives, crba, forward_accelerations, forward_kinematics, forward_velocities,
+    impulse_dynamics, impulse_dynamics_derivatives, lie, minv, rnea, robots,
 };
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
@@ -34,7 +34,7 @@ fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64])
     let mut data = Data::new(model);
     let now = forward_kinematics(model, &mut data, q);
     let now = (now.frame(c.frame), c.other.map_or(Se3::identity(), |f| now.frame(f)) * c.target.placement);
-    let turn = Se3::new(now.0.rotation, condyle_dynamics::Vec3::zero());
+    let turn = Se3::new(now.0.rotation, Vec3::zero());
     let shift = Se3::new(condyle_dynamics::Mat3::identity(), now.0.translation);
     let local = c.reference == ReferenceFrame::Local;
     let split =
@@ -50,10 +50,10 @@ fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64])
             }
         }
         _ => {
-            let at = |v: Motion<Dual64>, p: condyle_dynamics::Vec3<Dual64>| v.linear + v.angular.cross(p);
+            let at = |v: Motion<Dual64>, p: Vec3<Dual64>| v.linear + v.angular.cross(p);
             let u = at(v1, x1.translation) - at(v2, x2.translation);
-            let zero = condyle_dynamics::Vec3::zero();
-            let parts = split(Motion::new(u, condyle_dynamics::Vec3::zero()));
+            let zero = Vec3::zero();
+            let parts = split(Motion::new(u, Vec3::zero()));
             let error = Motion::new(now.0.translation - now.1.translation, zero);
             if local { (parts.map(|m| turn.act_inv(m)), turn.act_inv(error)) } else { (parts, error) }
         }
@@ -206,12 +206,11 @@ fn redundant_constraints() {
 #[test]
 fn smallest_forces() {
     let mut builder = ModelBuilder::new("box");
-    let inertia =
-        condyle_dynamics::Inertia::from_com(3.0, condyle_dynamics::Vec3::zero(), condyle_dynamics::Sym3::diagonal(0.1));
+    let inertia = condyle_dynamics::Inertia::from_com(3.0, Vec3::zero(), condyle_dynamics::Sym3::diagonal(0.1));
     let body =
         builder.body("box", condyle_dynamics::WORLD, condyle_dynamics::Joint::FreeFlyer, Se3::identity(), inertia);
     for (k, x) in [-1.0, 0.0, 2.0].into_iter().enumerate() {
-        let placement = Se3 { translation: condyle_dynamics::Vec3::new(x, 0.0, -0.5), ..Se3::identity() };
+        let placement = Se3 { translation: Vec3::new(x, 0.0, -0.5), ..Se3::identity() };
         builder.frame(&format!("f{k}"), body, placement);
     }
     let model = builder.build().unwrap();
@@ -374,4 +373,32 @@ fn another_robots_constraints() {
     let (arm, quadruped) = (robots::arm7(), robots::quadruped());
     let mut set = ConstraintSet::<f64>::new(&quadruped, &[]).unwrap();
     constrained_dynamics(&arm, &mut Data::new(&arm), &mut set, &[0.0; 7], &[0.0; 7], &[0.0; 7], &[]);
+}
+
+/// The loops of a model become constraints of its frames; a coupling of joints holds no frame.
+#[test]
+fn loops_of_a_model() {
+    let mut builder = ModelBuilder::new("loops");
+    let hinge = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
+    let I = Inertia::from_com(1.0, Vec3::new(0.1, 0.2, 0.3), Sym3::diagonal(0.1));
+    let [one, other] = ["one", "other"].map(|name| builder.body(name, WORLD, hinge, Se3::identity(), I));
+    builder.constraint_point("pin", [(one, Se3::identity()), (other, Se3::identity())]);
+    builder.constraint_coupling("gear", one, Some(other), [0.1, -2.0, 0.0, 0.0, 0.0]);
+    builder.constraint_rigid("weld", [(other, Se3::identity()), (WORLD, Se3::identity())]);
+    let model = builder.build().unwrap();
+    let names: Vec<&str> = model.constraints().iter().map(|c| &*c.name).collect();
+    assert_eq!(names, ["pin", "gear", "weld"]);
+    let [pin, gear, weld] = [0, 1, 2].map(|k| ContactConstraint::of(&model.constraints()[k]));
+    let frame = |name: &str| model.frame(name).unwrap();
+    assert_eq!(
+        pin,
+        Some(ContactConstraint { other: Some(frame("pin#2")), ..ContactConstraint::point(frame("pin#1")) })
+    );
+    assert_eq!(gear, None);
+    assert_eq!(
+        weld,
+        Some(ContactConstraint { other: Some(frame("weld#2")), ..ContactConstraint::rigid(frame("weld#1")) })
+    );
+    let both: Vec<ContactConstraint> = model.constraints().iter().filter_map(ContactConstraint::of).collect();
+    assert_eq!(ConstraintSet::<f64>::new(&model, &both).unwrap().rows(), 9);
 }

@@ -44,7 +44,7 @@ fn christoffel_symbols() {
     let mut models = vec![robots::arm7()];
     for seed in 0..TREES {
         let rng = &mut rng(seed);
-        let mut tree = Tree { parts: Vec::new(), gravity: Vec3::zero() };
+        let mut tree = Tree { parts: Vec::new(), gravity: Vec3::zero(), smooth: false };
         for i in 0..8 {
             let axis = normal3(rng);
             let joint =

@@ -23,6 +23,7 @@ mod divide_conquer;
 mod energy;
 mod factorisation;
 mod forward_dynamics;
+mod free_armature;
 mod ground;
 mod guarantees;
 mod identities;

@@ -170,7 +170,7 @@ fn joints_that_cannot_follow() {
     assert_eq!(said("<joint joint2='b'/>"), "<string>:6: <joint>: has no joint1");
     assert_eq!(said("<joint joint1='c'/>"), "<string>:6: <joint>: joint1: no joint is named `c`");
     let each_other = "<joint joint1='a' joint2='b'/><joint joint1='b' joint2='a'/>";
-    assert_eq!(said(each_other), "<string>:4: joint `a`: mimics a joint without a coordinate of its own");
+    assert_eq!(said(each_other), "<string>:4: joint `a`: mimics itself, alone or by way of others");
 }
 
 #[test]

@@ -185,7 +185,7 @@ fn mistakes_with_batches_are_reported_at_the_call() {
     assert_panic(HERE, "input: expected an index below 8", || {
         _ = batch.rnea_input_derivative(&arm, &q, &v, &v, &[], condyle_dynamics::Input::Force(8));
     });
-    assert_panic(HERE, "smoothing: expected a positive speed", || _ = batch.passive_torque(&arm, &v, 0.0));
+    assert_panic(HERE, "smoothing: expected a positive speed", || _ = batch.passive_torque(&arm, &q, &v, 0.0));
     assert_panic(HERE, "tau: expected 14 numbers", || _ = batch.aba(&arm, &q, &v, &[0.0; 13], &[]));
     assert_panic(HERE, "to[0]: expected length 98", || batch.writer(&mut [&mut [0.0; 97]]).crba(&arm, &q));
 

@@ -2,7 +2,7 @@
 
 use crate::common;
 
-use common::{State, Worst, all_models, lift, rng};
+use common::{State, Worst, all_models, armature_torque, lift, rng};
 use condyle_dynamics::{
     Data, Inertia, Model, forward_kinematics, forward_velocities, inertial_parameters, joint_torque_regressor,
     kinetic_energy_regressor, potential_energy_regressor, rnea, robots,
@@ -32,9 +32,7 @@ fn torques() {
         let Y = joint_torque_regressor(model, &mut data, &q, &v, &a);
         assert_eq!(Y.shape(), (model.nv(), 10 * (model.bodies().len() - 1)));
         let mut tau = Y * parameters(model);
-        for k in 0..model.nv() {
-            tau[k] += model.armature()[k] * a[k];
-        }
+        tau += DVector::from(armature_torque(model, &v, &a));
         worst.see(model, tau.as_slice(), rnea(model, &mut data, &q, &v, &a, &[]));
     }
 }

@@ -103,7 +103,8 @@ fn order_on_a_free_body() {
 #[test]
 fn order_on_trees() {
     let losses = JointOptions { damping: 0.2, friction: 0.3, armature: 0.1, ..JointOptions::default() };
-    let (tree, mimics) = (Tree::random(&mut rng(0)), Tree::random_with_mimics(&mut rng(1)));
+    let [tree, mimics] = [Tree::random(&mut rng(0)), Tree::random_with_mimics(&mut rng(1))];
+    let [tree, mimics] = [tree, mimics].map(|tree| Tree { smooth: true, ..tree });
     for (seed, model) in [tree.build(), mimics.build(), double_pendulum(&losses)].into_iter().enumerate() {
         let mut random = rng(seed as u64);
         let Random { q, v, tau, f_ext, .. } = Random::random(&model, &mut random);
@@ -202,7 +203,7 @@ fn variational_steps_are_symmetric() {
 /// Newton's method doubles the digits that are right in each iteration, as it does only with the exact slope of its equation.
 #[test]
 fn variational_steps_converge_quadratically() {
-    let trees = (0..8).map(|seed| Tree::random_with_mimics(&mut rng(seed)).build());
+    let trees = (0..8).map(|seed| Tree { smooth: true, ..Tree::random_with_mimics(&mut rng(seed)) }.build());
     let damped = double_pendulum(&JointOptions { damping: 5.0, ..JointOptions::default() });
     for (seed, model) in trees.chain([damped]).enumerate() {
         let Random { q, v, tau, f_ext, .. } = Random::random(&model, &mut rng(seed as u64));
@@ -216,8 +217,8 @@ fn variational_steps_converge_quadratically() {
             };
             (1..50).find(takes).expect("it converges")
         };
-        let (half, all) = (iterations(1e-6), iterations(1e-12));
-        assert!(all <= half + 1, "{half} iterations to 1e-6, {all} to 1e-12, on\n{model}");
+        let (half, all) = (iterations(1e-5), iterations(1e-10));
+        assert!(all <= half + 1, "{half} iterations to 1e-5, {all} to 1e-10, on\n{model}");
     }
 }
 
@@ -445,7 +446,7 @@ fn nothing_is_allocated() {
             joint_torque_regressor(model, &mut data, &q, &v, &a);
             kinetic_energy_regressor(model, &mut data, &q, &v);
             potential_energy_regressor(model, &mut data, &q);
-            passive_torque(model, &v, 0.1, &mut out);
+            passive_torque(model, &q, &v, 0.1, &mut out);
         });
         assert_eq!(count, 0, "on\n{model}");
     }

@@ -57,9 +57,9 @@ fn files() {
 
 #[test]
 fn documents() {
-    expect("", "<string>:1: not well-formed XML: the document does not have a root node");
-    expect("\nrobot", "<string>:2: not well-formed XML: unknown token at 2:1");
-    expect("\n<robot><link name='a'>", "<string>:1: not well-formed XML: the root node was opened but never closed");
+    expect("", "<string>:1: not well-formed XML: there is no element");
+    expect("\nrobot", "<string>:2: not well-formed XML: text outside of the root element");
+    expect("\n<robot>\n<link name='a'>\n", "<string>:4: not well-formed XML: <link> of line 3 is never closed");
     expect("<!-- no robot -->\n<sdf/>", "<string>:2: <sdf>: the root element of a URDF is <robot>");
     expect("<robot/>", "<string>:1: <robot>: has no links");
     let nested = format!("<robot>\n<link name='a'>{}{}</link></robot>", "<a>".repeat(1 << 16), "</a>".repeat(1 << 16));
@@ -75,7 +75,7 @@ fn xacro() {
     assert!(load(&declared, &UrdfOptions::default()).is_ok()); // expanded files often declare it still
     let used = declared.replace("</robot>", "<xacro:wheel side='left'/>\n</robot>");
     let error = load(&used, &UrdfOptions::default()).unwrap_err();
-    assert!(error.ends_with(&format!(": <wheel>: belongs to xacro: {expand}")), "{error}");
+    assert!(error.ends_with(&format!(": <xacro:wheel>: belongs to xacro: {expand}")), "{error}");
     let error = load(&with(r#"<mass value="1"/>"#, r#"<mass value="${m}"/>"#), &UrdfOptions::default()).unwrap_err();
     assert!(error.ends_with(&format!("`${{m}}` is an expression of xacro: {expand}")), "{error}");
 }
@@ -89,11 +89,6 @@ fn names() {
     expect(&with(base, r#"<link name="arm"/>"#), "<string>:3: link `arm`: the name is taken by the link on line 2");
     let second = r#"<joint name="j" type="fixed"><parent link="base"/><child link="arm"/></joint></robot>"#;
     expect(&with("</robot>", second), "<string>:12: joint `j`: the name is taken by the joint on line 6");
-    let reserved = "joint `root_joint`: the name belongs to the library";
-    let floating = UrdfOptions { root_joint: Some(Joint::FreeFlyer), ..UrdfOptions::default() };
-    assert_eq!(load(&with(r#""j""#, r#""root_joint""#), &floating).unwrap_err(), format!("<string>:6: {reserved}"));
-    let error = load(&with(r#"name="j""#, r#"name="universe""#), &floating).unwrap_err();
-    assert_eq!(error, "<string>:6: joint `universe`: the name belongs to the library");
 }
 
 #[test]
@@ -164,7 +159,6 @@ fn limits() {
     expect(&with(limit, "").replace("revolute", "prismatic"), missing);
     assert!(load(&with(limit, "").replace("revolute", "continuous"), &UrdfOptions::default()).is_ok());
     let lower = r#"lower="-1""#;
-    expect(&with(lower, r#"lower="2""#), "<string>:10: joint `j`: lower limit 2 is above upper limit 1");
     for value in ["nan", "one", "", "1 2"] {
         let said = format!("<string>:10: joint `j`: limit lower: `{value}` is no number");
         expect(&with(lower, &format!(r#"lower="{value}""#)), &said);
@@ -182,9 +176,6 @@ fn inertias() {
     let said = |what: &str| format!("<string>:4: link `arm`: {what}");
     expect(&with(mass, r#"<mass value="1 kg"/>"#), &said("mass value: `kg` is no finite number"));
     expect(&with(mass, r#"<mass value="1 2"/>"#), &said("mass value: expected 1 number, found 2"));
-    expect(&with(mass, "<mass/>"), &said("mass has no value"));
-    expect(&with(mass, ""), &said("inertial has no <mass>"));
-    expect(&with(r#"ixx="1""#, ""), &said("inertia has no ixx"));
     expect(&with(mass, r#"<mass value="nan"/>"#), &said("mass value: `nan` is no finite number"));
     expect(&with(r#"ixx="1""#, r#"ixx="inf""#), &said("inertia ixx: `inf` is no finite number"));
     let origin = r#"<mass value="1"/><origin xyz="0 nan 0"/>"#;
@@ -215,7 +206,7 @@ fn names_in_any_spelling() {
 fn mimics() {
     let mimic = |what: &str| with("<axis", &format!("<mimic {what}/><axis"));
     expect(&mimic(r#"joint="nobody""#), "<string>:6: joint `j`: mimics `nobody`, which is no moving joint");
-    expect(&mimic(r#"joint="j""#), "<string>:6: joint `j`: mimics a joint without a coordinate of its own");
+    expect(&mimic(r#"joint="j""#), "<string>:6: joint `j`: mimics itself, alone or by way of others");
     let nan = "<string>:9: joint `j`: mimic multiplier: `nan` is no finite number";
     expect(&mimic(r#"joint="j" multiplier="nan""#), nan);
     expect(&mimic(""), "<string>:9: joint `j`: mimic has no joint");

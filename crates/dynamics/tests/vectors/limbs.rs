@@ -18,7 +18,7 @@ const TOLERANCE_ABA: f64 = 1e-8;
 /// Robots with three to six limbs of random joints on a random base, some of them with branches.
 fn many_limbs(seed: u64, root: Joint) -> Model {
     let mut rng = rng(seed);
-    let mut tree = Tree { parts: Vec::new(), gravity: [0.0, 1.0, -9.0].into() };
+    let mut tree = Tree { parts: Vec::new(), gravity: [0.0, 1.0, -9.0].into(), smooth: false };
     let base = tree.add(&mut rng, 0, root);
     for limb in 0..3 + seed as usize % 4 {
         let axis = crate::common::normal3(&mut rng);
@@ -282,7 +282,7 @@ fn fingers_of_all_lengths() {
     let mut worst = sums_and_inverses();
     for (seed, lengths) in [&[1, 3, 2, 4, 1][..], &[2, 1, 5], &[1, 1, 4, 4, 4, 4, 2]].into_iter().enumerate() {
         let mut rng = rng(seed as u64);
-        let mut tree = Tree { parts: Vec::new(), gravity: [0.0, 1.0, -9.0].into() };
+        let mut tree = Tree { parts: Vec::new(), gravity: [0.0, 1.0, -9.0].into(), smooth: false };
         for &length in lengths {
             let mut last = 0;
             for _ in 0..length {

@@ -9,7 +9,7 @@ use condyle_dynamics::{
     coriolis_derivatives, coriolis_matrix, crba, energy_derivatives, forward_accelerations, forward_dynamics,
     forward_kinematics, forward_velocities, frame_jacobian, gravity, impulse_dynamics, impulse_dynamics_derivatives,
     joint_torque_regressor, kinetic_energy_regressor, minv, nonlinear_effects, passive_torque,
-    passive_torque_derivative, potential_energy_regressor, rnea, rnea_derivatives, rnea_hessian,
+    passive_torque_derivatives, potential_energy_regressor, rnea, rnea_derivatives, rnea_hessian,
     rnea_second_derivatives, static_torque, static_torque_derivative,
 };
 use condyle_spatial::block::Real;
@@ -388,15 +388,19 @@ fn others<T: Real>() -> Vec<Row<T>> {
         Row {
             name: "passive_torque",
             many: |m, b, _, s, to| {
-                b.passive_torque(m, &s.v, SMOOTHING).put(to);
-                b.passive_torque_derivative(m, &s.v, SMOOTHING).put(to);
+                b.passive_torque(m, &s.q, &s.v, SMOOTHING).put(to);
+                let d = b.passive_torque_derivatives(m, &s.q, &s.v, SMOOTHING);
+                d.dtau_dq.put(to);
+                d.dtau_dv.put(to);
             },
             one: |m, _, _, i, to| {
                 let mut tau = vec![T::zero(); m.nv()];
-                passive_torque(m, &i.v, SMOOTHING, &mut tau);
+                passive_torque(m, &i.q, &i.v, SMOOTHING, &mut tau);
                 tau[..].put(to);
-                passive_torque_derivative(m, &i.v, SMOOTHING, &mut tau);
-                tau[..].put(to);
+                let [mut dq, mut dv] = [(); 2].map(|()| DMatrix::from_element(m.nv(), m.nv(), T::zero()));
+                passive_torque_derivatives(m, &i.q, &i.v, SMOOTHING, &mut dq, &mut dv);
+                dq.put(to);
+                dv.put(to);
             },
         },
         Row {

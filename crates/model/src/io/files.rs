@@ -13,7 +13,7 @@ pub(crate) fn locate(path: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error
         None => Ok(path.to_owned()),
         Some(address) => {
             let [ros, ament] = ["ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"].map(std::env::var_os);
-            find(address, &folders(packages, ros, ament))
+            find(SCHEME, address, &folders(packages, ros, ament), Path::is_file)
         }
     }
 }
@@ -36,24 +36,69 @@ fn folders(packages: &[PathBuf], ros: Option<OsString>, ament: Option<OsString>)
     packages.iter().cloned().chain(split(ros)).chain(installed).collect()
 }
 
+/// Places at which the models that an SDF includes may be.
+pub(crate) struct Search<'a> {
+    /// Folder of the file that includes them; a string has none.
+    pub(crate) folder: Option<&'a Path>,
+    /// Folders that contain packages or models, or are one.
+    pub(crate) packages: &'a [PathBuf],
+}
+
+/// Variables of the environment that list folders with models.
+const MODEL_PATHS: [&str; 4] = ["GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "SDF_PATH", "GAZEBO_MODEL_PATH"];
+
+/// Returns the file, or the folder with a `model.config`, that an address of a model names: `model://`, `package://`, `file://`,
+/// or a path.
+///
+/// A path may begin in the folder of the file that has the address. After that, addresses and paths are looked for in
+/// `packages`, that folder, those around it and the `models` in them, the folders of Gazebo's variables and those of ROS.
+pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Error> {
+    let (scheme, path) = address.split_once("://").map_or(("", address), |(scheme, path)| (scheme, path));
+    let missing = |what: &str| Error::File { file: address.to_owned(), what: what.to_owned() };
+    match scheme {
+        "http" | "https" => return Err(missing("models of the network are not fetched")),
+        "" | "file" => {
+            let at = search.folder.map_or_else(|| PathBuf::from(path), |folder| folder.join(path));
+            if at.exists() && (search.folder.is_some() || at.is_absolute()) {
+                return Ok(at);
+            }
+            if Path::new(path).is_absolute() {
+                return Err(missing("no such file or folder"));
+            }
+        }
+        _ => {}
+    }
+    let absolute = search.folder.and_then(|folder| folder.canonicalize().ok());
+    let around = absolute.iter().flat_map(|folder| folder.ancestors()).flat_map(|a| [a.to_owned(), a.join("models")]);
+    let near: Vec<PathBuf> = search.packages.iter().cloned().chain(around).collect();
+    let [ros, ament] = ["ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"].map(std::env::var_os);
+    let mut all = folders(&near, None, None);
+    for name in MODEL_PATHS {
+        all.extend(folders(&[], std::env::var_os(name), None));
+    }
+    all.extend(folders(&[], ros, ament));
+    let prefix = if scheme.is_empty() { String::new() } else { format!("{scheme}://") };
+    find(&prefix, path, &all, |path| path.exists())
+}
+
 /// The first such file: of a package in a folder, or of a folder that is the package itself. The path stays in the
 /// package, but for links that are in it.
-fn find(address: &str, folders: &[PathBuf]) -> Result<PathBuf, Error> {
+fn find(scheme: &str, address: &str, folders: &[PathBuf], fits: fn(&Path) -> bool) -> Result<PathBuf, Error> {
     let (package, path) = address.split_once('/').unwrap_or((address, ""));
     let down = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);
     if package.starts_with('.') || ![package, path].into_iter().flat_map(|p| Path::new(p).components()).all(down) {
         let what = format!("its path leads out of the package `{package}`");
-        return Err(Error::File { file: format!("{SCHEME}{address}"), what });
+        return Err(Error::File { file: format!("{scheme}{address}"), what });
     }
     let mut looked = Vec::new();
     for folder in folders {
         let itself = folder.file_name().is_some_and(|name| name == package).then(|| folder.join(path));
         for file in [Some(folder.join(package).join(path)), itself].into_iter().flatten() {
-            if !package.is_empty() && file.is_file() {
+            if !package.is_empty() && fits(&file) {
                 return Ok(file);
             }
             looked.push(file.display().to_string());
         }
     }
-    Err(Error::Package { address: format!("{SCHEME}{address}"), package: package.to_owned(), looked })
+    Err(Error::Package { address: format!("{scheme}{address}"), package: package.to_owned(), looked })
 }

@@ -16,7 +16,6 @@ use std::collections::HashMap;
 ///
 /// The type of a child is its tag, unless `=type` names another one. `*` marks a child that is known and whose inside is not
 /// looked at. A child whose type has no line has neither attributes nor children.
-#[allow(dead_code)]
 pub(crate) struct Known {
     types: HashMap<&'static str, Type>,
 }
@@ -28,6 +27,9 @@ struct Type {
     /// Tag and type of each child; the type is empty if the inside of the child is not looked at.
     children: Vec<(&'static str, &'static str)>,
 }
+
+/// Maximum number of warnings about one file; chosen because a nearest name is looked for in each.
+const MAX_WARNINGS: usize = 1000;
 
 /// Type of a child whose inside is not looked at.
 const OPEN: &str = "";
@@ -55,19 +57,26 @@ impl Known {
     }
 
     /// Warns of all that is not known in an element, whose type is its tag, and of what a model cannot hold.
-    #[allow(dead_code)]
     pub(crate) fn check(&self, root: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
         if let Some((&name, _)) = self.types.get_key_value(root.tag.as_str()) {
             self.check_as(name, root, left_out, warnings);
+            if warnings.len() >= MAX_WARNINGS {
+                warnings.push(root.unknown(format!(
+                    "more than {MAX_WARNINGS} names are unknown or left out: the rest is not listed"
+                )));
+            }
         }
     }
 
     /// Warns of all that is not known in an element of a type.
     fn check_as(&self, name: &'static str, element: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
-        let none = Type::default();
+        let (none, is_full) = (Type::default(), |warnings: &[Warning]| warnings.len() >= MAX_WARNINGS);
         let known = self.types.get(name).unwrap_or(&none);
         let said = |what: &str| left_out.iter().find(|(of, inside, _)| *of == name && *inside == what);
         for (attribute, _) in &element.attributes {
+            if is_full(warnings) {
+                return;
+            }
             if let Some((.., what)) = said(attribute) {
                 warnings.push(element.left_out(format!("{attribute}: {what}")));
             } else if !known.attributes.contains(&attribute.as_str()) && !attribute.contains(':') {
@@ -76,6 +85,9 @@ impl Known {
             }
         }
         for child in &element.children {
+            if is_full(warnings) {
+                return;
+            }
             let tag = child.tag.as_str();
             if let Some((.., what)) = said(tag) {
                 warnings.push(child.left_out(*what));

@@ -1,5 +1,6 @@
 //! Positions with names, from SRDF: MoveIt's description of what a robot's groups of joints are for.
 
+use super::known::Known;
 use super::xml::{Amount, Element, numbers};
 use crate::body::Body;
 use crate::configuration::neutral;
@@ -8,6 +9,15 @@ use crate::joint::Joint;
 use crate::model::Model;
 use std::collections::HashMap;
 use std::path::Path;
+
+/// Table of [`Known`]: MoveIt's elements, and those of Pinocchio and HPP.
+const KNOWN: &str = "\
+robot: name version ; group* group_state end_effector* virtual_joint* passive_joint* disable_collisions* enable_collisions* \
+    disable_default_collisions* link_sphere_approximation* joint_property* chain_property* rotor_params* gripper* handle* \
+    specificities*
+group_state: name group ; joint
+joint: name value
+";
 
 /// The most `<group_state>`s that a file may have: each is as many numbers as a position of the robot has.
 const MAX_STATES: usize = 4096;
@@ -18,11 +28,12 @@ impl Model {
     /// A `<joint>` of a state has as many numbers as q has for it, or the angle if it turns without limits; joints that are not
     /// mentioned stay as in [`neutral`]. States of one name, such as `home` of an arm and of its hand, are one position. An SRDF
     /// is often shared by robots with fewer joints: those that this one has not are passed over, or errors if `strict`. Joints
-    /// that follow others have no number of their own. All else in the file (groups, pairs that cannot collide, …) is ignored.
+    /// that follow others have no number of their own. All else in the file (groups, pairs that cannot collide, …) is ignored:
+    /// names that are unknown, misspelt or misplaced too, unless `strict`.
     ///
     /// # Errors
     /// [`Error::File`], [`Error::Xml`] and [`Error::Element`], with file, line and element: what is no number, more or fewer
-    /// numbers than a joint has, rotations that have not the length 1. What a file may have at most stands at the
+    /// numbers than a joint has, rotations whose length is not 1. [`Error::Strict`]: an unknown name, if `strict`. What a file may have at most stands at the
     /// [beginning](crate#limits-of-files).
     pub fn reference_configurations(
         &self,
@@ -55,6 +66,13 @@ impl Model {
     fn group_states(&self, root: &Element, strict: bool) -> Result<Vec<(String, Vec<f64>)>, Error> {
         if root.tag != "robot" {
             return Err(root.wrong("expected <robot>, the root of an SRDF"));
+        }
+        if strict {
+            let mut warnings = Vec::new();
+            Known::new(KNOWN).check(root, &[], &mut warnings);
+            if let Some(warning) = warnings.into_iter().next() {
+                return Err(Error::Strict { file: root.file.to_string(), warning });
+            }
         }
         let bodies: HashMap<&str, &Body> = self.bodies[1..].iter().map(|b| (b.joint_name.as_str(), b)).collect();
         let (mut states, mut places) = (Vec::<(String, Vec<f64>)>::new(), HashMap::new());

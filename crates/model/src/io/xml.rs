@@ -1,13 +1,15 @@
 //! XML as the readers want it: elements that know their file and line.
 //!
-//! What is read is measured first, so that neither memory nor time nor the stack can be spent on it: a parser compares each
-//! attribute of an element with the others, and each namespace with those in scope.
+//! The text is measured first, so that neither memory nor time nor the stack can be spent on it.
+
+mod encoding;
+mod parse;
+mod write;
 
 use crate::error::Error;
 use crate::model::Model;
 use crate::warning::{Place, Warning, WarningKind};
-use roxmltree::{Document, Node};
-use std::collections::HashSet;
+use parse::count;
 use std::ffi::OsStr;
 use std::fs::File;
 use std::io::Read;
@@ -22,13 +24,11 @@ const MAX_TAGS: usize = 1 << 20;
 const MAX_EQUALS: usize = 1 << 22;
 /// The most attributes of an element.
 const MAX_ATTRIBUTES: usize = 256;
-/// The most prefixes of namespaces in a file, and the most declarations of one.
-const MAX_NAMESPACES: [usize; 2] = [256, 1 << 16];
 /// The most levels of nested elements: one level for each body of a chain in MJCF, and then some.
 pub(crate) const MAX_DEPTH: usize = 256;
 
-/// An element, with all that is in it.
-#[derive(Debug)]
+/// Element, with all that is in it. A prefix is part of a name (`gz:note`); declarations of prefixes are left out.
+#[derive(Clone, Debug)]
 pub(crate) struct Element {
     pub(crate) tag: String,
     pub(crate) attributes: Vec<(String, String)>,
@@ -38,6 +38,8 @@ pub(crate) struct Element {
     pub(crate) file: Rc<str>,
     /// Counted from 1.
     pub(crate) line: u32,
+    /// The index of the file with settings of its own that the element is from; 0 for the main one.
+    pub(crate) source: usize,
 }
 
 /// The amount of text that has been read for one robot.
@@ -75,13 +77,29 @@ impl Amount {
         if found > left as u64 {
             return Err(wrong(too_many(self.bytes as u64 + found, "bytes", MAX_BYTES)));
         }
-        String::from_utf8(bytes).map_err(|e| wrong(format!("byte {} is not UTF-8", e.utf8_error().valid_up_to())))
+        Ok(encoding::decode(bytes))
+    }
+
+    /// Counts copies of an element that a file asks for, as if they stood in it.
+    pub(crate) fn add_copies(&mut self, element: &Element, count: usize) -> Result<(), Error> {
+        let (mut tags, mut equals, mut waiting) = (0usize, 0usize, vec![element]);
+        while let Some(e) = waiting.pop() {
+            (tags, equals) = (tags + 1, equals + e.attributes.len());
+            waiting.extend(&e.children);
+        }
+        self.tags = self.tags.saturating_add(tags.saturating_mul(count));
+        self.equals = self.equals.saturating_add(equals.saturating_mul(count));
+        for (found, what, limit) in [(self.tags, "tags", MAX_TAGS), (self.equals, "equals signs", MAX_EQUALS)] {
+            if found > limit {
+                return Err(element.wrong(format!("{}, copies counted", too_many(found as u64, what, limit))));
+            }
+        }
+        Ok(())
     }
 
     /// Counts what is in a text, and says which limit it is above.
     fn add(&mut self, text: &str) -> Result<(), String> {
-        let bytes = text.as_bytes();
-        let count = |c: u8| bytes.iter().filter(|&&b| b == c).count();
+        let (bytes, count) = (text.as_bytes(), |byte| count(text.as_bytes(), byte));
         (self.bytes, self.tags, self.equals) =
             (self.bytes + bytes.len(), self.tags + count(b'<'), self.equals + count(b'='));
         for (found, what, limit) in
@@ -89,31 +107,6 @@ impl Amount {
         {
             if found > limit {
                 return Err(too_many(found as u64, what, limit));
-            }
-        }
-        // a value cannot have a `<` in it; where there is none, there may be a comment
-        let attributes = |tag: &str| tag.split('=').skip(1).filter(|s| s.trim_start().starts_with(['"', '\''])).count();
-        let mut line = 1;
-        for tag in text.split('<') {
-            let found = attributes(tag);
-            if found > MAX_ATTRIBUTES {
-                return Err(format!(
-                    "the element on line {line} has {found} attributes, at most {MAX_ATTRIBUTES} are allowed"
-                ));
-            }
-            line += tag.matches('\n').count();
-        }
-        let (mut prefixes, mut declared) = (HashSet::new(), 0);
-        for rest in text.split("xmlns").skip(1) {
-            prefixes.insert(rest.split(['=', ' ', '\t', '\r', '\n']).next());
-            declared += 1;
-        }
-        for (found, what, limit) in [
-            (prefixes.len(), "prefixes of namespaces (xmlns)", MAX_NAMESPACES[0]),
-            (declared, "declarations of namespaces (xmlns)", MAX_NAMESPACES[1]),
-        ] {
-            if found > limit {
-                return Err(format!("{found} {what}, at most {limit} are allowed"));
             }
         }
         Ok(())
@@ -128,48 +121,11 @@ impl Element {
     /// The root element of a text.
     pub(crate) fn parse(text: &str, file: &str, amount: &mut Amount) -> Result<Self, Error> {
         amount.add(text).map_err(|what| Error::File { file: file.to_owned(), what })?;
-        let document = Document::parse(text).map_err(|e| Error::Xml {
-            file: file.to_owned(),
-            line: e.pos().row,
-            what: if is_path(text) {
-                "this is a path: the function whose name does not end in `_str` reads the file".to_owned()
-            } else {
-                e.to_string()
-            },
-        })?;
-        let ends: Vec<usize> = text.match_indices('\n').map(|(i, _)| i).collect();
-        let (file, root) = (file.into(), document.root_element());
-        let macros = |n: &Node| n.is_element() && n.tag_name().namespace().is_some_and(|space| space.contains("xacro"));
-        if let Some(node) = root.descendants().find(macros) {
-            return Err(Self::new(node, &ends, &file).wrong(format!("belongs to xacro: {EXPAND}")));
+        if is_path(text) {
+            let what = "this is a path: the function whose name does not end in `_str` reads the file".to_owned();
+            return Err(Error::Xml { file: file.to_owned(), line: 1, what });
         }
-        match too_deep(root) {
-            None => Ok(Self::with_children(root, &ends, &file)),
-            Some((node, levels)) => {
-                let what = format!("elements are nested {levels} levels deep, at most {MAX_DEPTH} are allowed");
-                Err(Self::new(node, &ends, &file).wrong(what))
-            }
-        }
-    }
-
-    /// An element without its document and what is in it; `ends` are the places at which lines end.
-    fn new(node: Node, ends: &[usize], file: &Rc<str>) -> Self {
-        let line = 1 + ends.partition_point(|&end| end < node.range().start) as u32;
-        let plain = node.attributes().filter(|a| a.namespace().is_none());
-        Self {
-            tag: node.tag_name().name().to_owned(),
-            attributes: plain.map(|a| (a.name().to_owned(), a.value().to_owned())).collect(),
-            text: node.children().filter(Node::is_text).filter_map(|n| n.text()).collect(),
-            children: Vec::new(),
-            file: file.clone(),
-            line,
-        }
-    }
-
-    fn with_children(node: Node, ends: &[usize], file: &Rc<str>) -> Self {
-        let ours = |n: &Node| n.is_element() && n.tag_name().namespace() == node.tag_name().namespace();
-        let children = node.children().filter(ours).map(|child| Self::with_children(child, ends, file)).collect();
-        Self { children, ..Self::new(node, ends, file) }
+        parse::parse(text, file)
     }
 
     pub(crate) fn attribute(&self, name: &str) -> Option<&str> {
@@ -220,6 +176,11 @@ impl Element {
         Warning::LeftOut { place: self.place(), element: self.label(), what: what.into() }
     }
 
+    /// As [`left_out`](Self::left_out), at the line of something inside this element.
+    pub(crate) fn left_out_inside(&self, inside: &Self, what: impl Into<String>) -> Warning {
+        Warning::LeftOut { place: inside.place(), element: self.label(), what: what.into() }
+    }
+
     /// Returns the warning of a default that is taken where this element says nothing.
     pub(crate) fn assumed(&self, what: impl Into<String>) -> Warning {
         Warning::Assumed { place: self.place(), element: self.label(), what: what.into() }
@@ -233,30 +194,6 @@ impl Element {
     /// An error that names this element, and the line of one inside it.
     pub(crate) fn wrong_inside(&self, inside: &Self, what: impl Into<String>) -> Error {
         Error::Element { file: inside.file.to_string(), line: inside.line, element: self.label(), what: what.into() }
-    }
-}
-
-/// The first element below the deepest level that is read, and the number of levels that there are.
-fn too_deep<'a, 'input>(root: Node<'a, 'input>) -> Option<(Node<'a, 'input>, usize)> {
-    let (mut node, mut level, mut levels, mut first) = (root, 1, 1, None);
-    loop {
-        if level > levels {
-            levels = level;
-            if level > MAX_DEPTH {
-                first = first.or(Some(node));
-            }
-        }
-        if let Some(child) = node.first_element_child() {
-            (node, level) = (child, level + 1);
-            continue;
-        }
-        while level > 1 && node.next_sibling_element().is_none() {
-            (node, level) = (node.parent()?, level - 1);
-        }
-        match node.next_sibling_element() {
-            Some(next) if level > 1 => node = next,
-            _ => return first.map(|node| (node, levels)),
-        }
     }
 }
 

@@ -23,6 +23,7 @@
 mod vectorized;
 
 use crate::passes::coriolis::Coriolis;
+use crate::passes::free_armature;
 use crate::passes::kinematics::World;
 use crate::selection::pairs_by_rows;
 use crate::workspace::{filled, workspace, zero_matrix};
@@ -200,5 +201,6 @@ kernel! {
         if by_rows {
             vectorized::pairs(model, w, d);
         }
+        free_armature::add_slope(model, v, d.dtau_dv.as_mut_slice());
     }
 }

@@ -1,58 +1,221 @@
-//! Equality constraints: of two joints, one may follow the other; the others have no part in a tree.
+//! Equality constraints: loops, and joints that follow others.
 
-use super::attributes::Attributes;
+use super::Source;
+use super::attributes::{Attributes, MAIN};
+use super::spring::{Joints, Switches};
+use crate::body::FrameKind;
 use crate::builder::{BodyId, ModelBuilder};
 use crate::error::Error;
 use crate::io::xml::{Element, words};
 use crate::joint::Mimic;
 use crate::warning::Warning;
+use condyle_spatial::{Quaternion, Se3, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// The body that a joint carries, and the joint's position in the file's pose (`ref`).
-pub(super) type Joints = HashMap<String, (BodyId, f64)>;
+/// Body of the builder, and a pose in it.
+type At = (BodyId, Se3<f64>);
 
-/// Lets joints follow others, if asked to, and says what is left out.
+/// Bodies and sites of a file by their names, and the poses of bodies that the file has drawn.
+struct Places<'p> {
+    named: HashMap<(bool, String), At>,
+    /// Pose of each body of the builder in the world.
+    poses: &'p [Se3<f64>],
+}
+
+impl<'p> Places<'p> {
+    fn new(builder: &ModelBuilder, poses: &'p [Se3<f64>]) -> Self {
+        let bodies = builder.frames.iter().filter(|f| matches!(f.kind, FrameKind::Link | FrameKind::User));
+        let at = |f: &crate::body::Frame| ((f.kind == FrameKind::Link, f.name.clone()), (BodyId(f.body), f.placement));
+        Self { named: bodies.map(at).collect(), poses }
+    }
+
+    /// Returns the body or site that an attribute names.
+    fn find(&self, e: &Element, attribute: &str) -> Result<Option<At>, Error> {
+        let Some(name) = e.attribute(attribute) else { return Ok(None) };
+        match self.named.get(&(attribute.starts_with("body"), name.to_owned())) {
+            Some(&at) => Ok(Some(at)),
+            None => Err(e.wrong(format!("{attribute}: no {} is named `{name}`", &attribute[..4]))),
+        }
+    }
+
+    /// Returns the pose in the world that the file has drawn.
+    fn drawn(&self, (BodyId(body), X): At) -> Se3<f64> {
+        self.poses[body] * X
+    }
+}
+
+/// Adds the constraints of a file to a builder, and says what is left out.
 pub(super) fn add(
     builder: &mut ModelBuilder,
     root: &Element,
+    sources: &[Source],
     joints: &Joints,
+    poses: &[Se3<f64>],
     mimic: bool,
 ) -> Result<Vec<Warning>, Error> {
-    let (mut warnings, mut followers) = (Vec::new(), HashSet::new());
-    for section in root.children.iter().filter(|c| matches!(&*c.tag, "equality" | "tendon" | "deformable")) {
-        for element in &section.children {
-            let a = Attributes::plain(element);
-            let mut warn = |what: String| warnings.push(element.left_out(what));
-            if section.tag != "equality" || element.tag != "joint" {
-                warn(format!("<{}> has no part in a tree of bodies", section.tag));
-                continue;
-            }
-            if a.flag("active", None)? == Some(false) {
-                continue;
-            }
-            let joint = |name: &str| match a.get(name) {
-                None => Ok(None),
-                Some(joint) => match joints.get(joint) {
-                    Some(&found) => Ok(Some((joint, found))),
-                    None => Err(element.wrong(format!("{name}: no joint is named `{joint}`"))),
-                },
-            };
-            let (follower, leader) = (joint("joint1")?, joint("joint2")?);
-            let Some((name, (follower, y0))) = follower else { return Err(element.wrong("has no joint1")) };
-            let mut coefficients = a.list("polycoef")?.unwrap_or_else(|| vec![0.0, 1.0]);
-            coefficients.resize(5, 0.0);
-            match (leader, &coefficients[..]) {
-                _ if !mimic => warnings
-                    .push(element.mimic("a joint that follows another one is left free unless `mimic` is asked for")),
-                (Some((_, (leader, x0))), &[a0, a1, 0.0, 0.0, 0.0]) if followers.insert(name) => {
-                    // y − y₀ = a₀ + a₁ (x − x₀)
-                    builder.mimic(follower, leader, Mimic { ratio: a1, offset: y0 + a0 - a1 * x0 });
-                }
-                (Some(_), &[_, _, 0.0, 0.0, 0.0]) => warn(format!("`{name}` follows another joint already")),
-                (Some(_), _) => warn(format!("polycoef {} is not linear", words(&coefficients))),
-                (None, _) => warn(format!("holds `{name}` where it is: <equality> has no part in a tree of bodies")),
-            }
+    let (mut warnings, mut followers) = (Vec::new(), Followers::default());
+    let elements: Vec<_> = root.all("equality").flat_map(|section| &section.children).collect();
+    if !Switches::read(root)?.equality {
+        return Ok(warnings);
+    }
+    let places = Places::new(builder, poses);
+    let mut names = HashSet::new();
+    for name in elements.iter().filter_map(|e| e.attribute("name")) {
+        if !names.insert(name.to_owned()) {
+            return Err(root.wrong(format!("two elements of <equality> are named `{name}`")));
         }
     }
+    let mut counts = HashMap::new();
+    for e in elements {
+        let a = sources[e.source].defaults.of_kind(e, "equality", MAIN)?;
+        let count: &mut usize = counts.entry(&*e.tag).or_default();
+        *count += 1;
+        if a.flag("active", None)? == Some(false) {
+            continue;
+        }
+        let mut name = e.attribute("name").map_or_else(|| format!("{}{count}", e.tag), str::to_owned);
+        while e.attribute("name").is_none() && !names.insert(name.clone()) {
+            name.push('_');
+        }
+        match e.tag.as_str() {
+            "connect" | "weld" => {
+                let ([first, second], rigid) = loop_ends(e, &places)?;
+                if first.0 == second.0 {
+                    warnings.push(e.left_out("both ends are fixed to one body, which no constraint can move"));
+                } else if rigid {
+                    builder.constraint_rigid(&name, [first, second]);
+                } else {
+                    builder.constraint_point(&name, [first, second]);
+                }
+            }
+            "joint" => {
+                let joint = |attribute: &str| {
+                    let named = e.attribute(attribute).map(|name| joints.scalar(e, attribute, name));
+                    Ok::<_, Error>(named.transpose()?.map(|j| (j, BodyId(joints.all[j].body), joints.all[j].reference)))
+                };
+                let (follower, leader) = (joint("joint1")?, joint("joint2")?);
+                let Some((index, follower, y0)) = follower else { return Err(e.wrong("has no joint1")) };
+                if leader.is_some_and(|(leader, ..)| leader == index) {
+                    return Err(e.wrong("joint1 and joint2 are the same"));
+                }
+                let mut p = [0.0, 1.0, 0.0, 0.0, 0.0];
+                super::law::fill(&Attributes::plain(e), "polycoef", &mut p)?;
+                match (leader, p) {
+                    (Some((leader, _, x0)), [a0, a1, 0.0, 0.0, 0.0])
+                        // y − y₀ = a₀ + a₁ (x − x₀)
+                        if mimic && followers.add(index, leader, Mimic { ratio: a1, offset: y0 + a0 - a1 * x0 }) =>
+                    {
+                        continue;
+                    }
+                    (Some(_), [_, _, 0.0, 0.0, 0.0]) if !mimic => {
+                        let what = "a joint that follows another one is left free unless `mimic` is asked for";
+                        warnings.push(e.mimic(format!("{what}; the constraint `{name}` holds it")));
+                    }
+                    (Some(_), _) if mimic => {
+                        let why = match p[2..] == [0.0; 3] {
+                            true => "joint1 follows another joint, or joint2 follows joint1".to_owned(),
+                            false => format!("polycoef {} is not linear", words(&p)),
+                        };
+                        warnings.push(
+                            e.mimic(format!("{why}: the joint is left free, and the constraint `{name}` holds it")),
+                        );
+                    }
+                    _ => {}
+                }
+                let x0 = leader.map_or(0.0, |(.., x0)| x0);
+                let coefficients = if leader.is_some() { shifted(p, x0, y0) } else { [y0 + p[0], 0.0, 0.0, 0.0, 0.0] };
+                builder.constraint_coupling(&name, follower, leader.map(|(_, leader, _)| leader), coefficients);
+            }
+            _ => warnings.push(e.left_out("it is not held: the model's constraints have bodies and joints alone")),
+        }
+    }
+    let id = |joint: usize| BodyId(joints.all[joint].body);
+    for &follower in &followers.order {
+        let (leader, mimic) = followers.root(follower);
+        builder.mimic(id(follower), id(leader), mimic);
+    }
     Ok(warnings)
+}
+
+/// Joints that follow others, which may follow others too.
+#[derive(Default)]
+struct Followers {
+    leaders: HashMap<usize, (usize, Mimic)>,
+    order: Vec<usize>,
+    refused: HashSet<usize>,
+}
+
+impl Followers {
+    /// Lets a joint follow another one, and returns whether it can: it follows none yet, and does not lead that one.
+    fn add(&mut self, follower: usize, leader: usize, mimic: Mimic) -> bool {
+        if self.leaders.contains_key(&follower) || self.refused.contains(&follower) {
+            return false;
+        }
+        if self.root(leader).0 == follower {
+            self.refused.insert(follower);
+            return false;
+        }
+        self.leaders.insert(follower, (leader, mimic));
+        self.order.push(follower);
+        true
+    }
+
+    /// Returns the joint that follows none, and how a joint follows it.
+    fn root(&self, joint: usize) -> (usize, Mimic) {
+        let (mut at, mut mimic) = (joint, Mimic { ratio: 1.0, offset: 0.0 });
+        while let Some(&(leader, next)) = self.leaders.get(&at) {
+            mimic = Mimic { ratio: mimic.ratio * next.ratio, offset: mimic.ratio * next.offset + mimic.offset };
+            at = leader;
+        }
+        (at, mimic)
+    }
+}
+
+/// Returns the frames that a loop holds together, and whether it holds their orientation too.
+fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
+    let a = Attributes::plain(e);
+    let rigid = e.tag == "weld" && a.number("torquescale")? != Some(0.0);
+    let point = |p: Vec3<f64>| Se3 { translation: p, ..Se3::identity() };
+    let anchor = a.vector("anchor")?;
+    let Some((b1, X1)) = places.find(e, "body1")? else {
+        let both = places.find(e, "site1")?.zip(places.find(e, "site2")?);
+        let (first, second) = both.ok_or_else(|| e.wrong("has neither body1 nor site1 and site2"))?;
+        return Ok(([first, second], rigid));
+    };
+    if e.attribute("site1").or(e.attribute("site2")).is_some() {
+        return Err(e.wrong("has both bodies and sites: expected one of them"));
+    }
+    let world = (crate::builder::WORLD, Se3::identity());
+    let (b2, X2) = places.find(e, "body2")?.unwrap_or(world);
+    let [W1, W2] = [places.drawn((b1, X1)), places.drawn((b2, X2))];
+    if e.tag == "connect" {
+        // the anchor is a point of body1, and of body2 in the pose that the file has drawn
+        let anchor = point(anchor.ok_or_else(|| e.wrong("has no anchor"))?);
+        return Ok(([(b1, X1 * anchor), (b2, X2 * (W2.inverse() * W1 * anchor))], rigid));
+    }
+    // the anchor is a point of body2
+    let anchor = point(anchor.unwrap_or(Vec3::zero()));
+    let relative = match a.array::<7>("relpose")? {
+        Some([x, y, z, w, qx, qy, qz]) if [w, qx, qy, qz] != [0.0; 4] => {
+            let norm = (w * w + qx * qx + qy * qy + qz * qz).sqrt();
+            let [qx, qy, qz, w] = [qx, qy, qz, w].map(|part| part / norm);
+            Se3::new(Quaternion::new(qx, qy, qz, w).to_rotation(), Vec3::new(x, y, z))
+        }
+        _ => W1.inverse() * W2 * anchor,
+    };
+    Ok(([(b1, X1 * relative), (b2, X2 * anchor)], rigid))
+}
+
+/// Returns the coefficients of a polynomial y − y₀ = Σ pᵢ (x − x₀)ⁱ in the powers of x, by Horner's rule.
+fn shifted(p: [f64; 5], x0: f64, y0: f64) -> [f64; 5] {
+    let mut c = [0.0; 5];
+    for &coefficient in p.iter().rev() {
+        // c ← c · (x − x₀) + coefficient
+        for k in (1..5).rev() {
+            c[k] = c[k - 1] - x0 * c[k];
+        }
+        c[0] = coefficient - x0 * c[0];
+    }
+    c[0] += y0;
+    c
 }

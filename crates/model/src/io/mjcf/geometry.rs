@@ -1,33 +1,86 @@
 //! Inertias of bodies, given or from their geoms.
 
-use super::attributes::{Attributes, Compiler};
+use super::attributes::Attributes;
+use super::compiler::{Compiler, ORIENTATIONS, from_to};
+use super::mesh::Solid;
+use super::principal::principal;
 use crate::error::Error;
 use crate::io::xml::{Element, words};
-use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
+use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
 use core::f64::consts::PI;
 use nalgebra::Matrix3;
 
-/// Density of a geom that says neither mass nor density (kg/m³).
+/// Density of a geom that has neither mass nor density (kg/m³).
 const DENSITY: f64 = 1000.0;
+/// Volumes (m³) and areas (m²) below this weigh nothing, as in MuJoCo.
+const LEAST_VOLUME: f64 = 1e-14;
 
-/// An `<inertial>`, in the body's frame.
-pub(super) fn inertial(compiler: &Compiler, a: &Attributes) -> Result<Inertia<f64>, Error> {
+/// Inertia in its principal axes.
+#[derive(Clone, Copy)]
+pub(super) struct Weight {
+    /// kg.
+    pub(super) mass: f64,
+    /// The centre of mass and the principal axes.
+    pub(super) pose: Se3<f64>,
+    /// kg m².
+    pub(super) moments: [f64; 3],
+}
+
+impl Weight {
+    pub(super) fn inertia(&self) -> Inertia<f64> {
+        self.pose.act(Inertia::from_com(self.mass, Vec3::zero(), diagonal(self.moments)))
+    }
+
+    /// The same weight seen from a frame in which its own frame is at X.
+    pub(super) fn seen_from(self, X: Se3<f64>) -> Self {
+        Self { pose: X * self.pose, ..self }
+    }
+
+    /// Several weights as one: that one if it is alone, or their sum with axes by MuJoCo's method.
+    pub(super) fn sum(weights: &[Self]) -> Option<(Inertia<f64>, Se3<f64>)> {
+        let sum = weights.iter().fold(Inertia::zero(), |sum, w| sum + w.inertia());
+        match weights {
+            [] => None,
+            [one] => Some((sum, one.pose)),
+            _ => Some((sum, axes(sum))),
+        }
+    }
+}
+
+/// The centre of mass and the principal axes of an inertia.
+fn axes(I: Inertia<f64>) -> Se3<f64> {
+    let (com, about) = central(I);
+    Se3::new(principal(about).1, com)
+}
+
+/// The centre of mass, and the rotational inertia about it.
+fn central(I: Inertia<f64>) -> (Vec3<f64>, Sym3<f64>) {
+    let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
+    (com, I.rotational - Inertia::from_com(I.mass, com, Sym3::zero()).rotational)
+}
+
+/// An `<inertial>`, in the body's frame, and its principal axes there.
+pub(super) fn inertial(compiler: &Compiler, a: &Attributes) -> Result<(Inertia<f64>, Se3<f64>), Error> {
     let needed = |name: &str| a.element.wrong(format!("has no {name}"));
     a.get("pos").ok_or_else(|| needed("pos"))?;
     let mass = a.number("mass")?.ok_or_else(|| needed("mass"))?;
     let full = a.array::<6>("fullinertia")?;
-    let oriented = ["quat", "axisangle", "xyaxes", "zaxis", "euler"].iter().any(|n| a.get(n).is_some());
-    if full.is_some() && (oriented || a.get("diaginertia").is_some()) {
+    let given = a.array("diaginertia")?;
+    if full.is_some() && (ORIENTATIONS.iter().any(|n| a.get(n).is_some()) || given.is_some_and(|d| d != [0.0; 3])) {
         return Err(a.element.wrong("fullinertia goes with neither diaginertia nor an orientation"));
     }
-    let I = match (full, a.array("diaginertia")?) {
-        (Some([xx, yy, zz, xy, xz, yz]), _) => Sym3 { xx, xy, yy, xz, yz, zz },
-        (None, diagonal) => principal(diagonal.unwrap_or_default()),
-    };
     if mass < 0.0 {
         return Err(a.element.wrong(format!("mass is {mass} kg")));
     }
-    Ok(compiler.pose(a)?.act(Inertia::from_com(mass, Vec3::zero(), I)))
+    let X = compiler.pose(a)?;
+    let (I, R) = match full {
+        Some([xx, yy, zz, xy, xz, yz]) => {
+            let I = Sym3 { xx, xy, yy, xz, yz, zz };
+            (I, principal(I).1)
+        }
+        None => (diagonal(given.unwrap_or_default()), Mat3::identity()),
+    };
+    Ok((X.act(Inertia::from_com(mass, Vec3::zero(), I)), X * Se3::new(R, Vec3::zero())))
 }
 
 /// A body's inertia as the compiler corrects it: mass and principal moments not below their bounds, and moments that no
@@ -37,8 +90,7 @@ pub(super) fn corrected(compiler: &Compiler, body: &Element, I: Inertia<f64>) ->
     if least_mass <= 0.0 && least_moment <= 0.0 && !balance {
         return Ok(I);
     }
-    let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
-    let about = I.rotational - Inertia::from_com(I.mass, com, Sym3::zero()).rotational;
+    let (com, about) = central(I);
     let matrix = Matrix3::new(about.xx, about.xy, about.xz, about.xy, about.yy, about.yz, about.xz, about.yz, about.zz);
     if !matrix.sum().is_finite() {
         return Err(body.wrong("its inertia is not finite"));
@@ -54,96 +106,162 @@ pub(super) fn corrected(compiler: &Compiler, body: &Element, I: Inertia<f64>) ->
     Ok(Inertia::from_com(I.mass.max(least_mass), com, about))
 }
 
-/// Mass (kg) if it is given, and density (kg/m³) if not, of a geom that counts; none if it weighs nothing.
-fn weight(compiler: &Compiler, a: &Attributes) -> Result<Option<(Option<f64>, f64)>, Error> {
+/// Whether a geom counts for the inertia of its body, and has mass.
+pub(super) fn is_heavy(compiler: &Compiler, a: &Attributes) -> Result<bool, Error> {
     let group = a.number("group")?.unwrap_or(0.0);
     let (mass, density) = (a.number("mass")?, a.number("density")?.unwrap_or(DENSITY));
-    let counts = (compiler.groups[0]..=compiler.groups[1]).contains(&group);
-    Ok((counts && mass.unwrap_or(density) != 0.0).then_some((mass, density)))
+    let heavy = mass.unwrap_or(density) != 0.0 && a.get("type") != Some("plane");
+    Ok(heavy && (compiler.groups[0]..=compiler.groups[1]).contains(&group))
 }
 
-fn is_mesh(a: &Attributes) -> bool {
-    a.get("mesh").is_some() || matches!(a.get("type"), Some("mesh" | "sdf"))
-}
-
-/// Whether a geom is a mesh that has mass.
-pub(super) fn is_heavy_mesh(compiler: &Compiler, a: &Attributes) -> Result<bool, Error> {
-    Ok(is_mesh(a) && weight(compiler, a)?.is_some())
-}
-
-/// A geom's inertia, in the frame in which the geom's pose is.
-pub(super) fn geom(compiler: &Compiler, a: &Attributes) -> Result<Inertia<f64>, Error> {
+/// A heavy geom's weight, in the frame in which the geom's pose is; `mesh` is the one that it names, `field` the half sides of
+/// the box of its height field.
+pub(super) fn geom(
+    compiler: &Compiler,
+    a: &Attributes,
+    mesh: Option<&Solid>,
+    field: Option<[f64; 3]>,
+) -> Result<Option<Weight>, Error> {
     let wrong = |what: String| a.element.wrong(what);
-    let Some((mass, density)) = weight(compiler, a)? else { return Ok(Inertia::zero()) };
+    let (mass, density) = (a.number("mass")?, a.number("density")?.unwrap_or(DENSITY));
     if mass.unwrap_or(density) < 0.0 {
         return Err(wrong(format!("mass {} kg or density {density} kg/m³ is negative", mass.unwrap_or(0.0))));
     }
-    if a.flag("shellinertia", None)? == Some(true) {
-        return Err(wrong("shellinertia is not supported".to_owned()));
-    }
+    let shell = a.flag("shellinertia", None)? == Some(true);
     let kind = a.get("type").unwrap_or("sphere");
-    if is_mesh(a) {
-        let what = "has mass, and meshes are not read: give the body an <inertial>, or the geom mass=\"0\"";
-        return Err(wrong(what.to_owned()));
-    }
+    let (X, volume, unit) = match (kind, mesh) {
+        ("mesh" | "sdf", None) => return Err(wrong(format!("a geom of type {kind} has no mesh"))),
+        ("mesh" | "sdf", Some(_)) if shell => {
+            return Err(wrong("shellinertia: a mesh has an attribute `inertia` for it".to_owned()));
+        }
+        ("mesh" | "sdf", Some(mesh)) => (compiler.pose(a)? * mesh.pose, mesh.volume, mesh.moments),
+        _ => {
+            let (X, size) = match (mesh, field) {
+                (Some(mesh), _) => fitted(compiler, a, kind, mesh)?,
+                (_, Some(field)) => (compiler.pose(a)?, field.to_vec()),
+                _ => sized(compiler, a, kind)?,
+            };
+            let (volume, unit) = if shell { hollow(kind, &size) } else { solid(kind, &size) };
+            (X, volume, unit)
+        }
+    };
+    let mass = if volume > LEAST_VOLUME { mass.unwrap_or(density * volume) } else { 0.0 };
+    Ok((mass > LEAST_VOLUME).then(|| Weight { mass, pose: X, moments: unit.map(|x| mass * x) }))
+}
+
+/// The pose and the size of a primitive.
+fn sized(compiler: &Compiler, a: &Attributes, kind: &str) -> Result<(Se3<f64>, Vec<f64>), Error> {
     let length = match kind {
         "sphere" => 1,
         "capsule" | "cylinder" => 2,
         "box" | "ellipsoid" => 3,
-        _ => return Err(wrong(format!("a moving body has no geom of type `{kind}` with mass"))),
+        _ => return Err(a.element.wrong(format!("type: no geom has the type `{kind}`"))),
     };
     let mut size = a.list("size")?.unwrap_or_default();
-    let X = match a.array::<6>("fromto")? {
+    let X = match from_to(a, kind)? {
         None => compiler.pose(a)?,
-        Some(_) if kind == "sphere" => return Err(wrong("a sphere has no fromto".to_owned())),
-        Some([x0, y0, z0, x1, y1, z1]) => {
-            let (from, to) = (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1));
-            let axis = to - from;
-            let half = axis.norm_squared().sqrt() / 2.0;
-            if !(half.is_finite() && half > 1e-14) {
-                return Err(wrong("fromto: the points are too close".to_owned()));
-            }
+        Some((X, half)) => {
             size.truncate(1);
             size.resize(length - 1, size.first().copied().unwrap_or(0.0));
             size.push(half);
-            Se3::new(super::attributes::z_to(axis.scale(0.5 / half)), (from + to).scale(0.5))
+            X
         }
     };
     if size.len() < length || size[..length].iter().any(|&x| x <= 0.0) {
-        return Err(wrong(format!("size: a {kind} needs {length} positive numbers, found {}", words(&size))));
+        let what = format!("size: a {kind} needs {length} positive numbers, found {}", words(&size));
+        return Err(a.element.wrong(what));
     }
-    let (volume, unit) = shape(kind, &size);
-    let mass = mass.unwrap_or(density * volume);
-    Ok(X.act(Inertia::from_com(mass, Vec3::zero(), principal(unit.map(|x| mass * x)))))
+    Ok((X, size))
 }
 
-/// Volume (m³), and principal moments for each kilogram (m²).
-fn shape(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
+/// The pose and the size of a primitive that is fitted to a mesh: to the box that has the mesh's inertia, or to the box around it.
+fn fitted(compiler: &Compiler, a: &Attributes, kind: &str, mesh: &Solid) -> Result<(Se3<f64>, Vec<f64>), Error> {
+    let (center, [x, y, z]) = if compiler.fit_box { mesh.bounding_box() } else { (Vec3::zero(), mesh.inertia_box()) };
+    let round = if compiler.fit_box { x.max(y) } else { (x + y) / 2.0 };
+    let size = match (kind, compiler.fit_box) {
+        ("sphere", true) => vec![x.max(y).max(z)],
+        ("sphere", false) => vec![(x + y + z) / 3.0],
+        ("cylinder", _) => vec![round, z],
+        ("capsule", true) => vec![round, z - round],
+        ("capsule", false) => vec![round, (z - round / 2.0).max(0.0)],
+        ("box" | "ellipsoid", _) => vec![x, y, z],
+        _ => return Err(a.element.wrong(format!("type: no geom of type `{kind}` is fitted to a mesh"))),
+    };
+    let scale = a.number("fitscale")?.unwrap_or(1.0);
+    let X = compiler.pose(a)? * mesh.pose * Se3::new(Mat3::identity(), center);
+    Ok((X, size.into_iter().map(|x| scale * x).collect()))
+}
+
+/// Volume (m³), and principal moments for each kilogram (m²), of a full primitive.
+fn solid(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
     let a = size[0];
     match kind {
         "sphere" => (4.0 / 3.0 * PI * a * a * a, [0.4 * a * a; 3]),
-        "box" | "ellipsoid" => {
-            let (b, c) = (size[1], size[2]);
-            let (filled, part) = if kind == "box" { (8.0, 3.0) } else { (4.0 / 3.0 * PI, 5.0) };
-            let moments = [(b * b + c * c) / part, (a * a + c * c) / part, (a * a + b * b) / part];
-            (filled * a * b * c, moments)
-        }
         "cylinder" => {
             let h = 2.0 * size[1];
             let across = a * a / 4.0 + h * h / 12.0;
             (PI * a * a * h, [across, across, a * a / 2.0])
         }
         // capsule: a cylinder of height h between two half balls, whose centres of mass are 3a/8 beyond its ends
-        _ => {
+        "capsule" => {
             let h = 2.0 * size[1];
             let (tube, ball) = (PI * a * a * h, 4.0 / 3.0 * PI * a * a * a);
             let (t, b) = (tube / (tube + ball), ball / (tube + ball));
             let across = t * (a * a / 4.0 + h * h / 12.0) + b * (0.4 * a * a + h * h / 4.0 + 3.0 / 8.0 * a * h);
             (tube + ball, [across, across, t * a * a / 2.0 + b * 0.4 * a * a])
         }
+        _ => {
+            let (b, c) = (size[1], size[2]);
+            let (filled, part) = if kind == "ellipsoid" { (4.0 / 3.0 * PI, 5.0) } else { (8.0, 3.0) };
+            let moments = [(b * b + c * c) / part, (a * a + c * c) / part, (a * a + b * b) / part];
+            (filled * a * b * c, moments)
+        }
     }
 }
 
-fn principal([xx, yy, zz]: [f64; 3]) -> Sym3<f64> {
+/// Area (m²), and principal moments for each kilogram (m²), of the surface of a primitive.
+fn hollow(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
+    let a = size[0];
+    match kind {
+        "sphere" => (4.0 * PI * a * a, [2.0 / 3.0 * a * a; 3]),
+        "cylinder" => {
+            let h = 2.0 * size[1];
+            let (disc, tube) = (PI * a * a, 2.0 * PI * a * h);
+            let (d, t) = (2.0 * disc / (2.0 * disc + tube), tube / (2.0 * disc + tube));
+            let across = t * (a * a / 2.0 + h * h / 12.0) + d * (a * a / 4.0 + h * h / 4.0);
+            (2.0 * disc + tube, [across, across, t * a * a + d * a * a / 2.0])
+        }
+        "capsule" => {
+            let h = 2.0 * size[1];
+            let (tube, ball) = (2.0 * PI * a * h, 4.0 * PI * a * a);
+            let (t, b) = (tube / (tube + ball), ball / (tube + ball));
+            // a half shell has its centre of mass at a/2
+            let (center, far) = (a / 2.0, h / 2.0 + a / 2.0);
+            let ends = 2.0 / 3.0 * a * a + far * far - center * center;
+            let across = t * (a * a / 2.0 + h * h / 12.0) + b * ends;
+            (tube + ball, [across, across, t * a * a + b * 2.0 / 3.0 * a * a])
+        }
+        // Thomsen's formula for the area; moments of a layer of 1 µm, as MuJoCo has them
+        "ellipsoid" => {
+            let (b, c, p) = (size[1], size[2], 1.6075);
+            let area = 4.0 * PI * (((a * b).powf(p) + (b * c).powf(p) + (c * a).powf(p)) / 3.0).powf(1.0 / p);
+            let [outer, inner] = [1e-6, 0.0].map(|e| solid(kind, &[a + e, b + e, c + e]));
+            let moment = |k: usize| (outer.0 * outer.1[k] - inner.0 * inner.1[k]) / (outer.0 - inner.0);
+            (area, [moment(0), moment(1), moment(2)])
+        }
+        _ => {
+            let [x, y, z] = [a, size[1], size[2]];
+            let areas = [y * z, z * x, x * y].map(|area| 8.0 * area); // both sides across each axis
+            let total: f64 = areas.iter().sum();
+            let [across_x, across_y, across_z] = areas.map(|area| area / total);
+            // ∫ x² over the sides: x² on those across x, x²/3 on the others
+            let square = |half: f64, across: f64| half * half * (across + (1.0 - across) / 3.0);
+            let [xx, yy, zz] = [square(x, across_x), square(y, across_y), square(z, across_z)];
+            (total, [yy + zz, xx + zz, xx + yy])
+        }
+    }
+}
+
+fn diagonal([xx, yy, zz]: [f64; 3]) -> Sym3<f64> {
     Sym3 { xx, xy: 0.0, yy, xz: 0.0, yz: 0.0, zz }
 }

@@ -1,71 +1,121 @@
-//! Files in files.
+//! Files in files: those that are included, and those with settings of their own that are attached.
 
+use super::expand;
+use super::sections::Sections;
 use crate::error::Error;
+use crate::io::known::{Known, LeftOut};
 use crate::io::xml::{Amount, Element, MAX_DEPTH};
+use crate::warning::Warning;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// The text of a robot with what is in included files in place of the `<include>`s.
-pub(super) struct Includes<'a> {
-    /// The folder from which files are included; a string has none.
-    folder: Option<&'a Path>,
-    /// The files so far, without links.
-    seen: HashSet<PathBuf>,
-    amount: Amount,
+/// Known attributes and elements that a model cannot hold, and what becomes different.
+const LEFT_OUT: &LeftOut = &[];
+
+/// A file with settings of its own, with all that is included, replicated and attached in it in its place.
+pub(super) struct File {
+    pub(super) root: Element,
+    /// The folder of the file; a string has none.
+    pub(super) folder: Option<PathBuf>,
+    /// What was in its sections, once it has been attached.
+    pub(super) sections: Option<Sections>,
 }
 
-impl<'a> Includes<'a> {
-    /// The root element of a file.
-    pub(super) fn read(path: &'a Path) -> Result<Element, Error> {
-        let mut includes = Self { folder: Some(path.parent().unwrap_or(Path::new(""))), ..Self::of_string() };
-        includes.is_new(path);
-        let text = includes.amount.read(path)?;
-        includes.root(&text, &path.display().to_string())
+/// The files of a robot.
+pub(super) struct Files {
+    known: Known,
+    /// The main file first. A file that is being read has no entry yet.
+    pub(super) files: Vec<Option<File>>,
+    /// The files that are being read, outermost first.
+    open: Vec<PathBuf>,
+    pub(super) amount: Amount,
+    /// The number of `<attach>`s so far.
+    pub(super) attachments: usize,
+    pub(super) warnings: Vec<Warning>,
+}
+
+impl Files {
+    pub(super) fn new(known: Known) -> Self {
+        let amount = Amount::default();
+        Self { known, files: Vec::new(), open: Vec::new(), amount, attachments: 0, warnings: Vec::new() }
     }
 
-    /// The root element of a string, which includes no files.
-    pub(super) fn parse(text: &str) -> Result<Element, Error> {
-        Self::of_string().root(text, "<string>")
+    /// Reads a file with settings of its own, and returns its index.
+    pub(super) fn read(&mut self, path: &Path) -> Result<usize, Error> {
+        let text = self.amount.read(path)?;
+        let own = path.canonicalize().unwrap_or(path.to_owned());
+        if self.open.contains(&own) {
+            let what = "is attached inside of itself".to_owned();
+            return Err(Error::File { file: path.display().to_string(), what });
+        }
+        self.open.push(own);
+        let index = self.parse(&text, &path.display().to_string(), Some(path.parent().unwrap_or(Path::new(""))))?;
+        self.open.pop();
+        Ok(index)
     }
 
-    fn of_string() -> Self {
-        Self { folder: None, seen: HashSet::new(), amount: Amount::default() }
-    }
-
-    fn root(&mut self, text: &str, file: &str) -> Result<Element, Error> {
+    /// As [`read`](Self::read), of a text; without a folder it cannot name files.
+    pub(super) fn parse(&mut self, text: &str, file: &str, folder: Option<&Path>) -> Result<usize, Error> {
         let mut root = Element::parse(text, file, &mut self.amount)?;
-        self.resolve(&mut root, 1)?;
-        Ok(root)
+        let seen = self.open.last().cloned().into_iter().collect();
+        Includes { top: folder, seen, amount: &mut self.amount }.resolve(&mut root, folder, 1)?;
+        if root.tag != "mujoco" {
+            return Err(root.wrong("the root element of an MJCF is <mujoco>"));
+        }
+        self.known.check(&root, LEFT_OUT, &mut self.warnings);
+        let index = self.files.len();
+        belongs_to(&mut root, index);
+        self.files.push(None);
+        let folder = folder.map(Path::to_owned);
+        expand::expand(self, &mut root, folder.as_deref())?;
+        self.files[index] = Some(File { root, folder, sections: None });
+        Ok(index)
     }
+}
 
-    /// Remembers a file, and whether it is a new one.
-    fn is_new(&mut self, path: &Path) -> bool {
-        self.seen.insert(path.canonicalize().unwrap_or(path.to_owned()))
+/// Marks an element and all in it as a file's.
+fn belongs_to(element: &mut Element, source: usize) {
+    element.source = source;
+    for child in &mut element.children {
+        belongs_to(child, source);
     }
+}
 
-    /// Puts what is included somewhere in an element, which stands at a level, in its place.
-    fn resolve(&mut self, element: &mut Element, level: usize) -> Result<(), Error> {
+/// Puts what is in included files in place of the `<include>`s.
+struct Includes<'a> {
+    /// The folder of the main file.
+    top: Option<&'a Path>,
+    /// The files so far, without links.
+    seen: HashSet<PathBuf>,
+    amount: &'a mut Amount,
+}
+
+impl Includes<'_> {
+    /// Puts what is included somewhere in an element, which stands at a level and in a file in a folder, in its place.
+    fn resolve(&mut self, element: &mut Element, folder: Option<&Path>, level: usize) -> Result<(), Error> {
         if level > MAX_DEPTH {
             let what = format!("stands at level {level}, files included: at most {MAX_DEPTH} are allowed");
             return Err(element.wrong(what));
         }
         for mut child in std::mem::take(&mut element.children) {
             if child.tag != "include" {
-                self.resolve(&mut child, level + 1)?;
+                self.resolve(&mut child, folder, level + 1)?;
                 element.children.push(child);
                 continue;
             }
             let file = child.attribute("file").ok_or_else(|| child.wrong("has no file"))?;
-            let Some(folder) = self.folder else {
+            let (Some(top), Some(folder)) = (self.top, folder) else {
                 return Err(child.wrong(format!("a string has no folder to find `{file}` in")));
             };
-            let path = folder.join(file);
-            if !self.is_new(&path) {
+            // as MuJoCo: in the main file's folder, or else beside the including file
+            let path = Some(top.join(file)).filter(|path| path.exists()).unwrap_or_else(|| folder.join(file));
+            if !self.seen.insert(path.canonicalize().unwrap_or(path.clone())) {
                 return Err(child.wrong(format!("`{file}` is already part of the model")));
             }
             let text = self.amount.read(&path).map_err(|e| child.wrong(e.to_string()))?;
-            let mut included = Element::parse(&text, &path.display().to_string(), &mut self.amount)?;
-            self.resolve(&mut included, level)?; // its children come to stand where it was included
+            let mut included = Element::parse(&text, &path.display().to_string(), self.amount)?;
+            // its children come to stand where it was included
+            self.resolve(&mut included, Some(path.parent().unwrap_or(Path::new(""))), level)?;
             element.children.append(&mut included.children);
         }
         Ok(())

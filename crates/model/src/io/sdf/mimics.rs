@@ -1,49 +1,84 @@
-//! The axes of an SDF that follow others.
+//! The axes of an SDF that follow others, and gearboxes, which couple two axes.
 
-use super::poses::optional;
+use super::scopes::Scopes;
+use super::values::number;
 use crate::builder::{BodyId, ModelBuilder};
 use crate::error::Error;
-use crate::io::xml::Element;
+use crate::io::xml::{Element, bound};
 use crate::joint::Mimic;
 use crate::warning::Warning;
 use std::collections::HashMap;
 
-/// The bodies that move about or along each axis, by the joint's name and the axis's tag, and those that follow.
+/// The bodies that move about or along each axis, by the joint and the axis's tag, and those that follow.
 #[derive(Default)]
 pub(super) struct Axes<'a> {
-    bodies: HashMap<(&'a str, &'static str), BodyId>,
+    bodies: HashMap<(usize, &'static str), BodyId>,
     /// The joint, its `<mimic>`, the body that follows.
-    followers: Vec<(&'a Element, &'a Element, BodyId)>,
+    followers: Vec<(usize, &'a Element, BodyId)>,
 }
+
+/// Drake's element for a joint that follows another one.
+const DRAKE: &str = "drake:mimic";
 
 impl<'a> Axes<'a> {
     /// Remembers an axis of a joint.
-    pub(super) fn add(&mut self, joint: &'a Element, tag: &'static str, body: BodyId) {
-        self.bodies.insert((joint.attribute("name").unwrap_or_default(), tag), body);
-        if let Some(mimic) = joint.child(tag).and_then(|axis| axis.child("mimic")) {
-            self.followers.push((joint, mimic, body));
-        }
+    pub(super) fn add(&mut self, item: usize, joint: &'a Element, tag: &'static str, body: BodyId) {
+        self.bodies.insert((item, tag), body);
+        let mimic = joint.child(tag).and_then(|axis| axis.child("mimic")).or_else(|| joint.child(DRAKE));
+        self.followers.extend(mimic.map(|mimic| (item, mimic, body)));
     }
 
-    /// Lets the followers follow, or says that they are free.
-    pub(super) fn follow(&self, builder: &mut ModelBuilder, mimic: bool) -> Result<Vec<Warning>, Error> {
+    /// Returns the body that moves about or along an axis of a joint.
+    pub(super) fn body(&self, item: usize, tag: &'static str) -> Option<BodyId> {
+        self.bodies.get(&(item, tag)).copied()
+    }
+
+    /// Lets the followers follow, or warns that they are free.
+    pub(super) fn follow(
+        &self,
+        scopes: &Scopes,
+        builder: &mut ModelBuilder,
+        mimic: bool,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<(), Error> {
         if !mimic {
             let what = "a joint that follows another one is left free unless `mimic` is asked for";
-            let free = |joint: &Element| joint.mimic(what);
-            return Ok(self.followers.iter().map(|(joint, ..)| free(joint)).collect());
+            warnings.extend(self.followers.iter().map(|&(item, ..)| scopes.items[item].element.mimic(what)));
+            return Ok(());
         }
-        for &(joint, mimic, follower) in &self.followers {
+        builder.check_size()?; // before chains of followers are walked
+        let mut rules: HashMap<usize, (BodyId, Mimic)> = HashMap::new();
+        for &(item, mimic, follower) in &self.followers {
+            let joint = scopes.items[item].element;
             let (name, axis) = (mimic.attribute("joint").unwrap_or_default(), mimic.attribute("axis"));
             let tag = if axis == Some("axis2") { "axis2" } else { "axis" };
-            let Some(&leader) = self.bodies.get(&(name, tag)) else {
+            let leader = scopes.joint(item, name).and_then(|leader| self.body(leader, tag));
+            let Some(leader) = leader else {
                 return Err(joint.wrong(format!("mimic: no joint with an <{tag}> that moves is named `{name}`")));
             };
-            let number = |tag, otherwise| optional(joint, mimic, tag, otherwise);
-            let (ratio, offset) = (number("multiplier", 1.0)?, number("offset", 0.0)?);
+            let read = |tag, otherwise| match mimic.attribute(tag).filter(|_| mimic.tag == DRAKE) {
+                Some(text) => bound(text).map_err(|what| joint.wrong_inside(mimic, format!("{tag}: {what}"))),
+                None => number(joint, Some(mimic), tag, otherwise),
+            };
+            let (ratio, offset) = (read("multiplier", 1.0)?, read("offset", 0.0)?);
             // follower = multiplier (leader − reference) + offset
-            let offset = offset - ratio * number("reference", 0.0)?;
-            builder.mimic(follower, leader, Mimic { ratio, offset });
+            let offset = offset - ratio * read("reference", 0.0)?;
+            rules.insert(follower.0, (leader, Mimic { ratio, offset }));
         }
-        Ok(Vec::new())
+        for &(item, _, follower) in &self.followers {
+            let (mut leader, mut rule) = rules[&follower.0];
+            let mut left = rules.len();
+            while let Some(&(next, Mimic { ratio, offset })) = rules.get(&leader.0) {
+                // r (r₂ q + o₂) + o
+                rule = Mimic { ratio: rule.ratio * ratio, offset: rule.ratio * offset + rule.offset };
+                leader = next;
+                left -= 1;
+                if left == 0 {
+                    return Err(scopes.items[item].element.wrong("mimic: follows itself, through others"));
+                }
+            }
+            builder.mimic(follower, leader, rule);
+        }
+        Ok(())
     }
 }

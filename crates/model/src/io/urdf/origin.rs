@@ -1,6 +1,6 @@
 //! Placements in a URDF: `<origin>`, which has had quaternions since version 1.1.
 
-use super::{array, only_inside, vector};
+use super::elements::{array, only_inside, vector};
 use crate::error::Error;
 use crate::io::from_rpy;
 use crate::io::xml::Element;
@@ -28,7 +28,11 @@ impl Origins {
 
     /// The `<origin>` inside something, or none. Errors name `of`.
     pub(super) fn pose(self, of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
-        let Some(origin) = only_inside(of, inside, "origin")? else { return Ok(Se3::identity()) };
+        only_inside(of, inside, "origin")?.map_or(Ok(Se3::identity()), |origin| self.pose_of(of, origin))
+    }
+
+    /// Returns the placement that the attributes of an element name. Errors name `of`.
+    pub(super) fn pose_of(self, of: &Element, origin: &Element) -> Result<Se3<f64>, Error> {
         let rotation = match (array(of, origin, "rpy")?, array(of, origin, "quat_xyzw")?) {
             (Some(_), Some(_)) => return Err(of.wrong_inside(origin, "origin has both rpy and quat_xyzw")),
             (_, Some(_)) if !self.quaternions => {

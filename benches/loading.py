@@ -1,0 +1,71 @@
+"""Times how long robots take to load: the URDFs of example-robot-data, by this condyle and by another one.
+
+    python benches/loading.py [--beside FOLDER] [--rounds N]
+
+FOLDER has another `condyle` package, for example of an earlier version. Both load each file in turn, in processes of their own;
+a time is the median over the rounds. Prints a line for each robot and the ratio of the sums.
+"""
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+from pathlib import Path
+
+LOAD = """
+import json, sys, time
+import condyle
+
+for line in sys.stdin:
+    path = line.rstrip("\\n")
+    start = time.perf_counter()
+    try:
+        condyle.Model.from_urdf(path)
+    except condyle.Error as error:
+        print(json.dumps(None), flush=True)
+        continue
+    print(json.dumps(time.perf_counter() - start), flush=True)
+"""
+
+
+def robots() -> list[Path]:
+    """The URDFs of example-robot-data, wherever the package is installed."""
+    import example_robot_data
+
+    [root] = [p for base in Path(example_robot_data.__file__).parents for p in base.glob("**/example-robot-data/robots")][:1]
+    return sorted(root.glob("**/*.urdf"))
+
+
+def loader(folder: str | None) -> subprocess.Popen[str]:
+    """A process that loads the files whose paths it is given, and answers with the time of each."""
+    environment = os.environ | ({"PYTHONPATH": folder} if folder else {})
+    pipe = subprocess.PIPE
+    return subprocess.Popen([sys.executable, "-c", LOAD], stdin=pipe, stdout=pipe, text=True, env=environment)
+
+
+def ask(process: subprocess.Popen[str], path: Path) -> float | None:
+    assert process.stdin is not None and process.stdout is not None
+    print(path, file=process.stdin, flush=True)
+    return json.loads(process.stdout.readline())
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--beside", help="the folder that has another `condyle`")
+    parser.add_argument("--rounds", type=int, default=15)
+    wanted = parser.parse_args()
+    processes = [loader(folder) for folder in (None, *([wanted.beside] if wanted.beside else []))]
+    sums = [0.0] * len(processes)
+    for path in robots():
+        times = [[ask(process, path) for process in processes] for _ in range(wanted.rounds)]
+        if any(time is None for time in times[0]):
+            print(f"{path.stem:36} refused")
+            continue
+        medians = [statistics.median(each) * 1e6 for each in zip(*times, strict=True)]
+        sums = [total + median for total, median in zip(sums, medians, strict=True)]
+        print(f"{path.stem:36}" + "".join(f"{median:10.0f} µs" for median in medians))
+    print("all" + "".join(f"{total:10.0f} µs" for total in sums))
+    if len(sums) == 2:
+        print(f"ratio: {sums[0] / sums[1]:.3f}")

@@ -1,0 +1,86 @@
+//! Gravity compensation: the efforts by which a part of the weight of some bodies is carried.
+//!
+//! The force −m g acts at the point c of a body, as if an unseen hand held it. Its efforts are the gradient of the potential
+//! energy of these masses, as those of gravity, with a₀ = −g, in the frame of body i on the path from the body to the root:
+//!
+//! ```text
+//! F = [m a₀; m c × a₀]     τ_i = S_iᵀ F     λF = λXi F
+//! ∂τ_d/∂q_e = S_e,ω · ((m S_d,v + S_d,ω × m c) × a₀)     (e on the path from d to the root)
+//! ```
+//!
+//! and ∂τ_e/∂q_d is the same number, as these are second derivatives of an energy; so it costs O(depth) a body, O(depth²) with
+//! derivatives, and no scratch. Source: the weights of `statics.rs`, body by body.
+
+use condyle_model::joint::Joint;
+use condyle_model::layout::{Layout, Pairs};
+use condyle_model::{GravityCompensation, Model};
+use condyle_spatial::{Act, Force, Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
+
+/// The mass that is carried, in the turned frame of its body, and −g there.
+#[inline(always)]
+fn carried<L: Layout, R>(l: &L, model: &Model<R>, of: &GravityCompensation, q: &[L::S]) -> (Inertia<L::S>, Vec3<L::S>) {
+    let turned = Se3::new(model.nodes()[of.body].axis_rotation, Vec3::zero()); // bXz
+    let mass = turned.act_inv(Inertia { mass: of.mass, mass_com: of.mass_com, rotational: Sym3::zero() });
+    let (mut i, mut rotation) = (of.body, Mat3::identity());
+    while i > 0 {
+        rotation = Joint::placement(l, i, q).rotation * rotation; // oRb
+        i = model.nodes()[i].parent;
+    }
+    let mass = Inertia { mass: L::S::splat(of.mass), mass_com: mass.mass_com.lift(), rotational: Sym3::zero() };
+    (mass, rotation.transpose_mul(l.minus_gravity())) // a₀ = −oRbᵀ g
+}
+
+/// Adds the efforts.
+#[inline(always)]
+pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau: &mut [L::S]) {
+    for of in model.gravity_compensation() {
+        let (mass, a) = carried(l, model, of, q);
+        let mut F = Force::new(a.scale(mass.mass), mass.mass_com.cross(a)); // F = [m a₀; m c × a₀]
+        let mut i = of.body;
+        while i > 0 {
+            Joint::project(l, i, F, tau); // τ_i = S_iᵀ F
+            F = Joint::placement(l, i, q).act(F); // λF = λXi F
+            i = model.nodes()[i].parent;
+        }
+    }
+}
+
+/// Adds the slopes to an nv × nv matrix.
+#[inline(always)]
+pub(super) fn add_slopes<L: Pairs, R>(l: &L, model: &Model<R>, q: &[L::S], dtau_dq: &mut [L::S]) {
+    let identity = Se3::identity();
+    for of in model.gravity_compensation() {
+        let (mut mass, mut a) = carried(l, model, of, q);
+        let mut i = of.body;
+        while i > 0 {
+            let (support, nv) = (l.support(i), l.joint(i).nv());
+            let own = &support[support.len() - nv..];
+            for k in 0..nv {
+                let S_d = l.joint(i).column(&identity, k);
+                let mut moment = (mass * S_d).linear.cross(a); // (m S_v + S_ω × m c) × a₀
+                for e in 0..nv {
+                    let S_e = l.joint(i).column(&identity, e);
+                    l.add_entry(dtau_dq, own[k], own[e], S_e.angular.dot(moment));
+                }
+                let mut j = i;
+                loop {
+                    moment = Joint::placement(l, j, q).rotation * moment;
+                    j = model.nodes()[j].parent;
+                    if j == 0 {
+                        break;
+                    }
+                    let (support, nv) = (l.support(j), l.joint(j).nv());
+                    let before = &support[support.len() - nv..];
+                    for e in 0..nv {
+                        let x = l.joint(j).column(&identity, e).angular.dot(moment); // ∂τ_d/∂q_e = ∂τ_e/∂q_d
+                        l.add_entry(dtau_dq, own[k], before[e], x);
+                        l.add_entry(dtau_dq, before[e], own[k], x);
+                    }
+                }
+            }
+            let X = Joint::placement(l, i, q);
+            (mass, a) = (X.act(mass), X.rotation * a);
+            i = model.nodes()[i].parent;
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Things of a file beside the tree of bodies, in the order in which they depend on each other: tendons and actuators add
+//! armature, springs may follow from inertia, and limits of effort are sums.
+
+use super::Source;
+use super::keyframe;
+use super::reference::Reference;
+use super::spring::{Joints, Line, Switches};
+use super::tendon::Tendons;
+use super::transmission::Drives;
+use crate::error::Error;
+use crate::io::xml::Element;
+use crate::model::Model;
+use crate::warning::Warning;
+use condyle_spatial::Se3;
+
+/// Adds what the file has beside the tree to the model, and says what is left out. `poses` has the pose of each body in the
+/// world that the file has drawn.
+pub(super) fn add<'a>(
+    model: &mut Model,
+    root: &'a Element,
+    sources: &'a [Source<'a>],
+    joints: &mut Joints,
+    poses: &[Se3<f64>],
+) -> Result<Vec<Warning>, Error> {
+    let mut warnings = Vec::new();
+    let on = Switches::read(root)?;
+    let lines: Vec<Line> = joints.all.iter().map(|joint| Line::of(model, joint.body)).collect();
+    let mut tendons = Tendons::read(root, sources, joints)?;
+    let drives = Drives::read(root, sources, joints, &tendons, &on)?;
+    drives.load(model, joints, &mut tendons, &lines, &on);
+    // armature of each column: of the joint, and of tendons
+    let mut armature = vec![0.0; model.tree.columns.len()];
+    for joint in &joints.all {
+        armature[joint.columns(model)].fill(joint.armature);
+    }
+    for tendon in &tendons.all {
+        tendon.add_to(model, joints, &lines, &on, &mut armature, &mut warnings);
+    }
+    model.actuators = {
+        let reference = match drives.has_ratios() || joints.all.iter().any(|joint| joint.has_spring_damper()) {
+            true => Some(Reference::new(model, poses, &armature)),
+            false => None,
+        };
+        let response = |k: usize| reference.as_ref().map_or(0.0, |reference| reference.response(&[(k, 1.0)]));
+        joints.all.iter_mut().for_each(|joint| joint.find_spring(joint.columns(model), &response));
+        drives.table(model, (joints, &tendons), &on, reference.as_ref(), &mut warnings)?
+    };
+    for (joint, &line) in joints.all.iter().zip(&lines) {
+        joint.add_to(model, line, &on, &mut warnings);
+    }
+    drives.limit(model, (joints, &tendons), &lines, &on);
+    if !on.limit {
+        model.limits.lower.fill(f64::NEG_INFINITY);
+        model.limits.upper.fill(f64::INFINITY);
+    }
+    if !on.spring && !on.damper {
+        model.gravity_compensation.clear(); // MuJoCo has no passive forces then
+    }
+    keyframe::add(model, root, joints)?;
+    Ok(warnings)
+}

@@ -1,0 +1,205 @@
+//! The settings of `<compiler>`, and the poses that they give meaning to.
+
+use super::attributes::Attributes;
+use crate::error::Error;
+use crate::io::xml::Element;
+use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
+
+/// Whether bodies get their inertia from their geoms.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum FromGeoms {
+    Never,
+    WithoutInertial,
+    Always,
+}
+
+/// The settings of `<compiler>`.
+pub(super) struct Compiler {
+    /// Radians in a unit of angle.
+    pub(super) angle: f64,
+    eulerseq: Vec<u8>,
+    pub(super) autolimits: bool,
+    pub(super) from_geoms: FromGeoms,
+    /// Geoms of these groups count for inertia.
+    pub(super) groups: [f64; 2],
+    /// No body has less mass (kg), no principal moment of inertia is less (kg m²).
+    pub(super) bounds: [f64; 2],
+    /// Whether principal moments that no body has are replaced by their mean.
+    pub(super) balance: bool,
+    /// The mass to which all masses are scaled (kg).
+    pub(super) total_mass: Option<f64>,
+    /// Whether a free joint sits in the frame of inertia of its body.
+    pub(super) align_free: bool,
+    /// The folder of meshes, and whether it replaces the folders in their addresses.
+    pub(super) mesh_folder: String,
+    pub(super) strip_path: bool,
+    /// Whether a primitive that is fitted to a mesh has the box around it, instead of the box of its inertia.
+    pub(super) fit_box: bool,
+    /// The rule of a mesh's inertia where the mesh has none (before MuJoCo 3.2.4).
+    pub(super) exact_meshes: bool,
+}
+
+/// The ways to give an orientation.
+pub(super) const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "xyaxes", "zaxis", "euler"];
+
+impl Compiler {
+    pub(super) fn read(root: &Element) -> Result<Self, Error> {
+        let mut compiler = Self {
+            angle: 1f64.to_radians(),
+            eulerseq: b"xyz".to_vec(),
+            autolimits: true,
+            from_geoms: FromGeoms::WithoutInertial,
+            groups: [0.0, 5.0],
+            bounds: [0.0, 0.0],
+            balance: false,
+            total_mass: None,
+            align_free: false,
+            mesh_folder: String::new(),
+            strip_path: false,
+            fit_box: false,
+            exact_meshes: false,
+        };
+        for element in root.all("compiler") {
+            compiler.merge(element)?;
+        }
+        Ok(compiler)
+    }
+
+    /// Takes over what an element says.
+    fn merge(&mut self, element: &Element) -> Result<(), Error> {
+        let a = Attributes::plain(element);
+        self.angle = match a.get("angle") {
+            None => self.angle,
+            Some("degree") => 1f64.to_radians(),
+            Some("radian") => 1.0,
+            Some(other) => return Err(element.wrong(format!("angle: `{other}` is neither degree nor radian"))),
+        };
+        if let Some(eulerseq) = a.get("eulerseq") {
+            if eulerseq.len() != 3 || !eulerseq.bytes().all(|c| b"xyzXYZ".contains(&c)) {
+                return Err(element.wrong(format!("eulerseq: `{eulerseq}` is not three of xyzXYZ")));
+            }
+            self.eulerseq = eulerseq.as_bytes().to_vec();
+        }
+        if a.get("inertiafromgeom").is_some() {
+            self.from_geoms = match a.flag("inertiafromgeom", Some("auto"))? {
+                None => FromGeoms::WithoutInertial,
+                Some(true) => FromGeoms::Always,
+                Some(false) => FromGeoms::Never,
+            };
+        }
+        self.groups = a.array("inertiagrouprange")?.unwrap_or(self.groups);
+        if a.get("coordinate").is_some_and(|c| c != "local") {
+            return Err(element.wrong("coordinate: only local coordinates are read"));
+        }
+        for (name, flag) in [
+            ("autolimits", &mut self.autolimits),
+            ("balanceinertia", &mut self.balance),
+            ("alignfree", &mut self.align_free),
+            ("strippath", &mut self.strip_path),
+            ("fitaabb", &mut self.fit_box),
+            ("exactmeshinertia", &mut self.exact_meshes),
+        ] {
+            *flag = a.flag(name, None)?.unwrap_or(*flag);
+        }
+        for (name, bound) in ["boundmass", "boundinertia"].into_iter().zip(&mut self.bounds) {
+            *bound = a.number(name)?.unwrap_or(*bound);
+        }
+        for folder in ["assetdir", "meshdir"].iter().filter_map(|name| a.get(name)) {
+            self.mesh_folder = folder.to_owned();
+        }
+        self.total_mass = a.number("settotalmass")?.filter(|&x| x > 0.0).or(self.total_mass);
+        Ok(())
+    }
+
+    /// The pose that pos and quat, axisangle, euler, xyaxes or zaxis give.
+    pub(super) fn pose(&self, a: &Attributes) -> Result<Se3<f64>, Error> {
+        Ok(Se3::new(self.rotation(a)?, a.vector("pos")?.unwrap_or(Vec3::zero())))
+    }
+
+    fn rotation(&self, a: &Attributes) -> Result<Mat3<f64>, Error> {
+        let unit = |name: &str, v: Vec3<f64>| {
+            let norm = v.norm_squared().sqrt();
+            let ok = norm.is_finite() && norm > 1e-14;
+            if ok {
+                Ok(v.scale(1.0 / norm))
+            } else {
+                Err(a.element.wrong(format!("{name}: a vector has no direction")))
+            }
+        };
+        let own: Vec<&str> = ORIENTATIONS.into_iter().filter(|n| a.element.attribute(n).is_some()).collect();
+        if own.len() > 1 {
+            return Err(a.element.wrong(format!("has {} orientations: {}", own.len(), own.join(", "))));
+        }
+        // an element's own orientation goes before what its class says in another way, any other one before a quat
+        let inherited = || ORIENTATIONS.into_iter().rev().find(|n| a.get(n).is_some());
+        match own.first().copied().or_else(inherited) {
+            None | Some("quat") => {
+                let [w, x, y, z] = a.array("quat")?.unwrap_or([1.0, 0.0, 0.0, 0.0]);
+                let norm = (w * w + x * x + y * y + z * z).sqrt();
+                if !(norm.is_finite() && norm > 1e-14) {
+                    return Err(a.element.wrong("quat: has no direction"));
+                }
+                let s = 1.0 / norm;
+                Ok(Quaternion::new(x * s, y * s, z * s, w * s).to_rotation())
+            }
+            Some("axisangle") => {
+                let [x, y, z, angle] = a.array("axisangle")?.unwrap_or_default();
+                Ok(turn(unit("axisangle", Vec3::new(x, y, z))?, angle * self.angle))
+            }
+            Some("xyaxes") => {
+                let [x0, x1, x2, y0, y1, y2] = a.array("xyaxes")?.unwrap_or_default();
+                let (x, y) = (unit("xyaxes", Vec3::new(x0, x1, x2))?, Vec3::new(y0, y1, y2));
+                let y = unit("xyaxes", y - x.scale(x.dot(y)))?;
+                Ok(Mat3 { x, y, z: x.cross(y) })
+            }
+            Some("zaxis") => Ok(z_to(unit("zaxis", a.vector("zaxis")?.unwrap_or(Vec3::zero()))?)),
+            Some(_) => Ok(self.euler(a.array("euler")?.unwrap_or_default())),
+        }
+    }
+
+    /// The rotation by three angles about the axes of `eulerseq`.
+    pub(super) fn euler(&self, angles: [f64; 3]) -> Mat3<f64> {
+        let mut R = Mat3::identity();
+        for (axis, angle) in self.eulerseq.iter().zip(angles) {
+            let mut v = [0.0; 3];
+            v[usize::from(axis.to_ascii_lowercase() - b'x')] = 1.0;
+            let turn = turn(v.into(), angle * self.angle);
+            // lower case: about the axes that turn with it
+            R = if axis.is_ascii_lowercase() { R * turn } else { turn * R };
+        }
+        R
+    }
+}
+
+/// The rotation by an angle about a unit vector.
+pub(super) fn turn(axis: Vec3<f64>, angle: f64) -> Mat3<f64> {
+    lie::exp3(axis.scale(angle)).to_rotation()
+}
+
+/// The shortest rotation that takes z to a unit vector.
+pub(super) fn z_to(v: Vec3<f64>) -> Mat3<f64> {
+    let axis = Vec3::new(-v.y, v.x, 0.0);
+    let sin = axis.norm_squared().sqrt();
+    if sin < 1e-10 {
+        return turn(Vec3::new(1.0, 0.0, 0.0), 0f64.atan2(v.z));
+    }
+    turn(axis.scale(1.0 / sin), sin.atan2(v.z))
+}
+
+/// The pose of what goes from one point to another, and half the distance (m): its z axis points to the first one.
+pub(super) fn from_to(a: &Attributes, kind: &str) -> Result<Option<(Se3<f64>, f64)>, Error> {
+    let Some([x0, y0, z0, x1, y1, z1]) = a.array("fromto")? else { return Ok(None) };
+    if !matches!(kind, "capsule" | "cylinder" | "ellipsoid" | "box") {
+        return Err(a.element.wrong(format!("a {kind} has no fromto")));
+    }
+    if a.vector("pos")?.is_some_and(|pos| pos != Vec3::zero()) {
+        return Err(a.element.wrong("has both pos and fromto"));
+    }
+    let (from, to) = (Vec3::new(x0, y0, z0), Vec3::new(x1, y1, z1));
+    let axis = from - to;
+    let half = axis.norm_squared().sqrt() / 2.0;
+    if !(half.is_finite() && half > 1e-14) {
+        return Err(a.element.wrong("fromto: the points are too close"));
+    }
+    Ok(Some((Se3::new(z_to(axis.scale(0.5 / half)), (from + to).scale(0.5)), half)))
+}

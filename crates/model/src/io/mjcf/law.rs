@@ -1,0 +1,295 @@
+//! Laws of actuators: how control, length and velocity give a force. Each kind of element sets the numbers of one general law,
+//! and each has defaults of its own in a class.
+
+use super::attributes::Attributes;
+use crate::error::Error;
+use crate::io::xml::{Element, numbers};
+use core::f64::consts::PI;
+use std::rc::Rc;
+
+/// Number of parameters of dynamics, gain and bias.
+const PARAMETERS: usize = 10;
+
+/// Kinds of actuators: tags of elements in `<actuator>` and in a default class.
+pub(super) const KINDS: [&str; 13] = [
+    "general",
+    "motor",
+    "position",
+    "velocity",
+    "intvelocity",
+    "orientation",
+    "pid",
+    "damper",
+    "cylinder",
+    "muscle",
+    "adhesion",
+    "dcmotor",
+    "plugin",
+];
+
+/// Law of an actuator with the length l and the activation a, which follows the control u:
+///
+/// ```text
+/// f = gain(l, l̇) · a + bias(l, l̇)
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Law<'a> {
+    pub(super) dynamics: &'a str,
+    pub(super) gain: &'a str,
+    pub(super) bias: &'a str,
+    pub(super) dynprm: [f64; PARAMETERS],
+    pub(super) gainprm: [f64; PARAMETERS],
+    /// Of an affine bias b₀ + b₁ l + b₂ l̇, the numbers b. A positive b₂ of a servo is a damping ratio.
+    pub(super) biasprm: [f64; PARAMETERS],
+    /// Share of the target's range that the control has, or 0.
+    pub(super) inherit: f64,
+    /// Inputs of a kind that has several.
+    pub(super) input: Option<&'a str>,
+    /// Names of what a model cannot hold of a DC motor.
+    pub(super) extra: &'static str,
+}
+
+impl Default for Law<'_> {
+    fn default() -> Self {
+        let first = |x| [x, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let (dynprm, gainprm, biasprm) = (first(1.0), first(1.0), first(0.0));
+        let (dynamics, gain, bias) = ("none", "fixed", "none");
+        Self { dynamics, gain, bias, dynprm, gainprm, biasprm, inherit: 0.0, input: None, extra: "" }
+    }
+}
+
+/// Law of a default class: that of its last default, of whatever kind.
+struct ClassLaw<'a> {
+    kind: &'a str,
+    law: Law<'a>,
+    /// Law of the class around it.
+    outer: Option<Rc<Self>>,
+}
+
+/// Laws of a default class and of those around it.
+#[derive(Clone, Default)]
+pub(super) struct Laws<'a> {
+    outer: Option<Rc<ClassLaw<'a>>>,
+    own: Option<Rc<ClassLaw<'a>>>,
+}
+
+impl<'a> Laws<'a> {
+    /// Returns the laws of a class inside this one, before it has defaults.
+    pub(super) fn inner(&self) -> Self {
+        Self { outer: self.own.clone().or_else(|| self.outer.clone()), own: None }
+    }
+
+    /// Returns the law of an element of `<actuator>`. A kind inherits from the innermost class whose last default is of the
+    /// same kind or `<general>`; a `<general>` inherits from any.
+    pub(super) fn of(&self, e: &'a Element, viscous: f64) -> Result<Law<'a>, Error> {
+        let kind = e.tag.as_str();
+        let mut class = self.own.as_ref().or(self.outer.as_ref());
+        while let Some(found) = class.filter(|class| kind != "general" && class.kind != kind && class.kind != "general")
+        {
+            class = found.outer.as_ref();
+        }
+        let mut law = match class {
+            Some(class) if kind == "general" || class.kind == kind => class.law,
+            Some(class) => class.law.begin(kind),
+            None => Law::default().begin(kind),
+        };
+        law.read(kind, e, viscous)?;
+        Ok(law)
+    }
+
+    /// Takes an element of a default class, and returns its law.
+    pub(super) fn add(&mut self, e: &'a Element, viscous: f64) -> Result<Law<'a>, Error> {
+        let law = self.of(e, viscous)?;
+        self.own = Some(Rc::new(ClassLaw { kind: &e.tag, law, outer: self.outer.clone() }));
+        Ok(law)
+    }
+}
+
+impl<'a> Law<'a> {
+    /// Returns the law with which a kind begins that inherits from a general law.
+    fn begin(&self, kind: &str) -> Self {
+        let mut law = Self::default();
+        let [fixed, affine] = ["fixed", "affine"].map(|gain| self.gain == gain);
+        match kind {
+            "position" | "intvelocity" if fixed => {
+                (law.gainprm[0], law.biasprm[2], law.inherit) = (self.gainprm[0], self.biasprm[2], self.inherit);
+                if self.dynamics == "filterexact" {
+                    (law.dynamics, law.dynprm) = (self.dynamics, self.dynprm);
+                }
+            }
+            "velocity" | "adhesion" if fixed => law.gainprm[0] = self.gainprm[0],
+            "cylinder" if fixed => {
+                law.gainprm[0] = self.gainprm[0];
+                law.biasprm[..3].copy_from_slice(&self.biasprm[..3]);
+                law.dynprm[0] = self.dynprm[0];
+            }
+            "damper" => law.gainprm = if affine { self.gainprm } else { [0.0; PARAMETERS] },
+            "pid" if self.gain == "pid" => law = *self,
+            "pid" => law.biasprm[1] = -1.0,
+            "dcmotor" if self.gain == "dcmotor" => law = *self,
+            "dcmotor" => law.gainprm = [0.0; PARAMETERS],
+            "orientation" if self.gain == "so3" => law = *self,
+            _ => {}
+        }
+        law
+    }
+
+    /// Reads the attributes of an element of a kind.
+    fn read(&mut self, kind: &str, e: &'a Element, viscous: f64) -> Result<(), Error> {
+        let a = Attributes::plain(e);
+        let number = |name: &str, or: f64| a.number(name).map(|x| x.unwrap_or(or));
+        self.inherit = number("inheritrange", self.inherit)?;
+        self.input = e.attribute("input").or(self.input);
+        let set = |law: &mut Self, dynamics, gain, bias| (law.dynamics, law.gain, law.bias) = (dynamics, gain, bias);
+        match kind {
+            "general" | "plugin" => {
+                for (name, to) in
+                    [("dyntype", &mut self.dynamics), ("gaintype", &mut self.gain), ("biastype", &mut self.bias)]
+                {
+                    *to = e.attribute(name).unwrap_or(*to);
+                }
+                fill(&a, "dynprm", &mut self.dynprm)?;
+                fill(&a, "gainprm", &mut self.gainprm)?;
+                fill(&a, "biasprm", &mut self.biasprm)?;
+            }
+            "motor" => *self = Self::default(),
+            "position" | "intvelocity" | "orientation" => {
+                self.gainprm[0] = number("kp", self.gainprm[0])?;
+                self.servo(&a, self.gainprm[0])?;
+                if let Some(constant) = a.number("timeconst")? {
+                    self.dynprm[0] = constant;
+                    self.dynamics = if constant > 0.0 { "filterexact" } else { "none" };
+                }
+                match kind {
+                    "position" => set(self, self.dynamics, "fixed", "affine"),
+                    "intvelocity" => set(self, "integrator", "fixed", "affine"),
+                    _ => set(self, "none", "so3", "so3"),
+                }
+            }
+            "pid" => {
+                self.servo(&a, number("kp", -self.biasprm[1])?)?;
+                self.gainprm[0] = number("ki", if self.gain == "pid" { self.gainprm[0] } else { 0.0 })?;
+                self.dynprm[1] = number("slewmax", if self.dynamics == "pid" { self.dynprm[1] } else { 0.0 })?;
+                let acts = self.gainprm[0] != 0.0 || self.dynprm[1] != 0.0;
+                set(self, if acts { "pid" } else { "none" }, "pid", "affine");
+            }
+            "velocity" => {
+                let kv = number("kv", self.gainprm[0])?;
+                (self.gainprm[0], self.biasprm) = (kv, [0.0; PARAMETERS]);
+                self.biasprm[2] = -kv;
+                set(self, "none", "fixed", "affine");
+            }
+            "damper" => {
+                let kv = number("kv", -self.gainprm[2])?;
+                if kv < 0.0 {
+                    return Err(e.wrong(format!("kv {kv} is negative")));
+                }
+                self.gainprm = [0.0; PARAMETERS];
+                self.gainprm[2] = -kv;
+                set(self, "none", "affine", "none");
+            }
+            "cylinder" => {
+                self.dynprm[0] = number("timeconst", self.dynprm[0])?;
+                self.gainprm[0] = number("area", self.gainprm[0])?;
+                if let Some(diameter) = a.number("diameter")?.filter(|d| *d >= 0.0) {
+                    self.gainprm[0] = PI / 4.0 * diameter * diameter;
+                }
+                if let Some(bias) = a.array::<3>("bias")? {
+                    self.biasprm[..3].copy_from_slice(&bias);
+                }
+                set(self, "filter", "fixed", "affine");
+            }
+            "adhesion" => {
+                self.gainprm[0] = number("gain", self.gainprm[0])?;
+                set(self, "none", "fixed", "none");
+            }
+            "dcmotor" => self.dc_motor(&a, viscous)?,
+            _ => set(self, "muscle", "muscle", "muscle"),
+        }
+        Ok(())
+    }
+
+    /// Reads the gains of a servo.
+    fn servo(&mut self, a: &Attributes<'a>, kp: f64) -> Result<(), Error> {
+        let wrong = |what: String| Err(a.element.wrong(what));
+        self.biasprm[1] = -kp;
+        match (a.number("kv")?, a.number("dampratio")?) {
+            (Some(_), Some(_)) => return wrong("has kv and dampratio, which contradict each other".to_owned()),
+            (Some(x), None) | (None, Some(x)) if x < 0.0 => return wrong(format!("kv or dampratio {x} is negative")),
+            (Some(kv), None) => self.biasprm[2] = -kv,
+            (None, Some(ratio)) => self.biasprm[2] = ratio,
+            (None, None) => {}
+        }
+        Ok(())
+    }
+
+    /// Reads a DC motor: with the resistance R and the motor constant K, f = K/R (u − K l̇).
+    fn dc_motor(&mut self, a: &Attributes<'a>, viscous: f64) -> Result<(), Error> {
+        let some = |name: &str, count: usize| -> Result<[f64; 6], Error> {
+            let mut x = [0.0; 6];
+            fill(a, name, &mut x[..count])?;
+            Ok(x)
+        };
+        let [mut R, mut K] = [self.gainprm[0], self.gainprm[1]];
+        R = a.number("resistance")?.unwrap_or(R);
+        let [volts, stall, free, ..] = some("nominal", 3)?;
+        let [mut torque, mut emf, ..] = some("motorconst", 2)?;
+        if a.get("motorconst").is_none() {
+            torque = K;
+        }
+        if volts > 0.0 && emf <= 0.0 && free > 0.0 {
+            // free = volts emf / (emf² + R viscous)
+            let root = volts * volts - 4.0 * R * viscous * free * free;
+            let less = volts / free - if stall > 0.0 { volts * viscous / stall } else { 0.0 };
+            emf = match viscous > 0.0 {
+                true if R > 0.0 && root > 0.0 => (volts + root.sqrt()) / (2.0 * free),
+                true if R <= 0.0 && less > 0.0 => less,
+                _ => volts / free,
+            };
+        }
+        K = match (torque > 0.0, emf > 0.0) {
+            (true, true) => (torque * emf).sqrt(),
+            (true, false) => torque,
+            _ => emf,
+        };
+        if R == 0.0 && volts > 0.0 && stall > 0.0 {
+            R = K * volts / stall;
+        }
+        if !(K > 0.0 && R > 0.0) {
+            return Err(a.element.wrong(format!("motor constant {K} or resistance {R} is not positive")));
+        }
+        (self.gainprm[0], self.gainprm[1]) = (R, K);
+        for name in ["inductance", "thermal", "controller", "lugre", "cogging"] {
+            if a.get(name).is_some() {
+                self.extra = name;
+            }
+        }
+        (self.dynamics, self.gain, self.bias) = ("none", "dcmotor", "dcmotor");
+        Ok(())
+    }
+
+    /// Returns the greatest torque of a DC motor that its `saturation` allows.
+    pub(super) fn saturation(&self, a: &Attributes<'a>) -> Result<Option<f64>, Error> {
+        let mut given = [0.0; 3];
+        fill(a, "saturation", &mut given)?;
+        let [torque, current, _] = given;
+        Ok(match self.gain == "dcmotor" {
+            true if torque > 0.0 => Some(torque),
+            true if current > 0.0 => Some(self.gainprm[1] * current),
+            _ => None,
+        })
+    }
+}
+
+/// Writes the numbers of an attribute over the first ones of an array, as MuJoCo reads numbers that may be fewer.
+pub(super) fn fill(a: &Attributes, name: &str, to: &mut [f64]) -> Result<(), Error> {
+    for text in a.layers(name) {
+        let wrong = |what: String| a.element.wrong(format!("{name}: {what}"));
+        let numbers = numbers(text).map_err(wrong)?;
+        if numbers.len() > to.len() {
+            return Err(wrong(format!("expected at most {} numbers, found {}", to.len(), numbers.len())));
+        }
+        to[..numbers.len()].copy_from_slice(&numbers);
+    }
+    Ok(())
+}

@@ -1,0 +1,125 @@
+//! Volumes, centres of mass and inertias of meshes, by MuJoCo's rules (`inertia` of `<mesh>`).
+
+use condyle_spatial::{Mat3, Se3, Sym3, Vec3};
+
+/// Volumes (m³) and areas (m²) below this are none, as in MuJoCo.
+#[cfg(feature = "meshes")]
+const LEAST: f64 = 1e-15;
+
+/// Inertia of a mesh.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Solid {
+    /// Volume (m³), or the area of a shell (m²).
+    pub(super) volume: f64,
+    /// The centre of mass and the principal axes, in the frame of the mesh's points.
+    pub(super) pose: Se3<f64>,
+    /// Principal moments for each kilogram (m²), greatest first.
+    pub(super) moments: [f64; 3],
+    /// The least and greatest coordinates of the points in its principal axes (m).
+    pub(super) bounds: [[f64; 3]; 2],
+}
+
+impl Solid {
+    /// Half the sides of the box that has the same inertia (m): Iₓ = m (y² + z²)/3.
+    pub(super) fn inertia_box(&self) -> [f64; 3] {
+        let [x, y, z] = self.moments;
+        [y + z - x, x + z - y, x + y - z].map(|sum| 0.5 * (6.0 * sum).max(0.0).sqrt())
+    }
+
+    /// The centre and half the sides of the box around it, in its principal axes (m).
+    pub(super) fn bounding_box(&self) -> (Vec3<f64>, [f64; 3]) {
+        let [low, high] = self.bounds;
+        let center = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
+        (center.into(), [0, 1, 2].map(|k| high[k] - center[k]))
+    }
+}
+
+/// The part of a mesh that has mass.
+#[cfg(feature = "meshes")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Rule {
+    /// The convex hull.
+    Convex,
+    /// What is inside of the surface.
+    Exact,
+    /// The pyramids over all triangles from the centroid of the surface, each counted as positive.
+    Legacy,
+    /// The surface.
+    Shell,
+}
+
+#[cfg(feature = "meshes")]
+impl Rule {
+    pub(super) fn of(name: &str) -> Option<Self> {
+        let rules =
+            [("convex", Self::Convex), ("exact", Self::Exact), ("legacy", Self::Legacy), ("shell", Self::Shell)];
+        rules.into_iter().find(|(known, _)| *known == name).map(|(_, rule)| rule)
+    }
+}
+
+#[cfg(feature = "meshes")]
+impl Solid {
+    /// The inertia of triangles, which are counter-clockwise from outside; of the hull of the points where there are none.
+    pub(super) fn new(points: &[Vec3<f64>], mut triangles: Vec<[u32; 3]>, rule: Rule) -> Result<Self, String> {
+        if triangles.is_empty() || rule == Rule::Convex {
+            let plain: Vec<_> = points.iter().map(|p| p.to_array()).collect();
+            triangles = condyle_meshes::hull(&plain).ok_or("its points lie in a plane")?;
+        }
+        let corners = |t: &[u32; 3], from: Vec3<f64>| t.map(|k| points[k as usize] - from);
+        // the centroid of the surface
+        let (mut area, mut centroid) = (0.0, Vec3::zero());
+        for t in &triangles {
+            let [a, b, c] = corners(t, Vec3::zero());
+            let part = (b - a).cross(c - a).norm_squared().sqrt() / 2.0;
+            (area, centroid) = (area + part, centroid + (a + b + c).scale(part / 3.0));
+        }
+        if !(area.is_finite() && area >= LEAST) {
+            return Err(format!("its surface of {area} m² is too small"));
+        }
+        centroid = centroid.scale(1.0 / area);
+        // a pyramid's part of the volume, or a triangle's of the area
+        let part = |[a, b, c]: [Vec3<f64>; 3]| match rule {
+            Rule::Shell => (b - a).cross(c - a).norm_squared().sqrt() / 2.0,
+            Rule::Legacy => (a.dot(b.cross(c)) / 6.0).abs(),
+            _ => a.dot(b.cross(c)) / 6.0,
+        };
+        let (mut volume, mut com) = (0.0, Vec3::zero());
+        for t in &triangles {
+            let t = corners(t, centroid);
+            let v = part(t);
+            // centre of a pyramid from its tip; MuJoCo takes the same one for a triangle
+            (volume, com) = (volume + v, com + (t[0] + t[1] + t[2]).scale(v / 4.0));
+        }
+        if volume < LEAST {
+            let what = if volume < 0.0 { "negative: its triangles are inside out" } else { "too small for a solid" };
+            return Err(format!("its volume of {volume} m³ is {what}"));
+        }
+        let com = centroid + com.scale(1.0 / volume);
+        // ∫ x xᵀ over pyramids from the centre of mass, or over triangles: Tonon (2004)
+        let (mut volume, mut P) = (0.0, Sym3::zero());
+        for t in &triangles {
+            let [a, b, c] = corners(t, com);
+            let v = part([a, b, c]);
+            volume += v;
+            let scale = v / if rule == Rule::Shell { 12.0 } else { 20.0 };
+            for p in [a, b, c, a + b + c] {
+                P = P.add_outer(scale, p);
+            }
+        }
+        let trace = P.xx + P.yy + P.zz;
+        let I = Sym3 { xx: trace - P.xx, xy: -P.xy, yy: trace - P.yy, xz: -P.xz, yz: -P.yz, zz: trace - P.zz };
+        let (moments, R): (_, Mat3<f64>) = super::principal::principal(I);
+        if !(moments[2] > 0.0 && moments.iter().all(|x| x.is_finite())) {
+            return Err(format!("its least moment of inertia, {} m⁵, is not positive", moments[2]));
+        }
+        let pose = Se3::new(R, com);
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for p in points {
+            let p = R.transpose_mul(*p - com).to_array();
+            for k in 0..3 {
+                (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k]));
+            }
+        }
+        Ok(Self { volume, pose, moments: moments.map(|x| x / volume), bounds: [low, high] })
+    }
+}

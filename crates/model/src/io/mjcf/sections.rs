@@ -1,0 +1,105 @@
+//! Tendons, equality constraints and actuators, which come along when what they refer to is replicated or attached.
+
+use crate::io::xml::Element;
+use std::collections::{HashMap, HashSet};
+
+/// The sections, in the order in which one may refer to another.
+const SECTIONS: [&str; 3] = ["tendon", "equality", "actuator"];
+
+/// The kind of a thing that has a name, and the name.
+pub(super) type Name = (&'static str, String);
+
+/// The elements of the sections of a file.
+pub(super) struct Sections {
+    /// An element that was replaced by copies is none.
+    elements: [Vec<Option<Element>>; 3],
+    /// The elements of each section, by the first thing that they refer to.
+    by_reference: [HashMap<Name, Vec<usize>>; 3],
+}
+
+impl Sections {
+    /// Takes the elements out of a file.
+    pub(super) fn take(root: &mut Element) -> Self {
+        let mut sections = Self { elements: Default::default(), by_reference: Default::default() };
+        for child in &mut root.children {
+            if let Some(k) = SECTIONS.iter().position(|tag| child.tag == *tag) {
+                for element in std::mem::take(&mut child.children) {
+                    sections.push(k, element);
+                }
+            }
+        }
+        sections
+    }
+
+    /// Puts them back, each kind into one section at the end of the file.
+    pub(super) fn put_back(self, root: &mut Element) {
+        root.children.retain(|child| !SECTIONS.contains(&&*child.tag));
+        for (tag, elements) in SECTIONS.into_iter().zip(self.elements) {
+            let children = elements.into_iter().flatten().collect();
+            let (file, line, source) = (root.file.clone(), root.line, root.source);
+            let (attributes, text) = (Vec::new(), String::new());
+            root.children.push(Element { tag: tag.to_owned(), attributes, text, children, file, line, source });
+        }
+    }
+
+    /// Adds an element to a section.
+    pub(super) fn push(&mut self, section: usize, element: Element) {
+        if let Some(first) = references(&element).into_iter().next() {
+            self.by_reference[section].entry(first).or_default().push(self.elements[section].len());
+        }
+        self.elements[section].push(Some(element));
+    }
+
+    /// The elements all of whose references are names of a part of the tree, or tendons of such, by section and index.
+    pub(super) fn of(&self, mut names: Vec<Name>) -> Vec<(usize, usize)> {
+        let mut known: HashSet<Name> = names.iter().cloned().collect();
+        let mut found = Vec::new();
+        for section in 0..SECTIONS.len() {
+            let by_reference = &self.by_reference[section];
+            let mut own: Vec<usize> =
+                names.iter().filter_map(|name| by_reference.get(name)).flatten().copied().collect();
+            own.sort_unstable();
+            for index in own {
+                let Some(element) = &self.elements[section][index] else { continue };
+                if references(element).iter().all(|name| known.contains(name)) {
+                    found.push((section, index));
+                    if let Some(name) = element.attribute("name").filter(|_| section == 0) {
+                        let name = ("tendon", name.to_owned());
+                        known.insert(name.clone());
+                        names.push(name);
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// The element of a section.
+    pub(super) fn get(&self, (section, index): (usize, usize)) -> Option<&Element> {
+        self.elements[section][index].as_ref()
+    }
+
+    /// Removes an element that copies replace.
+    pub(super) fn remove(&mut self, (section, index): (usize, usize)) {
+        self.elements[section][index] = None;
+    }
+}
+
+/// The kind of thing that an attribute names, if it names one in the tree or a tendon.
+pub(super) fn kind_of(attribute: &str) -> Option<&'static str> {
+    match attribute {
+        "joint" | "jointinparent" | "joint1" | "joint2" => Some("joint"),
+        "site" | "refsite" | "slidersite" | "cranksite" | "site1" | "site2" | "sidesite" => Some("site"),
+        "body" | "body1" | "body2" => Some("body"),
+        "tendon" | "tendon1" | "tendon2" => Some("tendon"),
+        "geom" => Some("geom"),
+        _ => None,
+    }
+}
+
+/// The things that an element of a section refers to; the world is everywhere.
+fn references(element: &Element) -> Vec<Name> {
+    let all = std::iter::once(element).chain(&element.children).flat_map(|e| &e.attributes);
+    let named = all.filter_map(|(attribute, value)| Some((kind_of(attribute)?, value.clone())));
+    named.filter(|name| name.1 != "world").collect()
+}

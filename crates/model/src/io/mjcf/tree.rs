@@ -1,0 +1,290 @@
+//! Bodies: their joints, inertias and frames.
+
+use super::Reader;
+use super::attributes::{Attributes, MAIN};
+use super::compiler::{FromGeoms, from_to};
+use super::geometry::{self, Weight};
+use super::mesh::Solid;
+use super::spring::FileJoint;
+use crate::body::FrameKind;
+use crate::builder::{BodyId, ModelBuilder, WORLD};
+use crate::error::Error;
+use crate::io::xml::Element;
+use crate::joint::Joint;
+use condyle_spatial::{Act, Inertia, Se3};
+
+/// The parts of a body, with those inside its `<frame>`s, each with the pose of the `<frame>` around it.
+#[derive(Default)]
+pub(super) struct Parts<'a> {
+    inertial: Option<(&'a Element, Se3<f64>)>,
+    joints: Vec<(Attributes<'a>, Se3<f64>)>,
+    geoms: Vec<(Attributes<'a>, Se3<f64>)>,
+    sites: Vec<(Attributes<'a>, Se3<f64>)>,
+    cameras: Vec<(Attributes<'a>, Se3<f64>)>,
+    /// Named frames, each with its own pose.
+    frames: Vec<(&'a Element, Se3<f64>)>,
+    /// The bodies in it, each with its own pose, and the class for what is in it.
+    bodies: Vec<(&'a Element, Se3<f64>, &'a str)>,
+}
+
+/// A body that waits for its turn.
+struct Waiting<'a> {
+    element: &'a Element,
+    class: &'a str,
+    /// The body of the model of which the parent is a part.
+    on: BodyId,
+    /// The pose in that body.
+    placement: Se3<f64>,
+    /// Whether the parent is the world itself.
+    top: bool,
+}
+
+/// A named frame or camera, which becomes a frame once the names of all sites are known.
+pub(super) struct Placed<'a> {
+    element: &'a Element,
+    body: BodyId,
+    placement: Se3<f64>,
+}
+
+impl<'a> Reader<'a> {
+    /// Adds all bodies, parents first.
+    pub(super) fn tree(&mut self, builder: &mut ModelBuilder, root: &'a Element) -> Result<(), Error> {
+        for world in root.all("worldbody") {
+            let mut parts = Parts::default();
+            self.gather(world, Se3::identity(), MAIN, &mut parts)?;
+            let joint = parts.joints.first().map(|(a, _)| a.element);
+            if let Some(joint) = joint.or(parts.inertial.map(|(e, _)| e)) {
+                return Err(joint.wrong("the world has neither joints nor inertia"));
+            }
+            self.frames(builder, &parts, WORLD, Se3::identity())?;
+            let mut waiting = Vec::new();
+            wait(&mut waiting, &parts, WORLD, Se3::identity(), true);
+            while let Some(next) = waiting.pop() {
+                let (parts, body, bXl) = self.body(builder, &next)?;
+                wait(&mut waiting, &parts, body, bXl, false);
+            }
+        }
+        Ok(())
+    }
+
+    /// Sorts what is in a body; `X` is the pose of the `<frame>` that it is in.
+    fn gather(&self, inside: &'a Element, X: Se3<f64>, class: &'a str, parts: &mut Parts<'a>) -> Result<(), Error> {
+        let defaults = |e: &Element| &self.source(e).defaults;
+        let own = inside.attribute("childclass").map_or(Ok(class), |c| defaults(inside).known(inside, c))?;
+        for e in &inside.children {
+            let around = if e.source == inside.source { own } else { MAIN }; // a file has classes of its own
+            let pose = || Ok::<_, Error>(X * self.compiler(e).pose(&Attributes::plain(e))?);
+            match e.tag.as_str() {
+                "joint" => parts.joints.push((self.of(e, around)?, X)),
+                "freejoint" => parts.joints.push((Attributes::plain(e), X)),
+                "inertial" if parts.inertial.is_some() => return Err(e.wrong("the body has another one")),
+                "inertial" => parts.inertial = Some((e, X)),
+                "geom" => parts.geoms.push((self.of(e, around)?, X)),
+                "site" => parts.sites.push((self.of(e, around)?, X)),
+                "camera" => parts.cameras.push((self.of(e, around)?, X)),
+                "body" => parts.bodies.push((e, pose()?, around)),
+                "frame" => {
+                    let pose = pose()?;
+                    if e.attribute("name").is_some_and(|name| !name.is_empty()) {
+                        parts.frames.push((e, pose));
+                    }
+                    self.gather(e, pose, around, parts)?;
+                }
+                "composite" | "flexcomp" | "plugin" => return Err(e.wrong("is not supported")),
+                _ => {} // lights
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a body: its parts, the body of the model that it is part of, and its pose there.
+    fn body(&mut self, builder: &mut ModelBuilder, w: &Waiting<'a>) -> Result<(Parts<'a>, BodyId, Se3<f64>), Error> {
+        let mut parts = Parts::default();
+        self.gather(w.element, Se3::identity(), w.class, &mut parts)?;
+        self.bodies += 1;
+        let name = self.name("body", w.element, &format!("body{}", self.bodies))?;
+        let (mut body, mut bXl) = (w.on, w.placement);
+        let moves = body != WORLD || !parts.joints.is_empty();
+        let count = parts.joints.len();
+        if Attributes::plain(w.element).flag("mocap", None)? == Some(true) {
+            if !w.top || count > 0 {
+                return Err(w.element.wrong("mocap: the body is no fixed child of the world"));
+            }
+            let what = "mocap: the body is fixed to the world; MuJoCo lets a program move it";
+            self.warnings.push(w.element.left_out(what));
+        }
+        let (inertia, axes) = self.inertia(w.element, &parts, moves)?;
+        self.mass += inertia.mass;
+        for (k, (a, X)) in parts.joints.iter().enumerate() {
+            let number = if count == 1 { String::new() } else { format!("{}", k + 1) };
+            let joint_name = self.name("joint", a.element, &format!("{name}_joint{number}"))?;
+            let (joint, lXj, mut jXl, options) = self.joint(a, *X)?;
+            let placement = if joint == Joint::FreeFlyer {
+                if !w.top || count > 1 {
+                    return Err(a.element.wrong("a free joint is the only joint of a body on the world"));
+                }
+                let align = match a.get("align") {
+                    None => None,
+                    Some(_) => a.flag("align", Some("auto"))?,
+                };
+                if align.unwrap_or(self.compiler(w.element).align_free) && parts.bodies.is_empty() {
+                    jXl = axes.inverse(); // the body's frame is put into its principal axes
+                }
+                Se3::identity() // its q is the body's pose in the world
+            } else {
+                bXl * lXj
+            };
+            let last = k + 1 == count;
+            let between = format!("{name}#{}", k + 1);
+            let (called, inertia) = if last { (&name, jXl.act(inertia)) } else { (&between, Inertia::zero()) };
+            body = builder.body_with((called, &joint_name), body, joint, placement, inertia, options);
+            let drawn = self.poses[w.on.0] * w.placement * jXl.inverse();
+            self.poses.push(drawn);
+            let compiler = self.compiler(a.element);
+            let found = FileJoint::read(a, joint, compiler.angle, compiler.autolimits)?;
+            self.joints.add(joint_name.clone(), found.on(body.0, drawn));
+            if !last {
+                builder.between(body);
+            }
+            builder.frame_of_kind(&joint_name, FrameKind::Joint, body, Se3::identity());
+            bXl = jXl;
+            if joint == Joint::FreeFlyer {
+                builder.frame_of_kind(&name, FrameKind::Link, body, Se3::identity());
+            }
+        }
+        if count == 0 {
+            builder.merge(body, bXl, inertia);
+        }
+        let compensated = Attributes::plain(w.element).number("gravcomp")?.unwrap_or(0.0);
+        if compensated != 0.0 && moves {
+            builder.compensate_gravity(body, bXl, inertia, compensated);
+        }
+        if !parts.joints.iter().any(|(a, _)| is_free(a)) {
+            builder.frame_of_kind(&name, FrameKind::Link, body, bXl);
+        }
+        self.frames(builder, &parts, body, bXl)?;
+        Ok((parts, body, bXl))
+    }
+
+    /// Adds the named sites of a body, and keeps its named frames and cameras for later.
+    fn frames(
+        &mut self,
+        builder: &mut ModelBuilder,
+        parts: &Parts<'a>,
+        body: BodyId,
+        bXl: Se3<f64>,
+    ) -> Result<(), Error> {
+        let has_name = |a: &Attributes| a.element.attribute("name").is_some_and(|name| !name.is_empty());
+        for (a, X) in parts.sites.iter().filter(|(a, _)| has_name(a)) {
+            let name = self.name("site", a.element, "")?;
+            let own = match from_to(a, a.get("type").unwrap_or("sphere"))? {
+                Some((pose, _)) => pose,
+                None => self.compiler(a.element).pose(a)?,
+            };
+            builder.frame_of_kind(&name, FrameKind::User, body, bXl * *X * own);
+        }
+        for &(element, X) in &parts.frames {
+            self.name("frame", element, "")?;
+            self.placed.push(Placed { element, body, placement: bXl * X });
+        }
+        // others turn towards something, and are fixed to no body
+        let is_fixed = |a: &Attributes| a.get("mode").is_none_or(|mode| mode == "fixed");
+        for (a, X) in parts.cameras.iter().filter(|(a, _)| has_name(a) && is_fixed(a)) {
+            self.name("camera", a.element, "")?;
+            let placement = bXl * *X * self.compiler(a.element).pose(a)?;
+            self.placed.push(Placed { element: a.element, body, placement });
+        }
+        Ok(())
+    }
+
+    /// Adds the named frames and cameras, frames first. One whose name is taken is named `frame:name` or `camera:name`.
+    pub(super) fn place(&mut self, builder: &mut ModelBuilder) {
+        let mut placed = std::mem::take(&mut self.placed);
+        placed.sort_by_key(|p| p.element.tag != "frame");
+        for Placed { element, body, placement } in placed {
+            let mut name = element.attribute("name").unwrap_or_default().to_owned();
+            while self.names.contains_key(&("site", name.clone())) {
+                name = format!("{}:{name}", element.tag);
+            }
+            self.names.insert(("site", name.clone()), element);
+            builder.frame_of_kind(&name, FrameKind::User, body, placement);
+        }
+    }
+
+    /// The body's inertia in its own frame, and its principal axes there.
+    fn inertia(
+        &mut self,
+        element: &'a Element,
+        parts: &Parts<'a>,
+        moves: bool,
+    ) -> Result<(Inertia<f64>, Se3<f64>), Error> {
+        let compiler = self.compiler(element);
+        let from_geoms = match compiler.from_geoms {
+            FromGeoms::Never => false,
+            FromGeoms::WithoutInertial => parts.inertial.is_none(),
+            FromGeoms::Always => true,
+        };
+        let mut weights = Vec::new();
+        for (a, X) in parts.geoms.iter().filter(|_| from_geoms) {
+            weights.extend(self.weight(element, a, moves)?.map(|w| w.seen_from(*X)));
+        }
+        let (sum, axes) = match (Weight::sum(&weights), parts.inertial) {
+            (Some(sum), _) => sum,
+            (None, Some((e, X))) => {
+                let (inertia, axes) = geometry::inertial(self.compiler(e), &Attributes::plain(e))?;
+                (X.act(inertia), X * axes)
+            }
+            (None, None) => (Inertia::zero(), Se3::identity()),
+        };
+        Ok((geometry::corrected(compiler, element, sum)?, axes))
+    }
+
+    /// A geom's weight on a body, in the body's frame or that of the `<frame>` around the geom; none if it weighs nothing.
+    fn weight(&mut self, body: &Element, a: &Attributes<'a>, moves: bool) -> Result<Option<Weight>, Error> {
+        let source = self.source(a.element);
+        if moves && a.get("type") == Some("plane") {
+            return Err(a.element.wrong("a plane is on a body that moves"));
+        }
+        if !geometry::is_heavy(&source.compiler, a)? {
+            return Ok(None);
+        }
+        let field = source.assets.field(a)?;
+        let kind = a.get("type").unwrap_or("sphere");
+        let mesh = source.assets.mesh(a);
+        let mesh = if self.options.weightless_meshes { mesh.ok().flatten() } else { mesh? };
+        let is_mesh = a.get("mesh").is_some();
+        if !is_mesh {
+            return geometry::geom(&source.compiler, a, None, field);
+        }
+        let solid: Result<Solid, String> = match mesh {
+            Some(mesh) => self.solids.get(source, mesh, &self.options.packages),
+            None => Err("there is no such mesh".to_owned()),
+        };
+        match solid {
+            Ok(solid) => geometry::geom(&source.compiler, a, Some(&solid), field),
+            Err(why) => {
+                let name = a.get("mesh").unwrap_or_default();
+                if self.options.weightless_meshes || !moves {
+                    let of = body.label();
+                    let what = format!("the mass of a mesh on {of} is left out: mesh `{name}`: {why}");
+                    self.warnings.push(a.element.left_out(what));
+                    return Ok(None);
+                }
+                let what =
+                    format!("has the mass of mesh `{name}`: {why} (or give the body an <inertial>, or {kind} mass 0)");
+                Err(a.element.wrong(what))
+            }
+        }
+    }
+}
+
+/// Whether a joint is a free one.
+fn is_free(a: &Attributes) -> bool {
+    a.element.tag == "freejoint" || a.get("type") == Some("free")
+}
+
+/// Puts the bodies on a body in line, the first of them on top.
+fn wait<'a>(waiting: &mut Vec<Waiting<'a>>, parts: &Parts<'a>, on: BodyId, bXl: Se3<f64>, top: bool) {
+    let next = parts.bodies.iter().rev();
+    waiting.extend(next.map(|&(element, X, class)| Waiting { element, class, on, placement: bXl * X, top }));
+}

@@ -1,0 +1,187 @@
+//! Versions of SDF. An older file is converted to the newest version, by the rules of the format's own library: every reader
+//! after this one knows one version.
+
+use super::values::flag;
+use crate::error::Error;
+use crate::io::xml::Element;
+
+/// Versions of the format, without their `1.`. There has never been a 1.1.
+const VERSIONS: [u32; 12] = [0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
+/// Newest version.
+pub(super) const NEWEST: u32 = VERSIONS[VERSIONS.len() - 1];
+/// Tag of the root element. Version 1.0 to 1.2 may write `gazebo`.
+const ROOT: &str = "sdf";
+/// Frame of the model that an element stands in.
+pub(super) const MODEL: &str = "__model__";
+
+/// Attributes that became elements in version 1.2, by the tag that has them.
+const ATTRIBUTES: &[(&str, &[&str])] = &[
+    ("model", &["static"]),
+    ("link", &["gravity", "self_collide", "kinematic"]),
+    ("inertial", &["mass", "density"]),
+    ("inertia", &["ixx", "ixy", "ixz", "iyy", "iyz", "izz"]),
+    ("axis", &["xyz"]),
+    ("axis2", &["xyz"]),
+    ("dynamics", &["damping", "friction"]),
+    ("limit", &["lower", "upper", "effort", "velocity"]),
+];
+
+/// Elements whose one attribute became their text in version 1.2, with the tag that they have since.
+const TEXTS: &[(&str, &str, &str)] = &[
+    ("origin", "pose", "pose"),
+    ("parent", "link", "parent"),
+    ("child", "link", "child"),
+    ("gravity", "xyz", "gravity"),
+];
+
+/// Converts the root element of a file to the newest version.
+pub(super) fn convert(root: &mut Element) -> Result<(), Error> {
+    let version = version(root)?;
+    ROOT.clone_into(&mut root.tag);
+    if version == 0 {
+        attributes_to_elements(root);
+    }
+    if version <= 4 {
+        for model in models(root) {
+            axes(model, &mut |axis| {
+                if axis.child(FLAG).is_none() {
+                    let flag = axis.with(FLAG, "true");
+                    axis.children.push(flag);
+                }
+            });
+        }
+    }
+    if version <= 5 {
+        for world in root.children.iter_mut().filter(|c| c.tag == "world") {
+            gravity_of_physics(world);
+        }
+    }
+    if version <= 6 {
+        frames(root)?;
+    }
+    Ok(())
+}
+
+/// Reads the version of a file, without its `1.`.
+fn version(root: &Element) -> Result<u32, Error> {
+    if root.tag != ROOT && root.tag != "gazebo" {
+        return Err(root.wrong("the root element of an SDF is <sdf>"));
+    }
+    let known = || {
+        let names: Vec<String> = VERSIONS.iter().map(|minor| format!("1.{minor}")).collect();
+        names.join(", ")
+    };
+    let Some(text) = root.attribute("version") else {
+        return Err(root.wrong(format!("has no version; known are {}", known())));
+    };
+    let found = VERSIONS.iter().copied().find(|minor| text.trim() == format!("1.{minor}"));
+    let found = found.filter(|&minor| root.tag == ROOT || minor <= 2);
+    found.ok_or_else(|| root.wrong(format!("version `{text}` is unknown; known are {}", known())))
+}
+
+/// Element that says that an axis is in the frame of the model, up to version 1.6.
+const FLAG: &str = "use_parent_model_frame";
+
+/// Returns the models of a root element and of its worlds.
+fn models(root: &mut Element) -> impl Iterator<Item = &mut Element> {
+    let inside = root.children.iter_mut().flat_map(|child| match &*child.tag {
+        "world" => child.children.iter_mut().collect(),
+        _ => vec![child],
+    });
+    inside.filter(|child| child.tag == "model")
+}
+
+/// Does something to each axis of the joints that stand in a model.
+fn axes(model: &mut Element, change: &mut dyn FnMut(&mut Element)) {
+    for joint in model.children.iter_mut().filter(|c| c.tag == "joint") {
+        joint.children.iter_mut().filter(|c| matches!(&*c.tag, "axis" | "axis2")).for_each(&mut *change);
+    }
+}
+
+/// Turns attributes into elements: version 1.0.
+fn attributes_to_elements(element: &mut Element) {
+    if let Some((_, names)) = ATTRIBUTES.iter().find(|(tag, _)| *tag == element.tag) {
+        for name in *names {
+            if let Some(at) = element.attributes.iter().position(|(found, _)| found == name) {
+                let (_, value) = element.attributes.remove(at);
+                let child = element.with(name, &value);
+                element.children.push(child);
+            }
+        }
+    }
+    let is_link = element.tag == "link";
+    for child in &mut element.children {
+        if matches!(&*child.tag, "plugin" | "visual" | "sensor" | "collision") {
+            continue;
+        }
+        if let Some((_, attribute, tag)) = TEXTS.iter().find(|(tag, ..)| *tag == child.tag)
+            && let Some(at) = child.attributes.iter().position(|(found, _)| found == attribute)
+        {
+            (_, child.text) = child.attributes.remove(at);
+            (*tag).clone_into(&mut child.tag);
+        }
+        if is_link && child.tag == "damping" {
+            "velocity_decay".clone_into(&mut child.tag);
+        }
+        attributes_to_elements(child);
+    }
+}
+
+/// Moves the gravity from the physics of a world to the world: version 1.5.
+fn gravity_of_physics(world: &mut Element) {
+    let physics = world.children.iter_mut().find(|c| c.tag == "physics");
+    let gravity = physics.and_then(|p| {
+        let at = p.children.iter().position(|c| c.tag == "gravity")?;
+        Some(p.children.remove(at))
+    });
+    world.children.extend(gravity);
+}
+
+/// Renames the `frame` of poses, and turns the flag of axes into `expressed_in`: version 1.6.
+fn frames(element: &mut Element) -> Result<(), Error> {
+    if element.tag == "plugin" || element.tag.contains(':') {
+        return Ok(());
+    }
+    for child in &mut element.children {
+        if child.tag == "pose" && child.attribute("frame").is_some() {
+            child.attributes.retain(|(name, _)| name != "relative_to");
+            for (name, _) in child.attributes.iter_mut().filter(|(name, _)| name == "frame") {
+                "relative_to".clone_into(name);
+            }
+        }
+        frames(child)?;
+    }
+    if element.tag != "joint" {
+        return Ok(());
+    }
+    for axis in element.children.iter_mut().filter(|c| matches!(&*c.tag, "axis" | "axis2")) {
+        let in_model = flag(axis, FLAG, false)?;
+        axis.children.retain(|c| c.tag != FLAG);
+        if in_model {
+            if axis.child("xyz").is_none() {
+                let xyz = axis.with("xyz", "0 0 1");
+                axis.children.push(xyz);
+            }
+            for xyz in axis.children.iter_mut().filter(|c| c.tag == "xyz") {
+                xyz.attributes.retain(|(name, _)| name != "expressed_in");
+                xyz.attributes.push(("expressed_in".to_owned(), MODEL.to_owned()));
+            }
+        }
+    }
+    Ok(())
+}
+
+impl Element {
+    /// Returns a new element with a text, at the line of this one.
+    pub(super) fn with(&self, tag: &str, text: &str) -> Self {
+        Self {
+            tag: tag.to_owned(),
+            attributes: Vec::new(),
+            text: text.to_owned(),
+            children: Vec::new(),
+            file: self.file.clone(),
+            line: self.line,
+            source: 0,
+        }
+    }
+}

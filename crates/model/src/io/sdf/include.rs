@@ -1,0 +1,183 @@
+//! Files of an SDF: the included models in place of the `<include>`s, all of one version, everything unknown in them reported.
+
+use super::convert::convert;
+use super::schema::{KNOWN, LEFT_OUT};
+use super::scopes::MERGED;
+use super::values::{attribute, flag, text};
+use crate::error::Error;
+use crate::io::files::{Search, find_model};
+use crate::io::known::Known;
+use crate::io::xml::{Amount, Element, MAX_DEPTH};
+use crate::warning::Warning;
+use std::path::{Path, PathBuf};
+
+/// Name of the file that says which file of a folder is its model, and its older name.
+const CONFIGS: [&str; 2] = ["model.config", "manifest.xml"];
+
+/// Maximum number of included files: opening more takes longer than a second.
+const MAX_INCLUDES: usize = 16_384;
+
+/// Reader of a robot's files.
+pub(super) struct Includes<'o> {
+    amount: Amount,
+    known: Known,
+    packages: &'o [PathBuf],
+    /// Files that are being read, each one included by the one before it.
+    open: Vec<PathBuf>,
+    /// Number of includes so far.
+    count: usize,
+    pub(super) warnings: Vec<Warning>,
+    /// Fault of the first model of a world that was left out since its file could not be found.
+    pub(super) missing: Option<Error>,
+}
+
+impl<'o> Includes<'o> {
+    pub(super) fn new(packages: &'o [PathBuf]) -> Self {
+        let (amount, known) = (Amount::default(), Known::new(KNOWN));
+        Self { amount, known, packages, open: Vec::new(), count: 0, warnings: Vec::new(), missing: None }
+    }
+
+    /// Reads a file and all that it includes; its root stands at a level.
+    pub(super) fn file(&mut self, path: &Path, level: usize) -> Result<Element, Error> {
+        let text = self.amount.read(path)?;
+        let root = Element::parse(&text, &path.display().to_string(), &mut self.amount)?;
+        self.open.push(path.canonicalize().unwrap_or_else(|_| path.to_owned()));
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let root = self.expand(root, Some(folder), level)?;
+        self.open.pop();
+        Ok(root)
+    }
+
+    /// Reads a string and all that it includes.
+    pub(super) fn string(&mut self, text: &str) -> Result<Element, Error> {
+        let root = Element::parse(text, "<string>", &mut self.amount)?;
+        self.expand(root, None, 1)
+    }
+
+    fn expand(&mut self, mut root: Element, folder: Option<&Path>, level: usize) -> Result<Element, Error> {
+        convert(&mut root)?;
+        self.known.check(&root, LEFT_OUT, &mut self.warnings);
+        self.children(&mut root, folder, level)?;
+        Ok(root)
+    }
+
+    /// Puts the included models in the place of the includes in an element, which stands at a level.
+    fn children(&mut self, element: &mut Element, folder: Option<&Path>, level: usize) -> Result<(), Error> {
+        if level > MAX_DEPTH {
+            let what = format!("stands at level {level}, files included: at most {MAX_DEPTH} are allowed");
+            return Err(element.wrong(what));
+        }
+        for mut child in std::mem::take(&mut element.children) {
+            match &*child.tag {
+                "include" => match self.include(&mut child, folder, level + 1) {
+                    Ok(model) => element.children.extend(model),
+                    // a world without its sun and ground is a world
+                    Err(Fault::Missing(what)) if element.tag != "model" => {
+                        self.warnings.push(child.left_out(format!("the included model is left out: {what}")));
+                        self.missing = self.missing.take().or_else(|| Some(child.wrong(what)));
+                    }
+                    Err(Fault::Missing(what)) => return Err(child.wrong(what)),
+                    Err(Fault::Other(error)) => return Err(error),
+                },
+                "world" | "model" => {
+                    self.children(&mut child, folder, level + 1)?;
+                    element.children.push(child);
+                }
+                _ => element.children.push(child),
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the model that an `<include>` names, with what it says of it: none if the file has only lights or actors.
+    fn include(
+        &mut self,
+        include: &mut Element,
+        folder: Option<&Path>,
+        level: usize,
+    ) -> Result<Option<Element>, Fault> {
+        let wrong = |what: String| Fault::Other(include.wrong(what));
+        self.count += 1;
+        if self.count > MAX_INCLUDES {
+            return Err(wrong(format!("{} files are included, at most {MAX_INCLUDES} are allowed", self.count)));
+        }
+        let uri = text(include, "uri").ok_or_else(|| wrong("has no uri".to_owned()))?;
+        let found = find_model(uri, &Search { folder, packages: self.packages });
+        let found = found.map_err(|e| Fault::Missing(e.to_string()))?;
+        let path = if found.is_dir() { self.model_of(&found)? } else { found };
+        if !path.is_file() {
+            return Err(Fault::Missing(format!("{uri}: there is no file {}", path.display())));
+        }
+        if self.open.contains(&path.canonicalize().unwrap_or_else(|_| path.clone())) {
+            return Err(wrong(format!("{} includes itself", path.display())));
+        }
+        let mut root = self.file(&path, level)?;
+        if let Some(second) = root.all("model").nth(1) {
+            return Err(wrong(format!("expected one model in {}, found a second: {}", path.display(), second.label())));
+        }
+        let Some(at) = root.children.iter().position(|c| c.tag == "model") else {
+            return match root.children.iter().any(|c| matches!(&*c.tag, "light" | "actor")) {
+                true => Ok(None),
+                false => Err(wrong(format!("{} has no model", path.display()))),
+            };
+        };
+        let mut model = root.children.swap_remove(at);
+        let mut set = |name: &str, value: &str| {
+            model.attributes.retain(|(found, _)| found != name);
+            model.attributes.push((name.to_owned(), value.to_owned()));
+        };
+        if let Some(name) = text(include, "name") {
+            set("name", name);
+        }
+        if let Some(frame) = text(include, "placement_frame") {
+            if include.child("pose").is_none() {
+                return Err(wrong("has a placement_frame and no pose".to_owned()));
+            }
+            set("placement_frame", frame);
+        }
+        if attribute(include, include, "merge")? {
+            set(MERGED, "true");
+        }
+        flag(include, "static", false)?;
+        for tag in ["pose", "static"] {
+            if let Some(at) = include.children.iter().position(|c| c.tag == tag) {
+                model.children.retain(|c| c.tag != tag);
+                model.children.push(include.children.swap_remove(at));
+            }
+        }
+        Ok(Some(model))
+    }
+
+    /// Returns the file of a folder with a model: that of the newest version that is known.
+    fn model_of(&mut self, folder: &Path) -> Result<PathBuf, Fault> {
+        let Some(config) = CONFIGS.iter().map(|name| folder.join(name)).find(|path| path.is_file()) else {
+            let plain = folder.join("model.sdf");
+            let what = || format!("{} has no {}", folder.display(), CONFIGS[0]);
+            return if plain.is_file() { Ok(plain) } else { Err(Fault::Missing(what())) };
+        };
+        let text = self.amount.read(&config)?;
+        let root = Element::parse(&text, &config.display().to_string(), &mut self.amount)?;
+        let minor = |sdf: &Element| {
+            let version = sdf.attribute("version")?.trim().strip_prefix("1.")?.parse::<u32>().ok()?;
+            (version <= super::convert::NEWEST).then_some(version)
+        };
+        // of two files of one version the first one
+        let best = root.all("sdf").reduce(|best, sdf| if minor(sdf) > minor(best) { sdf } else { best });
+        let name = best.map(|sdf| sdf.text.trim()).filter(|name| !name.is_empty());
+        let name = name.ok_or_else(|| root.wrong("names no <sdf> file"))?;
+        Ok(folder.join(name))
+    }
+}
+
+/// Fault of an include.
+enum Fault {
+    /// The file cannot be found.
+    Missing(String),
+    Other(Error),
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Self {
+        Self::Other(error)
+    }
+}

@@ -1,0 +1,282 @@
+//! Names and poses of an SDF. Each model is a scope: what stands in it is named from there, `inner::link` in a model inside it,
+//! and has a pose in the frame of the model.
+
+use super::convert::MODEL;
+use super::values::{flag, text};
+use crate::error::Error;
+use crate::io::xml::Element;
+use crate::names::{near, nearest};
+use condyle_spatial::Se3;
+use std::collections::HashMap;
+
+/// Name under which everything knows the world.
+pub(super) const WORLD_LINK: &str = "world";
+/// Attribute of a model whose elements stand in the scope around it: an `<include merge="true">`.
+pub(super) const MERGED: &str = "__merge__";
+/// Maximum number of bytes in all names, those of the models around each included: a name in nested models repeats theirs.
+const MAX_NAMES: usize = 64 << 20;
+/// Index of the scope of the world.
+pub(super) const WORLD_SCOPE: usize = 0;
+
+/// Model, or the world.
+pub(super) struct Scope<'a> {
+    element: &'a Element,
+    /// Beginning of the names in it, for example `robot::arm::`.
+    prefix: String,
+    /// Item that is the model itself; none is the world.
+    pub(super) own: Option<usize>,
+    /// Scope in which the model stands, and the number of scopes around it.
+    pub(super) parent: usize,
+    pub(super) depth: usize,
+    /// Whether its links are fixed to the world: the model, or one around it, is static.
+    is_static: bool,
+    /// First link and first model in it.
+    first: [Option<usize>; 2],
+}
+
+/// Link, joint, frame or model.
+pub(super) struct Item<'a> {
+    pub(super) element: &'a Element,
+    /// Scope in which it stands.
+    pub(super) scope: usize,
+    /// Name from the world.
+    name: String,
+    /// Scope of a model.
+    pub(super) inside: Option<usize>,
+    /// Pose in the frame of the scope.
+    pub(super) pose: Se3<f64>,
+}
+
+/// Names and poses of a robot.
+pub(super) struct Scopes<'a> {
+    pub(super) scopes: Vec<Scope<'a>>,
+    pub(super) items: Vec<Item<'a>>,
+    names: HashMap<String, usize>,
+    joints: HashMap<String, usize>,
+    bytes: usize,
+    /// Beginning of all names that is not told: the one model of a file.
+    single: String,
+    /// Links to which items are attached, as far as they were asked for; none is the world.
+    attached: HashMap<usize, Option<usize>>,
+}
+
+/// Something that has a pose: an item, or the world.
+pub(super) type Place = Option<usize>;
+
+impl<'a> Scopes<'a> {
+    /// Names everything in some models, and in the world around them, and finds the poses.
+    pub(super) fn new(world: &'a Element, models: &[&'a Element]) -> Result<Self, Error> {
+        let mut scopes = Self {
+            scopes: Vec::new(),
+            items: Vec::new(),
+            names: HashMap::new(),
+            joints: HashMap::new(),
+            bytes: 0,
+            single: String::new(),
+            attached: HashMap::new(),
+        };
+        let scope = Scope {
+            element: world,
+            prefix: String::new(),
+            own: None,
+            parent: 0,
+            depth: 0,
+            is_static: false,
+            first: [None; 2],
+        };
+        scopes.scopes.push(scope);
+        for model in models {
+            scopes.model(model, WORLD_SCOPE)?;
+        }
+        for child in world.children.iter().filter(|c| matches!(&*c.tag, "joint" | "frame")) {
+            scopes.insert(child, WORLD_SCOPE)?;
+        }
+        if let [model] = models {
+            let single = format!("{}::", model.attribute("name").unwrap_or_default());
+            // unless the world has something of the same name
+            let mut in_world = scopes.items.iter().filter(|item| item.scope == WORLD_SCOPE && item.inside.is_none());
+            if !in_world.any(|item| scopes.names.contains_key(&format!("{single}{}", item.name))) {
+                scopes.single = single;
+            }
+        }
+        scopes.resolve()?;
+        Ok(scopes)
+    }
+
+    /// Adds a model and all that stands in it.
+    fn model(&mut self, element: &'a Element, parent: usize) -> Result<(), Error> {
+        let own = self.insert(element, parent)?;
+        let is_merged = element.attribute(MERGED).is_some();
+        let around = &self.scopes[parent];
+        let prefix = if is_merged { around.prefix.clone() } else { format!("{}::", self.items[own].name) };
+        let is_static = flag(element, "static", false)? && !is_merged || around.is_static;
+        let (scope, depth) = (self.scopes.len(), around.depth + 1);
+        self.items[own].inside = Some(scope);
+        self.scopes.push(Scope { element, prefix, own: Some(own), parent, depth, is_static, first: [None; 2] });
+        for child in &element.children {
+            match &*child.tag {
+                "model" => self.model(child, scope)?,
+                "link" | "joint" | "frame" => drop(self.insert(child, scope)?),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds an item.
+    fn insert(&mut self, element: &'a Element, scope: usize) -> Result<usize, Error> {
+        let name = element.attribute("name").filter(|n| !n.is_empty()).ok_or_else(|| element.wrong("has no name"))?;
+        if [WORLD_LINK, MODEL].contains(&name) {
+            return Err(element.wrong("the name belongs to SDF"));
+        }
+        let prefix = &self.scopes[scope].prefix;
+        let full = match element.attribute(MERGED) {
+            Some(_) => format!("{prefix}_merged__{name}{MODEL}"),
+            None => format!("{prefix}{name}"),
+        };
+        self.bytes += full.len();
+        if self.bytes > MAX_NAMES {
+            let what =
+                format!("names of nested models have {} bytes so far, at most {MAX_NAMES} are allowed", self.bytes);
+            return Err(element.wrong(what));
+        }
+        let index = self.items.len();
+        let tag = &*element.tag;
+        if let Some(&other) = self.names.get(&full) {
+            // SDF 1.6 and before let a link and a joint share a name; then only the link can be referred to
+            let found = self.items[other].element;
+            if found.tag == tag || ![tag, &found.tag].iter().any(|t| matches!(*t, "link" | "joint")) {
+                let what = format!("the name is taken by the {} on line {}", found.tag, found.line);
+                return Err(element.wrong(what));
+            }
+            if tag == "link" {
+                self.names.insert(full.clone(), index);
+            }
+        } else {
+            self.names.insert(full.clone(), index);
+        }
+        if tag == "joint" && self.joints.insert(full.clone(), index).is_some() {
+            return Err(element.wrong("the name is taken by another joint"));
+        }
+        let first = &mut self.scopes[scope].first;
+        match tag {
+            "link" => first[0] = first[0].or(Some(index)),
+            "model" => first[1] = first[1].or(Some(index)),
+            _ => {}
+        }
+        self.items.push(Item { element, scope, name: full, inside: None, pose: Se3::identity() });
+        Ok(index)
+    }
+
+    /// Returns the name of an item in the model that is read.
+    pub(super) fn name(&self, item: usize) -> &str {
+        let name = &*self.items[item].name;
+        name.strip_prefix(&self.single).unwrap_or(name)
+    }
+
+    /// Returns the indices of all items with a tag, in the order of the file.
+    pub(super) fn all(&self, tag: &'static str) -> impl Iterator<Item = usize> + '_ {
+        self.items.iter().enumerate().filter(move |(_, item)| item.element.tag == tag).map(|(i, _)| i)
+    }
+
+    /// Whether an item is the frame of a merged model, or of the one model of a file.
+    pub(super) fn is_hidden(&self, item: usize) -> bool {
+        self.items[item].element.attribute(MERGED).is_some()
+            || self.single.strip_suffix("::") == Some(&self.items[item].name)
+    }
+
+    /// Whether the links beside an item are fixed to the world.
+    pub(super) fn is_static(&self, item: usize) -> bool {
+        self.scopes[self.items[item].scope].is_static
+    }
+
+    /// Finds what a name means beside an item.
+    pub(super) fn find(&self, beside: usize, name: &str) -> Option<Place> {
+        self.find_in(self.items[beside].scope, name)
+    }
+
+    /// Finds the joint that a name means beside an item.
+    pub(super) fn joint(&self, beside: usize, name: &str) -> Option<usize> {
+        self.joints.get(&format!("{}{name}", self.scopes[self.items[beside].scope].prefix)).copied()
+    }
+
+    pub(super) fn find_in(&self, scope: usize, name: &str) -> Option<Place> {
+        match name {
+            WORLD_LINK => return Some(None),
+            MODEL => return Some(self.scopes[scope].own),
+            _ => {}
+        }
+        let full = format!("{}{name}", self.scopes[scope].prefix);
+        let get = |name: &str| self.names.get(name).copied();
+        // the frame of a nested model, also as older files have it: a frame `inner::__model__`
+        let inner = || full.strip_suffix(MODEL).and_then(|n| n.strip_suffix("::")).and_then(get);
+        get(&full).or_else(inner).or_else(|| get(&format!("{full}::{MODEL}"))).map(Some)
+    }
+
+    /// Says that no item has a name.
+    pub(super) fn near(&self, scope: usize, name: &str, tag: &str) -> String {
+        let prefix = &self.scopes[scope].prefix;
+        let fits = |item: &&Item| tag.is_empty() || item.element.tag == tag;
+        let mut names: Vec<&str> =
+            self.items.iter().filter(fits).filter_map(|item| item.name.strip_prefix(prefix)).collect();
+        names.sort_unstable();
+        near(&nearest(name, names.into_iter()))
+    }
+
+    pub(super) fn missing(&self, beside: usize, name: &str) -> String {
+        let near = self.near(self.items[beside].scope, name, "");
+        format!("no link, joint or frame is named `{name}`{near}")
+    }
+
+    /// Returns the link that a joint's parent or child names, perhaps through frames; none is the world.
+    pub(super) fn link(&mut self, joint: usize, tag: &str) -> Result<Place, Error> {
+        let Item { element, scope, .. } = self.items[joint];
+        let name = text(element, tag).ok_or_else(|| element.wrong(format!("has no {tag}")))?;
+        match self.find_in(scope, name) {
+            Some(at) => self.attached(at, element),
+            None => Err(element.wrong(format!("no link is named `{name}`{}", self.near(scope, name, "link")))),
+        }
+    }
+
+    /// Returns the link to which an item is attached; none is the world. Errors name `of`.
+    pub(super) fn attached(&mut self, at: Place, of: &Element) -> Result<Place, Error> {
+        let (mut at, mut path) = (at, Vec::new());
+        let link = loop {
+            let Some(item) = at else { break None };
+            if let Some(&known) = self.attached.get(&item) {
+                break known;
+            }
+            if path.len() == self.items.len() {
+                return Err(of.wrong("is attached to itself"));
+            }
+            path.push(item);
+            let Item { element, scope, inside, .. } = self.items[item];
+            let name = match (&*element.tag, inside) {
+                ("link", _) => break Some(item),
+                (_, Some(inside)) => {
+                    let Scope { is_static, first: [link, model], element, .. } = self.scopes[inside];
+                    match element.attribute("canonical_link").filter(|n| !n.is_empty()) {
+                        _ if is_static => break None,
+                        Some(name) => {
+                            let found = self.find_in(inside, name);
+                            let what = || {
+                                format!("canonical_link: no link is named `{name}`{}", self.near(inside, name, "link"))
+                            };
+                            at = found.ok_or_else(|| element.wrong(what()))?;
+                        }
+                        None => at = link.or(model),
+                    }
+                    continue;
+                }
+                ("joint", _) => text(element, "child").unwrap_or_default(),
+                _ => element.attribute("attached_to").filter(|a| !a.is_empty()).unwrap_or(MODEL),
+            };
+            at = self.find_in(scope, name).ok_or_else(|| {
+                let near = self.near(scope, name, "");
+                element.wrong(format!("attached to `{name}`, which is not there{near}"))
+            })?;
+        };
+        self.attached.extend(path.into_iter().map(|item| (item, link)));
+        Ok(link)
+    }
+}

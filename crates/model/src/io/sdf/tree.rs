@@ -1,0 +1,99 @@
+//! The tree in the graph that the joints of an SDF make of its links.
+
+use super::scopes::{Place, Scopes};
+use crate::error::Error;
+use crate::io::xml::Element;
+use std::collections::{HashMap, HashSet, VecDeque};
+
+/// Types of joints, but for gearboxes, which only couple two others.
+const KINDS: [&str; 8] = ["fixed", "revolute", "continuous", "prismatic", "screw", "ball", "universal", "revolute2"];
+/// Type of a joint that couples two others.
+pub(super) const GEARBOX: &str = "gearbox";
+
+/// A joint, and the links that it connects; no link is the world.
+#[derive(Clone)]
+pub(super) struct Edge<'a> {
+    pub(super) element: &'a Element,
+    pub(super) item: usize,
+    /// In small letters.
+    pub(super) kind: String,
+    pub(super) parent: Place,
+    pub(super) child: usize,
+}
+
+impl<'a> Edge<'a> {
+    /// Reads a joint.
+    pub(super) fn new(scopes: &mut Scopes<'a>, item: usize) -> Result<Self, Error> {
+        let element = scopes.items[item].element;
+        let kind = element.attribute("type").ok_or_else(|| element.wrong("has no type"));
+        let (parent, child) = (scopes.link(item, "parent")?, scopes.link(item, "child")?);
+        let kind = kind?.trim().to_ascii_lowercase();
+        if kind != GEARBOX && !KINDS.contains(&&*kind) {
+            let known = KINDS.join(", ");
+            return Err(
+                element.wrong(format!("joints of type `{kind}` are not supported; known are {known} and {GEARBOX}"))
+            );
+        }
+        let Some(child) = child else { return Err(element.wrong("its child is the world")) };
+        if parent == Some(child) {
+            let what = format!("its parent and its child are one link, `{}`", scopes.name(child));
+            return Err(element.wrong(what));
+        }
+        Ok(Self { element, item, kind, parent, child })
+    }
+}
+
+/// A spanning tree, and what is not part of it.
+#[derive(Default)]
+pub(super) struct Tree {
+    /// Links on which no joint carries another one: each begins a tree of its own.
+    pub(super) roots: Vec<usize>,
+    /// Joints that carry others from each link, or from the world. A joint whose child carries its parent is reversed.
+    pub(super) on: HashMap<Place, Vec<(usize, bool)>>,
+    /// Joints that close loops.
+    pub(super) loops: Vec<usize>,
+}
+
+impl Tree {
+    /// Walks the joints breadth first in the order of the file: from the world and the links that are fixed to it, then from
+    /// each link that is nobody's child. A joint is walked from its child only where its parent is met in no other way.
+    pub(super) fn new(edges: &[Edge], links: &[usize], fixed: &[usize]) -> Self {
+        let (mut below, mut above): (HashMap<Place, Vec<usize>>, HashMap<usize, Vec<usize>>) = Default::default();
+        for (i, edge) in edges.iter().enumerate() {
+            below.entry(edge.parent).or_default().push(i);
+            above.entry(edge.child).or_default().push(i);
+        }
+        let mut tree = Self::default();
+        let mut line: VecDeque<Place> = [None].into_iter().chain(fixed.iter().map(|&link| Some(link))).collect();
+        let mut reached: HashSet<Place> = line.iter().copied().collect();
+        let (mut walked, mut backwards) = (vec![false; edges.len()], VecDeque::new());
+        let (mut heads, mut rest) = (links.iter().filter(|l| !above.contains_key(l)), links.iter());
+        loop {
+            while let Some(at) = line.pop_front() {
+                for &i in below.get(&at).into_iter().flatten().filter(|&&i| !walked[i]) {
+                    if !reached.insert(Some(edges[i].child)) {
+                        tree.loops.push(i);
+                        continue;
+                    }
+                    line.push_back(Some(edges[i].child));
+                    tree.on.entry(at).or_default().push((i, false));
+                }
+                backwards.extend(at.and_then(|link| above.get(&link)).into_iter().flatten());
+            }
+            let found = std::iter::from_fn(|| backwards.pop_front()).find(|&&i| !reached.contains(&edges[i].parent));
+            if let Some(&i) = found {
+                let Edge { parent, child, .. } = edges[i];
+                walked[i] = true;
+                reached.insert(parent);
+                line.push_back(parent);
+                tree.on.entry(Some(child)).or_default().push((i, true));
+                continue;
+            }
+            let mut new = |l: &&usize| !reached.contains(&Some(**l));
+            let Some(&root) = heads.find(&mut new).or_else(|| rest.find(&mut new)) else { return tree };
+            reached.insert(Some(root));
+            tree.roots.push(root);
+            line.push_back(Some(root));
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! Joints of a URDF: kinds, axes, limits, losses.
+
+use super::elements::{array, only, read, text, vector};
+use crate::body::JointOptions;
+use crate::error::Error;
+use crate::io::xml::{self, Element};
+use crate::joint::Joint;
+use crate::warning::Warning;
+use condyle_spatial::{Mat3, Vec3};
+
+/// Joint that moves, and the rotation of its frame in its link's frame.
+pub(super) struct Moving {
+    pub(super) joint: Joint,
+    /// R_lj of a planar joint, whose z is its axis. All others have the link's frame.
+    pub(super) rotation: Option<Mat3<f64>>,
+}
+
+/// Returns the joint, or none if it is fixed.
+pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Option<Moving>, Error> {
+    let axis = || match only(joint, "axis")? {
+        Some(axis) => vector(joint, axis, "xyz")?.ok_or_else(|| joint.wrong_inside(axis, "axis has no xyz")),
+        None => Ok(Vec3::new(1.0, 0.0, 0.0)),
+    };
+    let is_drakes = joint.tag != "joint";
+    let mut rotation = None;
+    let kind = match text(joint, joint, "type")? {
+        "fixed" if !is_drakes => return Ok(None),
+        "revolute" if !is_drakes => Joint::Revolute { axis: axis()? },
+        "continuous" if !is_drakes => Joint::Continuous { axis: axis()? },
+        "prismatic" if !is_drakes => Joint::Prismatic { axis: axis()? },
+        "spherical" if !is_drakes => Joint::Spherical,
+        "floating" if !is_drakes => Joint::FreeFlyer,
+        "ball" if is_drakes => Joint::Spherical,
+        "screw" if is_drakes => {
+            let screw = only(joint, "drake:screw_thread_pitch")?.ok_or_else(|| joint.wrong("has no thread pitch"))?;
+            let [turn] = array(joint, screw, "value")?.ok_or_else(|| joint.wrong_inside(screw, "has no value"))?;
+            Joint::Helical { axis: axis()?, pitch: turn / core::f64::consts::TAU } // metres of a turn, of a radian
+        }
+        "planar" => {
+            let axis = Joint::Revolute { axis: axis()? }.normalized().map_err(|what| joint.wrong(what))?.axis();
+            let axis = axis.unwrap_or(Vec3::new(0.0, 0.0, 1.0));
+            let turned = from_z_to(axis);
+            if turned != Mat3::identity() {
+                rotation = Some(turned);
+                let given = if only(joint, "axis")?.is_some() { "its" } else { "no axis is given: its" };
+                let Vec3 { x, y, z } = axis;
+                let what = format!("{given} plane is normal to the axis ({x}, {y}, {z}); Pinocchio's is normal to z");
+                warnings.push(joint.assumed(what));
+            }
+            Joint::Planar
+        }
+        other => {
+            let kinds = match is_drakes {
+                false => "revolute, continuous, prismatic, fixed, floating, planar, spherical",
+                true => "ball, planar, screw",
+            };
+            return Err(joint.wrong(format!("type `{other}` is none of {kinds}")));
+        }
+    };
+    kind.normalized().map(|joint| Some(Moving { joint, rotation })).map_err(|what| joint.wrong(what))
+}
+
+/// Returns the shortest rotation that turns z to a unit vector u: I + \[v\]× + \[v\]×² / (1 + u_z), with v = z × u. It is exact for
+/// x, y and z. Drake has the same, the half turn about x for −z included.
+fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
+    let Vec3 { x, y, z } = u;
+    let v2 = x * x + y * y; // |v|² = (1 + z)(1 − z)
+    if v2 == 0.0 && z < 0.0 {
+        return Mat3 { x: Vec3::new(1.0, 0.0, 0.0), y: Vec3::new(0.0, -1.0, 0.0), z: u };
+    }
+    let k = if z > 0.0 { 1.0 / (1.0 + z) } else { (1.0 - z) / v2 };
+    let xy = -k * x * y;
+    Mat3 { x: Vec3::new(1.0 - k * x * x, xy, -x), y: Vec3::new(xy, 1.0 - k * y * y, -y), z: u }
+}
+
+/// Returns the limits and losses of a joint that moves.
+pub(super) fn options(joint: &Element, kind: Joint, warnings: &mut Vec<Warning>) -> Result<JointOptions, Error> {
+    let (limit, dynamics) = (only(joint, "limit")?, only(joint, "dynamics")?);
+    let mut options = JointOptions::default();
+    // the numbers of joints with several degrees of freedom have no unit
+    if kind.nv() > 1 {
+        let has = |inside: &Element| {
+            inside.attributes.iter().any(|(_, x)| x.split_whitespace().any(|x| x.parse() != Ok(0.0)))
+        };
+        for inside in [limit, dynamics].into_iter().flatten().filter(|inside| has(inside)) {
+            let what = "its numbers have no unit for a joint with several degrees of freedom, and no effect";
+            warnings.push(joint.left_out_inside(inside, what));
+        }
+        return Ok(options);
+    }
+    let is_limited = matches!(kind, Joint::Revolute { .. } | Joint::Prismatic { .. });
+    if let Some(limit) = limit {
+        let number = |name| read(joint, limit, name, xml::bound);
+        let [lower, upper, effort, velocity] = ["lower", "upper", "effort", "velocity"].map(number);
+        let (lower, upper, effort, velocity) = (lower?.unwrap_or(0.0), upper?.unwrap_or(0.0), effort?, velocity?);
+        let mut bound = |name, found: Option<f64>| match found {
+            None if is_limited => Err(joint.wrong_inside(limit, format!("limit has no {name}"))),
+            Some(x) if x < 0.0 => {
+                warnings.push(joint.assumed(format!("limit {name} is {x}, below 0: it has no limit")));
+                Ok(None)
+            }
+            _ => Ok(found),
+        };
+        let effort = bound("effort", effort)?;
+        options.velocity = bound("velocity", velocity)?;
+        options.effort = effort.map(|effort| (-effort, effort));
+        if is_limited && lower > upper {
+            let what = format!("lower limit {lower} is above upper limit {upper}: its position has no limits");
+            warnings.push(joint.left_out_inside(limit, what));
+        } else if is_limited {
+            options.position = Some((lower, upper));
+        }
+        for name in ["acceleration", "deceleration", "jerk", "drake:acceleration"] {
+            if number(name)?.is_some_and(f64::is_finite) {
+                warnings.push(joint.left_out_inside(limit, format!("{name}: a model has no such limit")));
+            }
+        }
+    } else if is_limited {
+        return Err(joint.wrong("is revolute or prismatic and has no <limit>"));
+    }
+    if let Some(dynamics) = dynamics {
+        let number = |name| Ok(array(joint, dynamics, name)?.map_or(0.0, |[x]| x));
+        (options.damping, options.friction) = (number("damping")?, number("friction")?);
+    }
+    Ok(options)
+}

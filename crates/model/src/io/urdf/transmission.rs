@@ -1,0 +1,59 @@
+//! Transmissions: the inertia of a rotor, as seen at its joint.
+
+use crate::io::xml::{Element, array};
+use crate::warning::Warning;
+use std::collections::HashMap;
+
+/// Tags of a rotor's inertia about its axis (kg m²).
+const ROTOR: [&str; 5] = ["drake:rotor_inertia", "rotorInertia", "rotor_inertia", "motorInertia", "motor_inertia"];
+/// Tags of the turns of a rotor for one turn of its joint.
+const RATIO: [&str; 5] = ["drake:gear_ratio", "mechanicalReduction", "mechanical_reduction", "gearRatio", "gear_ratio"];
+
+/// Returns the armature n² J of each joint whose transmission has both a reduction n and a rotor's inertia J. Others warn, unless
+/// their reduction is 1 and they have no rotor.
+pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> HashMap<&'a str, f64> {
+    let mut found = HashMap::new();
+    for transmission in robot.all("transmission") {
+        let (mut joints, mut actuators) = (transmission.all("joint"), transmission.all("actuator"));
+        let (joint, actuator) = (joints.next(), actuators.next());
+        let is_simple = joints.next().is_none() && actuators.next().is_none();
+        let inside = [actuator, joint, Some(transmission)];
+        let find = |tags: &[&str]| {
+            let mut elements = inside.iter().flatten().flat_map(|of| tags.iter().filter_map(|tag| of.child(tag)));
+            elements.find_map(|element| Some((element, number(element)?)))
+        };
+        let (rotor, mut ratio) = (find(&ROTOR), find(&RATIO).map(|(_, n)| n));
+        let name = joint.and_then(|joint| joint.attribute("name"));
+        let left_out = match rotor {
+            _ if !is_simple => match (rotor, ratio) {
+                (None, None | Some(1.0)) => None,
+                _ => Some("it couples joints: M has no inertia of its rotors".to_owned()),
+            },
+            None => ratio
+                .filter(|n| n.abs() != 1.0)
+                .map(|n| format!("has a reduction of {n} and no rotor inertia: M has no inertia of the rotor")),
+            Some((element, inertia)) => {
+                if element.tag == ROTOR[0] {
+                    ratio = Some(find(&RATIO[..1]).map_or(1.0, |(_, n)| n)); // as Drake has it
+                }
+                match (ratio, name) {
+                    (Some(n), Some(name)) if inertia >= 0.0 => {
+                        *found.entry(name).or_insert(0.0) += n * n * inertia;
+                        None
+                    }
+                    _ => Some(format!(
+                        "has a rotor inertia of {inertia} kg m², but no reduction or joint: M does not have it"
+                    )),
+                }
+            }
+        };
+        warnings.extend(left_out.map(|what| transmission.left_out(what)));
+    }
+    found
+}
+
+/// Returns the number of an element: its attribute `value`, or its text.
+fn number(element: &Element) -> Option<f64> {
+    let [x] = array(element.attribute("value").unwrap_or(&element.text)).ok()?;
+    Some(x)
+}

@@ -1,0 +1,67 @@
+//! XML for other parsers: the text of a robot, without what they refuse.
+
+use super::{Amount, Element};
+use crate::error::Error;
+use crate::model::Model;
+
+impl Model {
+    /// Returns the text of a file's bytes.
+    #[doc(hidden)]
+    pub fn decoded(bytes: Vec<u8>) -> String {
+        super::encoding::decode(bytes)
+    }
+
+    /// Returns a text with the same elements on the same lines, which every parser of XML reads: without a document type, comments
+    /// and prefixes.
+    #[doc(hidden)]
+    pub fn well_formed(text: &str) -> Result<String, Error> {
+        let mut written = Written { text: String::with_capacity(text.len()), line: 1 };
+        written.element(&Element::parse(text, "<string>", &mut Amount::default())?);
+        Ok(written.text)
+    }
+}
+
+struct Written {
+    text: String,
+    line: u32,
+}
+
+impl Written {
+    /// Writes an element on its line, or on the first line after it that is free.
+    fn element(&mut self, element: &Element) {
+        let name = |name: &str| name.replace(':', "-");
+        while self.line < element.line {
+            self.text.push('\n');
+            self.line += 1;
+        }
+        self.text.push('<');
+        self.text += &name(&element.tag);
+        for (attribute, value) in &element.attributes {
+            self.text.push(' ');
+            self.text += &name(attribute);
+            self.text += "=\"";
+            self.escaped(value);
+            self.text.push('"');
+        }
+        self.text.push('>');
+        self.escaped(element.text.trim());
+        element.children.iter().for_each(|child| self.element(child));
+        self.text += "</";
+        self.text += &name(&element.tag);
+        self.text.push('>');
+    }
+
+    fn escaped(&mut self, text: &str) {
+        for c in text.chars() {
+            match c {
+                '&' => self.text += "&amp;",
+                '<' => self.text += "&lt;",
+                '"' => self.text += "&quot;",
+                '\n' => self.text += "&#10;", // no line of the file
+                '\t' => self.text += "&#9;",
+                c if c.is_control() => {}
+                c => self.text.push(c),
+            }
+        }
+    }
+}

@@ -1,0 +1,250 @@
+//! Limits of effort, the table of actuators, their classes, armature and damping.
+
+use super::*;
+
+/// The extremes of `qfrc_actuator` at rest, over all controls.
+#[test]
+fn actuators_limit_effort() {
+    const INF: f64 = f64::INFINITY;
+    let limited = "<joint name='j' axis='0 1 0' actuatorfrcrange='-100 12'/>";
+    let cases = [
+        (HINGE, "<motor joint='j'/>", [-INF, INF]),
+        (HINGE, "<motor joint='j' gear='50' forcerange='-3 3'/>", [-150.0, 150.0]),
+        (HINGE, "<motor joint='j' gear='50' ctrlrange='-1 2'/>", [-50.0, 100.0]),
+        (HINGE, "<motor joint='j' gear='-50' ctrlrange='-1 2'/>", [-100.0, 50.0]),
+        (HINGE, "<motor joint='j' ctrlrange='-1 2' forcerange='-0.5 9'/>", [-0.5, 2.0]),
+        (HINGE, "<motor jointinparent='j' ctrlrange='-1 2' forcelimited='false' forcerange='-9 9'/>", [-1.0, 2.0]),
+        (HINGE, "<motor joint='j' ctrlrange='-1 2' ctrllimited='false'/>", [-INF, INF]),
+        (HINGE, "<motor joint='j' ctrlrange='0 0' forcerange='0 0'/>", [-INF, INF]),
+        (HINGE, "<motor joint='j' gear='0'/>", [0.0, 0.0]),
+        (HINGE, "<general joint='j' gainprm='-4' ctrlrange='-1 2'/>", [-8.0, 4.0]),
+        (HINGE, "<general joint='j' gainprm='2' biastype='affine' biasprm='3' ctrlrange='-1 2'/>", [1.0, 7.0]),
+        // a servo has no limit but that of its force: it depends on the length
+        (HINGE, "<position joint='j' kp='100' ctrlrange='-1 1'/>", [-INF, INF]),
+        (HINGE, "<position joint='j' kp='100' ctrlrange='-1 1' forcerange='-7 8' gear='2'/>", [-14.0, 16.0]),
+        (HINGE, "<velocity joint='j' kv='100' ctrlrange='-1 1' forcerange='-7 8'/>", [-7.0, 8.0]),
+        (HINGE, "<damper joint='j' kv='3' ctrlrange='0 1'/>", [-INF, INF]),
+        (HINGE, "<cylinder joint='j' area='3' bias='1 0 0' ctrlrange='1 2'/>", [1.0, 7.0]),
+        (HINGE, "<dcmotor joint='j' motorconst='0.1 0.4' resistance='2' saturation='0 5'/>", [-1.0, 1.0]),
+        (HINGE, "<intvelocity joint='j' kp='7' inheritrange='1' forcerange='-3 4'/>", [-3.0, 4.0]),
+        // several add up, and the joint clips the sum
+        (
+            HINGE,
+            "<motor joint='j' gear='-2' forcerange='-1 3'/><motor joint='j' gear='3' ctrlrange='-2 1'/>",
+            [-12.0, 5.0],
+        ),
+        (limited, "<motor joint='j' gear='2' forcerange='-1 30'/>", [-2.0, 12.0]),
+        (limited, "<motor joint='j'/>", [-100.0, 12.0]),
+        (limited, "<motor joint='j' ctrlrange='-900 -200'/>", [-100.0, -100.0]),
+        (limited, "<motor site='s' ctrlrange='-900 -200'/>", [-100.0, 12.0]),
+        ("<joint name='j' axis='0 1 0' actuatorfrcrange='0 0'/>", "<motor joint='j'/>", [-INF, INF]),
+    ];
+    for (joint, actuators, expected) in cases {
+        assert_eq!(effort(&driven(joint, actuators)), expected, "{actuators}");
+    }
+    let none = model("", HINGE, "");
+    assert_eq!(effort(&none), [-INF, INF]); // without an actuator
+    let off = model(
+        "<option><flag clampctrl='disable'/></option>",
+        HINGE,
+        "<actuator><motor joint='j' ctrlrange='-1 1'/></actuator>",
+    );
+    assert_eq!(effort(&off), [-INF, INF]);
+}
+
+/// The force of an actuator on a tendon is clipped to the tendon's range, then to its own: `qfrc_actuator`.
+#[test]
+fn tendons_limit_effort() {
+    let tendon = "<tendon><fixed name='t' actuatorfrcrange='-3 3'><joint joint='j' coef='-2'/></fixed></tendon>";
+    let joint = "<joint name='j' axis='0 1 0' actuatorfrcrange='-100 12'/>";
+    let motors = "<motor joint='j' gear='2' forcerange='-1 3'/><motor tendon='t' gear='5' forcerange='-4 9'/>";
+    let found = model("", joint, &format!("{tendon}<actuator>{motors}</actuator>"));
+    assert_eq!(effort(&found), [-32.0, 12.0]);
+    let Transmission::Tendon { name, joints } = &found.actuators()[1].transmission else { panic!() };
+    assert_eq!((name.as_str(), &joints[..]), ("t", &[(1, -2.0)][..]));
+    assert!(said(&found).is_empty());
+    let shared =
+        model("", joint, &format!("{tendon}<actuator>{}</actuator>", "<motor tendon='t' ctrlrange='-9 9'/>".repeat(2)));
+    assert_eq!(effort(&shared), [-36.0, 12.0]);
+    let what = "actuatorfrcrange: it is no limit of effort, for several actuators share the tendon";
+    assert_eq!(said(&shared), [format!("<string>:1: fixed `t`: {what}")]);
+}
+
+/// A ball takes the axis that the gear is; a joint that floats keeps limits along the axes of its body alone.
+#[test]
+fn balls_and_free_joints() {
+    let ball = driven("<joint name='j' type='ball'/>", "<motor joint='j' gear='1 -2 0' ctrlrange='-3 4'/>");
+    assert_eq!(ball.limits().effort_lower, [-3.0, -8.0, f64::NEG_INFINITY]);
+    assert_eq!(ball.limits().effort_upper, [4.0, 6.0, f64::INFINITY]);
+    assert_eq!(ball.actuators()[0].gear, [1.0, -2.0, 0.0, 0.0, 0.0, 0.0]);
+    let free = driven("<freejoint name='j'/>", "<motor joint='j' gear='1 0 0 0 2 0' ctrlrange='-3 4'/>");
+    assert_eq!(free.limits().effort_upper[..4], [f64::INFINITY; 4]);
+    assert_eq!(free.limits().effort_upper[4], 8.0);
+    let parent = driven("<joint name='j' type='ball'/>", "<motor name='m' jointinparent='j' ctrlrange='-3 4'/>");
+    let what = "it is left out of the table of actuators: its axis is fixed in the parent of a ball or free joint";
+    assert_eq!(said(&parent), [format!("<string>:1: motor `m`: {what}")]);
+    assert!(parent.actuators().is_empty());
+}
+
+/// `actuator_gainprm` and `actuator_biasprm`.
+#[test]
+fn laws_of_actuators() {
+    let cases = [
+        // gain, bias, kp, kv
+        ("<motor joint='j'/>", [1.0, 0.0, 0.0, 0.0]),
+        ("<position joint='j'/>", [1.0, 0.0, 1.0, 0.0]),
+        ("<position joint='j' kp='100' kv='10'/>", [100.0, 0.0, 100.0, 10.0]),
+        ("<position joint='j' kp='7' dampratio='0.5'/>", [7.0, 0.0, 7.0, 0.591607978309961_6]),
+        ("<position joint='j' kp='7' dampratio='0.5' gear='3'/>", [7.0, 0.0, 7.0, 0.197202659436653_86]),
+        ("<velocity joint='j' kv='3'/>", [3.0, 0.0, 0.0, 3.0]),
+        ("<general joint='j' gainprm='5 1' biastype='affine' biasprm='1 -2 -3'/>", [5.0, 1.0, 2.0, 3.0]),
+        ("<general joint='j' gainprm='5' biasprm='1 -2 -3'/>", [5.0, 0.0, 0.0, 0.0]),
+        ("<pid joint='j' kp='2' kv='3' input='pos'/>", [2.0, 0.0, 2.0, 3.0]),
+        ("<dcmotor joint='j' motorconst='0.1' resistance='2'/>", [0.05, 0.0, 0.0, 0.005]),
+        ("<dcmotor joint='j' motorconst='0.1 0.4' resistance='2'/>", [0.1, 0.0, 0.0, 0.02]),
+        ("<dcmotor joint='j' nominal='24 10 100'/>", [0.24 / 0.576, 0.0, 0.0, 0.24 * 0.24 / 0.576]),
+        ("<dcmotor joint='j' nominal='24 10 100' damping='0.01'/>", [0.216 / 0.5184, 0.0, 0.0, 0.09]),
+    ];
+    for (actuator, expected) in cases {
+        let found = driven(HINGE, actuator);
+        let a = &found.actuators()[0];
+        close(&[a.gain, a.bias, a.kp, a.kv], &expected);
+        assert!(said(&found).is_empty(), "{actuator}");
+    }
+    let found = driven(HINGE, "<position name='servo' joint='j' inheritrange='0.5' forcerange='-2 3'/>");
+    let a = &found.actuators()[0];
+    assert_eq!((a.name.as_str(), a.force), ("servo", (-2.0, 3.0)));
+    close(&[a.control.0, a.control.1], &[-0.1308996938995747, 0.6544984694978735]);
+    assert!(matches!(a.transmission, Transmission::Joint { body: 1 }));
+    let site = driven(HINGE, "<motor site='s' gear='0 0 1'/>");
+    let Transmission::Frame { frame } = site.actuators()[0].transmission else { panic!() };
+    assert_eq!(site.frames()[frame].name, "s");
+}
+
+/// `actuator_gainprm`, `actuator_biasprm`, `actuator_gear`, `actuator_ctrlrange` of elements without numbers of their own. A
+/// kind inherits its law from the innermost class whose last default is of its kind or `<general>`, all else from any.
+#[test]
+fn classes_of_actuators() {
+    let servo = "<position kp='100' kv='10'/>";
+    let general = "<general gainprm='100 2' biasprm='6 -100 -5' biastype='affine'/>";
+    let inner = |inside: &str| format!("{servo}<default class='x'>{inside}</default>");
+    let cases = [
+        (servo.to_owned(), "<position joint='j'/>", [100.0, 0.0, 100.0, 10.0]),
+        (servo.to_owned(), "<position joint='j' kv='1'/>", [100.0, 0.0, 100.0, 1.0]),
+        (servo.to_owned(), "<general joint='j'/>", [100.0, 0.0, 100.0, 10.0]),
+        (servo.to_owned(), "<velocity joint='j'/>", [1.0, 0.0, 0.0, 1.0]),
+        (format!("{servo}<motor/>"), "<position joint='j'/>", [1.0, 0.0, 1.0, 0.0]),
+        (format!("{servo}<general gainprm='7'/>"), "<position joint='j'/>", [7.0, 0.0, 7.0, 10.0]),
+        (format!("<motor/>{servo}"), "<position joint='j'/>", [100.0, 0.0, 100.0, 10.0]),
+        (general.to_owned(), "<general joint='j'/>", [100.0, 6.0, 100.0, 5.0]),
+        (general.to_owned(), "<motor joint='j'/>", [1.0, 0.0, 0.0, 0.0]),
+        (general.to_owned(), "<velocity joint='j'/>", [100.0, 0.0, 0.0, 100.0]),
+        (general.to_owned(), "<pid joint='j' input='pos'/>", [1.0, 0.0, 1.0, 0.0]),
+        (inner("<position kp='5'/>"), "<position joint='j' class='x'/>", [5.0, 0.0, 5.0, 10.0]),
+        (inner("<velocity kv='5'/>"), "<position joint='j' class='x'/>", [100.0, 0.0, 100.0, 10.0]),
+        (inner("<velocity kv='5'/>"), "<general joint='j' class='x'/>", [5.0, 0.0, 0.0, 5.0]),
+        (
+            "<dcmotor motorconst='0.1' resistance='2'/>".to_owned(),
+            "<dcmotor joint='j' resistance='4'/>",
+            [0.025, 0.0, 0.0, 0.0025],
+        ),
+    ];
+    for (class, actuator, expected) in cases {
+        let found = model(&format!("<default>{class}</default>"), HINGE, &format!("<actuator>{actuator}</actuator>"));
+        let a = &found.actuators()[0];
+        close(&[a.gain, a.bias, a.kp, a.kv], &expected);
+    }
+    // a list may be shorter than that of the class
+    let shared = "<default><motor gear='5 0 1' ctrlrange='-1 1' armature='0.1'/></default>";
+    let found = model(shared, HINGE, "<actuator><position joint='j' gear='2'/></actuator>");
+    assert_eq!(found.actuators()[0].gear, [2.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    assert_eq!((found.actuators()[0].control, found.armature()), ((-1.0, 1.0), &[0.4][..]));
+    let joints = "<default><joint stiffness='1 2 3' damping='4 5 6'/></default>";
+    let found = model(joints, "<joint name='j' axis='0 1 0' stiffness='7' damping='8'/>", "");
+    assert_eq!((found.springs()[0].stiffness, found.damping()), ([7.0, 2.0, 3.0], &[8.0][..]));
+    assert_eq!(found.damping_polynomial(), [[5.0, 6.0]]);
+}
+
+/// `mj_fullM` and `qfrc_damper`: rotors count gear² times.
+#[test]
+fn armature_and_damping_of_actuators() {
+    let found = driven(
+        "<joint name='j' axis='0 1 0' armature='0.1' damping='0.5'/>",
+        "<motor joint='j' gear='10 2' armature='0.01' damping='1 2 3'/><motor joint='j' gear='-3' armature='0.02' damping='1'/>",
+    );
+    close(found.armature(), &[0.1 + 1.0 + 0.18]);
+    close(found.damping(), &[0.5 + 100.0 + 9.0]);
+    close(found.damping_polynomial().as_flattened(), &[200.0, 300.0]);
+    let ball =
+        driven("<joint name='j' type='ball'/>", "<motor joint='j' gear='4 2 3' armature='0.01' damping='1 2 3'/>");
+    close(ball.armature(), &[0.16; 3]);
+    close(ball.damping(), &[16.0; 3]);
+    let free = driven(
+        "<joint name='j' type='free' damping='1 2' frictionloss='2'/>",
+        "<motor joint='j' gear='4' damping='0.5'/>",
+    );
+    close(free.damping(), &[9.0; 6]);
+    close(free.friction(), &[2.0; 6]);
+    assert_eq!(free.damping_polynomial(), [[2.0, 0.0]; 6]);
+    let tendon = "<tendon><fixed name='t' armature='0.5' damping='0.1'><joint joint='j' coef='2'/></fixed></tendon>";
+    let motor = "<actuator><motor tendon='t' gear='10' armature='0.01' damping='1 2 3'/></actuator>";
+    let found = model("", HINGE, &format!("{tendon}{motor}"));
+    close(found.armature(), &[4.0 * (0.5 + 1.0)]);
+    close(found.damping(), &[4.0 * (0.1 + 100.0)]);
+    close(found.damping_polynomial().as_flattened(), &[8.0 * 200.0, 16.0 * 300.0]);
+}
+
+/// Every change of what a robot does is said: element, and what becomes different.
+#[test]
+fn what_actuators_lose_is_said() {
+    let cases = [
+        ("<muscle joint='j' lengthrange='0 1'/>", "muscle", "it is left out of the table of actuators: it is a muscle"),
+        (
+            "<damper joint='j' kv='1' ctrlrange='0 1'/>",
+            "damper",
+            "it is left out of the table of actuators: its gain depends on length or velocity",
+        ),
+        (
+            "<adhesion body='b' ctrlrange='0 1'/>",
+            "adhesion",
+            "it is left out of the table of actuators: it acts on contacts of a body",
+        ),
+        (
+            "<motor site='s' refsite='s'/>",
+            "motor",
+            "it is left out of the table of actuators: it drives a site against another one",
+        ),
+        (
+            "<motor cranksite='s' slidersite='s' cranklength='1'/>",
+            "motor",
+            "it is left out of the table of actuators: it drives a slider and a crank",
+        ),
+        (
+            "<position joint='j' timeconst='0.1'/>",
+            "position",
+            "its activation is not filtered: it follows the control at once",
+        ),
+        (
+            "<intvelocity joint='j'/>",
+            "intvelocity",
+            "its control is not integrated: the control is the activation itself",
+        ),
+        ("<pid joint='j'/>", "pid", "its setpoint of velocity and its feedforward are left out"),
+        (
+            "<pid joint='j' ki='1' input='pos'/>",
+            "pid",
+            "its integral and the limit of its setpoint's rate are left out",
+        ),
+        ("<motor joint='j' delay='0.01' nsample='5'/>", "motor", "delay: the control acts at once"),
+        ("<dcmotor joint='j' motorconst='1' resistance='1' cogging='1 2 3'/>", "dcmotor", "cogging"),
+    ];
+    for (actuator, element, what) in cases {
+        let found = driven(HINGE, actuator);
+        assert_eq!(found.warnings().len(), 1, "{actuator}");
+        let Warning::LeftOut { element: of, what: why, .. } = &found.warnings()[0] else { panic!() };
+        assert_eq!(of, &format!("<{element}>"));
+        assert!(why.starts_with(what), "{why}");
+    }
+    let yields = model("", "<joint stiffness='1' springyield='2'/>", "");
+    assert_eq!(said(&yields), ["<string>:1: <joint>: springyield: the spring does not yield, however far it is moved"]);
+}

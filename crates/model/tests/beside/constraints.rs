@@ -1,0 +1,133 @@
+//! Loops, couplings, followers and keyframes.
+
+use super::*;
+
+/// `eq_data`: anchors in body1 and body2, and the relative orientation.
+#[test]
+fn loops_and_couplings() {
+    let text = "<mujoco><worldbody><body name='a' pos='1 2 3' quat='1 2 3 4'><joint name='p' axis='0 1 0' ref='15' pos='.1 .2 .3'/>
+        <geom size='.1'/><body name='c' pos='.1 .2 .3' quat='4 3 2 1'><joint name='s' type='slide' axis='1 2 3' ref='0.25'/>
+        <geom size='.1'/><site name='u' pos='0 .1 0' quat='1 1 0 0'/></body></body>
+        <body name='e' pos='0 1 0' quat='1 0 0 1'><freejoint/><geom size='.1'/><site name='v' pos='.3 0 0'/></body></worldbody>
+        <equality><connect body1='c' body2='e' anchor='.1 .2 .3'/><weld name='w' body1='c' body2='e' anchor='.1 .2 .3'/>
+        <weld body1='a' relpose='.1 .2 .3 1 1 0 0' anchor='.3 .2 .1' torquescale='0'/>
+        <joint joint1='p' joint2='s' polycoef='0.1 0.2 0.3 0.4 0.5'/><weld site1='u' site2='v'/><connect body1='c' active='false' anchor='0 0 0'/>
+        <joint joint1='s'/></equality></mujoco>";
+    let found = read(text).unwrap();
+    let names: Vec<&str> = found.constraints().iter().map(|c| c.name.as_str()).collect();
+    assert_eq!(names, ["connect1", "w", "weld2", "joint1", "weld3", "joint2"]);
+    // each frame of a constraint, in the body or site whose name follows
+    let placed = |k: usize, of: [&str; 2]| {
+        let frames = match found.constraints()[k].kind {
+            ModelConstraintKind::Point { frames } | ModelConstraintKind::Rigid { frames } => frames,
+            _ => panic!(),
+        };
+        [0, 1].map(|side| {
+            let frame = &found.frames()[frames[side]];
+            let at = &found.frames()[found.frame(of[side]).unwrap()];
+            assert_eq!((frame.body, frame.kind), (at.body, FrameKind::Constraint));
+            assert_eq!(frame.name, format!("{}#{}", names[k], side + 1));
+            at.placement.inverse() * frame.placement
+        })
+    };
+    let place = |X: Se3<f64>| X.translation.to_array();
+    let [first, second] = placed(0, ["c", "e"]);
+    close(&place(first), &[0.1, 0.2, 0.3]);
+    close(&place(second), &[1.56, -1.104, 3.328]);
+    assert!(matches!(found.constraints()[0].kind, ModelConstraintKind::Point { .. }));
+    let [first, second] = placed(1, ["c", "e"]);
+    close(&place(first), &[-1.54, -2.964, 0.848]);
+    close(&place(second), &[0.1, 0.2, 0.3]);
+    // the quaternion (0, −0.7071, −0.4243, −0.5657) turns x, y and z to
+    let turned = [first.rotation.x, first.rotation.y, first.rotation.z].map(|axis| axis.to_array());
+    close(turned.as_flattened(), &[0.0, 0.6, 0.8, 0.6, -0.64, 0.48, 0.8, 0.48, -0.36]);
+    assert!(matches!(found.constraints()[1].kind, ModelConstraintKind::Rigid { .. }));
+    let [first, second] = placed(2, ["a", "world"]);
+    close(&place(first), &[0.1, 0.2, 0.3]);
+    close(&place(second), &[0.3, 0.2, 0.1]);
+    assert!(matches!(found.constraints()[2].kind, ModelConstraintKind::Point { .. })); // torquescale 0 leaves rotation free
+    for X in placed(4, ["u", "v"]) {
+        close(&place(X), &[0.0; 3]);
+    }
+    let ModelConstraintKind::Coupling { follower, leader, coefficients: c } = found.constraints()[3].kind else {
+        panic!()
+    };
+    assert_eq!((follower, leader), (1, Some(2)));
+    for x in [-0.7, 0.3, 1.1] {
+        let d: f64 = x - 0.25;
+        let y = 15f64.to_radians() + 0.1 + 0.2 * d + 0.3 * d * d + 0.4 * d.powi(3) + 0.5 * d.powi(4);
+        close(&[c.iter().rev().fold(0.0, |sum, c| sum * x + c)], &[y]);
+    }
+    let ModelConstraintKind::Coupling { leader: None, coefficients, .. } = found.constraints()[5].kind else {
+        panic!()
+    };
+    assert_eq!(coefficients, [0.25, 0.0, 0.0, 0.0, 0.0]);
+    assert!(said(&found).is_empty());
+    // both bodies are one here
+    let held = model("", &format!("{HINGE}<body name='c'/>"), "<equality><weld body1='b' body2='c'/></equality>");
+    assert_eq!(said(&held), ["<string>:1: <weld>: both ends are fixed to one body, which no constraint can move"]);
+}
+
+/// Chains of followers have one leader; a circle of them is held beside the tree.
+#[test]
+fn followers_of_followers() {
+    let ball = "<geom size='0.1'/>";
+    let bodies: String = ["a", "b", "c"]
+        .map(|name| format!("<body><joint name='{name}' damping='1' actuatorfrcrange='-1 2'/>{ball}</body>"))
+        .concat();
+    let text = |equality: &str| {
+        format!(
+            "<mujoco><worldbody>{bodies}</worldbody><equality>{equality}</equality><actuator><motor joint='b' ctrlrange='-3 1'/></actuator></mujoco>"
+        )
+    };
+    let chain = "<joint joint1='c' joint2='b' polycoef='0.5 3'/><joint joint1='b' joint2='a' polycoef='0.1 -2'/>";
+    let options = MjcfOptions { mimic: true, ..MjcfOptions::default() };
+    let found = Model::from_mjcf_str(&text(chain), &options).unwrap();
+    let mimic = |i: usize| found.bodies()[i].mimic.map(|mimic| [mimic.ratio, mimic.offset]);
+    assert_eq!((found.nv(), mimic(1), mimic(2)), (1, None, Some([-2.0, 0.1])));
+    close(&mimic(3).unwrap(), &[-6.0, 0.8]); // c = 0.5 + 3 (0.1 − 2 a)
+    assert!(said(&found).is_empty() && found.constraints().is_empty());
+    // damping and efforts of followers act on the leader: v_b = −2 v_a, v_c = −6 v_a
+    close(found.damping(), &[1.0 + 4.0 + 36.0]);
+    close(&effort(&found), &[-1.0 - 2.0 - 12.0, 2.0 + 2.0 + 6.0]);
+    let circle = format!("{chain}<joint joint1='a' joint2='c'/>");
+    let found = Model::from_mjcf_str(&text(&circle), &options).unwrap();
+    assert_eq!((found.nv(), found.constraints().len()), (1, 1));
+    let what = "joint1 follows another joint, or joint2 follows joint1: the joint is left free, and the constraint `joint3` holds it";
+    assert_eq!(said(&found), [format!("<string>:1: <joint>: {what}")]);
+    let free = read(&text(chain)).unwrap();
+    assert_eq!((free.nv(), free.constraints().len()), (3, 2));
+    assert!(free.warnings().iter().all(|warning| warning.kind() == WarningKind::Mimic));
+}
+
+/// `key_qpos` and `mj_objectVelocity` along the body's axes.
+#[test]
+fn keyframes() {
+    let ball = "<geom size='0.1'/>";
+    let text = |keys: &str| {
+        format!(
+            "<mujoco><worldbody><body pos='1 2 3' quat='1 0 0 1'><freejoint/>{ball}<body><joint name='o' type='ball'/>{ball}
+            <body><joint name='p' type='slide' ref='0.25'/>{ball}</body></body></body></worldbody><keyframe>{keys}</keyframe></mujoco>"
+        )
+    };
+    let home = "<key name='home' qpos='1 2 3 2 0 0 2 0 0 0 3 0.5' qvel='1 2 3 4 5 6 7 8 9 10'/><key/>";
+    let found = read(&text(home)).unwrap();
+    let [home, second] = found.keyframes() else { panic!() };
+    assert_eq!((home.name.as_str(), second.name.as_str()), ("home", "key1"));
+    let half = 0.5f64.sqrt();
+    close(&home.q, &[1.0, 2.0, 3.0, 0.0, 0.0, half, half, 0.0, 0.0, 1.0, 0.0, 0.5]);
+    close(&home.v, &[2.0, -1.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0]);
+    close(&second.q, &[1.0, 2.0, 3.0, 0.0, 0.0, half, half, 0.0, 0.0, 0.0, 1.0, 0.25]);
+    assert_eq!(second.v, [0.0; 10]);
+    let refused = |keys: &str, expected: &str| assert_eq!(read(&text(keys)).unwrap_err().to_string(), expected);
+    refused("<key qpos='1 2'/>", "<string>:2: <key>: qpos: expected 12 numbers, found 2");
+    refused("<key name='k' qvel='1'/>", "<string>:2: key `k`: qvel: expected 10 numbers, found 1");
+    refused("<key name='k'/><key name='k'/>", "<string>:1: <mujoco>: two keyframes have the same name");
+    // coordinates of joints that follow are left out
+    let hinges = format!(
+        "<mujoco><worldbody><body><joint name='a'/>{ball}</body><body><joint name='b'/>{ball}</body></worldbody>
+        <equality><joint joint1='a' joint2='b'/></equality><keyframe><key qpos='1 2' qvel='3 4'/></keyframe></mujoco>"
+    );
+    let found = Model::from_mjcf_str(&hinges, &MjcfOptions { mimic: true, ..MjcfOptions::default() }).unwrap();
+    assert_eq!((&found.keyframes()[0].q[..], &found.keyframes()[0].v[..]), (&[2.0][..], &[4.0][..]));
+}
