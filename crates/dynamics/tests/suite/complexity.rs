@@ -23,8 +23,11 @@ fn hinges(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     builder.build().expect("a tree is well-formed")
 }
 
-/// The parents of a chain, a binary tree, a star about body 1, and a chain of branches.
-const SHAPES: [(&str, fn(usize) -> usize); 4] = [
+/// The parent of each body.
+type Shape = fn(usize) -> usize;
+
+/// A chain, a binary tree, a star about body 1, and a chain of branches.
+const SHAPES: [(&str, Shape); 4] = [
     ("chain", |i| i - 1),
     ("binary tree", |i| i / 2),
     ("star", |i| if i > 1 { 1 } else { 0 }),
