@@ -73,12 +73,7 @@ fn factorisation(c: &mut Criterion) {
         }
         group.finish();
 
-        let M = crba(&model, &mut data, &q).clone();
-        let (mut sparse, mut dense) = (Ltdl::new(&model), Cholesky::new(model.nv()));
-        let mut group = c.benchmark_group(format!("factorise/{name}"));
-        group.bench_function("Dense", |b| b.iter(|| dense.factorize(black_box(&M))));
-        group.bench_function("Sparse", |b| b.iter(|| sparse.factorize(black_box(&M))));
-        group.finish();
+        let (mut sparse, mut dense) = factors(c, &name, &model);
 
         let mut x = tau.clone();
         let mut group = c.benchmark_group(format!("solve/{name}"));
@@ -115,12 +110,35 @@ fn factorisation(c: &mut Criterion) {
     }
 }
 
+/// Times both factors of M.
+fn factors(c: &mut Criterion, name: &str, model: &Model) -> (Ltdl<f64>, Cholesky<f64>) {
+    let q = random_configuration(model, &mut StdRng::seed_from_u64(1));
+    let M = crba(model, &mut Data::new(model), &q).clone();
+    let (mut sparse, mut dense) = (Ltdl::new(model), Cholesky::new(model.nv()));
+    let mut group = c.benchmark_group(format!("factorise/{name}"));
+    group.bench_function("Dense", |b| b.iter(|| dense.factorize(black_box(&M))));
+    group.bench_function("Sparse", |b| b.iter(|| sparse.factorize(black_box(&M))));
+    group.finish();
+    (sparse, dense)
+}
+
+/// Several humanoids in one model.
+fn crowds(c: &mut Criterion) {
+    for n in [2, 4, 8, 22] {
+        let (one, mut builder) = (robots::humanoid(), ModelBuilder::new("crowd"));
+        for k in 0..n {
+            builder.append(WORLD, Se3::identity(), &one, &format!("{k}_"));
+        }
+        factors(c, &format!("{n} humanoids"), &builder.build().expect("robots side by side are one"));
+    }
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default()
         .warm_up_time(Duration::from_millis(100))
         .measurement_time(Duration::from_millis(400))
         .sample_size(20);
-    targets = factorisation
+    targets = factorisation, crowds
 }
 criterion_main!(benches);

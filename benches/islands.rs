@@ -1,5 +1,6 @@
 //! Several quadrupeds on their feet in one model: what each costs, beside what one costs alone: `cargo bench --bench islands`,
-//! in µs. `islands.py` runs this under callgrind, which sees the functions by their names, and prints instructions.
+//! in µs. A second table has the same robots as models of their own, one after the other and shared by threads: the most that
+//! islands solved in parallel could gain. `islands.py` runs this under callgrind, which sees the functions by their names, and prints instructions.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Se3, WORLD, constrained_dynamics,
@@ -9,10 +10,11 @@ use condyle::{
 };
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-const ROBOTS: [usize; 5] = [1, 2, 4, 8, 16];
+const ROBOTS: [usize; 6] = [1, 2, 4, 8, 16, 32];
 
 /// The time for which each function is measured.
 const TIME: Duration = Duration::from_millis(500);
@@ -71,11 +73,11 @@ measured! {
 }
 
 /// The time of a call in µs: the least of many.
-fn time(algorithm: fn(&mut Herd), herd: &mut Herd) -> f64 {
+fn time(mut call: impl FnMut()) -> f64 {
     let (start, mut least) = (Instant::now(), f64::INFINITY);
     while start.elapsed() < TIME {
         let before = Instant::now();
-        algorithm(herd);
+        call();
         least = least.min(before.elapsed().as_secs_f64());
     }
     1e6 * least
@@ -91,7 +93,20 @@ fn main() {
     println!("| --- |{}", " --- |".repeat(ALGORITHMS.len()));
     for robots in ROBOTS {
         let herd = &mut Herd::new(robots);
-        let each = ALGORITHMS.map(|(_, algorithm)| format!("{:.2}", time(algorithm, herd) / robots as f64));
+        let each = ALGORITHMS.map(|(_, algorithm)| format!("{:.2}", time(|| algorithm(herd)) / robots as f64));
         println!("| {robots} | {} |", each.join(" | "));
+    }
+    for (name, algorithm) in &ALGORITHMS[..2] {
+        let threads = rayon::current_num_threads();
+        println!("\n| µs for each robot, {name} | one model | apart | apart, {threads} threads |");
+        println!("| --- | --- | --- | --- |");
+        for robots in ROBOTS {
+            let (herd, mut apart) = (&mut Herd::new(robots), (0..robots).map(|_| Herd::new(1)).collect::<Vec<_>>());
+            let together = time(|| algorithm(herd));
+            let alone = time(|| apart.iter_mut().for_each(algorithm));
+            let shared = time(|| apart.par_iter_mut().for_each(algorithm));
+            let [a, b, c] = [together, alone, shared].map(|t| t / robots as f64);
+            println!("| {robots} | {a:.2} | {b:.2} | {c:.2} |");
+        }
     }
 }

@@ -126,21 +126,23 @@ def test_mdbook(tmp_path: Path) -> None:
     assert "<math" in (tmp_path / "book" / "rnea.html").read_text(encoding="utf-8")
 
 
-# For each worked example: the block that defines the algorithm, the block of the example, and mistakes in the former,
-# each as (right, wrong).
+# For each worked example: the block that defines the algorithm (of the chapter or of rnea.md), that of the example,
+# and mistakes in the former, each as (right, wrong).
+RNEA = [
+    (" + cross(vel[i]) @ vJ", ""),
+    (" + cross_dual(vel[i]) @ I[i] @ vel[i]", ""),
+    ("f[i] = I[i] @ acc[i] + ", "f[i] = "),
+    ("up[i] @ acc[tree.parent[i]] + ", ""),
+    ("        f[tree.parent[i]] += up[i].T @ f[i]  # λX*_i = (iXλ)ᵀ\n", ""),
+    ("acc[0] = -tree.gravity", "acc[0] = tree.gravity"),
+]
 MISTAKES = {
     "rnea.md": (
         "def rnea(",
         "tau, vel, acc, alone, f = rnea(Tree(arm, q), v, a)\nper_link(vel",
-        [
-            (" + cross(vel[i]) @ vJ", ""),
-            (" + cross_dual(vel[i]) @ I[i] @ vel[i]", ""),
-            ("f[i] = I[i] @ acc[i] + ", "f[i] = "),
-            ("up[i] @ acc[tree.parent[i]] + ", ""),
-            ("        f[tree.parent[i]] += up[i].T @ f[i]  # λX*_i = (iXλ)ᵀ\n", ""),
-            ("acc[0] = -tree.gravity", "acc[0] = tree.gravity"),
-        ],
+        RNEA,
     ),
+    "rnea.md#three-links": ("def rnea(", "rnea(tree3, np.array([1.0, 2.0, -1.0]), rest)", RNEA),
     "crba.md": (
         "def composite(",
         "arm = planar_arm([1.0, 1.0], [3.0, 2.0])",
@@ -165,30 +167,66 @@ MISTAKES = {
             ("u[i] - U[i].T @ before", "u[i]"),
         ],
     ),
+    "exercises.md": ("def rnea(", "arm = planar_arm([0.5, 0.3], [2.0, 1.0])", RNEA),
+    "exercises.md#three-ways": (
+        "def by_energy(",
+        "slopes = [by_energy(",
+        [
+            ("m[k] * J.T @ J + ", ""),
+            (" + m[k] * L[k] ** 2 / 12 * np.outer(turned, turned)", ""),
+            ("        V += m[k] * g * sum(l * np.sin(t) for l, t in zip(lengths, angles))\n", ""),
+            ("[*L[:k], L[k] / 2]", "[*L[:k], L[k]]"),
+        ],
+    ),
+    "exercises.md#own-rnea": (
+        "def own_rnea(",
+        "(q, v, a, _), bodies = random_state(arm7)",
+        [
+            (" + np.cross(w[p], np.cross(w[p], r))", ""),
+            (" + np.cross(R[i].T @ w[p], e * v[i - 1])", ""),
+            (" + np.cross(w[i], inertia[i] @ w[i])", ""),
+            (" + np.cross(w[i], np.cross(w[i], com[i]))", ""),
+            (" + np.cross(place[i][:3, 3], up)", ""),
+        ],
+    ),
+    "complexity.md": (
+        "def uicker_kahn(",
+        "tau, count = uicker_kahn(",
+        [
+            (" * v[k - 1] * v[l - 1]", " * v[k - 1]"),
+            ("min(k, l), max(k, l)", "max(k, l), min(k, l)"),
+            ("np.trace(about) / 2 * np.eye(3) - about", "about"),
+            ("body.mass * g @ along", "0 * g @ along"),
+        ],
+    ),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("chapter", MISTAKES)
-def test_examples_detect_mistakes(chapter: str) -> None:
+@pytest.mark.parametrize("example", MISTAKES)
+def test_examples_detect_mistakes(example: str) -> None:
     """An example by hand fails if one term of its algorithm is dropped."""
-    definition, example, mistakes = MISTAKES[chapter]
+    chapter = example.partition("#")[0]
+    definition, begins, mistakes = MISTAKES[example]
     text = (ROOT / "docs" / chapter).read_text()
-    [defining] = [block.code for block in BOOK.blocks(text) if definition in block.code]
-    [shown] = [block for block in BOOK.blocks(text) if example in block.code]
+    pages = [text, *((ROOT / "docs" / page).read_text() for page in ("rnea.md",) if definition not in text)]
+    [defining] = [block.code for page in pages for block in BOOK.blocks(page) if definition in block.code]
+    [shown] = [block for block in BOOK.blocks(text) if begins in block.code]
     helpers = BOOK.run(chapter)
 
     def fails(code: str) -> bool:
         names, printed = dict(helpers), io.StringIO()
-        exec(code, names)
         try:
+            exec(code, names)
             with contextlib.redirect_stdout(printed), np.errstate(all="ignore"):
-                exec(shown.code, names)
+                exec(shown.code if shown.code != defining else "", names)
         except (AssertionError, np.linalg.LinAlgError):
             return True
-        return printed.getvalue() != shown.expected
+        return printed.getvalue() != (shown.expected or "")
 
-    helpers |= {"v": np.array([1.0, 2.0]), "tau": np.array([5.0, 3.0])}
+    if example == "rnea.md#three-links":
+        helpers |= {"q": np.array([0.0, np.pi / 4, -np.pi / 4])}
     if chapter == "aba.md":
+        helpers |= {"v": np.array([1.0, 2.0]), "tau": np.array([5.0, 3.0])}
         helpers["arm"] = helpers["planar_arm"]([1.0, 0.8], [2.0, 1.0])
     assert not fails(defining)
     for right, wrong in mistakes:

@@ -20,6 +20,8 @@ def test_there_are_examples() -> None:
 def test_example(path: Path, tmp_path: Path) -> None:
     if path.stem.startswith("casadi"):
         pytest.importorskip("casadi")
+    if path.stem == "wholebody_clarabel":
+        pytest.importorskip("clarabel")
     if path.stem == "pictures":
         pytest.importorskip("viser")
     if path.stem == "coming_from_crocoddyl":

@@ -509,3 +509,18 @@ fn the_text_is_the_same_every_time() {
     };
     assert_eq!(text(), text());
 }
+
+/// The rows of generated code in the table of the book's page on complexity.
+#[test]
+fn the_book_has_these_figures() {
+    let page = include_str!("../../../docs/complexity.md");
+    let rows = ["rnea", "nonlinear_effects", "crba", "aba", "minv"].map(|name| {
+        let counts = [robots::arm7(), robots::quadruped(), robots::humanoid()].map(|model| {
+            let found = functions(&model, &[name], &Settings::default()).expect("the library has this function");
+            found[0].operations().flops().to_string()
+        });
+        format!("| `{name}`, generated | {} |", counts.join(" | "))
+    });
+    let missing: Vec<&String> = rows.iter().filter(|row| !page.contains(&row[..])).collect();
+    assert!(missing.is_empty(), "docs/complexity.md: expected the rows {missing:#?}");
+}

@@ -1,15 +1,14 @@
 //! Divide and conquer gives the accelerations of the articulated-body algorithm, in O(log n) steps, whatever the threads.
 
 use crate::common;
+use crate::counted::{Counted, counted};
 
 use common::{State, Worst, all_models, lift, lift_forces, random_inertia, random_pose, rng, tree};
 use condyle_dynamics::{
-    BodyId, Data, DivideConquer, Inertia, Joint, JointOptions, Mat3, Mimic, Model, ModelBuilder, Scalar, Se3, Sym3,
-    Vec3, WORLD, aba, robots,
+    BodyId, Data, DivideConquer, Inertia, Joint, JointOptions, Mat3, Mimic, Model, ModelBuilder, Se3, Sym3, Vec3,
+    WORLD, aba, robots,
 };
-use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use num_dual::Dual64;
-use std::cell::Cell;
 
 /// Some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 in the robots and grows with the cube
 /// of a chain's length: 1e8 for 300 links. Of that, aba itself loses as much; the largest accelerations, to which the
@@ -255,99 +254,6 @@ fn levels() {
     }
 }
 
-thread_local! {
-    static OPERATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-/// A number that knows how many operations had to be done one after the other for it, and counts all of them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Counted {
-    value: f64,
-    steps: u32,
-}
-
-impl Counted {
-    fn after(value: f64, of: &[Self]) -> Self {
-        OPERATIONS.set(OPERATIONS.get() + 1);
-        Self { value, steps: 1 + of.iter().map(|x| x.steps).max().unwrap_or(0) }
-    }
-}
-
-macro_rules! operators {
-    ($($trait:ident $name:ident),*) => {$(
-        impl $trait for Counted {
-            type Output = Self;
-            fn $name(self, o: Self) -> Self {
-                Self::after(self.value.$name(o.value), &[self, o])
-            }
-        }
-    )*};
-}
-operators!(Add add, Sub sub, Mul mul, Div div);
-
-impl Neg for Counted {
-    type Output = Self;
-    fn neg(self) -> Self {
-        Self { value: -self.value, ..self }
-    }
-}
-impl AddAssign for Counted {
-    fn add_assign(&mut self, o: Self) {
-        *self = *self + o;
-    }
-}
-impl SubAssign for Counted {
-    fn sub_assign(&mut self, o: Self) {
-        *self = *self - o;
-    }
-}
-impl Scalar for Counted {
-    type Mask = bool;
-    const LANES: usize = 1;
-
-    fn splat(value: f64) -> Self {
-        Self { value, steps: 0 }
-    }
-    fn mul_add(self, b: Self, c: Self) -> Self {
-        Self::after(self.value * b.value + c.value, &[self, b, c])
-    }
-    fn recip(self) -> Self {
-        Self::after(self.value.recip(), &[self])
-    }
-    fn sqrt(self) -> Self {
-        Self::after(self.value.sqrt(), &[self])
-    }
-    fn sin_cos(self) -> (Self, Self) {
-        let (sin, cos) = self.value.sin_cos();
-        (Self::after(sin, &[self]), Self::after(cos, &[self]))
-    }
-    fn atan2(self, x: Self) -> Self {
-        Self::after(self.value.atan2(x.value), &[self, x])
-    }
-    fn abs(self) -> Self {
-        Self { value: self.value.abs(), ..self }
-    }
-    fn lt(self, o: Self) -> bool {
-        self.value < o.value
-    }
-    fn select(mask: bool, a: Self, b: Self) -> Self {
-        Self { value: if mask { a.value } else { b.value }, steps: a.steps.max(b.steps) }
-    }
-    fn and(a: bool, b: bool) -> bool {
-        a && b
-    }
-    fn or(a: bool, b: bool) -> bool {
-        a || b
-    }
-}
-
-/// Operations in all, and the longest row of operations that had to wait for one another.
-fn counted<'a>(f: impl FnOnce() -> &'a [Counted]) -> (u64, u32) {
-    let before = OPERATIONS.get();
-    let steps = f().iter().map(|x| x.steps).max().unwrap_or(0);
-    (OPERATIONS.get() - before, steps)
-}
-
 /// What was computed, not what was planned: each doubling of a chain adds the same number of steps, where the
 /// articulated-body algorithm doubles them, for a fixed multiple of its work.
 #[test]
@@ -363,6 +269,7 @@ fn steps_grow_with_the_logarithm() {
         let recursive = counted(|| aba(&model, &mut data, &q, &v, &tau, &[]));
         let mut divided = DivideConquer::new(&model, 1);
         let divided = pool.install(|| counted(|| divided.aba(&model, &q, &v, &tau, &[])));
+        let [recursive, divided] = [recursive, divided].map(|(work, steps)| (work.all(), steps));
         println!("{n:5} {:12} {:7} {:12} {:7}", recursive.0, recursive.1, divided.0, divided.1);
         rows.push((recursive, divided));
     }
