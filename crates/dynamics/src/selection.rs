@@ -31,8 +31,8 @@ pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
 /// are none. The sparse factor of an arm of seven takes five times the instructions.
 pub const SHORT_CHAIN: usize = 8;
 
-/// Whether M⁻¹ of a chain, which has no zeros, comes from M without a factor.
-pub fn inverse_by_gauss_jordan<R>(model: &Model<R>) -> bool {
+/// Whether a robot is a chain of few coordinates. Its M has no zeros, and M⁻¹ comes from M without a factor.
+pub fn is_short_chain<R>(model: &Model<R>) -> bool {
     let chain = model.columns().iter().enumerate().all(|(k, column)| column.depth == k);
     chain && !model.has_mimic() && model.nv() <= SHORT_CHAIN
 }

@@ -34,6 +34,8 @@ mod registers;
 mod runs;
 mod small_elimination;
 #[doc(hidden)]
+pub mod small_solve;
+#[doc(hidden)]
 pub mod sparsity;
 #[doc(hidden)]
 pub mod threads;

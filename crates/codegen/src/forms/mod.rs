@@ -10,7 +10,7 @@ mod crba;
 pub(crate) mod joint_placement;
 
 use branches::Branches;
-use condyle_dynamics::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
+use condyle_dynamics::selection::{SHORT_CHAIN, inverse_by_factor, is_short_chain};
 use condyle_dynamics::{Data, forward_kinematics, rnea, rnea_derivatives, subtract_armature_bias};
 use condyle_linalg::gauss_jordan::gauss_jordan;
 use condyle_linalg::tree_product::minus_products;
@@ -162,7 +162,7 @@ impl<S: Scalar> Inverse<S> {
         if !inverse_by_factor(model, factor.nonzeros()) {
             return None;
         }
-        if inverse_by_gauss_jordan(model) {
+        if is_short_chain(model) {
             gauss_jordan::<S, SHORT_CHAIN>(&M(), &mut Minv);
             return Some(Self { factor: None, Minv });
         }

@@ -1,15 +1,15 @@
 //! Forward dynamics: how a robot accelerates under the efforts that it is given.
 
-use super::inertia::crba;
-use super::inverse_dynamics::{check_arguments, rnea};
+use super::inertia::crba as inertia_matrix;
+use super::inverse_dynamics::{check_arguments, rnea as inverse_dynamics};
 use super::limbs::{Task, run as run_limbs};
 use crate::data::Data;
 use crate::lanes::limbs::pass::Arguments;
-use crate::passes::aba;
 use crate::passes::factored_dynamics::{ForwardDynamicsMethod, run_dense, run_sparse};
 use crate::passes::free_armature::without_bias;
-use crate::passes::kinematics::positions;
-use crate::selection;
+use crate::passes::kinematics::{positions, positions_after_rnea};
+use crate::passes::{aba, crba, rnea};
+use crate::selection::{self, is_short_chain};
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 
@@ -135,9 +135,16 @@ pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     method: ForwardDynamicsMethod,
 ) {
     let zero = core::mem::take(&mut data.forward_dynamics.zero);
-    rnea(model, data, q, v, &zero, f_ext); // h − Σ Jᵢᵀ f_ext,i
+    if method == ForwardDynamicsMethod::Dense && is_short_chain(model) {
+        // h and M of one set of sines and cosines: a chain has no limbs
+        rnea::run(model, &mut data.world, &mut data.rnea, q, v, &zero, f_ext);
+        positions_after_rnea(model, &mut data.world, q);
+        crba::run(model, &data.world, &mut data.crba);
+    } else {
+        inverse_dynamics(model, data, q, v, &zero, f_ext); // h − Σ Jᵢᵀ f_ext,i
+        inertia_matrix(model, data, q);
+    }
     data.forward_dynamics.zero = zero;
-    crba(model, data, q);
     let (d, h, M) = (&mut data.forward_dynamics, &data.rnea.tau, &data.crba.M);
     match method {
         ForwardDynamicsMethod::Dense => run_dense(d, h, M, tau),

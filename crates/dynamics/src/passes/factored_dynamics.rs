@@ -1,8 +1,10 @@
 //! Forward dynamics by the method that is fastest for the model.
 
+use crate::selection::SHORT_CHAIN;
 use crate::workspace::{filled, workspace};
 use condyle_linalg::Cholesky;
 use condyle_linalg::Ltdl;
+use condyle_linalg::small_solve::small_solve;
 use condyle_model::Model;
 use condyle_spatial::kernel;
 use condyle_spatial::{Array, Matrix, Scalar};
@@ -44,6 +46,9 @@ kernel! {
     pub(crate) fn run_dense<S>(d: &mut Workspace<S>, h: &[S], M: &Matrix<S>, tau: &[S]) {
         let Workspace { dense, qdd, .. } = d;
         subtract(tau, h, qdd);
+        if qdd.len() <= SHORT_CHAIN {
+            return small_solve::<S, SHORT_CHAIN>(M, qdd);
+        }
         dense.factorize(M);
         dense.solve(qdd); // M q̈ = τ − h
     }

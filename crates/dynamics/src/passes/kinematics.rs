@@ -37,9 +37,15 @@ pub(crate) enum PlacementCache {
 
 /// oXi = oXλ λXi, and the columns of S, for all bodies.
 #[inline(always)]
-pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
+pub(crate) fn place<L: Layout>(l: &L, world: &mut World<L::S>, q: &[L::S]) {
+    Joint::sin_cos(l, q, &mut world.sin_cos);
+    place_turned(l, world, q);
+}
+
+/// As [`place`], for joints whose sines and cosines are known.
+#[inline(always)]
+fn place_turned<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
     *placed = PlacementCache::Bodies(l.geometry_hash());
-    Joint::sin_cos(l, q, sin_cos);
     let (oX, S, sin, cos) = (&mut oX[..], &mut S[..], &sin_cos.sin[..], &sin_cos.cos[..]);
     for i in l.bodies() {
         let X = l.parent(oX, i) * Joint::placement_with(l, i, q, sin[i], cos[i]); // oXi = oXλ λXi
@@ -104,6 +110,13 @@ kernel! {
     /// Places all bodies.
     pub(crate) fn positions<S, R>(model: &Model<R>, world: &mut World<S>, q: &[S]) {
         place(&Single::new(model), world, q);
+    }
+}
+
+kernel! {
+    /// Places all bodies, whose joints' sines and cosines `rnea` has left.
+    pub(crate) fn positions_after_rnea<S, R>(model: &Model<R>, world: &mut World<S>, q: &[S]) {
+        place_turned(&Single::new(model), world, q);
     }
 }
 

@@ -8,7 +8,7 @@
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
-use crate::selection::{SHORT_CHAIN, inverse_by_factor, inverse_by_gauss_jordan};
+use crate::selection::{SHORT_CHAIN, inverse_by_factor, is_short_chain};
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
@@ -33,7 +33,7 @@ workspace! {
         /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
         pub by_factor: bool = inverse_by_factor(model, factor.nonzeros()),
         /// Whether M is inverted without a factor. Written by: `new`.
-        pub by_gauss_jordan: bool = inverse_by_gauss_jordan(model),
+        pub by_gauss_jordan: bool = is_short_chain(model),
     }
 }
 
