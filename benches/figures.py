@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Measures every timing figure of README and book, and writes it where it stands.
+"""Measures the timing figures of README and book, and writes them into the pages.
 
-    python3 benches/figures.py measure [PART ...] [--cpu K]   # into benches/figures.json; all parts take about an hour
-    python3 benches/figures.py write                          # from there into the pages
-    python3 benches/figures.py check                          # fails if a page and the JSON differ
+    python3 benches/figures.py measure [PART ...]   # into benches/figures.json; all parts take about an hour
+    python3 benches/figures.py write                # from the JSON into the pages
+    python3 benches/figures.py check                # fails if a page and the JSON differ
 
-A table of a page stands between `<!-- figures: NAME -->` and `<!-- end -->`, and is written whole. A figure in a sentence is
-given by the sentence, in QUOTES: the words stay, the figures are written.
+A table is written between `<!-- figures: NAME -->` and `<!-- end -->`. QUOTES lists each sentence that holds figures:
+its words stay as they are, its figures are replaced. Measuring needs an idle machine with two cores.
 """
 
 import argparse
@@ -24,20 +24,24 @@ ROOT = Path(__file__).resolve().parents[1]
 RESULTS = Path(__file__).with_suffix(".json")
 ROBOTS = ("panda", "anymal", "talos")
 CRITERION = ("factorisation", "divide_conquer")
-PARTS = ("dynamics", "dynamics_avx2", "fddp", "casadi", *CRITERION)
 COMMANDS = {
     "dynamics": "python3 benches/peers/dynamics.py --rounds 5 --cpu 1 panda anymal talos",
     "dynamics_avx2": "CONDYLE_LEVEL=avx2 python3 benches/peers/dynamics.py --rounds 5 --cpu 1 panda anymal talos",
     "fddp": ".venv/crocoddyl/bin/python benches/peers/ocp.py --cpu 1 --solver fddp reach trot walk humanoid",
-    "casadi": ".venv/pinocchio/bin/python benches/peers/casadi_functions.py",
+    "threads": ".venv/crocoddyl/bin/python benches/peers/ocp_threads.py",
+    "casadi": ".venv/pinocchio/bin/python benches/peers/casadi_comparison.py",
+    "generated": "CC=clang-19 .venv/pinocchio/bin/python benches/generated.py --cpu 1",
+    "slopes": ".venv/pinocchio/bin/python docs/pictures/slopes.py",
     "factorisation": "cargo bench --bench factorisation",
     "divide_conquer": "cargo bench --bench divide_conquer",
 }
-"""The command that measures each part."""
+"""Command that measures each part."""
+WITHOUT_OPTION = ("casadi", "slopes")
+"""Parts whose command prints one JSON object, without an option --json."""
 
 
 def measure(part: str) -> Any:
-    """Runs the command of a part; returns its records, or the medians of criterion (ns) by group and function."""
+    """Runs the command of a part. Returns its records, or criterion's medians (ns) by group and function."""
     command = COMMANDS[part]
     words = [word for word in command.split() if "=" not in word]
     environment = os.environ | dict(word.split("=") for word in command.split() if "=" in word)
@@ -48,18 +52,17 @@ def measure(part: str) -> Any:
         for found in sorted(target.glob("criterion/**/new/benchmark.json")):
             about = json.loads(found.read_text())
             estimates = json.loads(found.with_name("estimates.json").read_text())
-            group, function = about["group_id"], about["function_id"] or about["value_str"]
+            group, function = about["group_id"], "/".join(filter(None, (about["function_id"], about["value_str"])))
             medians.setdefault(group, {})[function] = round(estimates["median"]["point_estimate"], 1)
         return medians
-    output = subprocess.run(
-        [*words, "--json"], check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=environment
-    )
-    text = output.stdout.strip()
-    return json.loads(text) if text.startswith("[") else [json.loads(line) for line in text.splitlines()]
+    option = [] if part in WITHOUT_OPTION else ["--json"]
+    done = subprocess.run([*words, *option], check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=environment)
+    text = done.stdout.strip()
+    return json.loads(text) if option == [] or text.startswith("[") else [json.loads(row) for row in text.splitlines()]
 
 
 def machine() -> dict[str, str]:
-    """The processor and the day."""
+    """Returns the processor, its vector extension and the date."""
     lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     [name, *_] = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     [flags, *_] = [line for line in lines if line.startswith("flags")]
@@ -68,7 +71,7 @@ def machine() -> dict[str, str]:
 
 
 class Figures:
-    """The figures of the JSON, as pages ask for them."""
+    """Figures of the JSON, by the names that pages use."""
 
     def __init__(self, results: dict[str, Any]) -> None:
         self.results = results
@@ -97,7 +100,7 @@ ALGORITHMS = ("rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivative
 
 
 def dynamics_table(figures: Figures, mode: str) -> str:
-    """A table of ratios to Pinocchio, ours in brackets (µs)."""
+    """Returns a table of ratios to Pinocchio, with our time in brackets (µs)."""
     lines = [f"| {mode}: ratio (ours in µs) | " + " | ".join(ROBOTS) + " |", "| --- |" + " --- |" * len(ROBOTS)]
     names = list(dict.fromkeys(r["algorithm"] for r in figures.rows("dynamics") if r["mode"] == mode))
     for name in [name for name in names if mode == "a horizon" or name in ALGORITHMS]:
@@ -145,7 +148,7 @@ def us(ns: float) -> str:
 
 
 def ways_table(figures: Figures) -> str:
-    """Forward dynamics in three ways, and the factor alone."""
+    """Returns the table of forward dynamics by three methods, of the factor alone, and of the inverse of M."""
     groups = figures.medians("factorisation")
     names = [group.partition("/")[2] for group in groups if group.startswith("forward dynamics/")]
     order = ["arm7", "quadruped", "humanoid"]
@@ -166,6 +169,100 @@ def ways_table(figures: Figures) -> str:
     return "\n".join(lines)
 
 
+def generated_table(figures: Figures) -> str:
+    """Returns the table of generated C: ns of a call, ratios to the library's call and to Pinocchio's, and operations."""
+    rows = {(row["robot"], row["function"]): row for row in figures.rows("generated")}
+    lines = ["| ns (ratios) | panda | anymal | talos | operations |", "| --- | --- | --- | --- | --- |"]
+    for name in ALGORITHMS:
+        found = [rows[robot, name] for robot in ROBOTS]
+        cells = [
+            f"{row['ns']:.0f} ({row['ns'] / 1e3 / figures.us(name, row['robot']):.2f}; {row['ns'] / row['pinocchio_ns']:.2f})"
+            for row in found
+        ]
+        lines.append(f"| {name} | " + " | ".join([*cells, ", ".join(str(row["operations"]) for row in found)]) + " |")
+    return "\n".join(lines)
+
+
+def cppadcodegen_table(figures: Figures) -> str:
+    rows = {(row["robot"], row["function"]): row for row in figures.rows("generated")}
+    lines = ["| ratio to CppADCodeGen's | panda | anymal | talos |", "| --- | --- | --- | --- |"]
+    for name in ALGORITHMS:
+        ratios = [rows[robot, name]["ratio"] for robot in ROBOTS]
+        if None not in ratios:
+            lines.append(f"| {name} | " + " | ".join(f"{ratio:.2f}" for ratio in ratios) + " |")
+    return "\n".join(lines)
+
+
+def threads_table(figures: Figures) -> str:
+    """Returns the table of an iteration of FDDP on two threads, as a part of one thread's time."""
+    rows = {(row["name"], row["way"]): row for row in figures.rows("threads")}
+    lines = ["| time on two threads / on one | " + " | ".join(FDDP) + " |", "| --- |" + " --- |" * len(FDDP)]
+    kinds = [("whole", "2 threads", "total"), ("derivatives that the sweep waits for", "2 threads", "derivatives")]
+    kinds += [(phase, "2 threads", phase) for phase in ("sweep", "rollout")]
+    kinds += [("whole, sweep in two segments", "2 segments", "total")]
+    for title, way, phase in kinds:
+        cells = (f"{rows[name, way][phase]['ratio']:.2f}" for name in FDDP)
+        lines.append(f"| {title} | " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+def casadi_functions(figures: Figures) -> str:
+    lines = ["| µs | our call | ours in CasADi | CasADi expressions |", "| --- | --- | --- | --- |"]
+    for row in figures.results["casadi"]["records"]["functions"]:
+        own = f"{row['ours_us']:.2f}" if "ours_us" in row else "–"
+        cells = f"{own} | {row['casadi_with_ours_us']:.2f} | {row['casadi_expressions_us']:.2f}"
+        lines.append(f"| {row['robot']}, {row['function']}, {row['kind']} | {cells} |")
+    return "\n".join(lines)
+
+
+SOLVERS = {
+    "fddp": "FDDP",
+    "ipopt_with_ours": "IPOPT, our functions",
+    "ipopt_expressions": "IPOPT, CasADi expressions",
+}
+
+
+def casadi_motion(figures: Figures) -> str:
+    reach = figures.results["casadi"]["records"]["reach"]
+    lines = ["| | ms | iterations | cost |", "| --- | --- | --- | --- |"]
+    for name, title in SOLVERS.items():
+        way = reach[name]
+        lines.append(f"| {title} | {way['ms']:.2f} | {way['iterations']} | {way['cost']:.6f} |")
+    return "\n".join(lines)
+
+
+def slopes_table(figures: Figures) -> str:
+    found = figures.results["slopes"]["records"]
+    lines = ["| µs a state, n joints | " + " | ".join(map(str, found["sizes"])) + " | slope |"]
+    lines.append("| --- |" + " --- |" * (len(found["sizes"]) + 1))
+    for name, row in found["growth"].items():
+        lines.append(f"| {name} | " + " | ".join(f"{t:.2f}" for t in row["us"]) + f" | {row['slope']:.2f} |")
+    return "\n".join(lines)
+
+
+def spread_table(figures: Figures) -> str:
+    lines = ["| µs a call, from Python | mean | σ | median | 95 % |", "| --- | --- | --- | --- | --- |"]
+    for robot, methods in figures.results["slopes"]["records"]["forward_dynamics"].items():
+        for method, row in methods.items():
+            cells = " | ".join(f"{row[key]:.2f}" for key in ("mean", "sigma", "median", "p95"))
+            lines.append(f"| {robot}, {method} | {cells} |")
+    return "\n".join(lines)
+
+
+DIVIDED = ("chain of 100", "chain of 300", "chain of 1000", "star of 100", "star of 300", "star of 1000")
+
+
+def divided_table(figures: Figures) -> str:
+    """Returns the table of divide and conquer with two halves, each by recursion."""
+    groups = figures.medians("divide_conquer")
+    lines = ["| µs | `aba` | one thread | two threads |", "| --- | --- | --- | --- |"]
+    for name in DIVIDED:
+        found, half = groups[f"divide and conquer/{name}"], int(name.split()[-1]) // 2
+        times = (us(found[key]) for key in ("aba", f"grain {half}/1 threads", f"grain {half}/2 threads"))
+        lines.append(f"| {name} | " + " | ".join(times) + " |")
+    return "\n".join(lines)
+
+
 def machine_line(figures: Figures) -> str:
     at = figures.results["dynamics"]["machine"]
     return f"{at['processor']} ({at['vectors']}), one core, {at['date']}"
@@ -179,6 +276,14 @@ TABLES: dict[str, Callable[[Figures], str]] = {
     "avx2": avx2_table,
     "fddp": fddp_table,
     "three ways": ways_table,
+    "generated": generated_table,
+    "cppadcodegen": cppadcodegen_table,
+    "threads": threads_table,
+    "casadi functions": casadi_functions,
+    "casadi motion": casadi_motion,
+    "slopes": slopes_table,
+    "spread": spread_table,
+    "divide and conquer": divided_table,
 }
 
 
@@ -188,13 +293,126 @@ def spread(f: Figures, algorithm: str, mode: str) -> tuple[str, str]:
     return f"{min(ratios):.2f}", f"{max(ratios):.2f}"
 
 
-def sum_to_aba(f: Figures, robot: str, mode: str = "one call") -> float:
-    """(RNEA + CRBA) / ABA."""
-    return (f.us("rnea", robot, mode) + f.us("crba", robot, mode)) / f.us("aba", robot, mode)
+def share_of_sum(f: Figures, group: str) -> tuple[str, str]:
+    """Returns the least and the greatest time of the faster factor as a multiple of ABA's, over trees of 6 joints and more."""
+    ratios = [
+        min(ways["Dense"], ways["Sparse"]) / ways["ArticulatedBody"]
+        for name, ways in f.medians("factorisation").items()
+        if name.startswith(group)
+    ]
+    return f"{min(ratios):.1f}", f"{max(ratios):.1f}"
 
 
-# Sentences of pages: the page, the sentence with {} for each figure, and the figures.
+def times_of(f: Figures, name: str, slow: str, fast: str, group: str = "forward dynamics") -> str:
+    ways = f.medians("factorisation")[f"{group}/{name}"]
+    return f"{ways[slow] / ways[fast]:.1f}"
+
+
+def columns_to_crba(f: Figures, robot: str, n: int) -> str:
+    """Returns the time of n calls of RNEA as a multiple of one call of CRBA."""
+    return f"{n * f.us('rnea', robot) / f.us('crba', robot):.0f}"
+
+
+def differences(f: Figures, calls: int) -> str:
+    """Returns the time of so many differences of RNEA as a multiple of its derivatives, on TALOS."""
+    return f"{calls * f.us('rnea', 'talos') / f.us('rnea_derivatives', 'talos'):.0f}"
+
+
+def generated_gain(f: Figures, names: tuple[str, ...]) -> list[str]:
+    """Returns the least and the greatest time of the library's call as a multiple of generated code's."""
+    gains = [
+        f.us(row["function"], row["robot"]) * 1e3 / row["ns"] for row in f.rows("generated") if row["function"] in names
+    ]
+    return [f"{min(gains):.1f}", f"{max(gains):.1f}"]
+
+
+def fddp_spread(f: Figures) -> list[str]:
+    ratios = [row["time"]["total"]["ratio"] for row in f.rows("fddp") if "time" in row]
+    return [f"{min(ratios):.2f}", f"{max(ratios):.2f}"]
+
+
+def all_ratios(f: Figures, mode: str) -> list[str]:
+    """Returns the least and the greatest ratio to Pinocchio over algorithms and robots."""
+    ratios = [f.ratio(name, robot, mode) for name in ALGORITHMS for robot in ROBOTS]
+    return [f"{min(ratios):.2f}", f"{max(ratios):.2f}"]
+
+
 QUOTES: list[tuple[str, str, Callable[[Figures], list[str]]]] = [
+    (
+        "README.md",
+        "One call takes {} to {} of Pinocchio's time, a state in a batch {} to {}.",
+        lambda f: [*all_ratios(f, "one call"), *all_ratios(f, "per state of a batch")],
+    ),
+    ("README.md", "An iteration of FDDP takes {} to {} of Crocoddyl's.", fddp_spread),
+    (
+        "DESIGN.md",
+        "On trees of 6 joints and more, the faster factor takes {} to {} times the time of ABA.",
+        lambda f: [*share_of_sum(f, "forward dynamics/")],
+    ),
+    (
+        "docs/choosing.md",
+        "the faster factor takes {} times ABA's time on an arm of 7, {} times on a humanoid",
+        lambda f: [
+            times_of(f, "arm7", "Dense", "ArticulatedBody"),
+            times_of(f, "humanoid", "Sparse", "ArticulatedBody"),
+        ],
+    ),
+    (
+        "docs/choosing.md",
+        "{} times on an arm of 7, {} times on a humanoid of 38",
+        lambda f: [columns_to_crba(f, "panda", 7), columns_to_crba(f, "talos", 38)],
+    ),
+    (
+        "docs/choosing.md",
+        "$n$ calls of `rnea` take {} times the time on an arm of 7, {} times on a humanoid of 38",
+        lambda f: [columns_to_crba(f, "panda", 7), columns_to_crba(f, "talos", 38)],
+    ),
+    (
+        "docs/choosing.md",
+        "{} µs for a single call, {} µs in a batch",
+        lambda f: [f"{f.us('rnea', 'talos'):.2f}", f"{f.us('rnea', 'talos', 'per state of a batch'):.2f}"],
+    ),
+    (
+        "docs/choosing.md",
+        "{} times (one-sided) or {} times (central) on a humanoid of 38",
+        lambda f: [differences(f, 76), differences(f, 152)],
+    ),
+    (
+        "docs/choosing.md",
+        "{} to {} times for RNEA, {} to {} times for derivatives, against the library's single call",
+        lambda f: [*generated_gain(f, ("rnea",)), *generated_gain(f, ("rnea_derivatives", "aba_derivatives"))],
+    ),
+    (
+        "docs/choosing.md",
+        "the sparse factor takes {} times the dense one's time on an arm of 7, {} on a humanoid",
+        lambda f: [
+            times_of(f, "arm7", "Sparse", "Dense", "factorise"),
+            times_of(f, "humanoid", "Sparse", "Dense", "factorise"),
+        ],
+    ),
+    (
+        "docs/sparsity.md",
+        "forward dynamics by the faster factor takes {} to {} times as long as ABA",
+        lambda f: [*share_of_sum(f, "forward dynamics/")],
+    ),
+    (
+        "docs/sparsity.md",
+        "the sparse factor takes {} times as long as a dense Cholesky on an arm of 7, and {} on a humanoid of 38",
+        lambda f: [
+            times_of(f, "arm7", "Sparse", "Dense", "factorise"),
+            times_of(f, "humanoid", "Sparse", "Dense", "factorise"),
+        ],
+    ),
+    (
+        "docs/sparsity.md",
+        "On a star of 200 joints the dense method takes {} times as long as the sparse one",
+        lambda f: [times_of(f, "star of 200", "Dense", "Sparse")],
+    ),
+    (
+        "docs/exercises.md",
+        "On trees of 6 joints and more, the faster factor takes {} to {} times as long as ABA",
+        lambda f: [*share_of_sum(f, "forward dynamics/")],
+    ),
     (
         "docs/derivatives.md",
         "RNEA takes {} µs, its derivatives by hand {} µs. That is {} times RNEA",
@@ -224,7 +442,7 @@ QUOTES: list[tuple[str, str, Callable[[Figures], list[str]]]] = [
         lambda f: [
             f"{f.us('rnea', 'panda'):.2f}",
             f"{f.us('crba', 'panda'):.2f}",
-            f"{7 * f.us('rnea', 'panda') / f.us('crba', 'panda'):.0f}",
+            columns_to_crba(f, "panda", 7),
         ],
     ),
     (
@@ -233,6 +451,7 @@ QUOTES: list[tuple[str, str, Callable[[Figures], list[str]]]] = [
         lambda f: [*spread(f, "rnea", "per state of a batch"), *spread(f, "rnea", "one call")],
     ),
 ]
+"""Sentences of pages: the page, the sentence with {} for each figure, and the figures."""
 
 
 def filled(path: Path, text: str, figures: Figures) -> str:
@@ -266,11 +485,11 @@ def pages() -> list[Path]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("action", choices=("measure", "write", "check"))
-    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
+    parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(COMMANDS))
     wanted = parser.parse_args()
     results = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
     if wanted.action == "measure":
-        for part in wanted.parts or PARTS:
+        for part in wanted.parts or COMMANDS:
             results[part] = {"command": COMMANDS[part], "machine": machine(), "records": measure(part)}
             RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n")
         return

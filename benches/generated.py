@@ -1,18 +1,19 @@
 #!/usr/bin/env python3
 """Times generated C beside Pinocchio, compiled for the same processor, and beside our pass on plain f64.
 
-    python benches/generated.py [--rounds N] [--cpu K] [ROBOT ...]
+    python benches/generated.py [--json] [--rounds N] [--cpu K] [ROBOT ...]
 
 Generated code is compiled by CC, else clang, else gcc, and called with 64 states in turn, as is Pinocchio, which
 benches/peers/dynamics.py builds (some ten minutes the first time). Pinocchio's own generated code is what CppADCodeGen
 makes of its recursions (benches/peers/cppadcg.cpp, some ten minutes more), compiled by the same compiler with the same
 options. One program calls it and ours in turn: their ratio is the median over the rounds. A time is the shortest, as
 the rest is what else the machine does. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`:
-limbs one after the other, and side by side; then batches beside vectors of eight states. Needs Linux, Rust, compilers
-of C and C++, and the package condyle.
+limbs one after the other, and side by side; then batches beside vectors of eight states. --json prints a record a line
+instead of tables, without our passes. Needs Linux, Rust, compilers of C and C++, and the package condyle.
 """
 
 import argparse
+import json
 import os
 import shutil
 import statistics
@@ -139,6 +140,7 @@ def beside(ours: "dict[str, float | None]") -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("robots", nargs="*", default=["panda", "anymal", "talos"], metavar="ROBOT")
+    parser.add_argument("--json", action="store_true", help="print a record a line")
     parser.add_argument("--rounds", type=int, default=11)
     parser.add_argument("--cpu", type=int, default=0)
     options = parser.parse_args()
@@ -146,11 +148,12 @@ def main() -> None:
     python = dynamics.environment("venv", "pin==4.1.0", "example-robot-data-loaders==5.0.0")
     theirs = dynamics.build_pinocchio(python)
     cppadcg = dynamics.build_pinocchio(python, "cppadcg", "-O1", "cmeel-cppad==20250000.2", "cmeel-cppadcodegen==2.4.3")
-    print(f"{compiler()} {' '.join(FLAGS)}, {options.rounds} rounds\n")
-    print(
-        "| robot | function | operations | ours ns | Pinocchio ns | ratio | CppADCodeGen ns | ratio | KB | compiled s |"
-    )
-    print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
+    if not options.json:
+        print(f"{compiler()} {' '.join(FLAGS)}, {options.rounds} rounds\n")
+        print(
+            "| robot | function | operations | ours ns | Pinocchio ns | ratio | CppADCodeGen ns | ratio | KB | compiled s |"
+        )
+        print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     files = []
     for robot in options.robots:
         source, locked = dynamics.ROBOTS[robot]
@@ -166,6 +169,10 @@ def main() -> None:
         recorded = record_theirs(cppadcg, paths[0], paths[2])
         for function in FUNCTIONS:
             ours = measured(model, function, paths[2], options.rounds, options.cpu, recorded)
+            if options.json:
+                row = {"robot": robot, "function": function, **ours, "pinocchio_ns": peer[function]}
+                print(json.dumps(row), flush=True)
+                continue
             print(
                 f"| {robot} | {function} | {ours['operations']} | {ours['ns']:.0f} | {peer[function]:.0f} | "
                 f"{ours['ns'] / peer[function]:.2f} | {beside(ours)} | "
@@ -173,6 +180,8 @@ def main() -> None:
                 flush=True,
             )
         files.append(path + ("" if root == "fixed" else ":free"))
+    if options.json:
+        return
     environment = os.environ | {"CC": compiler(), "CFLAGS": " ".join(FLAGS)}
     command = ["cargo", "bench", "--locked", "-p", "condyle-codegen", "--bench", "generated", "--", *files]
     subprocess.run(command, cwd=dynamics.ROOT, check=True, env=environment)

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times an iteration of FDDP on one thread and on several.
 
-    .venv/crocoddyl/bin/python benches/peers/ocp_threads.py [--threads 2] [--rounds 15] [NAME ...]
+    .venv/crocoddyl/bin/python benches/peers/ocp_threads.py [--json] [--threads 2] [--rounds 15] [NAME ...]
 
 Three ways, in turn, round after round, on the problems of `ocp_problems.py`: one thread; several, with the sweep
 beside the derivatives; and with the sweep in as many segments. Figures are medians over the rounds of milliseconds in
@@ -10,6 +10,7 @@ way's own iterations are counted. Needs as many cores as threads.
 """
 
 import argparse
+import json
 import statistics
 
 import numpy as np
@@ -38,11 +39,13 @@ def solver(spec, robot, settings):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true", help="print a record a line")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--rounds", type=int, default=15)
     parser.add_argument("names", nargs="*", default=["reach", "trot", "walk", "humanoid"])
     options = parser.parse_args()
-    print("ms in an iteration (of one thread's)")
+    if not options.json:
+        print("ms in an iteration (of one thread's)")
     for name in options.names:
         spec, robot = PROBLEMS[name]()
         named = list(ways(options.threads))
@@ -56,11 +59,15 @@ def main():
                 row.append({phase: 1e3 * solved.phases[phase] / len(solved.rows) for phase in PHASES})
             times.append(row)
         for i, (way, _) in enumerate(named):
-            figures = []
+            figures, record = [], {"name": name, "way": way}
             for phase in PHASES:
                 ms = statistics.median(row[i][phase] for row in times)
                 share = statistics.median(row[i][phase] / row[0][phase] for row in times)
                 figures.append(f"{phase} {ms:.3f} ({share:.2f})")
+                record[phase] = {"ms": ms, "ratio": share}
+            if options.json:
+                print(json.dumps(record), flush=True)
+                continue
             print(f"{name:9} {way:20} {'  '.join(figures)}", flush=True)
 
 

@@ -49,12 +49,11 @@ pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
     is::<S, Fused>() && !model.has_mimic() && model.support_len() > LONG_SUPPORT * model.columns().len()
 }
 
-/// The method of forward dynamics.
+/// Returns the fastest method of forward dynamics: ABA, unless joints share a coordinate, for which ABA's recursion does not close.
 ///
-/// Measured by `benches/factorisation.rs` on chains, binary trees and stars of 6 to 200 joints and on the embedded robots: h
-/// and M alone cost as much as the whole recursion on the smallest and 1.1 to 3 times as much on the others, so no factor of
-/// M can win, however sparse. Where joints share a coordinate the recursion does not close. Of the factors, the sparse one
-/// is as fast as the dense one on chains, and on a star of 200 it makes forward dynamics 13 times faster.
+/// Measured by `benches/factorisation.rs` on the embedded robots, and on chains, binary trees and stars of 6 to 200 joints. A factor
+/// of M never wins: h and M together take nearly as long as ABA on an arm of 7 and up to 3 times as long on the others.
+/// `docs/performance.md` has the table.
 pub(crate) fn forward_dynamics<R>(model: &Model<R>) -> ForwardDynamicsMethod {
     if model.has_mimic() { ForwardDynamicsMethod::Sparse } else { ForwardDynamicsMethod::ArticulatedBody }
 }
