@@ -170,14 +170,14 @@ def ways_table(figures: Figures) -> str:
 
 
 def generated_table(figures: Figures) -> str:
-    """Returns the table of generated C: ns of a call, ratios to the library's call and to Pinocchio's, and operations."""
+    """Returns the table of generated C: ns of a call, its ratios to our call and to Pinocchio's, and operations."""
     rows = {(row["robot"], row["function"]): row for row in figures.rows("generated")}
     lines = ["| ns (ratios) | panda | anymal | talos | operations |", "| --- | --- | --- | --- | --- |"]
     for name in ALGORITHMS:
         found = [rows[robot, name] for robot in ROBOTS]
         cells = [
-            f"{row['ns']:.0f} ({row['ns'] / 1e3 / figures.us(name, row['robot']):.2f}; {row['ns'] / row['pinocchio_ns']:.2f})"
-            for row in found
+            f"{ns:.0f} ({ns / 1e3 / figures.us(name, row['robot']):.2f}; {ns / row['pinocchio_ns']:.2f})"
+            for row, ns in ((row, row["ns"]) for row in found)
         ]
         lines.append(f"| {name} | " + " | ".join([*cells, ", ".join(str(row["operations"]) for row in found)]) + " |")
     return "\n".join(lines)
