@@ -294,7 +294,7 @@ def spread(f: Figures, algorithm: str, mode: str) -> tuple[str, str]:
 
 
 def share_of_sum(f: Figures, group: str) -> tuple[str, str]:
-    """Returns the least and the greatest time of the faster factor as a multiple of ABA's, over trees of 6 joints and more."""
+    """Returns the least and the greatest time of the faster factor, as a multiple of ABA's."""
     ratios = [
         min(ways["Dense"], ways["Sparse"]) / ways["ArticulatedBody"]
         for name, ways in f.medians("factorisation").items()
