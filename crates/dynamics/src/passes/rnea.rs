@@ -1,9 +1,10 @@
 //! Inverse dynamics by the recursive Newton–Euler algorithm.
 //!
 //! Source: Luh, Walker, Paul, *On-line computational scheme for mechanical manipulators* (1980); in the bodies' own
-//! frames. It is Featherstone's (*Rigid Body Dynamics Algorithms*, 2008, table 5.1) with the classical acceleration of each
-//! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
-//! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it. Line by line:
+//! frames. Compared with Featherstone (*Rigid Body Dynamics Algorithms*, 2008, table 5.1), it uses the classical
+//! acceleration of each origin instead of the spatial one. So no linear velocity is needed. A point r of a body has
+//! acceleration a + K r with K = ω̇× + ω× ω×; this holds for the centre of mass and for the joints on the body. Line by
+//! line:
 //!
 //! | the book | here |
 //! | --- | --- |
@@ -15,8 +16,9 @@
 //! | τ_i = S_iᵀ f_i | `project`, when the pass has left the subtree of body i |
 //! | f_λ += λX*_i f_i | `add_to_parent_on_stack` |
 //!
-//! The two loops of the book are one here: a body's subtree is finished when the pass has gone down to its last body, and
-//! its force then goes to the parent. The test `the_book_gives_the_same` runs the book's form beside it.
+//! The two loops of the book are merged into one. When the pass has visited the last body of a subtree, it adds the
+//! force of the subtree's root to the parent. The test `the_book_gives_the_same` compares this pass with the book's
+//! form.
 
 use crate::passes::free_armature::add_armature_bias;
 use crate::passes::kinematics::{PlacementCache, World};
@@ -33,20 +35,20 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// λXi. Written by: `pass`.
         pub X: Array<Se3<S>> = filled(Se3::identity, size.levels),
-        /// The rotation of the body and the acceleration of its origin, with gravity as the world's. Written by:
-        /// `pass`.
+        /// Angular velocity and acceleration of the body, and acceleration of its origin, with gravity as the world's
+        /// acceleration. Written by: `pass`.
         pub motion: Array<ClassicalMotion<S>> =
             filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.levels),
         /// Force through the joint. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.levels),
         /// Joint efforts. Written by: `pass`.
         pub tau: Array<S> = filled(S::zero, size.nv),
-        /// Zeros, for the accelerations and velocities that are not given. Written by: nobody.
+        /// Zeros, used as accelerations or velocities that are not given. Never overwritten.
         pub zero: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// The whole algorithm, down and up each branch in turn.
+/// Runs the whole algorithm, going down and up each branch in turn.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
     l: &L,
@@ -94,7 +96,7 @@ pub(crate) fn pass<L: Layout>(
 }
 
 kernel! {
-    /// Body by body.
+    /// Runs the algorithm body by body.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &mut World<S>,
