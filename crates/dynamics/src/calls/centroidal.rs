@@ -69,7 +69,7 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
 /// Computes all terms of the equations of motion in two passes, in O(n · depth): M, h, Ag, dAg, hg, centre of mass,
 /// energies, and the Jacobians of all frames.
 ///
-/// q: nq numbers; v: nv. Up to rounding, the results equal those of the separate calls [`crba`](crate::crba),
+/// q: nq numbers; v: nv. Up to rounding, the results equal the results of the separate calls [`crba`](crate::crba),
 /// [`nonlinear_effects`](crate::nonlinear_effects), [`centroidal_map_rate`](crate::centroidal_map_rate) and
 /// [`forward_velocities`](crate::forward_velocities). Allocates nothing. Source: Featherstone, *Rigid Body Dynamics
 /// Algorithms* (2008), tables 5.1 and 6.2; Wensing and Orin (2016).
