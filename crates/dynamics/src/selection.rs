@@ -27,8 +27,8 @@ pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
     model.has_mimic() || nonzeros <= SHORT_ROWS * model.nv()
 }
 
-/// Largest nv for which a chain's M is inverted by Gauss–Jordan: a column then fits in registers and loops unroll. For a
-/// 7-joint arm the sparse factor takes five times the instructions.
+/// Largest nv for which a chain's M is inverted by Gauss–Jordan: a column then fits in registers and loops unroll. For
+/// a 7-joint arm the sparse factor takes five times the instructions.
 pub const SHORT_CHAIN: usize = 8;
 
 /// Returns whether M⁻¹ is computed from M without a factor, as for short chains, whose M has no zeros.
@@ -52,11 +52,11 @@ pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
 
 /// Returns the method of forward dynamics for a model.
 ///
-/// Measured by `benches/factorisation.rs` on chains, binary trees and stars of 6 to 200 joints and on the embedded robots.
-/// Computing only h and M costs as much as the whole recursion on the smallest robots, and 1.1 to 3 times as much on the
-/// others. So no factor of M can be faster, however sparse. If joints share a coordinate, the recursion is not applicable.
-/// Among the factors, the sparse one is as fast as the dense one on chains. On a star of 200 joints it makes forward
-/// dynamics 13 times faster.
+/// Measured by `benches/factorisation.rs` on chains, binary trees and stars of 6 to 200 joints and on the embedded
+/// robots. Computing only h and M costs as much as the whole recursion on the smallest robots, and 1.1 to 3 times as
+/// much on the others. So no factor of M can be faster, however sparse. If joints share a coordinate, the recursion is
+/// not applicable. Among the factors, the sparse one is as fast as the dense one on chains. On a star of 200 joints it
+/// makes forward dynamics 13 times faster.
 pub(crate) fn forward_dynamics<R>(model: &Model<R>) -> ForwardDynamicsMethod {
     if model.has_mimic() { ForwardDynamicsMethod::Sparse } else { ForwardDynamicsMethod::ArticulatedBody }
 }

@@ -11,8 +11,8 @@ use condyle_spatial::{Array, Matrix, Scalar, matrix};
 /// Marker with which this crate may name vector types.
 pub(crate) struct Gate;
 
-// SAFETY: vectors are created and used only in kernels that are entered through their entry functions, and in functions
-// that choose the vectors of the current SIMD level.
+// SAFETY: vectors are created and used in two places only: in kernels, which are entered through their entry functions,
+// and in functions that choose the vectors of the current SIMD level.
 #[allow(unsafe_code)]
 unsafe impl Witness for Gate {}
 

@@ -73,7 +73,8 @@ batched! {
     /// As [`rnea`](Self::rnea).
     fn com_velocity(model, data; q, v) -> &[T] [[3]] { forward_velocities(model, data, q, v).com_velocity() }
 
-    /// Computes [`Accelerations::com_acceleration`](crate::Accelerations::com_acceleration) for each state: c̈, three numbers.
+    /// Computes [`Accelerations::com_acceleration`](crate::Accelerations::com_acceleration) for each state: c̈, three
+    /// numbers.
     ///
     /// q: nq numbers per state; v, a: nv.
     ///
@@ -110,7 +111,8 @@ batched! {
         centroidal_map_rate(model, data, q, v)
     }
 
-    /// Computes [`Velocities::centroidal_momentum`](crate::Velocities::centroidal_momentum) for each state: hg, six numbers.
+    /// Computes [`Velocities::centroidal_momentum`](crate::Velocities::centroidal_momentum) for each state: hg, six
+    /// numbers.
     ///
     /// q: nq numbers per state; v: nv.
     ///

@@ -160,7 +160,8 @@ batched! {
         coriolis_derivatives(model, data, q, v)
     }
 
-    /// Computes [`passive_torque_derivatives`](crate::passive_torque_derivatives()) for each state: two matrices nv × nv.
+    /// Computes [`passive_torque_derivatives`](crate::passive_torque_derivatives()) for each state: two matrices nv ×
+    /// nv.
     ///
     /// q: nq numbers per state; v: nv; smoothing: ε > 0.
     ///
@@ -227,7 +228,8 @@ batched! {
         });
     }
 
-    /// Computes [`RneaDerivatives::with_respect_to`](crate::RneaDerivatives::with_respect_to) for each state: nv × [`Input::len`].
+    /// Computes [`RneaDerivatives::with_respect_to`](crate::RneaDerivatives::with_respect_to) for each state: nv ×
+    /// [`Input::len`].
     ///
     /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
@@ -241,7 +243,8 @@ batched! {
         to.columns(out, columns);
     }
 
-    /// Computes [`AbaDerivatives::with_respect_to`](crate::AbaDerivatives::with_respect_to) for each state: nv × [`Input::len`].
+    /// Computes [`AbaDerivatives::with_respect_to`](crate::AbaDerivatives::with_respect_to) for each state: nv ×
+    /// [`Input::len`].
     ///
     /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
     ///

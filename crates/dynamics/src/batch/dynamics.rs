@@ -108,7 +108,8 @@ batched! {
         joint_torque_regressor(model, data, q, v, a)
     }
 
-    /// Computes [`kinetic_energy_regressor`](crate::kinetic_energy_regressor) for each state: y, 10 (bodies − 1) numbers.
+    /// Computes [`kinetic_energy_regressor`](crate::kinetic_energy_regressor) for each state: y, 10 (bodies − 1)
+    /// numbers.
     ///
     /// q: nq numbers per state; v: nv.
     ///
@@ -118,7 +119,8 @@ batched! {
         kinetic_energy_regressor(model, data, q, v)
     }
 
-    /// Computes [`potential_energy_regressor`](crate::potential_energy_regressor) for each state: y, 10 (bodies − 1) numbers.
+    /// Computes [`potential_energy_regressor`](crate::potential_energy_regressor) for each state: y, 10 (bodies − 1)
+    /// numbers.
     ///
     /// q: nq numbers per state.
     ///

@@ -101,7 +101,8 @@ batched! {
         forward_velocities(model, data, q, v).body_velocity(body, reference)
     }
 
-    /// Computes [`Accelerations::frame_acceleration`](crate::Accelerations::frame_acceleration) for each state: a, six numbers.
+    /// Computes [`Accelerations::frame_acceleration`](crate::Accelerations::frame_acceleration) for each state: a, six
+    /// numbers.
     ///
     /// q: nq numbers per state; v, a: nv.
     ///
@@ -111,7 +112,8 @@ batched! {
         forward_accelerations(model, data, q, v, a).frame_acceleration(frame, reference)
     }
 
-    /// Computes [`Accelerations::body_acceleration`](crate::Accelerations::body_acceleration) for each state: a, six numbers.
+    /// Computes [`Accelerations::body_acceleration`](crate::Accelerations::body_acceleration) for each state: a, six
+    /// numbers.
     ///
     /// q: nq numbers per state; v, a: nv.
     ///
@@ -121,7 +123,8 @@ batched! {
         forward_accelerations(model, data, q, v, a).body_acceleration(body, reference)
     }
 
-    /// Computes [`Accelerations::frame_classical_acceleration`](crate::Accelerations::frame_classical_acceleration) for each state: v̇ + ω × v, ω̇, six numbers.
+    /// Computes [`Accelerations::frame_classical_acceleration`](crate::Accelerations::frame_classical_acceleration) for
+    /// each state: v̇ + ω × v, ω̇, six numbers.
     ///
     /// q: nq numbers per state; v, a: nv.
     ///
@@ -131,7 +134,8 @@ batched! {
         forward_accelerations(model, data, q, v, a).frame_classical_acceleration(frame, reference)
     }
 
-    /// Computes [`Accelerations::body_classical_acceleration`](crate::Accelerations::body_classical_acceleration) for each state: v̇ + ω × v, ω̇, six numbers.
+    /// Computes [`Accelerations::body_classical_acceleration`](crate::Accelerations::body_classical_acceleration) for
+    /// each state: v̇ + ω × v, ω̇, six numbers.
     ///
     /// q: nq numbers per state; v, a: nv.
     ///
@@ -141,7 +145,8 @@ batched! {
         forward_accelerations(model, data, q, v, a).body_classical_acceleration(body, reference)
     }
 
-    /// Computes [`Velocities::frame_jacobian_rate`](crate::Velocities::frame_jacobian_rate) for each state: dJ/dt, 6 × nv.
+    /// Computes [`Velocities::frame_jacobian_rate`](crate::Velocities::frame_jacobian_rate) for each state: dJ/dt, 6 ×
+    /// nv.
     ///
     /// q: nq numbers per state; v: nv.
     ///
@@ -153,7 +158,8 @@ batched! {
         &six[0]
     }
 
-    /// Computes [`Velocities::body_jacobian_rate`](crate::Velocities::body_jacobian_rate) for each state: dJ/dt, 6 × nv.
+    /// Computes [`Velocities::body_jacobian_rate`](crate::Velocities::body_jacobian_rate) for each state: dJ/dt, 6 ×
+    /// nv.
     ///
     /// q: nq numbers per state; v: nv.
     ///
@@ -165,7 +171,8 @@ batched! {
         &six[0]
     }
 
-    /// Computes [`Velocities::frame_velocity_derivative`](crate::Velocities::frame_velocity_derivative) for each state: ∂v/∂q, 6 × nv.
+    /// Computes [`Velocities::frame_velocity_derivative`](crate::Velocities::frame_velocity_derivative) for each state:
+    /// ∂v/∂q, 6 × nv.
     ///
     /// q: nq numbers per state; v: nv.
     ///
@@ -177,7 +184,8 @@ batched! {
         &six[0]
     }
 
-    /// Computes [`Velocities::body_velocity_derivative`](crate::Velocities::body_velocity_derivative) for each state: ∂v/∂q, 6 × nv.
+    /// Computes [`Velocities::body_velocity_derivative`](crate::Velocities::body_velocity_derivative) for each state:
+    /// ∂v/∂q, 6 × nv.
     ///
     /// q: nq numbers per state; v: nv.
     ///

@@ -228,7 +228,7 @@ impl<T: Real> Batch<T> {
         self.last = last;
         let mut to: [&mut [T]; MOST_RESULTS] = Default::default();
         if states == 0 {
-            return; // nothing to be written
+            return; // no results to write
         }
         if let Some(places) = written {
             self.last.check(places);

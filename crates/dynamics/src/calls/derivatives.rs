@@ -257,7 +257,7 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Da
     if data.minv.by_factor {
         minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
     } else {
-        minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // those of `aba`
+        minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // the factors of `aba`
     }
     if data.aba_derivatives.solve.pays() {
         let dtau = [data.rnea_derivatives.dtau_dq.as_slice(), data.rnea_derivatives.dtau_dv.as_slice()];

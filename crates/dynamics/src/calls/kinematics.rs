@@ -26,8 +26,8 @@ impl<S: Scalar> Data<S> {
     /// ```
     ///
     /// # Panics
-    /// If this data was made for a model of another tree, or the last call was for a model with different joint or
-    /// frame placements.
+    /// If this data was made for a model of another tree, or the last call used a model with other placements of joints
+    /// or frames.
     #[track_caller]
     pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
         self.check(model);

@@ -133,8 +133,8 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     });
 }
 
-/// Computes [`rnea_hessian`] for each unit vector in turn, and calls `give` with its index and the matrices. lambda is scratch,
-/// overwritten.
+/// Computes [`rnea_hessian`] for each unit vector in turn, and calls `give` with its index and the matrices. lambda is
+/// scratch, overwritten.
 #[track_caller]
 pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,

@@ -22,14 +22,14 @@ pub(crate) struct Link {
 /// Rows of one constraint.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
-    /// Paths towards the root, without the root: the body of the first frame to the junction, the body of the other
-    /// frame to the junction, and the junction to the root.
+    /// Paths towards the root, without the root: from the first frame's body to the junction, from the other frame's
+    /// body to the junction, and from the junction on.
     pub ways: [Vec<Link>; 3],
     /// Number of values that each of its slots has in Y, and the index of the first value of slot 0.
     pub wide: usize,
     pub start: usize,
-    /// Constraints up to and including this one that share slots beyond the root with it, and the runs of these slots,
-    /// as in its plan.
+    /// Constraints, up to and including this one, that share slots beyond the root's slots with it. Each has the runs
+    /// of these slots, as in the plan.
     pub beside: Vec<(usize, Vec<[usize; 3]>)>,
     /// Unit forces of its rows on the bodies of both frames, in the world's frame. Written by: `begin`.
     pub forces: [[[f64; WIDE]; 6]; 2],

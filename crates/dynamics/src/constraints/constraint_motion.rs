@@ -271,7 +271,7 @@ impl<S: Scalar> FramePair<S> {
                 by_q += self.outward(plan, (Jlog * self.x1.act_inv(rate)).scale(kp)); // ∂ log X = Jlog ₀X₁⁻¹ S
             }
             if plan.aligned() && first {
-                by_q += turn(s.angular, turned); // the frame's axes turn what is expressed along the world's
+                by_q += turn(s.angular, turned); // along the world's axes, it turns with frame 1
             }
             let (row, column, ratio) = (plan.row, touch.coordinate, S::splat(touch.ratio));
             let (by_q, by_v) = (by_q.to_array(), self.express(plan, by_v).to_array());

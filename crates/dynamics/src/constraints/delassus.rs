@@ -93,7 +93,7 @@ impl<S: Scalar> Delassus<S> {
                 for (j, &k) in places.iter().enumerate().rev() {
                     let (x, row) = (-y[j], M.row_from_root(k));
                     if j < *second {
-                        axpy(x, row, &mut y[..j]); // y_e −= L_ke y_k on the places e between k and the root
+                        axpy(x, row, &mut y[..j]); // y_e −= L_ke y_k in the slots e between k and the root
                     } else {
                         axpy(x, &row[..*shared], &mut y[..*shared]);
                         axpy(x, &row[*shared..], &mut y[*second..j]);

@@ -97,7 +97,7 @@ impl Plan {
         for (i, constraint) in constraints.iter().enumerate() {
             let bodies = constraint.bodies(model, &constraints[..i])?;
             let ways = bodies.map(|body| {
-                let mut way = BTreeSet::new(); // with all places before, to the root
+                let mut way = BTreeSet::new(); // including all earlier slots, up to the root
                 for &c in support(body) {
                     let mut k = place[model.columns()[c].coordinate];
                     while k != NONE && way.insert(k) {

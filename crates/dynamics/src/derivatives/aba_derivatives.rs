@@ -7,8 +7,8 @@
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
 //! ```
 //!
-//! The dynamics of a floating body and of the bodies that it carries do not depend on position or common velocity, and
-//! gravity accelerates all of them equally. So some derivatives for the linear and angular coordinates of its free
+//! The dynamics of a floating body, and of the bodies that it carries, do not depend on position or common velocity.
+//! Gravity accelerates all of them equally. So some derivatives for the linear and angular coordinates of its free
 //! joint are known without any product. With the velocities v₀ and ω, the rotation R and the acceleration of free fall
 //! g:
 //!

@@ -23,8 +23,8 @@
 //! ```
 //!
 //! For two columns of one joint, B₁ and C are as above, and ∂²φ/∂q̇_d∂q̇_e = −⟨S_e, D S_d⟩. ∂²φ/∂q_d∂q_e is the mean of
-//! the line above and the same line with d and e exchanged, because q ⊕ δ is an exponential of δ. So the cost is that
-//! of a few first derivatives, O(n · depth), whereas the tensors have n³ entries.
+//! the line above and the same line with d and e exchanged, because q ⊕ δ is an exponential of δ. So it costs as much
+//! as a few first derivatives, O(n · depth), whereas the tensors have n³ entries.
 //!
 //! Sources: Singh, Russell, Wensing, *On second-order derivatives of rigid-body dynamics: theory and implementation*
 //! (2024), for the tensors; Nganga and Wensing, *Accelerating second-order differential dynamic programming for

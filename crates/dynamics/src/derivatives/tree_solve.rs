@@ -64,7 +64,7 @@ impl<S: Scalar> Workspace<S> {
 
 fn paths(columns: &[Column]) -> Vec<Path> {
     let n = columns.len();
-    let parent = |c: usize| columns[c].parent.unwrap_or(n); // n stands for the world
+    let parent = |c: usize| columns[c].parent.unwrap_or(n); // n denotes the world
     let mut children = vec![Vec::new(); n + 1];
     (0..n).for_each(|c| children[parent(c)].push(c));
     let mut places = vec![0; n + 1];

@@ -29,9 +29,9 @@ pub(crate) enum Kind {
     Run,
     /// One body, and the following piece, which assembles the subtrees attached to it.
     Hub,
-    /// The following piece, and the piece after it, which is attached below.
+    /// Join of the following piece and the piece after it, which is attached below.
     Join,
-    /// The following piece and the piece after it, both attached to the same body.
+    /// Sum of the following piece and the piece after it, both attached to the same body.
     Gather,
 }
 
@@ -105,7 +105,7 @@ impl Assembly {
             weight[parent] += weight[i];
         }
         for children in &mut children {
-            children.sort_by_key(|&i| (usize::MAX - weight[i], i)); // the heaviest first
+            children.sort_by_key(|&i| (usize::MAX - weight[i], i)); // heaviest first
         }
         let nv = model.bodies().iter().map(|b| b.joint.nv()).collect();
         let firm = model.bodies().iter().map(firm).collect();
@@ -210,8 +210,8 @@ impl Planner {
     }
 }
 
-/// Returns the index at which to cut a row of weights so that the heavier part is as light as possible, if a cut is
-/// allowed. Both parts have at least one weight.
+/// Returns the best cut of a row of weights, if a cut is allowed: the heavier part is as light as possible. Both parts
+/// have at least one weight.
 fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> {
     let total: usize = weights.iter().sum();
     let (mut left, mut best) = (0, None);

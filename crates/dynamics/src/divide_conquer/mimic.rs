@@ -1,10 +1,9 @@
 //! Ties between joints that share a coordinate (mimic). The accelerations of the robot follow from the accelerations
 //! that it would have if all of its joints were free.
 //!
-//! Let Z be the joints that share coordinates, and G the map from the shared coordinates y to Z (1 for a leader, the
-//! ratio for a mimic joint). Let w be the efforts at Z that tie the joints, and σ a rotor that each of them has in the
-//! free robot only. M_σ is the inertia matrix of the free robot, A = (M_σ⁻¹)_ZZ, and a its accelerations without w.
-//! Then:
+//! Let Z be the joints that share coordinates. G maps the shared coordinates y to Z (1 for a leader, the ratio for a
+//! mimic joint). Let w be the efforts at Z that tie the joints, and σ a rotor that each of them has in the free robot
+//! only. M_σ is the inertia matrix of the free robot, A = (M_σ⁻¹)_ZZ, and a its accelerations without w. Then:
 //!
 //! ```text
 //! a_Z + A w = G ÿ                          joints that share a coordinate move as it says
@@ -192,7 +191,7 @@ impl<S: Scalar> Ties<S> {
         }
         free.iter().zip(&mut *dofs).for_each(|(&a, dof)| dof.qdd = a);
         for (k, member) in members.iter().enumerate() {
-            dofs[member.dof].qdd = G[(k, member.shared)] * ydd[member.shared]; // to the last bit
+            dofs[member.dof].qdd = G[(k, member.shared)] * ydd[member.shared]; // satisfies the ties exactly
         }
     }
 }

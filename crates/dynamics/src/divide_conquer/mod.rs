@@ -33,8 +33,8 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// ⌈log₂ n⌉ + 1 levels for a chain of n bodies. A join of two pieces costs about six times as much as the elimination
 /// of a body. A body of a run between two handles costs 1.5 times as much as a body in [`aba`](crate::aba()). So with
 /// few processors the runs must be long (n divided by the number of threads). On two threads this is faster than `aba`
-/// from about 200 bodies on; on one thread it is never faster (`benches/divide_conquer.rs`). With joints that share
-/// coordinates (mimic), the passes run once for the robot with all joints free, and once more for each of those joints.
+/// from about 200 bodies on; on one thread it is never faster (`benches/divide_conquer.rs`). If joints share
+/// coordinates (mimic), the passes run once with all joints free, and once more for each of those joints.
 ///
 /// Runs in the rayon pool in which it is called, otherwise in the global pool. The bits do not depend on the number of
 /// threads. [`new`](Self::new) allocates all memory, except what rayon allocates. Source: Featherstone (1999), parts 1
@@ -129,12 +129,12 @@ impl<S: Scalar> DivideConquer<S> {
         check_forces(f_ext.len(), bodies);
         let l = Single::<S, R>::new(model);
         self.qdd.copy_from_slice(tau);
-        subtract_armature_bias(model, v, &mut self.qdd); // efforts, until the accelerations take their place
+        subtract_armature_bias(model, v, &mut self.qdd); // holds efforts now, accelerations at the end
         let mut dofs = self.dofs.iter_mut();
         for link in &self.assembly.links {
             let node = &model.nodes()[link.body];
             for (k, dof) in dofs.by_ref().take(node.joint.nv()).enumerate() {
-                let leads = node.mimic.is_none(); // efforts and armature of a shared coordinate act at its leader
+                let leads = node.mimic.is_none(); // efforts and armature of a shared coordinate belong to its leader
                 dof.tau = if leads { self.qdd[node.idx_v + k] } else { S::zero() };
                 dof.rotor = if leads { l.armature(link.body, k) } else { S::zero() };
             }
@@ -249,8 +249,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Computes the placements of a piece in the world, given the pose and velocity of the body to which it is
-    /// attached, and reduces the piece to its handles.
+    /// Computes the placements of a piece in the world and reduces the piece to its handles. The pose and velocity of
+    /// the body to which it is attached are given.
     fn assemble(&self, part: Part<'_, L::S>, oX: Se3<L::S>, v: Motion<L::S>) {
         let (piece, mut rest) = part.open();
         let handle = piece.handle;
@@ -286,8 +286,8 @@ impl<L: Layout + Sync> Job<'_, L> {
             Kind::Join => {
                 let (mut upper, mut lower) = rest.split();
                 let ArticulatedPair { X, w, .. } = &upper.handles[0];
-                let (oX2, v2) = (oX * *X, v + oX.act(*w)); // of the last body of the upper piece
-                let v2 = Se3::new(Mat3::identity(), oX2.translation).act_inv(v2); // seen from its origin
+                let (oX2, v2) = (oX * *X, v + oX.act(*w)); // last body of the upper piece
+                let v2 = Se3::new(Mat3::identity(), oX2.translation).act_inv(v2); // about its origin
                 let oX2 = Se3::new(oX2.rotation, Vec3::zero());
                 self.both(|| self.assemble(upper.again(), oX, v), || self.assemble(lower.again(), oX2, v2));
                 handle.join(&upper.handles[0], &lower.handles[0], piece.open);
@@ -350,8 +350,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         (Ia, pa + Ia * body.c) // pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
     }
 
-    /// Computes the accelerations within a piece, given the acceleration of the body to which it is attached, and the
-    /// force on its last body.
+    /// Computes the accelerations within a piece from the acceleration of the body above it and the force on its last
+    /// body.
     fn accelerate(&self, part: Part<'_, L::S>, a: Motion<L::S>, f: Option<Force<L::S>>) {
         let l = self.l;
         let (piece, rest) = part.open();

@@ -109,7 +109,7 @@ pub(crate) fn inward<L: Layout>(
         }
         let vi = l.parent_on_stack(v, i) + vJ; // v_i = v_λ + v_J
         let here = l.stack_index(i);
-        v[here] = vi; // what is stored as soon as it is known needs no place on the stack
+        v[here] = vi; // stored immediately, so that it does not occupy the machine stack
         c[i] = vi.cross(vJ); // c_i = v_i × v_J
         let I = oX[i].act(l.inertia(i));
         IA[here] = ArticulatedInertia::from(I);

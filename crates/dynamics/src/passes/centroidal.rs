@@ -136,7 +136,7 @@ fn shift_map<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
         }
     }
     let Ig = Se3::new(condyle_spatial::Mat3::identity(), -com).act(I);
-    d.whole.Ig = Inertia { mass_com: Vec3::zero(), ..Ig }; // zero but for rounding
+    d.whole.Ig = Inertia { mass_com: Vec3::zero(), ..Ig }; // zero up to rounding
     d.whole.com = com;
 }
 

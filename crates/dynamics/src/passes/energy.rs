@@ -37,7 +37,7 @@ answers! {
         let l = Single::<S, R>::new(of.model);
         let mut twice = rotors(of.model, &of.moving.qd);
         for i in l.bodies() {
-            let v = of.world.oX[i].act_inv(of.moving.v[i]); // in the body
+            let v = of.world.oX[i].act_inv(of.moving.v[i]); // in the body's frame
             twice += v.dot(l.inertia(i) * v);
         }
         twice * S::splat(0.5)

@@ -1,8 +1,8 @@
 //! Armature of free joints: an apparent mass without weight, in the axes of the joint's parent.
 //!
-//! The armature a along the linear coordinates of a free joint resists the acceleration of the body's origin in the
-//! axes of the parent (for a floating base, the world's), as in MuJoCo. In the body's axes, which v and ω use, this
-//! acceleration is v̇ + ω × v. The kinetic energy T = ½ a vᵀ v of this mass gives
+//! The armature a along the linear coordinates of a free joint resists the acceleration of the body's origin, as in
+//! MuJoCo. This acceleration is in the axes of the parent (for a floating base, the world's). In the body's axes, which
+//! v and ω use, it is v̇ + ω × v. The kinetic energy T = ½ a vᵀ v of this mass gives
 //!
 //! ```text
 //! τ_v = a (v̇ + ω × v)     ∂τ_v/∂v = a ω×     ∂τ_v/∂ω = −a v×

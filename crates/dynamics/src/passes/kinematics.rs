@@ -46,7 +46,7 @@ pub(crate) fn place<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut Wor
         oX[i] = X;
         let (joint, column) = (l.joint(i), l.column(i));
         if let Joint::Revolute { .. } | Joint::Continuous { .. } = joint {
-            S[column] = Joint::column_about_z(&X); // oXi S, while oXi is at hand
+            S[column] = Joint::column_about_z(&X); // oXi S, from the local copy of oXi
         } else {
             for k in 0..joint.nv() {
                 S[column + k] = joint.column(&oX[i], k);

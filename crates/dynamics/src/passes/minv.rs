@@ -73,7 +73,7 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
         let S_c = w.S[c].to_array();
         let row = &mut rows[c * n + c..(c + 1) * n];
         let (above, here) = A.split_at_mut((columns[c].depth + 1) * 6 * n);
-        let above = &above[columns[c].depth * 6 * n..]; // zeros for a column on the world
+        let above = &above[columns[c].depth * 6 * n..]; // zeros for a column attached to the world
         subtract_six(f.U[c].scale(f.D_inv[c]).to_array(), above, n, c, row); // −D⁻¹ Uᵀ A_λ
         for r in 0..6 {
             let (A_parent, A) = (&above[r * n + c..(r + 1) * n], &mut here[r * n + c..(r + 1) * n]);

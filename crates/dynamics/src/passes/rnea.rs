@@ -6,15 +6,16 @@
 //! acceleration a + K r with K = ω̇× + ω× ω×; this holds for the centre of mass and for the joints on the body. Line by
 //! line:
 //!
-//! | the book | here |
-//! | --- | --- |
-//! | v₀ = 0, a₀ = −g | ω₀ = ω̇₀ = 0, K₀ = 0, a₀ = −g |
-//! | iXλ = X_J X_T | `Xi` = λXi, with the sines and cosines of all joints computed before |
-//! | v_i = iXλ v_λ + v_J | ω = Rᵀ ω_λ + ω_J |
-//! | a_i = iXλ a_λ + S q̈ + v_i × v_J | a = Rᵀ (a_λ + K_λ p), ω̇ = Rᵀ ω̇_λ, and what the joint adds (`added_to`) |
-//! | f_i = I a_i + v_i ×* I v_i − f_x | f = m a + K h, n = I ω̇ + ω × I ω + h × a, minus f_x |
-//! | τ_i = S_iᵀ f_i | `project`, when the pass has left the subtree of body i |
-//! | f_λ += λX*_i f_i | `add_to_parent_on_stack` |
+//! ```text
+//! the book                            here
+//! v₀ = 0, a₀ = −g                     ω₀ = ω̇₀ = 0, K₀ = 0, a₀ = −g
+//! iXλ = X_J X_T                       Xi = λXi, with the sines and cosines of all joints computed before
+//! v_i = iXλ v_λ + v_J                 ω = Rᵀ ω_λ + ω_J
+//! a_i = iXλ a_λ + S q̈ + v_i × v_J     a = Rᵀ (a_λ + K_λ p), ω̇ = Rᵀ ω̇_λ, and what the joint adds (added_to)
+//! f_i = I a_i + v_i ×* I v_i − f_x    f = m a + K h, n = I ω̇ + ω × I ω + h × a, minus f_x
+//! τ_i = S_iᵀ f_i                      project, when the pass has left the subtree of body i
+//! f_λ += λX*_i f_i                    add_to_parent_on_stack
+//! ```
 //!
 //! The two loops of the book are merged into one. When the pass has visited the last body of a subtree, it adds the
 //! force of the subtree's root to the parent. The test `the_book_gives_the_same` compares this pass with the book's
@@ -68,7 +69,7 @@ pub(crate) fn pass<L: Layout>(
     for i in l.bodies() {
         let here = l.stack_index(i);
         let Xi = Joint::placement_with(l, i, q, sin[i], cos[i]); // λXi = X_T X_J
-        X[here] = Xi; // what is stored as soon as it is known needs no place on the stack
+        X[here] = Xi; // stored immediately, so that it does not occupy the machine stack
         let (parent, R) = (l.parent_on_stack(motion, i), Xi.rotation);
         let a = parent.centripetal().mul_add(Xi.translation, parent.a); // a_λ + K_λ p
         let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };

@@ -37,7 +37,7 @@ fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
     let g = -l.minus_gravity();
     for i in l.bodies() {
         let I = l.inertia(i);
-        let moment = oX[i].rotation * I.mass_com + oX[i].translation.scale(I.mass); // m c, from the world's origin
+        let moment = oX[i].rotation * I.mass_com + oX[i].translation.scale(I.mass); // m c about the world's origin
         F[i] = Force::new(g.scale(I.mass), moment.cross(g)); // weight: [m g; c × m g]
         if let Some(external) = l.force(f_ext, i) {
             F[i] += oX[i].act(external);

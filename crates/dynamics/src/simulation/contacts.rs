@@ -99,7 +99,7 @@ impl Contacts {
     ) -> Status {
         self.correction.fill(0.0);
         if !v_next.iter().all(|v| v.is_finite()) {
-            return Status::Done; // the caller sees that it is not finite
+            return Status::Done; // the caller detects it
         }
         self.place(model, data, q);
         self.factor.factorize(crba(model, data, q));
@@ -201,7 +201,7 @@ impl Contacts {
                 self.solver.G[a * n + c] = g;
             }
             self.solver.b[a] = b;
-            self.solver.impulses[a] = self.impulses[3 * i + k]; // the first guess
+            self.solver.impulses[a] = self.impulses[3 * i + k]; // first guess
         }
         let Ground { friction, tolerance, max_iterations, .. } = self.ground;
         self.solver.solve(points, friction, tolerance, max_iterations)

@@ -54,8 +54,8 @@ pub use status::Status;
 #[non_exhaustive]
 pub enum Integrator {
     /// Semi-implicit Euler: v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation. It is symplectic where M
-    /// is constant. Otherwise the Coriolis forces are evaluated at the beginning of the step, and bodies that spin fast
-    /// without damping gain energy, light links without bound. Suitable for damped robots and short horizons.
+    /// is constant. Otherwise the Coriolis forces are evaluated at the beginning of the step. Bodies that spin fast
+    /// without damping then gain energy, light links without bound. Suitable for damped robots and short horizons.
     SemiImplicitEuler,
     /// Classical Runge–Kutta method for ξ̇ = J_log(ξ) v, v̇ = aba(q₀ ⊕ ξ, v, τ) (Munthe-Kaas, *Runge-Kutta methods on
     /// Lie groups*, 1998). Order 4, four evaluations; the energy drifts by O(h⁴) per second.

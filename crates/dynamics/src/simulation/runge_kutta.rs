@@ -54,8 +54,8 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
     for (part, weight) in STAGES {
         let (ahead, weight) = (input.h * S::splat(part), input.h * S::splat(weight));
         for k in 0..v.len() {
-            xi[k] = dxi[k] * ahead; // ξ = c h ξ̇ of the stage before
-            v_stage[k] = dv[k].mul_add(ahead, v[k]); // v = v₀ + c h v̇ of the stage before
+            xi[k] = dxi[k] * ahead; // ξ = c h ξ̇ of the previous stage
+            v_stage[k] = dv[k].mul_add(ahead, v[k]); // v = v₀ + c h v̇ of the previous stage
         }
         integrate(model, q, xi, q_next);
         tangent::multiply(model, GroupJacobian::Log, xi, v_stage, dxi); // ξ̇ = J_log(ξ) v

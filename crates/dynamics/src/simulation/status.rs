@@ -15,8 +15,8 @@ pub enum Status {
         /// Number of iterations that were made.
         iterations: usize,
     },
-    /// The impulses of the ground violate the laws of contact by more than the tolerance. The step was still taken with
-    /// them: they only push, and are inside the friction cones. More iterations
+    /// Impulses of the ground that violate the laws of contact by more than the tolerance. The step was still taken
+    /// with them: they only push, and are inside the friction cones. More iterations
     /// ([`Ground::max_iterations`](super::Ground::max_iterations)) or a shorter step may help. If M is badly
     /// conditioned, for example for bodies of some grams, rounding leaves an error. Then the
     /// [`tolerance`](super::Ground::tolerance) should be larger.
@@ -24,7 +24,7 @@ pub enum Status {
         /// Largest error in the velocity of a point (m/s).
         error: f64,
     },
-    /// The velocity or the position is no longer finite. The step was not taken, and the old state is kept.
+    /// Velocity or position that is no longer finite. The step was not taken, and the old state is kept.
     NotFinite,
 }
 

@@ -116,7 +116,7 @@ fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S
     let lagrangian::Workspace { M, p_q, L_qq, .. } = &mut d.lagrangian;
     let A = &mut d.slope;
     for (L_qq, passive_q) in L_qq.iter_mut().zip(&d.passive_q) {
-        *L_qq += *passive_q; // ∂τ/∂q, which acts as ∂²L/∂q∂q does
+        *L_qq += *passive_q; // ∂τ/∂q acts like ∂²L/∂q∂q
     }
     tangent::multiply_right(model, Exp, &d.x, L_qq);
     for j in 0..nv {

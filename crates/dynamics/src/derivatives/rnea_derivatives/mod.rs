@@ -19,7 +19,7 @@
 //! ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F)     ∂τ_e/∂q̇_d = S_eᵀ (Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d)
 //! ```
 //!
-//! (Iᶜ, B, F are those of d's joint).
+//! (Iᶜ, B, F belong to d's joint).
 
 mod vectorized;
 
@@ -161,7 +161,7 @@ pub(crate) fn pass<L: Columns>(
                 let dv_de = S_e.angular.dot_add(BS, PsidSd_e.dot(IS)); // ∂τ_d/∂q̇_e
                 let (dq_ed, dv_ed) = (S_e.dot(by_q), S_e.dot(by_v)); // ∂τ_e/∂q_d, ∂τ_e/∂q̇_d
                 let M_de = S_e.dot(IS);
-                l.set_row(dq, column, e, dq_de); // all stores after all products, which may stay in registers
+                l.set_row(dq, column, e, dq_de); // stores come last, so that products stay in registers
                 l.set_row(dv, column, e, dv_de);
                 l.set_column(dq, column, e, dq_ed);
                 l.set_column(dv, column, e, dv_ed);

@@ -207,7 +207,7 @@ impl Rows {
     ) {
         let (mut x, mut whole, mut rest) = (read::<V, N>(&self.gamma), [[V::zero(); N]; 6], [[V::zero(); N]; 6]);
         for (k, way) in self.ways.iter().enumerate() {
-            let (mut f_whole, mut f) = (whole, rest); // where both ways have met
+            let (mut f_whole, mut f) = (whole, rest); // beyond the junction of both paths
             if k < 2 {
                 f_whole = read_forces(self.forces[k].as_flattened(), WIDE);
                 f = f_whole;
@@ -246,7 +246,7 @@ impl Rows {
     }
 
     /// Adds the contributions of the slots beyond the root, which this and another constraint share, to three columns
-    /// of J M⁻¹ Jᵀ. The columns start at row r of the other constraint; the rows are those of this constraint.
+    /// of J M⁻¹ Jᵀ. The columns start at row r of the other constraint. The rows belong to this constraint.
     #[inline(always)]
     pub(crate) fn multiply<V: Block<Number = f64>, const N: usize>(
         &self,

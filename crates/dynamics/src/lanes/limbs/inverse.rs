@@ -138,7 +138,7 @@ impl Scratch {
         let mut sums = [[V::zero(); N]; M];
         for (p, &e) in path.iter().enumerate() {
             if e >= start + many {
-                break; // what e carries stands further on
+                break; // columns that e carries come later
             }
             debug_assert!(e < *n);
             // SAFETY: the plan's paths consist of columns, and Zt has one row per column.

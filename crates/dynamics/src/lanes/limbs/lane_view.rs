@@ -50,7 +50,7 @@ impl<'d> LaneView<'d> {
 }
 
 fn number<S: Scalar>(x: &Four, lane: usize) -> S {
-    S::splat(lanes(core::slice::from_ref(x))[lane]) // out of memory: this runs with the instructions of any processor
+    S::splat(lanes(core::slice::from_ref(x))[lane]) // read from memory: must run on any processor
 }
 
 fn vector<S: Scalar>(v: &Vec3<Four>, lane: usize) -> Vec3<S> {

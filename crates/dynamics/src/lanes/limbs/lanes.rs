@@ -124,7 +124,7 @@ impl Layout for Limbs<'_> {
     }
     #[inline(always)]
     fn armature(&self, i: usize, k: usize) -> Four {
-        let mut armature = [1.0; LANES]; // of a lane without a joint: nothing is divided by 0
+        let mut armature = [1.0; LANES]; // value for lanes without a joint, avoids a division by 0
         let from = self.coordinates[self.steps[i].idx_v + k].from;
         for lane in 0..LANES {
             if from[lane] < self.armature.len() {

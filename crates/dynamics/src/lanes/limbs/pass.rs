@@ -24,7 +24,7 @@ pub(crate) struct Scratch {
     pub v: Array<Four>,
     pub x: Array<Four>,
     pub f_ext: Array<Force<Four>>,
-    /// An argument, with a 0 for lanes without a joint. Shape: max(nq, nv) + 1. Written by: `gather`.
+    /// Copy of an argument, with a 0 for lanes without a joint. Shape: max(nq, nv) + 1. Written by: `gather`.
     padded: Array<Fused>,
     pub world: World<Four>,
     pub rnea: rnea::Workspace<Four>,
@@ -149,7 +149,7 @@ pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [Fused]) {
     assert!(numbers.len() == LANES * plan.state.coordinates.len(), "lanes of another robot");
     for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
         debug_assert!(at < numbers.len());
-        // SAFETY: the plan's indices are those of its coordinates in the lanes, and the lanes hold all coordinates.
+        // SAFETY: the plan's indices locate its coordinates in the lanes, and the lanes hold all coordinates.
         *to = Fused(unsafe { *numbers.get_unchecked(at) });
     }
     for &(k, at, ratio) in &plan.state.followers {
