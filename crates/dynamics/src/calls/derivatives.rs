@@ -283,7 +283,7 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
 /// Computes the exact derivatives of the centroidal momentum, its rate, and the position, velocity and acceleration of
 /// the centre of mass, in O(n).
 ///
-/// q: nq numbers; v, a: nv. The derivatives are with respect to q, v and a. Accelerations exclude gravity. Bodies fixed
+/// q: nq numbers; v, a: nv. Returns derivatives with respect to q, v and a. Accelerations exclude gravity. Bodies fixed
 /// to the world are ignored; results are NaN if no moving body has mass. Allocates nothing. Source: Carpentier and
 /// Mansard (2018).
 ///

@@ -92,13 +92,13 @@ impl<S: Scalar> FramePair<S> {
         Self { v: [v[i], v[j]], a: [a[i], a[j]], ..Self::at_rest(plan, target, w) }
     }
 
-    /// Expresses a motion in the world's frame along the axes of the constraint's rows.
+    /// Converts a motion from the world's frame to the axes of the constraint's rows.
     #[inline(always)]
     fn express(&self, plan: &Plan, m: Motion<S>) -> Motion<S> {
         if plan.aligned() { Motion::new(at(m, self.x1.translation), m.angular) } else { self.x1.act_inv(m) }
     }
 
-    /// Expresses a vector along the world's axes along the axes of the constraint's rows.
+    /// Converts a vector from the world's axes to the axes of the constraint's rows.
     #[inline(always)]
     fn along(&self, plan: &Plan, x: Vec3<S>) -> Vec3<S> {
         if plan.aligned() { x } else { self.x1.rotation.transpose_mul(x) }
@@ -128,7 +128,7 @@ impl<S: Scalar> FramePair<S> {
         self.along(plan, linear)
     }
 
-    /// Expresses a motion along the axes of frame 1 along the axes of the constraint's rows.
+    /// Converts a motion from the axes of frame 1 to the axes of the constraint's rows.
     #[inline(always)]
     pub(crate) fn outward(&self, plan: &Plan, m: Motion<S>) -> Motion<S> {
         let R = self.x1.rotation;

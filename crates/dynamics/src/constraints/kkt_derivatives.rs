@@ -3,7 +3,7 @@
 //! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. So small changes of them satisfy
 //!
 //! ```text
-//! M δq̈ − Jᵀ δλ + r_q δq + r_v δv = δτ,        r = ∂(M q̈ + h − Jᵀ λ)   at q̈ and λ as they are
+//! M δq̈ − Jᵀ δλ + r_q δq + r_v δv = δτ,        r = ∂(M q̈ + h − Jᵀ λ)   at fixed q̈ and λ
 //! J δq̈         + c_q δq + c_v δv = 0,         c = ∂(J q̈ + γ)
 //! ```
 //!

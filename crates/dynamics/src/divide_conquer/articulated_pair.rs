@@ -5,8 +5,8 @@
 //! piece's first joint is attached. The lower handle is described by the force f that acts on it:
 //!
 //! ```text
-//! f' = K a + p − Lᵀ f      what the joint above must transmit: K and p are Iᵃ and pᵃ of the articulated-body algorithm
-//! a' = L a + b + Y f       how the body below accelerates
+//! f' = K a + p − Lᵀ f      force through the joint above: K and p are Iᵃ and pᵃ of the articulated-body algorithm
+//! a' = L a + b + Y f       acceleration of the body below
 //! ```
 //!
 //! This needs only the inverses of the articulated-body algorithm and no inverse of an inertia, so bodies may be

@@ -6,8 +6,8 @@
 //! only. M_σ is the inertia matrix of the free robot, A = (M_σ⁻¹)_ZZ, and a its accelerations without w. Then:
 //!
 //! ```text
-//! a_Z + A w = G ÿ                          joints that share a coordinate move as it says
-//! Gᵀ (w − σ G ÿ) = 0                       what ties them, but for what turns the rotors, does no work
+//! a_Z + A w = G ÿ                          joints that share a coordinate move with it
+//! Gᵀ (w − σ G ÿ) = 0                       the tying efforts, except those of the rotors, do no work
 //! (Gᵀ A⁻¹ G − Gᵀ σ G) ÿ = Gᵀ A⁻¹ a_Z       hence
 //! q̈ = a + (M_σ⁻¹)_Z w,    w = A⁻¹ (G ÿ − a_Z)
 //! ```

@@ -3,7 +3,7 @@
 //! From the frame f up to the world, with the pose iXf of f in the frame of body i:
 //!
 //! ```text
-//! J_i = iXf⁻¹ S_i     λXf = λXi(q) iXf     and at the world oXf, by which J turns to other references
+//! J_i = iXf⁻¹ S_i     λXf = λXi(q) iXf     at the world, oXf converts J to other reference frames
 //! ```
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 2.8 (S in any coordinates) and example 4.1.

@@ -240,7 +240,8 @@ impl<'a> Limbs<'a> {
         let value = value.to_fused();
         for lane in (0..LANES).rev() {
             debug_assert!((at[lane] as usize) < matrix.len());
-            // SAFETY: a plan's pairs are entries of nv × nv matrices, which all matrices here are: see `clear`.
+            // SAFETY: a plan's pairs index entries of nv × nv matrices, and all matrices here have this size: see
+            // `clear`.
             unsafe { *matrix.get_unchecked_mut(at[lane] as usize) = value[lane] };
         }
     }
