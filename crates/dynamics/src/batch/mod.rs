@@ -155,8 +155,8 @@ impl<T: Real> Batch<T> {
         each!(InLanes, &self.lanes, group => group.threads())
     }
 
-    /// Returns the number of states of the arguments. The first nonempty argument determines it, otherwise the forces
-    /// do; without both, it is `full`.
+    /// Returns the number of states of the arguments. The first argument with numbers per state determines it,
+    /// otherwise the forces do; without both, it is `full`.
     #[track_caller]
     fn count(&self, model: &Model, given: &[Given<'_, T>], full: usize) -> usize {
         let length = |at: usize| [model.nq(), model.nv(), model.nv(), model.nv(), 6 * model.nodes().len()][at];

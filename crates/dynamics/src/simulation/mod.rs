@@ -153,8 +153,8 @@ impl Simulation<f64> {
     ///
     /// # Errors
     /// [`Error::Ground`] if the integrator is not [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame does
-    /// not exist or is fixed to the world, or the normal is no direction. Also if the restitution is not in 0..=1, or
-    /// another number is negative or not finite.
+    /// not exist or is fixed to the world, or the normal is no direction. Also if the restitution is not in 0..=1, the
+    /// friction or the tolerance is negative, or a number is not finite.
     pub fn set_ground(&mut self, ground: Ground) -> Result<(), Error> {
         if self.settings.integrator != Integrator::SemiImplicitEuler {
             let what =
