@@ -1,4 +1,4 @@
-//! All that algorithms write: scratch and results.
+//! Memory that algorithms write: scratch and results.
 #![allow(unsafe_code)]
 
 use crate::constraints::{constrained_derivatives, constrained_dynamics, impulse_dynamics};
@@ -14,8 +14,8 @@ use condyle_model::Model;
 use condyle_spatial::gate::{is, same};
 use condyle_spatial::{Scalar, alike};
 
-/// [`Data`], of its workspaces with what each is made from: the struct, how it is made and copied, and the check that it may be
-/// read under both names of `f64` ([`alike!`]).
+/// Defines [`Data`] from its workspaces and their arguments: the struct, its construction and cloning, and the check
+/// that it may be read under both names of `f64` ([`alike!`]).
 macro_rules! data {
     ($(#[$doc:meta])* ($size:ident, $model:ident) $($name:ident: $Workspace:ident $(:: $Inner:ident)? = ($($from:ident),*),)*) => {
         $(#[$doc])*
@@ -23,10 +23,10 @@ macro_rules! data {
         #[repr(C)]
         pub struct Data<S = f64> {
             size: Size,
-            /// The hash of the tree that it was made for.
+            /// Hash of the tree for which the data was made.
             tree: u64,
             $(pub(crate) $name: $Workspace $(:: $Inner)? <S>,)*
-            /// The scratch of single calls on robots with limbs.
+            /// Scratch of single calls on robots with limbs.
             pub(crate) limbs: Option<Box<Scratch>>,
         }
 
@@ -48,10 +48,10 @@ macro_rules! data {
 }
 
 data! {
-    /// Scratch and results of every algorithm, for one model and one kind of scalar.
+    /// Scratch and results of every algorithm, for one model and one type of scalar.
     ///
-    /// Each algorithm keeps its own workspace, which its file defines, and reads nothing that another left behind, so calls
-    /// may come in any order. All memory is allocated here, none later. One `Data` for each thread.
+    /// Each algorithm has its own workspace, defined in its file, and does not read results of other algorithms. So
+    /// calls may come in any order. All memory is allocated here. Use one `Data` per thread.
     ///
     /// ```
     /// use condyle_dynamics::{Data, robots};
@@ -84,12 +84,12 @@ data! {
 }
 
 impl<S: Scalar> Data<S> {
-    /// Allocates everything for a model.
+    /// Allocates all memory for a model.
     pub fn new<R: 'static>(model: &Model<R>) -> Self {
         if !is::<R, f64>() || !(S::COMPILED || is::<S, f32>()) {
             return Self::allocate(model);
         }
-        // SAFETY: R is f64, and S is the scalar of the data that is given back.
+        // SAFETY: R is f64, and S is the scalar of the returned data.
         unsafe {
             if is::<S, f64>() {
                 same(new_single(same(model)))
@@ -104,7 +104,7 @@ impl<S: Scalar> Data<S> {
     }
 }
 
-/// Constructors of [`Data`] and their copies, compiled in this crate.
+/// Constructors of [`Data`] and their clones, compiled in this crate.
 fn new_single(model: &Model) -> Data<f64> {
     Data::allocate(model)
 }
@@ -130,7 +130,8 @@ fn clone_long(data: &Data<Long>) -> Data<Long> {
     data.copy()
 }
 
-/// A copy, made in a function of its own for each kind of workspace: in one for all it would be the library's largest.
+/// Clones a workspace. It is a separate function for each type of workspace; one function for all would be the
+/// library's largest.
 #[inline(never)]
 fn copied<W: Clone>(workspace: &W) -> W {
     workspace.clone()
@@ -141,7 +142,7 @@ impl<S: Scalar> Clone for Data<S> {
         if !(S::COMPILED || is::<S, f32>()) {
             return self.copy();
         }
-        // SAFETY: S is the scalar of the data that is given back.
+        // SAFETY: S is the scalar of the returned data.
         unsafe {
             if is::<S, f64>() {
                 same(clone_single(same(self)))
@@ -157,7 +158,7 @@ impl<S: Scalar> Clone for Data<S> {
 }
 
 impl<S> Data<S> {
-    /// Panics unless this was made for a model of the same tree.
+    /// Panics unless the data was made for a model of the same tree.
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
@@ -169,7 +170,7 @@ impl<S> Data<S> {
 }
 
 impl Size {
-    /// The panic of [`Data::check`], not inlined: every call checks its data.
+    /// Panics on behalf of [`Data::check`]; not inlined, because every call checks its data.
     #[cold]
     #[inline(never)]
     #[track_caller]
@@ -181,7 +182,7 @@ impl Size {
     }
 }
 
-/// Panics unless there is a force for each body, the world included, or none at all.
+/// Panics unless there is one force per body, including the world, or none.
 #[inline]
 #[track_caller]
 pub(crate) fn check_forces(found: usize, bodies: usize) {
@@ -190,7 +191,7 @@ pub(crate) fn check_forces(found: usize, bodies: usize) {
     }
 }
 
-/// The panic of [`check_forces`].
+/// Panics on behalf of [`check_forces`].
 #[cold]
 #[inline(never)]
 #[track_caller]

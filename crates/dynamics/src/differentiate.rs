@@ -1,12 +1,14 @@
-//! Derivatives of a user's own function of the state, by dual numbers.
+//! Derivatives of user-defined functions of the state, by dual numbers.
 //!
-//! A state x begins with a position q of nq numbers, which moves to q ⊕ δ; whatever follows (velocity, effort, …) moves
-//! straight. So x of n numbers has n − nq + nv directions, and derivatives are by these: of f(x ⊕ δ) at δ = 0.
+//! A state x begins with a position q of nq numbers, which moves to q ⊕ δ. All other numbers (velocity, effort, …) move
+//! by addition. So a state of n numbers has n − nq + nv directions, and derivatives are with respect to these: the
+//! derivatives of f(x ⊕ δ) at δ = 0.
 //!
-//! In vector registers eight or four directions take one evaluation ([`LaneJacobian`]), of a function that is written for
-//! any scalar. One direction is a dual number, two are a hyper-dual one (Fike and Alonso, *The development of hyper-dual
-//! numbers for exact second-derivative calculations*, 2011): derivatives are exact, and cost one evaluation of f for each
-//! direction or pair of directions. What has a derivative by hand has it many times faster.
+//! A function written for any scalar can be evaluated for eight or four directions at once, in vector registers
+//! ([`LaneJacobian`]). One direction is a dual number, two are a hyper-dual number (Fike and Alonso, *The development
+//! of hyper-dual numbers for exact second-derivative calculations*, 2011). Derivatives are exact and cost one
+//! evaluation of f per direction or pair of directions. Where this crate has an analytical derivative, it is many times
+//! faster.
 
 use crate::data::Data;
 use crate::workspace::{Long, Short};
@@ -23,7 +25,7 @@ use condyle_spatial::{Constant, Scalar};
 use nalgebra::{DMatrix, DVector};
 use num_dual::{Dual64, HyperDual64};
 
-/// x ⊕ δ, on numbers that know the directions of δ.
+/// Returns x ⊕ δ, for numbers that carry derivatives along δ.
 fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
     let mut out: Vec<S> = x.iter().map(|&x| S::splat(x)).collect();
     let (q, rest) = out.split_at_mut(model.nq());
@@ -33,16 +35,16 @@ fn moved<S: Scalar, R>(model: &Model<R>, x: &[f64], delta: &[S]) -> Vec<S> {
     out
 }
 
-/// The number of directions of a state.
+/// Returns the number of directions of a state.
 #[track_caller]
 fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
     assert!(x.len() >= model.nq(), "x: expected at least {} numbers, found {}", model.nq(), x.len());
     x.len() - model.nq() + model.nv()
 }
 
-/// f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ, exact, in one evaluation of f for each direction.
+/// Computes f(x) and its exact Jacobian ∂f(x ⊕ δ)/∂δ, in one evaluation of f per direction.
 ///
-/// x: a position of nq numbers, then any others. Returns f(x), m numbers, and an m × (nv + others) matrix.
+/// x: a position of nq numbers, then any other numbers. Returns f(x), m numbers, and an m × (nv + others) matrix.
 ///
 /// ```
 /// use condyle_dynamics::{Data, forward_kinematics, jacobian, robots};
@@ -56,7 +58,7 @@ fn directions<R>(model: &Model<R>, x: &[f64]) -> usize {
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers, or f gives another number of results for another x.
+/// If x has fewer than nq numbers, or f returns different numbers of results.
 #[track_caller]
 pub fn jacobian<R>(
     model: &Model<R>,
@@ -77,24 +79,24 @@ pub fn jacobian<R>(
     (DVector::from_iterator(value.len(), value.iter().map(|x| x.re)), J)
 }
 
-/// A function of a robot's state, for any scalar: what [`LaneJacobian`] can differentiate.
+/// Function of a robot's state, for any scalar, which [`LaneJacobian`] can differentiate.
 pub trait StateFunction {
-    /// The number of results.
+    /// Returns the number of results.
     fn len(&self) -> usize;
 
-    /// Whether there are none.
+    /// Returns whether the function has no results.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// f(x) into `y`. `data` is scratch for the algorithms, of the robot whose state x is.
+    /// Computes f(x) and stores it in `y`. `data` is scratch for the algorithms, made for the robot with state x.
     fn call<S: Scalar>(&mut self, data: &mut Data<S>, x: &[S], y: &mut [S]);
 }
 
-/// Jacobians of functions of one robot's state, exact, as by [`jacobian`], but in one evaluation of f for each eight
-/// (AVX-512) or four (AVX2, NEON, SIMD128) directions, and without allocating beyond what f does.
+/// Exact Jacobians of functions of one robot's state. Compared with [`jacobian`], one evaluation of f serves eight
+/// (AVX-512) or four (AVX2, NEON, SIMD128) directions, and nothing is allocated except by f.
 ///
-/// Results differ in their last digits from level to level ([`level`](mod@crate::level)).
+/// The last digits of results differ between SIMD levels ([`level`](mod@crate::level)).
 ///
 /// ```
 /// use condyle_dynamics::{Data, LaneJacobian, Model, Scalar, StateFunction, forward_kinematics, robots};
@@ -130,7 +132,8 @@ enum Width {
 }
 
 impl LaneJacobian {
-    /// For states of n numbers, q first, and functions with `results` results. The instructions are those of now.
+    /// Allocates memory for states of n numbers, q first, and functions with `results` results. Uses the SIMD level
+    /// that is current now.
     ///
     /// # Panics
     /// If n is less than nq.
@@ -145,10 +148,11 @@ impl LaneJacobian {
         Self { width, value: DVector::zeros(results), J: DMatrix::zeros(results, n - model.nq() + model.nv()) }
     }
 
-    /// f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ: m numbers, and an m × (nv + others) matrix.
+    /// Computes f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ: m numbers, and an m × (nv + others) matrix.
     ///
     /// # Panics
-    /// If x or the results of f have other lengths than [`new`](Self::new) was told, or the robot is another one.
+    /// If the length of x or of f's results differs from the lengths given to [`new`](Self::new), or the robot is
+    /// another one.
     #[track_caller]
     pub fn of<R: Constant<f64>>(
         &mut self,
@@ -159,8 +163,8 @@ impl LaneJacobian {
         self.run(model, x, f, None)
     }
 
-    /// Computes f(x) and some columns of its Jacobian, those of the directions k of δ in `directions`. The other columns are
-    /// not written: they are zeros until a call computes them.
+    /// Computes f(x) and the columns of its Jacobian for the directions k of δ in `directions`. The other columns are
+    /// not written: they are zero until a call computes them.
     ///
     /// ```
     /// # use condyle_dynamics::{Data, LaneJacobian, Scalar, StateFunction, robots};
@@ -176,7 +180,7 @@ impl LaneJacobian {
     /// ```
     ///
     /// # Panics
-    /// As [`of`](Self::of), and if a direction is not below nv + others.
+    /// As [`of`](Self::of), or if a direction is not below nv + others.
     #[track_caller]
     pub fn along<R: Constant<f64>>(
         &mut self,
@@ -211,13 +215,13 @@ impl LaneJacobian {
     }
 }
 
-/// Scratch for as many directions at a time as S has lanes.
+/// Scratch for one direction per lane of S.
 #[derive(Debug)]
 struct Directions<S> {
     data: Data<LaneDual<S>>,
     /// δ. Shape: directions.
     delta: Vec<LaneDual<S>>,
-    /// x, and x ⊕ δ.
+    /// x, then x ⊕ δ.
     x: Vec<LaneDual<S>>,
     moved: Vec<LaneDual<S>>,
     y: Vec<LaneDual<S>>,
@@ -246,19 +250,19 @@ impl<S: Block<Number = f64>> Directions<S> {
     }
 }
 
-/// A Jacobian to be computed.
+/// Jacobian that is to be computed.
 struct SideBySide<'a, S, R, F> {
     directions: &'a mut Directions<S>,
     model: &'a Model<R>,
     x: &'a [f64],
     f: &'a mut F,
-    /// The columns that are wanted; all if there is no list.
+    /// Columns to compute; `None` for all.
     columns: Option<&'a [usize]>,
     value: &'a mut DVector<f64>,
     J: &'a mut DMatrix<f64>,
 }
 
-/// Most lanes that there are.
+/// Maximum number of lanes.
 const WIDEST: usize = 8;
 
 impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R, F> {
@@ -300,9 +304,9 @@ impl<S: Block<Number = f64>, R, F: StateFunction> Kernel for SideBySide<'_, S, R
     }
 }
 
-/// f(x) and its gradient ∂f(x ⊕ δ)/∂δ, exact, in one evaluation of f for each direction.
+/// Computes f(x) and its exact gradient ∂f(x ⊕ δ)/∂δ, in one evaluation of f per direction.
 ///
-/// x: a position of nq numbers, then any others. Returns f(x) and nv + others numbers.
+/// x: a position of nq numbers, then any other numbers. Returns f(x) and nv + others numbers.
 ///
 /// ```
 /// use condyle_dynamics::{Data, gradient, rnea, robots};
@@ -325,9 +329,10 @@ pub fn gradient<R>(model: &Model<R>, x: &[f64], mut f: impl FnMut(&[Dual64]) -> 
     (value[0], J.row(0).transpose())
 }
 
-/// f(x), its gradient and its Hessian ∂²f(x ⊕ δ)/∂δ∂δ, exact, in one evaluation of f for each pair of directions.
+/// Computes f(x), its exact gradient and its exact Hessian ∂²f(x ⊕ δ)/∂δ∂δ, in one evaluation of f per pair of
+/// directions.
 ///
-/// x: a position of nq numbers, then any others. Returns f(x), nv + others numbers, and as many squared.
+/// x: a position of nq numbers, then any other numbers. Returns f(x), n = nv + others numbers, and an n × n matrix.
 ///
 /// ```
 /// use condyle_dynamics::{Data, forward_kinematics, hessian, robots, static_torque_derivative};

@@ -1,6 +1,7 @@
 //! Robot models, rigid-body algorithms and their exact derivatives.
 //!
-//! A [`Model`] is frozen and shared; a [`Data`] is one thread's scratch; an algorithm is a function of both:
+//! A [`Model`] is immutable and can be shared. A [`Data`] is the scratch of one thread. An algorithm is a function of
+//! both:
 //!
 //! ```
 //! use condyle_dynamics::{Data, aba, robots};
@@ -11,14 +12,21 @@
 //! assert!((a[2] + 9.81).abs() < 1e-12); // it falls
 //! ```
 //!
-//! Every function is generic over the [`Scalar`], allocates nothing, fills all that it returns, and is right whatever
-//! ran before. `CONVENTIONS` below says in which frames and order numbers are.
+//! Every function is generic over the [`Scalar`] and allocates nothing. It writes all of its results, and they do not
+//! depend on earlier calls. `CONVENTIONS` below defines frames and the order of numbers.
 //!
 //! # Features
-//! All are on by default. `loaders`: files of robots, and `robots`. `meshes`: masses and inertias of meshes in MJCF. `serde`:
-//! models and constraints to and from its formats. `threads`: those of rayon. `std`: the standard library, which all but `serde` need, and derivatives of functions of
-//! your own (`jacobian`, `LaneJacobian`, …). Without it the crate needs `alloc` and, for the functions of floats, the feature
-//! `libm`: so it runs where there is no operating system (`examples/embedded` in the repository).
+//! All are on by default.
+//!
+//! - `loaders`: robot files, and `robots`.
+//! - `meshes`: masses and inertias of meshes in MJCF.
+//! - `serde`: models and constraints in serde's formats.
+//! - `threads`: rayon's threads.
+//! - `std`: the standard library, which all other features except `serde` need, and derivatives of your own functions
+//!   (`jacobian`, `LaneJacobian`, …).
+//!
+//! Without `std` the crate needs `alloc`, and the feature `libm` for floating-point functions. So it runs without an
+//! operating system (`examples/embedded` in the repository).
 #![doc = include_str!("../CONVENTIONS.md")]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]

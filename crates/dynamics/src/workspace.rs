@@ -1,42 +1,43 @@
-//! The arrays of which the workspaces of passes are made.
+//! Arrays of which the workspaces of passes consist.
 //!
-//! Each pass keeps a workspace of its own, defined in its file by `workspace!`, in which each field says frame, shape and
-//! writer. It is made of arrays and matrices that are read under both names of `f64`, as the compiler checks.
+//! Each pass has its own workspace, defined in its file by `workspace!`, and each field documents its frame, shape and
+//! writer. A workspace consists of arrays and matrices that can be read under both names of `f64`; the compiler checks
+//! this.
 
 use condyle_model::Model;
 use condyle_spatial::gate::{self, Witness};
 use condyle_spatial::{Array, Matrix, Scalar, matrix};
 
-/// The promise of this crate, by which it names vectors.
+/// Marker with which this crate may name vector types.
 pub(crate) struct Gate;
 
-// SAFETY: vectors are made and used in kernels that are entered through their door, and in functions that choose the vectors
-// of the level in use.
+// SAFETY: vectors are created and used in two places only: in kernels, which are entered through their entry functions,
+// and in functions that choose the vectors of the current SIMD level.
 #[allow(unsafe_code)]
 unsafe impl Witness for Gate {}
 
-/// Four numbers at once, with AVX2, NEON or SIMD128.
+/// Four numbers in one vector, with AVX2, NEON or SIMD128.
 pub(crate) type Short = gate::Short<Gate>;
-/// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
+/// Eight numbers in one vector, with AVX-512; otherwise the same as `Short`.
 pub(crate) type Long = gate::Long<Gate>;
 
-/// The sizes of the arrays of a workspace.
+/// Sizes of the arrays of a workspace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Size {
-    /// Bodies, the world included.
+    /// Number of bodies, including the world.
     pub bodies: usize,
-    /// Degrees of freedom of all joints.
+    /// Number of degrees of freedom of all joints.
     pub columns: usize,
-    /// Columns on the longest way from the root.
+    /// Number of columns on the longest path from the root.
     pub depth: usize,
-    /// Bodies on the longest way from the root, the world included.
+    /// Number of bodies on the longest path from the root, including the world.
     pub levels: usize,
-    /// Coordinates.
+    /// Number of coordinates.
     pub nv: usize,
 }
 
 impl Size {
-    /// The sizes for a model.
+    /// Returns the sizes for a model.
     pub(crate) fn new<R>(model: &Model<R>) -> Self {
         Self {
             bodies: model.nodes().len(),
@@ -48,23 +49,23 @@ impl Size {
     }
 }
 
-/// An array of n equal entries. It is not inlined, and makes the entry itself, as a workspace has dozens of arrays; entries are
-/// copied whole, where `vec!` would clone them number by number.
+/// Returns an array of n equal entries. It is not inlined and makes the entry itself, because a workspace has dozens of
+/// arrays. Entries are copied whole, whereas `vec!` would clone them number by number.
 #[inline(never)]
 pub(crate) fn filled<T: Copy>(entry: impl Fn() -> T, n: usize) -> Array<T> {
     let entry = entry();
     (0..n).map(|_| entry).collect()
 }
 
-/// A matrix of zeros.
+/// Returns a matrix of zeros.
 #[inline(never)]
 pub(crate) fn zero_matrix<S: Scalar>(rows: usize, columns: usize) -> Matrix<S> {
     matrix(rows, columns, S::zero())
 }
 
-/// A workspace: of each field what it is, and what it is made with, from the sizes of a model and from what stands above it;
-/// behind `same`, those that do not depend on the scalar. Makes the struct, its `new`, and the check that it may be read
-/// under both names of `f64` ([`alike!`](condyle_spatial::alike)).
+/// Defines a workspace. Each field has a type and an initial value, which may use the sizes of a model and the fields
+/// above it. Fields after `same` do not depend on the scalar. The macro defines the struct, its `new`, and the check
+/// that it may be read under both names of `f64` ([`alike!`](condyle_spatial::alike)).
 macro_rules! workspace {
     (
         $(#[$doc:meta])*

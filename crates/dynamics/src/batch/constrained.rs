@@ -11,28 +11,28 @@ use crate::calls::impulse_dynamics::{Impulse, ImpulseDerivatives, impulse_dynami
 use condyle_spatial::block::Real;
 
 results! {
-    /// Forward dynamics under constraints in many states: see [`Constrained`](crate::Constrained).
+    /// Forward dynamics under constraints of many states: see [`Constrained`](crate::Constrained).
     BatchConstrained of Constrained {
-        /// q̈, nv numbers for each state.
+        /// q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// λ, as many numbers for each state as there are rows.
+        /// λ, one number per row, for each state.
         lambda: &'b [T] = [ROWS];
-        /// The largest number in J q̈ + γ of each state.
+        /// Largest absolute value in J q̈ + γ of each state.
         residual: &'b [T] = [];
-        /// The number of rows of J of each state that depend on rows before them.
+        /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
     }
 
-    /// Forward dynamics under constraints and its derivatives in many states: see
+    /// Forward dynamics under constraints and its derivatives, of many states: see
     /// [`ConstrainedDerivatives`](crate::ConstrainedDerivatives).
     BatchConstrainedDerivatives of ConstrainedDerivatives {
-        /// q̈, nv numbers for each state.
+        /// q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// λ, as many numbers for each state as there are rows.
+        /// λ, one number per row, for each state.
         lambda: &'b [T] = [ROWS];
-        /// The largest number in J q̈ + γ of each state.
+        /// Largest absolute value in J q̈ + γ of each state.
         residual: &'b [T] = [];
-        /// The number of rows of J of each state that depend on rows before them.
+        /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
         /// ∂q̈/∂q in the tangent space, nv × nv.
         da_dq: Matrices<'b, T> = [NV, NV];
@@ -50,16 +50,16 @@ results! {
         inertia: Matrices<'b, T> = [ROWS, ROWS];
     }
 
-    /// Forward dynamics under constraints and its equations, differentiated, in many states: see
+    /// Forward dynamics under constraints and its linearised equations, of many states: see
     /// [`ConstrainedEquations`](crate::ConstrainedEquations).
     BatchConstrainedEquations of ConstrainedEquations {
-        /// q̈, nv numbers for each state.
+        /// q̈, nv numbers per state.
         a: &'b [T] = [NV];
-        /// λ, as many numbers for each state as there are rows.
+        /// λ, one number per row, for each state.
         lambda: &'b [T] = [ROWS];
-        /// The largest number in J q̈ + γ of each state.
+        /// Largest absolute value in J q̈ + γ of each state.
         residual: &'b [T] = [];
-        /// The number of rows of J of each state that depend on rows before them.
+        /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
         /// M, nv × nv.
         M: Matrices<'b, T> = [NV, NV];
@@ -73,27 +73,27 @@ results! {
         dgamma_dv: Matrices<'b, T> = [ROWS, NV];
     }
 
-    /// Impacts in many states: see [`Impulse`](crate::Impulse).
+    /// Impacts of many states: see [`Impulse`](crate::Impulse).
     BatchImpulse of Impulse {
-        /// v⁺, nv numbers for each state.
+        /// v⁺, nv numbers per state.
         v: &'b [T] = [NV];
-        /// Λ, as many numbers for each state as there are rows.
+        /// Λ, one number per row, for each state.
         lambda: &'b [T] = [ROWS];
-        /// The largest number in J (v⁺ + ε v) of each state.
+        /// Largest absolute value in J (v⁺ + ε v) of each state.
         residual: &'b [T] = [];
-        /// The number of rows of J of each state that depend on rows before them.
+        /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
     }
 
-    /// Impacts and their derivatives in many states: see [`ImpulseDerivatives`](crate::ImpulseDerivatives).
+    /// Impacts of many states and their derivatives: see [`ImpulseDerivatives`](crate::ImpulseDerivatives).
     BatchImpulseDerivatives of ImpulseDerivatives {
-        /// v⁺, nv numbers for each state.
+        /// v⁺, nv numbers per state.
         v: &'b [T] = [NV];
-        /// Λ, as many numbers for each state as there are rows.
+        /// Λ, one number per row, for each state.
         lambda: &'b [T] = [ROWS];
-        /// The largest number in J (v⁺ + ε v) of each state.
+        /// Largest absolute value in J (v⁺ + ε v) of each state.
         residual: &'b [T] = [];
-        /// The number of rows of J of each state that depend on rows before them.
+        /// Number of rows of J that depend on earlier rows, for each state.
         redundant: &'b [T] = [];
         /// ∂v⁺/∂q in the tangent space, nv × nv.
         dv_dq: Matrices<'b, T> = [NV, NV];
@@ -109,19 +109,20 @@ results! {
 }
 
 batched! {
-    /// [`constrained_dynamics`](crate::constrained_dynamics()) of each state.
+    /// Computes [`constrained_dynamics`](crate::constrained_dynamics()) for each state.
     ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
-    /// As [`aba`](Self::aba), or if `constraints` were made for another model or by a batch for another number of threads.
+    /// As [`aba`](Self::aba), or if `constraints` were made for another model, or by a batch with another number of
+    /// threads.
     fn constrained_dynamics(model, data, constraints: BatchConstraints; q, v, tau, f_ext) -> BatchConstrained<'_, T> {
         constrained_dynamics(model, data, constraints, q, v, tau, f_ext)
     }
 
-    /// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()) of each state.
+    /// Computes [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()) for each state.
     ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`constrained_dynamics`](Self::constrained_dynamics).
@@ -130,9 +131,9 @@ batched! {
         constrained_dynamics_derivatives(model, data, constraints, q, v, tau, f_ext)
     }
 
-    /// [`constrained_dynamics_equations`](crate::constrained_dynamics_equations) of each state.
+    /// Computes [`constrained_dynamics_equations`](crate::constrained_dynamics_equations) for each state.
     ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`constrained_dynamics`](Self::constrained_dynamics).
@@ -141,9 +142,9 @@ batched! {
         constrained_dynamics_equations(model, data, constraints, q, v, tau, f_ext)
     }
 
-    /// [`impulse_dynamics`](crate::impulse_dynamics()) of each state.
+    /// Computes [`impulse_dynamics`](crate::impulse_dynamics()) for each state.
     ///
-    /// q: nq numbers a state; v: nv; restitution: ε.
+    /// q: nq numbers per state; v: nv; restitution: ε.
     ///
     /// # Panics
     /// As [`constrained_dynamics`](Self::constrained_dynamics).
@@ -151,9 +152,9 @@ batched! {
         impulse_dynamics(model, data, constraints, q, v, S::splat(restitution))
     }
 
-    /// [`impulse_dynamics_derivatives`](crate::impulse_dynamics_derivatives()) of each state.
+    /// Computes [`impulse_dynamics_derivatives`](crate::impulse_dynamics_derivatives()) for each state.
     ///
-    /// q: nq numbers a state; v: nv; restitution: ε.
+    /// q: nq numbers per state; v: nv; restitution: ε.
     ///
     /// # Panics
     /// As [`constrained_dynamics`](Self::constrained_dynamics).

@@ -1,4 +1,4 @@
-//! The constraints of a batch: for each thread a set, with the targets of all states.
+//! Constraints of a batch: one set per thread, which holds the targets of all states.
 
 use super::{Batch, InLanes};
 use crate::constraints::constraint::{ContactConstraint, Target};
@@ -12,7 +12,7 @@ use condyle_model::{Error, Model};
 use condyle_spatial::block::Real;
 use core::ops::Range;
 
-/// Constraints of one model, with the scratch of one [`Batch`] for them: see [`ConstraintSet`].
+/// Constraints of one model, with the scratch that one [`Batch`] needs for them: see [`ConstraintSet`].
 ///
 /// ```
 /// use condyle_dynamics::{Batch, ContactConstraint, Proximal, robots};
@@ -31,7 +31,7 @@ pub struct BatchConstraints<T: Real = f64> {
     pub(super) sets: Sets<T>,
 }
 
-/// A set for each thread, with as many lanes as the groups of the batch have.
+/// One set per thread, with as many lanes as the groups of the batch.
 #[derive(Clone, Debug)]
 pub(super) enum Sets<T: Real> {
     Single(Vec<ConstraintSet<T>>),
@@ -40,10 +40,10 @@ pub(super) enum Sets<T: Real> {
 }
 
 impl<T: Real> Batch<T> {
-    /// Plans constraints of a model, for this batch, and allocates everything.
+    /// Plans the constraints of a model for this batch, and allocates all memory.
     ///
     /// # Errors
-    /// Those of [`ConstraintSet::new`].
+    /// As [`ConstraintSet::new`].
     pub fn constraints(
         &self,
         model: &Model,
@@ -71,32 +71,32 @@ fn made<S: condyle_spatial::Scalar>(
 }
 
 impl<T: Real> BatchConstraints<T> {
-    /// The number of rows of J, and of numbers of λ of each state.
+    /// Returns the number of rows of J, which is also the length of λ of each state.
     pub fn rows(&self) -> usize {
         each!(Sets, &self.sets, sets => sets[0].rows())
     }
 
-    /// The rows of constraint k.
+    /// Returns the rows of constraint k.
     ///
     /// # Panics
-    /// If there is no such constraint.
+    /// If constraint k does not exist.
     #[track_caller]
     pub fn range(&self, k: usize) -> Range<usize> {
         each!(Sets, &self.sets, sets => sets[0].range(k))
     }
 
-    /// Changes how redundant constraints share their forces.
+    /// Sets how redundant constraints share their forces.
     pub fn set_proximal(&mut self, proximal: Proximal) {
         each!(Sets, &mut self.sets, sets => sets.iter_mut().for_each(|set| set.proximal = proximal));
     }
 
-    /// Changes where constraint k wants its frame to be in all states, between calls. Allocates nothing.
+    /// Changes the target of constraint k's frame in all states, between calls. Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Constraint`] for a target that is not finite or whose rotation is none; that of before then stays.
+    /// [`Error::Constraint`] if the target is not finite or its rotation is invalid. The old target is then kept.
     ///
     /// # Panics
-    /// If there is no such constraint.
+    /// If constraint k does not exist.
     #[track_caller]
     pub fn set_target(&mut self, k: usize, target: Target<f64>) -> Result<(), Error> {
         check_index("k", k, each!(Sets, &self.sets, sets => sets[0].len()), "constraints");
@@ -106,7 +106,8 @@ impl<T: Real> BatchConstraints<T> {
         each!(Sets, &mut self.sets, sets => sets.iter_mut().try_for_each(|set| set.set_target(k, target.lift())))
     }
 
-    /// Whether a batch can use these: it has as many threads, and as many lanes, as the one that made them.
+    /// Returns whether a batch can use these constraints: it must have the same number of threads and lanes as the
+    /// batch that made them.
     pub fn fits(&self, batch: &Batch<T>) -> bool {
         match (&self.sets, &batch.lanes) {
             (Sets::Single(sets), InLanes::Single(group)) => sets.len() == group.threads(),
@@ -116,7 +117,7 @@ impl<T: Real> BatchConstraints<T> {
         }
     }
 
-    /// Panics unless this was made for a model with the same joints and frames in the same places.
+    /// Panics unless the constraints were made for a model with the same joints and frames at the same placements.
     #[track_caller]
     pub(super) fn check(&self, model: &Model) {
         each!(Sets, &self.sets, sets => sets[0].check(model));

@@ -1,4 +1,4 @@
-//! Derivatives in many states.
+//! Derivatives of many states.
 
 use super::group::{DA, DTAU, MINV};
 use super::places::{Places, Put};
@@ -18,19 +18,19 @@ use crate::passes::passive::{PassiveDerivatives, slopes};
 use condyle_spatial::block::Real;
 
 results! {
-    /// The derivatives of τ = rnea(q, v, a) in many states: see [`RneaDerivatives`](crate::RneaDerivatives).
+    /// Derivatives of τ = rnea(q, v, a), of many states: see [`RneaDerivatives`](crate::RneaDerivatives).
     BatchRneaDerivatives of RneaDerivatives {
         /// ∂τ/∂q in the tangent space.
         dtau_dq: Matrices<'b, T> = [NV, NV];
         /// ∂τ/∂v.
         dtau_dv: Matrices<'b, T> = [NV, NV];
-        /// ∂τ/∂a = M(q), armature included.
+        /// ∂τ/∂a = M(q), including armature.
         dtau_da: Matrices<'b, T> = [NV, NV];
     }
 
-    /// q̈ = aba(q, v, τ) and its derivatives in many states: see [`AbaDerivatives`](crate::AbaDerivatives).
+    /// q̈ = aba(q, v, τ) and its derivatives, of many states: see [`AbaDerivatives`](crate::AbaDerivatives).
     BatchAbaDerivatives of AbaDerivatives {
-        /// q̈ itself, nv numbers for each state.
+        /// q̈, nv numbers per state.
         a: &'b [T] = [NV];
         /// ∂q̈/∂q in the tangent space.
         da_dq: Matrices<'b, T> = [NV, NV];
@@ -40,7 +40,7 @@ results! {
         da_dtau: Matrices<'b, T> = [NV, NV];
     }
 
-    /// The derivatives of C(q, v) v in many states: see [`CoriolisDerivatives`](crate::CoriolisDerivatives).
+    /// Derivatives of C(q, v) v, of many states: see [`CoriolisDerivatives`](crate::CoriolisDerivatives).
     BatchCoriolisDerivatives of CoriolisDerivatives {
         /// ∂(C v)/∂q, nv × nv.
         dq: Matrices<'b, T> = [NV, NV];
@@ -48,7 +48,7 @@ results! {
         dv: Matrices<'b, T> = [NV, NV];
     }
 
-    /// The derivatives of passive efforts in many states: see
+    /// Derivatives of passive efforts, of many states: see
     /// [`passive_torque_derivatives`](crate::passive_torque_derivatives()).
     BatchPassiveDerivatives of PassiveDerivatives {
         /// ∂τ/∂q in the tangent space, nv × nv.
@@ -57,17 +57,17 @@ results! {
         dtau_dv: Matrices<'b, T> = [NV, NV];
     }
 
-    /// The derivatives of the energies in many states: see [`EnergyDerivatives`](crate::EnergyDerivatives).
+    /// Derivatives of the energies, of many states: see [`EnergyDerivatives`](crate::EnergyDerivatives).
     BatchEnergyDerivatives of EnergyDerivatives {
-        /// ∂T/∂q, nv numbers for each state.
+        /// ∂T/∂q, nv numbers per state.
         dT_dq: &'b [T] = [NV];
-        /// ∂T/∂v, nv numbers for each state.
+        /// ∂T/∂v, nv numbers per state.
         dT_dv: &'b [T] = [NV];
-        /// ∂V/∂q, nv numbers for each state.
+        /// ∂V/∂q, nv numbers per state.
         dV_dq: &'b [T] = [NV];
     }
 
-    /// The second derivatives of λᵀ rnea(q, v, a) in many states: see [`RneaHessian`](crate::RneaHessian).
+    /// Second derivatives of φ = λᵀ rnea(q, v, a), of many states: see [`RneaHessian`](crate::RneaHessian).
     BatchRneaHessian of RneaHessian {
         /// ∂²φ/∂q∂q, nv × nv.
         dqdq: Matrices<'b, T> = [NV, NV];
@@ -79,7 +79,7 @@ results! {
         dadq: Matrices<'b, T> = [NV, NV];
     }
 
-    /// The second derivatives of λᵀ aba(q, v, τ) in many states: see [`AbaHessian`](crate::AbaHessian).
+    /// Second derivatives of ψ = λᵀ aba(q, v, τ), of many states: see [`AbaHessian`](crate::AbaHessian).
     BatchAbaHessian of AbaHessian {
         /// ∂²ψ/∂q∂q, nv × nv.
         dqdq: Matrices<'b, T> = [NV, NV];
@@ -91,7 +91,7 @@ results! {
         dtaudq: Matrices<'b, T> = [NV, NV];
     }
 
-    /// The derivatives of centroidal momentum, its rate and the centre of mass in many states: see
+    /// Derivatives of the centroidal momentum, its rate and the centre of mass, of many states: see
     /// [`CentroidalDerivatives`](crate::CentroidalDerivatives).
     BatchCentroidalDerivatives of CentroidalDerivatives {
         /// ∂hg/∂q, 6 × nv.
@@ -116,9 +116,9 @@ results! {
 }
 
 batched! {
-    /// [`rnea_derivatives`](crate::rnea_derivatives()) of each state, three matrices nv × nv.
+    /// Computes [`rnea_derivatives`](crate::rnea_derivatives()) for each state: three matrices nv × nv.
     ///
-    /// q: nq numbers a state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -129,9 +129,9 @@ batched! {
         rnea_derivatives(model, data, q, v, a, f_ext);
     }
 
-    /// [`aba_derivatives`](crate::aba_derivatives()) of each state, nv numbers and three matrices nv × nv.
+    /// Computes [`aba_derivatives`](crate::aba_derivatives()) for each state: nv numbers and three matrices nv × nv.
     ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
@@ -140,9 +140,9 @@ batched! {
         aba_derivatives(model, data, q, v, tau, f_ext).a
     }
 
-    /// [`static_torque_derivative`](crate::static_torque_derivative()) of each state, nv × nv.
+    /// Computes [`static_torque_derivative`](crate::static_torque_derivative()) for each state: nv × nv.
     ///
-    /// q: nq numbers a state; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -150,9 +150,9 @@ batched! {
         static_torque_derivative(model, data, q, f_ext)
     }
 
-    /// [`coriolis_derivatives`](crate::coriolis_derivatives) of each state, two matrices nv × nv.
+    /// Computes [`coriolis_derivatives`](crate::coriolis_derivatives) for each state: two matrices nv × nv.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -160,9 +160,10 @@ batched! {
         coriolis_derivatives(model, data, q, v)
     }
 
-    /// [`passive_torque_derivatives`](crate::passive_torque_derivatives()) of each state, two matrices nv × nv.
+    /// Computes [`passive_torque_derivatives`](crate::passive_torque_derivatives()) for each state: two matrices nv ×
+    /// nv.
     ///
-    /// q: nq numbers a state; v: nv; smoothing: ε > 0.
+    /// q: nq numbers per state; v: nv; smoothing: ε > 0.
     ///
     /// # Panics
     /// As [`passive_torque`](Self::passive_torque).
@@ -172,17 +173,17 @@ batched! {
         PassiveDerivatives { dtau_dq, dtau_dv }
     }
 
-    /// [`energy_derivatives`](crate::energy_derivatives) of each state, nv numbers each.
+    /// Computes [`energy_derivatives`](crate::energy_derivatives) for each state: nv numbers each.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
     fn energy_derivatives(model, data; q, v) -> BatchEnergyDerivatives<'_, T> { energy_derivatives(model, data, q, v) }
 
-    /// [`centroidal_derivatives`](crate::centroidal_derivatives()) of each state, 6 × nv and 3 × nv.
+    /// Computes [`centroidal_derivatives`](crate::centroidal_derivatives()) for each state: 6 × nv and 3 × nv.
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -190,9 +191,9 @@ batched! {
         centroidal_derivatives(model, data, q, v, a)
     }
 
-    /// [`rnea_hessian`](crate::rnea_hessian()) of each state, four matrices nv × nv.
+    /// Computes [`rnea_hessian`](crate::rnea_hessian()) for each state: four matrices nv × nv.
     ///
-    /// q: nq numbers a state; v, a, lambda: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, a, lambda: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -200,9 +201,9 @@ batched! {
         rnea_hessian(model, data, q, v, a, f_ext, lambda)
     }
 
-    /// [`aba_hessian`](crate::aba_hessian()) of each state, four matrices nv × nv.
+    /// Computes [`aba_hessian`](crate::aba_hessian()) for each state: four matrices nv × nv.
     ///
-    /// q: nq numbers a state; v, tau, lambda: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau, lambda: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
@@ -210,10 +211,10 @@ batched! {
         aba_hessian(model, data, q, v, tau, f_ext, lambda)
     }
 
-    /// [`rnea_second_derivatives`](crate::rnea_second_derivatives) of each state: the matrices of all τ_i, nv × nv each, one
-    /// below the other.
+    /// Computes [`rnea_second_derivatives`](crate::rnea_second_derivatives) for each state: the nv × nv matrices of all
+    /// τ_i, stacked vertically.
     ///
-    /// q: nq numbers a state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -227,12 +228,13 @@ batched! {
         });
     }
 
-    /// [`RneaDerivatives::with_respect_to`](crate::RneaDerivatives::with_respect_to) of each state, nv × [`Input::len`].
+    /// Computes [`RneaDerivatives::with_respect_to`](crate::RneaDerivatives::with_respect_to) for each state: nv ×
+    /// [`Input::len`].
     ///
-    /// q: nq numbers a state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if the input names no moving body or a smoothing that is not positive.
+    /// As [`rnea`](Self::rnea), or if the input names a body that does not move, or its smoothing is not positive.
     fn rnea_input_derivative(model, data => to; q, v, a, f_ext; input: Input)
     with wide columns (input.len(model)) -> Matrices<'_, T> [[NV, COLUMNS]] {
         let (n, columns) = (model.nv(), input.len(model));
@@ -241,12 +243,13 @@ batched! {
         to.columns(out, columns);
     }
 
-    /// [`AbaDerivatives::with_respect_to`](crate::AbaDerivatives::with_respect_to) of each state, nv × [`Input::len`].
+    /// Computes [`AbaDerivatives::with_respect_to`](crate::AbaDerivatives::with_respect_to) for each state: nv ×
+    /// [`Input::len`].
     ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
-    /// As [`aba`](Self::aba), or if the input names no moving body or a smoothing that is not positive.
+    /// As [`aba`](Self::aba), or if the input names a body that does not move, or its smoothing is not positive.
     fn aba_input_derivative(model, data => to; q, v, tau, f_ext; input: Input)
     with wide columns (input.len(model)) -> Matrices<'_, T> [[NV, COLUMNS]] {
         let (n, columns) = (model.nv(), input.len(model));

@@ -1,4 +1,4 @@
-//! Dynamics of many states, and what is linear in the inertias.
+//! Dynamics of many states, and quantities that are linear in the inertias.
 
 use super::group::{M, MINV};
 use super::results::Matrices;
@@ -11,58 +11,58 @@ use crate::passes::factored_dynamics::ForwardDynamicsMethod;
 use crate::passes::passive::passive_torque;
 
 batched! {
-    /// [`rnea`](crate::rnea()): τ of each state, nv numbers.
+    /// Computes [`rnea`](crate::rnea()) for each state: τ, nv numbers.
     ///
-    /// q: nq numbers a state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, a: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
-    /// If an argument has the wrong length, there are more states than there is room for, or the batch was made for a
-    /// model of another tree; so do all below.
+    /// If an argument has the wrong length, the number of states exceeds the capacity, or the batch was made for a
+    /// model of another tree. The same holds for all functions below.
     fn rnea(model, data; q, v, a, f_ext) -> &[T] [[NV]] { rnea(model, data, q, v, a, f_ext) }
 
-    /// [`nonlinear_effects`](crate::nonlinear_effects): h of each state, nv numbers.
+    /// Computes [`nonlinear_effects`](crate::nonlinear_effects) for each state: h, nv numbers.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
     fn nonlinear_effects(model, data; q, v) -> &[T] [[NV]] { nonlinear_effects(model, data, q, v) }
 
-    /// [`gravity`](crate::gravity): g of each state, nv numbers.
+    /// Computes [`gravity`](crate::gravity) for each state: g, nv numbers.
     ///
-    /// q: nq numbers a state.
+    /// q: nq numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
     fn gravity(model, data; q) -> &[T] [[NV]] { gravity(model, data, q) }
 
-    /// [`static_torque`](crate::static_torque()): τ of each state, nv numbers.
+    /// Computes [`static_torque`](crate::static_torque()) for each state: τ, nv numbers.
     ///
-    /// q: nq numbers a state; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
     fn static_torque(model, data; q, f_ext) -> &[T] [[NV]] { static_torque(model, data, q, f_ext) }
 
-    /// [`coriolis_matrix`](crate::coriolis_matrix): C of each state, nv × nv.
+    /// Computes [`coriolis_matrix`](crate::coriolis_matrix) for each state: C, nv × nv.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
     fn coriolis_matrix(model, data; q, v) -> Matrices<'_, T> [[NV, NV]] { coriolis_matrix(model, data, q, v) }
 
-    /// [`aba`](crate::aba()): q̈ of each state, nv numbers.
+    /// Computes [`aba`](crate::aba()) for each state: q̈, nv numbers.
     ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if M is singular ([`Model::singular_joints`](crate::Model::singular_joints)).
     fn aba(model, data; q, v, tau, f_ext) -> &[T] [[NV]] { aba(model, data, q, v, tau, f_ext) }
 
-    /// [`forward_dynamics`](crate::forward_dynamics()): q̈ of each state by a method of choice, nv numbers.
+    /// Computes [`forward_dynamics`](crate::forward_dynamics()) for each state by a given method: q̈, nv numbers.
     ///
-    /// q: nq numbers a state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
+    /// q: nq numbers per state; v, tau: nv; f_ext: a force on each body in its frame, or empty for none.
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
@@ -70,25 +70,25 @@ batched! {
         forward_dynamics(model, data, q, v, tau, f_ext, method)
     }
 
-    /// [`crba`](crate::crba()): M of each state, nv × nv.
+    /// Computes [`crba`](crate::crba()) for each state: M, nv × nv.
     ///
-    /// q: nq numbers a state.
+    /// q: nq numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
     fn crba(model, data => to; q) keeps [crba.M: M] -> Matrices<'_, T> [[NV, NV]] { crba(model, data, q); }
 
-    /// [`minv`](crate::minv()): M⁻¹ of each state, nv × nv.
+    /// Computes [`minv`](crate::minv()) for each state: M⁻¹, nv × nv.
     ///
-    /// q: nq numbers a state.
+    /// q: nq numbers per state.
     ///
     /// # Panics
     /// As [`aba`](Self::aba).
     fn minv(model, data => to; q) keeps [minv.Minv: MINV] -> Matrices<'_, T> [[NV, NV]] { minv(model, data, q); }
 
-    /// [`passive_torque`](crate::passive_torque): τ of each state, nv numbers.
+    /// Computes [`passive_torque`](crate::passive_torque) for each state: τ, nv numbers.
     ///
-    /// q: nq numbers a state; v: nv; smoothing: ε > 0.
+    /// q: nq numbers per state; v: nv; smoothing: ε > 0.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea), or if `smoothing` is not positive.
@@ -98,9 +98,9 @@ batched! {
         &*tau
     }
 
-    /// [`joint_torque_regressor`](crate::joint_torque_regressor): Y of each state, nv × 10 (bodies − 1).
+    /// Computes [`joint_torque_regressor`](crate::joint_torque_regressor) for each state: Y, nv × 10 (bodies − 1).
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -108,9 +108,10 @@ batched! {
         joint_torque_regressor(model, data, q, v, a)
     }
 
-    /// [`kinetic_energy_regressor`](crate::kinetic_energy_regressor): y of each state, 10 (bodies − 1) numbers.
+    /// Computes [`kinetic_energy_regressor`](crate::kinetic_energy_regressor) for each state: y, 10 (bodies − 1)
+    /// numbers.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).
@@ -118,9 +119,10 @@ batched! {
         kinetic_energy_regressor(model, data, q, v)
     }
 
-    /// [`potential_energy_regressor`](crate::potential_energy_regressor): y of each state, 10 (bodies − 1) numbers.
+    /// Computes [`potential_energy_regressor`](crate::potential_energy_regressor) for each state: y, 10 (bodies − 1)
+    /// numbers.
     ///
-    /// q: nq numbers a state.
+    /// q: nq numbers per state.
     ///
     /// # Panics
     /// As [`rnea`](Self::rnea).

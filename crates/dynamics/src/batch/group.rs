@@ -1,4 +1,4 @@
-//! The work of a batch: groups of states, a lane for each, spread over threads.
+//! Work of a batch: groups of states, one state per lane, distributed over threads.
 
 use super::places::Places;
 use super::state_matrix::StateMatrix;
@@ -12,19 +12,19 @@ use condyle_spatial::block::{Block, MOST, Real, Strided, flat_mut, gather, lanes
 use condyle_spatial::simd::Kernel;
 use condyle_spatial::{Array, Force, Matrix};
 
-/// Groups of as many states as a scalar has lanes, and who computes them.
+/// Groups of states, each with one state per lane of the scalar, and the workers that compute them.
 #[derive(Clone, Debug)]
 pub(super) struct Group<S: Block> {
-    /// The workers, one for each thread.
+    /// Workers, one per thread.
     workers: Vec<Worker<S>>,
-    /// The most groups of as many states as there are lanes.
+    /// Maximum number of groups.
     groups: usize,
-    /// The matrices of each group, of those kinds that passes have been asked for; none before. Written by: `keep`.
+    /// Matrices of each group, allocated for the kinds that passes have requested so far. Written by: `keep`.
     matrices: Vec<[Matrix<S>; KINDS]>,
 }
 
-/// The matrices of a group of states that stay in lanes, each nv × nv and each written by one pass alone, so that zeros stay
-/// zero.
+/// Indices of the matrices that a group of states keeps in lanes, each nv × nv. Each matrix is written by one pass
+/// only, so that its zeros stay zero.
 pub(super) const M: usize = 0;
 
 pub(super) const MINV: usize = 1;
@@ -33,27 +33,28 @@ pub(super) const DTAU: [usize; 3] = [2, 3, 4];
 
 pub(super) const DA: [usize; 2] = [5, 6];
 
-/// The kinds that are symmetric: the two numbers of a pair differ by rounding at most, and either may stand for both.
+/// Kinds that are symmetric: the two numbers of a pair differ at most by rounding, and either may replace the other.
 pub(super) const SYMMETRIC: [usize; 3] = [M, MINV, DTAU[2]];
 
 pub(super) const KINDS: usize = 7;
 
-/// The arguments of a state, by their places: q; v; an acceleration or an effort; λ of a contraction; forces.
+/// Number of arguments of a state. Their slots, in order: q; v; an acceleration or an effort; λ of a contraction;
+/// forces.
 pub(super) const ARGUMENTS: usize = 5;
 
 pub(super) const FORCES: usize = ARGUMENTS - 1;
 
-/// The scratch of a thread.
+/// Scratch of a thread.
 #[derive(Debug)]
 struct Worker<S: Block> {
     data: Data<S>,
-    /// The arguments, a state in each lane. Shape: nq, nv, nv, nv. Written by: `one_by_one`.
+    /// Arguments, one state per lane. Shape: nq, nv, nv, nv. Written by: `one_by_one`.
     numbers: [Array<S>; FORCES],
-    /// Shape: bodies or none. Written by: `one_by_one`.
+    /// External forces. Shape: bodies, or empty. Written by: `one_by_one`.
     f_ext: Vec<Force<S>>,
     /// Scratch of passes. Shape: 6 × nv.
     six: [Matrix<S>; 2],
-    /// Scratch of passes. Shape: nv × the greater one of nv and 10.
+    /// Scratch of passes. Shape: nv × max(nv, 10).
     wide: Array<S>,
 }
 
@@ -71,7 +72,7 @@ impl<S: Block> Worker<S> {
 }
 
 impl<S: Block> Clone for Worker<S> {
-    /// A copy with as much room for forces, so that it does not allocate later either.
+    /// Returns a copy with the same capacity for forces, so that the copy does not allocate later either.
     fn clone(&self) -> Self {
         let Self { data, numbers, f_ext, six, wide } = self;
         let mut forces = Vec::with_capacity(f_ext.capacity());
@@ -80,32 +81,32 @@ impl<S: Block> Clone for Worker<S> {
     }
 }
 
-/// A group of states, as a pass sees it.
+/// Group of states, as passed to a pass.
 pub(super) struct States<'w, S: Block> {
     pub model: &'w Model,
     pub data: &'w mut Data<S>,
     pub q: &'w [S],
     pub v: &'w [S],
     pub a: &'w [S],
-    /// The same as a: a pass has one of the two.
+    /// Same slice as `a`; a pass uses one of the two.
     pub tau: &'w [S],
     pub lambda: &'w [S],
     pub f_ext: &'w [Force<S>],
     pub constraints: Option<&'w mut ConstraintSet<S>>,
     /// Scratch. Shape: 6 × nv.
     pub six: &'w mut [Matrix<S>; 2],
-    /// Scratch. Shape: nv × the greater one of nv and 10.
+    /// Scratch. Shape: nv × max(nv, 10).
     pub wide: &'w mut [S],
-    /// The matrices that stay in lanes, if the pass has some.
+    /// Matrices that stay in lanes, if the pass has any.
     pub kept: Option<&'w mut [Matrix<S>; KINDS]>,
 }
 
-/// The work on a group of states: it calls a function of this crate, and puts its results to their places.
+/// Work on a group of states: calls a function of this crate, and writes its results to their slots.
 pub(super) trait Pass<T: Real>: Copy + Sync {
-    /// The kinds of matrices that it leaves in lanes.
+    /// Kinds of matrices that the pass leaves in lanes.
     const KINDS: &'static [usize];
 
-    /// To be inlined into the code of the level.
+    /// Runs the pass. Must be inlined into the code of the SIMD level.
     fn run<S: Block<Number = T>>(self, states: States<'_, S>, to: &mut Places<'_, T>);
 }
 
@@ -123,29 +124,30 @@ pub(super) fn enter<T: Real, S: Block<Number = T>>(pass: impl Pass<T>, of: State
     S::enter(Entered(pass, of, to));
 }
 
-/// A pass for one kind of lanes. What spreads states is compiled once for all of them.
+/// Pass for one type of lanes. The code that distributes states is compiled once for all passes.
 pub(super) type Work<'f, T, S> = dyn Fn(States<'_, S>, &mut Places<'_, T>) + Sync + 'f;
 
-/// The arguments of some states; empty where a function takes none.
+/// Arguments of some states; arguments that a function does not take are empty.
 #[derive(Clone, Copy)]
 pub(super) struct Arguments<'a, T>(pub [&'a [T]; ARGUMENTS]);
 
 impl<T> Arguments<'_, T> {
-    /// The arguments of the first `n` of `states` states, and of the others.
+    /// Splits the arguments into those for the first `n` of `states` states and those for the others.
     fn split(self, n: usize, states: usize) -> (Self, Self) {
         let parts = self.0.map(|of| of.split_at(of.len() / states * n));
         (Self(parts.map(|part| part.0)), Self(parts.map(|part| part.1)))
     }
 }
 
-/// The places for the results of some states: vectors and matrices of each, and matrices that stay in lanes, if there are.
+/// Destinations for the results of some states: vectors and matrices of each state, and matrices that stay in lanes, if
+/// any.
 struct Results<'a, S: Block> {
     numbers: Places<'a, S::Number>,
     matrices: &'a mut [[Matrix<S>; KINDS]],
 }
 
 impl<S: Block> Results<'_, S> {
-    /// The places of the first `n` of `states` states, and of the others.
+    /// Splits the destinations into those for the first `n` of `states` states and those for the others.
     fn split(self, n: usize, states: usize) -> (Self, Self) {
         let numbers = self.numbers.split(n, states);
         let matrices = self.matrices.split_at_mut(n.div_ceil(S::LANES).min(self.matrices.len()));
@@ -153,13 +155,13 @@ impl<S: Block> Results<'_, S> {
     }
 }
 
-/// Those who compute: workers, and for each the constraints, if the pass has some.
+/// Workers that share the computation, each with its constraints if the pass has any.
 struct Team<'a, S: Block> {
     workers: &'a mut [Worker<S>],
     sets: &'a mut [ConstraintSet<S>],
 }
 
-/// All states, by all threads.
+/// Runs the work on all states, on all threads.
 fn spread<T: Real, S: Block<Number = T>>(
     work: &Work<'_, T, S>,
     model: &Model,
@@ -183,7 +185,7 @@ fn spread<T: Real, S: Block<Number = T>>(
     );
 }
 
-/// All groups, by one thread.
+/// Runs the work on all groups, on one thread.
 fn one_by_one<T: Real, S: Block<Number = T>>(
     work: &Work<'_, T, S>,
     model: &Model,
@@ -222,18 +224,18 @@ impl<S: Block> Group<S> {
         }
     }
 
-    /// The number of threads.
+    /// Returns the number of threads.
     pub(super) fn threads(&self) -> usize {
         self.workers.len()
     }
 
-    /// Panics unless this was made for a model of the same tree.
+    /// Panics unless this group was made for a model of the same tree.
     #[track_caller]
     pub(super) fn check(&self, model: &Model) {
         self.workers[0].data.check(model);
     }
 
-    /// Makes the matrices of a pass, for as many states as there is room for, if it is run for the first time.
+    /// Allocates the matrices of a pass for the capacity of the batch, when the pass runs for the first time.
     pub(super) fn keep(&mut self, kinds: &[usize], nv: usize) {
         if kinds.is_empty() {
             return;
@@ -248,7 +250,7 @@ impl<S: Block> Group<S> {
         }
     }
 
-    /// Runs a pass over all states; `has_matrices` says whether it leaves some in lanes.
+    /// Runs a pass over all states. `has_matrices`: whether the pass leaves matrices in lanes.
     pub(super) fn run<T: Real>(
         &mut self,
         work: &Work<'_, T, S>,
@@ -264,7 +266,7 @@ impl<S: Block> Group<S> {
         spread(work, model, team, states, from, Results { numbers, matrices });
     }
 
-    /// A matrix of state k, in its lane.
+    /// Returns a matrix of state k, as a view of its lane.
     pub(super) fn matrix(&self, kind: usize, k: usize) -> StateMatrix<'_, S::Number> {
         let matrix = &self.matrices[k / S::LANES][kind];
         let n = matrix.nrows();
@@ -272,7 +274,7 @@ impl<S: Block> Group<S> {
         StateMatrix::new(lane, [n, n], [S::LANES, S::LANES * n])
     }
 
-    /// The matrices of the first states, as many as there is room for, each by rows.
+    /// Writes the matrices of the first states by rows, as many states as `to` has space for.
     pub(super) fn write_rows(&self, kind: usize, to: &mut [S::Number]) {
         let n = self.matrices.first().map_or(0, |matrices| matrices[kind].nrows());
         if n == 0 {

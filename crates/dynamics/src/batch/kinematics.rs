@@ -1,4 +1,4 @@
-//! Places and motions of bodies and frames in many states.
+//! Placements and motions of bodies and frames of many states.
 
 use super::places::{Places, Put};
 use super::results::{Matrices, Poses, Take, Taken, results};
@@ -10,14 +10,14 @@ use crate::passes::frames::ReferenceFrame;
 use condyle_spatial::Matrix;
 use condyle_spatial::block::Real;
 
-/// The derivatives of an acceleration, in the matrices of a single call.
+/// Derivatives of an acceleration, in the matrices of a single call.
 struct AccelerationDerivatives<'s, S> {
     da_dq: &'s Matrix<S>,
     da_dv: &'s Matrix<S>,
 }
 
 results! {
-    /// The derivatives of an acceleration in many states.
+    /// Derivatives of an acceleration, of many states.
     BatchAccelerationDerivatives of AccelerationDerivatives {
         /// ∂a/∂q in the tangent space, 6 × nv.
         da_dq: Matrices<'b, T> = [6, NV];
@@ -27,9 +27,10 @@ results! {
 }
 
 batched! {
-    /// [`forward_kinematics`](crate::forward_kinematics): oXb of all bodies in each state, in the order of the bodies.
+    /// Computes [`forward_kinematics`](crate::forward_kinematics) for each state: oXb of all bodies, in the order of
+    /// the bodies.
     ///
-    /// q: nq numbers a state.
+    /// q: nq numbers per state.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, Data, forward_kinematics, robots};
@@ -48,153 +49,161 @@ batched! {
         }
     }
 
-    /// [`Placements::frame`](crate::Placements::frame): oXf of a frame in each state, its only pose.
+    /// Computes [`Placements::frame`](crate::Placements::frame) for each state: oXf, the only pose of the state.
     ///
-    /// q: nq numbers a state.
+    /// q: nq numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_placement(model, data => to; q; frame: usize) -> Poses<'_, T> [[4, 4]] {
         to.pose(0, [0, 1], forward_kinematics(model, data, q).frame(frame));
     }
 
-    /// [`frame_jacobian`](crate::frame_jacobian): J of each state, 6 × nv.
+    /// Computes [`frame_jacobian`](crate::frame_jacobian) for each state: J, 6 × nv.
     ///
-    /// q: nq numbers a state.
+    /// q: nq numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_jacobian(model, data; q; frame: usize, reference: ReferenceFrame) with six -> Matrices<'_, T> [[6, NV]] {
         frame_jacobian(model, q, frame, reference, &mut six[0]);
         &six[0]
     }
 
-    /// [`body_jacobian`](crate::body_jacobian): J of each state, 6 × nv.
+    /// Computes [`body_jacobian`](crate::body_jacobian) for each state: J, 6 × nv.
     ///
-    /// q: nq numbers a state.
+    /// q: nq numbers per state.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such body.
+    /// As [`rnea`](Self::rnea), or if the body does not exist.
     fn body_jacobian(model, data; q; body: usize, reference: ReferenceFrame) with six -> Matrices<'_, T> [[6, NV]] {
         body_jacobian(model, q, body, reference, &mut six[0]);
         &six[0]
     }
 
-    /// [`Velocities::frame_velocity`](crate::Velocities::frame_velocity): v of each state, six numbers.
+    /// Computes [`Velocities::frame_velocity`](crate::Velocities::frame_velocity) for each state: v, six numbers.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_velocity(model, data; q, v; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_velocities(model, data, q, v).frame_velocity(frame, reference)
     }
 
-    /// [`Velocities::body_velocity`](crate::Velocities::body_velocity): v of each state, six numbers.
+    /// Computes [`Velocities::body_velocity`](crate::Velocities::body_velocity) for each state: v, six numbers.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such body.
+    /// As [`rnea`](Self::rnea), or if the body does not exist.
     fn body_velocity(model, data; q, v; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_velocities(model, data, q, v).body_velocity(body, reference)
     }
 
-    /// [`Accelerations::frame_acceleration`](crate::Accelerations::frame_acceleration): a of each state, six numbers.
+    /// Computes [`Accelerations::frame_acceleration`](crate::Accelerations::frame_acceleration) for each state: a, six
+    /// numbers.
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_acceleration(model, data; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).frame_acceleration(frame, reference)
     }
 
-    /// [`Accelerations::body_acceleration`](crate::Accelerations::body_acceleration): a of each state, six numbers.
+    /// Computes [`Accelerations::body_acceleration`](crate::Accelerations::body_acceleration) for each state: a, six
+    /// numbers.
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such body.
+    /// As [`rnea`](Self::rnea), or if the body does not exist.
     fn body_acceleration(model, data; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).body_acceleration(body, reference)
     }
 
-    /// [`Accelerations::frame_classical_acceleration`](crate::Accelerations::frame_classical_acceleration): v̇ + ω × v, ω̇ of each state, six numbers.
+    /// Computes [`Accelerations::frame_classical_acceleration`](crate::Accelerations::frame_classical_acceleration) for
+    /// each state: v̇ + ω × v, ω̇, six numbers.
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_classical_acceleration(model, data; q, v, a; frame: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).frame_classical_acceleration(frame, reference)
     }
 
-    /// [`Accelerations::body_classical_acceleration`](crate::Accelerations::body_classical_acceleration): v̇ + ω × v, ω̇ of each state, six numbers.
+    /// Computes [`Accelerations::body_classical_acceleration`](crate::Accelerations::body_classical_acceleration) for
+    /// each state: v̇ + ω × v, ω̇, six numbers.
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such body.
+    /// As [`rnea`](Self::rnea), or if the body does not exist.
     fn body_classical_acceleration(model, data; q, v, a; body: usize, reference: ReferenceFrame) -> &[T] [[6]] {
         forward_accelerations(model, data, q, v, a).body_classical_acceleration(body, reference)
     }
 
-    /// [`Velocities::frame_jacobian_rate`](crate::Velocities::frame_jacobian_rate): dJ/dt of each state, 6 × nv.
+    /// Computes [`Velocities::frame_jacobian_rate`](crate::Velocities::frame_jacobian_rate) for each state: dJ/dt, 6 ×
+    /// nv.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_jacobian_rate(model, data; q, v; frame: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).frame_jacobian_rate(frame, reference, &mut six[0]);
         &six[0]
     }
 
-    /// [`Velocities::body_jacobian_rate`](crate::Velocities::body_jacobian_rate): dJ/dt of each state, 6 × nv.
+    /// Computes [`Velocities::body_jacobian_rate`](crate::Velocities::body_jacobian_rate) for each state: dJ/dt, 6 ×
+    /// nv.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such body.
+    /// As [`rnea`](Self::rnea), or if the body does not exist.
     fn body_jacobian_rate(model, data; q, v; body: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).body_jacobian_rate(body, reference, &mut six[0]);
         &six[0]
     }
 
-    /// [`Velocities::frame_velocity_derivative`](crate::Velocities::frame_velocity_derivative): ∂v/∂q of each state, 6 × nv.
+    /// Computes [`Velocities::frame_velocity_derivative`](crate::Velocities::frame_velocity_derivative) for each state:
+    /// ∂v/∂q, 6 × nv.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_velocity_derivative(model, data; q, v; frame: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).frame_velocity_derivative(frame, reference, &mut six[0]);
         &six[0]
     }
 
-    /// [`Velocities::body_velocity_derivative`](crate::Velocities::body_velocity_derivative): ∂v/∂q of each state, 6 × nv.
+    /// Computes [`Velocities::body_velocity_derivative`](crate::Velocities::body_velocity_derivative) for each state:
+    /// ∂v/∂q, 6 × nv.
     ///
-    /// q: nq numbers a state; v: nv.
+    /// q: nq numbers per state; v: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such body.
+    /// As [`rnea`](Self::rnea), or if the body does not exist.
     fn body_velocity_derivative(model, data; q, v; body: usize, reference: ReferenceFrame)
     with six -> Matrices<'_, T> [[6, NV]] {
         forward_velocities(model, data, q, v).body_velocity_derivative(body, reference, &mut six[0]);
         &six[0]
     }
 
-    /// [`Accelerations::frame_acceleration_derivatives`](crate::Accelerations::frame_acceleration_derivatives) of each
-    /// state, 6 × nv.
+    /// Computes [`Accelerations::frame_acceleration_derivatives`](crate::Accelerations::frame_acceleration_derivatives)
+    /// for each state, 6 × nv.
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;
@@ -202,13 +211,13 @@ batched! {
         AccelerationDerivatives { da_dq, da_dv }
     }
 
-    /// [`Accelerations::body_acceleration_derivatives`](crate::Accelerations::body_acceleration_derivatives) of each
-    /// state, 6 × nv.
+    /// Computes [`Accelerations::body_acceleration_derivatives`](crate::Accelerations::body_acceleration_derivatives)
+    /// for each state, 6 × nv.
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such body.
+    /// As [`rnea`](Self::rnea), or if the body does not exist.
     fn body_acceleration_derivatives(model, data; q, v, a; body: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;
@@ -216,13 +225,14 @@ batched! {
         AccelerationDerivatives { da_dq, da_dv }
     }
 
-    /// [`Accelerations::frame_classical_acceleration_derivatives`](crate::Accelerations::frame_classical_acceleration_derivatives) of each
-    /// state, 6 × nv.
+    /// Computes
+    /// [`Accelerations::frame_classical_acceleration_derivatives`](crate::Accelerations::frame_classical_acceleration_derivatives)
+    /// for each state, 6 × nv.
     ///
-    /// q: nq numbers a state; v, a: nv.
+    /// q: nq numbers per state; v, a: nv.
     ///
     /// # Panics
-    /// As [`rnea`](Self::rnea), or if there is no such frame.
+    /// As [`rnea`](Self::rnea), or if the frame does not exist.
     fn frame_classical_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;

@@ -1,14 +1,15 @@
-//! Many states at once: the knots of a horizon, the samples of a controller.
+//! Batches of states, such as the knots of a horizon or the samples of a controller.
 //!
-//! As many states as a vector register holds go through a pass side by side, each in a lane: by the processor's level that
-//! is eight or four in `f64`, sixteen or eight in `f32`, one at the baseline. Groups of them are spread over threads.
-//! Arguments and results lie state after state; the matrices of RNEA, CRBA, ABA and M⁻¹ stay as the passes leave them, entry
-//! after entry, each for a whole group. A lane knows nothing of the others, and computes as a single call does at that level,
-//! so a state's numbers are the same to the last bit wherever it stands, in however long a batch, on however many threads.
+//! A pass computes one state per lane of a vector register. The number of lanes depends on the SIMD level: eight or
+//! four in `f64`, sixteen or eight in `f32`, and one at the baseline level. Groups of states are distributed over
+//! threads. Arguments and results are stored state by state. The matrices of RNEA, CRBA, ABA and M⁻¹ keep the layout of
+//! the passes: entry by entry, each entry for a whole group. Lanes are independent, and each computes like a single
+//! call at that level. So a state's numbers are bitwise the same at any index, for any batch size and any number of
+//! threads.
 //!
-//! Each function is an entry of a table (`table.rs`), which calls that for a single state on lanes.
+//! Each function is an entry of a table (`table.rs`), which calls the function for a single state on lanes.
 
-/// The same of whichever vectors an `InLanes` or `Sets` has.
+/// Evaluates the same expression for each variant of an `InLanes` or `Sets`.
 macro_rules! each {
     ($Of:ident, $of:expr, $some:ident => $body:expr) => {
         match $of {
@@ -47,16 +48,15 @@ use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 
 /// Scratch and results for up to N states at once, on one or several threads.
 ///
-/// Every function takes its arguments as the one of the same name for a single state does, with those of all states one
-/// after the other: q has `states` · nq numbers, and how many states that is may change from call to call. Results stay
-/// until the next call. `T` is `f64`, or `f32` with the feature of that name. Of a robot without coordinates, of which
-/// nothing says how many states are meant, they are as many as there are forces for, or without forces as many as there is
-/// room for.
+/// Every function takes the arguments of the function of the same name for a single state, concatenated over all
+/// states: q has `states` · nq numbers. The number of states may change from call to call. Results are valid until the
+/// next call. `T` is `f64`, or `f32` with the feature `f32`. If a robot has no coordinates, the number of forces gives
+/// the number of states; without forces, it is the capacity.
 ///
-/// Memory is allocated by [`new`](Self::new) for scratch, once for each thread, and for a vector of nv numbers for each
-/// state; by the first call of a function that gives more than any before it, for what it gives; and by rayon for itself on
-/// more than one thread. The level of vector instructions is the one in use when the batch is made. Made for one thread,
-/// it never leaves the caller's; else it runs in the pool of rayon in which it is called, or else in the global one.
+/// [`new`](Self::new) allocates the scratch of each thread, and a vector of nv numbers per state. A call allocates if
+/// its results need more memory than all earlier ones. With more than one thread, rayon allocates too. The SIMD level
+/// is the one in use when the batch is made. A batch for one thread runs in the caller's thread. Otherwise it runs in
+/// the rayon pool in which it is called, or in the global pool.
 ///
 /// ```
 /// use condyle_dynamics::{Batch, Data, rnea, robots};
@@ -72,13 +72,13 @@ use table::{BODIES, COLUMNS, Given, NV, PARAMETERS, ROWS};
 pub struct Batch<T: Real = f64> {
     states: usize,
     lanes: InLanes<T>,
-    /// The results that do not stay in lanes, of all states one after the other. Shape: states × that of the result. Written
-    /// by: all functions.
+    /// Results that do not stay in lanes, of all states one after the other. Shape: states × shape of the result.
+    /// Written by: all functions.
     slots: [Vec<T>; MOST_RESULTS],
     last: Last,
 }
 
-/// A number that batches are made of: `f64`, and with the feature `f32` that too.
+/// Number type of batches: `f64`, and `f32` with the feature `f32`.
 pub trait BatchNumber: Real {}
 
 impl BatchNumber for f64 {}
@@ -86,7 +86,7 @@ impl BatchNumber for f64 {}
 #[cfg(feature = "f32")]
 impl BatchNumber for f32 {}
 
-/// Groups of as many states as the vectors of the level have lanes.
+/// Groups of states, with as many lanes as the vectors of the SIMD level.
 #[derive(Clone, Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
@@ -95,13 +95,13 @@ enum InLanes<T: Real> {
 }
 
 impl<T: Real> Batch<T> {
-    /// The most threads: each has scratch of its own.
+    /// Maximum number of threads; each has its own scratch.
     pub const MOST_THREADS: usize = 1024;
 
-    /// The most states, of which there may be less memory for.
+    /// Maximum number of states; memory may suffice for fewer.
     pub const MOST_STATES: usize = 1 << (usize::BITS / 2);
 
-    /// Room for up to `states` states at once, on `threads` threads.
+    /// Allocates a batch for up to `states` states at once, on `threads` threads.
     ///
     /// # Panics
     /// If `threads` is 0 or above [`MOST_THREADS`](Self::MOST_THREADS), or `states` above
@@ -127,9 +127,11 @@ impl<T: Real> Batch<T> {
         }
     }
 
-    /// The same functions, which write their results to places of the caller's instead: as many as the function has results, in
-    /// the order of its struct, each with the numbers of all states one after the other, matrices by rows. What is written as soon
-    /// as it is computed need not go through memory twice. Where nothing else says how many states are meant, the places do.
+    /// Returns a writer with the same functions, which write their results to the caller's memory.
+    ///
+    /// `to` has one slice for each result of the function, in the order of the fields of its struct. Each slice holds
+    /// the numbers of all states one after the other, matrices by rows. Writing results directly avoids a second pass
+    /// through memory. If no argument gives the number of states, the length of the slices does.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -143,17 +145,18 @@ impl<T: Real> Batch<T> {
         BatchWriter { batch: self, to }
     }
 
-    /// The number of states for which it has room.
+    /// Returns the maximum number of states.
     pub fn capacity(&self) -> usize {
         self.states
     }
 
-    /// The number of threads that it runs on.
+    /// Returns the number of threads.
     pub fn threads(&self) -> usize {
         each!(InLanes, &self.lanes, group => group.threads())
     }
 
-    /// The number of states that arguments are for: the first that has numbers says it, else the forces, else it is `full`.
+    /// Returns the number of states of the arguments. The first argument with numbers per state determines it,
+    /// otherwise the forces do; without both, it is `full`.
     #[track_caller]
     fn count(&self, model: &Model, given: &[Given<'_, T>], full: usize) -> usize {
         let length = |at: usize| [model.nq(), model.nv(), model.nv(), model.nv(), 6 * model.nodes().len()][at];
@@ -182,8 +185,8 @@ impl<T: Real> Batch<T> {
         states
     }
 
-    /// Checks the arguments and runs a pass over all states, to results of these shapes, which are `written` to the caller's
-    /// places or stay here.
+    /// Checks the arguments and runs a pass over all states. Results of these shapes go to the caller's memory
+    /// `written`, or stay in the batch.
     #[track_caller]
     fn compute<P: Pass<T>>(
         &mut self,
@@ -225,7 +228,7 @@ impl<T: Real> Batch<T> {
         self.last = last;
         let mut to: [&mut [T]; MOST_RESULTS] = Default::default();
         if states == 0 {
-            return; // nothing to be written
+            return; // no results to write
         }
         if let Some(places) = written {
             self.last.check(places);
@@ -264,7 +267,7 @@ impl<T: Real> Batch<T> {
     }
 }
 
-/// A batch whose functions write their results to the caller's memory: see [`Batch::writer`].
+/// Batch whose functions write their results to the caller's memory: see [`Batch::writer`].
 #[derive(Debug)]
 pub struct BatchWriter<'b, 'a, T: Real> {
     batch: &'b mut Batch<T>,

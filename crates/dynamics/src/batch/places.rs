@@ -1,39 +1,39 @@
-//! The places to which passes of a batch put their results: of each state, one after the other.
+//! Destinations to which passes of a batch write the results of each state, one after the other.
 
 use super::group::SYMMETRIC;
 use condyle_spatial::block::{Block, MOST, Strided, scatter, scatter_matrix};
 use condyle_spatial::{Force, Inertia, Matrix, Motion, Scalar, Se3, Vec3};
 use core::mem;
 
-/// The most results of a function.
+/// Maximum number of results of a function.
 pub(super) const MOST_RESULTS: usize = 12;
 
-/// The places for the results of states, of which passes fill one after the other for some states at a time.
+/// Destinations for the results of states. Passes fill them one after the other, for a few states at a time.
 pub(super) struct Places<'a, T> {
-    /// The numbers of all states; of those results that a function does not have, none.
+    /// Memory for the numbers of all states; empty beyond the number of results.
     to: [&'a mut [T]; MOST_RESULTS],
-    /// The number of those that it has.
+    /// Number of results.
     results: usize,
-    /// The first of the states that are written now.
+    /// Index of the first state that is written now.
     first: usize,
-    /// How many they are.
+    /// Number of states that are written now.
     states: usize,
-    /// The result that is written next.
+    /// Index of the result that is written next.
     next: usize,
 }
 
 impl<'a, T> Places<'a, T> {
-    /// The places for so many results.
+    /// Returns the destinations for a given number of results.
     pub(super) fn new(to: [&'a mut [T]; MOST_RESULTS], results: usize, states: usize) -> Self {
         Self { to, results, first: 0, states, next: 0 }
     }
 
-    /// Goes to so many states from this one on.
+    /// Moves on to `states` states, starting at state `first`.
     pub(super) fn go_to(&mut self, first: usize, states: usize) {
         (self.first, self.states, self.next) = (first, states, 0);
     }
 
-    /// The places of the first `n` of `states` states, and of the others.
+    /// Splits the destinations into those for the first `n` of `states` states and those for the others.
     pub(super) fn split(mut self, n: usize, states: usize) -> (Self, Self) {
         let mut others = Self::new(Default::default(), self.results, states - n);
         for (first, other) in self.to[..self.results].iter_mut().zip(&mut others.to) {
@@ -46,27 +46,27 @@ impl<'a, T> Places<'a, T> {
 }
 
 impl<T> Places<'_, T> {
-    /// Writes some numbers of each state.
+    /// Writes a vector of each state.
     #[inline(never)]
     pub(super) fn numbers<S: Block<Number = T>>(&mut self, x: &[S]) {
         scatter(x, self.states, &mut self.to[self.next][self.first * x.len()..][..self.states * x.len()]);
         self.next += 1;
     }
 
-    /// Writes a matrix of each state, of so many columns, by rows.
+    /// Writes a matrix of each state by rows, for a matrix with the given number of columns.
     pub(super) fn columns<S: Block<Number = T>>(&mut self, x: &[S], columns: usize) {
         self.part(self.next, [0, 1], x, columns);
         self.next += 1;
     }
 
-    /// Writes a matrix of each state of a kind that could have stayed in lanes, by rows.
+    /// Writes a matrix of each state by rows, for a kind that could also have stayed in lanes.
     pub(super) fn kind<S: Block<Number = T>>(&mut self, kind: usize, x: &Matrix<S>) {
-        // the columns of what is symmetric are its rows, one after the other
+        // The columns of a symmetric matrix are its rows, one after the other.
         let columns = if SYMMETRIC.contains(&kind) { x.len() } else { x.ncols() };
         self.columns(x.as_slice(), columns);
     }
 
-    /// Writes matrix k of n, of a result that is so many matrices.
+    /// Writes matrix k of n, for a result that consists of n matrices.
     #[inline(never)]
     pub(super) fn part<S: Block<Number = T>>(&mut self, result: usize, [k, n]: [usize; 2], x: &[S], columns: usize) {
         if x.is_empty() {
@@ -82,7 +82,7 @@ impl<T> Places<'_, T> {
         scatter_matrix(&matrix, &mut each[..self.states], columns);
     }
 
-    /// Writes pose k of n, of a result that is so many poses, as a homogeneous matrix.
+    /// Writes pose k of n as a homogeneous matrix, for a result that consists of n poses.
     #[inline(always)]
     pub(super) fn pose<S: Block<Number = T>>(&mut self, result: usize, k: [usize; 2], X: Se3<S>) {
         let Se3 { rotation: R, translation: p } = X;
@@ -92,7 +92,7 @@ impl<T> Places<'_, T> {
     }
 }
 
-/// What a single call gives, which goes to the next places.
+/// Result of a single call, which is written to the next destinations.
 pub(super) trait Put<S: Block> {
     fn put(self, to: &mut Places<'_, S::Number>);
 }
@@ -118,7 +118,7 @@ put! {
     Inertia<S>: I => columns(&centroidal_matrix(I), 6);
 }
 
-/// The inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī], by columns.
+/// Returns the inertia of a whole robot about its centre of mass, [m 1, 0; 0, Ī], by columns.
 #[inline(always)]
 fn centroidal_matrix<S: Scalar>(I: Inertia<S>) -> [S; 36] {
     let mut columns = [S::zero(); 36];

@@ -1,4 +1,4 @@
-//! What a batch gives: vectors, matrices and poses of each state, and structs of them.
+//! Results of a batch: vectors, matrices and poses of each state, and structs of them.
 
 use super::places::MOST_RESULTS;
 use super::state_matrix::StateMatrix;
@@ -7,7 +7,8 @@ use condyle_linalg::{check, check_index};
 use condyle_spatial::block::Real;
 use condyle_spatial::{Mat3, Se3, Vec3};
 
-/// The shape of a result for one state: no sizes for a number, one for a vector, two for a matrix, three for so many matrices.
+/// Shape of a result for one state: no sizes for a number, one for a vector, two for a matrix, three for several
+/// matrices.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Shape {
     sizes: [usize; 3],
@@ -15,7 +16,7 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    /// A shape of some sizes, at most three.
+    /// Returns the shape with the given sizes, at most three.
     pub(super) fn new(given: impl Iterator<Item = usize>) -> Self {
         let (mut sizes, mut rank) = ([1; 3], 0);
         for size in given {
@@ -29,20 +30,20 @@ impl Shape {
         &self.sizes[..self.rank]
     }
 
-    /// The number of its numbers.
+    /// Returns the number of entries.
     pub(super) fn len(self) -> usize {
         self.sizes.iter().product()
     }
 
-    /// As one matrix: of several, one below the other.
+    /// Returns the shape as one matrix; several matrices are stacked vertically.
     fn matrix(self) -> [usize; 2] {
         let [a, b, c] = self.sizes;
         if self.rank == 3 { [a * b, c] } else { [a, b] }
     }
 }
 
-/// The results of the last call of a batch: how many states there were, the shape of each result, and which kind of matrix it
-/// is, if these stay in lanes.
+/// Shapes of the results of a batch's last call: the number of states, the shape of each result, and the kind of each
+/// matrix that stays in lanes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Last {
     pub states: usize,
@@ -52,13 +53,14 @@ pub(super) struct Last {
 }
 
 impl Last {
-    /// The number of states that these places have room for: of the first result that has numbers, else none.
+    /// Returns the number of states for which the slices have space. The first result with numbers determines it;
+    /// otherwise it is 0.
     pub(super) fn room<T>(&self, places: &[&mut [T]]) -> usize {
         let first = places.iter().zip(&self.shapes).find(|(_, shape)| shape.len() > 0);
         first.map_or(0, |(place, shape)| place.len() / shape.len())
     }
 
-    /// Panics unless these are places for its results.
+    /// Panics unless the slices match the results.
     #[track_caller]
     pub(super) fn check<T>(&self, places: &[&mut [T]]) {
         assert!(
@@ -74,15 +76,15 @@ impl Last {
     }
 }
 
-/// Results that are taken one after the other.
+/// Results that are read one after the other.
 pub(super) struct Taken<'b, T: Real> {
     pub batch: &'b Batch<T>,
     pub next: usize,
 }
 
-/// A kind of results.
+/// Type of results.
 pub(super) trait Take<'b, T: Real> {
-    /// The shapes of its results, where no function says them.
+    /// Shapes of the results, for types that define them. Otherwise the function defines them.
     const SHAPES: &'static [&'static [usize]] = &[];
 
     fn take(from: &mut Taken<'b, T>) -> Self;
@@ -118,7 +120,7 @@ impl<'b, T: Real> Take<'b, T> for Poses<'b, T> {
     }
 }
 
-/// A matrix for each state of a batch.
+/// Matrix of each state of a batch.
 #[derive(Clone, Copy, Debug)]
 pub struct Matrices<'b, T: Real> {
     of: Stored<'b, T>,
@@ -128,14 +130,14 @@ pub struct Matrices<'b, T: Real> {
 
 #[derive(Clone, Copy, Debug)]
 enum Stored<'b, T: Real> {
-    /// As the passes leave them, and of which kind they are.
+    /// Matrices of this kind, as the passes leave them.
     InLanes(&'b InLanes<T>, usize),
-    /// One after the other, each by rows.
+    /// Matrices one after the other, each by rows.
     ByRows(&'b [T]),
 }
 
 impl<'b, T: Real> Matrices<'b, T> {
-    /// Returns the matrix of state k, which [`to_owned`](StateMatrix::to_owned) copies to one of nalgebra's.
+    /// Returns the matrix of state k. [`to_owned`](StateMatrix::to_owned) copies it to a matrix of nalgebra.
     ///
     /// # Panics
     /// If state k does not exist.
@@ -149,7 +151,7 @@ impl<'b, T: Real> Matrices<'b, T> {
         }
     }
 
-    /// Writes those of all states one after the other, each by rows.
+    /// Writes the matrices of all states one after the other, each by rows.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -162,7 +164,7 @@ impl<'b, T: Real> Matrices<'b, T> {
     /// ```
     ///
     /// # Panics
-    /// If `to` does not have as many numbers.
+    /// If the length of `to` is not the number of entries of all states.
     #[track_caller]
     pub fn write_rows(&self, to: &mut [T]) {
         let [m, n] = self.shape;
@@ -190,10 +192,10 @@ impl<'b, T: Real> Matrices<'b, T> {
     }
 }
 
-/// Some poses for each state of a batch.
+/// Poses of each state of a batch.
 #[derive(Clone, Copy, Debug)]
 pub struct Poses<'b, T> {
-    /// Homogeneous matrices by rows.
+    /// Homogeneous matrices, each by rows.
     numbers: &'b [T],
     each: usize,
     states: usize,
@@ -219,8 +221,8 @@ fn check_state(k: usize, states: usize) {
     check_index("k", k, states, "states");
 }
 
-/// Structs of results, each made of a single call's struct: its members of these names are put one after the other, in places
-/// of the shapes in brackets.
+/// Defines structs of results, each made from a single call's struct. The fields of the given names are written one
+/// after the other, to destinations of the shapes in brackets.
 macro_rules! results {
     ($(
         $(#[$doc:meta])*
@@ -253,7 +255,7 @@ macro_rules! results {
 pub(super) use results;
 
 impl<T: Real> Batch<T> {
-    /// The sizes of each result of the last call, for one state.
+    /// Returns the sizes of each result of the last call, for one state.
     #[doc(hidden)]
     pub fn last_shapes(&self) -> impl Iterator<Item = &[usize]> {
         self.last.shapes[..self.last.results].iter().map(Shape::sizes)

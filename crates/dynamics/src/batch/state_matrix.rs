@@ -1,7 +1,7 @@
-//! The matrix of one state of a batch: borrowed numbers with a shape and two strides.
+//! Matrix of one state of a batch: borrowed numbers with a shape and two strides.
 //!
-//! It is a type of its own and no view of nalgebra's. nalgebra multiplies views whose rows are not adjacent by reading and
-//! writing out of bounds (its issue 1616). Here every access is checked.
+//! The type is not a view of nalgebra, because nalgebra's products of views with non-adjacent rows read and write out
+//! of bounds (its issue 1616). Here every access is checked.
 
 use super::state_matrix_operators::dot;
 use condyle_linalg::check;
@@ -10,11 +10,11 @@ use core::fmt;
 use core::ops::Index;
 use nalgebra::{DMatrix, Dim, Matrix, RawStorage, RawStorageMut, Scalar};
 
-/// A matrix of one state of a batch, which borrows its entries from the batch's results.
+/// Matrix of one state of a batch, which borrows its entries from the batch's results.
 ///
-/// Rows and columns may both have gaps between their entries, because several states share the memory. The matrix is
-/// indexed, iterated by columns, transposed, added, subtracted and multiplied as a matrix of nalgebra is.
-/// [`to_owned`](Self::to_owned) copies it to a `DMatrix`, which offers all the rest.
+/// Rows and columns may both have gaps between their entries, because several states share the memory. The matrix
+/// supports indexing, iteration by columns, transposition, sums, differences and products, like a matrix of nalgebra.
+/// [`to_owned`](Self::to_owned) copies it to a `DMatrix`, for all other operations.
 ///
 /// ```
 /// use condyle_dynamics::{Batch, robots};
@@ -28,7 +28,7 @@ use nalgebra::{DMatrix, Dim, Matrix, RawStorage, RawStorageMut, Scalar};
 /// assert!((M * &x - copy * x).amax() < 1e-14);
 /// ```
 pub struct StateMatrix<'b, T> {
-    /// Entry (i, j) is number i · `strides[0]` + j · `strides[1]`.
+    /// Numbers; entry (i, j) is number i · `strides[0]` + j · `strides[1]`.
     numbers: &'b [T],
     shape: [usize; 2],
     strides: [usize; 2],
@@ -44,13 +44,13 @@ impl<T> Clone for StateMatrix<'_, T> {
 impl<T> Copy for StateMatrix<'_, T> {}
 
 impl<'b, T> StateMatrix<'b, T> {
-    /// The matrix of this shape whose entry (i, j) is number i · `strides[0]` + j · `strides[1]`.
+    /// Returns the matrix of this shape whose entry (i, j) is number i · `strides[0]` + j · `strides[1]`.
     ///
     /// # Panics
-    /// If there are too few numbers.
+    /// If `numbers` is too short.
     #[track_caller]
     pub(super) fn new(numbers: &'b [T], shape: [usize; 2], strides: [usize; 2]) -> Self {
-        let strides = strides.map(|stride| stride.max(1)); // of an empty matrix they may be 0
+        let strides = strides.map(|stride| stride.max(1)); // 0 is possible for an empty matrix
         if let [Some(i), Some(j)] = shape.map(|size| size.checked_sub(1)) {
             let last = i * strides[0] + j * strides[1];
             assert!(last < numbers.len(), "numbers: expected more than {last}, found {}", numbers.len());
@@ -195,12 +195,12 @@ impl<'b, T> StateMatrix<'b, T> {
 }
 
 impl<T: Scalar> StateMatrix<'_, T> {
-    /// Copies the matrix to one of nalgebra's, which owns its entries.
+    /// Copies the matrix to a `DMatrix` of nalgebra.
     pub fn to_owned(&self) -> DMatrix<T> {
         DMatrix::from_iterator(self.shape[0], self.shape[1], self.iter().cloned())
     }
 
-    /// Copies the matrix to one of nalgebra's, or to a block of one. Allocates nothing.
+    /// Copies the matrix to a matrix of nalgebra, or to a block of one. Allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -222,7 +222,7 @@ impl<T: Scalar> StateMatrix<'_, T> {
     /// Writes the entries by rows. Allocates nothing.
     ///
     /// # Panics
-    /// If `to` does not have one number for each entry.
+    /// If the length of `to` is not the number of entries.
     #[track_caller]
     pub fn write_rows(&self, to: &mut [T]) {
         check("to", to.len(), self.len());
@@ -231,7 +231,7 @@ impl<T: Scalar> StateMatrix<'_, T> {
 }
 
 impl<T: Real> StateMatrix<'_, T> {
-    /// Writes the product M x, of a vector or of a matrix x, to `out`. Allocates nothing.
+    /// Writes the product M x to `out`, for a vector or a matrix x. Allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{Batch, robots};
@@ -243,7 +243,8 @@ impl<T: Real> StateMatrix<'_, T> {
     /// ```
     ///
     /// # Panics
-    /// If `x` does not have as many rows as the matrix has columns, or `out` is not of the product's shape.
+    /// If the number of rows of `x` is not the number of columns of the matrix, or `out` does not have the product's
+    /// shape.
     #[track_caller]
     pub fn mul_to<R: Dim, C: Dim, P: Dim, Q: Dim>(
         &self,
@@ -260,8 +261,7 @@ impl<T: Real> StateMatrix<'_, T> {
         }
     }
 
-    /// Writes the product M x of a vector to `out`: x has a number for each column, `out` one for each row. Allocates
-    /// nothing.
+    /// Writes the product M x of a vector to `out`: x has one number per column, `out` one per row. Allocates nothing.
     ///
     /// # Panics
     /// If `x` or `out` has the wrong length.
@@ -274,12 +274,12 @@ impl<T: Real> StateMatrix<'_, T> {
         }
     }
 
-    /// Returns the largest absolute value of the entries: 0 if there are none, not a number if one of them is none.
+    /// Returns the largest absolute value of the entries: 0 for an empty matrix, NaN if an entry is NaN.
     pub fn amax(&self) -> T {
         let mut most = T::zero();
         for x in self {
             let x = x.abs();
-            #[allow(clippy::eq_op)] // holds for what is not a number
+            #[allow(clippy::eq_op)] // true for NaN only
             if x != x {
                 return x;
             }
@@ -288,7 +288,7 @@ impl<T: Real> StateMatrix<'_, T> {
         most
     }
 
-    /// Returns the Frobenius norm: the square root of the sum of all squares.
+    /// Returns the Frobenius norm, the square root of the sum of the squared entries.
     pub fn norm(&self) -> T {
         self.iter().fold(T::zero(), |sum, &x| sum + x * x).sqrt()
     }
@@ -304,7 +304,7 @@ impl<T: Real> StateMatrix<'_, T> {
 impl<T> Index<(usize, usize)> for StateMatrix<'_, T> {
     type Output = T;
 
-    /// The entry in row i and column j.
+    /// Returns the entry in row i and column j.
     ///
     /// # Panics
     /// If the entry does not exist.
@@ -313,12 +313,12 @@ impl<T> Index<(usize, usize)> for StateMatrix<'_, T> {
     fn index(&self, (i, j): (usize, usize)) -> &T {
         match self.get((i, j)) {
             Some(x) => x,
-            None => no_entry((i, j), self.shape), // not in a closure, which would be reported in place of the caller
+            None => no_entry((i, j), self.shape), // not in a closure: the panic must name the caller
         }
     }
 }
 
-/// Reports an index outside of a matrix.
+/// Panics: the index is outside of the matrix.
 #[cold]
 #[inline(never)]
 #[track_caller]
@@ -326,10 +326,10 @@ fn no_entry((i, j): (usize, usize), [m, n]: [usize; 2]) -> ! {
     panic!("entry ({i}, {j}): expected a row below {m} and a column below {n}");
 }
 
-/// The entries of a [`StateMatrix`], by columns.
+/// Iterator over the entries of a [`StateMatrix`], by columns.
 pub struct Entries<'b, T> {
     of: StateMatrix<'b, T>,
-    /// The next entry.
+    /// Index (i, j) of the next entry.
     i: usize,
     j: usize,
 }

@@ -1,7 +1,7 @@
-//! Conversions, sums, differences, products and comparisons of [`StateMatrix`], with each other and with nalgebra's
-//! matrices.
+//! Conversions, sums, differences, products and comparisons of [`StateMatrix`], with each other and with matrices of
+//! nalgebra.
 //!
-//! Results own their entries. A product sums in the order of the columns, as two plain loops do.
+//! Results own their entries. A product sums over increasing column indices, as two plain loops do.
 
 use super::state_matrix::StateMatrix;
 use alloc::vec::Vec;
@@ -11,7 +11,7 @@ use core::ops::{Add, Mul, Neg, Sub};
 use nalgebra::allocator::Allocator;
 use nalgebra::{DMatrix, DVector, DefaultAllocator, Dim, Dyn, Matrix, OMatrix, RawStorage, Scalar};
 
-/// Returns Σ M_ik x_k, for k from 0 on.
+/// Returns Σ M_ik x_k, summed over increasing k.
 #[inline]
 pub(super) fn dot<T: Real>(M: &StateMatrix<'_, T>, i: usize, x: impl Fn(usize) -> T) -> T {
     let mut terms = M.row(i).into_iter().enumerate().map(|(k, &m)| m * x(k));
@@ -48,21 +48,21 @@ where
     OMatrix::from_fn_generic(R::from_usize(m), Dyn(M.ncols()), |i, j| dot(&Mt, j, |k| A[(i, k)])) // Σ A_ik M_kj
 }
 
-/// Returns the product A B of two matrices of states.
+/// Returns the product A B of two `StateMatrix` operands.
 #[track_caller]
 fn product_of_two<T: Real>(A: &StateMatrix<'_, T>, B: &StateMatrix<'_, T>) -> DMatrix<T> {
     A.check_factor(B.nrows());
     DMatrix::from_fn(A.nrows(), B.ncols(), |i, j| dot(A, i, |k| B[(k, j)])) // Σ A_ik B_kj
 }
 
-/// Returns the product M x of a vector in a slice.
+/// Returns the product M x, for a vector x in a slice.
 #[track_caller]
 fn product_with_slice<T: Real>(M: &StateMatrix<'_, T>, x: &[T]) -> DVector<T> {
     M.check_factor(x.len());
     DVector::from_fn(M.nrows(), |i, _| dot(M, i, |k| x[k])) // Σ M_ik x_k
 }
 
-/// A matrix with a shape and entries: of a state or of nalgebra's.
+/// Matrix with a shape and entries: a `StateMatrix` or a matrix of nalgebra.
 trait Entrywise {
     type Entry;
     fn size(&self) -> (usize, usize);
@@ -89,7 +89,7 @@ impl<T: Copy, R: Dim, C: Dim, S: RawStorage<T, R, C>> Entrywise for Matrix<T, R,
     }
 }
 
-/// A reference to one.
+/// Reference to such a matrix.
 impl<M: Entrywise> Entrywise for &M {
     type Entry = M::Entry;
     fn size(&self) -> (usize, usize) {
@@ -100,7 +100,7 @@ impl<M: Entrywise> Entrywise for &M {
     }
 }
 
-/// Combines the entries of two matrices of one shape.
+/// Combines the entries of two matrices of the same shape.
 #[track_caller]
 fn combined<T: Real>(
     a: &impl Entrywise<Entry = T>,

@@ -1,16 +1,21 @@
-//! How a function becomes one of a batch: `batched!` makes of an entry like
+//! Table of the batch functions. `batched!` turns an entry like
 //!
 //! ```text
 //! /// [`coriolis_matrix`](crate::coriolis_matrix): C of each state, nv × nv.
 //! fn coriolis_matrix(model, data; q, v) -> Matrices<'_, T> [[NV, NV]] { coriolis_matrix(model, data, q, v) }
 //! ```
 //!
-//! the methods of `Batch` and of `BatchWriter` of that name: they take the arguments of all states, check them, and run the
-//! body on groups of states, a lane for each. What it gives is put to the places that have the shapes in brackets; results in
-//! a struct have theirs there (`results!`). With `data => to` the body writes to places itself. After the arguments of states
-//! may stand some that all share, with their types; `with` names more of what a pass has, `columns` says what `COLUMNS` is in a
-//! shape, and `keeps` names the matrices of `Data` that stay in lanes instead, the last ones of the shapes; a writer writes
-//! them too.
+//! into methods of that name for `Batch` and `BatchWriter`. They take and check the arguments of all states, and run
+//! the body on groups of states, one state per lane.
+//!
+//! - The result of the body is written to destinations that have the shapes in brackets. Structs define their shapes in
+//!   `results!`.
+//! - With `data => to`, the body writes to the destinations itself.
+//! - Arguments of states may be followed by arguments that all states share, with their types.
+//! - `with` names further scratch of the pass.
+//! - `columns` gives the value of `COLUMNS` in a shape.
+//! - `keeps` names the matrices of `Data` that stay in lanes instead, the last ones of the shapes. A writer writes
+//!   these matrices too.
 
 use super::group::FORCES;
 use crate::calls::parameter_derivatives::Input;
@@ -19,33 +24,33 @@ use crate::passes::frames::{ReferenceFrame, check_body, check_frame};
 use crate::passes::passive::check_smoothing;
 use condyle_model::Model;
 
-/// Sizes that depend on the robot, in shapes.
+/// Sizes in shapes that depend on the robot.
 pub(super) const NV: usize = usize::MAX;
 pub(super) const BODIES: usize = usize::MAX - 1;
-/// Ten for each body but the world.
+/// Ten per body, except the world.
 pub(super) const PARAMETERS: usize = usize::MAX - 2;
-/// Of constraints.
+/// Number of constraint rows.
 pub(super) const ROWS: usize = usize::MAX - 3;
-/// What an entry says.
+/// Number of columns given by an entry of the table.
 pub(super) const COLUMNS: usize = usize::MAX - 4;
 
-/// An argument of some states.
+/// Argument of some states.
 #[derive(Clone, Copy)]
 pub(super) struct Given<'a, T> {
     pub name: &'static str,
-    /// Its place among the arguments of a pass.
+    /// Slot among the arguments of a pass.
     pub at: usize,
     pub numbers: &'a [T],
 }
 
-/// The type of an argument.
+/// Expands to the type of an argument.
 macro_rules! given {
     (f_ext, $T:ident) => { &[condyle_spatial::Force<$T>] };
     ($name:ident, $T:ident) => { &[$T] };
 }
 pub(super) use given;
 
-/// The numbers of an argument.
+/// Expands to the numbers of an argument.
 macro_rules! numbers {
     (f_ext, $x:expr) => {
         condyle_spatial::block::flat($x)
@@ -56,7 +61,7 @@ macro_rules! numbers {
 }
 pub(super) use numbers;
 
-/// The place of an argument among those of a pass, by its name.
+/// Returns the slot of an argument among the arguments of a pass, by its name.
 pub(super) const fn place(name: &str) -> usize {
     match name.as_bytes() {
         b"q" => 0,
@@ -67,9 +72,10 @@ pub(super) const fn place(name: &str) -> usize {
     }
 }
 
-/// An argument that all states share. It is checked before the lanes are entered, so that the panic names the caller's line.
+/// Argument that all states share. It is checked before the lanes are entered, so that the panic names the caller's
+/// line.
 pub(super) trait Shared: Sized {
-    /// Panics if the argument of this name is wrong for the model.
+    /// Panics if the argument of this name is invalid for the model.
     #[track_caller]
     fn check(self, _name: &str, _model: &Model) {}
 }
@@ -77,7 +83,7 @@ pub(super) trait Shared: Sized {
 impl Shared for ReferenceFrame {}
 impl Shared for Option<ForwardDynamicsMethod> {}
 
-/// A body or a frame.
+/// Index of a body or a frame.
 impl Shared for usize {
     #[track_caller]
     fn check(self, name: &str, model: &Model) {
@@ -88,7 +94,7 @@ impl Shared for usize {
     }
 }
 
-/// A restitution or a smoothing.
+/// Restitution or smoothing.
 impl Shared for f64 {
     #[track_caller]
     fn check(self, name: &str, _: &Model) {
@@ -105,7 +111,7 @@ impl Shared for Input {
     }
 }
 
-/// Puts what a pass gives to the next places, if it has not written to places itself.
+/// Writes the result of a pass to the next destinations, unless the pass has written it itself.
 macro_rules! put {
     ($places:ident, $body:block) => {
         $crate::batch::places::Put::<S>::put($body, $places)
@@ -117,7 +123,7 @@ macro_rules! put {
 }
 pub(super) use put;
 
-/// The shapes of results: as a function says, or as the struct that it gives does.
+/// Expands to the shapes of results, given by the function or by the struct that it returns.
 macro_rules! shapes {
     ($Out:ty, [$([$($size:expr),*]),*]) => { &[$(&[$($size),*]),*] };
     ($Out:ty,) => { <$Out as $crate::batch::results::Take<T>>::SHAPES };
@@ -144,7 +150,7 @@ macro_rules! batched {
                 const KINDS: &'static [usize] = &[$($($kind),+)?];
 
                 #[inline(always)]
-                #[allow(unused_variables)] // by passes that need no `Data`, or leave what they give
+                #[allow(unused_variables)] // some passes need no `Data` or keep their results
                 fn run<S: condyle_spatial::block::Block<Number = T>>(self, s: States<'_, S>, to: &mut Places<'_, T>) {
                     let Self { $($($shared),*)? } = self;
                     let ($model, $data) = (s.model, s.data);
@@ -165,8 +171,8 @@ macro_rules! batched {
                 }
             }
 
-            /// For all states, to where the results are `written` or to where they stay.
-            #[allow(clippy::too_many_arguments)] // those of the function
+            /// Computes all states. Results are `written` to the caller's memory or stay in the batch.
+            #[allow(clippy::too_many_arguments)] // as many as the function has
             #[track_caller]
             pub(super) fn compute<T: condyle_spatial::block::Real>(
                 batch: &mut $crate::batch::Batch<T>,
@@ -205,10 +211,11 @@ macro_rules! batched {
         )*}
 
         impl<T: condyle_spatial::block::Real> $crate::batch::BatchWriter<'_, '_, T> {$(
-            #[doc = concat!("Writes what [`Batch::", stringify!($name), "`](crate::Batch::", stringify!($name), ") gives.")]
+            #[doc = concat!("Writes the results of [`Batch::", stringify!($name), "`](crate::Batch::", stringify!($name), ").")]
             ///
             /// # Panics
-            /// As it does, or if there are not as many places as results, or a place does not have the size of its result.
+            /// As the method of [`Batch`](crate::Batch), or if `to` does not have one slice per result, each of the
+            /// result's size.
             #[track_caller]
             pub fn $name(
                 &mut self,

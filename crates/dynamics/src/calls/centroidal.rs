@@ -1,4 +1,4 @@
-//! The momentum of the whole robot about its centre of mass, and all terms of the equations of motion at once.
+//! Momentum of the whole robot about its centre of mass, and all terms of the equations of motion in one call.
 
 use super::kinematics::{forward_kinematics, forward_velocities};
 use crate::data::Data;
@@ -8,10 +8,10 @@ use crate::passes::frames::{Placements, Velocities};
 use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar};
 
-/// Ag(q), the centroidal momentum matrix, with the centre of mass, its Jacobian and the inertia about it, in O(n).
+/// Computes the centroidal momentum matrix Ag(q), the centre of mass, its Jacobian, and the inertia about it, in O(n).
 ///
-/// q: nq numbers. What is fixed to the world does not count; not a number if nothing that moves has a mass. Allocates
-/// nothing. Source: Orin, Goswami, Lee (2013).
+/// q: nq numbers. Bodies fixed to the world are ignored; results are NaN if no moving body has mass. Allocates nothing.
+/// Source: Orin, Goswami, Lee (2013).
 ///
 /// ```
 /// use condyle_dynamics::{Data, centroidal_map, neutral, robots};
@@ -23,7 +23,7 @@ use condyle_spatial::{Constant, Scalar};
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[inline(always)]
 #[track_caller]
 pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
@@ -36,10 +36,11 @@ pub fn centroidal_map<'d, S: Scalar, R: Constant<S>>(
     data.centroidal.map()
 }
 
-/// Ag(q), dAg/dt along v, and the centroidal momentum hg = Ag v, with what [`centroidal_map`] gives, in O(n).
+/// Computes Ag(q), dAg/dt along v, and the centroidal momentum hg = Ag v, with all results of [`centroidal_map`], in
+/// O(n).
 ///
-/// q: nq numbers; v: nv. What is fixed to the world does not count; not a number if nothing that moves has a mass.
-/// Allocates nothing. Source: Wensing and Orin (2016).
+/// q: nq numbers; v: nv. Bodies fixed to the world are ignored; results are NaN if no moving body has mass. Allocates
+/// nothing. Source: Wensing and Orin (2016).
 ///
 /// ```
 /// use condyle_dynamics::{Data, centroidal_map_rate, forward_accelerations, robots};
@@ -65,13 +66,13 @@ pub fn centroidal_map_rate<'d, S: Scalar, R: Constant<S>>(
     data.centroidal.map_rate()
 }
 
-/// M, h, Ag, dAg, hg, centre of mass, energies, and the Jacobians of all frames: what the equations of motion are made
-/// of, from one pass to the tips and one back, in O(n · depth).
+/// Computes all terms of the equations of motion in two passes, in O(n · depth): M, h, Ag, dAg, hg, centre of mass,
+/// energies, and the Jacobians of all frames.
 ///
-/// q: nq numbers; v: nv. The numbers are those of [`crba`](crate::crba),
+/// q: nq numbers; v: nv. Up to rounding, the results equal the results of the separate calls [`crba`](crate::crba),
 /// [`nonlinear_effects`](crate::nonlinear_effects), [`centroidal_map_rate`](crate::centroidal_map_rate) and
-/// [`forward_velocities`](crate::forward_velocities), up to rounding. Allocates nothing. Source: Featherstone, *Rigid
-/// Body Dynamics Algorithms* (2008), tables 5.1 and 6.2; Wensing and Orin (2016).
+/// [`forward_velocities`](crate::forward_velocities). Allocates nothing. Source: Featherstone, *Rigid Body Dynamics
+/// Algorithms* (2008), tables 5.1 and 6.2; Wensing and Orin (2016).
 ///
 /// ```
 /// use condyle_dynamics::{Data, ReferenceFrame, compute_all_terms, robots};

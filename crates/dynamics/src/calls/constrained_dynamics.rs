@@ -1,4 +1,4 @@
-//! Forward dynamics under constraints, its derivatives, and the equations differentiated.
+//! Forward dynamics under constraints, its derivatives, and its linearised equations.
 
 use super::inverse_dynamics::check_arguments;
 use super::limbs_constrained;
@@ -13,30 +13,34 @@ use crate::passes::kinematics::positions;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
-/// What [`constrained_dynamics`] gives.
+/// Result of [`constrained_dynamics`].
 #[derive(Clone, Copy, Debug)]
 pub struct Constrained<'d, S> {
     /// q̈, nv numbers (rad/s², m/s²).
     pub a: &'d [S],
-    /// λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m); as many numbers as
-    /// there are rows.
+    /// λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m); one number per
+    /// row.
     pub lambda: &'d [S],
-    /// The largest number in J q̈ + γ (m/s², rad/s²): how well the constraints are satisfied.
+    /// Largest absolute value in J q̈ + γ (m/s², rad/s²): measures how well the constraints are satisfied.
     pub residual: S,
-    /// The number of rows of J that depend on rows before them, up to rounding: they have no force of their own (in f64, J
-    /// M⁻¹ Jᵀ + μ 1 is singular to 13 digits). 0 says that the solution is the only one.
+    /// Number of rows of J that depend on earlier rows, up to rounding. These rows get no force of their own (in f64, J
+    /// M⁻¹ Jᵀ + μ 1 is singular to 13 digits). 0 means that the solution is unique.
     pub redundant: S,
 }
 
-/// q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that make J q̈ + γ = 0: forward dynamics under constraints.
+/// Computes forward dynamics under constraints: q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i), with the forces λ that make J
+/// q̈ + γ = 0.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (N, N m), number 0 being the world's; or empty
-/// for none. Works on the tree's zeros: O(n d²) for a tree of depth d, O(d) for each pair of rows, O(rows³); of robots
-/// with limbs ([`Model::with_limbs`]) on the articulated bodies, in O(n) beside the rows. Allocates nothing.
-/// Constraints that contradict each other, or themselves at a singular posture, give finite numbers and a residual;
-/// [`Proximal`](crate::Proximal) settings decide how redundant ones share their forces. Source: Carpentier, Budhiraja,
-/// Mansard (2021), on the factorisation of Featherstone (2005); Wensing, Featherstone, Orin, *A reduced-order recursive
-/// algorithm for the computation of the operational-space inertia matrix* (2012).
+/// q: nq numbers; v, tau: nv; f_ext: one force per body in the body's frame (N, N m), index 0 is the world; or empty
+/// for none. The computation uses the sparsity of the tree: O(n d²) for a tree of depth d, O(d) for each pair of rows,
+/// and O(rows³). For robots with limbs ([`Model::with_limbs`]) it uses the articulated bodies: O(n) plus the cost of
+/// the rows. Allocates nothing.
+///
+/// If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the result is
+/// finite and `residual` is not zero. [`Proximal`](crate::Proximal) settings decide how redundant constraints share
+/// their forces. Source: Carpentier, Budhiraja, Mansard (2021), with the factorisation of Featherstone (2005); Wensing,
+/// Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the operational-space inertia
+/// matrix* (2012).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics, neutral, robots};
@@ -77,7 +81,7 @@ pub fn constrained_dynamics<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Panics unless the arguments fit.
+/// Panics if an argument is invalid.
 #[inline]
 #[track_caller]
 fn check<S: Scalar, R>(model: &Model<R>, data: &Data<S>, constraints: &ConstraintSet<S>, arguments: Arguments<'_, S>) {
@@ -86,7 +90,7 @@ fn check<S: Scalar, R>(model: &Model<R>, data: &Data<S>, constraints: &Constrain
     model.check_regular();
 }
 
-/// The whole algorithm over the factor of M, for arguments that fit.
+/// Runs the whole algorithm with the factor of M. The arguments must be valid.
 pub(crate) fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -102,20 +106,20 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     solve(constraints, &d.factor, &d.effort, &mut d.qdd);
 }
 
-/// What [`constrained_dynamics_equations`] gives; J is that of [`ConstraintSet::jacobian`].
+/// Result of [`constrained_dynamics_equations`]. [`ConstraintSet::jacobian`] returns J.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedEquations<'d, S> {
-    /// q̈ itself, nv numbers.
+    /// q̈, nv numbers.
     pub a: &'d [S],
-    /// λ itself, as many numbers as there are rows.
+    /// λ, one number per row.
     pub lambda: &'d [S],
-    /// The largest number in J q̈ + γ (m/s², rad/s²).
+    /// Largest absolute value in J q̈ + γ (m/s², rad/s²).
     pub residual: S,
-    /// The number of rows of J that depend on rows before them, up to rounding.
+    /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// M, nv × nv, armature included.
+    /// M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
-    /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: the change of τ when q moves to q ⊕ δ, per δ.
+    /// r_q = ∂(M q̈ + h − Jᵀ λ)/∂q in the tangent space, nv × nv: change of τ per δ when q moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
     /// r_v = ∂h/∂v, nv × nv.
     pub dtau_dv: &'d Matrix<S>,
@@ -125,19 +129,19 @@ pub struct ConstrainedEquations<'d, S> {
     pub dgamma_dv: &'d Matrix<S>,
 }
 
-/// [`constrained_dynamics`](crate::constrained_dynamics()) and the linear equations between changes of q, v, τ and of the
-/// q̈ and λ that follow:
+/// Computes [`constrained_dynamics`](crate::constrained_dynamics()) and its linearised equations, which relate changes
+/// of q, v and τ to changes of q̈ and λ:
 ///
 /// ```text
 /// M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,      J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 /// ```
 ///
-/// What [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives) solves, for those who would rather
-/// eliminate something else: nothing is inverted here, and all blocks keep the zeros of the tree.
+/// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives) solves these equations. This function
+/// is for callers that eliminate other unknowns: it inverts nothing, and all blocks keep the sparsity of the tree.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
-/// Targets of the constraints are fixed. In O(n · depth) beside the forward dynamics. Allocates nothing. Source: Carpentier
-/// and Mansard (2018).
+/// q: nq numbers; v, tau: nv; f_ext: one force per body in its frame (the force moves with the body), or empty for
+/// none. Targets of the constraints are fixed. Costs O(n · depth) in addition to the forward dynamics. Allocates
+/// nothing. Source: Carpentier and Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics_equations, crba, robots};
@@ -179,7 +183,7 @@ pub fn constrained_dynamics_equations<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Forward dynamics and the equations differentiated, for arguments that fit.
+/// Computes forward dynamics and its linearised equations. The arguments must be valid.
 pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -195,18 +199,18 @@ pub(crate) fn differentiate<S: Scalar, R: Constant<S>>(
     differentiate_motion(constraints, world, &id.bodies);
 }
 
-/// What [`constrained_dynamics_derivatives`] gives. The blocks of K⁻¹ are ∂q̈/∂τ, −∂λ/∂τ (transposed) and −Λ.
+/// Result of [`constrained_dynamics_derivatives`]. The blocks of K⁻¹ are ∂q̈/∂τ, −∂λ/∂τ (transposed) and −Λ.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedDerivatives<'d, S> {
-    /// q̈ itself, nv numbers.
+    /// q̈, nv numbers.
     pub a: &'d [S],
-    /// λ itself, as many numbers as there are rows.
+    /// λ, one number per row.
     pub lambda: &'d [S],
-    /// The largest number in J q̈ + γ (m/s², rad/s²).
+    /// Largest absolute value in J q̈ + γ (m/s², rad/s²).
     pub residual: S,
-    /// The number of rows of J that depend on rows before them, up to rounding.
+    /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// ∂q̈/∂q in the tangent space, nv × nv: the change of q̈ when q moves to q ⊕ δ, per δ.
+    /// ∂q̈/∂q in the tangent space, nv × nv: change of q̈ per δ when q moves to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
     /// ∂q̈/∂v, nv × nv.
     pub da_dv: &'d Matrix<S>,
@@ -218,17 +222,20 @@ pub struct ConstrainedDerivatives<'d, S> {
     pub dlambda_dv: &'d Matrix<S>,
     /// ∂λ/∂τ, rows × nv.
     pub dlambda_dtau: &'d Matrix<S>,
-    /// Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows: the inertia that the robot shows to its constraints.
+    /// Λ = (J M⁻¹ Jᵀ)⁻¹, rows × rows: inertia of the robot along its constraints.
     pub inertia: &'d Matrix<S>,
 }
 
-/// [`constrained_dynamics`](crate::constrained_dynamics()) and its derivatives with respect to q, v and τ, exact.
+/// Computes [`constrained_dynamics`](crate::constrained_dynamics()) and its exact derivatives with respect to q, v and
+/// τ.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
-/// Targets of the constraints are fixed. In O(n · depth) for what goes into them and O((n + rows)² n) for the products
-/// with K⁻¹, of which zeros of the tree are left out. Allocates nothing. Where constraints are redundant, the derivatives
-/// of q̈ are exact up to the residual; those of λ are the solution of the same kind (without μ: redundant rows without
-/// force; with μ: the smallest one) of the equations differentiated. Source: Carpentier and Mansard (2018).
+/// q: nq numbers; v, tau: nv; f_ext: one force per body in its frame (the force moves with the body), or empty for
+/// none. Targets of the constraints are fixed. Costs O(n · depth) for the right-hand sides and O((n + rows)² n) for the
+/// products with K⁻¹, which skip the zeros of the tree. Allocates nothing.
+///
+/// Where constraints are redundant, the derivatives of q̈ are exact up to the residual. The derivatives of λ then solve
+/// the differentiated equations in the same sense as λ: without μ, redundant rows have no force; with μ, the solution
+/// is the smallest one. Source: Carpentier and Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics_derivatives, robots};

@@ -1,5 +1,5 @@
-//! Inverse dynamics under constraints: the efforts and the constraints' accelerations for a motion and forces that are
-//! given, and their derivatives.
+//! Inverse dynamics under constraints: efforts and constraint accelerations for given motions and forces, and their
+//! derivatives.
 
 use super::inverse_dynamics;
 use crate::constraints::constrained_dynamics::evaluate;
@@ -14,22 +14,22 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
-/// What [`constrained_inverse_dynamics`] gives; J is that of [`ConstraintSet::jacobian`].
+/// Result of [`constrained_inverse_dynamics`]. [`ConstraintSet::jacobian`] returns J.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedInverse<'d, S> {
     /// τ = M q̈ + h − Jᵀ λ, nv numbers (N m, N).
     pub tau: &'d [S],
-    /// J q̈ + γ, as many numbers as there are rows (m/s², rad/s²): 0 where the motion satisfies the constraints.
+    /// J q̈ + γ, one number per row (m/s², rad/s²): 0 where the motion satisfies the constraints.
     pub acceleration: &'d [S],
 }
 
-/// τ = M q̈ + h − Jᵀ λ − Σ Jᵢᵀ f_ext,i and J q̈ + γ, for accelerations and forces that are given: inverse dynamics under
-/// constraints.
+/// Computes inverse dynamics under constraints for given accelerations and forces: τ = M q̈ + h − Jᵀ λ − Σ Jᵢᵀ f_ext,i,
+/// and J q̈ + γ.
 ///
-/// Where nothing drives a coordinate, τ is 0 in any motion that is possible; where constraints hold, J q̈ + γ is.
+/// For a feasible motion, τ is 0 at each coordinate without an actuator, and J q̈ + γ is 0.
 ///
-/// q: nq numbers; v, a: nv; lambda: a number for each row; f_ext: a force on each body in its frame, number 0 being the
-/// world's, or empty for none. In O(n) beside the rows of J. Allocates nothing.
+/// q: nq numbers; v, a: nv; lambda: one number per row; f_ext: one force per body in its frame, index 0 is the world;
+/// or empty for none. Costs O(n) plus the cost of the rows of J. Allocates nothing.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics, constrained_inverse_dynamics};
@@ -67,16 +67,16 @@ pub fn constrained_inverse_dynamics<'d, S: Scalar, R: Constant<S>>(
     ConstrainedInverse { tau: &data.rnea.tau, acceleration: &constraints.error }
 }
 
-/// What [`constrained_inverse_dynamics_derivatives`] gives; J is that of [`ConstraintSet::jacobian`], and ∂τ/∂λ = −Jᵀ.
+/// Result of [`constrained_inverse_dynamics_derivatives`]. [`ConstraintSet::jacobian`] returns J, and ∂τ/∂λ = −Jᵀ.
 #[derive(Clone, Copy, Debug)]
 pub struct ConstrainedInverseDerivatives<'d, S> {
-    /// τ itself, nv numbers.
+    /// τ, nv numbers.
     pub tau: &'d [S],
-    /// J q̈ + γ itself, as many numbers as there are rows.
+    /// J q̈ + γ, one number per row.
     pub acceleration: &'d [S],
-    /// ∂τ/∂q̈ = M, nv × nv, armature included.
+    /// ∂τ/∂q̈ = M, nv × nv, including armature.
     pub M: &'d Matrix<S>,
-    /// ∂τ/∂q in the tangent space, nv × nv: the change of τ when q moves to q ⊕ δ, per δ.
+    /// ∂τ/∂q in the tangent space, nv × nv: change of τ per δ when q moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
     /// ∂τ/∂v, nv × nv.
     pub dtau_dv: &'d Matrix<S>,
@@ -86,11 +86,12 @@ pub struct ConstrainedInverseDerivatives<'d, S> {
     pub dacceleration_dv: &'d Matrix<S>,
 }
 
-/// [`constrained_inverse_dynamics`] and its derivatives with respect to q, v and q̈, exact; those with respect to λ are
-/// −Jᵀ and 0.
+/// Computes [`constrained_inverse_dynamics`] and its exact derivatives with respect to q, v and q̈. The derivatives
+/// with respect to λ are −Jᵀ (of τ) and 0 (of J q̈ + γ).
 ///
-/// Arguments as there; targets of the constraints are fixed. In O(n · depth). Allocates nothing. Source: Carpentier and
-/// Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018).
+/// Arguments are as for [`constrained_inverse_dynamics`]; targets of the constraints are fixed. In O(n · depth).
+/// Allocates nothing. Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms*
+/// (2018).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_inverse_dynamics_derivatives, crba};
@@ -131,7 +132,7 @@ pub fn constrained_inverse_dynamics_derivatives<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// The matrices of [`ConstrainedInverseDerivatives`].
+/// Matrices of [`ConstrainedInverseDerivatives`].
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct EquationsAt<'d, S> {
@@ -142,8 +143,8 @@ pub struct EquationsAt<'d, S> {
     pub dgamma_dv: &'d Matrix<S>,
 }
 
-/// [`constrained_inverse_dynamics_derivatives`] without the values: for the knots of an optimal control problem, whose rollout
-/// has found q̈ and λ.
+/// Computes only the matrices of [`constrained_inverse_dynamics_derivatives`]. It serves the knots of an optimal
+/// control problem, whose rollout has already computed q̈ and λ.
 #[doc(hidden)]
 #[track_caller]
 pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
@@ -166,7 +167,7 @@ pub fn constrained_equations_at<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// The derivatives, for arguments that fit.
+/// Computes the derivatives. The arguments must be valid.
 fn differentiate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -184,7 +185,7 @@ fn differentiate<S: Scalar, R: Constant<S>>(
     differentiate_motion(constraints, world, &id.bodies);
 }
 
-/// τ, for bodies that are placed.
+/// Computes τ for bodies whose placements are known.
 fn inverse<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -197,7 +198,7 @@ fn inverse<S: Scalar, R: Constant<S>>(
     rnea::run(model, &mut data.world, &mut data.rnea, q, v, a, &data.constrained_derivatives.forces);
 }
 
-/// Panics unless the arguments fit.
+/// Panics if an argument is invalid.
 #[inline]
 #[track_caller]
 fn check_arguments<S: Scalar, R>(

@@ -18,10 +18,11 @@ use condyle_linalg::tree_product::minus_products;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 
-/// ∂τ/∂q of [`static_torque`](crate::static_torque()), and without forces of [`gravity`](crate::gravity): exact, in O(n · depth).
+/// Computes ∂τ/∂q of [`static_torque`](crate::static_torque()), exactly, in O(n · depth). Without forces it is ∂τ/∂q of
+/// [`gravity`](crate::gravity).
 ///
-/// q: nq numbers; f_ext: a force on each body in its frame (it moves with the body), or empty for none. Returns the full
-/// nv × nv matrix (N m/rad, N/m), entry (i, j) being ∂τᵢ/∂q_j. Allocates nothing. Source: as of
+/// q: nq numbers; f_ext: one force per body in its frame (the force moves with the body), or empty for none. Returns
+/// the full nv × nv matrix (N m/rad, N/m), with entry (i, j) = ∂τᵢ/∂q_j. Allocates nothing. Source: as for
 /// [`rnea_derivatives`], at rest.
 ///
 /// ```
@@ -47,10 +48,11 @@ pub fn static_torque_derivative<'d, S: Scalar, R: Constant<S>>(
     &data.statics.dtau_dq
 }
 
-/// The derivatives of kinetic and potential energy with respect to q and v, exact, in O(n).
+/// Computes the exact derivatives of kinetic and potential energy with respect to q and v, in O(n).
 ///
-/// q: nq numbers; v: nv. Returns nv numbers each (J/rad, J s/rad, J/rad; per m for axes that slide). Allocates nothing.
-/// Source: T = ½ Σ ⟨v, I v⟩ + ½ Σ armature q̇² and V = −Σ m gᵀ c, with ∂v/∂q of `frame_derivatives.rs`.
+/// q: nq numbers; v: nv. Returns three vectors of nv numbers (J/rad, J s/rad, J/rad; per m for sliding joints).
+/// Allocates nothing. Source: T = ½ Σ ⟨v, I v⟩ + ½ Σ armature q̇² and V = −Σ m gᵀ c, with ∂v/∂q of
+/// `frame_derivatives.rs`.
 ///
 /// ```
 /// use condyle_dynamics::{Data, energy_derivatives, gravity, robots};
@@ -76,22 +78,23 @@ pub fn energy_derivatives<'d, S: Scalar, R: Constant<S>>(
     data.energy.view()
 }
 
-/// The derivatives of τ = rnea(q, v, a): three full nv × nv matrices, and [all others](Self::with_respect_to) when asked.
+/// Derivatives of τ = rnea(q, v, a): three full nv × nv matrices. [`with_respect_to`](Self::with_respect_to) computes
+/// the derivatives with respect to other inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct RneaDerivatives<'d, S, R = f64> {
-    /// ∂τ/∂q in the tangent space: the change of τ when q moves to q ⊕ δ, per δ.
+    /// ∂τ/∂q in the tangent space: change of τ per δ when q moves to q ⊕ δ.
     pub dtau_dq: &'d Matrix<S>,
     /// ∂τ/∂v.
     pub dtau_dv: &'d Matrix<S>,
-    /// ∂τ/∂a = M(q), armature included.
+    /// ∂τ/∂a = M(q), including armature.
     pub dtau_da: &'d Matrix<S>,
     pub(crate) state: State<'d, S, R>,
 }
 
-/// The derivatives of [`rnea`](crate::rnea) with respect to q, v and a, exact, in O(n · depth).
+/// Computes the exact derivatives of [`rnea`](crate::rnea) with respect to q, v and a, in O(n · depth).
 ///
-/// q: nq numbers; v, a: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
-/// Returns three nv × nv matrices, row by row ∂τᵢ/∂·. Allocates nothing. Source: Singh, Russell, Wensing (2022),
+/// q: nq numbers; v, a: nv; f_ext: one force per body in its frame (the force moves with the body), or empty for none.
+/// Returns three nv × nv matrices; row i is ∂τᵢ/∂·. Allocates nothing. Source: Singh, Russell, Wensing (2022),
 /// algorithm 1.
 ///
 /// ```
@@ -125,14 +128,15 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
     view(model, data)
 }
 
-/// Body by body, for arguments that fit; leaves what second derivatives are made of.
+/// Computes the derivatives body by body and keeps the terms needed for second derivatives. The arguments must be
+/// valid.
 pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
     let Arguments { q, v, x: a, f_ext } = arguments;
     positions(model, &mut data.world, q);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
 }
 
-/// What `pass` has left, body by body or in the limbs' lanes.
+/// Returns a view of the results of `pass`, computed body by body or in the limbs' lanes.
 pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDerivatives<'d, S, R> {
     let d = &data.rnea_derivatives;
     let in_limbs = matches!(data.world.placed, PlacementCache::Limbs(_));
@@ -142,7 +146,7 @@ pub(crate) fn view<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> RneaDeri
     RneaDerivatives { dtau_dq: &d.dtau_dq, dtau_dv: &d.dtau_dv, dtau_da: &d.dtau_da, state }
 }
 
-/// The derivatives of the Coriolis product C(q, v) v, each a full nv × nv matrix.
+/// Derivatives of the Coriolis product C(q, v) v, each a full nv × nv matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct CoriolisDerivatives<'d, S> {
     /// ∂(C v)/∂q.
@@ -151,10 +155,10 @@ pub struct CoriolisDerivatives<'d, S> {
     pub dv: &'d Matrix<S>,
 }
 
-/// The derivatives of C(q, v) v = h(q, v) − g(q), the Coriolis and centrifugal efforts, exact, in O(n · depth).
+/// Computes the exact derivatives of the Coriolis and centrifugal efforts C(q, v) v = h(q, v) − g(q), in O(n · depth).
 ///
-/// q: nq numbers; v: nv. Returns two nv × nv matrices (N m/rad, N m s/rad). Allocates nothing. Source: those of
-/// [`rnea`](crate::rnea) at a = 0 where nothing weighs anything.
+/// q: nq numbers; v: nv. Returns two nv × nv matrices (N m/rad, N m s/rad). Allocates nothing. Source: the derivatives
+/// of [`rnea`](crate::rnea) at a = 0 without gravity.
 ///
 /// ```
 /// use condyle_dynamics::{Data, coriolis_derivatives, coriolis_matrix, robots};
@@ -182,12 +186,13 @@ pub fn coriolis_derivatives<'d, S: Scalar, R: Constant<S>>(
     CoriolisDerivatives { dq: &d.dtau_dq, dv: &d.dtau_dv }
 }
 
-/// q̈ = aba(q, v, τ) and its derivatives: three full nv × nv matrices, and [all others](Self::with_respect_to) when asked.
+/// q̈ = aba(q, v, τ) and its derivatives: three full nv × nv matrices. [`with_respect_to`](Self::with_respect_to)
+/// computes the derivatives with respect to other inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct AbaDerivatives<'d, S, R = f64> {
-    /// q̈ itself, nv numbers.
+    /// q̈, nv numbers.
     pub a: &'d [S],
-    /// ∂q̈/∂q in the tangent space: the change of q̈ when q moves to q ⊕ δ, per δ.
+    /// ∂q̈/∂q in the tangent space: change of q̈ per δ when q moves to q ⊕ δ.
     pub da_dq: &'d Matrix<S>,
     /// ∂q̈/∂v.
     pub da_dv: &'d Matrix<S>,
@@ -196,11 +201,11 @@ pub struct AbaDerivatives<'d, S, R = f64> {
     pub(crate) state: State<'d, S, R>,
 }
 
-/// [`aba`](crate::aba) and its derivatives with respect to q, v and τ, exact.
+/// Computes [`aba`](crate::aba) and its exact derivatives with respect to q, v and τ.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
-/// Returns q̈ and three nv × nv matrices, in O(n · depth) for what goes into them and O(n³) for the products with M⁻¹.
-/// Allocates nothing. Source: Carpentier and Mansard (2018), equation 18.
+/// q: nq numbers; v, tau: nv; f_ext: one force per body in its frame (the force moves with the body), or empty for
+/// none. Returns q̈ and three nv × nv matrices. Costs O(n · depth) for the derivatives of τ and O(n³) for the products
+/// with M⁻¹. Allocates nothing. Source: Carpentier and Mansard (2018), equation 18.
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba_derivatives, minv, robots};
@@ -240,7 +245,8 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     view_of_aba(model, data)
 }
 
-/// Body by body, for arguments that fit; leaves what second derivatives are made of.
+/// Computes the derivatives body by body and keeps the terms needed for second derivatives. The arguments must be
+/// valid.
 pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
     let Arguments { v, f_ext, .. } = arguments;
     accelerate(model, data, arguments);
@@ -251,7 +257,7 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Da
     if data.minv.by_factor {
         minv::from_matrix(&mut data.minv, &data.rnea_derivatives.dtau_da);
     } else {
-        minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // those of `aba`
+        minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // the factors of `aba`
     }
     if data.aba_derivatives.solve.pays() {
         let dtau = [data.rnea_derivatives.dtau_dq.as_slice(), data.rnea_derivatives.dtau_dv.as_slice()];
@@ -261,7 +267,7 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Da
     }
 }
 
-/// ∂q̈ = −M⁻¹ ∂τ, after `rnea_derivatives` and `minv`.
+/// Computes ∂q̈ = −M⁻¹ ∂τ, after `rnea_derivatives` and `minv`.
 fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let (d, out) = (&data.rnea_derivatives, &mut data.aba_derivatives);
     let float_freely = out.float_freely(model);
@@ -274,11 +280,12 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     }
 }
 
-/// The derivatives of the centroidal momentum, its rate, and the centre of mass and its velocity and acceleration, with
-/// respect to q, v and a, exact, in O(n).
+/// Computes the exact derivatives of the centroidal momentum, its rate, and the position, velocity and acceleration of
+/// the centre of mass, in O(n).
 ///
-/// q: nq numbers; v, a: nv. Gravity is not among the accelerations. What is fixed to the world does not count; not a
-/// number if nothing that moves has a mass. Allocates nothing. Source: Carpentier and Mansard (2018).
+/// q: nq numbers; v, a: nv. Returns derivatives with respect to q, v and a. Accelerations exclude gravity. Bodies fixed
+/// to the world are ignored; results are NaN if no moving body has mass. Allocates nothing. Source: Carpentier and
+/// Mansard (2018).
 ///
 /// ```
 /// use condyle_dynamics::{Data, centroidal_derivatives, centroidal_map, neutral, robots};
@@ -303,7 +310,7 @@ pub fn centroidal_derivatives<'d, S: Scalar, R: Constant<S>>(
     data.centroidal_derivatives.view()
 }
 
-/// What `aba_derivatives` has left.
+/// Returns a view of the results of `aba_derivatives`.
 pub(crate) fn view_of_aba<'d, S, R>(model: &'d Model<R>, data: &'d Data<S>) -> AbaDerivatives<'d, S, R> {
     let aba::Workspace { a, da_dq, da_dv, .. } = &data.aba_derivatives;
     AbaDerivatives { a, da_dq, da_dv, da_dtau: &data.minv.Minv, state: view(model, data).state }

@@ -1,4 +1,4 @@
-//! The state at which inverse dynamics has been differentiated, with all that its passes have left of the bodies.
+//! State at which inverse dynamics was differentiated, with all quantities of the bodies that its passes computed.
 
 use crate::derivatives::rnea_derivatives::Workspace;
 use crate::lanes::limbs::LaneView;
@@ -8,13 +8,13 @@ use condyle_model::Model;
 use condyle_spatial::gate::{Fused, Rename};
 use condyle_spatial::{Constant, Inertia, Motion, Scalar, Se3, Vec3};
 
-/// The state at which inverse dynamics has been differentiated.
+/// State at which inverse dynamics was differentiated.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State<'d, S, R> {
     pub model: &'d Model<R>,
     pub world: &'d World<S>,
     pub pass: &'d Workspace<S>,
-    /// The lanes in which the bodies stand, if they were not computed one by one.
+    /// Lanes that hold the bodies' quantities; `None` if the bodies were computed one by one.
     pub limbs: Option<LaneView<'d>>,
 }
 
@@ -27,7 +27,7 @@ impl<'d> Rename<State<'d, Fused, f64>> for State<'d, f64, f64> {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// oXb, in the body's public frame.
+    /// Returns oXb, the pose of body b in the frame that the URDF gives it.
     #[inline(always)]
     pub(crate) fn pose(&self, b: usize) -> Se3<S> {
         if let Some(limbs) = self.limbs {
@@ -36,7 +36,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         Placements { model: self.model, world: self.world }.body(b)
     }
 
-    /// S of column k of joint i.
+    /// Returns column k of joint i's S.
     #[inline(always)]
     pub(crate) fn column(&self, i: usize, k: usize) -> Motion<S> {
         if let Some(limbs) = self.limbs {
@@ -45,7 +45,8 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         self.world.S[self.model.nodes()[i].column + k]
     }
 
-    /// Velocity, and acceleration with gravity as the world's.
+    /// Returns the velocity and the acceleration of a body. The acceleration includes gravity, as the world's
+    /// acceleration.
     #[inline(always)]
     pub(crate) fn moving(&self, b: usize) -> (Motion<S>, Motion<S>) {
         if let Some(limbs) = self.limbs {
@@ -54,7 +55,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         (self.pass.bodies.v[b], self.pass.bodies.a[b])
     }
 
-    /// Iᶜ.
+    /// Returns Iᶜ of joint i.
     #[inline(always)]
     pub(crate) fn carried(&self, i: usize) -> Inertia<S> {
         if let Some(limbs) = self.limbs {
@@ -63,7 +64,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         self.pass.bodies.IC[i]
     }
 
-    /// The columns of body b's joint and of all before it: of which body, and the how manieth.
+    /// Returns the pairs (body, column within its joint) on the path from body b to the root.
     pub(crate) fn columns(&self, b: usize) -> impl Iterator<Item = (usize, usize)> {
         let nodes = &self.model.nodes();
         let way = core::iter::successors(Some(b), |&i| Some(nodes[i].parent)).take_while(|&i| i > 0);

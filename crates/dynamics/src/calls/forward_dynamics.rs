@@ -1,4 +1,4 @@
-//! Forward dynamics: how a robot accelerates under the efforts that it is given.
+//! Forward dynamics: accelerations of a robot for given efforts.
 
 use super::inertia::crba as inertia_matrix;
 use super::inverse_dynamics::{check_arguments, rnea as inverse_dynamics};
@@ -13,12 +13,12 @@ use crate::selection::{self, is_short_chain};
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Scalar};
 
-/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): how the robot accelerates, in O(n).
+/// Computes forward dynamics, q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), in O(n).
 ///
-/// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
-/// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
-/// Source: Featherstone (2008), table 7.1. Robots whose joints share a coordinate (mimic) go over a sparse factor
-/// of M, as [`forward_dynamics`] does with [`ForwardDynamicsMethod::Sparse`].
+/// q: nq numbers; v, tau: nv; f_ext: one force per body (N, N m), acting at the body's origin and expressed in its
+/// frame, index 0 is the world; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing. Source:
+/// Featherstone (2008), table 7.1. If joints share a coordinate (mimic), the call uses a sparse factor of M, as
+/// [`forward_dynamics`] does with [`ForwardDynamicsMethod::Sparse`].
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba, robots, rnea};
@@ -30,11 +30,12 @@ use condyle_spatial::{Constant, Force, Scalar};
 /// assert!(back.iter().all(|&tau| f64::abs(tau - 1.0) < 1e-10));
 /// ```
 ///
-/// M may be regular and yet singular at one position: a mass without extent on the axis about which it turns. Nothing looks
-/// for that: the accelerations are then not finite, or as large as rounding has it, as they are of all that needs M⁻¹.
+/// M may be singular at single positions only, for example when a point mass lies on the axis about which it turns.
+/// This is not checked: the accelerations are then not finite or dominated by rounding. The same holds for all
+/// functions that need M⁻¹.
 ///
 /// # Panics
-/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular wherever the robot is
+/// If an argument has the wrong length, `data` was made for a model of another tree, or M is singular at every position
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn aba<'d, S: Scalar, R: Constant<S>>(
@@ -54,7 +55,7 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     &data.aba.qdd
 }
 
-/// Body by body, for arguments that fit; leaves what depends on q behind.
+/// Computes q̈ body by body and keeps the quantities that depend on q. The arguments must be valid.
 pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
     if model.has_mimic() {
         by_factor(model, data, arguments, ForwardDynamicsMethod::Sparse);
@@ -73,8 +74,8 @@ pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut
 }
 
 impl ForwardDynamicsMethod {
-    /// The fastest method for a model: [`ArticulatedBody`](Self::ArticulatedBody), unless joints share a coordinate
-    /// (mimic), for which the recursion over bodies does not close; then [`Sparse`](Self::Sparse).
+    /// Returns the fastest method for a model. It is [`ArticulatedBody`](Self::ArticulatedBody), or
+    /// [`Sparse`](Self::Sparse) if joints share a coordinate (mimic), which the recursion over bodies does not support.
     ///
     /// ```
     /// use condyle_dynamics::{ForwardDynamicsMethod, robots};
@@ -85,11 +86,12 @@ impl ForwardDynamicsMethod {
     }
 }
 
-/// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a method of choice, or by the [`fastest`](ForwardDynamicsMethod::fastest).
+/// Computes q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) by a given method, or by the
+/// [`fastest`](ForwardDynamicsMethod::fastest) one for `None`.
 ///
-/// q: nq numbers; v, tau: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
-/// frame, number 0 being the world's; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing.
-/// Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), chapters 6 and 7. If joints share a coordinate,
+/// q: nq numbers; v, tau: nv; f_ext: one force per body (N, N m), acting at the body's origin and expressed in its
+/// frame, index 0 is the world; or empty for none. Returns nv numbers (rad/s², m/s²). Allocates nothing. Source:
+/// Featherstone, *Rigid Body Dynamics Algorithms* (2008), chapters 6 and 7. If joints share a coordinate,
 /// [`ForwardDynamicsMethod::ArticulatedBody`] factorises M too, as [`aba`](crate::aba()) does.
 ///
 /// ```
@@ -127,7 +129,7 @@ pub fn forward_dynamics<'d, S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Forward dynamics over a factor of M.
+/// Computes forward dynamics with a factor of M.
 pub(crate) fn by_factor<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,

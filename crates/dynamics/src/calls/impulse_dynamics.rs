@@ -1,4 +1,4 @@
-//! Impacts: how velocities jump when constraints set in, and the derivatives.
+//! Impacts: jumps of the velocity when constraints become active, and their derivatives.
 
 use crate::constraints::constrained_derivatives::{By, invert, respond};
 use crate::constraints::constrained_dynamics::{factorize, inertia, solve};
@@ -12,27 +12,27 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Matrix, Scalar, Vec3};
 
-/// What [`impulse_dynamics`] gives.
+/// Result of [`impulse_dynamics`].
 #[derive(Clone, Copy, Debug)]
 pub struct Impulse<'d, S> {
     /// v⁺, the velocity after the impact, nv numbers (rad/s, m/s).
     pub v: &'d [S],
-    /// Λ, the impulse of each constraint on the body of its frame, along the axes of its rows (N s, N m s); as many
-    /// numbers as there are rows.
+    /// Λ, the impulse of each constraint on the body of its frame, along the axes of its rows (N s, N m s); one number
+    /// per row.
     pub lambda: &'d [S],
-    /// The largest number in J (v⁺ + ε v) (m/s, rad/s).
+    /// Largest absolute value in J (v⁺ + ε v) (m/s, rad/s).
     pub residual: S,
-    /// The number of rows of J that depend on rows before them, up to rounding.
+    /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
 }
 
-/// v⁺ = v + M⁻¹ Jᵀ Λ with the impulses Λ that make J v⁺ = −ε J v: the velocity after an impact.
+/// Computes the velocity after an impact: v⁺ = v + M⁻¹ Jᵀ Λ, with the impulses Λ that make J v⁺ = −ε J v.
 ///
-/// q: nq numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy. Of the
-/// constraints, frames and reference frames count; gains and targets do not, but for where the other frame's point is.
-/// Works on the tree's zeros, as [`constrained_dynamics`](crate::constrained_dynamics()) does, with the same
-/// [`Proximal`](crate::Proximal) settings. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms*
-/// (2008), section 11.7.
+/// q: nq numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy. Only the
+/// constraints' frames and reference frames matter. Gains and targets are ignored, except that targets locate the point
+/// on the other frame. Like [`constrained_dynamics`](crate::constrained_dynamics()), it uses the sparsity of the tree
+/// and the same [`Proximal`](crate::Proximal) settings. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics
+/// Algorithms* (2008), section 11.7.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, impulse_dynamics, neutral, robots};
@@ -80,7 +80,7 @@ where
     check("v", v.len(), model.nv());
 }
 
-/// The whole algorithm, for arguments that fit.
+/// Runs the whole algorithm. The arguments must be valid.
 fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -98,18 +98,18 @@ fn run<S: Scalar, R: Constant<S>>(
     part(out, v, &d.qdd, restitution);
 }
 
-/// What [`impulse_dynamics_derivatives`] gives.
+/// Result of [`impulse_dynamics_derivatives`].
 #[derive(Clone, Copy, Debug)]
 pub struct ImpulseDerivatives<'d, S> {
-    /// v⁺ itself, nv numbers.
+    /// v⁺, nv numbers.
     pub v: &'d [S],
-    /// Λ itself, as many numbers as there are rows.
+    /// Λ, one number per row.
     pub lambda: &'d [S],
-    /// The largest number in J (v⁺ + ε v) (m/s, rad/s).
+    /// Largest absolute value in J (v⁺ + ε v) (m/s, rad/s).
     pub residual: S,
-    /// The number of rows of J that depend on rows before them, up to rounding.
+    /// Number of rows of J that depend on earlier rows, up to rounding.
     pub redundant: S,
-    /// ∂v⁺/∂q in the tangent space, nv × nv: the change of v⁺ when q moves to q ⊕ δ, per δ.
+    /// ∂v⁺/∂q in the tangent space, nv × nv: change of v⁺ per δ when q moves to q ⊕ δ.
     pub dv_dq: &'d Matrix<S>,
     /// ∂v⁺/∂v, nv × nv.
     pub dv_dv: &'d Matrix<S>,
@@ -117,15 +117,14 @@ pub struct ImpulseDerivatives<'d, S> {
     pub dlambda_dq: &'d Matrix<S>,
     /// ∂Λ/∂v, rows × nv.
     pub dlambda_dv: &'d Matrix<S>,
-    /// (J M⁻¹ Jᵀ)⁻¹, rows × rows: the inertia that the robot shows to its constraints.
+    /// (J M⁻¹ Jᵀ)⁻¹, rows × rows: inertia of the robot along its constraints.
     pub inertia: &'d Matrix<S>,
 }
 
-/// [`impulse_dynamics`] and its derivatives with respect to q and the velocity before the impact, exact.
+/// Computes [`impulse_dynamics`] and its exact derivatives with respect to q and the velocity before the impact.
 ///
-/// q: nq numbers; v: nv; restitution: ε. As
-/// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()) in cost, and in what it says of redundant
-/// constraints. Allocates nothing.
+/// q: nq numbers; v: nv; restitution: ε. Cost and treatment of redundant constraints are as for
+/// [`constrained_dynamics_derivatives`](crate::constrained_dynamics_derivatives()). Allocates nothing.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, impulse_dynamics_derivatives, robots};

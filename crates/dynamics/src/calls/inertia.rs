@@ -1,4 +1,4 @@
-//! The joint-space inertia matrix and its inverse.
+//! Joint-space inertia matrix and its inverse.
 
 use super::limbs::{Task, run as run_limbs};
 use crate::data::Data;
@@ -9,10 +9,10 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Matrix, Scalar};
 
-/// M(q), the joint-space inertia matrix: τ = M a + h, kinetic energy ½ vᵀ M v. In O(n · depth).
+/// Computes the joint-space inertia matrix M(q), in O(n · depth): τ = M a + h, kinetic energy ½ vᵀ M v.
 ///
-/// q: nq numbers. Returns the full symmetric nv × nv matrix, armature included. Allocates nothing.
-/// Source: Featherstone (2008), table 6.2.
+/// q: nq numbers. Returns the full symmetric nv × nv matrix, including armature. Allocates nothing. Source:
+/// Featherstone (2008), table 6.2.
 ///
 /// ```
 /// use condyle_dynamics::{Data, crba, robots};
@@ -24,7 +24,7 @@ use condyle_spatial::{Constant, Matrix, Scalar};
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {
     data.check(model);
@@ -37,11 +37,11 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
     &data.crba.M
 }
 
-/// M(q)⁻¹, the accelerations for unit efforts, in O(n²).
+/// Computes M(q)⁻¹, the accelerations for unit efforts, in O(n²).
 ///
-/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018); on trees with
-/// short branches, and where joints share a coordinate (mimic), by the factor of Featherstone (2005) ([`Ltdl`](crate::Ltdl));
-/// on chains of at most eight coordinates from M by Gauss and Jordan.
+/// q: nq numbers. Returns the full symmetric nv × nv matrix. Allocates nothing. Source: Carpentier (2018). Trees with
+/// short branches, and joints that share a coordinate (mimic), use the factor of Featherstone (2005)
+/// ([`Ltdl`](crate::Ltdl)). Chains of at most eight coordinates invert M by Gauss–Jordan elimination.
 ///
 /// ```
 /// use condyle_dynamics::{Data, crba, minv, robots};
@@ -53,7 +53,7 @@ pub fn crba<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, `data` was made for a model of another tree, or M is singular
+/// If `q` does not have nq numbers, `data` was made for a model of another tree, or M is singular
 /// ([`Model::singular_joints`]).
 #[track_caller]
 pub fn minv<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d Matrix<S> {

@@ -1,4 +1,4 @@
-//! Inverse dynamics: the efforts that make a robot move as it is told.
+//! Inverse dynamics: efforts that produce a given motion of a robot.
 
 use super::kinematics::{forward_kinematics, forward_velocities};
 use super::limbs::{Task, run as run_limbs};
@@ -9,7 +9,7 @@ use condyle_linalg::check;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar};
 
-/// RNEA with the limbs side by side where there are some, else body by body.
+/// Runs RNEA with the limbs in parallel lanes if the robot has limbs, otherwise body by body.
 fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
     if !run_limbs(Task::Rnea, model, data, arguments) {
         let Arguments { q, v, x: a, f_ext } = arguments;
@@ -17,11 +17,11 @@ fn run<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, argument
     }
 }
 
-/// τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i: the joint efforts that make the robot accelerate with a, in O(n).
+/// Computes inverse dynamics, in O(n): τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i, the joint efforts for the acceleration a.
 ///
-/// q: nq numbers; v, a: nv; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its
-/// frame, number 0 being the world's; or empty for none. Returns nv numbers (N m, N). Allocates nothing.
-/// Source: Luh, Walker, Paul (1980).
+/// q: nq numbers; v, a: nv; f_ext: one force per body (N, N m), acting at the body's origin and expressed in its frame,
+/// index 0 is the world; or empty for none. Returns nv numbers (N m, N). Allocates nothing. Source: Luh, Walker, Paul
+/// (1980).
 ///
 /// ```
 /// use condyle_dynamics::{Data, robots, rnea};
@@ -48,7 +48,7 @@ pub fn rnea<'d, S: Scalar, R: Constant<S>>(
     &data.rnea.tau
 }
 
-/// Panics unless the arguments fit, of which the third has this name.
+/// Panics if an argument is invalid. `name` is the name of the third argument, `x`.
 #[inline]
 #[track_caller]
 pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str, arguments: Arguments<'_, S>) {
@@ -60,7 +60,8 @@ pub(crate) fn check_arguments<S, R>(model: &Model<R>, data: &Data<S>, name: &str
     check_forces(f_ext.len(), model.nodes().len());
 }
 
-/// h(q, v) = C(q, v) v + g(q): the efforts that keep the velocity as it is, in O(n). It is [`rnea`] with a = 0.
+/// Computes the bias efforts h(q, v) = C(q, v) v + g(q), which keep the velocity constant, in O(n). This is [`rnea`]
+/// with a = 0.
 ///
 /// q: nq numbers; v: nv. Returns nv numbers (N m, N). Allocates nothing.
 ///
@@ -82,7 +83,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
     &data.rnea.tau
 }
 
-/// g(q): the efforts that hold the robot still, in O(n). It is [`rnea`] with v = a = 0.
+/// Computes the gravity efforts g(q), which hold the robot still, in O(n). This is [`rnea`] with v = a = 0.
 ///
 /// q: nq numbers. Returns nv numbers (N m, N). Allocates nothing.
 ///
@@ -96,7 +97,7 @@ pub fn nonlinear_effects<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Data<S>, q: &[S]) -> &'d [S] {
     data.check(model);
@@ -107,12 +108,12 @@ pub fn gravity<'d, S: Scalar, R: Constant<S>>(model: &Model<R>, data: &'d mut Da
     &data.rnea.tau
 }
 
-/// τ = g(q) − Σ Jᵢᵀ f_ext,i: the efforts that hold the robot still under external forces, in O(n). It is
-/// [`rnea`](crate::rnea) with v = a = 0, at a lower price.
+/// Computes the efforts that hold the robot still under external forces, in O(n): τ = g(q) − Σ Jᵢᵀ f_ext,i. This is
+/// [`rnea`](crate::rnea) with v = a = 0, at a lower cost.
 ///
-/// q: nq numbers; f_ext: a force on each body (N, N m), acting at the body's origin and expressed in its frame, number 0
-/// being the world's; or empty for none. Returns nv numbers (N m, N). Allocates nothing.
-/// Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 5.3.
+/// q: nq numbers; f_ext: one force per body (N, N m), acting at the body's origin and expressed in its frame, index 0
+/// is the world; or empty for none. Returns nv numbers (N m, N). Allocates nothing. Source: Featherstone, *Rigid Body
+/// Dynamics Algorithms* (2008), section 5.3.
 ///
 /// ```
 /// use condyle_dynamics::{Data, Force, Vec3, robots, static_torque};
@@ -140,8 +141,8 @@ pub fn static_torque<'d, S: Scalar, R: Constant<S>>(
     &data.statics.tau
 }
 
-/// C(q, v), the Coriolis matrix by Christoffel symbols: C v = h − g, Ṁ = C + Cᵀ, so that Ṁ − 2C is skew. In
-/// O(n · depth).
+/// Computes the Coriolis matrix C(q, v) from Christoffel symbols, in O(n · depth): C v = h − g and Ṁ = C + Cᵀ, so that
+/// Ṁ − 2C is skew.
 ///
 /// q: nq numbers; v: nv. Returns the full nv × nv matrix (N m s/rad, N s/m). Allocates nothing.
 /// Source: Echeandia and Wensing (2021), algorithm 1.

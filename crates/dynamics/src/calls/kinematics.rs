@@ -1,4 +1,4 @@
-//! Kinematics: the placements and the motions of the bodies.
+//! Kinematics: placements and motions of the bodies.
 
 use super::limbs::spread;
 use crate::data::Data;
@@ -10,10 +10,10 @@ use condyle_model::Model;
 use condyle_spatial::{Constant, Dense, DenseMatrix, Scalar, Se3, Vec3};
 
 impl<S: Scalar> Data<S> {
-    /// Returns the placements at the position of the last call on this data, without computing them again. Returns `None` if
-    /// the call did without them, as [`rnea`](crate::rnea()) does.
+    /// Returns the placements at the position of the last call on this data, without computing them again. Returns
+    /// `None` if that call computed no placements, as for [`rnea`](crate::rnea()).
     ///
-    /// The model must have the joints and frames of the model of that call. Inertias and gravity may differ.
+    /// The model must have the same joints and frames as the model of that call. Inertias and gravity may differ.
     ///
     /// ```
     /// use condyle_dynamics::{Data, aba, forward_kinematics, robots};
@@ -26,7 +26,8 @@ impl<S: Scalar> Data<S> {
     /// ```
     ///
     /// # Panics
-    /// If this was made for a model of another tree, or the last call was for a model with joints or frames elsewhere.
+    /// If this data was made for a model of another tree, or the last call used a model with other placements of joints
+    /// or frames.
     #[track_caller]
     pub fn placements<'d, R: Constant<S>>(&'d mut self, model: &'d Model<R>) -> Option<Placements<'d, S, R>> {
         self.check(model);
@@ -43,7 +44,7 @@ impl<S: Scalar> Data<S> {
     }
 }
 
-/// Reports placements of another robot.
+/// Panics: the placements belong to another robot.
 #[cold]
 #[inline(never)]
 #[track_caller]
@@ -53,7 +54,7 @@ fn wrong_geometry(name: &str) -> ! {
     );
 }
 
-/// Places all bodies: oXi = oXλ λXi(q), in O(n).
+/// Computes the placements of all bodies, oXi = oXλ λXi(q), in O(n).
 ///
 /// q: nq numbers. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 4.1.
 ///
@@ -68,7 +69,7 @@ fn wrong_geometry(name: &str) -> ! {
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     model: &'d Model<R>,
@@ -81,11 +82,11 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
     Placements { model, world: &data.world }
 }
 
-/// The Jacobian J of one frame, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
+/// Computes the Jacobian J of one frame, 6 × nv, linear rows first: the frame's velocity is J v. Overwrites J.
 ///
-/// q: nq numbers. It needs no `Data` and looks only at the joints between the frame and the world, in O(depth + nv); where
-/// several things are asked at one position, [`Placements::frame_jacobian`] has the same numbers, up to rounding. Allocates
-/// nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), example 4.1.
+/// q: nq numbers. The function needs no `Data` and visits only the joints between the frame and the world, in O(depth +
+/// nv). For several quantities at one position, use [`Placements::frame_jacobian`], which gives the same numbers up to
+/// rounding. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), example 4.1.
 ///
 /// ```
 /// use condyle_dynamics::{Data, ReferenceFrame, forward_kinematics, frame_jacobian, robots};
@@ -99,7 +100,7 @@ pub fn forward_kinematics<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, there is no such frame, or `J` is not 6 × nv.
+/// If `q` does not have nq numbers, there is no such frame, or `J` is not 6 × nv.
 #[track_caller]
 pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -111,8 +112,8 @@ pub fn frame_jacobian<S: Scalar, R: Constant<S>>(
     frame_jacobian_strided(model, q, frame, reference, columns("J", J, model.nv()), [1, 6]);
 }
 
-/// [`frame_jacobian`] to where one row lies `strides[0]` numbers behind the one before, and one column `strides[1]`: for
-/// languages whose matrices lie by rows.
+/// Computes [`frame_jacobian`] with strides: `strides[0]` is the distance from one row to the next, `strides[1]` from
+/// one column to the next. It serves languages that store matrices by rows.
 #[doc(hidden)]
 #[track_caller]
 pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
@@ -128,7 +129,7 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
     jacobian_on(model, q, frame.body, frame.placement, reference, J, strides);
 }
 
-/// The Jacobian J of one body, 6 × nv: [`frame_jacobian`] of the frame that the URDF gives it.
+/// Computes the Jacobian J of one body, 6 × nv: [`frame_jacobian`] of the frame that the URDF gives the body.
 ///
 /// ```
 /// use condyle_dynamics::{ReferenceFrame, body_jacobian, robots};
@@ -139,7 +140,7 @@ pub fn frame_jacobian_strided<S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, there is no such body, or `J` is not 6 × nv.
+/// If `q` does not have nq numbers, there is no such body, or `J` is not 6 × nv.
 #[track_caller]
 pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -151,7 +152,7 @@ pub fn body_jacobian<S: Scalar, R: Constant<S>>(
     body_jacobian_strided(model, q, body, reference, columns("J", J, model.nv()), [1, 6]);
 }
 
-/// [`body_jacobian`] to where rows and columns lie as in [`frame_jacobian_strided`].
+/// Computes [`body_jacobian`] with strides, as in [`frame_jacobian_strided`].
 #[doc(hidden)]
 #[track_caller]
 pub fn body_jacobian_strided<S: Scalar, R: Constant<S>>(
@@ -182,7 +183,7 @@ fn jacobian_on<S: Scalar, R: Constant<S>>(
     path_jacobian(model, q, body, (zXb * bXf).lift(), reference, J, strides);
 }
 
-/// Places all bodies and gives their velocities: v_i = v_λ + S q̇, in O(n).
+/// Computes the placements and velocities of all bodies, v_i = v_λ + S q̇, in O(n).
 ///
 /// q: nq numbers; v: nv. Allocates nothing. Source: Featherstone (2008), table 5.1; in the world's frame.
 ///
@@ -211,10 +212,10 @@ pub fn forward_velocities<'d, S: Scalar, R: Constant<S>>(
     Velocities { placements: Placements { model, world: &data.world }, moving: &data.moving }
 }
 
-/// Places all bodies and gives their velocities and accelerations: a_i = a_λ + S q̈ + Ṡ q̇, in O(n).
+/// Computes the placements, velocities and accelerations of all bodies, a_i = a_λ + S q̈ + Ṡ q̇, in O(n).
 ///
-/// q: nq numbers; v, a: nv. Gravity is not among the accelerations. Allocates nothing. Source: Featherstone (2008),
-/// table 5.1; in the world's frame.
+/// q: nq numbers; v, a: nv. Accelerations exclude gravity. Allocates nothing. Source: Featherstone (2008), table 5.1;
+/// in the world's frame.
 ///
 /// ```
 /// use condyle_dynamics::{Data, ReferenceFrame, forward_accelerations, robots};

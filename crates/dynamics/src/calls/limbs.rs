@@ -1,4 +1,7 @@
-//! Calls with the limbs of a robot side by side.
+//! Calls that compute the limbs of a robot in parallel lanes.
+//!
+//! Limbs are branches of the tree, such as legs and arms. Steps of different limbs are computed at once, one limb per
+//! lane of a SIMD vector.
 #![allow(unsafe_code)]
 
 use crate::data::Data;
@@ -14,7 +17,7 @@ use condyle_spatial::gate::{Fused, Level, is, level, same};
 use condyle_spatial::register_kernel;
 use condyle_spatial::{Constant, Scalar};
 
-/// The function that is asked for.
+/// Function to compute.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Task {
     Rnea,
@@ -26,7 +29,7 @@ pub(crate) enum Task {
 }
 
 register_kernel! {
-    /// τ by steps.
+    /// Computes τ by steps.
     fn rnea_by_steps<V>(
         model: &Model,
         plan: &Plan,
@@ -45,14 +48,14 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// Arguments in lanes.
+    /// Loads the arguments into lanes.
     pub(super) fn load_steps<V>(plan: &Plan, s: &mut Scratch, arguments: Arguments<'_>) {
         load(plan, s, arguments);
     }
 }
 
 register_kernel! {
-    /// Placements and columns of all steps.
+    /// Computes the placements and columns of all steps.
     pub(super) fn place_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
         let l = Limbs::new(plan, model);
         place(&l, &mut s.world, &s.q);
@@ -61,21 +64,21 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// M by steps that are placed.
+    /// Computes M by steps whose placements are known.
     fn crba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, M: &mut [Fused]) {
         crba::pass(&Limbs::new(plan, model), &s.world, &mut s.IC, M);
     }
 }
 
 register_kernel! {
-    /// The factors of the articulated bodies, by steps that are placed.
+    /// Computes the factors of the articulated bodies, by steps whose placements are known.
     fn factorize_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch) {
         aba::factorize(&Limbs::new(plan, model), &s.world, &mut s.aba);
     }
 }
 
 register_kernel! {
-    /// q̈ by steps that are placed.
+    /// Computes q̈ by steps whose placements are known.
     fn aba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool, qdd: &mut [Fused]) {
         aba::pass(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, given(f_ext, &s.f_ext));
         scatter(plan, &s.aba.qdd, qdd);
@@ -83,7 +86,7 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// M⁻¹ from the factors of the articulated bodies.
+    /// Computes M⁻¹ from the factors of the articulated bodies.
     fn inverse_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, Minv: &mut [Fused]) {
         let l = Limbs::new(plan, model);
         l.broadcast(&mut s.aba.D_inv);
@@ -92,7 +95,8 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// ∂τ/∂q, ∂τ/∂v and M by steps that are placed, at the acceleration that was given or, `after_aba`, at that found.
+    /// Computes ∂τ/∂q, ∂τ/∂v and M by steps whose placements are known. The acceleration is the given one, or the
+    /// computed one if `after_aba`.
     fn rnea_derivatives_by_steps<V>(
         model: &Model,
         plan: &Plan,
@@ -112,21 +116,21 @@ register_kernel! {
     }
 }
 
-/// The forces on all steps, or none.
+/// Returns the forces on all steps, or an empty slice for none.
 #[inline(always)]
 fn given<T>(some: bool, f_ext: &[T]) -> &[T] {
     if some { f_ext } else { &[] }
 }
 
-/// The plan, where this model and `data` have limbs side by side, and the processor can.
+/// Returns the plan if the model and `data` have limbs in parallel lanes and the processor supports them.
 #[inline]
 pub(crate) fn ready<'m, S: Scalar, R: Constant<S>>(model: &'m Model<R>, data: &Data<S>) -> Option<&'m Plan> {
     let (Some(plan), Some(scratch)) = (&model.limbs(), &data.limbs) else { return None };
     (is::<(S, R), (f64, f64)>() && scratch.fits(plan) && level() > Level::Baseline).then_some(plan)
 }
 
-/// An algorithm with the limbs side by side, where this model and `data` have them; whether they have. Arguments that it
-/// does not take are empty.
+/// Runs an algorithm with the limbs in parallel lanes, if the model and `data` have them. Returns whether it ran.
+/// Arguments that the algorithm does not use are empty.
 #[inline]
 pub(crate) fn run<S: Scalar, R: Constant<S>>(
     task: Task,
@@ -143,7 +147,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// A task on arguments that fit.
+/// Runs a task. The arguments must be valid.
 fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments: Arguments<'_>) {
     let Some(s) = data.limbs.as_deref_mut() else { return };
     let f_ext = !arguments.f_ext.is_empty();
@@ -174,7 +178,7 @@ fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments
     }
 }
 
-/// Arguments of forward dynamics in lanes, the efforts without the bias of free joints with armature.
+/// Loads the arguments of forward dynamics into lanes. The efforts exclude the bias of free joints with armature.
 pub(super) fn load_free(
     model: &Model,
     plan: &Plan,
@@ -190,7 +194,7 @@ pub(super) fn load_free(
     load_steps(plan, s, Arguments { x: effort, ..arguments });
 }
 
-/// Takes the placements that a call left in lanes to where those of single bodies stand.
+/// Copies the placements that a call left in lanes to the arrays of single bodies.
 pub(crate) fn spread<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let Some(plan) = ready(model, data) else { return };
     let Data { limbs: Some(scratch), world: World { oX, S: columns, placed, .. }, .. } = data else { return };

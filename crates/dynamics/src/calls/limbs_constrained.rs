@@ -1,4 +1,4 @@
-//! Dynamics under constraints with the limbs of a robot side by side.
+//! Dynamics under constraints with the limbs of a robot in parallel lanes.
 #![allow(unsafe_code)]
 
 use super::limbs::{load_free, place_steps, ready};
@@ -17,7 +17,7 @@ use condyle_spatial::{Constant, Scalar};
 use condyle_spatial::{kernel, register_kernel};
 
 register_kernel! {
-    /// The articulated bodies, for steps that are placed.
+    /// Computes the articulated bodies for steps whose placements are known.
     fn articulate<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool) {
         let f_ext = if f_ext { &s.f_ext[..] } else { &[] };
         aba::inward(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, f_ext);
@@ -25,7 +25,7 @@ register_kernel! {
 }
 
 register_kernel! {
-    /// J, J M⁻¹ Jᵀ, and −(J q̈ + γ) for λ = 0 in place of λ.
+    /// Computes J and J M⁻¹ Jᵀ, and stores −(J q̈ + γ) for λ = 0 in λ.
     fn carry_forces<V>(
         model: &Model,
         plan: &Plan,
@@ -42,7 +42,7 @@ register_kernel! {
 }
 
 kernel! {
-    /// λ from J M⁻¹ Jᵀ.
+    /// Computes λ from J M⁻¹ Jᵀ.
     fn decompose<S>(set: &mut ConstraintSet<S>) {
         set.delassus.redundant = S::zero();
         for island in &set.islands {
@@ -52,7 +52,7 @@ kernel! {
 }
 
 register_kernel! {
-    /// q̈ and J q̈ + γ for λ.
+    /// Computes q̈ and J q̈ + γ for λ.
     fn accelerate<V>(
         model: &Model,
         plan: &Plan,
@@ -64,11 +64,11 @@ register_kernel! {
         for r in 0..set.lambda.len() {
             lanes.all.x[r] = set.lambda[r].0;
         }
-        // SAFETY: these are vectors.
+        // SAFETY: the elements are vectors.
         lanes.push(plan, &set.plans, unsafe { numbers_mut(&mut s.aba.u) });
         aba::outward(&Limbs::new(plan, model), &s.world, &mut s.aba);
         scatter(plan, &s.aba.qdd, qdd);
-        // SAFETY: motions are made of vectors.
+        // SAFETY: motions consist of vectors.
         let a = unsafe { numbers(&s.aba.a) };
         for (of, constraint) in lanes.rows.iter().zip(&set.plans) {
             let [one, other] = constraint.bodies;
@@ -80,8 +80,8 @@ register_kernel! {
     }
 }
 
-/// Constrained dynamics with the limbs side by side, where this model, `data` and `constraints` have them; whether they
-/// have.
+/// Computes constrained dynamics with the limbs in parallel lanes, if the model, `data` and `constraints` have them.
+/// Returns whether it did.
 #[inline]
 pub(crate) fn run<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -98,7 +98,7 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
     true
 }
 
-/// The call, for arguments that fit.
+/// Runs the call. The arguments must be valid.
 fn enter(model: &Model, plan: &Plan, data: &mut Data<f64>, set: &mut ConstraintSet<Fused>, arguments: Arguments<'_>) {
     let (Some(s), Some(mut lanes)) = (data.limbs.as_deref_mut(), set.limbs.take()) else { return };
     load_free(model, plan, s, &mut data.aba, arguments);

@@ -1,7 +1,8 @@
-//! The derivatives of inverse and forward dynamics with respect to everything beside q, v, a and τ.
+//! Derivatives of inverse and forward dynamics with respect to inputs other than q, v, a and τ.
 //!
-//! Inverse dynamics is linear in external forces, in inertial parameters, in armature, damping and friction, and in
-//! gravity, so each derivative is a matrix B that can be read off what the derivatives by q and v have computed anyway:
+//! Inverse dynamics is linear in external forces, inertial parameters, armature, damping, friction and gravity. So each
+//! derivative is a matrix B, assembled from quantities that the derivatives with respect to q and v have already
+//! computed:
 //!
 //! ```text
 //! ∂τ/∂f_b = −J_bᵀ                        ∂τ_c/∂π_b = y(S_c, a_b) − y(v_b × S_c, v_b)     (regressor.rs)
@@ -10,7 +11,7 @@
 //! ∂τ/∂damping = Rᵀ diag(R v)             ∂τ/∂friction = Rᵀ diag(tanh(R v/ε))             (v of a free joint)
 //! ```
 //!
-//! Of forward dynamics, M q̈ + h = τ gives ∂q̈/∂· = −M⁻¹ B.
+//! For forward dynamics, M q̈ + h = τ gives ∂q̈/∂· = −M⁻¹ B.
 
 use super::derivatives::{AbaDerivatives, RneaDerivatives};
 use super::differentiated::State;
@@ -22,23 +23,23 @@ use condyle_model::joint::Joint;
 use condyle_spatial::elementary::tanh;
 use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Mat3, Matrix, Scalar, Vec3, alike, kernel};
 
-/// An input of the dynamics beside position, velocity, acceleration and effort.
+/// Input of the dynamics other than position, velocity, acceleration and effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Input {
-    /// The external force on a body, six numbers in the body's frame, linear first: as in `f_ext` (N, N m).
+    /// External force on a body, six numbers in the body's frame, linear first, as in `f_ext` (N, N m).
     Force(usize),
-    /// The ten [inertial parameters](crate::inertial_parameters::from_inertia) of a body, in its frame.
+    /// Ten [inertial parameters](crate::inertial_parameters::from_inertia) of a body, in its frame.
     Inertia(usize),
-    /// The acceleration of free fall, three numbers in the world's frame (m/s²).
+    /// Acceleration of free fall, three numbers in the world's frame (m/s²).
     Gravity,
-    /// The armature of each coordinate, nv numbers (kg m², kg).
+    /// Armature of each coordinate, nv numbers (kg m², kg).
     Armature,
-    /// The viscous damping of each coordinate, nv numbers, where [`passive_torque`](crate::passive_torque) is added to τ
-    /// (N m s/rad, N s/m).
+    /// Viscous damping of each coordinate, nv numbers (N m s/rad, N s/m), if [`passive_torque`](crate::passive_torque)
+    /// is added to τ.
     Damping,
-    /// The Coulomb friction of each coordinate, nv numbers, where [`passive_torque`](crate::passive_torque) is added to τ
-    /// (N m, N).
+    /// Coulomb friction of each coordinate, nv numbers (N m, N), if [`passive_torque`](crate::passive_torque) is added
+    /// to τ.
     Friction {
         /// ε of `passive_torque` (rad/s, m/s).
         smoothing: f64,
@@ -48,7 +49,7 @@ pub enum Input {
 alike!(Input);
 
 impl Input {
-    /// The number of numbers of the input, and of columns of a derivative with respect to it.
+    /// Returns the length of the input, which is the number of columns of a derivative with respect to it.
     ///
     /// ```
     /// use condyle_dynamics::{Input, robots};
@@ -65,7 +66,7 @@ impl Input {
     }
 }
 
-/// Where entries of B go: to B, or with −M⁻¹ to −M⁻¹ B.
+/// Destination of the entries of B: adds them to B, or multiplied with −M⁻¹ to −M⁻¹ B.
 struct Entries<'e, S> {
     out: &'e mut [S],
     Minv: Option<&'e Matrix<S>>,
@@ -73,7 +74,7 @@ struct Entries<'e, S> {
 }
 
 impl<S: Scalar> Entries<'_, S> {
-    /// Adds to an entry of B.
+    /// Adds a number to an entry of B.
     #[inline(always)]
     fn add(&mut self, row: usize, column: usize, x: S) {
         let out = &mut self.out[column * self.nv..(column + 1) * self.nv];
@@ -90,7 +91,7 @@ impl<S: Scalar> Entries<'_, S> {
 }
 
 kernel! {
-    /// B, or −M⁻¹ B.
+    /// Computes B, or −M⁻¹ B.
     fn write<S, R>(state: State<'_, S, R>, input: Input, Minv: Option<&Matrix<S>>, out: &mut [S]) {
         out.fill(S::zero());
         let nv = state.model.nv();
@@ -99,7 +100,7 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Gives each entry of B other than zero. An entry may be given in parts.
+    /// Passes each nonzero entry of B to `to`. An entry may be passed in several parts.
     #[inline(always)]
     fn entries(&self, input: Input, to: &mut Entries<'_, S>) {
         let (model, pass) = (self.model, self.pass);
@@ -156,8 +157,8 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
-    /// Gives what a unit of damping, or with a smoothing of friction, loses on each coordinate. A free joint loses along the axes
-    /// of its parent: in the body's axes Rᵀ diag(x(R v)).
+    /// Passes the entries of B for unit damping, or for unit friction if a smoothing is given. A free joint's losses
+    /// act along the axes of its parent; in the body's axes they are Rᵀ diag(x(R v)).
     #[inline(always)]
     fn losses(&self, smoothing: Option<f64>, to: &mut Entries<'_, S>) {
         let (model, qd) = (self.model, &self.pass.qd[..]);
@@ -188,7 +189,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
         }
     }
 
-    /// The rotation of a free joint: from the axes of its body to those of its parent.
+    /// Returns the rotation of a free joint, from the axes of its body to the axes of its parent.
     #[inline(always)]
     fn free_rotation(&self, i: usize) -> Mat3<S> {
         let body = &self.model.bodies()[i];
@@ -201,7 +202,7 @@ impl<S: Scalar, R: Constant<S>> State<'_, S, R> {
 }
 
 impl Input {
-    /// Panics for an input that does not exist, or a derivative of another shape.
+    /// Panics if the input does not exist or the derivative has another shape.
     #[track_caller]
     pub(crate) fn check<R>(self, model: &Model<R>, name: &str, found: (usize, usize)) {
         let shape = (model.nv(), self.len(model));
@@ -220,7 +221,7 @@ impl Input {
 }
 
 impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
-    /// ∂τ/∂(any other input), nv × [`Input::len`], in at most O(n) operations a column. dtau is overwritten.
+    /// Computes ∂τ/∂(any other input), nv × [`Input::len`], in at most O(n) operations per column. Overwrites dtau.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Input, rnea, rnea_derivatives, robots};
@@ -235,14 +236,14 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If `dtau` has not that shape, or the input names no moving body or a smoothing that is not positive.
+    /// If `dtau` does not have that shape, the input names a body that does not move, or its smoothing is not positive.
     #[track_caller]
     pub fn with_respect_to(&self, input: Input, dtau: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "dtau", dtau.shape());
         self.write_input(input, dtau.as_mut_slice());
     }
 
-    /// ∂τ/∂(any other input), column by column.
+    /// Computes ∂τ/∂(any other input), stored by columns.
     pub(crate) fn write_input(&self, input: Input, dtau: &mut [S]) {
         let model = self.state.model;
         input.check(model, "dtau", (model.nv(), input.len(model)));
@@ -251,7 +252,7 @@ impl<S: Scalar, R: Constant<S>> RneaDerivatives<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
-    /// ∂q̈/∂(any other input), nv × [`Input::len`], in at most O(n²) operations a column. da is overwritten.
+    /// Computes ∂q̈/∂(any other input), nv × [`Input::len`], in at most O(n²) operations per column. Overwrites da.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Input, aba_derivatives, neutral, robots};
@@ -265,14 +266,14 @@ impl<S: Scalar, R: Constant<S>> AbaDerivatives<'_, S, R> {
     /// ```
     ///
     /// # Panics
-    /// If `da` has not that shape, or the input names no moving body or a smoothing that is not positive.
+    /// If `da` does not have that shape, the input names a body that does not move, or its smoothing is not positive.
     #[track_caller]
     pub fn with_respect_to(&self, input: Input, da: &mut DenseMatrix<S, impl Dense<S>>) {
         input.check(self.state.model, "da", da.shape());
         self.write_input(input, da.as_mut_slice());
     }
 
-    /// ∂q̈/∂(any other input), column by column.
+    /// Computes ∂q̈/∂(any other input), stored by columns.
     pub(crate) fn write_input(&self, input: Input, da: &mut [S]) {
         let model = self.state.model;
         input.check(model, "da", (model.nv(), input.len(model)));

@@ -6,12 +6,12 @@ use crate::passes::regressor;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Matrix, Scalar};
 
-/// Y(q, v, a) with τ = Y π, in O(n · depth): inverse dynamics as a linear function of the inertias, armature apart.
+/// Computes the regressor Y(q, v, a) of inverse dynamics, τ = Y π, in O(n · depth). It excludes armature.
 ///
-/// q: nq numbers; v, a: nv. Returns the nv × 10 (bodies − 1) matrix whose columns 10 (i − 1) … 10 i − 1 belong to body i,
-/// in the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). With the
-/// rotors it reads τ = Y π + armature a; armature is no inertial parameter. Along the linear coordinates of a free joint the
-/// rotors' part is armature (v̇ + ω × v). Allocates nothing. Source: Atkeson, An, Hollerbach (1986).
+/// q: nq numbers; v, a: nv. Returns the nv × 10 (bodies − 1) matrix whose columns 10 (i − 1) … 10 i − 1 belong to body
+/// i, in the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia).
+/// Armature is not an inertial parameter: with rotors, τ = Y π + armature a. Along the linear coordinates of a free
+/// joint, the rotors add armature (v̇ + ω × v). Allocates nothing. Source: Atkeson, An, Hollerbach (1986).
 ///
 /// ```
 /// use condyle_dynamics::{Data, inertial_parameters, joint_torque_regressor, rnea, robots};
@@ -40,9 +40,9 @@ pub fn joint_torque_regressor<'d, S: Scalar, R: Constant<S>>(
     &data.regressor.torque
 }
 
-/// The kinetic energy's regressor y(q, v), T = y · π, in O(n): the rotors' ½ armature v² apart.
+/// Computes the regressor y(q, v) of the kinetic energy, T = y · π, in O(n). It excludes the rotors' ½ armature v².
 ///
-/// q: nq numbers; v: nv. Returns 10 (bodies − 1) numbers, ½ y(v_i, v_i) of body after body, in the order and frame of
+/// q: nq numbers; v: nv. Returns 10 (bodies − 1) numbers, ½ y(v_i, v_i) for each body i, in the order and frame of
 /// [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates nothing. Source: Gautier
 /// and Khalil, *Direct calculation of minimum set of inertial parameters of serial robots* (1990).
 ///
@@ -69,10 +69,10 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     &data.regressor.kinetic
 }
 
-/// The potential energy's regressor y(q), V = y · π, zero at the world's origin, in O(n).
+/// Computes the regressor y(q) of the potential energy, V = y · π, in O(n). V is zero at the world's origin.
 ///
-/// q: nq numbers. Returns 10 (bodies − 1) numbers, \[−g · p_i, −R_iᵀ g, 0\] of body after body at the pose (R_i, p_i),
-/// in the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates
+/// q: nq numbers. Returns 10 (bodies − 1) numbers, \[−g · p_i, −R_iᵀ g, 0\] for each body i with pose (R_i, p_i), in
+/// the order and frame of [`inertial_parameters::from_inertia`](crate::inertial_parameters::from_inertia). Allocates
 /// nothing. Source: V_i = −g · (m p_i + R_i m c); Gautier and Khalil (1990).
 ///
 /// ```
@@ -85,7 +85,7 @@ pub fn kinetic_energy_regressor<'d, S: Scalar, R: Constant<S>>(
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers, or `data` was made for a model of another tree.
+/// If `q` does not have nq numbers, or `data` was made for a model of another tree.
 #[track_caller]
 pub fn potential_energy_regressor<'d, S: Scalar, R: Constant<S>>(
     model: &Model<R>,

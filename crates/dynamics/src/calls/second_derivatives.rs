@@ -12,9 +12,10 @@ use condyle_model::Model;
 use condyle_spatial::{Array, Constant, Force, Matrix, Scalar};
 use nalgebra::DMatrix;
 
-/// The second derivatives of φ = λᵀ rnea(q, v, a), each a full nv × nv matrix; those by v and a, and by a twice, are zero.
+/// Second derivatives of φ = λᵀ rnea(q, v, a), each a full nv × nv matrix. The derivatives ∂²φ/∂v∂a and ∂²φ/∂a∂a are
+/// zero.
 ///
-/// They are the Hessian of φ(q ⊕ δ, v + …, a + …) at δ = 0.
+/// The matrices are blocks of the Hessian of φ(q ⊕ δ, v + …, a + …) at δ = 0.
 #[derive(Clone, Copy, Debug)]
 pub struct RneaHessian<'d, S, R = f64> {
     /// ∂²φ/∂q∂q, symmetric.
@@ -23,18 +24,18 @@ pub struct RneaHessian<'d, S, R = f64> {
     pub dvdq: &'d Matrix<S>,
     /// ∂²φ/∂v∂v, symmetric.
     pub dvdv: &'d Matrix<S>,
-    /// ∂²φ/∂a∂q: entry (j, k) is ∂²φ/∂a_j∂q_k, the derivative of M λ by q.
+    /// ∂²φ/∂a∂q, the derivative of M λ with respect to q: entry (j, k) is ∂²φ/∂a_j∂q_k.
     pub dadq: &'d Matrix<S>,
-    /// The first derivatives of τ, which come with them.
+    /// First derivatives of τ, computed at the same time.
     pub first: RneaDerivatives<'d, S, R>,
 }
 
-/// The second derivatives of [`rnea`](crate::rnea), contracted with a vector λ: the Hessian of φ = λᵀ τ(q, v, a), exact,
-/// in O(n · depth).
+/// Computes the second derivatives of [`rnea`](crate::rnea), contracted with a vector λ, in O(n · depth): the exact
+/// Hessian of φ = λᵀ τ(q, v, a).
 ///
-/// q: nq numbers; v, a, lambda: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for none.
-/// Returns four nv × nv matrices (in units of λᵀ τ by those of q, v and a), and the first derivatives of τ. Allocates
-/// nothing. Source: as of [`rnea_derivatives`](crate::rnea_derivatives()), differentiated once more.
+/// q: nq numbers; v, a, lambda: nv; f_ext: one force per body in its frame (the force moves with the body), or empty
+/// for none. Returns four nv × nv matrices (units: λᵀ τ divided by the units of q, v and a), and the first derivatives
+/// of τ. Allocates nothing. Source: as for [`rnea_derivatives`](crate::rnea_derivatives()), differentiated once more.
 ///
 /// ```
 /// use condyle_dynamics::{Data, rnea_hessian, robots};
@@ -71,7 +72,7 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     RneaHessian { dqdq, dvdq, dvdv, dadq, first }
 }
 
-/// The second derivatives of τ = rnea(q, v, a): one Hessian for each effort, 4 nv³ numbers.
+/// Second derivatives of τ = rnea(q, v, a): one Hessian per effort, 4 nv³ numbers.
 #[derive(Clone, Debug)]
 pub struct RneaSecondDerivatives<S> {
     /// ∂²τ_i/∂q∂q for each i, symmetric.
@@ -82,12 +83,12 @@ pub struct RneaSecondDerivatives<S> {
     pub dvdv: Vec<DMatrix<S>>,
     /// ∂²τ_i/∂a∂q for each i: entry (j, k) is ∂²τ_i/∂a_j∂q_k = ∂M_ij/∂q_k.
     pub dadq: Vec<DMatrix<S>>,
-    /// The unit vectors. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
+    /// Unit vector, overwritten for each effort. Shape: nv. Written by: `new`, `rnea_second_derivatives`.
     lambda: Array<S>,
 }
 
 impl<S: Scalar> RneaSecondDerivatives<S> {
-    /// Memory for the tensors of a model.
+    /// Allocates the tensors for a model.
     pub fn new<R>(model: &Model<R>) -> Self {
         let zeros = || vec![DMatrix::from_element(model.nv(), model.nv(), S::zero()); model.nv()];
         let lambda = filled(S::zero, model.nv());
@@ -95,10 +96,11 @@ impl<S: Scalar> RneaSecondDerivatives<S> {
     }
 }
 
-/// The second derivatives of [`rnea`](crate::rnea) as full tensors, in O(n² · depth).
+/// Computes the second derivatives of [`rnea`](crate::rnea) as full tensors, in O(n² · depth).
 ///
-/// q: nq numbers; v, a: nv; f_ext: a force on each body in its frame, or empty for none; out is overwritten. Allocates
-/// nothing. A solver wants them contracted: [`rnea_hessian`], which this calls for each unit vector.
+/// q: nq numbers; v, a: nv; f_ext: one force per body in its frame, or empty for none; out is overwritten. Allocates
+/// nothing. Solvers usually need the tensors contracted with a vector: see [`rnea_hessian`], which this function calls
+/// for each unit vector.
 ///
 /// ```
 /// use condyle_dynamics::{Data, RneaSecondDerivatives, rnea_second_derivatives, robots};
@@ -131,7 +133,8 @@ pub fn rnea_second_derivatives<S: Scalar, R: Constant<S>>(
     });
 }
 
-/// [`rnea_hessian`] for each unit vector in turn: gives its number and the matrices. lambda is scratch, overwritten.
+/// Computes [`rnea_hessian`] for each unit vector in turn, and calls `give` with its index and the matrices. lambda is
+/// scratch, overwritten.
 #[track_caller]
 pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -152,9 +155,9 @@ pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// The second derivatives of ψ = λᵀ aba(q, v, τ), each a full nv × nv matrix; all others are zero.
+/// Second derivatives of ψ = λᵀ aba(q, v, τ), each a full nv × nv matrix. All other second derivatives are zero.
 ///
-/// They are the Hessian of ψ(q ⊕ δ, v + …, τ + …) at δ = 0.
+/// The matrices are blocks of the Hessian of ψ(q ⊕ δ, v + …, τ + …) at δ = 0.
 #[derive(Clone, Copy, Debug)]
 pub struct AbaHessian<'d, S, R = f64> {
     /// ∂²ψ/∂q∂q, symmetric.
@@ -163,18 +166,19 @@ pub struct AbaHessian<'d, S, R = f64> {
     pub dvdq: &'d Matrix<S>,
     /// ∂²ψ/∂v∂v, symmetric.
     pub dvdv: &'d Matrix<S>,
-    /// ∂²ψ/∂τ∂q: entry (j, k) is ∂²ψ/∂τ_j∂q_k, the derivative of M⁻¹ λ by q.
+    /// ∂²ψ/∂τ∂q, the derivative of M⁻¹ λ with respect to q: entry (j, k) is ∂²ψ/∂τ_j∂q_k.
     pub dtaudq: &'d Matrix<S>,
-    /// q̈ and its first derivatives, which come with them.
+    /// q̈ and its first derivatives, computed at the same time.
     pub first: AbaDerivatives<'d, S, R>,
 }
 
-/// The second derivatives of [`aba`](crate::aba), contracted with a vector λ: the Hessian of ψ = λᵀ q̈(q, v, τ), exact.
+/// Computes the second derivatives of [`aba`](crate::aba), contracted with a vector λ: the exact Hessian of ψ = λᵀ
+/// q̈(q, v, τ).
 ///
-/// q: nq numbers; v, tau, lambda: nv; f_ext: a force on each body in its frame (it moves with the body), or empty for
-/// none. Returns four nv × nv matrices (in units of λᵀ q̈ by those of q, v and τ), q̈ and its first derivatives: O(n · depth)
-/// for what goes into them, and three sparse products of O(n²) columns. Allocates nothing. Source: Nganga and Wensing
-/// (2021).
+/// q: nq numbers; v, tau, lambda: nv; f_ext: one force per body in its frame (the force moves with the body), or empty
+/// for none. Returns q̈, its first derivatives, and four nv × nv matrices (units: λᵀ q̈ divided by the units of q, v
+/// and τ). Costs O(n · depth) for the second derivatives of τ, and three sparse products of O(n²) columns. Allocates
+/// nothing. Source: Nganga and Wensing (2021).
 ///
 /// ```
 /// use condyle_dynamics::{Data, aba_hessian, robots};

@@ -1,7 +1,7 @@
-//! The derivatives of forward dynamics under constraints, by hand.
+//! Analytical derivatives of forward dynamics under constraints.
 //!
-//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. Differentiated at q̈ and λ as they are, with
-//! r = ∂(M q̈ + h − Jᵀ λ) and c = ∂(J q̈ + γ), they are equations with the same matrix, whose inverse has the blocks
+//! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. Differentiating them gives linear equations with the
+//! same matrix K. With r = ∂(M q̈ + h − Jᵀ λ) and c = ∂(J q̈ + γ), at fixed q̈ and λ, and the blocks of K⁻¹:
 //!
 //! ```text
 //! K⁻¹ = [ P    J̄  ]      Λ = (J M⁻¹ Jᵀ)⁻¹,   J̄ = M⁻¹ Jᵀ Λ,   P = M⁻¹ − J̄ J M⁻¹
@@ -9,7 +9,7 @@
 //! ∂q̈/∂x = −P r − J̄ c,   ∂λ/∂x = J̄ᵀ r − Λ c,   ∂q̈/∂τ = P,   ∂λ/∂τ = −J̄ᵀ
 //! ```
 //!
-//! r and c are those of [`constrained_equations`]. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
+//! [`constrained_equations`] defines r and c. Source: Carpentier and Mansard, *Analytical derivatives of rigid body
 //! dynamics algorithms* (2018), for the equations; Budhiraja, Carpentier, Mastalli, Mansard, *Differential dynamic
 //! programming for multi-phase rigid contact dynamics* (2018).
 
@@ -30,14 +30,14 @@ workspace! {
         pub P: Matrix<S> = zero_matrix(size.nv, size.nv),
         /// ∂(M q̈ + h − Jᵀ λ)/∂q. Written by: `differentiate`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// The derivative of q̈ or of the velocity. Written by: `constrained_dynamics_derivatives`,
+        /// Derivative of q̈ or of the velocity after an impact. Written by: `constrained_dynamics_derivatives`,
         /// `impulse_dynamics_derivatives`.
         pub da_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
         pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// C −= A B in some columns, and some rows of C, where column j of B has zeros but in the rows `rows[j]`.
+/// Computes C −= A B in some columns and some rows of C. Column j of B is zero outside the rows `rows[j]`.
 #[inline(always)]
 fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
     A: &Matrix<S>,
@@ -54,7 +54,7 @@ fn subtract_product<S: Scalar, R: AsRef<[usize]>>(
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Λ, J̄ and P of K⁻¹ of an island, for M⁻¹ in place of P, and J M⁻¹ Jᵀ that is factorised.
+    /// Computes Λ, J̄ and P of K⁻¹ of an island. P holds M⁻¹ on entry, and J M⁻¹ Jᵀ must be factorised.
     #[inline(always)]
     fn invert_island(&mut self, k: usize, P: &mut Matrix<S>) {
         let Self { U, Jbar, dlambda_dtau, delassus, proximal, .. } = self;
@@ -98,7 +98,7 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// The blocks of K⁻¹.
+    /// Computes the blocks of K⁻¹.
     pub(crate) fn invert<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, P: &mut Matrix<S>) {
         factor.inverse(P); // M⁻¹
         for k in 0..set.islands.len() {
@@ -107,7 +107,7 @@ kernel! {
     }
 }
 
-/// What the equations are differentiated by.
+/// Variable with respect to which the equations are differentiated.
 #[derive(Clone, Copy)]
 pub(crate) enum By {
     Position,
@@ -117,7 +117,8 @@ pub(crate) enum By {
 alike!(By);
 
 kernel! {
-    /// The derivatives of acceleration and forces, for the blocks of K⁻¹, r, and c in the set, where they may differ from zero.
+    /// Computes the derivatives of acceleration and forces, in the entries that may be nonzero. Inputs are the blocks
+    /// of K⁻¹, r, and the set's c.
     pub(crate) fn respond<S>(set: &mut ConstraintSet<S>, by: By, P: &Matrix<S>, r: &Matrix<S>, da: &mut Matrix<S>) {
         let ConstraintSet { Jbar, dlambda_dtau, delassus, nonzero_rows, touching, islands, .. } = set;
         let (c, dlambda) = match by {

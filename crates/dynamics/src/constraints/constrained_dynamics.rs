@@ -1,7 +1,7 @@
 //! Forward dynamics under constraints.
 //!
-//! Gauss's principle: of all accelerations that satisfy J q̈ + γ = 0, the robot takes the one that is nearest to its free
-//! acceleration in the metric of M. With the forces λ of the constraints,
+//! Gauss's principle: among all accelerations with J q̈ + γ = 0, the robot's acceleration is the nearest to its free
+//! acceleration, in the metric of M. With the forces λ of the constraints,
 //!
 //! ```text
 //! [ M   Jᵀ ] [  q̈ ]   [ τ − h ]         J M⁻¹ Jᵀ λ = −(γ + J M⁻¹ (τ − h)),
@@ -25,29 +25,29 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Mat3, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// In the world's frame.
+    /// Quantities in the world's frame.
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
         /// Velocity. Written by: `bias`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Acceleration for q̈ = 0, with gravity as the world's. Written by: `bias`.
+        /// Acceleration for q̈ = 0, including gravity as the world's acceleration. Written by: `bias`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Iᶜ. Written by: `bias`, `inertia`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
         /// Force through the joint for q̈ = 0. Written by: `bias`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Written by: `bias`, `inertia`.
+        /// M. Written by: `bias`, `inertia`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Its factor. Written by: `constrained_dynamics`, `impulse_dynamics`.
+        /// Factor of M. Written by: `constrained_dynamics`, `impulse_dynamics`.
         pub factor: Ltdl<S> = Ltdl::new(model),
         /// τ − h. Written by: `bias`, `constrained_dynamics`.
         pub effort: Array<S> = filled(S::zero, size.nv),
-        /// The acceleration, or the change of velocity. Written by: `constrained_dynamics`, `impulse_dynamics`.
+        /// Acceleration, or change of velocity. Written by: `constrained_dynamics`, `impulse_dynamics`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// M, h and the bodies' motion for q̈ = 0, for bodies that are placed: the Newton–Euler and the composite-rigid-body
-/// algorithm in one pass to the tips and one back.
+/// Computes M, h and the bodies' motion for q̈ = 0, for bodies whose placements are known. It runs the Newton–Euler and
+/// the composite-rigid-body algorithm in one pass to the tips and one back.
 #[inline(always)]
 fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let Workspace { v, a, IC, F, M, effort, .. } = d;
@@ -77,7 +77,7 @@ fn bias<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], 
 }
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// y = J x + y.
+    /// Computes y = J x + y.
     #[inline(always)]
     pub(crate) fn add_motion(&self, x: &[S], y: &mut [S]) {
         for plan in &self.plans {
@@ -91,7 +91,7 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// y = Jᵀ λ + y.
+    /// Computes y = Jᵀ λ + y.
     #[inline(always)]
     pub(crate) fn add_effort(&self, y: &mut [S]) {
         for plan in &self.plans {
@@ -104,18 +104,19 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// The largest |J q̈ + γ|.
+    /// Returns the largest |J q̈ + γ|.
     pub(crate) fn residual(&self) -> S {
         let mut residual = S::zero();
         largest(&self.error, &mut residual);
         residual
     }
 
-    /// The force of constraint k as the last call left it, at the origin of its frame, along the axes of its reference; of
-    /// all but rigid ones without moment. It acts on the body of the frame, its opposite on the other body or the world.
+    /// Returns the force of constraint k from the last call, at the origin of its frame, along the axes of its
+    /// reference. Only rigid constraints have a moment. The force acts on the body of the frame; the opposite force
+    /// acts on the other body or the world.
     ///
     /// # Panics
-    /// If there is no such constraint.
+    /// If constraint k does not exist.
     #[inline(always)]
     #[track_caller]
     pub fn force(&self, k: usize) -> Force<S> {
@@ -134,7 +135,7 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// M and τ − h, for bodies that are placed.
+    /// Computes M and τ − h, for bodies whose placements are known.
     pub(crate) fn equations<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -152,7 +153,7 @@ kernel! {
 }
 
 kernel! {
-    /// M alone, for bodies that are placed.
+    /// Computes only M, for bodies whose placements are known.
     pub(crate) fn inertia<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         let l = Single::new(model);
         for i in l.bodies() {
@@ -163,14 +164,15 @@ kernel! {
 }
 
 kernel! {
-    /// The factor of M.
+    /// Factorises M.
     pub(crate) fn factorize<S>(d: &mut Workspace<S>) {
         d.factor.factorize(&d.M);
     }
 }
 
 kernel! {
-    /// J and J q̈ + γ, for bodies whose velocities and accelerations are known; for accelerations without q̈ it is γ.
+    /// Computes J and J q̈ + γ, for bodies whose velocities and accelerations are known. With the accelerations for q̈
+    /// = 0, it computes γ.
     pub(crate) fn evaluate<S>(world: &World<S>, set: &mut ConstraintSet<S>, v: &[Motion<S>], a: &[Motion<S>]) {
         for (i, plan) in set.plans.iter().enumerate() {
             let target = &set.targets[i];
@@ -185,7 +187,7 @@ kernel! {
 }
 
 kernel! {
-    /// λ and the acceleration x for an effort, so that J x + γ = 0; for M that is factorised.
+    /// Computes λ and the acceleration x for an effort, so that J x + γ = 0. M must be factorised.
     pub(crate) fn solve<S>(set: &mut ConstraintSet<S>, factor: &Ltdl<S>, effort: &[S], x: &mut [S]) {
         x.copy_from_slice(effort);
         factor.solve(x); // M⁻¹ (τ − h)
@@ -210,7 +212,7 @@ kernel! {
 }
 
 kernel! {
-    /// The largest absolute value of some numbers.
+    /// Raises `largest` to the largest absolute value of some numbers.
     pub(crate) fn largest<S>(of: &[S], largest: &mut S) {
         for &x in of {
             *largest = S::select(largest.lt(x.abs()), x.abs(), *largest);

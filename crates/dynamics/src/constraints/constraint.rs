@@ -1,4 +1,4 @@
-//! What constraints are: frames that touch the world, and frames of two bodies that are held together.
+//! Definition of constraints: contacts of frames with the world, and pairs of frames that are held together.
 
 use crate::passes::frames::ReferenceFrame;
 use alloc::borrow::ToOwned;
@@ -6,24 +6,24 @@ use condyle_model::{Error, Model, ModelConstraint, ModelConstraintKind};
 use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, alike};
 use core::any::Any;
 
-/// The motion that a constraint holds.
+/// Kind of motion that a constraint holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum ConstraintKind {
-    /// The origin of a frame: three rows, a force.
+    /// Origin of a frame: three rows, a force.
     Point,
-    /// The origin of a frame along one axis, the third of [`axes`](ContactConstraint::axes): one row.
+    /// Origin of a frame along one axis, the third of [`axes`](ContactConstraint::axes): one row.
     Line,
-    /// The origin of a frame along two axes, the first and the third of [`axes`](ContactConstraint::axes): two rows.
+    /// Origin of a frame along two axes, the first and the third of [`axes`](ContactConstraint::axes): two rows.
     Plane,
-    /// A frame: six rows, a force and a moment, linear first.
+    /// Frame: six rows, a force and a moment, linear first.
     Rigid,
 }
 
 impl ConstraintKind {
-    /// 1 (line), 2 (plane), 3 (point) or 6 (rigid).
+    /// Returns the number of rows: 1 (line), 2 (plane), 3 (point) or 6 (rigid).
     pub fn rows(self) -> usize {
         match self {
             Self::Line => 1,
@@ -34,29 +34,29 @@ impl ConstraintKind {
     }
 }
 
-/// The target of a constraint: where its frame should be, and how it should move there.
+/// Target of a constraint: desired pose of its frame, and desired motion there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Target<S> {
-    /// The wanted pose of the frame in the other frame (the world for a contact); of all but rigid ones, the translation
-    /// alone.
+    /// Desired pose of the frame in the other frame (the world for a contact). All kinds except rigid use only its
+    /// translation.
     pub placement: Se3<S>,
-    /// The wanted velocity relative to the other frame, in the reference frame (m/s, rad/s).
+    /// Desired velocity relative to the other frame, in the reference frame (m/s, rad/s).
     pub velocity: Motion<S>,
-    /// The wanted acceleration relative to the other frame, in the reference frame (m/s², rad/s²).
+    /// Desired acceleration relative to the other frame, in the reference frame (m/s², rad/s²).
     pub acceleration: Motion<S>,
 }
 
 alike!(Target { placement, velocity, acceleration });
 
 impl<S: Scalar> Target<S> {
-    /// Both frames in one place, at rest.
+    /// Returns the target with coinciding frames, at rest.
     pub fn identity() -> Self {
         Self { placement: Se3::identity(), velocity: Motion::zero(), acceleration: Motion::zero() }
     }
 
-    /// A message for a target of plain numbers that is none.
+    /// Returns a message if the target's scalars are `f64` and the target is invalid.
     pub(crate) fn wrong(&self) -> Option<&'static str> {
         let Target { placement: X, velocity, acceleration } = (self as &dyn Any).downcast_ref::<Target<f64>>()?;
         let motions = velocity.to_array().into_iter().chain(acceleration.to_array());
@@ -66,7 +66,7 @@ impl<S: Scalar> Target<S> {
         (!X.rotation.is_rotation()).then_some("its target's placement is no rotation and translation")
     }
 
-    /// The same target on another scalar.
+    /// Converts the target to another scalar.
     pub fn lift<T: Scalar>(self) -> Target<T>
     where
         S: Constant<T>,
@@ -79,29 +79,31 @@ impl<S: Scalar> Target<S> {
     }
 }
 
-/// A contact of a frame with the world, or a loop that two frames close.
+/// Contact of a frame with the world, or a loop that two frames close.
 ///
-/// With the frame's pose X = ₂X₁ in the other frame moved to the target, its velocity v and acceleration a relative to
-/// the other body, the constraint asks for
+/// Let X = ₂X₁ be the frame's pose in the other frame moved to the target, and v and a its velocity and acceleration
+/// relative to the other body. The constraint requires
 ///
 /// ```text
 /// a − a* + kd (v − v*) + kp e = 0,      e = log X (rigid), the axes of frame 1 applied to p₁ − p₂ (point)
 /// ```
 ///
-/// which is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0. All is expressed
-/// along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the world
-/// ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)), at the frame's origin, and so is the force λ with which
-/// the constraint acts on the body of `frame`; on the other body, or the world, acts −λ.
+/// This is Baumgarte's stabilisation: the error of position and velocity decays as ë + kd ė + kp e = 0. All quantities
+/// are at the frame's origin, along the axes of `frame` ([`Local`](ReferenceFrame::Local)) or of the world
+/// ([`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned)). The same holds for the force λ that the constraint
+/// exerts on the body of `frame`. The force −λ acts on the other body, or the world.
 ///
-/// A point's acceleration is the classical one, a rigid frame's the spatial one; a rigid loop in `Local` takes the rate
-/// of v's six numbers, in `LocalWorldAligned` the difference of the spatial accelerations, which is the same where v = 0.
-/// Signs, gains and axes are those of Pinocchio's `RigidConstraintModel` (whose second placement is the other frame's
-/// times the target) and, for contacts, of Crocoddyl's `ContactModel3D` and `ContactModel6D`.
+/// The acceleration of a point is the classical one, and the acceleration of a rigid frame is the spatial one. A rigid
+/// loop in `Local` uses the rate of v's six numbers. In `LocalWorldAligned` it uses the difference of the spatial
+/// accelerations, which is the same where v = 0. Signs, gains and axes agree with Pinocchio's `RigidConstraintModel`
+/// (whose second placement is the other frame's placement times the target). For contacts they agree with Crocoddyl's
+/// `ContactModel3D` and `ContactModel6D`.
 ///
-/// A contact along a line or in a plane has some rows of a point's, along the columns e₁, e₂, e₃ of `axes`, which stand in
-/// the axes of `reference`: e₃ (line), or e₁ and e₃ (plane); the other directions are free. Crocoddyl's `ContactModel1D`
-/// with a `rotation` and a reference x* is the line with `axes` = rotationᵀ and the target rotation · (0, 0, x*); its
-/// `ContactModel2D` is the plane in `Local` (with kp, it takes the error of position along the world's x and z).
+/// A contact along a line or in a plane has some rows of a point's contact, along columns e₁, e₂, e₃ of `axes`, which
+/// are expressed in the axes of `reference`: e₃ (line), or e₁ and e₃ (plane). The other directions are free.
+/// Crocoddyl's `ContactModel1D` with a `rotation` and a reference x* is the line with `axes` = rotationᵀ and the target
+/// rotation · (0, 0, x*). Its `ContactModel2D` is the plane in `Local` (with kp, `ContactModel2D` measures the error of
+/// position along the world's x and z).
 ///
 /// Source: Baumgarte, *Stabilization of constraints and integrals of motion in dynamical systems* (1972).
 ///
@@ -117,28 +119,28 @@ impl<S: Scalar> Target<S> {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct ContactConstraint {
-    /// The number of the frame that is held.
+    /// Index of the frame that is held.
     pub frame: usize,
-    /// The number of the frame that it is held to; the world if there is none.
+    /// Index of the frame to which it is held; `None` for the world.
     pub other: Option<usize>,
-    /// A point, some directions of it, or the whole frame.
+    /// Kind: a point, some directions of a point, or the whole frame.
     pub kind: ConstraintKind,
-    /// The axes of a line or a plane, as columns along those of `reference`; 1 for all others.
+    /// Axes of a line or a plane, as columns expressed in the axes of `reference`; the identity for other kinds.
     #[cfg_attr(feature = "serde", serde(default = "Mat3::identity"))]
     pub axes: Mat3<f64>,
-    /// Along which axes the rows and λ are: `Local` or `LocalWorldAligned`.
+    /// Axes of the rows and of λ: `Local` or `LocalWorldAligned`.
     pub reference: ReferenceFrame,
-    /// How fast an error of position decays (1/s²).
+    /// Gain of the position error (1/s²).
     pub kp: f64,
-    /// How fast an error of velocity decays (1/s).
+    /// Gain of the velocity error (1/s).
     pub kd: f64,
-    /// The place and motion that are aimed at; can be changed later
+    /// Desired placement and motion; can be changed later
     /// ([`ConstraintSet::set_target`](crate::ConstraintSet::set_target)).
     pub target: Target<f64>,
 }
 
 impl ContactConstraint {
-    /// A point contact of a frame's origin with the world, in `Local`, without stabilisation.
+    /// Returns a point contact of a frame's origin with the world, in `Local`, without stabilisation.
     pub fn point(frame: usize) -> Self {
         let reference = ReferenceFrame::Local;
         let target = Target::identity();
@@ -146,26 +148,27 @@ impl ContactConstraint {
         Self { frame, other: None, kind: ConstraintKind::Point, axes, reference, kp: 0.0, kd: 0.0, target }
     }
 
-    /// A contact of a frame's origin with the world along the frame's z alone, without stabilisation.
+    /// Returns a contact of a frame's origin with the world along the frame's z only, without stabilisation.
     pub fn line(frame: usize) -> Self {
         Self { kind: ConstraintKind::Line, ..Self::point(frame) }
     }
 
-    /// A contact of a frame's origin with the world along the frame's x and z, without stabilisation.
+    /// Returns a contact of a frame's origin with the world along the frame's x and z, without stabilisation.
     pub fn plane(frame: usize) -> Self {
         Self { kind: ConstraintKind::Plane, ..Self::point(frame) }
     }
 
-    /// A rigid contact of a frame with the world, in `Local`, without stabilisation.
+    /// Returns a rigid contact of a frame with the world, in `Local`, without stabilisation.
     pub fn rigid(frame: usize) -> Self {
         Self { kind: ConstraintKind::Rigid, ..Self::point(frame) }
     }
 
-    /// The constraint of a model's file, in `Local`, without stabilisation; `None` for a coupling of joints, which holds no frame.
+    /// Returns the constraint of a model's file, in `Local`, without stabilisation. Returns `None` for a coupling of
+    /// joints, which does not hold a frame.
     ///
-    /// A model lists the loops of its file ([`Model::constraints`]) and leaves them open: the algorithms of a tree do not know
-    /// them. With [`constrained_dynamics`](crate::constrained_dynamics()) they are closed. An error of position, as the first state
-    /// may have it, decays with the gains kp and kd.
+    /// A model lists the loops of its file ([`Model::constraints`]) and leaves them open: the algorithms for trees
+    /// ignore them. [`constrained_dynamics`](crate::constrained_dynamics()) closes them. A position error, for example
+    /// of the initial state, decays with the gains kp and kd.
     ///
     /// ```
     /// use condyle_dynamics::{ConstraintSet, ContactConstraint, Data, Inertia, Joint, ModelBuilder, Proximal, Se3, Sym3};
@@ -206,7 +209,8 @@ impl ContactConstraint {
         Some(Self { kind, other: Some(frames[1]), ..Self::point(frames[0]) })
     }
 
-    /// The bodies of both frames, unless something is wrong with this constraint or with it beside the ones before.
+    /// Returns the bodies of both frames. Fails if this constraint is invalid or repeats one of the earlier constraints
+    /// `before`.
     pub(crate) fn bodies<R>(&self, model: &Model<R>, before: &[Self]) -> Result<[usize; 2], Error> {
         let wrong = |what| Err(Error::Constraint { constraint: before.len(), what });
         let frames = model.frames().len();

@@ -1,4 +1,4 @@
-//! What constrained dynamics of a robot with limbs (`constrained.rs`) needs of the constraints of a set, and writes.
+//! Inputs and results of constrained dynamics for a robot with limbs (`constrained.rs`), for the constraints of a set.
 
 use crate::constraints::plan::Plan;
 use alloc::boxed::Box;
@@ -7,43 +7,45 @@ use condyle_model::Model;
 use condyle_model::limbs::LANES;
 use condyle_spatial::gate::is;
 
-/// The number of rows of constraints that stand side by side: in one vector, or in two.
+/// Maximum number of constraint rows in parallel lanes: one or two vectors.
 pub(crate) const WIDE: usize = 2 * LANES;
 
-/// A body that feels the forces of a constraint.
+/// Body on which the forces of a constraint act.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub body: usize,
-    /// The columns of its joint: how many there are, and where the first stands among the places of the constraint.
+    /// Columns of its joint: their number, and the slot of the first among the slots of the constraint.
     pub nv: usize,
     pub at: usize,
 }
 
-/// One constraint.
+/// Rows of one constraint.
 #[derive(Clone, Debug)]
 pub(crate) struct Rows {
-    /// The ways to the root, without it: from the body of the first frame, of the other, and from where both ways meet.
+    /// Paths towards the root, without the root: from the first frame's body to the junction, from the other frame's
+    /// body to the junction, and from the junction on.
     pub ways: [Vec<Link>; 3],
-    /// The number of numbers that each of its places has in Y, and the beginning of those of place 0.
+    /// Number of values that each of its slots has in Y, and the index of the first value of slot 0.
     pub wide: usize,
     pub start: usize,
-    /// The constraints before it and itself, and the runs of places beyond the root that both touch, as in its plan.
+    /// Constraints, up to and including this one, that share slots beyond the root's slots with it. Each has the runs
+    /// of these slots, as in the plan.
     pub beside: Vec<(usize, Vec<[usize; 3]>)>,
-    /// The unit forces of its rows on the bodies of both frames, in the world's frame. Written by: `begin`.
+    /// Unit forces of its rows on the bodies of both frames, in the world's frame. Written by: `begin`.
     pub forces: [[[f64; WIDE]; 6]; 2],
     /// γ'. Written by: `begin`.
     pub gamma: [f64; WIDE],
 }
 
-/// All rows together: a number for each, then zeros, to whole vectors and a vector more.
+/// Quantities of all rows: one number per row, padded with zeros to whole vectors plus one vector.
 #[derive(Clone, Debug)]
 pub(crate) struct All {
-    /// The body that carries all others, 0 if there is none, and how many columns its joint has.
+    /// Body that carries all others, 0 if none does, and the number of columns of its joint.
     pub root: usize,
     pub nv: usize,
     pub stride: usize,
-    /// The force on the root: all of the forces on the bodies that it carries, and what remains of them. Shape: 6 × stride.
-    /// Written by: `carry`.
+    /// Force on the root: the sum of all forces on the bodies that it carries, and the remainder of that sum. Shape: 6
+    /// × stride. Written by: `carry`.
     pub whole: Vec<f64>,
     pub rest: Vec<f64>,
     /// J q̈ + γ for λ = 0, then λ. Shape: stride. Written by: `carry`, `carry_on`, `constrained.rs`.
@@ -54,20 +56,20 @@ pub(crate) struct All {
     pub YD: Vec<f64>,
 }
 
-/// The constraints of a set.
+/// Constraints of a set.
 #[derive(Clone, Debug)]
 pub(crate) struct ConstraintLanes {
     pub(crate) rows: Vec<Rows>,
-    /// Y and Y D⁻¹. Shape: places of each constraint × its width. Written by: `carry`.
+    /// Y and Y D⁻¹. Shape: slots of each constraint × its width. Written by: `carry`.
     pub(crate) Y: Vec<f64>,
     pub(crate) YD: Vec<f64>,
     pub(crate) all: All,
 }
 
 impl ConstraintLanes {
-    /// The lanes for a robot with limbs on which no joint follows another, and constraints of points and frames.
+    /// Returns the lanes for a robot with limbs but without mimic joints, if all constraints are points or frames.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>, plans: &[Plan]) -> Option<Box<Self>> {
-        // rows come by threes
+        // The number of rows must be a multiple of three.
         let whole = plans.iter().all(|plan| plan.rows().is_multiple_of(3));
         if model.limbs().is_none() || model.has_mimic() || !is::<S, f64>() || !whole {
             return None;
@@ -86,7 +88,7 @@ impl ConstraintLanes {
             let [one, other] = plan.bodies.map(way);
             let own = |a: &[usize], b: &[usize]| a.iter().filter(|i| !b.contains(i)).map(link).collect();
             let shared = one.iter().filter(|i| other.contains(i)).map(link).collect();
-            // the root's places are the first ones
+            // The root's slots come first.
             let beyond = |&[here, there, n]: &[usize; 3]| {
                 let root = if here < nv { nv } else { 0 };
                 (n > root).then_some([here + root, there + root, n - root])

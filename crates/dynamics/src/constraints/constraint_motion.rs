@@ -1,24 +1,24 @@
-//! The relative motion of the frames of a constraint: J, the acceleration γ for q̈ = 0, and their derivatives.
+//! Relative motion of the frames of a constraint: J, the acceleration γ for q̈ = 0, and their derivatives.
 //!
-//! In the world's frame, where body 1 carries frame 1 at ₀X₁ and body 2 the target, with Δv = v₁ − v₂, the acceleration
-//! that shall vanish is
+//! In the world's frame, body 1 carries frame 1 at ₀X₁, and body 2 carries the target at ₀X₂. With Δv = v₁ − v₂, the
+//! following acceleration must vanish:
 //!
 //! ```text
 //! rigid   ₀X₁⁻¹ (a₁ − a₂ + Δv × v₂ + kd Δv) + kp log(₂X₁) − (a* + kd v*)       (without Δv × v₂ along the world's axes)
 //! point   R₁ᵀ (α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂)) − (a* + kd v*)            u, α: velocity, acceleration of points
 //! ```
 //!
-//! and of a line or a plane the part of a point's along some axes, e₃ᵀ (…) or [e₁ e₃]ᵀ (…).
+//! For a line or a plane it is the part of a point's acceleration along some axes, e₃ᵀ (…) or [e₁ e₃]ᵀ (…).
 //!
-//! When coordinate e moves a body, ∂v and ∂a are those in the head of `rnea_derivatives.rs`; a point p of the body with
-//! s = S_e at p and Ψ̇, Ψ̈ taken there too then has
+//! When coordinate e moves a body, ∂v and ∂a are given at the top of `rnea_derivatives.rs`. For a point p of the body,
+//! with s = S_e, Ψ̇ and Ψ̈ evaluated at p,
 //!
 //! ```text
 //! ∂u/∂q_e = s_ω × u + Ψ̇     ∂α/∂q_e = s_ω × α + Ψ̈ + 2 Ψ̇_ω × u     ∂α/∂q̇_e = Ψ̇ + Ṡ + 2 s_ω × u
 //! ```
 //!
-//! and what is expressed in frame 1, ₀X₁⁻¹ m, changes by ₀X₁⁻¹ (∂m − S_e × m) if e moves frame 1. Gravity, which is the
-//! world's acceleration here, leaves all differences.
+//! A motion ₀X₁⁻¹ m expressed in frame 1 changes by ₀X₁⁻¹ (∂m − S_e × m) if e moves frame 1. Gravity is the world's
+//! acceleration here and cancels in all differences.
 
 use crate::constraints::constraint::{ConstraintKind, Target};
 use crate::constraints::plan::Plan;
@@ -26,18 +26,18 @@ use crate::passes::kinematics::World;
 use condyle_spatial::lie::{Quaternion, jlog6, log6};
 use condyle_spatial::{Act, Cross, Mat3, Matrix, Motion, Scalar, Se3, Vec3};
 
-/// The poses of the two frames of a constraint and the motions of their bodies, in the world's frame.
+/// Poses of the two frames of a constraint and motions of their bodies, in the world's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FramePair<S> {
-    /// ₀X₁: the frame.
+    /// ₀X₁, the pose of the frame.
     pub x1: Se3<S>,
-    /// ₀X₂: the target in the other frame.
+    /// ₀X₂, the pose of the target, given in the other frame.
     pub x2: Se3<S>,
     pub v: [Motion<S>; 2],
     pub a: [Motion<S>; 2],
 }
 
-/// The columns of the motion of all joints, in the world's frame, as in `rnea_derivatives.rs`.
+/// Columns of the motion of all joints, in the world's frame, as in `rnea_derivatives.rs`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Columns<'w, S> {
     pub S: &'w [Motion<S>],
@@ -46,13 +46,13 @@ pub(crate) struct Columns<'w, S> {
     pub PsidSd: &'w [Motion<S>],
 }
 
-/// The velocity of the point p of a rigid motion: v + ω × p.
+/// Returns the velocity of the point p of a rigid motion: v + ω × p.
 #[inline(always)]
 fn at<S: Scalar>(m: Motion<S>, p: Vec3<S>) -> Vec3<S> {
     m.linear + m.angular.cross(p)
 }
 
-/// x − y, of those that are there.
+/// Returns x − y, with x or y omitted if its flag is false.
 #[inline(always)]
 fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Motion<S> {
     match (first, second) {
@@ -63,14 +63,14 @@ fn minus<S: Scalar>(first: bool, x: Motion<S>, second: bool, y: Motion<S>) -> Mo
     }
 }
 
-/// Turns both parts of a motion by ω.
+/// Returns ω × m for both parts of a motion m.
 #[inline(always)]
 fn turn<S: Scalar>(w: Vec3<S>, m: Motion<S>) -> Motion<S> {
     Motion::new(w.cross(m.linear), w.cross(m.angular))
 }
 
 impl<S: Scalar> FramePair<S> {
-    /// The frames of bodies in these poses, at rest.
+    /// Returns the frames of bodies with these poses, at rest.
     #[inline(always)]
     pub(crate) fn between(plan: &Plan, target: &Target<S>, [one, other]: [Se3<S>; 2]) -> Self {
         let x1 = one * plan.turned[0].lift();
@@ -78,33 +78,33 @@ impl<S: Scalar> FramePair<S> {
         Self { x1, x2, v: [Motion::zero(); 2], a: [Motion::zero(); 2] }
     }
 
-    /// The frames of bodies that are placed and at rest.
+    /// Returns the frames of bodies at rest whose placements are known.
     #[inline(always)]
     pub(crate) fn at_rest(plan: &Plan, target: &Target<S>, World { oX, .. }: &World<S>) -> Self {
         let [i, j] = plan.bodies;
         Self::between(plan, target, [oX[i], oX[j]])
     }
 
-    /// The frames of bodies that move.
+    /// Returns the frames of moving bodies.
     #[inline(always)]
     pub(crate) fn new(plan: &Plan, target: &Target<S>, w: &World<S>, v: &[Motion<S>], a: &[Motion<S>]) -> Self {
         let [i, j] = plan.bodies;
         Self { v: [v[i], v[j]], a: [a[i], a[j]], ..Self::at_rest(plan, target, w) }
     }
 
-    /// A motion in the world's frame as the constraint's rows express it.
+    /// Converts a motion from the world's frame to the axes of the constraint's rows.
     #[inline(always)]
     fn express(&self, plan: &Plan, m: Motion<S>) -> Motion<S> {
         if plan.aligned() { Motion::new(at(m, self.x1.translation), m.angular) } else { self.x1.act_inv(m) }
     }
 
-    /// A vector along the world's axes as the constraint's rows express it.
+    /// Converts a vector from the world's axes to the axes of the constraint's rows.
     #[inline(always)]
     fn along(&self, plan: &Plan, x: Vec3<S>) -> Vec3<S> {
         if plan.aligned() { x } else { self.x1.rotation.transpose_mul(x) }
     }
 
-    /// The rows of what a point's rows would be: its part along the constraint's axes.
+    /// Returns the rows of the constraint, from the vector x of a point's rows: its part along the constraint's axes.
     #[inline(always)]
     fn held(plan: &Plan, x: Vec3<S>) -> Motion<S> {
         let axes: Mat3<S> = plan.axes.lift();
@@ -116,7 +116,7 @@ impl<S: Scalar> FramePair<S> {
         Motion::new(linear, Vec3::zero())
     }
 
-    /// A column of J of the points, along the axes of `reference`, as `column`.
+    /// Returns a column of the points' J along the axes of `reference`, like `column`.
     #[inline(always)]
     pub(crate) fn point_column(&self, plan: &Plan, s: Motion<S>, first: bool, second: bool) -> Vec3<S> {
         let (s1, s2) = (at(s, self.x1.translation), at(s, self.x2.translation));
@@ -128,21 +128,22 @@ impl<S: Scalar> FramePair<S> {
         self.along(plan, linear)
     }
 
-    /// A motion along the axes of frame 1 as the constraint's rows express it.
+    /// Converts a motion from the axes of frame 1 to the axes of the constraint's rows.
     #[inline(always)]
     pub(crate) fn outward(&self, plan: &Plan, m: Motion<S>) -> Motion<S> {
         let R = self.x1.rotation;
         if plan.aligned() { Motion::new(R * m.linear, R * m.angular) } else { m }
     }
 
-    /// ₂X₁ as a twist.
+    /// Returns ₂X₁ as a twist.
     #[inline(always)]
     fn error(&self) -> Motion<S> {
         let x = self.x2.inverse() * self.x1;
         log6(Quaternion::from_rotation(x.rotation), x.translation)
     }
 
-    /// A column of J: the velocity when the joint moves with the column s, which carries the frames as told.
+    /// Returns a column of J: the relative velocity when the joint moves with the column s. The flags tell which frames
+    /// the joint carries.
     #[inline(always)]
     fn column(&self, plan: &Plan, s: Motion<S>, first: bool, second: bool) -> Motion<S> {
         match plan.kind {
@@ -152,7 +153,7 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// The constraint's rows of J, on its places.
+    /// Computes the constraint's rows of J, in its slots.
     #[inline(always)]
     pub(crate) fn jacobian(&self, plan: &Plan, columns: &[Motion<S>], J: &mut [S]) {
         let (rows, n) = (plan.rows(), plan.places.len());
@@ -167,7 +168,7 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// The acceleration that shall vanish, with the corrections, for the accelerations of the bodies.
+    /// Returns the acceleration that must vanish, including the corrections, for the accelerations of the bodies.
     #[inline(always)]
     pub(crate) fn acceleration(&self, plan: &Plan, target: &Target<S>) -> Motion<S> {
         let (kp, kd) = (S::splat(plan.kp), S::splat(plan.kd));
@@ -175,7 +176,7 @@ impl<S: Scalar> FramePair<S> {
         match plan.kind {
             ConstraintKind::Rigid => {
                 let m = self.express(plan, self.rigid(plan, kd));
-                // Without kp no logarithm, which is not smooth at half turns.
+                // Without kp, skip the logarithm, which is not smooth at half turns.
                 let m = if plan.kp > 0.0 { m + self.outward(plan, self.error().scale(kp)) } else { m };
                 m - wanted
             }
@@ -183,7 +184,7 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// a₁ − a₂ + Δv × v₂ + kd Δv.
+    /// Returns a₁ − a₂ + Δv × v₂ + kd Δv, without Δv × v₂ along the world's axes.
     #[inline(always)]
     fn rigid(&self, plan: &Plan, kd: S) -> Motion<S> {
         let [v1, v2] = self.v;
@@ -191,7 +192,7 @@ impl<S: Scalar> FramePair<S> {
         if plan.aligned() { m } else { m + (v1 - v2).cross(v2) }
     }
 
-    /// The points' velocities u and accelerations α = a + ω × u.
+    /// Returns the points' velocities u and accelerations α = a + ω × u.
     #[inline(always)]
     fn points(&self) -> [[Vec3<S>; 2]; 2] {
         let (p1, p2) = (self.x1.translation, self.x2.translation);
@@ -201,7 +202,7 @@ impl<S: Scalar> FramePair<S> {
         [[u1, alpha1], [u2, alpha2]]
     }
 
-    /// α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂).
+    /// Returns α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂).
     #[inline(always)]
     fn point(&self, kp: S, kd: S) -> Vec3<S> {
         let [[u1, alpha1], [u2, alpha2]] = self.points();
@@ -209,8 +210,8 @@ impl<S: Scalar> FramePair<S> {
         (self.x1.translation - self.x2.translation).scale_add(kp, velocity)
     }
 
-    /// The derivatives of `acceleration` with respect to q and v, for the bodies' accelerations at a fixed q̈: added to
-    /// the constraint's rows of dq and dv. `error` is its value there.
+    /// Adds the derivatives of `acceleration` with respect to q and v to the constraint's rows of dq and dv. The
+    /// bodies' accelerations are those at a fixed q̈. `error` is the value of `acceleration` there.
     #[inline(always)]
     pub(crate) fn acceleration_derivatives(
         &self,
@@ -270,7 +271,7 @@ impl<S: Scalar> FramePair<S> {
                 by_q += self.outward(plan, (Jlog * self.x1.act_inv(rate)).scale(kp)); // ∂ log X = Jlog ₀X₁⁻¹ S
             }
             if plan.aligned() && first {
-                by_q += turn(s.angular, turned); // the frame's axes turn what is expressed along the world's
+                by_q += turn(s.angular, turned); // along the world's axes, it turns with frame 1
             }
             let (row, column, ratio) = (plan.row, touch.coordinate, S::splat(touch.ratio));
             let (by_q, by_v) = (by_q.to_array(), self.express(plan, by_v).to_array());
@@ -318,8 +319,8 @@ impl<S: Scalar> FramePair<S> {
         }
     }
 
-    /// The derivative of the relative velocity J w with respect to q for a fixed w, added to the constraint's rows of dq:
-    /// the ends and Ψ̇ are those of w, `value` is J w.
+    /// Adds the derivative of the relative velocity J w with respect to q, for a fixed w, to the constraint's rows of
+    /// dq. The frames' motions and Ψ̇ are computed for w; `value` is J w.
     #[inline(always)]
     pub(crate) fn velocity_derivative(
         &self,

@@ -1,4 +1,4 @@
-//! Constraints of one model: their plans, and memory for all that they need.
+//! Constraints of one model: their plans, and all memory that they need.
 
 use crate::constraints::constraint::{ContactConstraint, Target};
 use crate::constraints::constraint_lanes::ConstraintLanes;
@@ -16,13 +16,14 @@ use condyle_model::Model;
 use condyle_spatial::{Array, Dense, DenseMatrix, Matrix, Scalar, alike};
 use core::ops::Range;
 
-/// Constraints of one model: contacts and loops, and the scratch and results of [`constrained_dynamics`] and its like.
+/// Constraints of one model, contacts and loops, with the scratch and results of [`constrained_dynamics`] and similar
+/// functions.
 ///
-/// All memory is allocated here. Make one set for each combination of contacts, and change where they shall be through
-/// [`set_target`](Self::set_target); the [`Data`](crate::Data) can be the same for all sets.
+/// All memory is allocated here. Make one set for each combination of contacts, and change targets with
+/// [`set_target`](Self::set_target). All sets can share one [`Data`](crate::Data).
 ///
-/// Of several robots in one model that no constraint ties together, each costs what it costs alone, but for the zeros between
-/// them in matrices, if the constraints of each stand one after the other.
+/// A model may hold several robots that no constraint connects. Then each robot costs as much as alone, except for the
+/// zeros between robots in matrices. This requires that the constraints of each robot are adjacent.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, robots};
@@ -37,39 +38,40 @@ use core::ops::Range;
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct ConstraintSet<S> {
-    /// How redundant constraints share their forces; may be changed between calls.
+    /// Settings that decide how redundant constraints share their forces; may be changed between calls.
     pub proximal: Proximal,
     pub(crate) plans: Vec<Plan>,
     pub(crate) islands: Vec<Island>,
     pub(crate) targets: Array<Target<S>>,
     pub(crate) nv: usize,
-    /// The hash of the robot that it was made for: the frames and the axes of its joints are in it.
+    /// Hash of the robot for which the set was made; it covers the frames and the axes of the joints.
     geometry: u64,
-    /// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
+    /// Rows, for each coordinate, in which ∂(M q̈ + h − Jᵀλ)/∂q may be nonzero.
     pub(crate) nonzero_rows: Vec<NonzeroRows>,
-    /// For each coordinate, the rows of J in which it may differ from zero.
+    /// Rows of J, for each coordinate, in which J may be nonzero.
     pub(crate) touching: Vec<Vec<usize>>,
-    /// J on the places of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
+    /// J in the slots of each constraint. Shape: entries of all rows. Written by: `constraint_motion`.
     pub(crate) J: Array<S>,
-    /// γ: the constraints' accelerations for q̈ = 0, with all corrections. Shape: rows. Written by: `constraint_motion`.
+    /// γ, the constraints' accelerations for q̈ = 0, including all corrections. Shape: rows. Written by:
+    /// `constraint_motion`.
     pub(crate) gamma: Array<S>,
     pub(crate) delassus: Delassus<S>,
-    /// The forces, or impulses. Shape: rows. Written by: the algorithms.
+    /// Forces, or impulses. Shape: rows. Written by: the algorithms.
     pub(crate) lambda: Array<S>,
     /// J q̈ + γ. Shape: rows. Written by: the algorithms.
     pub(crate) error: Array<S>,
-    /// The derivatives of the constraints' accelerations (velocities). Shape: rows × nv. Written by: the algorithms'
+    /// Derivatives of the constraints' accelerations (or velocities). Shape: rows × nv. Written by: the algorithms'
     /// derivatives.
     pub(crate) dgamma_dq: Matrix<S>,
     pub(crate) dgamma_dv: Matrix<S>,
     /// M⁻¹ Jᵀ, and M⁻¹ Jᵀ Λ. Shape: nv × rows. Written by: the algorithms' derivatives.
     pub(crate) U: Matrix<S>,
     pub(crate) Jbar: Matrix<S>,
-    /// The derivatives of the forces. Shape: rows × nv. Written by: the algorithms' derivatives.
+    /// Derivatives of the forces. Shape: rows × nv. Written by: the algorithms' derivatives.
     pub(crate) dlambda_dq: Matrix<S>,
     pub(crate) dlambda_dv: Matrix<S>,
     pub(crate) dlambda_dtau: Matrix<S>,
-    /// The scratch of single calls on robots with limbs.
+    /// Scratch of single calls on robots with limbs.
     pub(crate) limbs: Option<Box<ConstraintLanes>>,
 }
 
@@ -78,12 +80,12 @@ alike!(ConstraintSet {
 } same { proximal, plans, islands, nv, geometry, nonzero_rows, touching, limbs });
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// Plans constraints of a model and allocates everything.
+    /// Plans the constraints of a model and allocates all memory.
     ///
     /// # Errors
-    /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference frame
-    /// is `World`, a gain is negative or not finite, a target is not finite or no placement, or two constraints are the
-    /// same.
+    /// [`Error::Constraint`] if a frame does not exist, two frames do not move relative to each other, a reference
+    /// frame is `World`, or a gain is negative or not finite. Also if a target or its rotation is invalid, `axes` are
+    /// invalid for the kind, or two constraints are the same.
     pub fn new<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Self, Error> {
         let plans = Plan::of_constraints(model, constraints)?;
         let (rows, entries) = plans.last().map_or((0, 0), |last| (last.row + last.rows(), last.end()));
@@ -114,63 +116,64 @@ impl<S: Scalar> ConstraintSet<S> {
         })
     }
 
-    /// Checks constraints of a model as [`new`](Self::new) does, and makes nothing.
+    /// Checks the constraints of a model as [`new`](Self::new) does, without allocating a set.
     ///
     /// # Errors
-    /// Those of [`new`](Self::new).
+    /// As [`new`](Self::new).
     pub fn check_all<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<(), Error> {
         constraints.iter().enumerate().try_for_each(|(i, one)| one.bodies(model, &constraints[..i]).map(drop))
     }
 
-    /// The number of constraints.
+    /// Returns the number of constraints.
     pub fn len(&self) -> usize {
         self.plans.len()
     }
 
-    /// Whether there is no constraint.
+    /// Returns whether the set has no constraints.
     pub fn is_empty(&self) -> bool {
         self.plans.is_empty()
     }
 
-    /// The number of rows of J, and of numbers of λ.
+    /// Returns the number of rows of J, which is also the length of λ.
     pub fn rows(&self) -> usize {
         self.lambda.len()
     }
 
-    /// The rows of constraint k.
+    /// Returns the rows of constraint k.
     ///
     /// # Panics
-    /// If there is no such constraint.
+    /// If constraint k does not exist.
     #[track_caller]
     pub fn range(&self, k: usize) -> Range<usize> {
         check_index("k", k, self.len(), "constraints");
         self.plans[k].row..self.plans[k].row + self.plans[k].rows()
     }
 
-    /// The islands: the coordinates and the rows of each part that is computed apart, as constraints that share no body are,
-    /// or only bodies that do not move. The coordinates are those of the model, in order; a tree that nothing holds has no rows.
+    /// Returns the islands: the coordinates and the rows of each independent part. Constraints that share no body, or
+    /// only bodies that do not move, are independent. The coordinates are the model's, in order. A tree without
+    /// constraints has no rows.
     pub fn islands(&self) -> impl Iterator<Item = (Range<usize>, Range<usize>)> {
         self.islands.iter().map(|island| (island.coordinates.clone(), island.rows.clone()))
     }
 
-    /// The target of constraint k, where it wants its frame to be, in each lane by itself.
+    /// Returns the target of constraint k; each lane has its own.
     ///
     /// # Panics
-    /// If there is no such constraint.
+    /// If constraint k does not exist.
     #[track_caller]
     pub fn target(&self, k: usize) -> Target<S> {
         check_index("k", k, self.len(), "constraints");
         self.targets[k]
     }
 
-    /// Changes where constraint k wants its frame to be, between calls. Allocates nothing.
+    /// Changes the target of constraint k between calls. Allocates nothing.
     ///
     /// # Errors
-    /// [`Error::Constraint`] for a target of plain numbers that is not finite or whose rotation is none; that of before then
-    /// stays.
+    /// [`Error::Constraint`] if the target's scalars are `f64` and the target is not finite or its rotation is invalid.
+    /// The old target is then kept.
     ///
     /// # Panics
-    /// If there is no such constraint.
+    /// If constraint k does not exist.
     #[track_caller]
     pub fn set_target(&mut self, k: usize, target: Target<S>) -> Result<(), Error> {
         check_index("k", k, self.len(), "constraints");
@@ -182,7 +185,7 @@ impl<S: Scalar> ConstraintSet<S> {
         Ok(())
     }
 
-    /// J, rows × nv, as the last call left it: J is overwritten.
+    /// Copies J of the last call, rows × nv. Overwrites J.
     ///
     /// # Panics
     /// If `J` is not rows × nv.
@@ -201,7 +204,7 @@ impl<S: Scalar> ConstraintSet<S> {
         }
     }
 
-    /// Panics unless this was made for a model with the same joints and frames in the same places.
+    /// Panics unless the set was made for a model with the same joints and frames at the same placements.
     #[inline]
     #[track_caller]
     pub(crate) fn check<R>(&self, model: &Model<R>) {
@@ -211,7 +214,7 @@ impl<S: Scalar> ConstraintSet<S> {
     }
 }
 
-/// The panic of [`ConstraintSet::check`].
+/// Panics on behalf of [`ConstraintSet::check`].
 #[cold]
 #[inline(never)]
 #[track_caller]

@@ -1,10 +1,10 @@
-//! J M⁻¹ Jᵀ and its inverse Λ, the inertia that a robot shows to its constraints.
+//! Delassus matrix J M⁻¹ Jᵀ and its inverse Λ, the inertia of a robot along its constraints.
 //!
-//! With M = Lᵀ D L, the rows of Y = J L⁻¹ have entries only where J's have, or nearer to the root, and J M⁻¹ Jᵀ = Y D⁻¹ Yᵀ
-//! needs what two constraints share and nothing else. It is factorised as C E Cᵀ with C unit lower triangular. A row that
-//! depends on rows before it has no pivot but rounding; its force is set to zero. Each [island](Island) is factorised by
-//! itself, in its columns and rows of what is kept for all. Source: Featherstone, *Exploiting
-//! sparsity in operational-space dynamics* (2010); Golub and Van Loan, *Matrix Computations* (4th edition), section 4.1.
+//! With M = Lᵀ D L, the rows of Y = J L⁻¹ have entries only where J has entries, or nearer to the root. J M⁻¹ Jᵀ = Y
+//! D⁻¹ Yᵀ needs only the slots that two constraints share. It is factorised as C E Cᵀ with C unit lower triangular. If
+//! a row depends on earlier rows, its pivot is only rounding, and its force is set to zero. Each [island](Island) is
+//! factorised separately, in its own columns and rows of the common arrays. Source: Featherstone, *Exploiting sparsity
+//! in operational-space dynamics* (2010); Golub and Van Loan, *Matrix Computations* (4th edition), section 4.1.
 
 use crate::constraints::islands::Island;
 use crate::constraints::plan::{Plan, Proximal};
@@ -14,36 +14,36 @@ use condyle_linalg::axpy::{axpy, dot};
 use condyle_spatial::{Array, Matrix, Scalar, alike};
 use core::ops::Range;
 
-/// A pivot smaller than this many roundings of its diagonal entry is none.
+/// Minimum pivot, in rounding errors of its diagonal entry; smaller pivots count as zero.
 const ROUNDINGS: f64 = 1e3;
 
-/// Columns are stored in steps of this many numbers, so that loops over them have no remainder. What stands above the
-/// diagonal, or behind the last row, has no meaning.
+/// Returns the step (in numbers) to which columns are padded, so that loops over them have no remainder. Entries above
+/// the diagonal, or after the last row, have no meaning.
 pub(crate) const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { STEP } else { 1 }
 }
 
-/// The step of single numbers.
+/// Step of single numbers.
 const STEP: usize = 8;
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Delassus<S> {
-    /// J L⁻¹, and that times D⁻¹, on the places of each constraint. Shape: entries of all rows. Written by: `multiply`.
+    /// J L⁻¹, and J L⁻¹ D⁻¹, in the slots of each constraint. Shape: entries of all rows. Written by: `multiply`.
     Y: Array<S>,
     Z: Array<S>,
-    /// The stride of the columns of `CE` and of the rows of `rows`: room for a row more, in whole steps.
+    /// Stride of the columns of `CE` and of the rows of `rows`: one row more than needed, rounded up to whole steps.
     pub stride: usize,
-    /// J M⁻¹ Jᵀ from the diagonal on, column by column; then C E. Shape: stride × rows, and a step. Written by: `multiply`,
-    /// or in lanes by `limbs`; then by `decompose`.
+    /// J M⁻¹ Jᵀ from the diagonal on, column by column; later C E. Shape: stride × rows, plus one step. Written by:
+    /// `multiply`, or in lanes by `limbs`; then by `decompose`.
     pub CE: Array<S>,
     /// C E row by row, up to the diagonal. Shape: as `CE`. Written by: `decompose`.
     rows: Array<S>,
-    /// 1/E; 0 where there is no pivot. Shape: rows. Written by: `decompose`.
+    /// 1/E, or 0 for a row without a pivot. Shape: rows. Written by: `decompose`.
     E_inv: Array<S>,
-    /// The number of rows without a pivot. Written by: `decompose`.
+    /// Number of rows without a pivot. Written by: `decompose`.
     pub redundant: S,
-    /// The right-hand side, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
+    /// Right-hand side, then the solution. Shape: stride. Written by: `decompose`, `solve`, `invert`.
     x: Array<S>,
     /// C⁻¹ b. Shape: rows. Written by: `substitute`.
     y: Array<S>,
@@ -53,7 +53,7 @@ pub(crate) struct Delassus<S> {
 
 alike!(Delassus { Y, Z, CE, rows, E_inv, redundant, x, y, inverse } same { stride });
 
-/// The smallest number that changes 1 when added to it.
+/// Returns the machine epsilon, the distance from 1 to the next number.
 #[inline(always)]
 fn epsilon<S: Scalar>() -> S {
     let third = S::splat(4.0) / S::splat(3.0) - S::one();
@@ -78,7 +78,7 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// J M⁻¹ Jᵀ, for the rows of J on their places.
+    /// Computes J M⁻¹ Jᵀ from the rows of J in their slots.
     #[inline(always)]
     pub(crate) fn multiply(&mut self, plans: &[Plan], island: &Island, J: &[S], M: &Ltdl<S>) {
         let D_inv = M.inverse_diagonal();
@@ -93,7 +93,7 @@ impl<S: Scalar> Delassus<S> {
                 for (j, &k) in places.iter().enumerate().rev() {
                     let (x, row) = (-y[j], M.row_from_root(k));
                     if j < *second {
-                        axpy(x, row, &mut y[..j]); // y_e −= L_ke y_k on the places e between k and the root
+                        axpy(x, row, &mut y[..j]); // y_e −= L_ke y_k in the slots e between k and the root
                     } else {
                         axpy(x, &row[..*shared], &mut y[..*shared]);
                         axpy(x, &row[*shared..], &mut y[*second..j]);
@@ -117,7 +117,7 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// Zeros in place of J M⁻¹ Jᵀ of an island, and in the row after it.
+    /// Sets J M⁻¹ Jᵀ of an island, and the row after it, to zero.
     #[inline(always)]
     pub(crate) fn clear(&mut self, Island { rows, .. }: &Island) {
         for j in rows.clone() {
@@ -125,8 +125,8 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// J M⁻¹ Jᵀ + μ 1 = C E Cᵀ of an island, for J M⁻¹ Jᵀ in place of C E, and λ in place of b, as `solve` gives it: b goes
-    /// along as one more row. The islands' rows without a pivot are counted together, from `redundant` on.
+    /// Factorises J M⁻¹ Jᵀ + μ 1 = C E Cᵀ of an island and solves for λ, as `solve` does. `CE` holds J M⁻¹ Jᵀ on entry,
+    /// and `lambda` holds b. b is processed as one more row. Adds the number of rows without a pivot to `redundant`.
     #[inline(always)]
     pub(crate) fn decompose(&mut self, island: &Island, proximal: Proximal, lambda: &mut [S]) {
         let Self { CE, rows, E_inv, stride, .. } = self;
@@ -156,7 +156,7 @@ impl<S: Scalar> Delassus<S> {
         self.repeat(island, proximal, lambda);
     }
 
-    /// λ in place of b, of an island: J M⁻¹ Jᵀ λ = b, by proximal iterations if there are any.
+    /// Solves J M⁻¹ Jᵀ λ = b of an island, by proximal iterations if there are any. `lambda` holds b on entry.
     #[inline(always)]
     pub(crate) fn solve(&mut self, island: &Island, proximal: Proximal, lambda: &mut [S]) {
         self.x[island.rows.clone()].copy_from_slice(&lambda[island.rows.clone()]);
@@ -165,7 +165,7 @@ impl<S: Scalar> Delassus<S> {
         self.repeat(island, proximal, lambda);
     }
 
-    /// λ in place of b, for what comes first in place of x.
+    /// Runs the remaining proximal iterations. `lambda` holds b on entry, and x holds the first solution.
     #[inline(always)]
     fn repeat(&mut self, Island { rows, .. }: &Island, proximal: Proximal, lambda: &mut [S]) {
         let mu = S::splat(proximal.mu);
@@ -179,7 +179,7 @@ impl<S: Scalar> Delassus<S> {
         lambda[rows.clone()].copy_from_slice(&self.x[rows.clone()]);
     }
 
-    /// Λ of an island: the map from b to λ. It has zeros beside.
+    /// Computes Λ of an island, the map from b to λ. Entries outside of the island are zero.
     #[inline(always)]
     pub(crate) fn invert(&mut self, Island { rows, .. }: &Island, proximal: Proximal) {
         let (n, mu) = (self.E_inv.len(), S::splat(proximal.mu));
@@ -201,7 +201,7 @@ impl<S: Scalar> Delassus<S> {
         }
     }
 
-    /// y = C⁻¹ b in place of x in some rows, for b that is zero before `start`.
+    /// Replaces x = b by y = C⁻¹ b in some rows. b is zero before `start`.
     #[inline(always)]
     fn substitute(&mut self, rows: &Range<usize>, start: usize) {
         let Self { CE, E_inv, x, y, stride, .. } = self;
@@ -215,7 +215,7 @@ impl<S: Scalar> Delassus<S> {
         x[rows.clone()].copy_from_slice(&y[rows.clone()]);
     }
 
-    /// C⁻ᵀ E⁻¹ y in place of x in some rows, for y in place of x.
+    /// Replaces x = y by C⁻ᵀ E⁻¹ y in some rows.
     #[inline(always)]
     fn back_substitute(&mut self, range: &Range<usize>) {
         let Self { rows, E_inv, x, stride, .. } = self;
@@ -228,13 +228,13 @@ impl<S: Scalar> Delassus<S> {
     }
 }
 
-/// How many numbers of column j there are in rows that end with these and one more, in whole steps.
+/// Returns the length of column j from its first step, for rows that end with these and one more, in whole steps.
 #[inline(always)]
 fn room<S: Scalar>(rows: &Range<usize>, j: usize) -> usize {
     (rows.end + 1).next_multiple_of(step::<S>()) - (j - j % step::<S>())
 }
 
-/// y += x s, in whole steps.
+/// Computes y += x s, in whole steps.
 #[inline(always)]
 fn update<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -247,7 +247,7 @@ fn update<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     }
 }
 
-/// y − Σ xₖ sₖ Eₖ⁻¹ in place of y, for the columns x of a matrix, from a row on; in whole steps.
+/// Computes y −= Σ xₖ sₖ Eₖ⁻¹ for the columns x of a matrix, from a row on, in whole steps.
 #[inline(always)]
 fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_inv: &[S], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -268,7 +268,7 @@ fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_in
     }
 }
 
-/// How often to solve: without μ, once is exact.
+/// Returns the number of solves: without μ, one solve is exact.
 fn rounds(proximal: Proximal) -> usize {
     if proximal.mu > 0.0 { proximal.iterations.max(1) } else { 1 }
 }

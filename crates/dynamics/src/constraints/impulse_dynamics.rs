@@ -1,15 +1,15 @@
-//! Impacts: how velocities jump when constraints set in, and the derivatives, by hand.
+//! Impacts: jumps of the velocity when constraints become active, and their analytical derivatives.
 //!
-//! An impulse Λ of the constraints, in no time, so that nothing else acts and no body moves, makes them part again with
-//! the restitution ε, 0 (they stick) to 1 (nothing is lost):
+//! The constraints exert an impulse Λ in an infinitesimal time, in which nothing else acts and no body moves. The
+//! restitution ε determines how they separate, from 0 (they stick) to 1 (no energy is lost):
 //!
 //! ```text
 //! M (v⁺ − v) = Jᵀ Λ,   J v⁺ = −ε J v          (A Newtonian restitution: Featherstone 2008, section 11.7)
 //! ```
 //!
-//! These are the equations of constrained dynamics for Δ = v⁺ − v in place of q̈, τ − h = 0 and γ = (1 + ε) J v, and so
-//! are their derivatives, with r = ∂(M Δ − Jᵀ Λ)/∂q (inverse dynamics of a robot at rest, weightless, that accelerates
-//! with Δ) and c = ∂(J w)/∂q, w = v⁺ + ε v:
+//! These are the equations of constrained dynamics with Δ = v⁺ − v instead of q̈, τ − h = 0 and γ = (1 + ε) J v. The
+//! same holds for their derivatives, with r = ∂(M Δ − Jᵀ Λ)/∂q and c = ∂(J w)/∂q, w = v⁺ + ε v. Here r is inverse
+//! dynamics of a robot at rest without gravity, with acceleration Δ:
 //!
 //! ```text
 //! ∂v⁺/∂q = −P r − J̄ c,   ∂Λ/∂q = J̄ᵀ r − (J M⁻¹ Jᵀ)⁻¹ c,   ∂v⁺/∂v = 1 − (1 + ε) J̄ J,   ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J
@@ -32,17 +32,17 @@ workspace! {
         pub v_after: Array<S> = filled(S::zero, size.nv),
         /// w = v⁺ + ε v. Written by: `pass`.
         pub w: Array<S> = filled(S::zero, size.nv),
-        /// The bodies' velocities for w, in the world's frame. Written by: `spread`.
+        /// Velocities of the bodies for w, in the world's frame. Written by: `spread`.
         pub velocity: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Ψ̇ for w. Written by: `spread`.
         pub Psid: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Zeros. Written by: nobody.
+        /// Zeros, never overwritten.
         pub zero: Array<S> = filled(S::zero, size.nv),
     }
 }
 
 kernel! {
-    /// J and γ = (1 + ε) J v, for bodies that are placed.
+    /// Computes J and γ = (1 + ε) J v, for bodies whose placements are known.
     pub(crate) fn approach<S>(world: &World<S>, set: &mut ConstraintSet<S>, d: &mut Workspace<S>, v: &[S], restitution: S) {
         for (i, plan) in set.plans.iter().enumerate() {
             FramePair::at_rest(plan, &set.targets[i], world).jacobian(plan, &world.S, &mut set.J);
@@ -58,7 +58,7 @@ kernel! {
 }
 
 kernel! {
-    /// v⁺ = v + Δ and w = v⁺ + ε v.
+    /// Computes v⁺ = v + Δ and w = v⁺ + ε v.
     pub(crate) fn part<S>(d: &mut Workspace<S>, v: &[S], change: &[S], restitution: S) {
         for k in 0..v.len() {
             d.v_after[k] = v[k] + change[k];
@@ -68,7 +68,7 @@ kernel! {
 }
 
 kernel! {
-    /// c, for bodies that are placed.
+    /// Computes c, for bodies whose placements are known.
     pub(crate) fn differentiate_motion<S, R>(
         model: &Model<R>,
         world: &World<S>,
@@ -86,7 +86,8 @@ kernel! {
 }
 
 kernel! {
-    /// The derivatives by the velocity before the impact: ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1 + ε) (J M⁻¹ Jᵀ)⁻¹ J.
+    /// Computes the derivatives with respect to the velocity before the impact: ∂v⁺/∂v = 1 − (1 + ε) J̄ J, ∂Λ/∂v = −(1
+    /// + ε) (J M⁻¹ Jᵀ)⁻¹ J.
     pub(crate) fn respond_to_v_before<S>(set: &mut ConstraintSet<S>, restitution: S, dv: &mut Matrix<S>) {
         let (n, rows) = (set.nv, set.lambda.len());
         let (Jbar, inertia) = (set.Jbar.as_slice(), set.delassus.inverse.as_slice());
@@ -112,7 +113,7 @@ kernel! {
     }
 }
 
-/// The velocities of all bodies for w and Ψ̇ = v_λ × S, for bodies that are placed.
+/// Computes the velocities of all bodies for w, and Ψ̇ = v_λ × S, for bodies whose placements are known.
 #[inline(always)]
 fn spread<L: Layout>(l: &L, World { S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { w, velocity, Psid, .. } = d;

@@ -1,9 +1,9 @@
-//! Islands: parts of a robot, and of its constraints, that know nothing of each other.
+//! Islands: independent parts of a robot and of its constraints.
 //!
-//! M has a block for each tree that stands on the world, and J M⁻¹ Jᵀ has entries for two constraints only where both touch
-//! one tree, or trees that other constraints tie together. So constraints that share no body, or only the world, are
-//! factored apart, and all that is made of them has zeros elsewhere. An island is a range of coordinates with a range of
-//! rows, none for a tree without constraints: where the ranges of two would overlap, they are taken for one.
+//! M has one block for each tree that is attached to the world. J M⁻¹ Jᵀ has entries for two constraints only if both
+//! act on one tree, or on trees that other constraints connect. So constraints that share no body except the world are
+//! factorised separately, and the results are zero elsewhere. An island is a range of coordinates with a range of rows,
+//! which is empty for a tree without constraints. Islands with overlapping ranges are merged.
 
 use crate::constraints::plan::Plan;
 use alloc::vec;
@@ -13,16 +13,16 @@ use condyle_model::Model;
 use condyle_spatial::{Matrix, Scalar};
 use core::ops::Range;
 
-/// A part that is computed apart from all others.
+/// Part that is computed independently of all others.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Island {
     pub coordinates: Range<usize>,
-    /// Its constraints, by their numbers, and their rows.
+    /// Indices of its constraints, and their rows.
     pub constraints: Range<usize>,
     pub rows: Range<usize>,
 }
 
-/// What encloses two ranges, of which one may be empty.
+/// Returns the smallest range that contains two ranges, each of which may be empty.
 fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
     match (a.is_empty(), b.is_empty()) {
         (true, _) => b.clone(),
@@ -48,10 +48,10 @@ impl Island {
         overlap(&self.coordinates, &other.coordinates) || overlap(&self.rows, &other.rows)
     }
 
-    /// The islands of a model with some constraints: their coordinates are those of the model, each once and in order.
+    /// Returns the islands of a model with some constraints. Their coordinates are the model's, each once and in order.
     pub(crate) fn of<R>(model: &Model<R>, plans: &[Plan]) -> Vec<Self> {
         let (nv, tree) = (model.nv(), EliminationTree::new(model, 1));
-        // where joints share coordinates, places are not coordinates
+        // If joints share coordinates, slots of the factor are not coordinates.
         let roots: Vec<usize> = match tree.swaps.is_empty() {
             true => (0..nv).filter(|&k| tree.parent[k] == NONE).collect(),
             false => vec![0],
@@ -75,19 +75,20 @@ impl Island {
         islands
     }
 
-    /// Its numbers in column j of a matrix with n rows, one for each coordinate.
+    /// Returns the range of its entries in column j of a matrix with n rows, one per coordinate.
     #[inline(always)]
     pub(crate) fn of_column(&self, j: usize, n: usize) -> Range<usize> {
         j * n + self.coordinates.start..j * n + self.coordinates.end
     }
 
-    /// Its numbers in column j of a matrix with so many rows, one for each row of J.
+    /// Returns the range of its entries in column j of a matrix with one row per row of J.
     #[inline(always)]
     pub(crate) fn rows_of_column(&self, j: usize, rows: usize) -> Range<usize> {
         j * rows + self.rows.start..j * rows + self.rows.end
     }
 
-    /// Zeros in the columns of its coordinates, but in its own rows, of a matrix with n rows, one for each coordinate.
+    /// Sets the columns of its coordinates to zero outside of its own rows, in a matrix with n rows, one per
+    /// coordinate.
     #[inline(always)]
     pub(crate) fn clear_beside<T: Copy>(&self, matrix: &mut [T], n: usize, zero: T) {
         if self.coordinates.len() == n {
@@ -101,7 +102,7 @@ impl Island {
     }
 }
 
-/// Zeros in a matrix with a row for each row of J and a column for each coordinate, where there may be something else.
+/// Sets the entries of all islands to zero, in a matrix with one row per row of J and one column per coordinate.
 #[inline(always)]
 pub(crate) fn clear_rows<S: Scalar>(islands: &[Island], matrix: &mut Matrix<S>) {
     let rows = matrix.nrows();

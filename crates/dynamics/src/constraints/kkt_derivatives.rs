@@ -1,16 +1,16 @@
-//! The equations of motion under constraints, differentiated.
+//! Linearised equations of motion under constraints.
 //!
 //! M q̈ + h − Jᵀ λ = τ and J q̈ + γ = 0 hold for every q, v and τ. So small changes of them satisfy
 //!
 //! ```text
-//! M δq̈ − Jᵀ δλ + r_q δq + r_v δv = δτ,        r = ∂(M q̈ + h − Jᵀ λ)   at q̈ and λ as they are
+//! M δq̈ − Jᵀ δλ + r_q δq + r_v δv = δτ,        r = ∂(M q̈ + h − Jᵀ λ)   at fixed q̈ and λ
 //! J δq̈         + c_q δq + c_v δv = 0,         c = ∂(J q̈ + γ)
 //! ```
 //!
-//! r comes from the derivatives of inverse dynamics with the forces of the constraints as external ones, each fixed in
-//! its body, and what is different: along the world's axes λ does not turn with frame 1, and the force on the other
-//! body is carried by frame 1 (a point's force: turned by frame 1, its point carried by body 2). Source: Carpentier and
-//! Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018).
+//! r comes from the derivatives of inverse dynamics, in which the constraints' forces are external forces fixed in
+//! their bodies. Two corrections are added. Along the world's axes, λ does not turn with frame 1. And frame 1 carries
+//! the force on the other body (for a point, frame 1 turns the force, and body 2 carries its point). Source: Carpentier
+//! and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018).
 
 use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_motion::{Columns, FramePair};
@@ -24,7 +24,7 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Cross, Force, Matrix, Motion, Scalar};
 
 impl<S: Scalar> ConstraintSet<S> {
-    /// The force λ of constraint i along the axes of its frame.
+    /// Returns the force λ of constraint i along the axes of its frame.
     #[inline(always)]
     fn local_force(&self, i: usize, ends: &FramePair<S>) -> Force<S> {
         let f = self.force(i);
@@ -35,7 +35,7 @@ impl<S: Scalar> ConstraintSet<S> {
         f
     }
 
-    /// The force on the other body, its sign turned, in the world's frame.
+    /// Returns the negative of the force on the other body, in the world's frame.
     #[inline(always)]
     fn reaction(&self, i: usize, ends: &FramePair<S>) -> Force<S> {
         let f = self.local_force(i, ends);
@@ -50,7 +50,7 @@ impl<S: Scalar> ConstraintSet<S> {
 }
 
 kernel! {
-    /// All forces on the bodies, for bodies that are placed: those from outside, and those of the constraints.
+    /// Computes all forces on the bodies, external and of the constraints, for bodies whose placements are known.
     pub(crate) fn load<S, R>(
         model: &Model<R>,
         set: &ConstraintSet<S>,
@@ -70,7 +70,7 @@ kernel! {
 }
 
 kernel! {
-    /// r_q, from the derivative for forces that are fixed in their bodies, to which is added what is different.
+    /// Computes r_q: the derivative for forces that are fixed in their bodies, plus the corrections.
     pub(crate) fn turn<S>(set: &ConstraintSet<S>, world: &World<S>, fixed: &Matrix<S>, r: &mut Matrix<S>) {
         r.as_mut_slice().copy_from_slice(fixed.as_slice());
         for (i, plan) in set.plans.iter().enumerate() {
@@ -111,7 +111,7 @@ kernel! {
                         continue;
                     }
                     let w = world.S[e.column].angular.scale(S::splat(e.ratio));
-                    // the turned force leaves the axes of a line or a plane: all rows of the point
+                    // The turned force leaves the axes of a line or a plane, so all rows of the point are needed.
                     if let Some(ends) = &ends {
                         let turned = w.cross(f.linear); // ω × λ
                         for j in &plan.touches {
@@ -134,7 +134,7 @@ kernel! {
 }
 
 kernel! {
-    /// c_q and c_v, for bodies whose motion is known.
+    /// Computes c_q and c_v, for bodies whose motion is known.
     pub(crate) fn differentiate_motion<S>(set: &mut ConstraintSet<S>, world: &World<S>, bodies: &rnea_derivatives::Bodies<S>) {
         let rnea_derivatives::Bodies { v, a, Psid, Psidd, PsidSd, .. } = bodies;
         let columns = Columns { S: &world.S, Psid, Psidd, PsidSd };

@@ -1,4 +1,4 @@
-//! Constraints: contacts and loops, how they are planned for a model, and the passes of dynamics under them.
+//! Constraints: contacts and loops, their plans for a model, and the passes of dynamics under constraints.
 
 pub(crate) mod constrained_derivatives;
 pub(crate) mod constrained_dynamics;

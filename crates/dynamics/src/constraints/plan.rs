@@ -1,8 +1,9 @@
-//! The plan of a constraint in a model: which coordinates move its frames, and where its rows stand among those of all.
+//! Plan of a constraint in a model: the coordinates that move its frames, and the offset of its rows among all rows.
 //!
-//! The coordinates that move a constraint's frames lie on the ways from the frames to the root of the tree of M's factor.
-//! Sorted, they are what both ways share, then the rest of one way, then the rest of the other: three runs at most. Rows
-//! of J are stored on these coordinates alone.
+//! The coordinates that move a constraint's frames are on the paths from the frames to the root, in the elimination
+//! tree of M's factor. A slot is a position of a coordinate in the order of that factor. Sorted, the slots form at most
+//! three runs: the shared part of both paths, then the rest of one path, then the rest of the other. Rows of J are
+//! stored for these coordinates only.
 
 use crate::constraints::constraint::{ConstraintKind, ContactConstraint};
 use crate::passes::frames::ReferenceFrame;
@@ -14,34 +15,34 @@ use condyle_model::{Error, Model};
 use condyle_spatial::{Mat3, Se3, Vec3};
 use core::ops::Range;
 
-/// How J M⁻¹ Jᵀ is regularised, so that redundant constraints share their forces.
+/// Regularisation of J M⁻¹ Jᵀ, which makes redundant constraints share their forces.
 ///
-/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found: each
-/// iteration takes the error of the motion to μ/(σ + μ) of what it was (σ: the least singular value of J M⁻¹ Jᵀ that is
-/// not 0), and redundant forces stay the smallest ones. With μ = 0 one iteration is exact, and rows that depend on
-/// earlier ones get no force. The number of iterations is fixed, so that all lanes and dual numbers do the same. Source:
-/// Carpentier, Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic equations* (2021).
+/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then with λ' the last solution. Each
+/// iteration multiplies the error of the motion by μ/(σ + μ) (σ: the smallest nonzero singular value of J M⁻¹ Jᵀ).
+/// Redundant forces stay the smallest possible. With μ = 0 one iteration is exact, and rows that depend on earlier rows
+/// get no force. The number of iterations is fixed, so that all lanes and dual numbers do the same. Source: Carpentier,
+/// Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic equations* (2021).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Proximal {
-    /// μ (1/kg): small beside J M⁻¹ Jᵀ, large beside its rounding errors, as 1e-8.
+    /// μ (1/kg): small compared with J M⁻¹ Jᵀ, large compared with its rounding errors, for example 1e-8.
     pub mu: f64,
-    /// The number of iterations; 0 counts as 1.
+    /// Number of iterations; 0 counts as 1.
     pub iterations: usize,
 }
 
 impl Default for Proximal {
-    /// μ = 0, one iteration.
+    /// Returns μ = 0 and one iteration.
     fn default() -> Self {
         Self { mu: 0.0, iterations: 1 }
     }
 }
 
-/// A degree of freedom that moves a frame of a constraint.
+/// Degree of freedom that moves a frame of a constraint.
 #[derive(Clone, Debug)]
 pub(crate) struct SupportColumn {
-    /// The joint's column.
+    /// Index of the joint's column.
     pub column: usize,
-    /// The place of its coordinate among the constraint's.
+    /// Index of its coordinate among the constraint's slots.
     pub at: usize,
     pub coordinate: usize,
     pub ratio: f64,
@@ -51,39 +52,39 @@ pub(crate) struct SupportColumn {
     pub second: bool,
 }
 
-/// A constraint as the algorithms see it.
+/// Constraint as the algorithms use it.
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     pub kind: ConstraintKind,
-    /// The axes of a line or a plane, along those of `reference`.
+    /// Axes of a line or a plane, expressed in the axes of `reference`.
     pub axes: Mat3<f64>,
     pub reference: ReferenceFrame,
     pub kp: f64,
     pub kd: f64,
     pub bodies: [usize; 2],
-    /// bXf in the bodies' public and in their turned frames.
+    /// Placements bXf in the bodies' public frames, and in their turned frames.
     pub placements: [Se3<f64>; 2],
     pub turned: [Se3<f64>; 2],
-    /// The first of its rows.
+    /// Index of its first row.
     pub row: usize,
-    /// The places that it touches, the roots' first, and their coordinates.
+    /// Slots of the coordinates that move its frames, the root's slots first, and their coordinates.
     pub places: Vec<usize>,
     pub coordinates: Vec<usize>,
-    /// The number of places that both ways share, and the place at which the second way goes on.
+    /// Number of slots that both paths share, and the index at which the second path continues.
     pub shared: usize,
     pub second: usize,
     pub touches: Vec<SupportColumn>,
-    /// The beginning of its rows in an array with an entry for each place of each row.
+    /// Offset of its rows in an array with one entry per slot of each row.
     pub start: usize,
-    /// For each constraint up to this one, the runs of places that both touch: where here, where there, how many.
+    /// Runs of slots that are shared with each constraint up to this one: index here, index there, length.
     pub common: Vec<Vec<[usize; 3]>>,
 }
 
 impl Plan {
-    /// The plans of some constraints, one after the other.
+    /// Plans some constraints, one after the other.
     ///
     /// # Errors
-    /// [`Error::Constraint`] for the first that the model does not allow.
+    /// [`Error::Constraint`] for the first constraint that is invalid for the model.
     pub(crate) fn of_constraints<R>(model: &Model<R>, constraints: &[ContactConstraint]) -> Result<Vec<Self>, Error> {
         let tree = EliminationTree::new(model, 1);
         let mut place = vec![0; model.nv()];
@@ -96,7 +97,7 @@ impl Plan {
         for (i, constraint) in constraints.iter().enumerate() {
             let bodies = constraint.bodies(model, &constraints[..i])?;
             let ways = bodies.map(|body| {
-                let mut way = BTreeSet::new(); // with all places before, to the root
+                let mut way = BTreeSet::new(); // including all earlier slots, up to the root
                 for &c in support(body) {
                     let mut k = place[model.columns()[c].coordinate];
                     while k != NONE && way.insert(k) {
@@ -154,35 +155,35 @@ impl Plan {
         self.kind.rows()
     }
 
-    /// The place where row r (counted from the constraint's first) stands in the array of all rows.
+    /// Returns the range of row r (counted from the constraint's first) in the array of all rows.
     #[inline(always)]
     pub(crate) fn range(&self, r: usize) -> Range<usize> {
         let n = self.places.len();
         self.start + r * n..self.start + (r + 1) * n
     }
 
-    /// The place at which the array of all rows goes on behind it.
+    /// Returns the offset at which the next constraint begins in the array of all rows.
     pub(crate) fn end(&self) -> usize {
         self.start + self.rows() * self.places.len()
     }
 
-    /// Whether the rows turn with the world's axes, not the frame's.
+    /// Returns whether the rows use the world's axes instead of the frame's axes.
     #[inline(always)]
     pub(crate) fn aligned(&self) -> bool {
         self.reference == ReferenceFrame::LocalWorldAligned
     }
 }
 
-/// The rows of J in which coordinate k may differ from zero.
+/// Returns the rows of J in which coordinate k may be nonzero.
 pub(crate) fn touching(plans: &[Plan], k: usize) -> Vec<usize> {
     let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
     touched.flat_map(|plan| plan.row..plan.row + plan.rows()).collect()
 }
 
-/// For each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may differ from zero.
+/// Returns, for each coordinate, the rows in which ∂(M q̈ + h − Jᵀλ)/∂q may be nonzero.
 pub(crate) fn nonzero_rows<R>(model: &Model<R>, plans: &[Plan]) -> Vec<NonzeroRows> {
     let rows = |k: usize| {
-        // what carries a frame moves the force on the other one
+        // The joints that carry a frame move the force on the other frame.
         let touched = plans.iter().filter(|plan| plan.coordinates.contains(&k));
         let more = touched.filter(|plan| plan.bodies[1] > 0).flat_map(|plan| plan.coordinates.iter());
         model.nonzero_rows()[k].rows.iter().chain(more).copied().collect::<BTreeSet<_>>().into_iter().collect()
@@ -190,7 +191,7 @@ pub(crate) fn nonzero_rows<R>(model: &Model<R>, plans: &[Plan]) -> Vec<NonzeroRo
     NonzeroRows::of_columns((0..model.nv()).map(rows).collect())
 }
 
-/// Places common to two sorted lists, as runs.
+/// Returns the slots common to two sorted lists, as runs.
 pub(crate) fn common(a: &[usize], b: &[usize]) -> Vec<[usize; 3]> {
     let mut runs: Vec<[usize; 3]> = Vec::new();
     for (i, place) in a.iter().enumerate() {

@@ -1,15 +1,16 @@
-//! The derivatives of forward dynamics, by hand.
+//! Analytical derivatives of forward dynamics.
 //!
-//! M(q) q̈ + h(q, v) = τ holds for every q and v, so with the derivatives of inverse dynamics at that q̈ (Carpentier and
-//! Mansard, *Analytical derivatives of rigid body dynamics algorithms*, 2018, equation 18)
+//! M(q) q̈ + h(q, v) = τ holds for every q and v. So the derivatives of inverse dynamics at that q̈ give (Carpentier
+//! and Mansard, *Analytical derivatives of rigid body dynamics algorithms*, 2018, equation 18)
 //!
 //! ```text
 //! ∂q̈/∂q = −M⁻¹ ∂τ/∂q,   ∂q̈/∂v = −M⁻¹ ∂τ/∂v,   ∂q̈/∂τ = M⁻¹
 //! ```
 //!
-//! What a body carries that floats feels neither where it is nor a velocity that all of it has, and gravity accelerates all of it
-//! alike. So of the linear and angular coordinates of its free joint, with the velocities v₀ and ω, one knows without any product
-//! (R: its rotation, g: the acceleration of free fall)
+//! The dynamics of a floating body, and of the bodies that it carries, do not depend on position or common velocity.
+//! Gravity accelerates all of them equally. So some derivatives for the linear and angular coordinates of its free
+//! joint are known without any product. With the velocities v₀ and ω, the rotation R and the acceleration of free fall
+//! g:
 //!
 //! ```text
 //! ∂q̈/∂p₀ = 0,   ∂v̇₀/∂v₀ = −ω×,   ∂v̇₀/∂θ₀ = (Rᵀ g)×,   and zeros in all other rows
@@ -28,22 +29,22 @@ use core::any::Any;
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// The acceleration. Written by: `aba_derivatives`.
+        /// Joint accelerations. Written by: `aba_derivatives`.
         pub a: Array<S> = filled(S::zero, size.nv),
-        /// Written by: `aba_derivatives`.
+        /// ∂q̈/∂q. Written by: `aba_derivatives`.
         pub da_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `aba_derivatives`.
+        /// ∂q̈/∂v. Written by: `aba_derivatives`.
         pub da_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
         pub solve: tree_solve::Workspace<S> = tree_solve::Workspace::new(model.columns(), size.nv),
     } same {
-        /// The first coordinate of each body that floats. Written by: `new`.
+        /// First coordinate of each floating body. Written by: `new`.
         pub floating: Vec<usize> = model.floating().map(|i| model.nodes()[i].idx_v).collect(),
-        /// The rows of ∂τ by which M⁻¹ is multiplied: none for linear coordinates of bodies that float. Written by: `new`.
+        /// Rows of ∂τ that M⁻¹ multiplies, none for linear coordinates of floating bodies. Written by: `new`.
         pub nonzero_rows: Vec<NonzeroRows> = NonzeroRows::of_columns(rows_that_count(model, &floating)),
     }
 }
 
-/// The rows of each column of ∂τ that may differ from zero, without those of the linear coordinates of bodies that float.
+/// Returns the rows of each column of ∂τ that may be nonzero; none for the linear coordinates of floating bodies.
 fn rows_that_count<R>(model: &Model<R>, floating: &[usize]) -> Vec<Vec<usize>> {
     let mut rows: Vec<Vec<usize>> = model.nonzero_rows().iter().map(|column| column.rows.clone()).collect();
     for &first in floating {
@@ -53,7 +54,8 @@ fn rows_that_count<R>(model: &Model<R>, floating: &[usize]) -> Vec<Vec<usize>> {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// Whether there are bodies that float and all do so freely: their linear coordinates have no armature, which is seen of numbers.
+    /// Returns whether there are floating bodies and none of their linear coordinates has armature. Only models of
+    /// `f64` are checked; for others it returns `false`.
     pub(crate) fn float_freely<R: 'static>(&self, model: &Model<R>) -> bool {
         let model = (model as &dyn Any).downcast_ref::<Model>();
         let is_free = |model: &Model| self.floating.iter().all(|&first| model.armature()[first..first + 3] == [0.0; 3]);
@@ -62,7 +64,7 @@ impl<S: Scalar> Workspace<S> {
 }
 
 kernel! {
-    /// ∂v̇₀/∂v₀ of bodies that float, where all else is zero.
+    /// Writes ∂v̇₀/∂v₀ of floating bodies. All other entries of these columns are zero.
     pub(crate) fn boost<S>(d: &mut Workspace<S>, v: &[S]) {
         let n = v.len();
         for &first in &d.floating {
@@ -75,7 +77,7 @@ kernel! {
 }
 
 kernel! {
-    /// ∂q̈ = −M⁻¹ ∂τ by the factors of the articulated bodies.
+    /// Computes ∂q̈ = −M⁻¹ ∂τ with the factors of the articulated bodies.
     pub(crate) fn solves<S>(world: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>, dtau: [&[S]; 2]) {
         let Workspace { da_dq, da_dv, solve, .. } = d;
         minus_solve(world, f, solve, dtau, [da_dq.as_mut_slice(), da_dv.as_mut_slice()]);

@@ -1,15 +1,15 @@
-//! The second derivatives of forward dynamics, contracted with a vector, by hand.
+//! Second derivatives of forward dynamics, contracted with a vector, by analytical formulas.
 //!
-//! τ(q, v, q̈(q, v, τ)) = τ holds for every q, v and τ. Differentiated twice and multiplied by μᵀ = λᵀ M⁻¹, with the Hessian
-//! of φ = μᵀ rnea(q, v, a) at a = q̈ (`rnea_hessian.rs`) and G = ∂²φ/∂a∂q,
+//! τ(q, v, q̈(q, v, τ)) = τ holds for every q, v and τ. It is differentiated twice and multiplied by μᵀ = λᵀ M⁻¹. With
+//! the Hessian of φ = μᵀ rnea(q, v, a) at a = q̈ (`rnea_hessian.rs`) and G = ∂²φ/∂a∂q, this gives
 //!
 //! ```text
 //! λᵀ ∂²q̈/∂q∂q = −∂²φ/∂q∂q − (∂q̈/∂q)ᵀ G − Gᵀ ∂q̈/∂q     λᵀ ∂²q̈/∂v∂q = −∂²φ/∂v∂q − (∂q̈/∂v)ᵀ G
 //! λᵀ ∂²q̈/∂v∂v = −∂²φ/∂v∂v                                λᵀ ∂²q̈/∂τ∂q = −M⁻¹ G
 //! ```
 //!
-//! and nothing else, since τ is linear in a and does not mix v with a. Source: Nganga and Wensing, *Accelerating
-//! second-order differential dynamic programming for rigid-body systems* (2021).
+//! All other second derivatives are zero, since τ is linear in a and has no term with both v and a. Source: Nganga and
+//! Wensing, *Accelerating second-order differential dynamic programming for rigid-body systems* (2021).
 
 use crate::derivatives::aba_derivatives::{self};
 use crate::derivatives::rnea_hessian;
@@ -19,7 +19,7 @@ use condyle_linalg::tree_product::minus_product;
 use condyle_spatial::kernel;
 use condyle_spatial::{Array, Matrix, Scalar};
 
-/// Bᵀ, of a square matrix.
+/// Computes Bᵀ of a square matrix B.
 #[inline(always)]
 fn transpose_to<S: Scalar>(B: &[S], out: &mut [S], n: usize) {
     for j in 0..n {
@@ -33,23 +33,23 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// μ = M⁻¹ λ. Written by: `aba_hessian`.
         pub mu: Array<S> = filled(S::zero, size.nv),
-        /// A transpose. Written by: `run`.
+        /// Transpose of a matrix. Written by: `run`.
         pub transpose: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// A product. Written by: `run`.
+        /// Product of two matrices. Written by: `run`.
         pub product: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Written by: `run`.
+        /// λᵀ ∂²q̈/∂q∂q. Written by: `run`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `run`.
+        /// λᵀ ∂²q̈/∂v∂q. Written by: `run`.
         pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `run`.
+        /// λᵀ ∂²q̈/∂v∂v. Written by: `run`.
         pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `run`.
+        /// λᵀ ∂²q̈/∂τ∂q. Written by: `run`.
         pub dtaudq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
 kernel! {
-    /// μ = M⁻¹ λ.
+    /// Computes μ = M⁻¹ λ.
     pub(crate) fn multiply<S>(Minv: &Matrix<S>, lambda: &[S], mu: &mut [S]) {
         let n = mu.len();
         for i in 0..n {
@@ -64,7 +64,7 @@ kernel! {
 }
 
 kernel! {
-    /// After `aba_derivatives` and the Hessian of φ.
+    /// Computes the Hessian, after `aba_derivatives` and the Hessian of φ.
     pub(crate) fn run<S>(
         coupled: &[NonzeroRows],
         first: &aba_derivatives::Workspace<S>,

@@ -1,14 +1,15 @@
-//! Derivatives of the centre of mass, the centroidal momentum and its rate by position, velocity and acceleration.
+//! Derivatives of the centre of mass, the centroidal momentum and its rate with respect to position, velocity and
+//! acceleration.
 //!
-//! About the world's origin, momentum h = Σ I v and rate F = Σ I a + v ×* I v change with coordinate e by what its joint
-//! carries (Ψ̇, Ψ̈, B of `rnea_derivatives.rs`, Y = Ψ̇ + Ṡ):
+//! About the world's origin, let the momentum be h = Σ I v and the rate F = Σ (I a + v ×* I v). Their changes with
+//! coordinate e come from the bodies that its joint carries (Ψ̇, Ψ̈, B of `rnea_derivatives.rs`, Y = Ψ̇ + Ṡ):
 //!
 //! ```text
 //! ∂h/∂q_e = S ×* hᶜ + Iᶜ Ψ̇     ∂F/∂q_e = S ×* Fᶜ + Iᶜ Ψ̈ + 2Bᶜ Ψ̇     ∂F/∂q̇_e = Iᶜ Y + 2Bᶜ S     ∂F/∂q̈_e = Iᶜ S
 //! ```
 //!
-//! Shifted to the centre of mass, f becomes [f; n − c × f], and its derivative gains −∂c × f. The linear rows over the mass
-//! are the derivatives of ċ and c̈.
+//! Shifted to the centre of mass, f becomes [f; n − c × f], and its derivative gains −∂c × f. The linear rows divided
+//! by the mass are the derivatives of ċ and c̈.
 //!
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the root.
 
@@ -21,7 +22,7 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
 
-/// The derivatives of a column, about the world's origin.
+/// Derivatives with respect to the coordinate of a column, about the world's origin.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 struct Column<S> {
@@ -41,22 +42,22 @@ impl<S: Scalar> Column<S> {
 }
 
 workspace! {
-    /// In the world's frame, but for what is said to be about the centre of mass.
+    /// Quantities in the world's frame about its origin, unless they are marked "about the centre of mass".
     pub(crate) struct Workspace<S>(size) {
-        /// Iᶜ; of the world, that of all bodies that move. Written by: `pass`.
+        /// Iᶜ; at index 0 the sum over all moving bodies. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// hᶜ and 2Bᶜ, likewise. Written by: `pass`.
+        /// hᶜ and 2Bᶜ; at index 0 the sum over all moving bodies. Written by: `pass`.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Fᶜ, likewise. Written by: `pass`.
+        /// Fᶜ; at index 0 the sum over all moving bodies. Written by: `pass`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Written by: `pass`.
+        /// Derivatives of each column. Written by: `pass`.
         columns: Array<Column<S>> = filled(Column::zero, size.columns),
-        /// About the centre of mass. Written by: `shift`.
+        /// Derivatives of momentum and rate, about the centre of mass. Written by: `shift`.
         pub dh_dq: Matrix<S> = zero_matrix(6, size.nv),
         pub drate_dq: Matrix<S> = zero_matrix(6, size.nv),
         pub drate_dv: Matrix<S> = zero_matrix(6, size.nv),
         pub drate_da: Matrix<S> = zero_matrix(6, size.nv),
-        /// Written by: `shift`.
+        /// Derivatives of the centre of mass, its velocity and its acceleration. Written by: `shift`.
         pub dcom_dq: Matrix<S> = zero_matrix(3, size.nv),
         pub dvcom_dq: Matrix<S> = zero_matrix(3, size.nv),
         pub dacom_dq: Matrix<S> = zero_matrix(3, size.nv),
@@ -65,7 +66,7 @@ workspace! {
 }
 
 impl<S> Workspace<S> {
-    /// What `run` has left.
+    /// Returns a view of the results of `run`.
     pub(crate) fn view(&self) -> CentroidalDerivatives<'_, S> {
         CentroidalDerivatives {
             dh_dq: &self.dh_dq,
@@ -81,7 +82,7 @@ impl<S> Workspace<S> {
     }
 }
 
-/// The derivatives about the world's origin, for bodies whose velocities and accelerations are known.
+/// Computes the derivatives about the world's origin, for bodies whose velocities and accelerations are known.
 #[inline(always)]
 fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, columns, .. } = d;
@@ -111,13 +112,13 @@ fn pass<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d
     }
 }
 
-/// −∂c × f, what a force's moment changes by with the point that it is about.
+/// Returns the change [0; −∂c × f] of a force's moment when its reference point moves by ∂c.
 #[inline(always)]
 fn moved<S: Scalar>(dcom: Vec3<S>, f: Vec3<S>) -> Force<S> {
     Force::new(Vec3::zero(), -dcom.cross(f))
 }
 
-/// The derivatives about the centre of mass, after `pass`.
+/// Computes the derivatives about the centre of mass, after `pass`.
 #[inline(always)]
 fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     let per_mass = d.IC[0].mass.recip();
@@ -143,7 +144,7 @@ fn shift<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     }
 }
 
-/// The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c. The axes are the world's.
+/// Derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c. The axes are the world's.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalDerivatives<'d, S> {
     /// ∂hg/∂q, 6 × nv, linear rows first.
@@ -167,7 +168,7 @@ pub struct CentroidalDerivatives<'d, S> {
 }
 
 kernel! {
-    /// For bodies whose accelerations are known.
+    /// Computes the derivatives, for bodies whose accelerations are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
         shift(model, d);

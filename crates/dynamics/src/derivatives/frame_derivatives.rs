@@ -1,25 +1,25 @@
-//! Derivatives of the velocity and the acceleration of bodies and frames by position and velocity.
+//! Derivatives of the velocity and the acceleration of bodies and frames with respect to position and velocity.
 //!
-//! When coordinate e changes, whatever its joint carries turns rigidly about S_e, and beside that its velocity and
-//! acceleration change because the joint's own parent moves (`rnea_derivatives.rs`):
+//! When coordinate e changes, the bodies that its joint carries turn rigidly about S_e. Their velocities and
+//! accelerations also change because the joint's own parent moves (`rnea_derivatives.rs`):
 //!
 //! ```text
 //! Ψ̇_e = v_λ × S_e                          ∂v/∂q_e = S_e × v + Ψ̇_e                ∂v/∂q̇_e = S_e
 //! Ψ̈_e = a_λ × S_e + v_λ × Ψ̇_e             ∂a/∂q_e = S_e × a + Ψ̈_e + Ψ̇_e × v     ∂a/∂q̇_e = Ψ̇_e + Ṡ_e + S_e × v
 //! ```
 //!
-//! That is seen from the world. The six numbers m of a motion in a frame r, at oXr, which moves itself by r_e per unit of
-//! q_e, change by oXr⁻¹ (∂m/∂q_e − r_e × m).
+//! These are the changes as seen from the world. Let m be the six numbers of a motion in a frame r at oXr, and let r
+//! move by r_e per unit of q_e. Then m changes by oXr⁻¹ (∂m/∂q_e − r_e × m).
 //!
 //! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), section IV. A
-//! derivative costs O(depth + nv); nothing allocates.
+//! derivative costs O(depth + nv). Derivatives do not allocate.
 
 use crate::passes::frames::{Accelerations, ReferenceFrame, Velocities, add, check_frame, columns};
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Motion, Scalar, Se3, kernel};
 
 kernel! {
-    /// ∂v/∂q of a frame at oXf on a body.
+    /// Computes ∂v/∂q of a frame at oXf on a body.
     fn velocity_derivative<S, R>(
         of: Velocities<'_, S, R>,
         body: usize,
@@ -44,7 +44,8 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
-    /// ∂v/∂q of a body's velocity, as for [`frame_velocity_derivative`](Self::frame_velocity_derivative).
+    /// Computes ∂v/∂q of a body's velocity, as [`frame_velocity_derivative`](Self::frame_velocity_derivative) does for
+    /// a frame.
     ///
     /// # Panics
     /// If there is no such body, or `dv_dq` is not 6 × nv.
@@ -59,8 +60,8 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
         velocity_derivative(*self, body, &self.body(body), reference, columns("dv_dq", dv_dq, self.model.nv()));
     }
 
-    /// ∂v/∂q of the six numbers v of a [frame's velocity](Self::frame_velocity), 6 × nv, linear rows first. dv_dq is
-    /// overwritten. ∂v/∂(velocity) is the frame's Jacobian.
+    /// Computes ∂v/∂q of the six numbers v of a [frame's velocity](Self::frame_velocity), 6 × nv, linear rows first.
+    /// Overwrites dv_dq. ∂v/∂(velocity) is the frame's Jacobian.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::Local, forward_velocities, robots};
@@ -93,7 +94,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     }
 }
 
-/// ∂v/∂q_e, ∂v/∂q̇_e, ∂a/∂q_e and ∂a/∂q̇_e of the motion of a body, in a frame of reference.
+/// Derivatives ∂v/∂q_e, ∂v/∂q̇_e, ∂a/∂q_e and ∂a/∂q̇_e of the motion of a body, in a reference frame.
 struct Column<S> {
     v_q: Motion<S>,
     v_v: Motion<S>,
@@ -102,7 +103,8 @@ struct Column<S> {
 }
 
 kernel! {
-    /// ∂a/∂q and ∂a/∂v of a frame at oXf on a body; of the classical acceleration, for the frame's velocity.
+    /// Computes ∂a/∂q and ∂a/∂v of a frame at oXf on a body. If the frame's velocity is given, a is the classical
+    /// acceleration.
     fn acceleration_derivatives<S, R>(
         of: Accelerations<'_, S, R>,
         body: usize,
@@ -132,8 +134,8 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
-    /// ∂a/∂q and ∂a/∂v of a body's spatial acceleration, as for
-    /// [`frame_acceleration_derivatives`](Self::frame_acceleration_derivatives).
+    /// Computes ∂a/∂q and ∂a/∂v of a body's spatial acceleration, as
+    /// [`frame_acceleration_derivatives`](Self::frame_acceleration_derivatives) does for a frame.
     ///
     /// # Panics
     /// If there is no such body, or a matrix is not 6 × nv.
@@ -149,8 +151,8 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         self.differentiate(body, &self.body(body), reference, None, da_dq, da_dv);
     }
 
-    /// ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's spatial acceleration](Self::frame_acceleration), each 6 × nv,
-    /// linear rows first. Both are overwritten. ∂a/∂(acceleration) is the frame's Jacobian.
+    /// Computes ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's spatial acceleration](Self::frame_acceleration),
+    /// each 6 × nv, linear rows first. Overwrites both. ∂a/∂(acceleration) is the frame's Jacobian.
     ///
     /// # Panics
     /// If there is no such frame, or a matrix is not 6 × nv.
@@ -168,8 +170,9 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         self.differentiate(body, &self.frame(frame), reference, None, da_dq, da_dv);
     }
 
-    /// ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's classical acceleration](Self::frame_classical_acceleration),
-    /// each 6 × nv, linear rows first. Both are overwritten. ∂a/∂(acceleration) is the frame's Jacobian.
+    /// Computes ∂a/∂q and ∂a/∂v of the six numbers a of a [frame's classical
+    /// acceleration](Self::frame_classical_acceleration), each 6 × nv, linear rows first. Overwrites both.
+    /// ∂a/∂(acceleration) is the frame's Jacobian.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, forward_accelerations, robots};
@@ -201,7 +204,7 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         self.differentiate(body, &self.frame(frame), reference, Some(&v), da_dq, da_dv);
     }
 
-    /// ∂a/∂q and ∂a/∂v of a frame at oXf on a body, as for [`acceleration_derivatives`].
+    /// Computes ∂a/∂q and ∂a/∂v of a frame at oXf on a body, as [`acceleration_derivatives`] does.
     #[inline(always)]
     #[track_caller]
     fn differentiate(
@@ -218,7 +221,8 @@ impl<S: Scalar, R: Constant<S>> Accelerations<'_, S, R> {
         acceleration_derivatives(*self, body, oXf, reference, velocity, da_dq, da_dv);
     }
 
-    /// The derivatives of a body's motion by the coordinate of column c, whose joint sits on `parent`.
+    /// Returns the derivatives of a body's motion with respect to the coordinate of column c, whose joint is attached
+    /// to `parent`.
     #[inline(always)]
     fn column(&self, body: usize, oXf: Se3<S>, reference: ReferenceFrame, c: usize, parent: usize) -> Column<S> {
         let oXr = reference.pose(oXf);

@@ -1,4 +1,4 @@
-//! Derivatives of the passes, by hand: one algorithm a file, written as passes are.
+//! Analytical derivatives of the passes: each file holds one algorithm, written like a pass.
 
 pub(crate) mod aba_derivatives;
 pub(crate) mod aba_hessian;

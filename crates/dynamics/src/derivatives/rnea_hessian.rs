@@ -1,16 +1,17 @@
-//! The second derivatives of inverse dynamics, contracted with a vector, by hand.
+//! Second derivatives of inverse dynamics, contracted with a vector, by analytical formulas.
 //!
-//! φ = λᵀ τ(q, v, a) is the power of the efforts at the velocity λ: φ = Σ ⟨w_i, F_i⟩, where w_i is the velocity of body i
-//! when the joints move with λ. When coordinate e changes, all that its joint carries turns rigidly about S_e, which no
-//! power feels, and beside that (`rnea_derivatives.rs`, with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e)
+//! φ = λᵀ τ(q, v, a) is the power of the efforts at the velocity λ: φ = Σ ⟨w_i, F_i⟩, where w_i is the velocity of body
+//! i when the joints move with λ. When coordinate e changes, the bodies that its joint carries turn rigidly about S_e,
+//! which does not change the power. In addition, each of these bodies has the following changes (see
+//! `rnea_derivatives.rs`), with W_e = w_λ × S_e and Y_e = Ψ̇_e + Ṡ_e:
 //!
 //! ```text
 //! by q_e:  δw = W_e,  δv = Ψ̇_e,  δa = Ψ̈_e + Ψ̇_e × v        by q̇_e:  δv = S_e,  δa = Y_e + S_e × v
 //! ```
 //!
-//! for each body it carries. Applied twice, to a column d and a column e before it, everything that depends on the bodies
-//! collapses to sums over what joint d carries: Iᶜ, 2Bᶜ, F as in the first derivatives, the momentum P = Σ I w, the rate
-//! of inertia D = Σ (w ×* I − I w ×), and Q = Σ 2Bᵀ w. Six forces of column d serve all columns e before it:
+//! This is applied twice, to a column d and an earlier column e. All terms that depend on the bodies then become sums
+//! over the bodies that joint d carries. They are Iᶜ, 2Bᶜ, F as in the first derivatives, the momentum P = Σ I w, the
+//! rate of inertia D = Σ (w ×* I − I w ×), and Q = Σ 2Bᵀ w. Six forces of column d serve all earlier columns e:
 //!
 //! ```text
 //! A₁ = Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F     A₂ = Iᶜ W_d + S_d ×* P     A₃ = 2Bᵀ W_d + S_d ×* Q + Ψ̇_d ×* P − D Ψ̇_d
@@ -21,13 +22,14 @@
 //! ∂²φ/∂q̈_e∂q_d = ⟨S_e, A₂⟩                  ∂²φ/∂q̈_d∂q_e = ⟨W_e, C⟩
 //! ```
 //!
-//! Two columns of one joint: B₁ and C as above, ∂²φ/∂q̇_d∂q̇_e = −⟨S_e, D S_d⟩, and ∂²φ/∂q_d∂q_e is the mean of the line
-//! above and the same with d and e exchanged, since q ⊕ δ is an exponential of δ. So the price is that of a few first
-//! derivatives, O(n · depth), where the tensors have n³ entries.
+//! For two columns of one joint, B₁ and C are as above, and ∂²φ/∂q̇_d∂q̇_e = −⟨S_e, D S_d⟩. ∂²φ/∂q_d∂q_e is the mean of
+//! the line above and the same line with d and e exchanged, because q ⊕ δ is an exponential of δ. So it costs as much
+//! as a few first derivatives, O(n · depth), whereas the tensors have n³ entries.
 //!
-//! The papers on the tensors are Singh, Russell, Wensing, *On second-order derivatives of rigid-body dynamics: theory and
-//! implementation* (2024), and on the contracted form Nganga and Wensing, *Accelerating second-order differential dynamic
-//! programming for rigid-body systems* (2021); the sums above are those of the first, contracted before they are expanded.
+//! Sources: Singh, Russell, Wensing, *On second-order derivatives of rigid-body dynamics: theory and implementation*
+//! (2024), for the tensors; Nganga and Wensing, *Accelerating second-order differential dynamic programming for
+//! rigid-body systems* (2021), for the contracted form. The sums above are the sums of the first paper, contracted
+//! before they are expanded.
 
 use crate::derivatives::rnea_derivatives::{self};
 use crate::passes::coriolis::Coriolis;
@@ -40,28 +42,28 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// In the world's frame.
+    /// Quantities in the world's frame.
     pub(crate) struct Workspace<S>(size) {
-        /// w, the velocity at λ. Written by: `pass`.
+        /// w, the bodies' velocity for λ. Written by: `pass`.
         pub w: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// W = w_λ × S. Written by: `pass`.
         pub W: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// P and D. Written by: `pass`.
         pub PD: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Q, of which only the angular part is not zero. Written by: `pass`.
+        /// Q; only its angular part is nonzero. Written by: `pass`.
         pub Q: Array<Vec3<S>> = filled(Vec3::zero, size.bodies),
-        /// Written by: `pass`.
+        /// ∂²φ/∂q∂q. Written by: `pass`.
         pub dqdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `pass`.
+        /// ∂²φ/∂v∂q. Written by: `pass`.
         pub dvdq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `pass`.
+        /// ∂²φ/∂v∂v. Written by: `pass`.
         pub dvdv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `pass`.
+        /// ∂²φ/∂a∂q. Written by: `pass`.
         pub dadq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// The whole algorithm, after `rnea_derivatives::pass`, whose sums over what joints carry it reads.
+/// Runs the whole algorithm, after `rnea_derivatives::pass`, whose sums over carried bodies it reads.
 #[inline(always)]
 fn pass<L: Pairs>(
     l: &L,
@@ -139,7 +141,7 @@ fn pass<L: Pairs>(
 }
 
 kernel! {
-    /// After `rnea_derivatives::pass`.
+    /// Computes the Hessian, after `rnea_derivatives::pass`.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &World<S>,

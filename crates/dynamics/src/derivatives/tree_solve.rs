@@ -1,8 +1,8 @@
-//! −M⁻¹ B for matrices B, without M: on long chains faster than a product with M⁻¹.
+//! Products −M⁻¹ B without M⁻¹, which on long chains are faster than a product with M⁻¹.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, for a robot at rest without gravity, whose
-//! joints B gives the efforts of; in the world's frame, by the factors of the articulated bodies, each in O(n) for a column
-//! of B, where the product costs O(n) for each row. Columns go together, side by side.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, for a robot at rest without gravity, with
+//! the columns of B as efforts. It works in the world's frame with the factors of the articulated bodies. Each column
+//! of B costs O(n), whereas the product costs O(n) for each entry. Several columns are processed together.
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
@@ -12,36 +12,36 @@ use alloc::vec::Vec;
 use condyle_model::tree::Column;
 use condyle_spatial::{Array, Scalar, alike};
 
-/// The number of columns of B that go together.
+/// Number of columns of B that are processed together.
 const SIDE: usize = 16;
 
-/// The same for a scalar that has several numbers already.
+/// Number of columns of B that are processed together, for a scalar with lanes.
 const SIDE_OF_LANES: usize = 2;
 
-/// Columns of which each but the last has one child, the next. What a path adds up it keeps in a place, which the last path
-/// that hangs on it takes over.
+/// Chain of columns: each column except the last has exactly one child, the next column. A path stores its sums in a
+/// slot. The last path attached to it reuses this slot.
 #[derive(Clone, Copy, Debug)]
 struct Path {
     start: usize,
-    /// One past its last column.
+    /// One past the index of its last column.
     end: usize,
-    /// The place of the path that it hangs on.
+    /// Slot of the path to which it is attached, and its own slot.
     from: usize,
     place: usize,
-    /// Nothing hangs on it.
+    /// Whether no path is attached to it.
     tip: bool,
 }
 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Workspace<S> {
-    /// Empty where this is not the way to take. Written by: `new`.
+    /// Paths of the tree; empty if this method is not used. Written by: `new`.
     paths: Vec<Path>,
     /// Efforts, then accelerations. Shape: columns × `SIDE`. Written by: `minus_solve`.
     pub x: Array<S>,
-    /// Bias forces. Shape: places × 6 × `SIDE`. Written by: `minus_solve`.
+    /// Bias forces. Shape: slots × 6 × `SIDE`. Written by: `minus_solve`.
     pub P: Array<S>,
-    /// Accelerations. Shape: places × 6 × `SIDE`. Written by: `minus_solve`.
+    /// Accelerations. Shape: slots × 6 × `SIDE`. Written by: `minus_solve`.
     pub A: Array<S>,
 }
 
@@ -56,7 +56,7 @@ impl<S: Scalar> Workspace<S> {
         Self { x, P: zeros(6 * places), A: zeros(6 * places), paths }
     }
 
-    /// Whether this is the way to take.
+    /// Returns whether this method is used.
     pub(crate) fn pays(&self) -> bool {
         !self.paths.is_empty()
     }
@@ -64,7 +64,7 @@ impl<S: Scalar> Workspace<S> {
 
 fn paths(columns: &[Column]) -> Vec<Path> {
     let n = columns.len();
-    let parent = |c: usize| columns[c].parent.unwrap_or(n); // n stands for the world
+    let parent = |c: usize| columns[c].parent.unwrap_or(n); // n denotes the world
     let mut children = vec![Vec::new(); n + 1];
     (0..n).for_each(|c| children[parent(c)].push(c));
     let mut places = vec![0; n + 1];
@@ -81,7 +81,7 @@ fn paths(columns: &[Column]) -> Vec<Path> {
     paths
 }
 
-/// X = −M⁻¹ B for each of two square matrices B, after `aba::factorize`.
+/// Computes X = −M⁻¹ B for each of two square matrices B, after `aba::factorize`.
 #[inline(always)]
 pub(crate) fn minus_solve<S: Scalar>(
     w: &World<S>,
@@ -128,7 +128,7 @@ fn by_sides<S: Scalar, const N: usize>(
     }
 }
 
-/// Accelerations in place of efforts.
+/// Replaces efforts by accelerations.
 #[inline(always)]
 fn sweep<S: Scalar, const N: usize>(
     paths: &[Path],

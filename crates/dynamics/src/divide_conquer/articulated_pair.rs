@@ -1,18 +1,18 @@
-//! A piece of a robot as it feels at two handles: the body on which it hangs, and its own last body.
+//! Articulated piece of a robot with two handles: the body to which the piece is attached, and the piece's last body.
 //!
 //! Source: Featherstone (1999), part 1, describes an articulated body with two handles by its inverse inertias, so that
-//! accelerations follow from forces. Here the handle above is given by its acceleration a (of the body on which the
-//! piece's first joint sits) and the one below by the force f that acts on it:
+//! forces determine accelerations. Here the upper handle is described by the acceleration a of the body to which the
+//! piece's first joint is attached. The lower handle is described by the force f that acts on it:
 //!
 //! ```text
-//! f' = K a + p − Lᵀ f      what the joint above must transmit: K and p are Iᵃ and pᵃ of the articulated-body algorithm
-//! a' = L a + b + Y f       how the body below accelerates
+//! f' = K a + p − Lᵀ f      force through the joint above: K and p are Iᵃ and pᵃ of the articulated-body algorithm
+//! a' = L a + b + Y f       acceleration of the body below
 //! ```
 //!
-//! which needs no inverse of an inertia, only those of the articulated-body algorithm: bodies may be without mass. (In
-//! scattering theory two such pieces are joined by Redheffer's star product.) With the second piece on the last body of
-//! the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f): the first piece is, for the second, a
-//! joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric G = E Y₁,
+//! This needs only the inverses of the articulated-body algorithm and no inverse of an inertia, so bodies may be
+//! massless. (In scattering theory, Redheffer's star product joins two such pieces.) If the second piece is attached to
+//! the last body of the first, f₁ = −f'₂ and a₂ = a'₁, so a₂ = L₁ a + b₁ − Y₁ (K₂ a₂ + p₂ − L₂ᵀ f). For the second
+//! piece, the first one is a joint of compliance Y₁. Hence, with E = (1 + Y₁ K₂)⁻¹ and the symmetric G = E Y₁,
 //!
 //! ```text
 //! a₂ = N a + e + G L₂ᵀ f,      N = E L₁,              e = E (b₁ − Y₁ p₂)
@@ -20,48 +20,48 @@
 //! L = L₂ N,                    b = b₂ + L₂ e,         Y = Y₂ + L₂ G L₂ᵀ
 //! ```
 //!
-//! 1 + Y₁ K₂ has no eigenvalue below 1, since Y₁ and K₂ have none below 0. It is eliminated as it stands: a root of Y₁
-//! would make a symmetric matrix of it, but Y₁ is of the rank of its piece's degrees of freedom, and what rounding leaves
-//! of a pivot that should be zero can be anything.
+//! 1 + Y₁ K₂ has no eigenvalue below 1, because Y₁ and K₂ have no negative eigenvalues. It is eliminated without making
+//! it symmetric. A square root of Y₁ would make it symmetric, but the rank of Y₁ is only the number of its piece's
+//! degrees of freedom. Rounding errors of pivots that should be zero would then spoil the result.
 //!
-//! Each handle is described in a frame along the world's axes, at its own origin: Y has rotations and translations of
-//! a body of this size in it, not of its distance from the world's origin.
+//! Each handle is described at its own origin, along the world's axes. So the rotations and translations in Y have the
+//! size of the piece, not of its distance from the world's origin.
 
 use condyle_spatial::{ArticulatedInertia, Force, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
-/// A 6 × 6 matrix by its columns, each with its linear part first.
+/// 6 × 6 matrix, stored by columns, each with its linear part first.
 type Matrix<S> = [[S; 6]; 6];
 
-/// 1 + Y₁ K₂, L₁, b₁ − Y₁ p₂ and Y₁ side by side.
+/// Width of the matrix [1 + Y₁ K₂, L₁, b₁ − Y₁ p₂, Y₁].
 const WIDTH: usize = 6 + 6 + 1 + 6;
 
-/// A piece between two handles.
+/// Piece between two handles.
 #[derive(Clone, Debug)]
 pub(crate) struct ArticulatedPair<S> {
-    /// The body below in the frame of the body above.
+    /// Pose of the lower body in the frame of the upper body.
     pub X: Se3<S>,
-    /// The velocity of the body below relative to the body above, in that frame.
+    /// Velocity of the lower body relative to the upper body, in that frame.
     pub w: Motion<S>,
-    /// Force above per acceleration above.
+    /// Force at the upper handle per acceleration of the upper handle.
     pub K: ArticulatedInertia<S>,
-    /// Force above with the handle above at rest.
+    /// Force at the upper handle when this handle is at rest.
     pub p: Force<S>,
-    /// Acceleration below per acceleration above.
+    /// Acceleration of the lower handle per acceleration of the upper handle.
     L: Matrix<S>,
-    /// Acceleration below per force below.
+    /// Acceleration of the lower handle per force on the lower handle.
     Y: Matrix<S>,
-    /// Acceleration below with the handle above at rest.
+    /// Acceleration of the lower handle when the upper handle is at rest.
     b: Motion<S>,
-    /// Acceleration between the two pieces of which it is made, per acceleration above.
+    /// Acceleration between the two pieces of which it consists, per acceleration of the upper handle.
     N: Matrix<S>,
-    /// The same per force between them.
+    /// Acceleration between the two pieces, per force between them.
     G: Matrix<S>,
-    /// The same with the handle above at rest.
+    /// Acceleration between the two pieces, when the upper handle is at rest.
     e: Motion<S>,
 }
 
 impl<S: Scalar> ArticulatedPair<S> {
-    /// Nothing between two handles that are the same body.
+    /// Returns an empty piece, whose handles are the same body.
     pub(crate) fn nothing() -> Self {
         Self {
             X: Se3::identity(),
@@ -77,7 +77,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         }
     }
 
-    /// No joint yet between the handles: Y = 0, b = 0, and L moves the origin to the handle below, at r.
+    /// Starts a piece without joints between the handles: Y = 0, b = 0, and L moves the origin to the lower handle, at
+    /// r.
     #[inline(always)]
     pub(crate) fn begin(&mut self, r: Vec3<S>) {
         let skew = r.skew(); // a' = [v + ω × r; ω]
@@ -89,7 +90,7 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.b = Motion::zero();
     }
 
-    /// One more degree of freedom above: S, U = Iᴬ S, 1/D, and its acceleration x = u/D with the handle above at rest.
+    /// Adds a degree of freedom above: S, U = Iᴬ S, 1/D, and its acceleration x = u/D when the upper handle is at rest.
     #[inline(always)]
     pub(crate) fn extend(&mut self, axis: Motion<S>, U: Force<S>, D_inv: S, x: S) {
         let s = times(&self.L, &axis.to_array()); // s = L S
@@ -101,13 +102,14 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.b = Motion::from(s).scale_add(x, self.b); // b ← b + s x
     }
 
-    /// The handle above moves on with the velocity-dependent acceleration c of its joint.
+    /// Moves the upper handle past a joint with the velocity-dependent acceleration c.
     #[inline(always)]
     pub(crate) fn shift(&mut self, c: Motion<S>) {
         self.b += Motion::from(times(&self.L, &c.to_array())); // b ← b + L c
     }
 
-    /// `upper` and, on its last body, `lower`; with what is needed below only if it is `open`.
+    /// Joins `upper` and `lower`, which is attached to the last body of `upper`. L, b and Y are computed only if it is
+    /// `open`.
     #[inline(always)]
     pub(crate) fn join(&mut self, upper: &Self, lower: &Self, open: bool) {
         let (L1, Y1, K2, p2) = (&upper.L, &upper.Y, full(lower.K), lower.p);
@@ -149,7 +151,8 @@ impl<S: Scalar> ArticulatedPair<S> {
         self.G = G;
     }
 
-    /// The acceleration a₂ between the two pieces of which this is made, and the force f₁ on the upper one there.
+    /// Returns the acceleration a₂ between the two pieces of which this consists, and the force f₁ on the upper piece
+    /// there.
     #[inline(always)]
     pub(crate) fn between(&self, lower: &Self, a: Motion<S>, f: Option<Force<S>>) -> (Motion<S>, Force<S>) {
         let mut a2 = self.e + Motion::from(times(&self.N, &a.to_array()));
@@ -163,8 +166,8 @@ impl<S: Scalar> ArticulatedPair<S> {
     }
 }
 
-/// Turns the rows of [A, B] into those of [·, A⁻¹ B], by Gaussian elimination: of the rows left, the one with the largest
-/// pivot goes first.
+/// Converts the rows of [A, B] to the rows of [·, A⁻¹ B], by Gaussian elimination with the largest pivot of the
+/// remaining rows.
 #[inline(always)]
 fn eliminate<S: Scalar>(rows: &mut [[S; WIDTH]; 6]) {
     for k in 0..6 {
@@ -213,7 +216,7 @@ fn identity<S: Scalar>() -> Matrix<S> {
     one
 }
 
-/// y += x s.
+/// Computes y += x s.
 #[inline(always)]
 fn add<S: Scalar>(y: &mut [S; 6], s: S, x: &[S; 6]) {
     for i in 0..6 {
@@ -221,7 +224,7 @@ fn add<S: Scalar>(y: &mut [S; 6], s: S, x: &[S; 6]) {
     }
 }
 
-/// A x.
+/// Returns A x.
 #[inline(always)]
 fn times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     let mut y = [S::zero(); 6];
@@ -231,7 +234,7 @@ fn times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     y
 }
 
-/// Aᵀ x.
+/// Returns Aᵀ x.
 #[inline(always)]
 fn transpose_times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     let mut y = [S::zero(); 6];
@@ -243,7 +246,7 @@ fn transpose_times<S: Scalar>(A: &Matrix<S>, x: &[S; 6]) -> [S; 6] {
     y
 }
 
-/// A B.
+/// Returns A B.
 #[inline(always)]
 fn product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     let mut C = zero();
@@ -253,7 +256,7 @@ fn product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     C
 }
 
-/// Aᵀ B.
+/// Returns Aᵀ B.
 #[inline(always)]
 fn transpose_product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     let mut T = zero();
@@ -265,7 +268,7 @@ fn transpose_product<S: Scalar>(A: &Matrix<S>, B: &Matrix<S>) -> Matrix<S> {
     product(&T, B)
 }
 
-/// An articulated inertia as a matrix.
+/// Returns an articulated inertia as a matrix.
 #[inline(always)]
 fn full<S: Scalar>(K: ArticulatedInertia<S>) -> Matrix<S> {
     let (linear, coupling, rotational) = (K.linear.full(), K.coupling, K.rotational.full());
@@ -281,7 +284,7 @@ fn full<S: Scalar>(K: ArticulatedInertia<S>) -> Matrix<S> {
     ]
 }
 
-/// The symmetric part of a matrix.
+/// Returns the symmetric part of a matrix.
 #[inline(always)]
 fn symmetric<S: Scalar>(A: &Matrix<S>) -> ArticulatedInertia<S> {
     let half = S::splat(0.5);

@@ -1,65 +1,69 @@
-//! Which pieces of a tree of bodies are put together in which order: the plan of the divide-and-conquer algorithm.
+//! Plan of the divide-and-conquer algorithm: the pieces of a tree of bodies, and the order in which they are assembled.
 //!
 //! Source: Featherstone, *A divide-and-conquer articulated-body algorithm for parallel O(log(n)) calculation of
-//! rigid-body dynamics*, part 2: trees, loops and accuracy (1999), who leaves the choice of the assembly tree open. Here
-//! a tree falls into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983): from each body the
-//! path goes on to the child that carries most. A path is cut in two where both halves, with all that hangs on them,
-//! weigh most nearly the same, and so on; the subtrees that hang on a body are paths of their own. A chain of n bodies
-//! thus has ⌈log₂ n⌉ levels of joins, and any tree O(log n). No cut is made below a body that without its load would not
-//! resist its own joint (one without mass, say): the piece above the cut could not be solved on its own.
+//! rigid-body dynamics*, part 2: trees, loops and accuracy (1999), who leaves the choice of the assembly tree open.
+//!
+//! Here a tree is divided into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983): from each
+//! body the path continues to the child that carries most bodies. A path is cut so that both halves, including the
+//! bodies that they carry, have nearly the same weight. The halves are cut in the same way. The other subtrees attached
+//! to a body are separate paths. So a chain of n bodies has ⌈log₂ n⌉ levels of joins, and any tree O(log n).
+//!
+//! No cut is made below a body whose own inertia would not resist its joint, such as a massless body. The piece above
+//! such a cut could not be solved separately.
 
 use alloc::vec::Vec;
 use condyle_model::{Body, Model};
 use condyle_spatial::{Act, ArticulatedInertia, Se3, Vec3};
 
-/// A joint whose inertia is a smaller part of its body's mass (kg) and rotational inertia (kg m²) counts as without any.
+/// Minimum inertia along a degree of freedom, as a fraction of the body's mass (kg) and rotational inertia (kg m²). A
+/// joint with less inertia counts as having none.
 const FREE: f64 = 1e-9;
 
-/// Stands for the handle above a piece in place of a parent among its links.
+/// Parent index in a piece's links that denotes the handle above the piece.
 pub(crate) const HANDLE: usize = usize::MAX;
 
-/// The way in which a piece is made.
+/// Kind of a piece, which determines how it is assembled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
-    /// Some bodies, connected with each other or with the body above, one after the other.
+    /// Bodies that are connected with each other or with the body above, eliminated one after the other.
     Run,
-    /// One body, and what the piece that follows makes of the subtrees on it.
+    /// One body, and the following piece, which assembles the subtrees attached to it.
     Hub,
-    /// The piece that follows, and below it the one after that.
+    /// Join of the following piece and the piece after it, which is attached below.
     Join,
-    /// The piece that follows and the one after that, both on the same body.
+    /// Sum of the following piece and the piece after it, both attached to the same body.
     Gather,
 }
 
-/// A piece. Those of which it is made follow it, and so do its bodies.
+/// Piece of the tree. Its parts and its bodies follow it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Piece {
     pub kind: Kind,
-    /// Another piece hangs on its last body: it has two handles.
+    /// Whether another piece is attached to its last body, so that it has two handles.
     pub open: bool,
-    /// The number of its bodies.
+    /// Number of its bodies.
     pub links: usize,
-    /// The number of degrees of freedom of their joints.
+    /// Number of degrees of freedom of their joints.
     pub dofs: usize,
-    /// The number of pieces of which it is made, itself included.
+    /// Number of pieces of which it consists, including itself.
     pub pieces: usize,
-    /// The number of pieces on the longest way from it to a run, itself included.
+    /// Number of pieces on the longest path from it to a run, including itself.
     levels: usize,
 }
 
-/// A body in the order of the pieces.
+/// Body in the order of the pieces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Link {
     pub body: usize,
-    /// The first of its degrees of freedom, counted from the piece's first.
+    /// Index of the first of its degrees of freedom, counted from the piece's first.
     pub dof: usize,
-    /// The parent's place in the run, or [`HANDLE`].
+    /// Index of its parent in the run, or [`HANDLE`].
     pub parent: usize,
-    /// It is on the way from the handle above to the one below.
+    /// Whether it is on the path from the upper handle to the lower one.
     pub spine: bool,
 }
 
-/// The cost of an assembly, counted.
+/// Cost of an assembly, in counts.
 ///
 /// ```
 /// use condyle_dynamics::{AssemblySize, DivideConquer, robots};
@@ -68,21 +72,21 @@ pub(crate) struct Link {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AssemblySize {
-    /// Moving bodies: each is eliminated once.
+    /// Number of moving bodies; each is eliminated once.
     pub bodies: usize,
-    /// Pieces within which bodies are eliminated one after the other.
+    /// Number of pieces within which bodies are eliminated one after the other.
     pub runs: usize,
-    /// Bodies in the largest of them.
+    /// Number of bodies in the largest of these pieces.
     pub longest_run: usize,
-    /// Pairs of pieces that are joined, one below the other.
+    /// Number of pairs of pieces that are joined, one below the other.
     pub joins: usize,
-    /// Pairs of pieces that are added up, both on one body.
+    /// Number of pairs of pieces that are added, both on one body.
     pub gathers: usize,
-    /// The number of pieces, from a run to the whole, that wait for one another.
+    /// Number of pieces that must be assembled one after the other, from a run to the whole.
     pub levels: usize,
 }
 
-/// All pieces, the whole first.
+/// All pieces, beginning with the whole.
 #[derive(Clone, Debug)]
 pub(crate) struct Assembly {
     pub pieces: Vec<Piece>,
@@ -90,7 +94,7 @@ pub(crate) struct Assembly {
 }
 
 impl Assembly {
-    /// Runs have at most `grain` bodies, or more where no cut can be made.
+    /// Plans the pieces of a model. Runs have at most `grain` bodies, or more where no cut can be made.
     pub(crate) fn new<R>(model: &Model<R>, grain: usize) -> Self {
         let bodies = model.bodies().len();
         let mut children = vec![Vec::new(); bodies];
@@ -101,7 +105,7 @@ impl Assembly {
             weight[parent] += weight[i];
         }
         for children in &mut children {
-            children.sort_by_key(|&i| (usize::MAX - weight[i], i)); // the heaviest first
+            children.sort_by_key(|&i| (usize::MAX - weight[i], i)); // heaviest first
         }
         let nv = model.bodies().iter().map(|b| b.joint.nv()).collect();
         let firm = model.bodies().iter().map(firm).collect();
@@ -129,10 +133,10 @@ impl Assembly {
 
 struct Planner {
     children: Vec<Vec<usize>>,
-    /// The number of bodies that each one carries, itself included.
+    /// Number of bodies that each body carries, including itself.
     weight: Vec<usize>,
     nv: Vec<usize>,
-    /// Its own inertia resists each degree of freedom of its joint.
+    /// Whether the body's own inertia resists each degree of freedom of its joint.
     firm: Vec<bool>,
     grain: usize,
     pieces: Vec<Piece>,
@@ -140,7 +144,7 @@ struct Planner {
 }
 
 impl Planner {
-    /// A piece, and what `parts` appends as its parts.
+    /// Adds a piece with the parts that `parts` appends.
     fn piece(&mut self, kind: Kind, open: bool, parts: impl FnOnce(&mut Self)) {
         let (at, first) = (self.pieces.len(), self.links.len());
         self.pieces.push(Piece { kind, open, links: 0, dofs: 0, pieces: 0, levels: 0 });
@@ -151,7 +155,7 @@ impl Planner {
         self.pieces[at] = Piece { kind, open, links: links.len(), dofs, pieces: self.pieces.len() - at, levels };
     }
 
-    /// Subtrees that hang on one body.
+    /// Adds the subtrees attached to one body.
     fn gather(&mut self, roots: &[usize]) {
         let weights: Vec<usize> = roots.iter().map(|&i| self.weight[i]).collect();
         if weights.iter().sum::<usize>() <= self.grain {
@@ -168,7 +172,7 @@ impl Planner {
         }
     }
 
-    /// A part of a heavy path.
+    /// Adds a part of a heavy path.
     fn path(&mut self, path: &[usize], open: bool) {
         let heavy = |i: usize| self.children[i].first().map_or(0, |&child| self.weight[child]);
         let weights: Vec<usize> = path.iter().map(|&i| self.weight[i] - heavy(i)).collect();
@@ -191,7 +195,7 @@ impl Planner {
         }
     }
 
-    /// All that hangs on the roots, without what hangs on the end of the spine, if there is one.
+    /// Adds all bodies that the roots carry, except the heaviest child of the spine's last body, if there is a spine.
     fn run(&mut self, roots: &[usize], spine: &[usize]) {
         let first = self.links.len();
         let mut stack: Vec<(usize, usize)> = roots.iter().rev().map(|&i| (i, HANDLE)).collect();
@@ -206,8 +210,8 @@ impl Planner {
     }
 }
 
-/// The place at which to cut a row of weights so that the heavier part is lightest, if it may be cut; both parts have at
-/// least one.
+/// Returns the best cut of a row of weights, if a cut is allowed: the heavier part is as light as possible. Both parts
+/// have at least one weight.
 fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> {
     let total: usize = weights.iter().sum();
     let (mut left, mut best) = (0, None);
@@ -221,7 +225,7 @@ fn halfway(weights: &[usize], may_cut: impl Fn(usize) -> bool) -> Option<usize> 
     best.map(|(_, cut)| cut)
 }
 
-/// Whether each D of the body's joint is positive with nothing hanging on it; in its own frame, where S is constant.
+/// Returns whether each D of the body's joint is positive for the body alone, in the body's frame, where S is constant.
 fn firm(body: &Body) -> bool {
     let inertia = Se3::new(body.joint.axis_rotation(), Vec3::zero()).act_inv(body.inertia);
     let rotational = inertia.rotational;

@@ -1,20 +1,21 @@
-//! Joints that share a coordinate (mimic), tied together again: how a robot accelerates, from how it would if all of its
-//! joints were free.
+//! Ties between joints that share a coordinate (mimic). The accelerations of the robot follow from the accelerations
+//! that it would have if all of its joints were free.
 //!
-//! On Z, the joints that share coordinates, be G the map from the shared coordinates y (1 for a leader, the ratio for a
-//! joint that follows), w the efforts at Z that tie them, and σ a rotor that each has in the free robot only. With M_σ
-//! the free robot's inertia matrix, A = (M_σ⁻¹)_ZZ, and a its accelerations without w:
+//! Let Z be the joints that share coordinates. G maps the shared coordinates y to Z (1 for a leader, the ratio for a
+//! mimic joint). Let w be the efforts at Z that tie the joints, and σ a rotor that each of them has in the free robot
+//! only. M_σ is the inertia matrix of the free robot, A = (M_σ⁻¹)_ZZ, and a its accelerations without w. Then:
 //!
 //! ```text
-//! a_Z + A w = G ÿ                          joints that share a coordinate move as it says
-//! Gᵀ (w − σ G ÿ) = 0                       what ties them, but for what turns the rotors, does no work
+//! a_Z + A w = G ÿ                          joints that share a coordinate move with it
+//! Gᵀ (w − σ G ÿ) = 0                       the tying efforts, except those of the rotors, do no work
 //! (Gᵀ A⁻¹ G − Gᵀ σ G) ÿ = Gᵀ A⁻¹ a_Z       hence
 //! q̈ = a + (M_σ⁻¹)_Z w,    w = A⁻¹ (G ÿ − a_Z)
 //! ```
 //!
-//! The columns of M_σ⁻¹ are the accelerations, at rest and without gravity, under a unit of effort at one joint of Z.
-//! With the rotors M_σ is regular wherever the tied robot's M is: what M_σ does not resist is at rest in Z, so M would not
-//! resist it either. Without them that is not so: what follows may have no inertia of its own.
+//! The columns of M_σ⁻¹ are the accelerations, at rest and without gravity, for a unit effort at one joint of Z. With
+//! the rotors, M_σ is regular wherever M of the tied robot is: a motion that M_σ does not resist has no velocity in Z,
+//! so M would not resist it either. Without rotors M_σ may be singular, because a mimic joint may have no inertia of
+//! its own.
 
 use crate::calls::inertia::crba;
 use crate::data::Data;
@@ -29,30 +30,30 @@ use condyle_spatial::{Constant, Scalar};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, rngs::StdRng};
 
-/// A joint that shares its coordinate with others.
+/// Joint that shares its coordinate with others.
 #[derive(Clone, Debug)]
 struct Member {
     body: usize,
-    /// Its degree of freedom, in the order of the assembly.
+    /// Index of its degree of freedom, in the order of the assembly.
     dof: usize,
-    /// Which of the shared coordinates it has.
+    /// Index of its shared coordinate.
     shared: usize,
 }
 
-/// The shared coordinates of a robot, and what ties the joints that share them.
+/// Shared coordinates of a robot, and quantities that tie the joints that share them.
 #[derive(Clone, Debug)]
 pub(crate) struct Ties<S> {
-    /// Z, in the order of the assembly.
+    /// Joints Z, in the order of the assembly.
     members: Vec<Member>,
     /// σ. Shape: Z. Written by: `choose_rotors`.
     rotors: Vec<S>,
-    /// Shape: Z × y. Written by: `prepare`.
+    /// G. Shape: Z × y. Written by: `prepare`.
     G: DMatrix<S>,
     /// a. Shape: degrees of freedom. Written by: `keep_free` and `solve`.
     free: Vec<S>,
-    /// (M_σ⁻¹)_Z, by columns. Shape: degrees of freedom × Z. Written by: `keep_response`.
+    /// (M_σ⁻¹)_Z, stored by columns. Shape: degrees of freedom × Z. Written by: `keep_response`.
     response: DMatrix<S>,
-    /// Shape: Z × Z. Written by: `solve`.
+    /// A. Shape: Z × Z. Written by: `solve`.
     A: DMatrix<S>,
     /// A⁻¹ G. Shape: Z × y. Written by: `solve`.
     X: DMatrix<S>,
@@ -60,14 +61,14 @@ pub(crate) struct Ties<S> {
     H: DMatrix<S>,
     factor_A: Cholesky<S>,
     factor_H: Cholesky<S>,
-    /// Shape: y. Written by: `solve`.
+    /// ÿ. Shape: y. Written by: `solve`.
     ydd: Vec<S>,
     /// G ÿ − a_Z, then w. Shape: Z. Written by: `solve`.
     w: Vec<S>,
 }
 
 impl<S: Scalar> Ties<S> {
-    /// The shared coordinates of a model, whose degrees of freedom are in the order of `links`.
+    /// Returns the ties of a model whose degrees of freedom are in the order of `links`.
     pub(crate) fn new<R: Constant<S>>(model: &Model<R>, links: &[Link]) -> Self {
         let mut joints = vec![0; model.nv()];
         model.columns().iter().for_each(|column| joints[column.coordinate] += 1);
@@ -100,8 +101,8 @@ impl<S: Scalar> Ties<S> {
         ties
     }
 
-    /// Makes the rotors as heavy as what they turn, so that neither hides the other: Gᵀ σ G is the diagonal of M at a
-    /// position that is in no way special.
+    /// Chooses rotors with about the same inertia as the bodies that they turn, so that rounding hides neither. Gᵀ σ G
+    /// is the diagonal of M at a random position.
     fn choose_rotors<R: Constant<S>>(&mut self, model: &Model<R>, shared: &[usize]) {
         if shared.is_empty() {
             return;
@@ -117,7 +118,7 @@ impl<S: Scalar> Ties<S> {
         }
     }
 
-    /// Reads the ratios.
+    /// Reads the ratios of the mimic joints.
     pub(crate) fn prepare<R>(&mut self, model: &Model<R>) {
         for (z, member) in self.members.iter().enumerate() {
             let ratio = model.nodes()[member.body].mimic.map_or(1.0, |mimic| mimic.ratio);
@@ -125,34 +126,34 @@ impl<S: Scalar> Ties<S> {
         }
     }
 
-    /// The number of joints that share a coordinate with others.
+    /// Returns the number of joints that share a coordinate with others.
     pub(crate) fn len(&self) -> usize {
         self.members.len()
     }
 
-    /// The place of one of these joints among the degrees of freedom.
+    /// Returns the index of one of these joints among the degrees of freedom.
     pub(crate) fn dof(&self, z: usize) -> usize {
         self.members[z].dof
     }
 
-    /// Puts the rotors on the joints.
+    /// Adds the rotors to the joints.
     pub(crate) fn add_rotors(&self, dofs: &mut [Dof<S>]) {
         for (member, &rotor) in self.members.iter().zip(&self.rotors) {
             dofs[member.dof].rotor += rotor;
         }
     }
 
-    /// Keeps the accelerations of the free robot.
+    /// Stores the accelerations of the free robot.
     pub(crate) fn keep_free(&mut self, dofs: &[Dof<S>]) {
         self.free.iter_mut().zip(dofs).for_each(|(a, dof)| *a = dof.qdd);
     }
 
-    /// Keeps the accelerations under a unit of effort at one of the joints.
+    /// Stores the accelerations for a unit effort at one of the joints.
     pub(crate) fn keep_response(&mut self, z: usize, dofs: &[Dof<S>]) {
         self.response.column_mut(z).iter_mut().zip(dofs).for_each(|(a, dof)| *a = dof.qdd);
     }
 
-    /// Gives each degree of freedom its acceleration in the tied robot.
+    /// Computes the acceleration of each degree of freedom in the tied robot.
     pub(crate) fn solve(&mut self, dofs: &mut [Dof<S>]) {
         let Self { members, rotors, G, free, response, A, X, H, factor_A, factor_H, ydd, w } = self;
         let (z, y) = G.shape();
@@ -190,7 +191,7 @@ impl<S: Scalar> Ties<S> {
         }
         free.iter().zip(&mut *dofs).for_each(|(&a, dof)| dof.qdd = a);
         for (k, member) in members.iter().enumerate() {
-            dofs[member.dof].qdd = G[(k, member.shared)] * ydd[member.shared]; // to the last bit
+            dofs[member.dof].qdd = G[(k, member.shared)] * ydd[member.shared]; // satisfies the ties exactly
         }
     }
 }

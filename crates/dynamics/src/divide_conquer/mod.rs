@@ -1,12 +1,13 @@
 //! Forward dynamics by the divide-and-conquer articulated-body algorithm, in O(log n) steps on O(n) processors.
 //!
 //! Source: Featherstone, *A divide-and-conquer articulated-body algorithm for parallel O(log(n)) calculation of
-//! rigid-body dynamics*, part 1: basic algorithm, and part 2: trees, loops and accuracy (1999). The robot is cut in two
-//! at a joint, each half again, and so on (`assembly.rs`); two pieces that are known at their handles make one that is
-//! (`articulated_pair.rs`), and from the whole the accelerations and forces at the cuts follow, down to each joint.
-//! Positions and velocities are found the same way, so no pass waits for a chain of bodies. All joints may have armature
-//! and any number of degrees of freedom. Joints that share a coordinate are set free, and tied again afterwards
-//! (`mimic.rs`).
+//! rigid-body dynamics*, part 1: basic algorithm, and part 2: trees, loops and accuracy (1999).
+//!
+//! The robot is cut in two at a joint, then each half again (`assembly.rs`). Two pieces that are known at their handles
+//! combine into one such piece (`articulated_pair.rs`). From the whole, the accelerations and forces at the cuts are
+//! computed, down to each joint. Positions and velocities are found in the same way, so no pass waits for a chain of
+//! bodies. All joints may have armature and any number of degrees of freedom. Joints that share a coordinate are first
+//! treated as free, and are tied afterwards (`mimic.rs`).
 
 mod articulated_pair;
 pub(crate) mod assembly;
@@ -28,16 +29,16 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 
 /// Forward dynamics by divide and conquer: the plan for one model, and its scratch.
 ///
-/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps: a
-/// chain of n bodies ⌈log₂ n⌉ + 1 levels. A join of two pieces costs some six times as much as the elimination of a body,
-/// a body of a run between two handles half as much again as one in [`aba`](crate::aba()). So on few processors the runs
-/// must be long (n over the number of threads). On two threads this is faster than `aba` from some 200 bodies on, and on
-/// one never (`benches/divide_conquer.rs`). With joints that share coordinates (mimic) the passes run once for the robot
-/// with all joints free, and once more for each of those joints.
+/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps:
+/// ⌈log₂ n⌉ + 1 levels for a chain of n bodies. A join of two pieces costs about six times as much as the elimination
+/// of a body. A body of a run between two handles costs 1.5 times as much as a body in [`aba`](crate::aba()). So with
+/// few processors the runs must be long (n divided by the number of threads). On two threads this is faster than `aba`
+/// from about 200 bodies on; on one thread it is never faster (`benches/divide_conquer.rs`). If joints share
+/// coordinates (mimic), the passes run once with all joints free, and once more for each of those joints.
 ///
-/// Runs in the pool of rayon in which it is called, else in the global one, with the same bits for any number of
-/// threads. All memory is allocated by [`new`](Self::new), but for what rayon allocates by itself.
-/// Source: Featherstone (1999), parts 1 and 2.
+/// Runs in the rayon pool in which it is called, otherwise in the global pool. The bits do not depend on the number of
+/// threads. [`new`](Self::new) allocates all memory, except what rayon allocates. Source: Featherstone (1999), parts 1
+/// and 2.
 ///
 /// ```
 /// use condyle_dynamics::{Data, DivideConquer, aba, robots};
@@ -51,24 +52,24 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 /// ```
 #[derive(Clone, Debug)]
 pub struct DivideConquer<S> {
-    /// The hash of the robot that it was planned for.
+    /// Hash of the robot for which it was planned.
     geometry: u64,
     assembly: Assembly,
-    /// The bodies in the order of the assembly. Shape: moving bodies.
+    /// Bodies in the order of the assembly. Shape: moving bodies.
     bodies: Vec<Body<S>>,
-    /// The degrees of freedom in the order of the assembly. Shape: those of all joints.
+    /// Degrees of freedom in the order of the assembly. Shape: degrees of freedom of all joints.
     dofs: Vec<Dof<S>>,
-    /// Shape: pieces. Written by: `relate`, `assemble`.
+    /// Pieces between their handles. Shape: pieces. Written by: `relate`, `assemble`.
     handles: Vec<ArticulatedPair<S>>,
     ties: Ties<S>,
-    /// Zeros. Shape: nv. Written by: nobody.
+    /// Zeros, never overwritten. Shape: nv.
     zero: Vec<S>,
     /// Joint accelerations. Shape: nv. Written by: `aba`.
     qdd: Vec<S>,
 }
 
 impl<S: Scalar> DivideConquer<S> {
-    /// Plans the assembly of a model from runs of at most `grain` bodies (0 counts as 1), and allocates everything.
+    /// Plans the assembly of a model from runs of at most `grain` bodies (0 counts as 1), and allocates all memory.
     pub fn new<R: Constant<S>>(model: &Model<R>, grain: usize) -> Self {
         let assembly = Assembly::new(model, grain.max(1));
         let body = Body {
@@ -101,21 +102,21 @@ impl<S: Scalar> DivideConquer<S> {
         }
     }
 
-    /// How much work the assembly is, and how many levels wait for one another.
+    /// Returns the cost of the assembly, and the number of levels that must be computed one after the other.
     pub fn size(&self) -> AssemblySize {
         self.assembly.size()
     }
 
-    /// q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i): the numbers of [`aba`](crate::aba()), up to rounding, in O(n) work
+    /// Computes q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), as [`aba`](crate::aba()) does up to rounding, in O(n) work
     /// and O(log n + grain) steps.
     ///
-    /// q: nq numbers; v, tau: nv; f_ext: a force on each body in its frame, or empty for none. Returns nv numbers.
-    /// Allocates nothing, but for what rayon does by itself. If z joints share coordinates (mimic), in 1 + z times the work
-    /// and steps, and O(n z + z³) for the ties.
+    /// q: nq numbers; v, tau: nv; f_ext: one force per body in its frame, or empty for none. Returns nv numbers.
+    /// Allocates nothing, except what rayon allocates. If z joints share coordinates (mimic), it takes 1 + z times the
+    /// work and steps, and O(n z + z³) for the ties.
     ///
     /// # Panics
-    /// If an argument has the wrong length, `model` has joints or frames elsewhere than the one that was planned for, or M
-    /// is singular ([`Model::singular_joints`]).
+    /// If an argument has the wrong length, M is singular ([`Model::singular_joints`]), or `model` has joints or frames
+    /// at other placements than the model of the plan.
     #[track_caller]
     pub fn aba<R: Constant<S>>(&mut self, model: &Model<R>, q: &[S], v: &[S], tau: &[S], f_ext: &[Force<S>]) -> &[S] {
         let (bodies, planned) = (model.nodes().len(), self.bodies.len() + 1);
@@ -128,12 +129,12 @@ impl<S: Scalar> DivideConquer<S> {
         check_forces(f_ext.len(), bodies);
         let l = Single::<S, R>::new(model);
         self.qdd.copy_from_slice(tau);
-        subtract_armature_bias(model, v, &mut self.qdd); // efforts, until the accelerations take their place
+        subtract_armature_bias(model, v, &mut self.qdd); // holds efforts now, accelerations at the end
         let mut dofs = self.dofs.iter_mut();
         for link in &self.assembly.links {
             let node = &model.nodes()[link.body];
             for (k, dof) in dofs.by_ref().take(node.joint.nv()).enumerate() {
-                let leads = node.mimic.is_none(); // efforts and armature of a shared coordinate act at its leader
+                let leads = node.mimic.is_none(); // efforts and armature of a shared coordinate belong to its leader
                 dof.tau = if leads { self.qdd[node.idx_v + k] } else { S::zero() };
                 dof.rotor = if leads { l.armature(link.body, k) } else { S::zero() };
             }
@@ -158,19 +159,19 @@ impl<S: Scalar> DivideConquer<S> {
     }
 }
 
-/// The arguments of a call.
+/// Arguments of a call.
 struct Job<'d, L: Layout> {
     l: &'d L,
     q: &'d [L::S],
     qd: &'d [L::S],
     f_ext: &'d [Force<L::S>],
-    /// The acceleration of the world.
+    /// Acceleration of the world.
     world: Motion<L::S>,
     parallel: bool,
 }
 
 impl<L: Layout + Sync> Job<'_, L> {
-    /// The whole algorithm, for degrees of freedom that know their efforts and armature.
+    /// Runs the whole algorithm. The degrees of freedom must have their efforts and armature.
     fn run(&self, mut all: Part<'_, L::S>, ties: &mut Ties<L::S>, zero: &[L::S]) {
         ties.add_rotors(all.dofs);
         self.passes(all.again());
@@ -191,7 +192,7 @@ impl<L: Layout + Sync> Job<'_, L> {
         ties.solve(all.dofs);
     }
 
-    /// The accelerations of all degrees of freedom, each on its own.
+    /// Computes the accelerations of all degrees of freedom as if all joints were free.
     fn passes(&self, mut all: Part<'_, L::S>) {
         if all.pieces.is_empty() {
             return;
@@ -201,7 +202,7 @@ impl<L: Layout + Sync> Job<'_, L> {
         self.accelerate(all, self.world, None);
     }
 
-    /// Two halves of the work, at the same time if there are threads for it.
+    /// Runs two halves of the work, concurrently if threads are available.
     #[inline(always)]
     fn both(&self, one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
         if self.parallel {
@@ -212,7 +213,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Places bodies relative to their parents, and the last body of an open piece relative to the one above the piece.
+    /// Computes the placements of bodies relative to their parents. For an open piece, also computes the placement of
+    /// its last body relative to the body above the piece.
     fn relate(&self, part: Part<'_, L::S>) {
         let (piece, rest) = part.open();
         let (handle, open) = (piece.handle, piece.open);
@@ -247,8 +249,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Places a piece in the world, given the pose and velocity of the body on which it hangs, and reduces it to its
-    /// handles.
+    /// Computes the placements of a piece in the world and reduces the piece to its handles. The pose and velocity of
+    /// the body to which it is attached are given.
     fn assemble(&self, part: Part<'_, L::S>, oX: Se3<L::S>, v: Motion<L::S>) {
         let (piece, mut rest) = part.open();
         let handle = piece.handle;
@@ -284,8 +286,8 @@ impl<L: Layout + Sync> Job<'_, L> {
             Kind::Join => {
                 let (mut upper, mut lower) = rest.split();
                 let ArticulatedPair { X, w, .. } = &upper.handles[0];
-                let (oX2, v2) = (oX * *X, v + oX.act(*w)); // of the last body of the upper piece
-                let v2 = Se3::new(Mat3::identity(), oX2.translation).act_inv(v2); // seen from its origin
+                let (oX2, v2) = (oX * *X, v + oX.act(*w)); // last body of the upper piece
+                let v2 = Se3::new(Mat3::identity(), oX2.translation).act_inv(v2); // about its origin
                 let oX2 = Se3::new(oX2.rotation, Vec3::zero());
                 self.both(|| self.assemble(upper.again(), oX, v), || self.assemble(lower.again(), oX2, v2));
                 handle.join(&upper.handles[0], &lower.handles[0], piece.open);
@@ -299,7 +301,7 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Pose, velocity, inertia and bias force of a body whose parent has pose oX and velocity v.
+    /// Computes pose, velocity, inertia and bias force of a body whose parent has pose oX and velocity v.
     #[inline(always)]
     fn place(&self, link: Link, body: &mut Body<L::S>, dofs: &mut [Dof<L::S>], oX: Se3<L::S>, v: Motion<L::S>) {
         let (l, i) = (self.l, link.body);
@@ -319,7 +321,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         }
     }
 
-    /// Iᵃ and pᵃ of a body, with its joint eliminated; on the spine, from what the handles feel of each other, too.
+    /// Eliminates the joint of a body and returns Iᵃ and pᵃ. On the spine, also updates the relation between the
+    /// handles.
     #[inline(always)]
     fn eliminate(
         &self,
@@ -347,7 +350,8 @@ impl<L: Layout + Sync> Job<'_, L> {
         (Ia, pa + Ia * body.c) // pᵃ = pᴬ + Iᵃ c + U D⁻¹ u
     }
 
-    /// Accelerations within a piece, given that of the body on which it hangs, and the force on its last body.
+    /// Computes the accelerations within a piece from the acceleration of the body above it and the force on its last
+    /// body.
     fn accelerate(&self, part: Part<'_, L::S>, a: Motion<L::S>, f: Option<Force<L::S>>) {
         let l = self.l;
         let (piece, rest) = part.open();

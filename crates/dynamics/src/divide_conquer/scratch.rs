@@ -1,11 +1,11 @@
-//! The scratch of the divide-and-conquer algorithm, in the order of the assembly, so that a piece is a slice of it and two
-//! pieces are two slices, which two threads may have.
+//! Scratch of the divide-and-conquer algorithm, in the order of the assembly. So a piece is a slice of the scratch, and
+//! two pieces are two slices, which two threads can use.
 
 use crate::divide_conquer::articulated_pair::ArticulatedPair;
 use crate::divide_conquer::assembly::{Kind, Link, Piece};
 use condyle_spatial::{ArticulatedInertia, Force, Motion, Se3};
 
-/// The quantities of a body; along the world's axes, at the origin of the piece.
+/// Quantities of a body, along the world's axes, at the origin of the piece.
 #[derive(Clone, Debug)]
 pub(crate) struct Body<S> {
     /// λXi. Written by: `relate`.
@@ -16,22 +16,23 @@ pub(crate) struct Body<S> {
     pub v: Motion<S>,
     /// v × v_J. Written by: `place`.
     pub c: Motion<S>,
-    /// Iᴬ. Written by: `place` and its children.
+    /// Iᴬ. Written by: `place`, and while its children are eliminated.
     pub IA: ArticulatedInertia<S>,
-    /// pᴬ. Written by: `place` and its children.
+    /// pᴬ. Written by: `place`, and while its children are eliminated.
     pub pA: Force<S>,
     /// Acceleration. Written by: `accelerate`.
     pub a: Motion<S>,
 }
 
-/// The quantities of a degree of freedom; along the world's axes, at the origin of the piece.
+/// Quantities of a degree of freedom, along the world's axes, at the origin of the piece.
 #[derive(Clone, Debug)]
 pub(crate) struct Dof<S> {
     /// Effort. Written by: `aba` and `run`.
     pub tau: S,
-    /// Armature, and in a robot whose joints were set free the rotor of `mimic.rs`. Written by: `aba` and `add_rotors`.
+    /// Armature; in a robot whose joints are treated as free, plus the rotor of `mimic.rs`. Written by: `aba` and
+    /// `add_rotors`.
     pub rotor: S,
-    /// Written by: `place`.
+    /// S. Written by: `place`.
     pub S: Motion<S>,
     /// U = Iᴬ S. Written by: `eliminate`.
     pub U: Force<S>,
@@ -43,7 +44,7 @@ pub(crate) struct Dof<S> {
     pub qdd: S,
 }
 
-/// A piece with all of which it is made.
+/// Piece with all pieces of which it consists.
 pub(crate) struct Part<'d, S> {
     pub pieces: &'d [Piece],
     pub links: &'d [Link],
@@ -53,14 +54,14 @@ pub(crate) struct Part<'d, S> {
 }
 
 impl<'d, S> Part<'d, S> {
-    /// A second borrow of the same memory, for a shorter time.
+    /// Borrows the same memory again, for a shorter time.
     #[inline(always)]
     pub(crate) fn again(&mut self) -> Part<'_, S> {
         let Self { pieces, links, bodies, dofs, handles } = self;
         Part { pieces, links, bodies, dofs, handles }
     }
 
-    /// The piece itself, and all of which it is made.
+    /// Returns the piece itself, and all pieces of which it consists.
     #[inline(always)]
     pub(crate) fn open(self) -> (Own<'d, S>, Self) {
         let Piece { kind, open, .. } = self.pieces[0];
@@ -75,7 +76,7 @@ impl<'d, S> Part<'d, S> {
         (own, Self { pieces: &self.pieces[1..], links: &self.links[n..], bodies: bodies.1, dofs: dofs.1, handles })
     }
 
-    /// The first of some pieces with all of which it is made, and the others.
+    /// Splits off the first piece, with all pieces of which it consists, from the other pieces.
     #[inline(always)]
     pub(crate) fn split(self) -> (Self, Self) {
         let Piece { links: n, dofs, pieces, .. } = self.pieces[0];
@@ -89,7 +90,7 @@ impl<'d, S> Part<'d, S> {
     }
 }
 
-/// A piece, without those of which it is made.
+/// Piece without the pieces of which it consists.
 pub(crate) struct Own<'d, S> {
     pub kind: Kind,
     pub open: bool,

@@ -1,10 +1,10 @@
 //! Forward dynamics by the articulated-body algorithm.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1; in the world's frame, where children are
-//! added to their parent without a change of coordinates. A joint of several degrees of freedom is a chain of joints
-//! of one, between bodies without mass: its columns are eliminated one after the other, the last one first, and no
-//! matrix is inverted. What the next body waits for, Sᵀ U on the way to the root and Uᵀ a' on the way back, is summed in
-//! two halves side by side.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. Everything is in the world's frame, so
+//! children are added to their parent without a change of coordinates. A joint of several degrees of freedom is treated
+//! as a chain of joints of one, between massless bodies. Its columns are eliminated one by one, the last one first, so
+//! no matrix is inverted. The critical dot products, Sᵀ U towards the root and Uᵀ a' on the way back, are summed in two
+//! independent halves.
 
 use crate::passes::kinematics::World;
 use crate::workspace::{filled, workspace};
@@ -14,7 +14,7 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, ArticulatedInertia, Cross, Force, Motion, Scalar, Vec3};
 
 workspace! {
-    /// In the world's frame.
+    /// Quantities in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Articulated inertia. Written by: `factorize`, `inward`.
         pub IA: Array<ArticulatedInertia<S>> = filled(ArticulatedInertia::zero, size.levels),
@@ -22,9 +22,9 @@ workspace! {
         pub U: Array<Force<S>> = filled(Force::zero, size.columns),
         /// 1/D, D = Sᵀ U + armature. Written by: `factorize`, `inward`.
         pub D_inv: Array<S> = filled(S::zero, size.columns),
-        /// Velocity; the world's stays 0. Written by: `inward`.
+        /// Velocity; the world's velocity stays 0. Written by: `inward`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.levels),
-        /// Acceleration, with gravity as the world's. Written by: `outward`.
+        /// Acceleration, including gravity as the world's acceleration. Written by: `outward`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.levels),
         /// v × v_J. Written by: `inward`.
         pub c: Array<Motion<S>> = filled(Motion::zero, size.bodies),
@@ -39,7 +39,7 @@ workspace! {
     }
 }
 
-/// Eliminates the degrees of freedom of joint i: of Iᴬ remains Iᵃ, what the parent feels.
+/// Eliminates the degrees of freedom of joint i. Returns Iᵃ, the part of Iᴬ that acts on the parent.
 #[inline(always)]
 fn eliminate<L: Layout>(
     l: &L,
@@ -61,7 +61,7 @@ fn eliminate<L: Layout>(
     Ia
 }
 
-/// U and D⁻¹ of all columns, which depend on q alone, for bodies that are placed.
+/// Computes U and D⁻¹ of all columns, which depend only on q, for bodies whose placements are known.
 #[inline(always)]
 pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IA, U, D_inv, .. } = d;
@@ -75,7 +75,7 @@ pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::
     }
 }
 
-/// The whole algorithm.
+/// Runs the whole algorithm.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
     l: &L,
@@ -89,7 +89,7 @@ pub(crate) fn pass<L: Layout>(
     outward(l, w, d);
 }
 
-/// The articulated inertia that each joint carries: down and up each branch in turn.
+/// Computes the articulated inertia and bias force of each joint, going down and up each branch in turn.
 #[inline(always)]
 pub(crate) fn inward<L: Layout>(
     l: &L,
@@ -109,7 +109,7 @@ pub(crate) fn inward<L: Layout>(
         }
         let vi = l.parent_on_stack(v, i) + vJ; // v_i = v_λ + v_J
         let here = l.stack_index(i);
-        v[here] = vi; // what is stored as soon as it is known needs no place on the stack
+        v[here] = vi; // stored immediately, so that it does not occupy the machine stack
         c[i] = vi.cross(vJ); // c_i = v_i × v_J
         let I = oX[i].act(l.inertia(i));
         IA[here] = ArticulatedInertia::from(I);
@@ -136,7 +136,7 @@ pub(crate) fn inward<L: Layout>(
     }
 }
 
-/// The accelerations: down once more.
+/// Computes the accelerations from the root to the tips.
 #[inline(always)]
 pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { U, D_inv, a, c, u, qdd, .. } = d;
@@ -158,14 +158,14 @@ pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>
 }
 
 kernel! {
-    /// Body by body, for bodies that are placed.
+    /// Runs the algorithm body by body, for bodies whose placements are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, v: &[S], tau: &[S], f_ext: &[Force<S>]) {
         pass(&Single::new(model), world, d, v, tau, f_ext);
     }
 }
 
 kernel! {
-    /// The factors alone, for bodies that are placed.
+    /// Computes only the factors, for bodies whose placements are known.
     pub(crate) fn factors<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         factorize(&Single::new(model), world, d);
     }

@@ -1,7 +1,7 @@
-//! All that the equations of motion are made of, from one pass to the tips and one back.
+//! All terms of the equations of motion, from one pass to the tips and one back.
 //!
-//! The composite-rigid-body algorithm, the centroidal map and its rate, and the nonlinear effects share placements,
-//! velocities, the bodies' inertias in the world's frame and the columns Iᶜ S.
+//! The composite-rigid-body algorithm, the centroidal map and its rate, and the nonlinear effects share four
+//! quantities: the placements, the velocities, the bodies' inertias in the world's frame, and the columns Iᶜ S.
 
 use crate::passes::answers::answers;
 use crate::passes::centroidal::{self, CentroidalMapRate};
@@ -18,24 +18,25 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// In the world's frame. The rest is in the workspaces of kinematics and centroidal map.
+    /// Quantities in the world's frame. The workspaces of kinematics and of the centroidal map hold the rest.
     pub(crate) struct Workspace<S>(size) {
-        /// Acceleration for q̈ = 0, with gravity as the world's. Written by: `pass`.
+        /// Acceleration for q̈ = 0, including gravity as the world's acceleration. Written by: `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Force through the joint for q̈ = 0. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Written by: `pass`.
+        /// M. Written by: `pass`.
         pub M: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `pass`.
+        /// h. Written by: `pass`.
         pub h: Array<S> = filled(S::zero, size.nv),
-        /// Twice that of the bodies, then the kinetic energy. Written by: `pass`, then by `run`.
+        /// Twice the kinetic energy of the bodies (`pass`), then the total kinetic energy (`run`). Written by: `pass`,
+        /// `run`.
         pub kinetic_energy: S = S::zero(),
-        /// Written by: `run`.
+        /// Potential energy. Written by: `run`.
         pub potential_energy: S = S::zero(),
     }
 }
 
-/// The whole algorithm, for bodies whose velocities are known.
+/// Runs the whole algorithm, for bodies whose velocities are known.
 #[inline(always)]
 fn pass<L: Pairs>(
     l: &L,
@@ -87,23 +88,23 @@ fn pass<L: Pairs>(
     l.add_armature(M);
 }
 
-/// The results of [`compute_all_terms`](crate::compute_all_terms()).
+/// Results of [`compute_all_terms`](crate::compute_all_terms()).
 #[derive(Clone, Copy, Debug)]
 pub struct AllTerms<'d, S, R = f64> {
     /// Placements and velocities of bodies and frames, and their Jacobians J and dJ/dt, on demand.
     pub kinematics: Velocities<'d, S, R>,
-    /// M(q), the full symmetric nv × nv matrix, as of [`crba`](crate::crba).
+    /// M(q), the full symmetric nv × nv matrix, as returned by [`crba`](crate::crba).
     pub M: &'d Matrix<S>,
-    /// h(q, v), nv numbers (N m, N), as of [`nonlinear_effects`](crate::nonlinear_effects).
+    /// h(q, v), nv numbers (N m, N), as returned by [`nonlinear_effects`](crate::nonlinear_effects).
     pub h: &'d [S],
-    /// Momentum, its map and the map's rate, centre of mass and its Jacobian, as of
+    /// Momentum, its map and the map's rate, centre of mass and its Jacobian, as returned by
     /// [`centroidal_map_rate`](crate::centroidal_map_rate).
     pub centroidal: CentroidalMapRate<'d, S>,
     /// T = ½ vᵀ M v (J).
     pub kinetic_energy: S,
     /// V = −m gᵀ c (J).
     pub potential_energy: S,
-    /// Accelerations of the bodies for q̈ = 0, with gravity as the world's.
+    /// Accelerations of the bodies for q̈ = 0, including gravity as the world's acceleration.
     pub(crate) a: &'d [Motion<S>],
 }
 
@@ -124,7 +125,7 @@ impl<'d> Rename<AllTerms<'d, Fused>> for AllTerms<'d, f64> {
 }
 
 impl<'d, S, R> AllTerms<'d, S, R> {
-    /// The robot.
+    /// Returns the robot.
     #[inline(always)]
     fn robot(&self) -> &'d Model<R> {
         self.kinematics.placements.model
@@ -132,8 +133,9 @@ impl<'d, S, R> AllTerms<'d, S, R> {
 }
 
 answers! {
-    /// J̇ v of a frame along the world's axes: p̈ of its origin and ω̇ where q̈ = 0 (m/s², rad/s²), in O(1). With J of
-    /// [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's classical acceleration.
+    /// Returns the drift J̇ v of a frame along the world's axes, in O(1): p̈ of its origin and ω̇ at q̈ = 0 (m/s²,
+    /// rad/s²). With J of [`LocalWorldAligned`](ReferenceFrame::LocalWorldAligned), J q̈ + J̇ v is the frame's
+    /// classical acceleration.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, compute_all_terms, forward_accelerations, robots};
@@ -158,7 +160,7 @@ answers! {
 }
 
 kernel! {
-    /// For bodies whose velocities are known.
+    /// Runs the algorithm for bodies whose velocities are known.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &World<S>,

@@ -1,12 +1,13 @@
-//! What can be asked of bodies that are placed, with answers of a few numbers.
+//! Queries on bodies whose placements are known, with answers of a few numbers.
 //!
-//! A single `f64` is computed where kernels are, with the products that are fused there, so that the bits are those of a
-//! state in lanes. On other scalars the answer is computed in place: kernels ask on theirs.
+//! For a single `f64`, the answer is computed in a kernel with the kernel's fused products. So it has the same bits as
+//! a state in lanes. For other scalars, the answer is computed directly, because such queries already run inside
+//! kernels.
 
-/// A number.
+/// One number.
 pub(crate) type Number<S> = S;
 
-/// Methods of [`Placements`](crate::Placements) and its like: each is a function of the value that the method is asked of.
+/// Defines methods of [`Placements`](crate::Placements) and similar types. Each method is a function of its receiver.
 macro_rules! answers {
     ($(
         $(#[$doc:meta])*
@@ -38,7 +39,7 @@ macro_rules! answers {
             }
         }
     )*};
-    // a body or a frame that does not exist is reported where the question is asked
+    // An invalid body or frame index is reported at the caller's line.
     (@check $of:ident, body $body:ident) => {
         $crate::passes::frames::check_body($of.robot(), $body)
     };

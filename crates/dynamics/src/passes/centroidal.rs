@@ -1,7 +1,8 @@
-//! The momentum of the whole robot about its centre of mass, and the matrices that give it.
+//! Momentum of the whole robot about its centre of mass, and the matrices that map velocities to it.
 //!
-//! About the world's origin the momentum is Σ I_i v_i = Σ Iᶜ_k S_k q̇_k, where Iᶜ_k is the inertia of all that joint k
-//! carries: column k of the map is Iᶜ S, and its rate is İᶜ S + Iᶜ Ṡ. Then all is shifted to the centre of mass.
+//! About the world's origin the momentum is Σ I_i v_i = Σ Iᶜ_k S_k q̇_k, where Iᶜ_k is the inertia of all bodies that
+//! joint k carries. So column k of the map is Iᶜ S, and its rate is İᶜ S + Iᶜ Ṡ. Finally everything is shifted to the
+//! centre of mass.
 //!
 //! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved computation
 //! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
@@ -18,29 +19,29 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Scalar, Se3, Vec3};
 
 workspace! {
-    /// In the world's frame, but for what is said to be about the centre of mass.
+    /// Quantities in the world's frame about its origin, unless they are marked "about the centre of mass".
     pub(crate) struct Workspace<S>(size) {
-        /// Iᶜ; of the world, that of all bodies that move. Written by: `map`, `map_rate`, all terms.
+        /// Iᶜ; at index 0 the sum over all moving bodies. Written by: `map`, `map_rate`, all terms.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// Iᶜ v and İᶜ, likewise. Written by: `map_rate`, all terms.
+        /// Iᶜ v and İᶜ; at index 0 the sum over all moving bodies. Written by: `map_rate`, all terms.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
         /// Iᶜ S. Written by: `map`, `map_rate`, all terms.
         pub F: Array<Force<S>> = filled(Force::zero, size.columns),
         /// İᶜ S + Iᶜ Ṡ. Written by: `map_rate`, all terms.
         pub dF: Array<Force<S>> = filled(Force::zero, size.columns),
-        /// About the centre of mass. Written by: `shift_map`.
+        /// Ag about the centre of mass. Written by: `shift_map`.
         pub Ag: Matrix<S> = zero_matrix(6, size.nv),
-        /// About the centre of mass. Written by: `shift_rate`.
+        /// dAg/dt about the centre of mass. Written by: `shift_rate`.
         pub dAg: Matrix<S> = zero_matrix(6, size.nv),
-        /// Written by: `shift_map`.
+        /// Jacobian of the centre of mass. Written by: `shift_map`.
         pub Jcom: Matrix<S> = zero_matrix(3, size.nv),
-        /// Written by: `shift_map`, `shift_rate`.
+        /// Quantities of the whole robot. Written by: `shift_map`, `shift_rate`.
         pub whole: Whole<S> = Whole::new(size),
     }
 }
 
 workspace! {
-    /// The robot as if it were one body: of which its rate has the last two alone.
+    /// Quantities of the robot as if it were one body. The last two are written only with the map's rate.
     pub(crate) struct Whole<S>(_size) {
         pub Ig: Inertia<S> = Inertia::zero(),
         pub com: Vec3<S> = Vec3::zero(),
@@ -50,20 +51,20 @@ workspace! {
 }
 
 impl<S: Scalar> Workspace<S> {
-    /// What `run_map` has left.
+    /// Returns the results of `run_map`.
     pub(crate) fn map(&self) -> CentroidalMap<'_, S> {
         let Self { Ag, Jcom, whole: Whole { Ig, com, .. }, .. } = self;
         CentroidalMap { Ag, Ig: *Ig, com: *com, Jcom }
     }
 
-    /// What `run_map_rate` has left.
+    /// Returns the results of `run_map_rate`.
     pub(crate) fn map_rate(&self) -> CentroidalMapRate<'_, S> {
         let Self { Ag, dAg, Jcom, whole: Whole { Ig, com, hg, com_velocity }, .. } = self;
         CentroidalMapRate { Ag, dAg, hg: *hg, Ig: *Ig, com: *com, com_velocity: *com_velocity, Jcom }
     }
 }
 
-/// Iᶜ S of all columns, for bodies that are placed.
+/// Computes Iᶜ S of all columns, for bodies whose placements are known.
 #[inline(always)]
 fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, F, .. } = d;
@@ -81,7 +82,7 @@ fn map<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
     }
 }
 
-/// Iᶜ S and its rate of all columns, for bodies whose velocities are known.
+/// Computes Iᶜ S and its rate for all columns, for bodies whose velocities are known.
 #[inline(always)]
 fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, BC, F, dF, .. } = d;
@@ -103,7 +104,7 @@ fn map_rate<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S
     }
 }
 
-/// Adds a column to the coordinate that it follows.
+/// Adds a column to the column of the coordinate that drives it.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut Matrix<S>, c: usize, f: Force<S>) {
     let column = &model.columns()[c];
@@ -113,7 +114,7 @@ pub(crate) fn add<S: Scalar, R>(model: &Model<R>, matrix: &mut Matrix<S>, c: usi
     }
 }
 
-/// f about the point c: [f; n − c × f].
+/// Returns f about the point c: [f; n − c × f].
 #[inline(always)]
 pub(crate) fn about<S: Scalar>(c: Vec3<S>, f: Force<S>) -> Force<S> {
     Force::new(f.linear, f.angular - c.cross(f.linear))
@@ -135,7 +136,7 @@ fn shift_map<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
         }
     }
     let Ig = Se3::new(condyle_spatial::Mat3::identity(), -com).act(I);
-    d.whole.Ig = Inertia { mass_com: Vec3::zero(), ..Ig }; // zero but for rounding
+    d.whole.Ig = Inertia { mass_com: Vec3::zero(), ..Ig }; // zero up to rounding
     d.whole.com = com;
 }
 
@@ -156,35 +157,35 @@ pub(crate) fn shift_rate<S: Scalar, R>(model: &Model<R>, d: &mut Workspace<S>) {
     d.whole.com_velocity = com_velocity;
 }
 
-/// The part of hg = Ag(q) v that depends on the position. The axes are the world's.
+/// Centroidal map and the other parts of hg = Ag(q) v that depend on the position only. The axes are the world's.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalMap<'d, S> {
-    /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
+    /// Centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
     pub Ag: &'d Matrix<S>,
-    /// The inertia of all moving bodies about their centre of mass, as if they were one.
+    /// Inertia of all moving bodies about their centre of mass, as if they were one body.
     pub Ig: Inertia<S>,
     /// c, the centre of mass in the world's frame (m).
     pub com: Vec3<S>,
-    /// The Jacobian of c, 3 × nv: ċ = Jcom v.
+    /// Jacobian of c, 3 × nv: ċ = Jcom v.
     pub Jcom: &'d Matrix<S>,
 }
 
-/// hg = Ag(q) v, and what its rate dhg = Ag a + dAg v depends on. The axes are the world's.
+/// Centroidal momentum hg = Ag(q) v, and the terms of its rate dhg = Ag a + dAg v. The axes are the world's.
 #[derive(Clone, Copy, Debug)]
 pub struct CentroidalMapRate<'d, S> {
-    /// The centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
+    /// Centroidal momentum matrix, 6 × nv, linear rows first: hg = Ag v.
     pub Ag: &'d Matrix<S>,
     /// dAg/dt, 6 × nv, along the velocity v.
     pub dAg: &'d Matrix<S>,
-    /// The momentum about the centre of mass (kg m/s, kg m²/s).
+    /// Momentum about the centre of mass (kg m/s, kg m²/s).
     pub hg: Force<S>,
-    /// The inertia of all moving bodies about their centre of mass, as if they were one.
+    /// Inertia of all moving bodies about their centre of mass, as if they were one body.
     pub Ig: Inertia<S>,
     /// c, the centre of mass in the world's frame (m).
     pub com: Vec3<S>,
-    /// ċ, its velocity (m/s).
+    /// ċ, the velocity of the centre of mass (m/s).
     pub com_velocity: Vec3<S>,
-    /// The Jacobian of c, 3 × nv: ċ = Jcom v.
+    /// Jacobian of c, 3 × nv: ċ = Jcom v.
     pub Jcom: &'d Matrix<S>,
 }
 
@@ -205,7 +206,7 @@ impl<'d> Rename<CentroidalMapRate<'d, Fused>> for CentroidalMapRate<'d, f64> {
 }
 
 kernel! {
-    /// For bodies that are placed.
+    /// Computes the map, for bodies whose placements are known.
     pub(crate) fn run_map<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         map(&Single::new(model), world, d);
         shift_map(model, d);
@@ -213,7 +214,7 @@ kernel! {
 }
 
 kernel! {
-    /// For bodies whose velocities are known.
+    /// Computes the map and its rate, for bodies whose velocities are known.
     pub(crate) fn run_map_rate<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         map_rate(&Single::new(model), world, moving, d);
         shift_rate(model, d);
@@ -221,10 +222,10 @@ kernel! {
 }
 
 answers! {
-    /// hg = Σ I_i v_i, the momentum of the moving bodies about their centre of mass, along the world's axes (kg m/s,
-    /// kg m²/s), in O(n).
+    /// Returns hg = Σ I_i v_i, the momentum of the moving bodies about their centre of mass, along the world's axes (kg
+    /// m/s, kg m²/s), in O(n).
     ///
-    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    /// Returns NaN if no moving body has mass. Allocates nothing.
     fn centroidal_momentum(of: Velocities) -> Force = Force::zero(); {
         let l = Single::<S, R>::new(of.model);
         let mut momentum = Force::zero();
@@ -235,10 +236,10 @@ answers! {
         about(of.com(), momentum)
     }
 
-    /// dhg = Σ I_i a_i + v_i ×* I_i v_i, the rate of the centroidal momentum, along the world's axes (N, N m), in O(n):
-    /// the weight and the external forces, about the centre of mass.
+    /// Returns dhg = Σ (I_i a_i + v_i ×* I_i v_i), the rate of the centroidal momentum, along the world's axes (N, N
+    /// m), in O(n). It equals the sum of weight and external forces about the centre of mass.
     ///
-    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    /// Returns NaN if no moving body has mass. Allocates nothing.
     fn centroidal_momentum_rate(of: Accelerations) -> Force = Force::zero(); {
         let l = Single::<S, R>::new(of.model);
         let mut rate = Force::zero();

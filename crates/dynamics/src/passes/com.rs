@@ -1,12 +1,12 @@
-//! The centre of mass and how it moves: sums over the moving bodies.
+//! Centre of mass and its motion, as sums over the moving bodies.
 //!
-//! In the world's frame, with the mass m of a body and its first moment h = m c, from the world's origin,
+//! In the world's frame, a body has mass m and first moment h = m c about the world's origin:
 //!
 //! ```text
 //! m ċ = m v + ω × h     m c̈ = m a + α × h + ω × (m v + ω × h)
 //! ```
 //!
-//! where (v, ω) and (a, α) are its spatial velocity and acceleration. What is fixed to the world does not count. The
+//! where (v, ω) and (a, α) are its spatial velocity and acceleration. Bodies fixed to the world are ignored. The
 //! Jacobian is part of [`centroidal_map`](crate::centroidal_map).
 
 use crate::passes::answers::answers;
@@ -15,14 +15,14 @@ use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Constant, Scalar, Vec3};
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
-    /// m and h = m c of a body, from the world's origin.
+    /// Returns m and h = m c of a body, about the world's origin.
     #[inline(always)]
     fn first_moment(&self, l: &Single<'_, S, R>, i: usize) -> (S, Vec3<S>) {
         let (I, oX) = (l.inertia(i), &self.world.oX[i]);
         (I.mass, oX.translation.scale_add(I.mass, oX.rotation * I.mass_com))
     }
 
-    /// Σ m and Σ m c over the moving bodies.
+    /// Returns Σ m and Σ m c over the moving bodies.
     #[inline(always)]
     pub(crate) fn mass_and_moment(&self) -> (S, Vec3<S>) {
         let l = Single::<S, R>::new(self.model);
@@ -37,9 +37,9 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
 }
 
 answers! {
-    /// c = Σ m_i c_i / Σ m_i, the centre of mass of the moving bodies in the world's frame (m), in O(n).
+    /// Returns c = Σ m_i c_i / Σ m_i, the centre of mass of the moving bodies in the world's frame (m), in O(n).
     ///
-    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    /// Returns NaN if no moving body has mass. Allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{Data, forward_kinematics, neutral, robots};
@@ -53,9 +53,9 @@ answers! {
         moment.scale(mass.recip())
     }
 
-    /// ċ, the velocity of the centre of mass of the moving bodies in the world's frame (m/s), in O(n).
+    /// Returns ċ, the velocity of the centre of mass of the moving bodies in the world's frame (m/s), in O(n).
     ///
-    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    /// Returns NaN if no moving body has mass. Allocates nothing.
     fn com_velocity(of: Velocities) -> Vec3 = Vec3::zero(); {
         let l = Single::<S, R>::new(of.model);
         let (mut mass, mut momentum) = (S::zero(), Vec3::zero());
@@ -67,10 +67,10 @@ answers! {
         momentum.scale(mass.recip())
     }
 
-    /// c̈, the acceleration of the centre of mass of the moving bodies in the world's frame (m/s²), without gravity, in
-    /// O(n).
+    /// Returns c̈, the acceleration of the centre of mass of the moving bodies in the world's frame (m/s²), without
+    /// gravity, in O(n).
     ///
-    /// Not a number if nothing that moves has a mass. Allocates nothing.
+    /// Returns NaN if no moving body has mass. Allocates nothing.
     fn com_acceleration(of: Accelerations) -> Vec3 = Vec3::zero(); {
         let l = Single::<S, R>::new(of.model);
         let (mut mass, mut force) = (S::zero(), Vec3::zero());

@@ -1,15 +1,16 @@
-//! The Coriolis matrix.
+//! Coriolis matrix.
 //!
 //! Source: Echeandia and Wensing, *Numerical methods to compute the Coriolis matrix and Christoffel symbols for
-//! rigid-body systems* (2021), algorithm 1, in the world's frame. With Iᶜ and Bᶜ of all that the joint of column d
-//! carries (2B m = v ×* I m − I (v × m) + m ×* I v), and e a column before it or of the same joint,
+//! rigid-body systems* (2021), algorithm 1, in the world's frame. Let Iᶜ and Bᶜ sum over all bodies that the joint of
+//! column d carries, with 2B m = v ×* I m − I (v × m) + m ×* I v. Let e be an earlier column on the path to the root,
+//! or one of the same joint. Then
 //!
 //! ```text
 //! C_de = S_dᵀ (Iᶜ Ṡ_e + Bᶜ S_e)     C_ed = S_eᵀ (Iᶜ Ṡ_d + Bᶜ S_d)
 //! ```
 //!
-//! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 numbers other than zero, given by the momentum
-//! (p, l) = I v and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
+//! As B + Bᵀ is the rate of a body's inertia, Ṁ = C + Cᵀ. 2B has 9 nonzero numbers, given by the momentum (p, l) = I v
+//! and the rate Σ of the rotational inertia: 2B m = [2 m_ω × p; Σ m_ω + m_ω × l].
 
 use crate::passes::free_armature;
 use crate::passes::kinematics::{Moving, World};
@@ -19,7 +20,7 @@ use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Force, Inertia, Matrix, Motion, Scalar, Sym3, Vec3, alike};
 
-/// The matrix 2B of a body or of all that a joint carries.
+/// Matrix 2B of a body, or summed over all bodies that a joint carries.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub(crate) struct Coriolis<S> {
@@ -40,12 +41,12 @@ impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
 }
 
 impl<S: Scalar> Coriolis<S> {
-    /// The terms of a body at rest.
+    /// Returns the terms of a body at rest.
     pub(crate) fn zero() -> Self {
         Self { momentum: Force::zero(), rate: Sym3::zero() }
     }
 
-    /// The terms of a moving body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
+    /// Returns the terms of a moving body: Σ = [ω]ₓĪ + ([ω]ₓĪ)ᵀ + 2 (v·h) 1 − h vᵀ − v hᵀ.
     #[inline(always)]
     pub(crate) fn of(I: Inertia<S>, v: Motion<S>) -> Self {
         let turning = v.angular.skew() * I.rotational.full();
@@ -57,7 +58,7 @@ impl<S: Scalar> Coriolis<S> {
         Self { momentum: I * v, rate }
     }
 
-    /// 2B m.
+    /// Returns 2B m.
     #[inline(always)]
     pub(crate) fn apply(self, m: Motion<S>) -> Force<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
@@ -67,14 +68,15 @@ impl<S: Scalar> Coriolis<S> {
         }
     }
 
-    /// 2Bᵀ m, of which only the angular part is not zero.
+    /// Returns the angular part of 2Bᵀ m; the linear part is zero.
     #[inline(always)]
     pub(crate) fn apply_transpose(self, m: Motion<S>) -> Vec3<S> {
         let (p, l) = (self.momentum.linear, self.momentum.angular);
         self.rate.mul_add(m.angular, l.cross_add(m.angular, p.cross(m.linear).scale(S::splat(2.0))))
     }
 
-    /// The rate of the inertia, İ m = v ×* I m − I (v × m): of the mass 0, of m c the linear momentum.
+    /// Returns the rate of the inertia, İ m = v ×* I m − I (v × m). Its mass is 0 and its first moment is the linear
+    /// momentum.
     #[inline(always)]
     pub(crate) fn inertia_rate(self) -> Inertia<S> {
         Inertia { mass: S::zero(), mass_com: self.momentum.linear, rotational: self.rate }
@@ -82,18 +84,18 @@ impl<S: Scalar> Coriolis<S> {
 }
 
 workspace! {
-    /// In the world's frame.
+    /// Quantities in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Iᶜ. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
         /// 2Bᶜ. Written by: `pass`.
         pub BC: Array<Coriolis<S>> = filled(Coriolis::zero, size.bodies),
-        /// Written by: `pass`.
+        /// C. Written by: `pass`.
         pub C: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// The whole algorithm, for bodies whose velocities are known.
+/// Runs the whole algorithm, for bodies whose velocities are known.
 #[inline(always)]
 fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let (S, dS, half) = (&w.S, &m.dS, L::S::splat(0.5));
@@ -131,7 +133,7 @@ fn pass<L: Pairs>(l: &L, w: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    /// For bodies whose velocities are known.
+    /// Computes C, for bodies whose velocities are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         pass(&Single::new(model), world, moving, d);
         free_armature::add_coriolis(model, &moving.qd, d.C.as_mut_slice());

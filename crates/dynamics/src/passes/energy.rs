@@ -10,8 +10,8 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Constant, Cross, Force, Inertia, Motion, Scalar};
 
 answers! {
-    /// V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), 0 at the world's
-    /// origin, in O(n).
+    /// Returns V = −Σ m_i gᵀ c_i, the potential energy of the moving bodies under the model's gravity (J), in O(n). Its
+    /// zero is at the world's origin.
     ///
     /// Allocates nothing.
     fn potential_energy(of: Placements) -> Number = S::zero(); {
@@ -19,8 +19,8 @@ answers! {
         Single::<S, R>::new(of.model).minus_gravity().dot(moment) // −gᵀ Σ m c
     }
 
-    /// T = ½ Σ v_iᵀ I_i v_i + ½ Σ armature q̇², the kinetic energy of the moving bodies and the rotors (J), in O(n). It
-    /// is ½ q̇ᵀ M q̇.
+    /// Returns T = ½ Σ v_iᵀ I_i v_i + ½ Σ armature q̇² = ½ q̇ᵀ M q̇, the kinetic energy of the moving bodies and the
+    /// rotors (J), in O(n).
     ///
     /// Allocates nothing.
     ///
@@ -37,13 +37,14 @@ answers! {
         let l = Single::<S, R>::new(of.model);
         let mut twice = rotors(of.model, &of.moving.qd);
         for i in l.bodies() {
-            let v = of.world.oX[i].act_inv(of.moving.v[i]); // in the body
+            let v = of.world.oX[i].act_inv(of.moving.v[i]); // in the body's frame
             twice += v.dot(l.inertia(i) * v);
         }
         twice * S::splat(0.5)
     }
 
-    /// E = T + V, the mechanical energy (J), in O(n): its rate is the power of the efforts and the external forces.
+    /// Returns E = T + V, the mechanical energy (J), in O(n). Its rate is the power of the efforts and the external
+    /// forces.
     ///
     /// Allocates nothing.
     fn mechanical_energy(of: Velocities) -> Number = S::zero(); {
@@ -51,7 +52,7 @@ answers! {
     }
 }
 
-/// Σ armature q̇², twice the kinetic energy of the rotors.
+/// Returns Σ armature q̇², twice the kinetic energy of the rotors.
 #[inline(always)]
 pub(crate) fn rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]) -> S {
     let mut twice = S::zero();
@@ -62,17 +63,17 @@ pub(crate) fn rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]) -> S
 }
 
 workspace! {
-    /// In the world's frame.
+    /// Quantities in the world's frame.
     pub(crate) struct Workspace<S>(size) {
-        /// Inertia of all that a joint carries. Written by: `derivatives`.
+        /// Inertia of all bodies that a joint carries. Written by: `derivatives`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// Momentum of all that a joint carries. Written by: `derivatives`.
+        /// Momentum of all bodies that a joint carries. Written by: `derivatives`.
         pub h: Array<Force<S>> = filled(Force::zero, size.bodies),
-        /// Written by: `derivatives`.
+        /// ∂T/∂q. Written by: `derivatives`.
         pub dT_dq: Array<S> = filled(S::zero, size.nv),
-        /// Written by: `derivatives`.
+        /// ∂T/∂v. Written by: `derivatives`.
         pub dT_dv: Array<S> = filled(S::zero, size.nv),
-        /// Written by: `derivatives`.
+        /// ∂V/∂q. Written by: `derivatives`.
         pub dV_dq: Array<S> = filled(S::zero, size.nv),
     }
 }
@@ -84,7 +85,7 @@ impl<S> Workspace<S> {
     }
 }
 
-/// The derivatives, for bodies whose velocities are known.
+/// Computes the derivatives, for bodies whose velocities are known.
 #[inline(always)]
 fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L::S>, d: &mut Workspace<L::S>) {
     let Workspace { IC, h, dT_dq, dT_dv, dV_dq } = d;
@@ -111,19 +112,19 @@ fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L
     l.add_armature_torque(&m.qd, dT_dv);
 }
 
-/// The derivatives of the energies, nv numbers each.
+/// Derivatives of the energies, nv numbers each.
 #[derive(Clone, Copy, Debug)]
 pub struct EnergyDerivatives<'d, S> {
-    /// ∂T/∂q of the kinetic energy.
+    /// ∂T/∂q, with T the kinetic energy.
     pub dT_dq: &'d [S],
     /// ∂T/∂v = M v, the generalised momentum.
     pub dT_dv: &'d [S],
-    /// ∂V/∂q = g(q) of the potential energy.
+    /// ∂V/∂q = g(q), with V the potential energy.
     pub dV_dq: &'d [S],
 }
 
 kernel! {
-    /// For bodies whose velocities are known.
+    /// Computes the derivatives, for bodies whose velocities are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         derivatives(&Single::new(model), world, moving, d);
     }

@@ -1,4 +1,4 @@
-//! Forward dynamics by the method that is fastest for the model.
+//! Forward dynamics with a factor of M, and the choice of the method.
 
 use crate::selection::SHORT_CHAIN;
 use crate::workspace::{filled, workspace};
@@ -9,32 +9,32 @@ use condyle_model::Model;
 use condyle_spatial::kernel;
 use condyle_spatial::{Array, Matrix, Scalar};
 
-/// A way to compute forward dynamics. All give the same numbers, up to rounding.
+/// Method of forward dynamics. All methods give the same numbers, up to rounding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ForwardDynamicsMethod {
-    /// The articulated-body algorithm, O(n).
+    /// Articulated-body algorithm, O(n).
     ArticulatedBody,
-    /// M q̈ = τ − h with the dense factor [`Cholesky`], O(n³).
+    /// Solution of M q̈ = τ − h with the dense factor [`Cholesky`], O(n³).
     Dense,
-    /// M q̈ = τ − h with the sparse factor [`Ltdl`], O(n d²) for a tree of depth d.
+    /// Solution of M q̈ = τ − h with the sparse factor [`Ltdl`], O(n d²) for a tree of depth d.
     Sparse,
 }
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// A factor of M. Written by: `forward_dynamics`.
+        /// Sparse factor of M. Written by: `forward_dynamics`.
         pub sparse: Ltdl<S> = Ltdl::new(model),
-        /// A factor of M. Written by: `forward_dynamics`.
+        /// Dense factor of M. Written by: `forward_dynamics`.
         pub dense: Cholesky<S> = Cholesky::new(size.nv),
         /// τ − h, then joint accelerations. Written by: `forward_dynamics`.
         pub qdd: Array<S> = filled(S::zero, size.nv),
-        /// Zeros. Written by: nobody.
+        /// Zeros, never overwritten.
         pub zero: Array<S> = filled(S::zero, model.nv()),
     }
 }
 
-/// τ − h, of which h has been computed.
+/// Computes τ − h for a known h.
 #[inline(always)]
 fn subtract<S: Scalar>(tau: &[S], h: &[S], out: &mut [S]) {
     for k in 0..tau.len() {

@@ -1,13 +1,13 @@
-//! What can be asked of bodies and frames once they are placed: pose, velocity, acceleration, Jacobian and its rate.
+//! Queries on bodies and frames whose placements are known: pose, velocity, acceleration, Jacobian and its rate.
 //!
-//! Everything is known in the world's frame. To express it in a frame r, at oXr and itself moving with v_r,
+//! All quantities are stored in the world's frame. To express them in a frame r, with pose oXr and velocity v_r,
 //!
 //! ```text
 //! J = oXr⁻¹ S     dJ/dt = oXr⁻¹ (Ṡ − v_r × S)     v = oXr⁻¹ v_i     a = oXr⁻¹ a_i
 //! ```
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), sections 2.10 (differentiation) and 2.11
-//! (acceleration). Each question about one body or frame costs O(1), a Jacobian O(depth + nv); nothing allocates.
+//! (acceleration). A query about one body or frame costs O(1), a Jacobian O(depth + nv). Queries do not allocate.
 
 use crate::passes::answers::answers;
 use crate::passes::kinematics::{Moving, World};
@@ -18,23 +18,23 @@ use condyle_spatial::gate::{Fused, Rename};
 use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Motion, Scalar, Se3, Vec3, alike, kernel};
 use core::ops::Deref;
 
-/// The frame in which what is asked about a frame (or a body, whose frame is then meant) is expressed.
+/// Frame in which a quantity of a frame is expressed. For a quantity of a body, `Local` means the body's frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum ReferenceFrame {
-    /// The frame itself.
+    /// Frame itself.
     Local,
-    /// The world's frame: the velocity of the body's point at the world's origin.
+    /// World's frame: the velocity of the body's point at the world's origin.
     World,
-    /// The motion of the frame's origin, along the axes of the world.
+    /// Axes of the world at the frame's origin: the motion of this origin.
     LocalWorldAligned,
 }
 
 alike!(ReferenceFrame);
 
 impl ReferenceFrame {
-    /// oXr: its pose, for a frame at oXf.
+    /// Returns oXr, the pose of the reference frame for a frame at oXf.
     #[inline(always)]
     pub(crate) fn pose<S: Scalar>(self, oXf: Se3<S>) -> Se3<S> {
         match self {
@@ -44,7 +44,8 @@ impl ReferenceFrame {
         }
     }
 
-    /// v_r: its own velocity in the world's frame, for a frame at oXf on a body that moves with v.
+    /// Returns v_r, the velocity of the reference frame in the world's frame, for a frame at oXf on a body with
+    /// velocity v.
     #[inline(always)]
     pub(crate) fn velocity<S: Scalar>(self, oXf: Se3<S>, v: Motion<S>) -> Motion<S> {
         match self {
@@ -55,24 +56,23 @@ impl ReferenceFrame {
     }
 }
 
-/// The placements of a robot at one position, as [`forward_kinematics`](crate::forward_kinematics) left them.
+/// Placements of a robot at one position, computed by [`forward_kinematics`](crate::forward_kinematics).
 #[derive(Clone, Copy, Debug)]
 pub struct Placements<'d, S, R = f64> {
     pub(crate) model: &'d Model<R>,
     pub(crate) world: &'d World<S>,
 }
 
-/// The placements and velocities of a robot, as [`forward_velocities`](crate::forward_velocities) left them. It is a
-/// [`Placements`] too.
+/// Placements and velocities of a robot, computed by [`forward_velocities`](crate::forward_velocities). Dereferences to
+/// [`Placements`].
 #[derive(Clone, Copy, Debug)]
 pub struct Velocities<'d, S, R = f64> {
     pub(crate) placements: Placements<'d, S, R>,
     pub(crate) moving: &'d Moving<S>,
 }
 
-/// The placements, velocities and accelerations of a robot, as [`forward_accelerations`](crate::forward_accelerations) left
-/// them. It is a
-/// [`Velocities`] and a [`Placements`] too.
+/// Placements, velocities and accelerations of a robot, computed by
+/// [`forward_accelerations`](crate::forward_accelerations). Dereferences to [`Velocities`], and so to [`Placements`].
 #[derive(Clone, Copy, Debug)]
 pub struct Accelerations<'d, S, R = f64> {
     pub(crate) velocities: Velocities<'d, S, R>,
@@ -103,7 +103,7 @@ impl<'d> Rename<Accelerations<'d, Fused>> for Accelerations<'d, f64> {
 }
 
 impl<'d, S, R> Placements<'d, S, R> {
-    /// The robot.
+    /// Returns the robot.
     #[inline(always)]
     pub(crate) fn robot(&self) -> &'d Model<R> {
         self.model
@@ -126,7 +126,7 @@ impl<'d, S, R> Deref for Accelerations<'d, S, R> {
     }
 }
 
-/// Adds a column of a Jacobian to the coordinate that it follows.
+/// Adds a column to the column of J that belongs to its coordinate.
 #[inline(always)]
 pub(crate) fn add<S: Scalar, R>(model: &Model<R>, J: &mut [S], c: usize, s: Motion<S>) {
     let column = &model.columns()[c];
@@ -151,7 +151,7 @@ pub(crate) fn check_frame<R>(model: &Model<R>, frame: usize) {
     check_index("frame", frame, model.frames().len(), "frames");
 }
 
-/// The columns of a Jacobian, if it is 6 × nv.
+/// Returns the columns of a Jacobian. Panics unless it is 6 × nv.
 #[inline]
 #[track_caller]
 pub(crate) fn columns<'a, S>(name: &str, J: &'a mut DenseMatrix<S, impl Dense<S>>, nv: usize) -> &'a mut [S] {
@@ -159,14 +159,15 @@ pub(crate) fn columns<'a, S>(name: &str, J: &'a mut DenseMatrix<S, impl Dense<S>
     J.as_mut_slice()
 }
 
-/// The classical acceleration of the point at a frame's origin: v̇ + ω × v, of its spatial acceleration and velocity.
+/// Returns the classical acceleration v̇ + ω × v of the point at a frame's origin, from its spatial acceleration and
+/// velocity.
 #[inline(always)]
 pub(crate) fn classical<S: Scalar>(a: Motion<S>, v: Motion<S>) -> Motion<S> {
     Motion::new(a.linear + v.angular.cross(v.linear), a.angular)
 }
 
 answers! {
-    /// oXb: the pose of a body in the world, in the frame that the URDF gives it.
+    /// Returns oXb, the pose of a body in the world. The body's frame is the frame that the URDF gives it.
     ///
     /// # Panics
     /// If there is no such body.
@@ -175,7 +176,7 @@ answers! {
         of.world.oX[body] * zXb.lift()
     }
 
-    /// oXf: the pose of a frame in the world.
+    /// Returns oXf, the pose of a frame in the world.
     ///
     /// # Panics
     /// If there is no such frame.
@@ -184,8 +185,8 @@ answers! {
         of.body(frame.body) * frame.placement.lift()
     }
 
-    /// The spatial velocity of a body: of its point at the origin of the reference frame (m/s), and of its rotation
-    /// (rad/s).
+    /// Returns the spatial velocity of a body: the velocity of its point at the origin of the reference frame (m/s),
+    /// and its angular velocity (rad/s).
     ///
     /// # Panics
     /// If there is no such body.
@@ -193,8 +194,8 @@ answers! {
         reference.pose(of.body(body)).act_inv(of.moving.v[body])
     }
 
-    /// The spatial velocity of a frame: of its body's point at the origin of the reference frame (m/s), and of its
-    /// rotation (rad/s).
+    /// Returns the spatial velocity of a frame: the velocity of its body's point at the origin of the reference frame
+    /// (m/s), and its angular velocity (rad/s).
     ///
     /// # Panics
     /// If there is no such frame.
@@ -202,8 +203,8 @@ answers! {
         reference.pose(of.frame(frame)).act_inv(of.moving.v[of.model.frames()[frame].body])
     }
 
-    /// The spatial acceleration of a body (m/s², rad/s²), without gravity: the rate of its spatial velocity, seen from
-    /// the world, expressed in the reference frame.
+    /// Returns the spatial acceleration of a body (m/s², rad/s²), without gravity: the rate of its spatial velocity, as
+    /// seen from the world, expressed in the reference frame.
     ///
     /// # Panics
     /// If there is no such body.
@@ -211,8 +212,8 @@ answers! {
         reference.pose(of.body(body)).act_inv(of.moving.a[body])
     }
 
-    /// The spatial acceleration of a frame (m/s², rad/s²), without gravity: the rate of its spatial velocity, seen from
-    /// the world, expressed in the reference frame.
+    /// Returns the spatial acceleration of a frame (m/s², rad/s²), without gravity: the rate of its spatial velocity,
+    /// as seen from the world, expressed in the reference frame.
     ///
     /// # Panics
     /// If there is no such frame.
@@ -220,8 +221,8 @@ answers! {
         reference.pose(of.frame(frame)).act_inv(of.moving.a[of.model.frames()[frame].body])
     }
 
-    /// The classical acceleration of a body's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its
-    /// rotation (rad/s²).
+    /// Returns the classical acceleration v̇ + ω × v of a body's point at the origin of the reference frame (m/s²), and
+    /// the body's angular acceleration (rad/s²).
     ///
     /// # Panics
     /// If there is no such body.
@@ -229,9 +230,9 @@ answers! {
         classical(of.body_acceleration(body, reference), of.body_velocity(body, reference))
     }
 
-    /// The classical acceleration of a frame's point at the origin of the reference frame, v̇ + ω × v (m/s²), and of its
-    /// rotation (rad/s²). In `LocalWorldAligned` it is p̈ of the frame's origin. Source: Featherstone (2008), section
-    /// 2.11.
+    /// Returns the classical acceleration v̇ + ω × v of a frame's point at the origin of the reference frame (m/s²),
+    /// and the frame's angular acceleration (rad/s²). In `LocalWorldAligned` its linear part is p̈ of the frame's
+    /// origin. Source: Featherstone (2008), section 2.11.
     ///
     /// # Panics
     /// If there is no such frame.
@@ -241,7 +242,7 @@ answers! {
 }
 
 kernel! {
-    /// J of a frame at oXf on a body.
+    /// Computes J of a frame at oXf on a body.
     fn jacobian<S, R>(
         of: Placements<'_, S, R>,
         body: usize,
@@ -258,7 +259,7 @@ kernel! {
 }
 
 kernel! {
-    /// dJ/dt of a frame at oXf on a body.
+    /// Computes dJ/dt of a frame at oXf on a body.
     fn jacobian_rate<S, R>(
         of: Velocities<'_, S, R>,
         body: usize,
@@ -276,7 +277,7 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
-    /// The Jacobian J of a body, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
+    /// Computes the Jacobian J of a body, 6 × nv, linear rows first: the body's velocity is J v. Overwrites J.
     ///
     /// # Panics
     /// If there is no such body, or `J` is not 6 × nv.
@@ -286,7 +287,7 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
         jacobian(*self, body, &self.body(body), reference, columns("J", J, self.model.nv()));
     }
 
-    /// The Jacobian J of a frame, 6 × nv, linear rows first: its velocity is J v. J is overwritten.
+    /// Computes the Jacobian J of a frame, 6 × nv, linear rows first: the frame's velocity is J v. Overwrites J.
     ///
     /// # Panics
     /// If there is no such frame, or `J` is not 6 × nv.
@@ -305,8 +306,8 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
-    /// The rate dJ/dt of a body's Jacobian, 6 × nv, as for [`frame_jacobian_rate`](Self::frame_jacobian_rate). dJ is
-    /// overwritten.
+    /// Computes the rate dJ/dt of a body's Jacobian, 6 × nv, as [`frame_jacobian_rate`](Self::frame_jacobian_rate) does
+    /// for a frame. Overwrites dJ.
     ///
     /// # Panics
     /// If there is no such body, or `dJ` is not 6 × nv.
@@ -316,10 +317,10 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
         jacobian_rate(*self, body, &self.body(body), reference, columns("dJ", dJ, self.model.nv()));
     }
 
-    /// The rate dJ/dt of a frame's Jacobian, 6 × nv, linear rows first. dJ is overwritten.
+    /// Computes the rate dJ/dt of a frame's Jacobian, 6 × nv, linear rows first. Overwrites dJ.
     ///
-    /// dJ v + J a is the derivative of the velocity's six numbers: the spatial acceleration in `Local` and `World`, the
-    /// classical acceleration in `LocalWorldAligned`, whose origin moves with the frame.
+    /// dJ v + J a is the derivative of the velocity's six numbers. In `Local` and `World` it is the spatial
+    /// acceleration. In `LocalWorldAligned`, whose origin moves with the frame, it is the classical acceleration.
     ///
     /// ```
     /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, forward_accelerations, robots};

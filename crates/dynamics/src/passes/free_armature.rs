@@ -1,37 +1,38 @@
-//! Armature of free joints: an apparent mass in the axes of the joint's parent, without weight.
+//! Armature of free joints: an apparent mass without weight, in the axes of the joint's parent.
 //!
-//! The armature a along the linear coordinates of a free joint resists the acceleration of the body's origin in the axes of the
-//! parent (the world's for a floating base), as in MuJoCo. In the body's axes, those of v and ω, this acceleration is
-//! v̇ + ω × v. With the kinetic energy T = ½ a vᵀ v of this mass
+//! The armature a along the linear coordinates of a free joint resists the acceleration of the body's origin, as in
+//! MuJoCo. This acceleration is in the axes of the parent (for a floating base, the world's). In the body's axes, which
+//! v and ω use, it is v̇ + ω × v. The kinetic energy T = ½ a vᵀ v of this mass gives
 //!
 //! ```text
 //! τ_v = a (v̇ + ω × v)     ∂τ_v/∂v = a ω×     ∂τ_v/∂ω = −a v×
 //! ```
 //!
-//! The first term is on the diagonal of M with all other armature; the second one, the bias, is here. It depends on the joint's
-//! velocity alone, and does no work: v · (ω × v) = 0. Its matrix a ω× is skew, as Ṁ = C + Cᵀ asks for where M is constant.
-//! Armature of the angular coordinates is a ω̇ without a bias.
+//! The first term is on the diagonal of M together with all other armature. This file adds the second term, the bias.
+//! It depends only on the joint's velocity and does no work: v · (ω × v) = 0. Its matrix a ω× is skew, as required by Ṁ
+//! = C + Cᵀ for a constant M. Armature of the angular coordinates gives a ω̇ without a bias.
 //!
-//! A model lists the joints ([`free_armature`](Model::free_armature)); without any, nothing here is computed. The three numbers
-//! a are equal, which the model checks; here each row takes its own, so that recorded code may have them as arguments.
+//! A model lists these joints ([`free_armature`](Model::free_armature)). If the list is empty, nothing is computed
+//! here. The model checks that the three numbers a are equal. Each row still uses its own number, so that recorded code
+//! can take them as arguments.
 
 use condyle_model::Model;
 use condyle_spatial::{Constant, Scalar, Vec3, kernel};
 
-/// Three numbers of a vector.
+/// Returns three consecutive numbers as a vector.
 #[inline(always)]
 fn three<S: Scalar>(x: &[S], first: usize) -> Vec3<S> {
     Vec3::new(x[first], x[first + 1], x[first + 2])
 }
 
-/// The armature times a vector, row by row.
+/// Multiplies each component of a vector with its armature.
 #[inline(always)]
 fn times<S: Scalar, R: Constant<S>>(model: &Model<R>, first: usize, x: Vec3<S>) -> Vec3<S> {
     let a = model.armature();
     Vec3::new(a[first].lift() * x.x, a[first + 1].lift() * x.y, a[first + 2].lift() * x.z)
 }
 
-/// a (ω × v) of the free joint that begins at a coordinate.
+/// Returns a (ω × v) of the free joint whose first coordinate is `first`.
 #[inline(always)]
 fn bias<S: Scalar, R: Constant<S>>(model: &Model<R>, first: usize, qd: &[S]) -> [S; 3] {
     times(model, first, three(qd, first + 3).cross(three(qd, first))).to_array() // a (ω × v)
@@ -49,7 +50,7 @@ pub fn add_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], 
     }
 }
 
-/// Takes the bias from the efforts: what remains is what accelerates.
+/// Subtracts the bias from the efforts. The remaining efforts accelerate the joint.
 #[doc(hidden)]
 #[inline(always)]
 pub fn subtract_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], tau: &mut [S]) {
@@ -61,8 +62,8 @@ pub fn subtract_armature_bias<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &
     }
 }
 
-/// Adds the columns of a matrix of three rows to a block of an nv × nv matrix, which is stored by columns; each row times its
-/// armature.
+/// Multiplies the rows of a 3-row matrix with their armature, and adds its columns to a block of an nv × nv matrix,
+/// stored by columns.
 #[inline(always)]
 fn add_block<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -79,7 +80,7 @@ fn add_block<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// Adds ∂τ/∂v of the bias to an nv × nv matrix by columns.
+/// Adds ∂τ/∂v of the bias to an nv × nv matrix, stored by columns.
 #[inline(always)]
 pub(crate) fn add_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], dtau_dv: &mut [S]) {
     for &first in model.free_armature() {
@@ -89,7 +90,7 @@ pub(crate) fn add_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], d
     }
 }
 
-/// Adds the bias to the Coriolis matrix, nv × nv by columns: a ω× in the rows and columns of v.
+/// Adds the bias to the Coriolis matrix, nv × nv, stored by columns: a ω× in the rows and columns of v.
 #[inline(always)]
 pub(crate) fn add_coriolis<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S], C: &mut [S]) {
     for &first in model.free_armature() {
@@ -97,7 +98,7 @@ pub(crate) fn add_coriolis<S: Scalar, R: Constant<S>>(model: &Model<R>, qd: &[S]
     }
 }
 
-/// Adds ∂²(λᵀ τ)/∂v∂v of the bias to an nv × nv matrix by columns. With μ = a λ_v, λᵀ τ = μ · (ω × v), so that
+/// Adds ∂²(λᵀ τ)/∂v∂v of the bias to an nv × nv matrix, stored by columns. With μ = a λ_v, λᵀ τ = μ · (ω × v), so that
 /// ∂²/∂v∂ω = μ× and ∂²/∂ω∂v = −μ×.
 #[inline(always)]
 pub(crate) fn add_curvature<S: Scalar, R: Constant<S>>(model: &Model<R>, lambda: &[S], dvdv: &mut [S]) {
@@ -115,7 +116,7 @@ pub(crate) fn add_curvature<S: Scalar, R: Constant<S>>(model: &Model<R>, lambda:
 }
 
 kernel! {
-    /// The efforts without the bias.
+    /// Computes the efforts without the bias.
     pub(crate) fn without_bias<S, R>(model: &Model<R>, v: &[S], tau: &[S], effort: &mut [S]) {
         effort.copy_from_slice(tau);
         subtract_armature_bias(model, v, effort);

@@ -1,22 +1,22 @@
-//! Gravity compensation: the efforts by which a part of the weight of some bodies is carried.
+//! Gravity compensation: efforts that carry a part of the weight of some bodies.
 //!
-//! The force −m g acts at the point c of a body, as if an unseen hand held it. Its efforts are the gradient of the potential
-//! energy of these masses, as those of gravity, with a₀ = −g, in the frame of body i on the path from the body to the root:
+//! The force −m g acts at the point c of a body. Its efforts are the gradient of the potential energy of these masses,
+//! like the efforts of gravity. With a₀ = −g, in the frame of body i on the path from the body to the root:
 //!
 //! ```text
 //! F = [m a₀; m c × a₀]     τ_i = S_iᵀ F     λF = λXi F
 //! ∂τ_d/∂q_e = S_e,ω · ((m S_d,v + S_d,ω × m c) × a₀)     (e on the path from d to the root)
 //! ```
 //!
-//! and ∂τ_e/∂q_d is the same number, as these are second derivatives of an energy; so it costs O(depth) a body, O(depth²) with
-//! derivatives, and no scratch. Source: the weights of `statics.rs`, body by body.
+//! ∂τ_e/∂q_d is the same number, because both are second derivatives of an energy. So the cost is O(depth) per body,
+//! O(depth²) with derivatives, and no scratch is needed. Source: the weights of `statics.rs`, body by body.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Pairs};
 use condyle_model::{GravityCompensation, Model};
 use condyle_spatial::{Act, Force, Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
 
-/// The mass that is carried, in the turned frame of its body, and −g there.
+/// Returns the carried mass in the turned frame of its body, and −g in that frame.
 #[inline(always)]
 fn carried<L: Layout, R>(l: &L, model: &Model<R>, of: &GravityCompensation, q: &[L::S]) -> (Inertia<L::S>, Vec3<L::S>) {
     let turned = Se3::new(model.nodes()[of.body].axis_rotation, Vec3::zero()); // bXz
@@ -30,7 +30,7 @@ fn carried<L: Layout, R>(l: &L, model: &Model<R>, of: &GravityCompensation, q: &
     (mass, rotation.transpose_mul(l.minus_gravity())) // a₀ = −oRbᵀ g
 }
 
-/// Adds the efforts.
+/// Adds the efforts to tau.
 #[inline(always)]
 pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau: &mut [L::S]) {
     for of in model.gravity_compensation() {
@@ -45,7 +45,7 @@ pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau
     }
 }
 
-/// Adds the slopes to an nv × nv matrix.
+/// Adds ∂τ/∂q to an nv × nv matrix.
 #[inline(always)]
 pub(super) fn add_slopes<L: Pairs, R>(l: &L, model: &Model<R>, q: &[L::S], dtau_dq: &mut [L::S]) {
     let identity = Se3::identity();

@@ -1,5 +1,5 @@
-//! Kinematics, the placements and motions of all bodies: one pass from the root to the tips for all bodies. What can then
-//! be asked is in `frames.rs`.
+//! Kinematics: the placements and motions of all bodies, in one pass from the root to the tips. `frames.rs` holds the
+//! queries on the results.
 
 use crate::workspace::{filled, workspace};
 use condyle_model::Model;
@@ -10,39 +10,39 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Array, Cross, Motion, Scalar, Se3};
 
 workspace! {
-    /// The quantities that depend on the position alone, in the world's frame.
+    /// Quantities that depend on the position only, in the world's frame.
     pub(crate) struct World<S>(size) {
-        /// Written by: `place`, and by `rnea`.
+        /// Sines and cosines of the joints. Written by: `place`, and by `rnea`.
         pub sin_cos: JointSinCos<S> = JointSinCos::new(size.bodies),
-        /// oXi: the body's turned frame in the world. Written by: `place`.
+        /// oXi, the pose of the body's turned frame in the world. Written by: `place`.
         pub oX: Array<Se3<S>> = filled(Se3::identity, size.bodies),
-        /// S: what each degree of freedom moves the body by. Written by: `place`.
+        /// S: motion of the body per unit velocity of each degree of freedom. Written by: `place`.
         pub S: Array<Motion<S>> = filled(Motion::zero, size.columns),
     } same {
-        /// The place of the last call's placements. Written by: `place`, by `rnea`, and by limbs.
+        /// Array that holds the placements of the last call. Written by: `place`, by `rnea`, and by limbs.
         pub placed: PlacementCache = PlacementCache::Nowhere,
     }
 }
 
-/// The place of the bodies' placements, with the [geometry hash](Model::geometry_hash) of their robot.
+/// Array that holds the bodies' placements, with the [geometry hash](Model::geometry_hash) of their robot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PlacementCache {
-    /// They were not computed.
+    /// Placements that were not computed.
     Nowhere,
-    /// Body by body.
+    /// Placements of single bodies.
     Bodies(u64),
-    /// Placements in the steps of limbs side by side.
+    /// Placements in the steps of limbs in parallel lanes.
     Limbs(u64),
 }
 
-/// oXi = oXλ λXi, and the columns of S, for all bodies.
+/// Computes oXi = oXλ λXi and the columns of S, for all bodies.
 #[inline(always)]
 pub(crate) fn place<L: Layout>(l: &L, world: &mut World<L::S>, q: &[L::S]) {
     Joint::sin_cos(l, q, &mut world.sin_cos);
     place_turned(l, world, q);
 }
 
-/// As [`place`], for joints whose sines and cosines are known.
+/// Does as [`place`], for joints whose sines and cosines are known.
 #[inline(always)]
 fn place_turned<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L::S>, q: &[L::S]) {
     *placed = PlacementCache::Bodies(l.geometry_hash());
@@ -52,7 +52,7 @@ fn place_turned<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L
         oX[i] = X;
         let (joint, column) = (l.joint(i), l.column(i));
         if let Joint::Revolute { .. } | Joint::Continuous { .. } = joint {
-            S[column] = Joint::column_about_z(&X); // oXi S, while oXi is at hand
+            S[column] = Joint::column_about_z(&X); // oXi S, from the local copy of oXi
         } else {
             for k in 0..joint.nv() {
                 S[column + k] = joint.column(&oX[i], k);
@@ -62,20 +62,21 @@ fn place_turned<L: Layout>(l: &L, World { sin_cos, oX, S, placed }: &mut World<L
 }
 
 workspace! {
-    /// The motions of the bodies, in the world's frame: what depends on the velocity and the acceleration too.
+    /// Motions of the bodies, in the world's frame. They depend on the velocity and the acceleration too.
     pub(crate) struct Moving<S>(size) {
-        /// Velocity of the body; the world's stays 0. Written by: `advance`.
+        /// Velocity of the body; the world's velocity stays 0. Written by: `advance`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Ṡ = v × S: how fast each column of S turns with its body. Written by: `advance`.
+        /// Ṡ = v × S: rate of each column of S, which turns with its body. Written by: `advance`.
         pub dS: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// The velocity coordinates. Written by: `advance`.
+        /// Velocity coordinates. Written by: `advance`.
         pub qd: Array<S> = filled(S::zero, size.nv),
-        /// Spatial acceleration of the body, without gravity; the world's stays 0. Written by: `accelerate`.
+        /// Spatial acceleration of the body, without gravity; the world's acceleration stays 0. Written by:
+        /// `accelerate`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
     }
 }
 
-/// v_i and the columns of Ṡ, for bodies that are placed.
+/// Computes v_i and the columns of Ṡ, for bodies whose placements are known.
 #[inline(always)]
 fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qd: &[L::S]) {
     let Moving { v, dS, .. } = m;
@@ -92,7 +93,7 @@ fn advance<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>
     }
 }
 
-/// a_i, for bodies whose velocities are known.
+/// Computes a_i, for bodies whose velocities are known.
 #[inline(always)]
 fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L::S>, qdd: &[L::S]) {
     let Moving { dS, qd, a, .. } = m;
@@ -107,28 +108,28 @@ fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L:
 }
 
 kernel! {
-    /// Places all bodies.
+    /// Computes the placements of all bodies.
     pub(crate) fn positions<S, R>(model: &Model<R>, world: &mut World<S>, q: &[S]) {
         place(&Single::new(model), world, q);
     }
 }
 
 kernel! {
-    /// Places all bodies, whose joints' sines and cosines `rnea` has left.
+    /// Places all bodies. `rnea` has computed the sines and cosines of their joints.
     pub(crate) fn positions_after_rnea<S, R>(model: &Model<R>, world: &mut World<S>, q: &[S]) {
         place_turned(&Single::new(model), world, q);
     }
 }
 
 kernel! {
-    /// The velocities of bodies that are placed.
+    /// Computes the velocities of bodies whose placements are known.
     pub(crate) fn velocities<S, R>(model: &Model<R>, world: &World<S>, moving: &mut Moving<S>, v: &[S]) {
         advance(&Single::new(model), world, moving, v);
     }
 }
 
 kernel! {
-    /// The accelerations of bodies whose velocities are known.
+    /// Computes the accelerations of bodies whose velocities are known.
     pub(crate) fn accelerations<S, R>(model: &Model<R>, world: &World<S>, moving: &mut Moving<S>, a: &[S]) {
         accelerate(&Single::new(model), world, moving, a);
     }

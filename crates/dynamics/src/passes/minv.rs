@@ -1,10 +1,10 @@
-//! The inverse of the joint-space inertia matrix, in one of three ways.
+//! Inverse of the joint-space inertia matrix, by one of three methods.
 //!
-//! From M without a factor, by Gauss and Jordan (which needs no pivots where M is positive definite), for short chains; from M by
-//! its sparse factor ([`Ltdl`]), in O(n d) operations a column, where the rows of the factor are short; else,
-//! and without M, by Carpentier, *Analytical inverse of the joint space inertia matrix* (2018): the articulated-body
-//! algorithm for all unit efforts at once, of which only those in the subtree of a joint reach it, in O(n) a column. In
-//! the world's frame one array of bias forces serves all bodies.
+//! 1. Short chains: from M by Gauss–Jordan elimination, which needs no pivots if M is positive definite.
+//! 2. Short rows of the sparse factor ([`Ltdl`]): from M by that factor, in O(n d) operations per column.
+//! 3. Otherwise, without M: Carpentier, *Analytical inverse of the joint space inertia matrix* (2018), in O(n) per
+//!    column. This is the articulated-body algorithm for all unit efforts at once. Only the efforts in the subtree of a
+//!    joint reach that joint. In the world's frame one array of bias forces serves all bodies.
 
 use crate::passes::aba;
 use crate::passes::kinematics::World;
@@ -20,24 +20,25 @@ use condyle_spatial::{Array, Matrix, Scalar};
 
 workspace! {
     pub(crate) struct Workspace<S>(size, model: &Model<R>) {
-        /// Bias force for each unit effort, one row for each of its six numbers. Shape: 6 × columns. Written by: `sweep`.
+        /// Bias force for each unit effort: six rows, one for each component. Shape: 6 × columns. Written by: `sweep`.
         pub P: Array<S> = filled(S::zero, 6 * size.columns),
-        /// Acceleration for each unit effort: of the world, zero, then at each depth of the tree. Shape: (1 + depth) × 6 ×
-        /// columns. Written by: `sweep`.
+        /// Acceleration for each unit effort: zeros for the world, then one block for each depth of the tree. Shape: (1
+        /// + depth) × 6 × columns. Written by: `sweep`.
         pub A: Array<S> = filled(S::zero, (1 + size.depth) * 6 * size.columns),
-        /// Written by: `minv`.
+        /// M⁻¹. Written by: `minv`.
         pub Minv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// A factor of M. Written by: `from_matrix`.
+        /// Sparse factor of M. Written by: `from_matrix`.
         pub factor: Ltdl<S> = Ltdl::new(model),
     } same {
-        /// Whether the factor is the way to take; it is the only one where joints share coordinates. Written by: `new`.
+        /// Whether M⁻¹ is computed by the sparse factor, the only method for joints that share coordinates. Written by:
+        /// `new`.
         pub by_factor: bool = inverse_by_factor(model, factor.nonzeros()),
         /// Whether M is inverted without a factor. Written by: `new`.
         pub by_gauss_jordan: bool = is_short_chain(model),
     }
 }
 
-/// y −= Σ sᵣ xᵣ, entry by entry, for six rows xᵣ of n numbers, from column `from` on.
+/// Computes y −= Σ sᵣ xᵣ entry by entry, for six rows xᵣ of n numbers, starting at column `from`.
 #[inline(always)]
 fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S]) {
     let to = from + y.len();
@@ -50,7 +51,7 @@ fn subtract_six<S: Scalar>(s: [S; 6], x: &[S], n: usize, from: usize, y: &mut [S
     }
 }
 
-/// M⁻¹, row c for the efforts j ≥ c first; the factors of the articulated bodies are those of `aba::factorize`.
+/// Computes M⁻¹ from the factors of `aba::factorize`. Row c is computed for the efforts j ≥ c, then mirrored.
 #[inline(always)]
 fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
     let n = columns.len();
@@ -72,7 +73,7 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
         let S_c = w.S[c].to_array();
         let row = &mut rows[c * n + c..(c + 1) * n];
         let (above, here) = A.split_at_mut((columns[c].depth + 1) * 6 * n);
-        let above = &above[columns[c].depth * 6 * n..]; // zeros for a column on the world
+        let above = &above[columns[c].depth * 6 * n..]; // zeros for a column attached to the world
         subtract_six(f.U[c].scale(f.D_inv[c]).to_array(), above, n, c, row); // −D⁻¹ Uᵀ A_λ
         for r in 0..6 {
             let (A_parent, A) = (&above[r * n + c..(r + 1) * n], &mut here[r * n + c..(r + 1) * n]);
@@ -89,7 +90,7 @@ fn sweep<S: Scalar>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: 
 }
 
 kernel! {
-    /// M⁻¹ from M.
+    /// Computes M⁻¹ from M.
     pub(crate) fn from_matrix<S>(d: &mut Workspace<S>, M: &Matrix<S>) {
         if d.by_gauss_jordan {
             return gauss_jordan::<S, SHORT_CHAIN>(M, &mut d.Minv);
@@ -100,7 +101,7 @@ kernel! {
 }
 
 kernel! {
-    /// M⁻¹ from the factors of the articulated bodies.
+    /// Computes M⁻¹ from the factors of the articulated bodies.
     pub(crate) fn from_factors<S>(columns: &[Column], w: &World<S>, f: &aba::Workspace<S>, d: &mut Workspace<S>) {
         sweep(columns, w, f, d);
     }

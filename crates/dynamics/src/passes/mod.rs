@@ -1,6 +1,6 @@
-//! Passes: one recursion over the bodies a file.
+//! Passes: each file holds one recursion over the bodies.
 //!
-//! A pass knows its [`Layout`](condyle_model::layout::Layout) and its workspace, and nothing of what stands around it: data,
+//! A pass depends only on its [`Layout`](condyle_model::layout::Layout) and its workspace. It does not depend on data,
 //! checks, limbs or batches. Its kernels run it on one body after the other.
 
 pub(crate) mod aba;

@@ -1,4 +1,4 @@
-//! Efforts that a robot exerts on itself: damping and friction of joints, springs, and gravity compensation.
+//! Passive efforts of a robot: damping and friction of joints, springs, and gravity compensation.
 //!
 //! ```text
 //! τ_k = −(d + d₁ |v_k| + d₂ v_k²) v_k − f tanh(v_k/ε) − (spring of the joint)_k + (gravity compensation)_k
@@ -6,15 +6,17 @@
 //!
 //! d and f are the model's [`damping`](Model::damping) and [`friction`](Model::friction) (a URDF's `<dynamics damping
 //! friction>`), d₁ and d₂ its [`damping_polynomial`](Model::damping_polynomial). Springs are in `springs.rs`, gravity
-//! compensation is in `gravity_compensation.rs`. No other algorithm knows of them: a caller adds them to τ.
+//! compensation is in `gravity_compensation.rs`. No other algorithm includes these efforts: callers add them to τ.
 //!
-//! Coulomb's law jumps at v = 0. tanh replaces the jump by the slope f/ε: the law is right to 1 % from |v| = 2.65 ε on
-//! and to 1e-6 from 7.25 ε, and at rest a joint creeps (a load below f moves it with less than ε artanh(load/f))
-//! instead of sticking. An explicit integrator needs steps shorter than 2 ε m/f, m the inertia that the joint feels.
+//! Coulomb's law jumps at v = 0. tanh replaces the jump by the slope f/ε. The relative error of the friction is below 1
+//! % from |v| = 2.65 ε on and below 1e-6 from 7.25 ε on. At rest a joint creeps instead of sticking: a load below f
+//! moves it with less than ε artanh(load/f). An explicit integrator needs steps shorter than 2 ε m/f, where m is the
+//! inertia that the joint feels.
 //!
-//! The linear coordinates of a free joint lose along the axes of its parent, as in MuJoCo: with the rotation R of the joint,
-//! u = R v, and the loss L of each component of u, τ = −Rᵀ L(u). Plain damping with three equal numbers is the same along any
-//! axes. When the body turns by δ, u changes by R (δ × v) and Rᵀ by −δ× Rᵀ. With A = Rᵀ diag(L′) R
+//! The losses of a free joint's linear coordinates act along the axes of its parent, as in MuJoCo. With the rotation R
+//! of the joint, u = R v, and the loss L of each component of u, τ = −Rᵀ L(u). Constant damping with three equal
+//! numbers is the same along any axes. When the body turns by δ, u changes by R (δ × v), and Rᵀ changes by −δ× Rᵀ. With
+//! A = Rᵀ diag(L′) R
 //!
 //! ```text
 //! ∂τ/∂v = −A     ∂τ/∂δ = τ× + A v×
@@ -28,22 +30,24 @@ use condyle_model::layout::Single;
 use condyle_spatial::elementary::tanh;
 use condyle_spatial::{Constant, Dense, DenseMatrix, Mat3, Matrix, Quaternion, Scalar, Vec3, kernel};
 
-/// τ = −d v − f tanh(v/ε) + springs + gravity compensation: the efforts that a robot exerts on itself.
+/// Computes the passive efforts of a robot: τ = −d v − f tanh(v/ε) + springs + gravity compensation.
 ///
-/// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv (N m, N), overwritten.
+/// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f; tau: nv (N m, N),
+/// overwritten.
 ///
-/// - Damping and friction take power. Damping may be a polynomial, d = d₀ + d₁ |v| + d₂ v²
-///   ([`Model::damping_polynomial`]). The smoothed friction is right to 1 % from |v| = 2.65 ε on. At rest a joint creeps instead
-///   of sticking: a load below f moves it with less than ε artanh(load/f). An explicit integrator needs steps shorter than
-///   2 ε m/f, with m the inertia that the joint feels.
-/// - A spring ([`Spring`](crate::Spring)) acts against the displacement Δ from its rest: with −(k₀ + k₁ Δ + k₂ Δ²) Δ on a joint
-///   of one degree of freedom, with −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ on others. Of a spherical joint Δ is a rotation vector in the
-///   body's axes. Free and planar joints have a displacement of the origin and a rotation, each with its own |Δ|. The spring of
-///   a joint that follows another one acts on the leader's coordinate.
+/// - Damping and friction dissipate power. Damping may be a polynomial, d = d₀ + d₁ |v| + d₂ v²
+///   ([`Model::damping_polynomial`]). The error of the smoothed friction is below 1 % from |v| = 2.65 ε on. At rest a
+///   joint creeps instead of sticking: a load below f moves it with less than ε artanh(load/f). An explicit integrator
+///   needs steps shorter than 2 ε m/f, with m the inertia that the joint feels.
+/// - A spring ([`Spring`](crate::Spring)) acts against the displacement Δ from its rest: with −(k₀ + k₁ Δ + k₂ Δ²) Δ on
+///   a joint of one degree of freedom, with −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ on others. For a spherical joint, Δ is a
+///   rotation vector in the body's axes. Free and planar joints have a displacement of the origin and a rotation, each
+///   with its own |Δ|. The spring of a mimic joint acts on its leader's coordinate.
 /// - Gravity compensation ([`GravityCompensation`](crate::GravityCompensation)) carries a part of the weight of bodies:
 ///   τ = −Σ Jᵀ m g.
 ///
-/// In O(n), and O(depth) for each body whose weight is carried. Allocates nothing. The laws are those of MuJoCo (`mj_passive`).
+/// Costs O(n), and O(depth) for each body whose weight is carried. Allocates nothing. The laws are MuJoCo's
+/// (`mj_passive`).
 ///
 /// ```
 /// use condyle_dynamics::{Joint, JointOptions, ModelBuilder, Inertia, Se3, Sym3, Vec3, WORLD, passive_torque};
@@ -70,11 +74,11 @@ pub fn passive_torque<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S], v: &
     efforts(model, q, v, smoothing, tau);
 }
 
-/// The derivatives of [`passive_torque`] with respect to q and v, exact.
+/// Computes the exact derivatives of [`passive_torque`] with respect to q and v.
 ///
-/// q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s); dtau_dq, in the tangent space, and dtau_dv: nv × nv (N m/rad, N/m;
-/// N m s/rad, N s/m), overwritten. ∂τ/∂v is diagonal but for free joints with friction or polynomial damping. ∂τ/∂q has a
-/// block for each spring, and couples joints where gravity is compensated. Allocates nothing.
+/// q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). dtau_dq, in the tangent space, and dtau_dv are nv × nv (N
+/// m/rad, N/m; N m s/rad, N s/m), overwritten. ∂τ/∂v is diagonal, except for free joints with friction or polynomial
+/// damping. ∂τ/∂q has a block for each spring, and couples joints where gravity is compensated. Allocates nothing.
 ///
 /// ```
 /// use condyle_dynamics::{passive_torque_derivatives, robots};
@@ -107,14 +111,14 @@ pub fn passive_torque_derivatives<S: Scalar, R: Constant<S>>(
     slopes(model, q, v, smoothing, dtau_dq.as_mut_slice(), dtau_dv.as_mut_slice());
 }
 
-/// The derivatives of passive efforts, for batches.
+/// Derivatives of passive efforts, for batches.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PassiveDerivatives<'d, S> {
     pub dtau_dq: &'d Matrix<S>,
     pub dtau_dv: &'d Matrix<S>,
 }
 
-/// Loss of a coordinate: damping, its polynomial, friction.
+/// Loss of a coordinate: damping, its polynomial, and friction.
 #[derive(Clone, Copy)]
 struct Loss {
     damping: f64,
@@ -130,7 +134,7 @@ impl Loss {
         Self { damping, polynomial: model.damping_polynomial()[k], friction, smoothing }
     }
 
-    /// −(d + d₁ |v| + d₂ v²) v − f tanh(v/ε).
+    /// Returns −(d + d₁ |v| + d₂ v²) v − f tanh(v/ε).
     #[inline(always)]
     fn effort<S: Scalar>(self, v: S) -> S {
         let friction = tanh(v * S::splat(1.0 / self.smoothing)) * S::splat(self.friction);
@@ -142,7 +146,7 @@ impl Loss {
         v.mul_add(-d, -friction)
     }
 
-    /// −d − 2 d₁ |v| − 3 d₂ v² − f/ε (1 − tanh²(v/ε)).
+    /// Returns −d − 2 d₁ |v| − 3 d₂ v² − f/ε (1 − tanh²(v/ε)).
     #[inline(always)]
     fn slope<S: Scalar>(self, v: S) -> S {
         let t = tanh(v * S::splat(1.0 / self.smoothing));
@@ -156,7 +160,7 @@ impl Loss {
     }
 }
 
-/// Whether a free joint loses in another way along the axes of its parent than along the body's.
+/// Returns whether the losses of a free joint differ between the axes of its parent and of its body.
 #[inline(always)]
 fn is_turned<R>(model: &Model<R>, first: usize) -> bool {
     let (d, of) = (model.damping(), first..first + 3);
@@ -166,13 +170,13 @@ fn is_turned<R>(model: &Model<R>, first: usize) -> bool {
         || model.damping_polynomial()[of].iter().any(|&polynomial| polynomial != [0.0; 2])
 }
 
-/// Rotation of a free joint, and the velocity of its origin along the axes of the body.
+/// Returns the rotation of a free joint, and the velocity of its origin along the axes of the body.
 #[inline(always)]
 fn turn<S: Scalar>(q: &[S], v: &[S]) -> (Mat3<S>, Vec3<S>) {
     (Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation(), Vec3::new(v[0], v[1], v[2]))
 }
 
-/// A function of each component of a vector u, which is a free joint's velocity along the axes of its parent.
+/// Returns the loss, or its slope, of each component of u, a free joint's velocity along the axes of its parent.
 #[inline(always)]
 fn each<S: Scalar, R>(model: &Model<R>, first: usize, smoothing: f64, u: Vec3<S>, slope: bool) -> Vec3<S> {
     let mut x = u.to_array();
@@ -184,7 +188,7 @@ fn each<S: Scalar, R>(model: &Model<R>, first: usize, smoothing: f64, u: Vec3<S>
 }
 
 kernel! {
-    /// All efforts.
+    /// Computes all efforts.
     pub(crate) fn efforts<S, R>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, tau: &mut [S]) {
         for k in 0..tau.len() {
             tau[k] = Loss::of(model, k, smoothing).effort(v[k]);
@@ -207,7 +211,7 @@ kernel! {
 }
 
 kernel! {
-    /// All slopes, matrices by columns.
+    /// Computes all slopes as matrices stored by columns.
     pub(crate) fn slopes<S, R>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, dtau_dq: &mut [S], dtau_dv: &mut [S]) {
         let nv = model.nv();
         dtau_dq.fill(S::zero());
@@ -242,14 +246,14 @@ kernel! {
     }
 }
 
-/// Rᵀ diag(s) R x.
+/// Returns Rᵀ diag(s) R x.
 #[inline(always)]
 fn stretched<S: Scalar>(R: Mat3<S>, s: [S; 3], x: Vec3<S>) -> Vec3<S> {
     let u = R * x;
     R.transpose_mul(Vec3::new(s[0] * u.x, s[1] * u.y, s[2] * u.z))
 }
 
-/// Panics unless a smoothing is positive.
+/// Panics unless the smoothing is positive.
 #[track_caller]
 pub(crate) fn check_smoothing(smoothing: f64) {
     assert!(smoothing > 0.0, "smoothing: expected a positive speed, found {smoothing}");

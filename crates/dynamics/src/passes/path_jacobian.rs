@@ -1,9 +1,9 @@
-//! The Jacobian of one frame at one position: only the joints between it and the world are looked at.
+//! Jacobian of one frame at one position, which visits only the joints between the frame and the world.
 //!
-//! From the frame f up to the world, with its pose iXf in the frame of body i:
+//! From the frame f up to the world, with the pose iXf of f in the frame of body i:
 //!
 //! ```text
-//! J_i = iXf⁻¹ S_i     λXf = λXi(q) iXf     and at the world oXf, by which J turns to other references
+//! J_i = iXf⁻¹ S_i     λXf = λXi(q) iXf     at the world, oXf converts J to other reference frames
 //! ```
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), section 2.8 (S in any coordinates) and example 4.1.
@@ -15,12 +15,12 @@ use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::{Act, Motion, Scalar, Se3, Vec3, kernel};
 
-/// The number of joints whose sines and cosines are computed at once.
+/// Number of joints whose sines and cosines are computed at once.
 const AT_ONCE: usize = 8;
 
 kernel! {
-    /// J of a frame at iXf on a body, in O(depth); the strides are the distances from one row of J to the next, and from one
-    /// column to the next.
+    /// Computes J of a frame at iXf on a body, in O(depth). The strides are the distance between rows of J, and the
+    /// distance between columns.
     pub(crate) fn path_jacobian<S, R>(
         model: &Model<R>,
         q: &[S],
@@ -34,7 +34,7 @@ kernel! {
         let l = Single::new(model);
         let (mut i, mut X) = (body, iXf);
         while i > 0 {
-            // some joints at a time, for the sake of their sines and cosines
+            // Groups of AT_ONCE joints, so that their sines and cosines are computed together.
             let (mut some, mut n) = ([0; AT_ONCE], 0);
             while i > 0 && n < AT_ONCE {
                 some[n] = i;
@@ -62,7 +62,7 @@ kernel! {
             ReferenceFrame::LocalWorldAligned => Se3::new(X.rotation, Vec3::zero()),
         };
         if model.has_mimic() {
-            // several columns may follow one coordinate
+            // Several columns may belong to one coordinate.
             for coordinate in 0..model.nv() {
                 act(turn, J, coordinate, strides);
             }

@@ -1,7 +1,7 @@
-//! Points of bodies and frames: velocity, Jacobian, and forces that act there.
+//! Points of bodies and frames: velocities, Jacobians, and forces at points.
 //!
-//! A point is given in the frame of its body, or in a frame on it, and moves with that. With its place p in the world, and S
-//! the columns of the body's joints in the world's frame,
+//! A point is given in the frame of its body, or in a frame on the body, and moves with it. Let p be its position in
+//! the world, and S the columns of the body's joints in the world's frame. Then
 //!
 //! ```text
 //! ṗ = v + ω × p     J = ∂ṗ/∂v = S_v + S_ω × p
@@ -14,7 +14,7 @@ use condyle_model::layout::{Columns, Single};
 use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Force, Scalar, Vec3, kernel};
 
 kernel! {
-    /// J of the point of a body that is at p in the world, 3 × nv by columns.
+    /// Computes J of the point of a body that is at p in the world, 3 × nv, stored by columns.
     pub(crate) fn point_jacobian<S, R>(of: Placements<'_, S, R>, body: usize, p: &Vec3<S>, J: &mut [S]) {
         J.fill(S::zero());
         for &c in Single::<S, R>::new(of.model).support(body) {
@@ -29,7 +29,8 @@ kernel! {
 }
 
 impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
-    /// The Jacobian J of a point of a body, 3 × nv: its velocity along the axes of the world is J v (m/s). J is overwritten.
+    /// Computes the Jacobian J of a point of a body, 3 × nv: the point's velocity along the axes of the world is J v
+    /// (m/s). Overwrites J.
     ///
     /// point: in the frame of the body (m). O(depth + nv); allocates nothing. Equation: see
     /// [`frame_point_jacobian`](Self::frame_point_jacobian).
@@ -42,10 +43,12 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
         point_jacobian(*self, body, &self.body(body).act(point), columns(J, self.model.nv()));
     }
 
-    /// The Jacobian J of a point of a frame, 3 × nv: its velocity along the axes of the world is J v (m/s). J is overwritten.
+    /// Computes the Jacobian J of a point of a frame, 3 × nv: the point's velocity along the axes of the world is J v
+    /// (m/s). Overwrites J.
     ///
-    /// point: in the frame (m). J = S_v + S_ω × p, with p = oXf · point and S the columns of the joints before it; these are
-    /// the linear rows of the Jacobian of a frame at the point, in `LocalWorldAligned`. O(depth + nv); allocates nothing.
+    /// point: in the frame (m). J = S_v + S_ω × p, with p = oXf · point and S the columns of the joints on the path to
+    /// the root. These are the linear rows of the Jacobian of a frame at the point, in `LocalWorldAligned`. O(depth +
+    /// nv); allocates nothing.
     ///
     /// ```
     /// use condyle_dynamics::{Act, Data, Vec3, forward_velocities, robots};
@@ -71,11 +74,12 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
         point_jacobian(*self, self.model.frames()[frame].body, &p, columns(J, self.model.nv()));
     }
 
-    /// A force of the world at a point of the world, as `f_ext` wants it: in the frame of the body, about its origin.
+    /// Converts a force at a point of the world to the convention of `f_ext`: in the frame of the body, about its
+    /// origin.
     ///
-    /// point: the place in the world at which it acts (m); force: along the axes of the world (N). With the body's pose
-    /// (R, p): f = Rᵀ force, n = Rᵀ ((point − p) × force). A point that is known in the body's frame is `body(body).act(point)`
-    /// in the world.
+    /// point: position in the world at which the force acts (m); force: along the axes of the world (N). With the
+    /// body's pose (R, p): f = Rᵀ force, n = Rᵀ ((point − p) × force). For a point in the body's frame, pass
+    /// `body(body).act(point)`.
     ///
     /// ```
     /// use condyle_dynamics::{Data, Force, Vec3, forward_kinematics, aba, robots};
@@ -99,7 +103,8 @@ impl<S: Scalar, R: Constant<S>> Placements<'_, S, R> {
 }
 
 impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
-    /// The velocity of a point of a body along the axes of the world (m/s): ṗ = v + ω × p. point: in the frame of the body (m).
+    /// Returns the velocity of a point of a body along the axes of the world (m/s): ṗ = v + ω × p. point: in the frame
+    /// of the body (m).
     ///
     /// # Panics
     /// If there is no such body.
@@ -110,7 +115,8 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
         self.moving.v[body].velocity_at(self.body(body).act(point))
     }
 
-    /// The velocity of a point of a frame along the axes of the world (m/s): ṗ = v + ω × p. point: in the frame (m).
+    /// Returns the velocity of a point of a frame along the axes of the world (m/s): ṗ = v + ω × p. point: in the frame
+    /// (m).
     ///
     /// # Panics
     /// If there is no such frame.
@@ -122,7 +128,7 @@ impl<S: Scalar, R: Constant<S>> Velocities<'_, S, R> {
     }
 }
 
-/// The columns of a Jacobian of a point, if it is 3 × nv.
+/// Returns the columns of a point's Jacobian. Panics unless it is 3 × nv.
 #[inline]
 #[track_caller]
 fn columns<S>(J: &mut DenseMatrix<S, impl Dense<S>>, nv: usize) -> &mut [S] {

@@ -1,15 +1,15 @@
 //! Dynamics and energies as linear functions of the inertial parameters.
 //!
-//! π stacks the ten [parameters](crate::inertial_parameters) of each body, the world left out. All that follows is one
-//! bilinear form: ⟨m, I w⟩ = y(m, w) · π_i. With velocity v, acceleration a and a column S of a joint on the way to the
-//! body, all in the body's frame,
+//! π stacks the ten [parameters](crate::inertial_parameters) of each body except the world. All regressors use one
+//! bilinear form: ⟨m, I w⟩ = y(m, w) · π_i. Let v and a be the velocity and acceleration of a body, and S a column of a
+//! joint on its path to the root, all in the body's frame. Then
 //!
 //! ```text
 //! τ_S = ⟨S, I a + v ×* I v⟩ = (y(S, a) − y(v × S, v)) · π_i,     T_i = ½ y(v, v) · π_i
 //! ```
 //!
-//! Source: Atkeson, An, Hollerbach, *Estimation of inertial parameters of manipulator loads and links* (1986);
-//! the form y makes the 6 × 10 matrices of that paper superfluous.
+//! Source: Atkeson, An, Hollerbach, *Estimation of inertial parameters of manipulator loads and links* (1986); with the
+//! form y, the 6 × 10 matrices of that paper are not needed.
 
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::{Moving, World};
@@ -19,21 +19,21 @@ use condyle_model::layout::{Columns, Layout, Single};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Matrix, Motion, Scalar};
 
-/// The number of numbers that describe the inertia of a body.
+/// Number of inertial parameters of a body.
 pub(crate) const PARAMETERS: usize = 10;
 
 workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// Y. Written by: `joint_torque_regressor`.
         pub torque: Matrix<S> = zero_matrix(size.nv, PARAMETERS * (size.bodies - 1)),
-        /// Written by: `kinetic_energy_regressor`.
+        /// y of the kinetic energy. Written by: `kinetic_energy_regressor`.
         pub kinetic: Array<S> = filled(S::zero, PARAMETERS * (size.bodies - 1)),
-        /// Written by: `potential_energy_regressor`.
+        /// y of the potential energy. Written by: `potential_energy_regressor`.
         pub potential: Array<S> = filled(S::zero, PARAMETERS * (size.bodies - 1)),
     }
 }
 
-/// y(m, w), the ten numbers with ⟨m, I w⟩ = y · π; symmetric in m and w.
+/// Returns y(m, w), the ten numbers with ⟨m, I w⟩ = y · π; symmetric in m and w.
 #[inline(always)]
 pub(crate) fn pairing<S: Scalar>(m: Motion<S>, w: Motion<S>) -> [S; PARAMETERS] {
     let (a, b) = (m.angular, w.angular);
@@ -52,7 +52,8 @@ pub(crate) fn pairing<S: Scalar>(m: Motion<S>, w: Motion<S>) -> [S; PARAMETERS] 
     ]
 }
 
-/// y(S, a) − y(v × S, v): the effort at a column S of a body with velocity v and acceleration a, per parameter.
+/// Returns y(S, a) − y(v × S, v): the effort per parameter, at a column S, of a body with velocity v and acceleration
+/// a.
 #[inline(always)]
 pub(crate) fn effort<S: Scalar>(column: Motion<S>, v: Motion<S>, a: Motion<S>) -> [S; PARAMETERS] {
     let (mut y, quadratic) = (pairing(column, a), pairing(v.cross(column), v));
@@ -62,14 +63,14 @@ pub(crate) fn effort<S: Scalar>(column: Motion<S>, v: Motion<S>, a: Motion<S>) -
     y
 }
 
-/// The rows of body i's ten parameters in a vector of all.
+/// Returns the ten parameters of body i in a vector of all parameters.
 #[inline(always)]
 fn of_body<S>(parameters: &mut [S], i: usize) -> &mut [S] {
     &mut parameters[PARAMETERS * (i - 1)..PARAMETERS * i]
 }
 
 kernel! {
-    /// Y of the efforts, for bodies whose accelerations are known.
+    /// Computes Y of the efforts, for bodies whose accelerations are known.
     pub(crate) fn torque<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         let l = Single::new(model);
         let minus_g = l.minus_gravity();
@@ -92,7 +93,7 @@ kernel! {
 }
 
 kernel! {
-    /// y of the kinetic energy, for bodies whose velocities are known.
+    /// Computes y of the kinetic energy, for bodies whose velocities are known.
     pub(crate) fn kinetic<S, R>(model: &Model<R>, world: &World<S>, moving: &Moving<S>, d: &mut Workspace<S>) {
         for i in 1..model.nodes().len() {
             let v_b = Placements { model, world }.body(i).act_inv(moving.v[i]);
@@ -102,7 +103,7 @@ kernel! {
 }
 
 kernel! {
-    /// y of the potential energy, for bodies that are placed.
+    /// Computes y of the potential energy, for bodies whose placements are known.
     pub(crate) fn potential<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>) {
         let minus_g = Single::<S, R>::new(model).minus_gravity();
         for i in 1..model.nodes().len() {

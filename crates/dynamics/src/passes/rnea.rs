@@ -1,22 +1,25 @@
 //! Inverse dynamics by the recursive Newton–Euler algorithm.
 //!
 //! Source: Luh, Walker, Paul, *On-line computational scheme for mechanical manipulators* (1980); in the bodies' own
-//! frames. It is Featherstone's (*Rigid Body Dynamics Algorithms*, 2008, table 5.1) with the classical acceleration of each
-//! origin in place of the spatial one, so that no linear velocity is needed: the acceleration of a point r of a body is
-//! a + K r with K = ω̇× + ω× ω×, for its centre of mass as for the joints on it. Line by line:
+//! frames. Compared with Featherstone (*Rigid Body Dynamics Algorithms*, 2008, table 5.1), it uses the classical
+//! acceleration of each origin instead of the spatial one. So no linear velocity is needed. A point r of a body has
+//! acceleration a + K r with K = ω̇× + ω× ω×; this holds for the centre of mass and for the joints on the body. Line by
+//! line:
 //!
-//! | the book | here |
-//! | --- | --- |
-//! | v₀ = 0, a₀ = −g | ω₀ = ω̇₀ = 0, K₀ = 0, a₀ = −g |
-//! | iXλ = X_J X_T | `Xi` = λXi, with the sines and cosines of all joints computed before |
-//! | v_i = iXλ v_λ + v_J | ω = Rᵀ ω_λ + ω_J |
-//! | a_i = iXλ a_λ + S q̈ + v_i × v_J | a = Rᵀ (a_λ + K_λ p), ω̇ = Rᵀ ω̇_λ, and what the joint adds (`added_to`) |
-//! | f_i = I a_i + v_i ×* I v_i − f_x | f = m a + K h, n = I ω̇ + ω × I ω + h × a, minus f_x |
-//! | τ_i = S_iᵀ f_i | `project`, when the pass has left the subtree of body i |
-//! | f_λ += λX*_i f_i | `add_to_parent_on_stack` |
+//! ```text
+//! the book                            here
+//! v₀ = 0, a₀ = −g                     ω₀ = ω̇₀ = 0, K₀ = 0, a₀ = −g
+//! iXλ = X_J X_T                       Xi = λXi, with the sines and cosines of all joints computed before
+//! v_i = iXλ v_λ + v_J                 ω = Rᵀ ω_λ + ω_J
+//! a_i = iXλ a_λ + S q̈ + v_i × v_J     a = Rᵀ (a_λ + K_λ p), ω̇ = Rᵀ ω̇_λ, and what the joint adds (added_to)
+//! f_i = I a_i + v_i ×* I v_i − f_x    f = m a + K h, n = I ω̇ + ω × I ω + h × a, minus f_x
+//! τ_i = S_iᵀ f_i                      project, when the pass has left the subtree of body i
+//! f_λ += λX*_i f_i                    add_to_parent_on_stack
+//! ```
 //!
-//! The two loops of the book are one here: a body's subtree is finished when the pass has gone down to its last body, and
-//! its force then goes to the parent. The test `the_book_gives_the_same` runs the book's form beside it.
+//! The two loops of the book are merged into one. When the pass has visited the last body of a subtree, it adds the
+//! force of the subtree's root to the parent. The test `the_book_gives_the_same` compares this pass with the book's
+//! form.
 
 use crate::passes::free_armature::add_armature_bias;
 use crate::passes::kinematics::{PlacementCache, World};
@@ -33,20 +36,20 @@ workspace! {
     pub(crate) struct Workspace<S>(size) {
         /// λXi. Written by: `pass`.
         pub X: Array<Se3<S>> = filled(Se3::identity, size.levels),
-        /// The rotation of the body and the acceleration of its origin, with gravity as the world's. Written by:
-        /// `pass`.
+        /// Angular velocity and acceleration of the body, and acceleration of its origin, with gravity as the world's
+        /// acceleration. Written by: `pass`.
         pub motion: Array<ClassicalMotion<S>> =
             filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.levels),
         /// Force through the joint. Written by: `pass`.
         pub f: Array<Force<S>> = filled(Force::zero, size.levels),
         /// Joint efforts. Written by: `pass`.
         pub tau: Array<S> = filled(S::zero, size.nv),
-        /// Zeros, for the accelerations and velocities that are not given. Written by: nobody.
+        /// Zeros, used as accelerations or velocities that are not given. Never overwritten.
         pub zero: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// The whole algorithm, down and up each branch in turn.
+/// Runs the whole algorithm, going down and up each branch in turn.
 #[inline(always)]
 pub(crate) fn pass<L: Layout>(
     l: &L,
@@ -66,7 +69,7 @@ pub(crate) fn pass<L: Layout>(
     for i in l.bodies() {
         let here = l.stack_index(i);
         let Xi = Joint::placement_with(l, i, q, sin[i], cos[i]); // λXi = X_T X_J
-        X[here] = Xi; // what is stored as soon as it is known needs no place on the stack
+        X[here] = Xi; // stored immediately, so that it does not occupy the machine stack
         let (parent, R) = (l.parent_on_stack(motion, i), Xi.rotation);
         let a = parent.centripetal().mul_add(Xi.translation, parent.a); // a_λ + K_λ p
         let m = ClassicalMotion { w: R.transpose_mul(parent.w), dw: R.transpose_mul(parent.dw), a: R.transpose_mul(a) };
@@ -94,7 +97,7 @@ pub(crate) fn pass<L: Layout>(
 }
 
 kernel! {
-    /// Body by body.
+    /// Runs the algorithm body by body.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         world: &mut World<S>,

@@ -5,18 +5,18 @@
 //! τ = −g(|Δ|) Δ,   g(r) = k₀ + k₁ r + k₂ r²     ∂τ/∂Δ = −(g 1 + (k₁/r + 2 k₂) Δ Δᵀ)     (others)
 //! ```
 //!
-//! Δ is the displacement of the joint from the rest of its spring. For a joint of one degree of freedom and a translation it is
-//! q − q₀, an angle of a continuous joint being taken to (−π, π]. A spherical joint has the rotation vector
-//! Δ = log(R₀ᵀ R), with ∂Δ/∂q the group's Jacobian J_log(Δ). A free or planar joint has two displacements, each with
-//! its own r: that of the origin, along the axes of the body, and that of the rotation:
+//! Δ is the displacement of the joint from the rest of its spring. For a joint of one degree of freedom and for a
+//! translation it is q − q₀; an angle of a continuous joint is mapped to (−π, π]. For a spherical joint it is the
+//! rotation vector Δ = log(R₀ᵀ R), with ∂Δ/∂q the group's Jacobian J_log(Δ). A free or planar joint has two
+//! displacements, each with its own r. They are u of the origin, along the axes of the body, and Δ of the rotation:
 //!
 //! ```text
 //! u = Rᵀ (p − p₀),   ∂u/∂(p, θ) = [1, u×]     Δ = log(R₀ᵀ R)
 //! ```
 //!
-//! All of these are forces of a potential. The laws are MuJoCo's (`mj_passive`), where k₁ makes the spring of one degree of freedom
-//! stiffer on one side than on the other. The spring of a joint that follows another one has that joint's own displacement, and
-//! the layout adds its effort to the leader's coordinate.
+//! All of these forces have a potential. The laws are MuJoCo's (`mj_passive`), where k₁ makes the spring of one degree
+//! of freedom stiffer on one side than on the other. The spring of a mimic joint uses the mimic joint's own
+//! displacement, and the layout adds its effort to the leader's coordinate.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Pairs};
@@ -24,10 +24,10 @@ use condyle_model::{Model, Spring};
 use condyle_spatial::lie::{jlog3, log3};
 use condyle_spatial::{Quaternion, Scalar, Vec3};
 
-/// Displacement (rad, m) below which |Δ| counts as its root, squared, so that nothing is divided by 0.
+/// Minimum of |Δ|² (rad², m²) before its root is taken; avoids a division by 0.
 const LEAST: f64 = 1e-30;
 
-/// Stiffness g at a displacement, and the factor s of Δ Δᵀ in the slope.
+/// Returns the stiffness g at a displacement, and the factor s of Δ Δᵀ in the slope.
 #[inline(always)]
 fn stiffness<S: Scalar>([k0, k1, k2]: [f64; 3], displacement: Vec3<S>) -> (S, S) {
     if k1 == 0.0 && k2 == 0.0 {
@@ -39,26 +39,26 @@ fn stiffness<S: Scalar>([k0, k1, k2]: [f64; 3], displacement: Vec3<S>) -> (S, S)
     (g, S::splat(k1) * r.recip() + S::splat(2.0 * k2)) // k₁/r + 2 k₂
 }
 
-/// −g Δ.
+/// Returns −g Δ.
 #[inline(always)]
 fn pull<S: Scalar>(k: [f64; 3], displacement: Vec3<S>) -> Vec3<S> {
     displacement.scale(-stiffness(k, displacement).0)
 }
 
-/// −(g 1 + s Δ Δᵀ) x.
+/// Returns −(g 1 + s Δ Δᵀ) x.
 #[inline(always)]
 fn slope<S: Scalar>(k: [f64; 3], displacement: Vec3<S>, x: Vec3<S>) -> Vec3<S> {
     let (g, s) = stiffness(k, displacement);
     -displacement.scale_add(s * displacement.dot(x), x.scale(g))
 }
 
-/// Angle from the direction (cos₀, sin₀) to the direction (cos, sin).
+/// Returns the angle from the direction (cos₀, sin₀) to the direction (cos, sin).
 #[inline(always)]
 fn angle<S: Scalar>([cos, sin]: [S; 2], [cos0, sin0]: [S; 2]) -> S {
     (cos0 * sin - sin0 * cos).atan2(cos0 * cos + sin0 * sin)
 }
 
-/// The position at which the spring of a joint of one degree of freedom rests, as an angle or a length.
+/// Returns the rest position of a spring on a joint of one degree of freedom, as an angle or a length.
 #[inline(always)]
 fn rest_of_one<R>(model: &Model<R>, spring: &Spring) -> f64 {
     match model.bodies()[spring.body].joint {
@@ -67,7 +67,7 @@ fn rest_of_one<R>(model: &Model<R>, spring: &Spring) -> f64 {
     }
 }
 
-/// Displacement of a joint of one degree of freedom.
+/// Returns the displacement of a joint of one degree of freedom.
 #[inline(always)]
 fn displacement_of_one<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q: &[L::S]) -> L::S {
     let (i, rest) = (spring.body, rest_of_one(model, spring));
@@ -75,14 +75,14 @@ fn displacement_of_one<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q
     let (node, own) = (&model.nodes()[i], model.bodies()[i].joint);
     let position = l.position(q, i, 0);
     if turns(node.joint) {
-        // the offset of a joint that follows is part of its placement
+        // The offset of a mimic joint is part of its placement.
         let offset = node.mimic.map_or(0.0, |mimic| mimic.offset);
         let (sin0, cos0) = Scalar::sin_cos(rest - offset);
         return angle([position, l.position(q, i, 1)], [L::S::splat(cos0), L::S::splat(sin0)]);
     }
     let displacement = position - L::S::splat(rest);
     if turns(own) {
-        let (sin, cos) = displacement.sin_cos(); // it follows a joint that does not turn without limits
+        let (sin, cos) = displacement.sin_cos(); // the leader is not continuous
         return sin.atan2(cos);
     }
     displacement
@@ -98,7 +98,8 @@ fn quaternion<S: Scalar>(q: &[S]) -> Quaternion<S> {
     Quaternion::new(q[0], q[1], q[2], q[3])
 }
 
-/// Displacements of a joint of several degrees of freedom, along the axes of the body: u of its origin, Δ of its rotation.
+/// Returns the displacements of a joint of several degrees of freedom, along the axes of the body: u of its origin, Δ
+/// of its rotation.
 #[inline(always)]
 fn displacements<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q: &[L::S]) -> (Vec3<L::S>, Vec3<L::S>) {
     let (joint, o) = (l.joint(spring.body), L::S::zero());
@@ -123,7 +124,7 @@ fn displacements<L: Layout, R>(l: &L, model: &Model<R>, spring: &Spring, q: &[L:
     }
 }
 
-/// Adds the efforts.
+/// Adds the efforts to tau.
 #[inline(always)]
 pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau: &mut [L::S]) {
     for spring in model.springs() {
@@ -142,7 +143,7 @@ pub(super) fn add_efforts<L: Layout, R>(l: &L, model: &Model<R>, q: &[L::S], tau
     }
 }
 
-/// Adds the slopes to an nv × nv matrix.
+/// Adds ∂τ/∂q to an nv × nv matrix.
 #[inline(always)]
 pub(super) fn add_slopes<L: Pairs, R>(l: &L, model: &Model<R>, q: &[L::S], dtau_dq: &mut [L::S]) {
     for spring in model.springs() {

@@ -1,8 +1,9 @@
-//! The efforts that hold a robot still: weights and external forces, summed from the tips to the root; and their
-//! derivatives.
+//! Efforts that hold a robot still, and their derivatives. Weights and external forces are summed from the tips to the
+//! root.
 //!
-//! When coordinate e turns what its joint carries about S_e, weights stay where they point, while external forces turn
-//! along. In the terms of `rnea_derivatives.rs` at rest, with a₀ = −g and Ψ̈ = a₀ × S, F the sum of Iᶜ a₀ − f_ext,
+//! When coordinate e turns the bodies that its joint carries about S_e, their weights keep their direction, while
+//! external forces turn with the bodies. In the notation of `rnea_derivatives.rs` at rest, with a₀ = −g and Ψ̈ = a₀ ×
+//! S, and F the sum of Iᶜ a₀ − f_ext,
 //!
 //! ```text
 //! ∂τ_d/∂q_e = S_dᵀ Iᶜ Ψ̈_e     ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + S_d ×* F)     (e before d; Iᶜ, F of the joint of d)
@@ -16,27 +17,27 @@ use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
 workspace! {
-    /// In the world's frame.
+    /// Quantities in the world's frame.
     pub(crate) struct Workspace<S>(size) {
-        /// Weight and external force of all that a joint carries. Written by: `pass`.
+        /// Weight and external force of all bodies that a joint carries. Written by: `pass`.
         pub F: Array<Force<S>> = filled(Force::zero, size.bodies),
         /// Joint efforts. Written by: `pass`.
         pub tau: Array<S> = filled(S::zero, size.nv),
-        /// Inertia of all that a joint carries. Written by: `derivative`.
+        /// Inertia of all bodies that a joint carries. Written by: `derivative`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
-        /// Written by: `derivative`.
+        /// ∂τ/∂q. Written by: `derivative`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
-/// The whole algorithm, for bodies that are placed.
+/// Runs the whole algorithm, for bodies whose placements are known.
 #[inline(always)]
 fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
     let Workspace { F, tau, .. } = d;
     let g = -l.minus_gravity();
     for i in l.bodies() {
         let I = l.inertia(i);
-        let moment = oX[i].rotation * I.mass_com + oX[i].translation.scale(I.mass); // m c, from the world's origin
+        let moment = oX[i].rotation * I.mass_com + oX[i].translation.scale(I.mass); // m c about the world's origin
         F[i] = Force::new(g.scale(I.mass), moment.cross(g)); // weight: [m g; c × m g]
         if let Some(external) = l.force(f_ext, i) {
             F[i] += oX[i].act(external);
@@ -53,13 +54,13 @@ fn pass<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L:
 }
 
 kernel! {
-    /// For bodies that are placed.
+    /// Computes τ, for bodies whose placements are known.
     pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, f_ext: &[Force<S>]) {
         pass(&Single::new(model), world, d, f_ext);
     }
 }
 
-/// The derivative, for bodies that are placed.
+/// Computes the derivative, for bodies whose placements are known.
 #[inline(always)]
 fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Workspace<L::S>, f_ext: &[Force<L::S>]) {
     let Workspace { F, IC, dtau_dq, .. } = d;
@@ -97,7 +98,7 @@ fn derivative<L: Pairs>(l: &L, World { oX, S, .. }: &World<L::S>, d: &mut Worksp
 }
 
 kernel! {
-    /// For bodies that are placed.
+    /// Computes the derivative, for bodies whose placements are known.
     pub(crate) fn run_derivative<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, f_ext: &[Force<S>]) {
         derivative(&Single::new(model), world, d, f_ext);
     }

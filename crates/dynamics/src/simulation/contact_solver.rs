@@ -1,12 +1,12 @@
-//! Impulses λ of m unilateral contacts with Coulomb friction, at the level of velocities:
+//! Impulses λ of m unilateral contacts with Coulomb friction, computed from velocities:
 //!
 //! ```text
 //! u = G λ + b        0 ≤ λ_n ⊥ u_n ≥ 0        ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t/‖u_t‖ where u_t ≠ 0
 //! ```
 //!
-//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity of the points without contact, plus the terms of the gaps in its
-//! normal rows. Each point has three rows: two along the ground, then the normal one. The friction cone is Coulomb's disc,
-//! neither a pyramid nor a convex relaxation. λ is a solution if and only if it is a fixed point of
+//! G is the Delassus matrix J M⁻¹ Jᵀ. b is the velocity of the points without contact, plus the terms of the gaps in
+//! its normal rows. Each point has three rows: two along the ground, then the normal one. The friction cone is
+//! Coulomb's disc, without a pyramid or a convex relaxation. λ is a solution if and only if it is a fixed point of
 //!
 //! ```text
 //! λ_n ← max(0, λ_n − u_n/g_n)        λ_t ← P(λ_t − u_t/g_t),  P the projection on the disc of radius μ λ_n
@@ -19,25 +19,26 @@
 //!   steps are discarded if they do not reduce the residual.
 //! - Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998). They find these sets from any first guess.
 //!
-//! Where contacts are redundant, G is singular and the impulses are not unique. Newton's method then adds ε to the diagonal
-//! of G in its slope, not in u. So it takes the step that changes the impulses least, and the fixed point stays the same (the
-//! proximal point algorithm, Rockafellar 1976). The first guess is the impulses of the last step, so that forces at rest stay
-//! as they are.
+//! Where contacts are redundant, G is singular and the impulses are not unique. Newton's method then adds ε to the
+//! diagonal of G in its slope, but not in u. So it takes the step that changes the impulses least, and the fixed point
+//! stays the same (the proximal point algorithm, Rockafellar 1976). The first guess is the impulses of the last step,
+//! so that forces at rest stay constant.
 
 use alloc::vec::Vec;
 use condyle_spatial::Scalar;
 
-/// Least and greatest ε, as a share of the largest entry on the diagonal of G. The least is small compared with the coupling of
-/// contacts, and large compared with rounding.
+/// Minimum and maximum of ε, as a share of the largest entry on the diagonal of G. The minimum is small compared with
+/// the coupling of contacts, and large compared with rounding.
 const PROXIMAL: [f64; 2] = [1e-8, 1.0];
-/// Least g, as a share of the same entry: the joints may hold a point in some directions, and its rows of G are then 0.
+/// Minimum of g, as a share of the same entry. The joints may hold a point in some directions, and its rows of G are
+/// then 0.
 const LEAST: f64 = 1e-12;
 /// Factor by which ε grows after discarded steps, and shrinks after accepted ones.
 const DAMPING: f64 = 30.0;
 /// Number of steps of Newton's method within which the residual must shrink; chosen because the sets of points settle in two or
 /// three steps, during which the residual may grow (random contacts: 4 fails four times less often than 1).
 const BURST: usize = 4;
-/// Largest share of the residual that accepted steps may leave.
+/// Maximum share of the residual that may remain after accepted steps.
 const PROGRESS: f64 = 0.7;
 /// Number of sweeps after discarded steps; they cost about as much as one step with 8 points.
 const SWEEPS: usize = 12;
@@ -50,13 +51,13 @@ const POLISHED: f64 = 1e-4;
 /// Outcome of a solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Outcome {
-    /// The residual is within the tolerance.
+    /// Residual within the tolerance.
     Solved,
     /// Residual (m/s) after the maximum number of iterations.
     NotSolved(f64),
 }
 
-/// Memory for contacts of up to some number of points; matrices by columns.
+/// Memory for contacts of up to a given number of points; matrices are stored by columns.
 #[derive(Clone, Debug)]
 pub(super) struct ContactSolver {
     /// G. Shape: 3m × 3m. Written by: the caller.
@@ -67,10 +68,10 @@ pub(super) struct ContactSolver {
     pub impulses: Vec<f64>,
     /// u = G λ + b (m/s), at the last λ. Shape: 3m. Written by: `solve`.
     pub velocities: Vec<f64>,
-    /// The impulses after Newton's step, and their u.
+    /// Impulses after Newton's step, and their u.
     candidate: Vec<f64>,
     candidate_velocities: Vec<f64>,
-    /// Newton's equation, its right-hand side and solution. Shape: 3m × 3m, and 3m.
+    /// Slope, right-hand side and solution of Newton's equation. Shape: 3m × 3m, and 3m.
     slope: Vec<f64>,
     step: Vec<f64>,
 }
@@ -91,8 +92,8 @@ impl ContactSolver {
         }
     }
 
-    /// Solves for λ of the first `points` points, with friction μ, to a residual of `tolerance` (m/s). One iteration is a burst
-    /// of Newton's method, and the sweeps if its steps are discarded. λ is inside its cones in any case.
+    /// Solves for λ of the first `points` points, with friction μ, to a residual of `tolerance` (m/s). One iteration is
+    /// a burst of Newton's method, plus the sweeps if its steps are discarded. λ is always inside its cones.
     pub(super) fn solve(&mut self, points: usize, friction: f64, tolerance: f64, max_iterations: usize) -> Outcome {
         let n = 3 * points;
         let Self { G, b, impulses, velocities, candidate, candidate_velocities, slope, step } = self;
@@ -142,13 +143,13 @@ impl ContactSolver {
     }
 }
 
-/// The numbers of one instant.
+/// Numbers of one instant.
 struct Problem<'a> {
     G: &'a [f64],
     b: &'a [f64],
     n: usize,
     friction: f64,
-    /// The largest entry on the diagonal of G, or 1 if nothing can move.
+    /// Largest entry on the diagonal of G, or 1 if nothing can move.
     scale: f64,
 }
 
@@ -163,26 +164,26 @@ impl<'a> Problem<'a> {
         self.G[j * self.n + i]
     }
 
-    /// g_t and g_n of the point whose rows begin at r: bounds of the eigenvalues of its blocks.
+    /// Returns g_t and g_n of the point whose rows begin at r: bounds of the eigenvalues of its blocks.
     fn stiffness(&self, r: usize) -> (f64, f64) {
         let least = LEAST * self.scale;
         ((self.entry(r, r) + self.entry(r + 1, r + 1)).max(least), self.entry(r + 2, r + 2).max(least))
     }
 
-    /// Row i of G λ + b.
+    /// Returns row i of G λ + b.
     fn velocity(&self, i: usize, x: &[f64]) -> f64 {
         let row = &self.G[i * self.n..][..self.n]; // G is symmetric
         row.iter().zip(x).fold(self.b[i], |sum, (g, x)| sum + g * x)
     }
 
-    /// u = G λ + b.
+    /// Computes u = G λ + b.
     fn multiply(&self, x: &[f64], u: &mut [f64]) {
         for (i, u) in u.iter_mut().enumerate() {
             *u = self.velocity(i, x);
         }
     }
 
-    /// Puts each impulse into its cone: λ_n ≥ 0, then ‖λ_t‖ ≤ μ λ_n.
+    /// Projects each impulse into its cone: λ_n ≥ 0, then ‖λ_t‖ ≤ μ λ_n.
     fn project(&self, x: &mut [f64]) {
         for x in x.chunks_exact_mut(3) {
             x[2] = x[2].max(0.0);
@@ -190,7 +191,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The largest distance from the fixed point, times g (m/s). It is not a number if one of λ is none.
+    /// Returns the largest distance from the fixed point, times g (m/s). It is NaN if a number of λ is NaN.
     fn residual(&self, x: &[f64], u: &[f64]) -> f64 {
         (0..self.n).step_by(3).fold(0.0, |largest: f64, r| {
             let (g_t, g_n) = self.stiffness(r);
@@ -203,8 +204,8 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// One sweep of Gauss–Seidel: the impulse of each point that solves its own law while the others stay. A point that
-    /// slides is brought nearer to it.
+    /// Runs one Gauss–Seidel sweep. It sets the impulse of each point to the solution of the point's own law, with all
+    /// other impulses fixed. For a sliding point, it only approaches this solution.
     fn sweep(&self, x: &mut [f64]) {
         for r in (0..self.n).step_by(3) {
             let mut block = [0, 1, 2].map(|i| [0, 1, 2].map(|j| self.entry(r + i, r + j)));
@@ -215,7 +216,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The impulse of one point: G its block, w its velocity without an impulse of its own.
+    /// Returns the impulse of one point. G is its block, w its velocity without its own impulse.
     fn alone(&self, G: [[f64; 3]; 3], w: [f64; 3], mut x: [f64; 3], (g_t, g_n): (f64, f64)) -> [f64; 3] {
         if w[2] >= 0.0 {
             return [0.0; 3]; // open: u = w
@@ -233,13 +234,13 @@ impl<'a> Problem<'a> {
         x
     }
 
-    /// The step of Newton's method: of F(λ) = 0 with
+    /// Computes a step d of Newton's method for F(λ) = 0, with
     ///
     /// - open: F = λ;
-    /// - closed: F_n = u_n, so d of it is the row of G + ε;
+    /// - closed: F_n = u_n, with the row of G + ε as slope;
     /// - sticking: F_t = u_t;
-    /// - sliding: F_t = λ_t − μ λ_n e, with e = z/‖z‖ and z = λ_t − u_t/g_t, so that
-    ///   dF_t = dλ_t − μ e dλ_n − μ λ_n/‖z‖ (1 − e eᵀ)(dλ_t − du_t/g_t).
+    /// - sliding: F_t = λ_t − μ λ_n e, with e = z/‖z‖ and z = λ_t − u_t/g_t, so that dF_t = dλ_t − μ e dλ_n − μ λ_n/‖z‖
+    ///   (1 − e eᵀ)(dλ_t − du_t/g_t).
     fn newton(&self, proximal: f64, x: &[f64], u: &[f64], A: &mut [f64], d: &mut [f64]) {
         let n = self.n;
         let epsilon = proximal * self.scale;
@@ -283,7 +284,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// ‖x‖.
+/// Returns ‖x‖.
 fn length([x, y]: [f64; 2]) -> f64 {
     Scalar::sqrt(x * x + y * y)
 }
@@ -292,7 +293,7 @@ fn dot([a, b, c]: [f64; 3], [x, y, z]: [f64; 3]) -> f64 {
     a * x + b * y + c * z
 }
 
-/// x of A x = b, for a positive definite A, by Cholesky's factor.
+/// Solves A x = b for a positive definite A, by Cholesky factorisation.
 fn solve3(A: [[f64; 3]; 3], b: [f64; 3]) -> [f64; 3] {
     let a = Scalar::sqrt(A[0][0]);
     let (l1, l2) = (A[1][0] / a, A[2][0] / a);
@@ -307,14 +308,14 @@ fn solve3(A: [[f64; 3]; 3], b: [f64; 3]) -> [f64; 3] {
     [(y0 - l1 * x1 - l2 * x2) / a, x1, x2]
 }
 
-/// The point of a disc about 0 that is nearest to z.
+/// Returns the point of a disc about 0 that is nearest to z.
 fn disc(z: [f64; 2], radius: f64) -> [f64; 2] {
     let size = length(z);
     if size <= radius { z } else { z.map(|z| z * (radius / size)) }
 }
 
-/// x in place of b: A x = b, by elimination with exchanges of rows; A is stored by columns and used up. Rows without a pivot
-/// give numbers that are not finite.
+/// Replaces b by the solution x of A x = b, by elimination with row exchanges. A is stored by columns and is
+/// overwritten. Rows without a pivot give numbers that are not finite.
 fn eliminate(A: &mut [f64], b: &mut [f64]) {
     let n = b.len();
     for k in 0..n {

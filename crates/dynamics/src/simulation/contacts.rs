@@ -1,5 +1,5 @@
-//! A step on the ground: gaps, Jacobians and the Delassus matrix of the points that may touch, the impulses, and the correction of
-//! what is below the plane. Model and equations: [`Ground`]; impulses: `contact_solver.rs`.
+//! A step on the ground: gaps, Jacobians and the Delassus matrix of the points that may touch, their impulses, and the
+//! correction of penetration. Model and equations: [`Ground`]; impulses: `contact_solver.rs`.
 
 use super::Status;
 use super::contact_solver::{ContactSolver, Outcome};
@@ -12,25 +12,26 @@ use condyle_linalg::{Ltdl, dot};
 use condyle_model::{Error, Model};
 use condyle_spatial::{Act, Matrix, Vec3, matrix};
 
-/// Maximum distance from the plane at which a point counts as on it (m). The solver's tolerance moves a point that rests by less
-/// (1e-12 m a step); if such distances were made up for, the points of a sole would take turns in bearing it.
+/// Maximum distance from the plane at which a point counts as on the plane (m). The solver's tolerance moves a resting
+/// point by less (1e-12 m per step). If such distances were corrected, the corners of a sole would alternately carry
+/// the load.
 const RESTING: f64 = 1e-7;
-/// Share of its depth by which a point is taken out of the ground in a step.
+/// Share of its depth by which a penetrating point is moved out of the ground in a step.
 const OUT: f64 = 0.2;
-/// Maximum speed at which that happens (m/s).
+/// Maximum speed of this correction (m/s).
 const OUT_SPEED: f64 = 0.5;
-/// Multiple of the speed that gravity gives in a step, below which a point that hits the ground does not leave it again: the
-/// restitution of a point at rest would shake it.
+/// Multiple of the speed that gravity produces in a step. A point that hits the ground more slowly does not bounce;
+/// otherwise restitution would shake a resting point.
 const REST: f64 = 2.0;
 
-/// A step on the ground: [`Contacts::advance`].
+/// Function that computes a step on the ground: [`Contacts::advance`].
 type Step = fn(&mut Contacts, &Model, &mut Data<f64>, f64, (&[f64], &[f64]), &mut [f64]) -> Status;
 
 /// Memory for the contacts of one robot with its ground. P is the number of points.
 #[derive(Clone, Debug)]
 pub(super) struct Contacts {
     pub ground: Ground,
-    /// [`advance`](Self::advance). It is called by this pointer, so that programs without a ground do not contain its code.
+    /// Pointer to [`advance`](Self::advance). The call by pointer keeps its code out of programs without a ground.
     pub step: Step,
     /// Two unit vectors along the plane, then its normal.
     axes: [Vec3<f64>; 3],
@@ -44,12 +45,12 @@ pub(super) struct Contacts {
     jacobian: Matrix<f64>,
     /// Rows of J of all points along the axes, one row after the other. Shape: 3P × nv.
     J: Vec<f64>,
-    /// Rows of J M⁻¹, as `J`, of the points in the program.
+    /// Rows of J M⁻¹ of the active points, stored like `J`.
     Y: Vec<f64>,
-    /// φ: the distance to the plane (m), 0 where it is less than `RESTING`. Shape: P.
+    /// φ, the distance to the plane (m); 0 if it is less than `RESTING`. Shape: P.
     gaps: Vec<f64>,
     positions: Vec<Vec3<f64>>,
-    /// The points in the program, in the order in which they came to it. Shape: up to P.
+    /// Indices of the active points, whose impulses are solved for, in the order of activation. Shape: up to P.
     active: Vec<usize>,
     factor: Ltdl<f64>,
     solver: ContactSolver,
@@ -79,14 +80,15 @@ impl Contacts {
         })
     }
 
-    /// Forgets the last step: the next one depends on its state alone.
+    /// Clears the results of the last step, so that the next step depends on the state only.
     pub(super) fn reset(&mut self) {
         self.impulses.fill(0.0);
         let nothing = GroundContact { position: Vec3::zero(), force: Vec3::zero(), touches: false };
         self.results.fill(nothing);
     }
 
-    /// v_next, the velocity after a step without contacts, becomes the one with them; q and v are the state before it.
+    /// Replaces v_next, the velocity after a step without contacts, by the velocity with contacts. q and v are the
+    /// state before the step.
     fn advance(
         &mut self,
         model: &Model,
@@ -97,13 +99,13 @@ impl Contacts {
     ) -> Status {
         self.correction.fill(0.0);
         if !v_next.iter().all(|v| v.is_finite()) {
-            return Status::Done; // the caller sees that it is not finite
+            return Status::Done; // the caller detects it
         }
         self.place(model, data, q);
         self.factor.factorize(crba(model, data, q));
         self.active.clear();
         for i in 0..self.gaps.len() {
-            // a point that would be below the plane, or was pushed in the last step
+            // Activate a point that would be below the plane, or that had an impulse in the last step.
             let reached = self.gaps[i] + h * self.normal_speed(i, v_next);
             if reached < 0.0 || self.impulses[3 * i + 2] > 0.0 {
                 self.add(i);
@@ -112,7 +114,7 @@ impl Contacts {
         let rest = REST * h * model.gravity().norm();
         let outcome = loop {
             let outcome = self.solve(h, v, v_next, rest);
-            // points outside of the program that the impulses of the others would push below the plane
+            // Activate further points that the impulses of the others would push below the plane.
             let before = self.active.len();
             for i in 0..self.gaps.len() {
                 let reached = self.gaps[i] + h * self.speed_after(i, v_next);
@@ -132,7 +134,7 @@ impl Contacts {
         }
     }
 
-    /// Positions, gaps and Jacobians of all points.
+    /// Computes positions, gaps and Jacobians of all points.
     fn place(&mut self, model: &Model, data: &mut Data<f64>, q: &[f64]) {
         let nv = model.nv();
         let placements = forward_kinematics(model, data, q);
@@ -151,13 +153,13 @@ impl Contacts {
         }
     }
 
-    /// Row k of J of point i.
+    /// Returns row k of J of point i.
     fn row(&self, i: usize, k: usize) -> &[f64] {
         let nv = self.correction.len();
         &self.J[(3 * i + k) * nv..][..nv]
     }
 
-    /// Puts a point into the program: its rows of J M⁻¹.
+    /// Activates a point and computes its rows of J M⁻¹.
     fn add(&mut self, i: usize) {
         let (nv, at) = (self.correction.len(), 3 * self.active.len());
         for k in 0..3 {
@@ -168,19 +170,19 @@ impl Contacts {
         self.active.push(i);
     }
 
-    /// J_n v of a point.
+    /// Returns J_n v of a point.
     fn normal_speed(&self, i: usize, v: &[f64]) -> f64 {
         dot(self.row(i, 2), v)
     }
 
-    /// J_n (v + M⁻¹ Jᵀ λ) of a point, with the impulses of the program.
+    /// Returns J_n (v + M⁻¹ Jᵀ λ) of a point, with the impulses λ of the active points.
     fn speed_after(&self, i: usize, v: &[f64]) -> f64 {
         let (nv, row) = (v.len(), self.row(i, 2));
         let pushes = self.Y.chunks_exact(nv.max(1)).zip(&self.solver.impulses).take(3 * self.active.len());
         pushes.fold(dot(row, v), |sum, (Y, &impulse)| sum + impulse * dot(row, Y))
     }
 
-    /// The impulses of the points in the program: G = J M⁻¹ Jᵀ, b = J v plus what the gaps ask for.
+    /// Computes the impulses of the active points, with G = J M⁻¹ Jᵀ and b = J v plus the terms of the gaps.
     fn solve(&mut self, h: f64, v: &[f64], v_next: &[f64], rest: f64) -> Outcome {
         let (nv, points) = (v.len(), self.active.len());
         let n = 3 * points;
@@ -199,13 +201,13 @@ impl Contacts {
                 self.solver.G[a * n + c] = g;
             }
             self.solver.b[a] = b;
-            self.solver.impulses[a] = self.impulses[3 * i + k]; // the first guess
+            self.solver.impulses[a] = self.impulses[3 * i + k]; // first guess
         }
         let Ground { friction, tolerance, max_iterations, .. } = self.ground;
         self.solver.solve(points, friction, tolerance, max_iterations)
     }
 
-    /// v⁺ = v_next + M⁻¹ Jᵀ λ, and the forces λ/h.
+    /// Computes v⁺ = v_next + M⁻¹ Jᵀ λ, and stores the forces λ/h.
     fn record(&mut self, h: f64, v_next: &mut [f64]) {
         let nv = v_next.len();
         self.impulses.fill(0.0);
@@ -226,7 +228,8 @@ impl Contacts {
         }
     }
 
-    /// w = M⁻¹ J_nᵀ π with 0 ≤ π ⊥ J_n (v⁺ + w) − (share of the depth)/h ≥ 0: contacts without friction.
+    /// Computes the correction w = M⁻¹ J_nᵀ π, as contacts without friction: 0 ≤ π ⊥ J_n (v⁺ + w) − (share of the
+    /// depth)/h ≥ 0.
     fn correct(&mut self, h: f64, v_next: &[f64]) {
         let (nv, points) = (v_next.len(), self.active.len());
         let mut deep = false;
@@ -248,9 +251,9 @@ impl Contacts {
     }
 }
 
-/// Two unit vectors at right angles to n and to each other, then n. For z they are x and y.
+/// Returns two orthogonal unit vectors perpendicular to n, then n. For n = z they are x and y.
 fn axes(n: Vec3<f64>) -> [Vec3<f64>; 3] {
-    // Duff et al. (2017): without cancellation for any n
+    // Duff et al. (2017): no cancellation for any n.
     let sign = 1f64.copysign(n.z);
     let a = -1.0 / (sign + n.z);
     let b = n.x * n.y * a;

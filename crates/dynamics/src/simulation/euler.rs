@@ -1,4 +1,4 @@
-//! The semi-implicit (symplectic) Euler method.
+//! Semi-implicit (symplectic) Euler method.
 
 use super::{Input, acceleration};
 use crate::data::Data;
@@ -9,14 +9,14 @@ use condyle_spatial::{Array, Constant, Scalar};
 
 workspace! {
     pub(super) struct Workspace<S>(size) {
-        /// Efforts, the passive ones included. Written by: `velocity`.
+        /// Efforts, including the passive ones. Written by: `velocity`.
         effort: Array<S> = filled(S::zero, size.nv),
         /// h v'. Written by: `position`.
         way: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// v' = v + h a: the velocity after the step, without the ground.
+/// Computes v' = v + h a, the velocity after the step, without the ground.
 #[track_caller]
 pub(super) fn velocity<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -32,7 +32,7 @@ pub(super) fn velocity<S: Scalar, R: Constant<S>>(
     }
 }
 
-/// q' = q ⊕ h (v' + w): the position after the step. The correction w is empty, or has nv numbers.
+/// Computes q' = q ⊕ h (v' + w), the position after the step. The correction w is empty, or has nv numbers.
 pub(super) fn position<S: Scalar, R>(
     model: &Model<R>,
     d: &mut Workspace<S>,

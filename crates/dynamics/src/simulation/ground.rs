@@ -1,4 +1,4 @@
-//! The ground on which a simulated robot stands: a plane, and the points of the robot that may touch it.
+//! Ground on which a simulated robot stands: a plane, and the points of the robot that may touch it.
 
 use condyle_model::{Error, Model};
 use condyle_spatial::Vec3;
@@ -6,8 +6,8 @@ use condyle_spatial::Vec3;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Distance from 1 to which rounding takes the length of a vector that was divided by it. Such a normal stays as it is, to the
-/// last bit.
+/// Tolerance within which a normal's length counts as 1; it covers the rounding of a normalised vector. Such a normal
+/// keeps its exact bits.
 const UNIT: f64 = 1e-15;
 
 /// Point of a robot that may touch the ground.
@@ -23,10 +23,10 @@ pub struct GroundPoint {
 
 /// Plane on which a robot stands, slides and lands, and the points of the robot that may touch it.
 ///
-/// The model is that of rigid bodies and Coulomb's friction, at the level of velocities (Moreau 1988; Stewart and Trinkle 1996;
-/// Anitescu and Potra 1997), with the steps of [`SemiImplicitEuler`](super::Integrator::SemiImplicitEuler). Each point has its
-/// gap φ to the plane, its velocity u⁺ = J v⁺ after the step, with a part along the normal and one along the plane, and an
-/// impulse λ:
+/// The model combines rigid bodies with Coulomb friction, formulated with velocities (Moreau 1988; Stewart and Trinkle
+/// 1996; Anitescu and Potra 1997), and uses the steps of [`SemiImplicitEuler`](super::Integrator::SemiImplicitEuler).
+/// Each point has its gap φ to the plane and its impulse λ. Its velocity u⁺ = J v⁺ after the step has a part along the
+/// normal and a part along the plane:
 ///
 /// ```text
 /// v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ
@@ -34,16 +34,21 @@ pub struct GroundPoint {
 /// ‖λ_t‖ ≤ μ λ_n,  and λ_t = −μ λ_n u_t⁺/‖u_t⁺‖ where u_t⁺ ≠ 0       Coulomb's disc: no pyramid
 /// ```
 ///
-/// So a point that comes near is slowed down to arrive at the plane at the end of a step, without penetration to first order.
-/// With a restitution e, a point that would hit the plane faster than 2 h ‖g‖ leaves it with e times its speed instead (Newton's
-/// law). Where a point is below the plane, in the first state or by the curvature of its path, a correction w of the step's
-/// displacement, q⁺ = q ⊕ h (v⁺ + w), takes it out by a fifth of its depth a step, at no more than 0.5 m/s. w is never part of the
-/// velocity, so depth does not become speed.
+/// A point that approaches the plane is slowed down so that it arrives at the end of a step, without penetration to
+/// first order. With a restitution e, a point that would hit the plane faster than 2 h ‖g‖ leaves it with e times its
+/// speed instead (Newton's law). A point may be below the plane, in the initial state or because its path is curved.
+/// Then a correction w of the step's displacement, q⁺ = q ⊕ h (v⁺ + w), reduces the depth by a fifth per step, at no
+/// more than 0.5 m/s. w is never part of the velocity, so depth does not become speed.
 ///
-/// Limits. Errors are O(h): contact begins and ends on a step, and so does sliding. Contacts take no energy but give none either:
-/// kinetic energy never grows by λ, except for e > 0 with several contacts and friction, where Newton's law can. Contacts of
-/// edges, of other bodies and with each other do not exist, nor do rolling resistance and torsional friction: a sole resists
-/// turning by its corners. Impulses of redundant contacts are not unique; their sum is. Forces are mean values over a step.
+/// Limits:
+///
+/// - Errors are O(h): contact and sliding begin and end at the ends of steps.
+/// - Contacts store no energy and add none: λ never increases the kinetic energy. The exception is e > 0 with several
+///   contacts and friction, where Newton's law can increase it.
+/// - Contacts of edges, of other bodies and between bodies are not modelled, nor are rolling resistance and torsional
+///   friction. A sole resists turning by its corners.
+/// - Impulses of redundant contacts are not unique; their sum is.
+/// - Forces are mean values over a step.
 ///
 /// ```
 /// use condyle_dynamics::{Vec3, neutral, robots};
@@ -68,19 +73,19 @@ pub struct GroundPoint {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Ground {
-    /// n, the direction out of the ground, in the world's frame; made a unit vector by
-    /// [`set_ground`](super::Simulation::set_ground).
+    /// n, the direction out of the ground, in the world's frame. [`set_ground`](super::Simulation::set_ground)
+    /// normalises it.
     pub normal: Vec3<f64>,
-    /// Height of the plane along n (m): n · p of its points p.
+    /// Height of the plane along n (m): n · p for each point p of the plane.
     pub height: f64,
     /// μ, Coulomb's coefficient of friction, at least 0.
     pub friction: f64,
-    /// e, the share of the normal speed that a point has after it has hit the ground, from 0 to 1.
+    /// e, the ratio of a point's normal speed after the impact to the speed before it, from 0 to 1.
     pub restitution: f64,
     /// Points of the robot that may touch the plane.
     pub points: Vec<GroundPoint>,
-    /// Largest error in the laws of contact (m/s): a point at rest moves no faster. Most steps end far below it, since the last
-    /// step of Newton's method squares the error.
+    /// Maximum error in the laws of contact (m/s): a point at rest moves no faster. Most steps end far below it, since
+    /// the last step of Newton's method squares the error.
     pub tolerance: f64,
     /// Maximum number of iterations of the contact solver in a step; each is a step of Newton's method or a few sweeps of
     /// Gauss–Seidel.
@@ -88,7 +93,8 @@ pub struct Ground {
 }
 
 impl Default for Ground {
-    /// The plane z = 0 with friction 0.7, no restitution, and no points; a tolerance of 1e-8 m/s and 500 iterations.
+    /// Returns the plane z = 0 with friction 0.7, no restitution, and no points; a tolerance of 1e-8 m/s and 500
+    /// iterations.
     fn default() -> Self {
         Self {
             normal: Vec3::new(0.0, 0.0, 1.0),
@@ -103,12 +109,12 @@ impl Default for Ground {
 }
 
 impl Ground {
-    /// The default ground, which the origins of some frames may touch.
+    /// Returns the default ground, with the origins of some frames as its points.
     pub fn at_frames(frames: impl IntoIterator<Item = usize>) -> Self {
         frames.into_iter().fold(Self::default(), |ground, frame| ground.with_sole(frame, &[Vec3::zero()]))
     }
 
-    /// The same ground with a sole: a polygon by its corners, in its frame (m). One corner is a point.
+    /// Adds a sole, a polygon given by its corners in its frame (m), and returns the ground. One corner is a point.
     ///
     /// ```
     /// use condyle_dynamics::{Vec3, robots, simulation::Ground};
@@ -124,7 +130,7 @@ impl Ground {
         self
     }
 
-    /// Checks all numbers for a robot, and makes the normal a unit vector.
+    /// Checks all numbers for a robot, and normalises the normal.
     pub(super) fn checked(mut self, model: &Model) -> Result<Self, Error> {
         let wrong = |what: String| Err(Error::Ground { what });
         let Vec3 { x, y, z } = self.normal;

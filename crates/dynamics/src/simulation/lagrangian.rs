@@ -1,16 +1,16 @@
-//! The momentum and the slope of the Lagrangian L(q, v) = ½ vᵀ M(q) v − V(q), with their derivatives.
+//! Momentum and slope of the Lagrangian L(q, v) = ½ vᵀ M(q) v − V(q), with their derivatives.
 //!
-//! In the world's frame, with composite quantities (sums over all that a joint carries: inertia Iᶜ, momentum hᶜ, and the
-//! force Fᶜ that holds it still), Ψ̇ = v_λ × S and Ψ̈ = −g × S. What joint j carries turns about S_e when coordinate e of
-//! the joint changes, and its bodies move faster by Ψ̇_e beside that: ∂v_i/∂q_e = S_e × v_i + Ψ̇_e (see
-//! `rnea_derivatives.rs`). Turning all changes no energy, so
+//! In the world's frame, composite quantities are sums over all bodies that a joint carries: inertia Iᶜ, momentum hᶜ,
+//! and the force Fᶜ that holds the bodies still. Let Ψ̇ = v_λ × S and Ψ̈ = −g × S. When coordinate e of joint j
+//! changes, the bodies that j carries turn about S_e, and their velocity also changes by Ψ̇_e: ∂v_i/∂q_e = S_e × v_i +
+//! Ψ̇_e (see `rnea_derivatives.rs`). The turn alone changes no energy, so
 //!
 //! ```text
 //! p_e = (M v)_e = S_e · hᶜ,   ∂L/∂q_e = Ψ̇_e · hᶜ − S_e · Fᶜ
 //! ∂hᶜ/∂q_d = S_d ×* hᶜ + Iᶜ Ψ̇_d,   ∂Fᶜ/∂q_d = S_d ×* Fᶜ + Iᶜ Ψ̈_d      (Iᶜ, hᶜ, Fᶜ of the joint of d)
 //! ```
 //!
-//! and for each column d and each column e on its way to the root
+//! and for each column d and each column e on its path to the root
 //!
 //! ```text
 //! ∂p_d/∂q_e = Ψ̇_e · Iᶜ S_d                        ∂p_e/∂q_d = S_e · ∂hᶜ/∂q_d
@@ -23,7 +23,7 @@ use condyle_model::layout::Pairs;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Motion, Scalar, Vec3};
 
 workspace! {
-    /// In the world's frame; matrices by columns.
+    /// Quantities in the world's frame; matrices are stored by columns.
     pub(super) struct Workspace<S>(size) {
         /// Velocity. Written by: `pass`.
         v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
@@ -45,13 +45,13 @@ workspace! {
         pub(super) M: Array<S> = filled(S::zero, size.nv * size.nv),
         /// ∂p/∂q, and its transpose ∂²L/∂q∂v. Written by: `pass`.
         pub(super) p_q: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// ∂²L/∂q∂q, row by row how ∂L/∂q changes. Written by: `pass`.
+        /// ∂²L/∂q∂q; row i is the derivative of entry i of ∂L/∂q. Written by: `pass`.
         pub(super) L_qq: Array<S> = filled(S::zero, size.nv * size.nv),
     }
 }
 
-/// All of it, for bodies that are placed, in O(n · depth). External forces take part in ∂L/∂q as if they were slopes of a
-/// potential, which they need not be: ∂²L/∂q∂q is then not symmetric.
+/// Computes all quantities for bodies whose placements are known, in O(n · depth). External forces enter ∂L/∂q like the
+/// slope of a potential, although they may have none. Then ∂²L/∂q∂q is not symmetric.
 #[inline(always)]
 pub(super) fn pass<L: Pairs>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>, qd: &[L::S], f_ext: &[Force<L::S>]) {
     let (oX, S) = (&w.oX, &w.S);

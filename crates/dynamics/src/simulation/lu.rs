@@ -1,12 +1,12 @@
-//! A dense factor A = L U on any scalar, stored by columns, without exchanges of rows.
+//! Dense factorisation A = L U on any scalar, stored by columns, without row exchanges.
 //!
-//! It is for matrices M + O(h) near a positive definite M: those have positive definite symmetric parts, for which
-//! elimination in the given order is stable (Golub and Van Loan, *Matrix Computations*, section 4.3.2).
+//! It is for matrices M + O(h) near a positive definite M. Their symmetric parts are positive definite, so elimination
+//! in the given order is stable (Golub and Van Loan, *Matrix Computations*, section 4.3.2).
 
 use condyle_linalg::axpy::axpy;
 use condyle_spatial::Scalar;
 
-/// L (its diagonal of ones left out) and U in place of A.
+/// Replaces A by L (without its unit diagonal) and U.
 pub(super) fn factorize<S: Scalar>(A: &mut [S], n: usize) {
     for j in 0..n {
         let (left, rest) = A.split_at_mut(j * n);
@@ -22,7 +22,7 @@ pub(super) fn factorize<S: Scalar>(A: &mut [S], n: usize) {
     }
 }
 
-/// x in place of b: L U x = b.
+/// Replaces b by the solution x of L U x = b.
 pub(super) fn solve<S: Scalar>(LU: &[S], b: &mut [S]) {
     let n = b.len();
     for j in 0..n {

@@ -1,7 +1,7 @@
-//! Robots that move by themselves: (q, v) from one instant to the next, on the joints' own groups.
+//! Simulation of robots: steps from (q, v) at one instant to the next, on the joints' groups.
 //!
 //! Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). Three
-//! [`Integrator`]s step them; a [`Simulation`] owns the state and everything they need.
+//! [`Integrator`]s compute steps; a [`Simulation`] owns the state and all scratch.
 //!
 //! ```
 //! use condyle_dynamics::{neutral, robots};
@@ -15,7 +15,8 @@
 //! # Ok::<(), condyle_dynamics::Error>(())
 //! ```
 //!
-//! A [`Ground`] lets it stand, slide, land and lift off. Limits of joints do not act: a control law can hold them.
+//! With a [`Ground`], the robot can stand, slide, land and lift off. Joint limits are not enforced; a control law can
+//! enforce them.
 
 mod contact_solver;
 mod contacts;
@@ -45,26 +46,25 @@ pub use ground::{Ground, GroundContact, GroundPoint};
 pub use state::State;
 pub use status::Status;
 
-/// The method by which a step is computed. τ and the external forces stay as they are during a step, forces in the body's
-/// frame;
-/// [passive torques](crate::passive_torque) follow position and velocity within it.
+/// Method that computes a step. τ and the external forces are constant during a step, the forces in the body's frame.
+/// [Passive torques](crate::passive_torque) follow position and velocity within the step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Integrator {
-    /// v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation. Where M is constant it is symplectic; elsewhere
-    /// the Coriolis forces are those of the beginning of the step, and what spins fast without damping gains energy,
-    /// light links without bound. Fit for damped robots and short horizons.
+    /// Semi-implicit Euler: v' = v + h aba(q, v, τ), q' = q ⊕ h v'. Order 1, one evaluation. It is symplectic where M
+    /// is constant. Otherwise the Coriolis forces are evaluated at the beginning of the step. Bodies that spin fast
+    /// without damping then gain energy, light links without bound. Suitable for damped robots and short horizons.
     SemiImplicitEuler,
-    /// The classical method of Runge and Kutta for ξ̇ = J_log(ξ) v, v̇ = aba(q₀ ⊕ ξ, v, τ) (Munthe-Kaas, *Runge-Kutta
-    /// methods on Lie groups*, 1998). Order 4, four evaluations; its energy drifts by O(h⁴) per second.
+    /// Classical Runge–Kutta method for ξ̇ = J_log(ξ) v, v̇ = aba(q₀ ⊕ ξ, v, τ) (Munthe-Kaas, *Runge-Kutta methods on
+    /// Lie groups*, 1998). Order 4, four evaluations; the energy drifts by O(h⁴) per second.
     RungeKutta4,
-    /// The variational integrator of the midpoint Lagrangian (Marsden and West, *Discrete mechanics and variational
-    /// integrators*, 2001; on groups: Bou-Rabee and Marsden, *Hamilton–Pontryagin integrators on Lie groups*, 2009),
-    /// solved by Newton's method with exact derivatives. Order 2, symmetric, symplectic: the energy sways by O(h²) and
-    /// does not drift, momentum is conserved to rounding. Its equation has no solution where a velocity changes by much
-    /// more than itself in a step ([`Status::NotConverged`]).
+    /// Variational integrator of the midpoint Lagrangian, solved by Newton's method with exact derivatives. Order 2,
+    /// symmetric, symplectic: the energy oscillates by O(h²) without drift, and momentum is conserved to rounding. Its
+    /// equation has no solution if a velocity changes by much more than itself in a step ([`Status::NotConverged`]).
+    /// Source: Marsden and West, *Discrete mechanics and variational integrators*, 2001; on groups: Bou-Rabee and
+    /// Marsden, *Hamilton–Pontryagin integrators on Lie groups*, 2009.
     Variational,
 }
 
@@ -73,44 +73,44 @@ pub enum Integrator {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Settings {
-    /// The method.
+    /// Method of the steps.
     pub integrator: Integrator,
     /// h, the length of a step (s), above 0.
     pub dt: f64,
-    /// The smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s), if the joints' damping and friction,
-    /// springs and gravity compensation are to act; `None` for none of these.
+    /// Smoothing ε of [`passive_torque`](crate::passive_torque()) (rad/s, m/s). `None` switches off damping, friction,
+    /// springs and gravity compensation of the joints.
     pub passive: Option<f64>,
-    /// Newton's method makes its last iteration, which squares the error, once the momenta balance to within this part of
-    /// their sum.
+    /// Relative error of the momentum balance below which Newton's method makes its last iteration, which squares the
+    /// error.
     pub tolerance: f64,
-    /// Newton's method gives up after so many iterations.
+    /// Maximum number of iterations of Newton's method.
     pub max_iterations: usize,
 }
 
 impl Default for Settings {
-    /// Semi-implicit Euler at 1 kHz, no passive torques; 1e-9 and 20.
+    /// Returns semi-implicit Euler at 1 kHz without passive torques, a tolerance of 1e-9 and 20 iterations.
     fn default() -> Self {
         Self { integrator: Integrator::SemiImplicitEuler, dt: 1e-3, passive: None, tolerance: 1e-9, max_iterations: 20 }
     }
 }
 
-/// The state that a control law sees before a step, and the efforts and forces that it sets.
+/// State that a control law reads before a step, and the efforts and forces that it sets.
 #[derive(Debug)]
 pub struct Control<'a, S> {
-    /// The time at which the step begins (s).
+    /// Time at which the step begins (s).
     pub time: f64,
-    /// The position, nq numbers.
+    /// Position, nq numbers.
     pub q: &'a [S],
-    /// The velocity, nv numbers.
+    /// Velocity, nv numbers.
     pub v: &'a [S],
-    /// The joint efforts during the step, nv numbers (N m, N); 0 when the law is called.
+    /// Joint efforts during the step, nv numbers (N m, N); 0 when the law is called.
     pub tau: &'a mut [S],
-    /// The force on each body during the step (N, N m), at its origin and in its frame, number 0 being the world's; 0
-    /// when the law is called.
+    /// Force on each body during the step (N, N m), at its origin and in its frame, index 0 is the world; 0 when the
+    /// law is called.
     pub f_ext: &'a mut [Force<S>],
 }
 
-/// The efforts and forces that act during a step.
+/// Efforts and forces that act during a step.
 #[derive(Clone, Copy)]
 struct Input<'a, S> {
     h: S,
@@ -119,12 +119,12 @@ struct Input<'a, S> {
     passive: Option<f64>,
 }
 
-/// A robot's state, and all that is needed to move it on: nothing is allocated after [`new`](Self::new) and
-/// [`set_ground`](Self::set_ground).
+/// State of a robot, and all memory to advance it. After [`new`](Self::new) and [`set_ground`](Self::set_ground),
+/// nothing is allocated.
 ///
-/// It shares its model, so it may be stored, cloned and sent to another thread. Several simulations run side by side on a scalar
-/// with lanes, and on dual numbers a simulation gives its own derivatives. Newton's method then iterates until all lanes have
-/// converged. A ground acts on `f64` only.
+/// It shares its model, so it may be stored, cloned and sent to another thread. A scalar with lanes runs several
+/// simulations in parallel, and dual numbers give derivatives of the simulation. Newton's method then iterates until
+/// all lanes have converged. A ground acts on `f64` only.
 #[derive(Clone, Debug)]
 pub struct Simulation<S: Scalar = f64, R = f64> {
     /// Method and step; may be changed between steps.
@@ -134,10 +134,10 @@ pub struct Simulation<S: Scalar = f64, R = f64> {
     time: f64,
     q: Vec<S>,
     v: Vec<S>,
-    /// The state after the step that is being computed.
+    /// State after the step that is being computed.
     q_next: Vec<S>,
     v_next: Vec<S>,
-    /// The efforts that the control law sets, and the forces.
+    /// Efforts that the control law sets, and the forces.
     tau: Vec<S>,
     f_ext: Vec<Force<S>>,
     euler: euler::Workspace<S>,
@@ -147,14 +147,14 @@ pub struct Simulation<S: Scalar = f64, R = f64> {
 }
 
 impl Simulation<f64> {
-    /// Puts the robot on a ground, in place of the one before; one without points takes it away.
+    /// Sets the ground and replaces the previous one. A ground without points removes it.
     ///
-    /// The state stays, also where points are below the ground. Allocates what the ground needs.
+    /// The state is kept, even if points are below the ground. Allocates the memory of the ground.
     ///
     /// # Errors
-    /// [`Error::Ground`] if the integrator is another one than
-    /// [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame does not exist or is fixed to the world, the normal is no
-    /// direction, the restitution is not in 0..=1, or another number is not finite or negative.
+    /// [`Error::Ground`] if the integrator is not [`SemiImplicitEuler`](Integrator::SemiImplicitEuler), a frame does
+    /// not exist or is fixed to the world, or the normal is no direction. Also if the restitution is not in 0..=1, the
+    /// friction or the tolerance is negative, or a number is not finite.
     pub fn set_ground(&mut self, ground: Ground) -> Result<(), Error> {
         if self.settings.integrator != Integrator::SemiImplicitEuler {
             let what =
@@ -166,21 +166,22 @@ impl Simulation<f64> {
         Ok(())
     }
 
-    /// The ground on which the robot stands, if it has one.
+    /// Returns the ground, if the robot has one.
     pub fn ground(&self) -> Option<&Ground> {
         self.ground.as_ref().map(|contacts| &contacts.ground)
     }
 
-    /// The contacts of the ground's points in the last step, in their order; none before the first step is taken.
+    /// Returns the contacts of the ground's points in the last step, in the order of the points. Before the first step,
+    /// no contact touches.
     pub fn contacts(&self) -> &[GroundContact] {
         self.ground.as_ref().map_or(&[], |contacts| &contacts.results)
     }
 }
 
 impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
-    /// Allocates everything; the robot is at [`neutral`](crate::neutral), at rest, at time 0.
+    /// Allocates all memory and sets the robot to [`neutral`](crate::neutral), at rest, at time 0.
     ///
-    /// model: an [`Arc`] of it, which is shared; the model itself, which is moved; or `&model`, which is copied.
+    /// model: an [`Arc`] of a model, which is shared; a model, which is moved; or `&model`, which is copied.
     pub fn new(model: impl Into<Arc<Model<R>>>, settings: Settings) -> Self {
         let model = model.into();
         let q: Vec<S> = crate::neutral(&model).into_iter().map(S::splat).collect();
@@ -203,33 +204,33 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         }
     }
 
-    /// The robot.
+    /// Returns the robot.
     pub fn model(&self) -> &Arc<Model<R>> {
         &self.model
     }
 
-    /// The position, nq numbers.
+    /// Returns the position, nq numbers.
     pub fn q(&self) -> &[S] {
         &self.q
     }
 
-    /// The velocity, nv numbers.
+    /// Returns the velocity, nv numbers.
     pub fn v(&self) -> &[S] {
         &self.v
     }
 
-    /// The sum of the steps since the state was set (s).
+    /// Returns the sum of the steps since the state was set (s).
     pub fn time(&self) -> f64 {
         self.time
     }
 
-    /// Puts the robot at position q with velocity v, and the clock to 0. Allocates nothing.
+    /// Sets the position to q, the velocity to v and the time to 0. Allocates nothing.
     ///
-    /// q: nq numbers; v: nv. Numbers of `f64` are checked, other scalars are not.
+    /// q: nq numbers; v: nv. The numbers are checked only for `f64`.
     ///
     /// # Errors
-    /// [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in it does not have length 1 up
-    /// to 1e-3; [`Error::Velocity`] if a number of v is not finite. The state is then the one before.
+    /// [`Error::Position`] if a number of q is not finite, or a quaternion or a pair (cos, sin) in q does not have
+    /// length 1 up to 1e-3; [`Error::Velocity`] if a number of v is not finite. The old state is then kept.
     ///
     /// # Panics
     /// If an argument has the wrong length.
@@ -252,10 +253,11 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         Ok(())
     }
 
-    /// One step of `settings.dt` under constant efforts and forces.
+    /// Makes one step of `settings.dt` under constant efforts and forces.
     ///
-    /// tau: nv numbers (N m, N); f_ext: a force on each body as in [`aba`](crate::aba()), or empty for none. O(n) for the
-    /// explicit integrators; for the variational one O(n³) in each of some three iterations. Allocates nothing.
+    /// tau: nv numbers (N m, N); f_ext: one force per body as in [`aba`](crate::aba()), or empty for none. Costs O(n)
+    /// for the explicit integrators, and O(n³) for each of about three iterations of the variational one. Allocates
+    /// nothing.
     ///
     /// ```
     /// use condyle_dynamics::{robots, simulation::{Integrator, Settings, Simulation}};
@@ -266,8 +268,8 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     /// ```
     ///
     /// # Panics
-    /// If an argument has the wrong length, the smoothing of passive torques is not positive, `settings.dt` is not above 0 or
-    /// not finite, or there is a ground and `settings.integrator` is not semi-implicit Euler.
+    /// If an argument has the wrong length, the smoothing of passive torques is not positive, or `settings.dt` is not a
+    /// finite number above 0. Also if the simulation has a ground and `settings.integrator` is not semi-implicit Euler.
     #[track_caller]
     pub fn step(&mut self, tau: &[S], f_ext: &[Force<S>]) -> Status {
         check("tau", tau.len(), self.model.nv());
@@ -310,9 +312,9 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
         status
     }
 
-    /// A number of steps, with a control law that is called before each of them; ends early when one is not taken. Returns the
-    /// status of that step, or else [`ContactsNotConverged`](Status::ContactsNotConverged) with the largest error if a step had
-    /// it.
+    /// Makes several steps and calls a control law before each of them. It stops early at a step that fails, and
+    /// returns the status of that step. Otherwise it returns [`ContactsNotConverged`](Status::ContactsNotConverged)
+    /// with the largest error if a step reported it.
     ///
     /// Allocates nothing, unless the law does.
     ///
@@ -337,12 +339,13 @@ impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
     }
 }
 
-/// The numbers of a vector of doubles.
+/// Returns the numbers of a vector of doubles.
 fn doubles(x: &dyn Any) -> Option<&[f64]> {
     x.downcast_ref::<Vec<f64>>().map(Vec::as_slice)
 }
 
-/// Turns the velocity after a step without contacts into the velocity with them. Only simulations of `f64` have a ground.
+/// Converts the velocity after a step without contacts to the velocity with contacts. Only simulations of `f64` have a
+/// ground.
 fn on_ground(
     ground: Option<&mut contacts::Contacts>,
     (model, data): (&dyn Any, &mut dyn Any),
@@ -360,7 +363,7 @@ fn on_ground(
     }
 }
 
-/// aba(q, v, τ + passive torque).
+/// Returns aba(q, v, τ + passive torque).
 #[inline(always)]
 #[track_caller]
 fn acceleration<'d, S: Scalar, R: Constant<S>>(

@@ -1,13 +1,13 @@
-//! The classical Runge–Kutta method on the joints' groups.
+//! Classical Runge–Kutta method on the joints' groups.
 //!
-//! Source: Munthe-Kaas, *Runge–Kutta methods on Lie groups* (1998). Near q₀ the motion is q₀ ⊕ ξ(t), and since
-//! ∂(q₀ ⊕ ξ)/∂ξ is the group's Jacobian J_exp(ξ) = J_log(ξ)⁻¹,
+//! Source: Munthe-Kaas, *Runge–Kutta methods on Lie groups* (1998). Near q₀ the motion is q₀ ⊕ ξ(t). Since ∂(q₀ ⊕ ξ)/∂ξ
+//! is the group's Jacobian J_exp(ξ) = J_log(ξ)⁻¹, the motion satisfies
 //!
 //! ```text
 //! ξ̇ = J_log(ξ) v,   v̇ = aba(q₀ ⊕ ξ, v, τ),   ξ(0) = 0
 //! ```
 //!
-//! is an ordinary differential equation in a vector space: what the classical method does to it has order 4.
+//! This is an ordinary differential equation in a vector space, so the classical method has order 4.
 
 use super::{Input, Status, acceleration, tangent};
 use crate::data::Data;
@@ -19,24 +19,24 @@ use condyle_spatial::{Array, Constant, Scalar};
 
 workspace! {
     pub(super) struct Workspace<S>(size) {
-        /// Efforts, the passive ones included. Written by: `step`.
+        /// Efforts, including the passive ones. Written by: `step`.
         effort: Array<S> = filled(S::zero, size.nv),
-        /// The state of a stage: ξ, v. Written by: `step`.
+        /// State of a stage: ξ, v. Written by: `step`.
         xi: Array<S> = filled(S::zero, size.nv),
         v: Array<S> = filled(S::zero, size.nv),
-        /// Its rates. Written by: `step`.
+        /// Rates of the state of a stage. Written by: `step`.
         dxi: Array<S> = filled(S::zero, size.nv),
         dv: Array<S> = filled(S::zero, size.nv),
-        /// The weighted sums of the rates. Written by: `step`.
+        /// Weighted sums of the rates. Written by: `step`.
         sum_xi: Array<S> = filled(S::zero, size.nv),
         sum_v: Array<S> = filled(S::zero, size.nv),
     }
 }
 
-/// The time of each stage as a part of the step, and the weight of its slope.
+/// Time of each stage as a fraction of the step, and weight of its slope.
 const STAGES: [(f64, f64); 4] = [(0.0, 1.0 / 6.0), (0.5, 1.0 / 3.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 6.0)];
 
-/// The whole method.
+/// Runs the whole method.
 #[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -54,8 +54,8 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
     for (part, weight) in STAGES {
         let (ahead, weight) = (input.h * S::splat(part), input.h * S::splat(weight));
         for k in 0..v.len() {
-            xi[k] = dxi[k] * ahead; // ξ = c h ξ̇ of the stage before
-            v_stage[k] = dv[k].mul_add(ahead, v[k]); // v = v₀ + c h v̇ of the stage before
+            xi[k] = dxi[k] * ahead; // ξ = c h ξ̇ of the previous stage
+            v_stage[k] = dv[k].mul_add(ahead, v[k]); // v = v₀ + c h v̇ of the previous stage
         }
         integrate(model, q, xi, q_next);
         tangent::multiply(model, GroupJacobian::Log, xi, v_stage, dxi); // ξ̇ = J_log(ξ) v

@@ -1,11 +1,11 @@
-//! The state of a simulation, to be stored and continued.
+//! State of a simulation that can be stored and restored.
 
 use super::Simulation;
 use alloc::vec::Vec;
 use condyle_model::Error;
 use condyle_spatial::{Constant, Scalar};
 
-/// Everything that the next steps of a [`Simulation`] depend on, besides its robot, settings and ground.
+/// Quantities that determine the next steps of a [`Simulation`], besides its robot, settings and ground.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -21,7 +21,8 @@ pub struct State<S = f64> {
 }
 
 impl<S: Scalar, R: Constant<S>> Simulation<S, R> {
-    /// The state, as a copy: [`restore`](Self::restore) continues from it with the same bits.
+    /// Returns a copy of the state. A simulation that continues from it with [`restore`](Self::restore) gives the same
+    /// bits.
     ///
     /// ```
     /// use condyle_dynamics::{robots, simulation::{Settings, Simulation}};

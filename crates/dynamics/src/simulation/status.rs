@@ -1,4 +1,4 @@
-//! The outcome of a step.
+//! Outcome of a step.
 
 use core::fmt;
 
@@ -9,37 +9,38 @@ use core::fmt;
 pub enum Status {
     /// All steps were taken, within all tolerances.
     Done,
-    /// Newton's method has not reached the tolerance: the step was not taken, the state is the one before it. A shorter
-    /// step helps.
+    /// Newton's method has not reached the tolerance. The step was not taken, and the old state is kept. A shorter step
+    /// helps.
     NotConverged {
         /// Number of iterations that were made.
         iterations: usize,
     },
-    /// The impulses of the ground break the laws of contact by more than the tolerance. The step was taken with them: they
-    /// push only, and are inside the friction cones. More iterations
-    /// ([`Ground::max_iterations`](super::Ground::max_iterations)) or a shorter step may help. Where M is badly conditioned, as
-    /// with bodies of some grams, rounding leaves an error, and the [`tolerance`](super::Ground::tolerance) should be larger.
+    /// Impulses of the ground that violate the laws of contact by more than the tolerance. The step was still taken
+    /// with them: they only push, and are inside the friction cones. More iterations
+    /// ([`Ground::max_iterations`](super::Ground::max_iterations)) or a shorter step may help. If M is badly
+    /// conditioned, for example for bodies of some grams, rounding leaves an error. Then the
+    /// [`tolerance`](super::Ground::tolerance) should be larger.
     ContactsNotConverged {
         /// Largest error in the velocity of a point (m/s).
         error: f64,
     },
-    /// The velocity or the position is no longer finite: the step was not taken, the state is the one before it.
+    /// Velocity or position that is no longer finite. The step was not taken, and the old state is kept.
     NotFinite,
 }
 
 impl Status {
-    /// Whether all steps were taken, within all tolerances.
+    /// Returns whether all steps were taken, within all tolerances.
     pub fn is_done(self) -> bool {
         self == Self::Done
     }
 
-    /// Whether all steps were taken.
+    /// Returns whether all steps were taken.
     pub fn is_taken(self) -> bool {
         matches!(self, Self::Done | Self::ContactsNotConverged { .. })
     }
 
-    /// Returns the status of a run whose last step has the status `last`: that of a step that was not taken, or else the
-    /// largest error of the contacts.
+    /// Returns the status of a run whose last step has the status `last`. It is the status of a step that was not
+    /// taken, otherwise the largest error of the contacts.
     #[must_use = "the status of the run"]
     pub fn and(self, last: Self) -> Self {
         match (self, last) {

@@ -5,17 +5,18 @@ use condyle_model::joint::{GroupJacobian, Joint};
 use condyle_spatial::{Constant, Cross, Force, Motion, Scalar};
 use core::ops::Range;
 
-/// The largest block: a free body's.
+/// Maximum size of a block, the size for a free body.
 const SIX: usize = 6;
-/// Terms of a series in ad_y: enough for full precision up to an angle of 1 rad in a step, for ten digits up to 2.5.
+/// Number of terms of a series in ad_y: enough for full precision up to an angle of 1 rad in a step, and for ten digits
+/// up to 2.5 rad.
 const TERMS: i32 = 18;
 
-/// Each joint with coordinates of its own, and where they stand in v.
+/// Returns each joint with its own coordinates, and the offset of these coordinates in v.
 fn joints<R>(model: &Model<R>) -> impl Iterator<Item = (Joint, usize)> + '_ {
     model.nodes().iter().skip(1).filter(|n| n.mimic.is_none()).map(|n| (n.joint, n.idx_v))
 }
 
-/// The block of a joint at tangent vector y, column by column; `None` for the identity.
+/// Returns the block of a joint at tangent vector y, column by column; `None` for the identity.
 fn block<S: Scalar>(joint: Joint, which: GroupJacobian, y: &[S]) -> Option<[[S; SIX]; SIX]> {
     let columns = joint.jacobian(which, y)?.columns();
     let mut block = [[S::zero(); SIX]; SIX];
@@ -36,7 +37,7 @@ fn dot<S: Scalar>(a: &[S], b: &[S]) -> S {
     sum
 }
 
-/// The blocks at y that are no identity, each with its coordinates.
+/// Returns the blocks at y that differ from the identity, each with its coordinates.
 fn blocks<'a, S: Scalar, R>(
     model: &'a Model<R>,
     which: GroupJacobian,
@@ -46,7 +47,7 @@ fn blocks<'a, S: Scalar, R>(
     joints(model).map(own).filter_map(move |(joint, own)| block(joint, which, &y[own.clone()]).map(|J| (own, J)))
 }
 
-/// out = J(y) x.
+/// Computes out = J(y) x.
 pub(super) fn multiply<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], x: &[S], out: &mut [S]) {
     out.copy_from_slice(x);
     for (own, J) in blocks(model, which, y) {
@@ -60,7 +61,7 @@ pub(super) fn multiply<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: 
     }
 }
 
-/// A = A J(y), for a square matrix stored by columns.
+/// Computes A = A J(y), for a square matrix stored by columns.
 pub(super) fn multiply_right<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
     let nv = model.nv();
     for (own, J) in blocks(model, which, y) {
@@ -76,7 +77,7 @@ pub(super) fn multiply_right<S: Scalar, R>(model: &Model<R>, which: GroupJacobia
     }
 }
 
-/// A = J(y)ᵀ A, for a vector or a matrix stored by columns.
+/// Computes A = J(y)ᵀ A, for a vector or a matrix stored by columns.
 pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: GroupJacobian, y: &[S], A: &mut [S]) {
     for (own, J) in blocks(model, which, y) {
         for column in A.chunks_exact_mut(model.nv()) {
@@ -89,17 +90,18 @@ pub(super) fn multiply_left_transposed<S: Scalar, R>(model: &Model<R>, which: Gr
     }
 }
 
-/// The joints whose group is not commutative: along which unit twists they move, and where they stand in v.
+/// Returns the joints whose group is not commutative: the indices of their unit twists, and their offset in v.
 fn twists<R>(model: &Model<R>) -> impl Iterator<Item = (&'static [usize], usize)> + '_ {
     joints(model).filter(|(joint, _)| !joint.commutes()).map(|(joint, at)| (joint.axes(), at))
 }
 
-/// The armature of a coordinate whose momentum stays along the body's axes: that of a free joint's linear coordinates does not.
+/// Returns the armature of a coordinate whose momentum stays along the body's axes. For the linear coordinates of a
+/// free joint, it returns 0.
 fn rotor<S: Scalar, R: Constant<S>>(model: &Model<R>, axes: &[usize], at: usize, k: usize) -> S {
     if axes.len() == SIX && k < 3 { S::zero() } else { model.armature()[at + k].lift() }
 }
 
-/// The coordinates of a joint among the six of a twist.
+/// Returns the coordinates of a joint as the six numbers of a twist.
 fn embed<S: Scalar>(axes: &[usize], x: impl Fn(usize) -> S) -> [S; SIX] {
     let mut six = [S::zero(); SIX];
     for (k, &axis) in axes.iter().enumerate() {
@@ -108,11 +110,11 @@ fn embed<S: Scalar>(axes: &[usize], x: impl Fn(usize) -> S) -> [S; SIX] {
     six
 }
 
-/// f += w ×* (D w) with the armature D, block by block.
+/// Computes f += w ×* (D w) with the armature D, block by block.
 ///
-/// Armature is D q̈ and nothing else in every algorithm, but along the linear coordinates of free joints (`free_armature.rs`). A
-/// Lagrangian with ½ wᵀ D w would turn the momentum D w with the body, on joints where that makes a difference: this force
-/// undoes it. It does no work.
+/// Every algorithm treats armature as D q̈, except along the linear coordinates of free joints (`free_armature.rs`). A
+/// Lagrangian with ½ wᵀ D w would turn the momentum D w with the body, on joints where this makes a difference. The
+/// force computed here cancels this effect. It does no work.
 pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
@@ -124,7 +126,7 @@ pub(super) fn add_rotors<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], f
     }
 }
 
-/// A += the slope of that force in w, for a square matrix stored by columns.
+/// Adds the slope of that force with respect to w to A, a square matrix stored by columns.
 pub(super) fn add_rotors_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &[S], A: &mut [S]) {
     for (axes, at) in twists(model) {
         let twist = Motion::from(embed(axes, |k| w[at + k]));
@@ -140,10 +142,10 @@ pub(super) fn add_rotors_slope<S: Scalar, R: Constant<S>>(model: &Model<R>, w: &
     }
 }
 
-/// A −= s ∂(J_exp(−y)ᵀ p)/∂y at constant p, for a square matrix stored by columns.
+/// Computes A −= s ∂(J_exp(−y)ᵀ p)/∂y at constant p, for a square matrix stored by columns.
 ///
-/// J_exp(−y) = Σ ad_yᵏ/(k+1)!, so with pₖ = (ad_yᵀ)ᵏ p the change along δ is Σ Dₖ/(k+1)!, D₀ = 0,
-/// Dₖ₊₁ = ad_δᵀ pₖ + ad_yᵀ Dₖ; and ad_yᵀ p = −y ×* p.
+/// J_exp(−y) = Σ ad_yᵏ/(k+1)!. With pₖ = (ad_yᵀ)ᵏ p, the change along δ is Σ Dₖ/(k+1)!, D₀ = 0, Dₖ₊₁ = ad_δᵀ pₖ + ad_yᵀ
+/// Dₖ. Here ad_yᵀ p = −y ×* p.
 pub(super) fn subtract_slope<S: Scalar, R>(model: &Model<R>, y: &[S], p: &[S], s: S, A: &mut [S]) {
     for (axes, at) in twists(model) {
         let y6 = Motion::from(embed(axes, |k| y[at + k]));

@@ -1,26 +1,26 @@
-//! The variational integrator of the midpoint Lagrangian, on the joints' groups.
+//! Variational integrator of the midpoint Lagrangian, on the joints' groups.
 //!
-//! The motion during a step is taken to be q ⊕ t w, w constant, and its action to be h L(q ⊕ h w/2, w). That the sum of
-//! the actions of all steps be stationary under changes of the positions between them (with the virtual work of τ) gives
-//! the momentum p after the step from the one before it: with y = h w,
+//! The motion during a step is approximated by q ⊕ t w with constant w, and its action by h L(q ⊕ h w/2, w). The sum of
+//! the actions of all steps must be stationary under changes of the positions between steps, including the virtual work
+//! of τ. With y = h w, this condition gives the momentum p' after the step from the momentum p before it:
 //!
 //! ```text
 //! M(q_m) w = J(−y)ᵀ p + h/2 J(−y/2)ᵀ f        q_m = q ⊕ y/2,   f = ∂L/∂q(q_m, w) + τ
 //! p' = Ad(y)ᵀ p + h Ad(y/2)ᵀ f                q' = q ⊕ y
 //! ```
 //!
-//! J is the group's right Jacobian J_exp and Ad(y) = ∂(q ⊕ −y)/∂q. The first equation is solved for w by Newton's method;
+//! J is the group's right Jacobian J_exp, and Ad(y) = ∂(q ⊕ −y)/∂q. Newton's method solves the first equation for w;
 //! its slope is
 //!
 //! ```text
 //! M + h/2 ∂p/∂q J(y/2) − h ∂(J(−y)ᵀ p)/∂y − h²/4 ∂(J(−x)ᵀ f)/∂x − h/2 J(−y/2)ᵀ (h/2 ∂²L/∂q∂q J(y/2) + (∂p/∂q)ᵀ + ∂τ/∂v)
 //! ```
 //!
-//! where passive efforts, which depend on q too, add ∂τ/∂q to ∂²L/∂q∂q.
+//! Passive efforts also depend on q, and add ∂τ/∂q to ∂²L/∂q∂q.
 //!
-//! The map (q, p) → (q', p') is symplectic, its own inverse when h changes sign, and keeps the momentum of whatever
-//! moves freely: Ad(y)ᵀ only expresses it in the body's new frame. Source: Marsden and West (2001), section 2.3, for the
-//! midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. In coordinates v = M(q)⁻¹ p.
+//! The map (q, p) → (q', p') is symplectic and its own inverse when h changes sign. It conserves the momentum of bodies
+//! that move freely: Ad(y)ᵀ only expresses it in the body's new frame. Source: Marsden and West (2001), section 2.3,
+//! for the midpoint rule; Bou-Rabee and Marsden (2009) for momenta on groups. In coordinates v = M(q)⁻¹ p.
 
 use super::{Input, Settings, Status, lagrangian, lu, tangent};
 use crate::calls::inertia::crba;
@@ -36,7 +36,7 @@ use condyle_model::layout::Single;
 use condyle_spatial::{Array, Constant, Scalar};
 
 workspace! {
-    /// Written by: `step`, where nothing else is said.
+    /// Scratch. Written by: `step`, unless stated otherwise.
     pub(super) struct Workspace<S>(size, model: &Model<R>) {
         /// p, the momentum before the step.
         p: Array<S> = filled(S::zero, size.nv),
@@ -48,20 +48,20 @@ workspace! {
         minus_x: Array<S> = filled(S::zero, size.nv),
         /// f = ∂L/∂q + τ. Written by: `evaluate`.
         f: Array<S> = filled(S::zero, size.nv),
-        /// The passive efforts of the joints, and their slopes in q and v. Written by: `evaluate`.
+        /// Passive efforts of the joints, and their slopes with respect to q and v. Written by: `evaluate`.
         passive: Array<S> = filled(S::zero, size.nv),
         passive_q: Array<S> = filled(S::zero, size.nv * size.nv),
         passive_v: Array<S> = filled(S::zero, size.nv * size.nv),
         /// J(−y)ᵀ p and J(−y/2)ᵀ f. Written by: `evaluate`.
         carried: Array<S> = filled(S::zero, size.nv),
         pushed: Array<S> = filled(S::zero, size.nv),
-        /// The residual of the equation, then Newton's step.
+        /// Residual of the equation, then Newton's step.
         residual: Array<S> = filled(S::zero, size.nv),
-        /// The slope of the equation, and its factor. Written by: `slope`.
+        /// Slope of the equation, and its factor. Written by: `slope`.
         slope: Array<S> = filled(S::zero, size.nv * size.nv),
-        /// Momenta, slopes of L and their derivatives at the midpoint. Written by: `evaluate`.
+        /// Momenta, slopes of L, and their derivatives, at the midpoint. Written by: `evaluate`.
         lagrangian: lagrangian::Workspace<S> = lagrangian::Workspace::new(size),
-        /// The factor of M after the step.
+        /// Factor of M after the step.
         M: Ltdl<S> = Ltdl::new(model),
     }
 }
@@ -77,7 +77,7 @@ impl<S: Scalar> Workspace<S> {
     }
 }
 
-/// f at the midpoint, and the terms of the equation.
+/// Computes f at the midpoint, and the terms of the equation.
 fn evaluate<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -109,14 +109,14 @@ fn evaluate<S: Scalar, R: Constant<S>>(
     tangent::multiply_left_transposed(model, Exp, &d.minus_x, &mut d.pushed); // J(−y/2)ᵀ f
 }
 
-/// The slope of the equation in w; what `evaluate` has left of the derivatives is used up.
+/// Computes the slope of the equation with respect to w. The derivatives computed by `evaluate` are overwritten.
 fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S) {
     let nv = model.nv();
     let half = h * S::splat(0.5);
     let lagrangian::Workspace { M, p_q, L_qq, .. } = &mut d.lagrangian;
     let A = &mut d.slope;
     for (L_qq, passive_q) in L_qq.iter_mut().zip(&d.passive_q) {
-        *L_qq += *passive_q; // ∂τ/∂q, which acts as ∂²L/∂q∂q does
+        *L_qq += *passive_q; // ∂τ/∂q acts like ∂²L/∂q∂q
     }
     tangent::multiply_right(model, Exp, &d.x, L_qq);
     for j in 0..nv {
@@ -138,10 +138,10 @@ fn slope<S: Scalar, R: Constant<S>>(model: &Model<R>, d: &mut Workspace<S>, h: S
     tangent::subtract_slope(model, &d.x, &d.f, half * half, A); // − h²/4 ∂(J(−x)ᵀ f)/∂x
 }
 
-/// The momentum (kg m²/s, kg m/s) below which nothing counts as moving.
+/// Minimum momentum (kg m²/s, kg m/s) that counts as motion.
 const STILL: f64 = 1e-30;
 
-/// The whole method.
+/// Runs the whole method.
 #[track_caller]
 pub(super) fn step<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
@@ -180,7 +180,7 @@ pub(super) fn step<S: Scalar, R: Constant<S>>(
             error += d.residual[k].abs();
             size += inside.abs() + d.carried[k].abs() + (d.pushed[k] * half).abs();
         }
-        // The step that follows squares the error, and completes the derivatives of dual numbers.
+        // The next step squares the error, and completes the derivatives of dual numbers.
         converged = S::all(error.lt(size * S::splat(settings.tolerance)));
         slope(model, d, h);
         lu::factorize(&mut d.slope, model.nv());

@@ -1,8 +1,8 @@
-//! The derivatives of inverse dynamics, by hand.
+//! Analytical derivatives of inverse dynamics.
 //!
 //! Source: Singh, Russell, Wensing, *Efficient analytical derivatives of rigid-body dynamics using spatial vector
-//! algebra* (2022), in the world's frame. When coordinate e of joint j changes, all that joint j carries turns rigidly
-//! about S_e, and beside that the velocities and accelerations there change by
+//! algebra* (2022), in the world's frame. When coordinate e of joint j changes, the bodies that joint j carries turn
+//! rigidly about S_e. Their velocities and accelerations also change because the joint's own parent moves:
 //!
 //! ```text
 //! Ψ̇_e = v_λ × S_e,   Ψ̈_e = a_λ × S_e + v_λ × Ψ̇_e          (λ: the parent of joint j)
@@ -10,15 +10,16 @@
 //! ∂v_i/∂q̇_e = S_e,              ∂a_i/∂q̇_e = Ψ̇_e + Ṡ_e + S_e × v_i       (Ṡ_e = v_j × S_e)
 //! ```
 //!
-//! so that with composite quantities (sums over all that a joint carries: inertia Iᶜ, force F, and the matrix B of
-//! 2 B m = v ×* I m − I (v × m) + m ×* I v) each pair of a column d and a column e before it costs a few products:
+//! Composite quantities are sums over all bodies that a joint carries: inertia Iᶜ, force F, and the matrix B of 2 B m =
+//! v ×* I m − I (v × m) + m ×* I v. With them, each pair of a column d and an earlier column e on the path to the root
+//! costs a few products:
 //!
 //! ```text
 //! ∂τ_d/∂q_e = S_dᵀ (Iᶜ Ψ̈_e + 2B Ψ̇_e)               ∂τ_d/∂q̇_e = S_dᵀ (Iᶜ (Ψ̇_e + Ṡ_e) + 2B S_e)
 //! ∂τ_e/∂q_d = S_eᵀ (Iᶜ Ψ̈_d + 2B Ψ̇_d + S_d ×* F)     ∂τ_e/∂q̇_d = S_eᵀ (Iᶜ (Ψ̇_d + Ṡ_d) + 2B S_d)
 //! ```
 //!
-//! (Iᶜ, B, F of the joint of d).
+//! (Iᶜ, B, F belong to d's joint).
 
 mod vectorized;
 
@@ -34,11 +35,11 @@ use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar,
 use vectorized::Rows;
 
 workspace! {
-    /// The quantities of the bodies and of the columns of their joints, in the world's frame.
+    /// Quantities of the bodies and of the columns of their joints, in the world's frame.
     pub(crate) struct Bodies<S>(size) {
         /// Velocity. Written by: `pass`.
         pub v: Array<Motion<S>> = filled(Motion::zero, size.bodies),
-        /// Acceleration, with gravity as the world's. Written by: `pass`.
+        /// Acceleration, including gravity as the world's acceleration. Written by: `pass`.
         pub a: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Iᶜ. Written by: `pass`.
         pub IC: Array<Inertia<S>> = filled(Inertia::zero, size.bodies),
@@ -52,7 +53,7 @@ workspace! {
         pub Psidd: Array<Motion<S>> = filled(Motion::zero, size.columns),
         /// Ψ̇ + Ṡ. Written by: `pass`.
         pub PsidSd: Array<Motion<S>> = filled(Motion::zero, size.columns),
-        /// Written by: `pass`, for `vectorized`.
+        /// Parts of each column for `vectorized`. Written by: `pass`.
         pub rows: Rows<S> = Rows::new(size.columns),
     }
 }
@@ -60,22 +61,22 @@ workspace! {
 workspace! {
     pub(crate) struct Workspace<S>(size) {
         pub bodies: Bodies<S> = Bodies::new(size),
-        /// The velocity and acceleration coordinates. Written by: `rnea_derivatives`.
+        /// Velocity and acceleration coordinates. Written by: `rnea_derivatives`.
         pub qd: Array<S> = filled(S::zero, size.nv),
         pub qdd: Array<S> = filled(S::zero, size.nv),
-        /// No acceleration. Written by: `new`.
+        /// Zeros, used as accelerations. Written by: `new`.
         pub still: Array<S> = filled(S::zero, size.nv),
-        /// Written by: `pass`.
+        /// ∂τ/∂q. Written by: `pass`.
         pub dtau_dq: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `pass`.
+        /// ∂τ/∂v. Written by: `pass`.
         pub dtau_dv: Matrix<S> = zero_matrix(size.nv, size.nv),
-        /// Written by: `pass`.
+        /// ∂τ/∂a. Written by: `pass`.
         pub dtau_da: Matrix<S> = zero_matrix(size.nv, size.nv),
     }
 }
 
 impl<S> Workspace<S> {
-    /// What `pass` writes: of the bodies, and the three matrices.
+    /// Returns the quantities that `pass` writes: the bodies' quantities, and the three matrices.
     #[inline(always)]
     pub(crate) fn parts(&mut self) -> (&mut Bodies<S>, [&mut [S]; 3]) {
         let Self { bodies, dtau_dq, dtau_dv, dtau_da, .. } = self;
@@ -83,7 +84,7 @@ impl<S> Workspace<S> {
     }
 }
 
-/// The whole algorithm, for bodies that are placed.
+/// Runs the whole algorithm, for bodies whose placements are known.
 #[inline(always)]
 pub(crate) fn pass<L: Columns>(
     l: &L,
@@ -160,7 +161,7 @@ pub(crate) fn pass<L: Columns>(
                 let dv_de = S_e.angular.dot_add(BS, PsidSd_e.dot(IS)); // ∂τ_d/∂q̇_e
                 let (dq_ed, dv_ed) = (S_e.dot(by_q), S_e.dot(by_v)); // ∂τ_e/∂q_d, ∂τ_e/∂q̇_d
                 let M_de = S_e.dot(IS);
-                l.set_row(dq, column, e, dq_de); // all stores after all products, which may stay in registers
+                l.set_row(dq, column, e, dq_de); // stores come last, so that products stay in registers
                 l.set_row(dv, column, e, dv_de);
                 l.set_column(dq, column, e, dq_ed);
                 l.set_column(dv, column, e, dv_ed);
@@ -182,7 +183,8 @@ pub(crate) fn pass<L: Columns>(
 }
 
 kernel! {
-    /// For bodies that are placed, under the model's gravity if no other acceleration of the world is given.
+    /// Computes the derivatives for bodies whose placements are known. `world` is the world's acceleration; if it is
+    /// empty, the model's gravity is used.
     pub(crate) fn run<S, R>(
         model: &Model<R>,
         w: &World<S>,

@@ -1,8 +1,8 @@
-//! ∂τ of robots with long branches, four columns side by side.
+//! ∂τ of robots with long branches, four columns at a time.
 //!
-//! Source: the pairs of `rnea_derivatives.rs`. The columns d that a column e carries stand one after the other, so their
-//! part of a pair does, too, each of its numbers in a row of its own, and four entries below one another in column e of a
-//! matrix are had at once. They are had with the same operations as one, so the bits are the same.
+//! Source: the pairs of `rnea_derivatives.rs`. The columns d that a column e carries are contiguous, and their parts of
+//! a pair are stored component by component. So four entries of a matrix column are computed at once, with the scalar
+//! operations and bits.
 
 use crate::derivatives::rnea_derivatives::{Bodies, Workspace};
 use crate::passes::kinematics::World;
@@ -12,14 +12,13 @@ use condyle_spatial::gate::Fused;
 use condyle_spatial::{Array, Force, Scalar, Vec3, alike};
 use core::any::Any;
 
-/// The number of columns that go together.
+/// Number of columns that are processed together.
 const SIDE: usize = 4;
 
-/// The number of numbers of a column: Iᶜ S, 2Bᵀ S, `by_q` and `by_v`.
+/// Number of values of a column: Iᶜ S, 2Bᵀ S, `by_q` and `by_v`.
 const NUMBERS: usize = 6 + 3 + 6 + 6;
 
-/// The part that each column brings to its pairs with the columns before it. Shape: columns / `SIDE`, rounded up, each
-/// `NUMBERS` × `SIDE`.
+/// Part of each column in its pairs with earlier columns. Shape: columns / `SIDE`, rounded up, each `NUMBERS` × `SIDE`.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub(crate) struct Rows<S> {
@@ -33,7 +32,7 @@ impl<S: Scalar> Rows<S> {
         Self { sides: filled(|| [[S::zero(); SIDE]; NUMBERS], columns.div_ceil(SIDE)) }
     }
 
-    /// Keeps what a column brings.
+    /// Stores the part of a column.
     #[inline(always)]
     pub(crate) fn keep(&mut self, column: usize, IS: Force<S>, BS: Vec3<S>, by_q: Force<S>, by_v: Force<S>) {
         let (side, at) = (&mut self.sides[column / SIDE], column % SIDE);
@@ -47,7 +46,7 @@ impl<S: Scalar> Rows<S> {
     }
 }
 
-/// All pairs of columns of different joints, from what `Rows` has kept.
+/// Computes all pairs of columns of different joints, from the parts stored in `Rows`.
 #[inline(always)]
 pub(crate) fn pairs<S: Scalar, R>(model: &Model<R>, w: &World<S>, d: &mut Workspace<S>) {
     let w = (w as &dyn Any).downcast_ref::<World<Fused>>();
@@ -102,25 +101,25 @@ mod vectors {
         }
     }
 
-    /// Four vectors of which the numbers begin at the k-th.
+    /// Returns four vectors whose numbers begin at index k.
     #[inline(always)]
     fn vector(side: &[[Fused; SIDE]; NUMBERS], k: usize) -> Vec3<Four> {
         Vec3::new(Four::from_fused(&side[k]), Four::from_fused(&side[k + 1]), Four::from_fused(&side[k + 2]))
     }
 
-    /// Four forces of which the numbers begin at the k-th.
+    /// Returns four forces whose numbers begin at index k.
     #[inline(always)]
     fn force(side: &[[Fused; SIDE]; NUMBERS], k: usize) -> Force<Four> {
         Force::new(vector(side, k), vector(side, k + 3))
     }
 
-    /// A vector in all lanes.
+    /// Copies a vector to all lanes.
     #[inline(always)]
     fn all3(v: Vec3<Fused>) -> Vec3<Four> {
         Vec3::new(Four::splat(v.x.0), Four::splat(v.y.0), Four::splat(v.z.0))
     }
 
-    /// A motion in all lanes.
+    /// Copies a motion to all lanes.
     #[inline(always)]
     fn all(m: Motion<Fused>) -> Motion<Four> {
         Motion::new(all3(m.linear), all3(m.angular))

@@ -1,18 +1,20 @@
 //! Dynamics under constraints of a robot with limbs, without M.
 //!
-//! Source: Wensing, Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the operational-space
-//! inertia matrix* (2012), on Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. With U = Iᴬ S and D of the
-//! articulated bodies, a force f on a body is felt at column d of its joint as Y_d = S_dᵀ f, and beyond it remains
-//! f − U_d D_d⁻¹ Y_d. Taken to the root so, the unit forces of the rows of J give
+//! Source: Wensing, Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the
+//! operational-space inertia matrix* (2012), based on Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1.
+//! Let U = Iᴬ S and D belong to the articulated bodies. A force f on a body causes the effort Y_d = S_dᵀ f at column d
+//! of its joint, and f − U_d D_d⁻¹ Y_d is passed on to the parent. If the unit forces of the rows of J are propagated
+//! to the root in this way, then
 //!
 //! ```text
 //! J M⁻¹ Jᵀ = Σ Y_d D_d⁻¹ Y_dᵀ,           J q̈ + γ = Σ Y_d D_d⁻¹ u_d + Σ f_iᵀ c_i + f₀ᵀ a₀ + γ'       for λ = 0,
 //! ```
 //!
-//! u and c being those of the articulated-body algorithm, f_i what remains beyond body i, a₀ the world's acceleration, and γ'
-//! what in γ is not the acceleration of a body. That algorithm's last pass then gives q̈ = M⁻¹ (τ − h + Jᵀ λ) with
-//! u + Yᵀ λ in place of u. It has limbs in its lanes; the forces have rows: those of one constraint as far as the root, from
-//! there on all of them.
+//! Here u and c belong to the articulated-body algorithm, and f_i is the force that remains beyond body i. a₀ is the
+//! world's acceleration, and γ' is the part of γ that is not the acceleration of a body. The last pass of that
+//! algorithm, with u + Yᵀ λ instead of u, gives q̈ = M⁻¹ (τ − h + Jᵀ λ). The articulated-body algorithm has limbs in
+//! its lanes. The forces have rows in their lanes: the rows of one constraint up to the root, and all rows from there
+//! on.
 
 use super::forces::Left;
 use super::lanes::Four;
@@ -28,7 +30,7 @@ use condyle_spatial::gate::Fused;
 use condyle_spatial::gate::Rename;
 use condyle_spatial::{Scalar, moves};
 
-/// xᵀ y of N vectors, in every lane.
+/// Returns xᵀ y of N vectors, in every lane.
 #[inline(always)]
 fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
     let mut sum = Four::load(x) * Four::load(y);
@@ -39,7 +41,7 @@ fn product<const N: usize>(x: &[f64], y: &[f64]) -> Four {
 }
 
 impl ConstraintLanes {
-    /// J, J M⁻¹ Jᵀ, and J q̈ + γ for λ = 0.
+    /// Computes J, J M⁻¹ Jᵀ, and J q̈ + γ for λ = 0.
     #[inline(always)]
     pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
         &mut self,
@@ -83,7 +85,7 @@ impl ConstraintLanes {
         }
     }
 
-    /// u + Yᵀ λ in place of u.
+    /// Replaces u by u + Yᵀ λ.
     #[inline(always)]
     pub(crate) fn push(&self, plan: &Plan, constraints: &[ConstraintPlan], u: &mut [f64]) {
         let All { root, nv, stride, Y, x: lambda, .. } = &self.all;

@@ -1,4 +1,4 @@
-//! The way of the unit forces of the rows of J through the articulated bodies to the root: see `constrained.rs`.
+//! Propagation of the unit forces of the rows of J through the articulated bodies to the root: see `constrained.rs`.
 #![allow(unsafe_code)]
 
 use super::lanes::{Four, numbers};
@@ -14,7 +14,7 @@ use condyle_spatial::block::Block;
 use condyle_spatial::gate::Fused;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 
-/// The results of the articulated-body algorithm, number by number.
+/// Results of the articulated-body algorithm, as slices of numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct Left<'a> {
     plan: &'a Plan,
@@ -32,14 +32,14 @@ pub(crate) struct Left<'a> {
 impl<'a> Left<'a> {
     #[inline(always)]
     pub(crate) fn new(plan: &'a Plan, model: &Model, w: &'a World<Four>, d: &'a aba::Workspace<Four>) -> Self {
-        // SAFETY: poses, motions and forces are made of vectors.
+        // SAFETY: poses, motions and forces consist of vectors.
         let [oX, S, U, v, c] = unsafe { [numbers(&w.oX), numbers(&w.S), numbers(&d.U), numbers(&d.v), numbers(&d.c)] };
-        // SAFETY: these are vectors.
+        // SAFETY: the elements are vectors.
         let [D_inv, u] = unsafe { [numbers(&d.D_inv), numbers(&d.u)] };
         Self { plan, oX, S, U, D_inv, u, v, c, world: (-*model.gravity()).to_array() }
     }
 
-    /// ₀X of a body.
+    /// Returns ₀X of a body.
     #[inline(always)]
     pub(crate) fn pose(self, body: usize) -> Se3<Fused> {
         let (step, lane) = self.plan.place(body);
@@ -53,7 +53,7 @@ impl<'a> Left<'a> {
         Se3::new(Mat3 { x, y, z }, translation)
     }
 
-    /// The velocity of a body.
+    /// Returns the velocity of a body.
     #[inline(always)]
     pub(crate) fn velocity(self, body: usize) -> Motion<Fused> {
         let x = six(self.v, self.plan.place(body));
@@ -65,7 +65,7 @@ impl<'a> Left<'a> {
     }
 }
 
-/// From where on every `LANES`-th number is one of the six of a motion or a force.
+/// Returns the slice in which every `LANES`-th number is one of the six of a motion or a force.
 #[inline(always)]
 pub(crate) fn six(of: &[f64], (at, lane): (usize, usize)) -> &[f64] {
     &of[6 * LANES * at + lane..][..5 * LANES + 1]
@@ -87,7 +87,7 @@ fn write<V: Block<Number = f64>, const N: usize>(x: [V; N], to: &mut [f64]) {
     }
 }
 
-/// A force of each of some rows.
+/// Force of each of several rows.
 type Forces<V, const N: usize> = [[V; N]; 6];
 
 #[inline(always)]
@@ -108,7 +108,7 @@ fn add<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, to: &mut Forces
     }
 }
 
-/// fᵀ m.
+/// Returns fᵀ m.
 #[inline(always)]
 fn dot<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, m: &[f64]) -> [V; N] {
     let mut sum = [V::zero(); N];
@@ -123,7 +123,8 @@ fn dot<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, m: &[f64]) -> [
     sum
 }
 
-/// What a column of a joint takes of the forces: Y and Y D⁻¹. They become the rest; x is J q̈ + γ so far.
+/// Passes the forces f through a column of a joint and returns Y and Y D⁻¹. f becomes the remaining forces, and Y D⁻¹ u
+/// is added to x, the partial sum of J q̈ + γ.
 #[inline(always)]
 fn take<V: Block<Number = f64>, const N: usize>(
     left: Left<'_>,
@@ -148,7 +149,7 @@ fn take<V: Block<Number = f64>, const N: usize>(
     [Y, YD]
 }
 
-/// x + f_iᵀ c_i.
+/// Adds f_iᵀ c_i to x.
 #[inline(always)]
 fn add_bias<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, c: &[f64], x: &mut [V; N]) {
     let by_c = dot(f, c);
@@ -157,7 +158,7 @@ fn add_bias<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, c: &[f64],
     }
 }
 
-/// x + f₀ᵀ a₀.
+/// Adds f₀ᵀ a₀ to x.
 #[inline(always)]
 fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 3], x: &mut [V; N]) {
     for r in 0..3 {
@@ -168,13 +169,14 @@ fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 
 }
 
 impl Rows {
-    /// The unit forces, and γ'.
+    /// Computes the unit forces and γ'.
     #[inline(always)]
     pub(crate) fn begin(&mut self, plan: &ConstraintPlan, ends: &FramePair<Fused>, gamma: [Fused; 6]) {
         let rigid = plan.kind == ConstraintKind::Rigid;
         let axes = if plan.aligned() { Mat3::identity() } else { ends.x1.rotation }.columns();
         for (end, (x, sign)) in [(ends.x1, 1.0), (ends.x2, -1.0)].into_iter().enumerate() {
-            // a frame is held at one place of both bodies, a point where it is on each of them
+            // A rigid constraint acts at one point of both bodies; a point constraint acts at the point's position on
+            // each body.
             let p = if rigid { ends.x1.translation } else { x.translation };
             for r in 0..3 {
                 let n = axes[r].scale(Fused(sign));
@@ -193,7 +195,7 @@ impl Rows {
         }
     }
 
-    /// Takes the unit forces to the root.
+    /// Propagates the unit forces to the root.
     #[inline(always)]
     pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
         &self,
@@ -205,7 +207,7 @@ impl Rows {
     ) {
         let (mut x, mut whole, mut rest) = (read::<V, N>(&self.gamma), [[V::zero(); N]; 6], [[V::zero(); N]; 6]);
         for (k, way) in self.ways.iter().enumerate() {
-            let (mut f_whole, mut f) = (whole, rest); // where both ways have met
+            let (mut f_whole, mut f) = (whole, rest); // beyond the junction of both paths
             if k < 2 {
                 f_whole = read_forces(self.forces[k].as_flattened(), WIDE);
                 f = f_whole;
@@ -243,8 +245,8 @@ impl Rows {
         write(x, &mut all.x[plan.row..]);
     }
 
-    /// Adds what this and another constraint touch beyond the root to three columns of J M⁻¹ Jᵀ, those from row r of the
-    /// other one on, in the rows of this one.
+    /// Adds the contributions of the slots beyond the root, which this and another constraint share, to three columns
+    /// of J M⁻¹ Jᵀ. The columns start at row r of the other constraint. The rows belong to this constraint.
     #[inline(always)]
     pub(crate) fn multiply<V: Block<Number = f64>, const N: usize>(
         &self,
@@ -274,7 +276,7 @@ impl Rows {
         }
     }
 
-    /// J q̈ + γ, for the accelerations of both bodies.
+    /// Returns J q̈ + γ, for the accelerations of both bodies.
     #[inline(always)]
     pub(crate) fn error(&self, [one, other]: [&[f64]; 2]) -> [f64; WIDE] {
         let mut error = [0.0; WIDE];
@@ -291,7 +293,7 @@ impl Rows {
 }
 
 impl All {
-    /// Zeros behind the last row, whatever was there.
+    /// Writes zeros after the last row.
     #[inline(always)]
     pub(crate) fn end<V: Block<Number = f64>, const N: usize>(&mut self, rows: usize) {
         let zeros = [V::zero(); N];
@@ -302,7 +304,7 @@ impl All {
         write(zeros, &mut self.x[rows..]);
     }
 
-    /// Takes what the root feels to the world.
+    /// Propagates the forces on the root to the world.
     #[inline(always)]
     pub(crate) fn carry_on<V: Block<Number = f64>, const N: usize>(
         &mut self,
@@ -336,7 +338,7 @@ impl All {
         }
     }
 
-    /// What the root's joint adds to J M⁻¹ Jᵀ, in place of what was there: of a multiple of three rows.
+    /// Sets J M⁻¹ Jᵀ to the contribution of the root's joint. The number of rows is a multiple of three.
     #[inline(always)]
     pub(crate) fn multiply<V: Block<Number = f64>, const N: usize>(&self, rows: usize, G: &mut [f64], stride: usize) {
         for first in (0..self.stride - WIDE).step_by(WIDE) {

@@ -1,15 +1,16 @@
 //! M⁻¹ of a robot with limbs, without M.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. With U = Iᴬ S and D = Sᵀ U of the articulated
-//! bodies, a unit acceleration of column e that no other joint resists is felt on the way out as T, first T = S_e, and
-//! turns column d by Z_de = −D_d⁻¹ U_dᵀ T, beyond which T + S_d Z_de is felt. That is Z = L⁻¹ of M = Lᵀ D L: with the zeros
-//! of the tree, and ones on its diagonal. So
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1. Let U = Iᴬ S and D = Sᵀ U belong to the
+//! articulated bodies. Consider a unit acceleration of column e that no other joint resists. It reaches the bodies
+//! further out as a motion T, which starts as T = S_e. Column d moves by Z_de = −D_d⁻¹ U_dᵀ T, and T + S_d Z_de is
+//! passed on. Z is L⁻¹ of M = Lᵀ D L, with the zeros of the tree and ones on its diagonal. So
 //!
 //! ```text
 //! M⁻¹ = Z D⁻¹ Zᵀ
 //! ```
 //!
-//! takes one product for each pair of columns and each column that carries both, and none of these waits for another.
+//! takes one product for each pair of columns and each column that carries both. None of these products waits for
+//! another.
 #![allow(unsafe_code)]
 
 use super::lanes::{Four, Limbs};
@@ -23,19 +24,19 @@ use condyle_spatial::block::Block;
 use condyle_spatial::gate::Fused;
 use condyle_spatial::{Motion, Scalar};
 
-/// The number of vectors of each row that are summed up at once.
+/// Number of vectors of each row that are summed at once.
 const SIDE: usize = 3;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
     sizes: Sizes,
-    /// T. Shape: the support of all steps. Written by: `carry`.
+    /// T. Shape: support of all steps. Written by: `carry`.
     T: Vec<Motion<Four>>,
-    /// Z D⁻¹, row by row, the columns from the root on. Shape: `Sizes`, and one. Written by: `carry`.
+    /// Z D⁻¹, row by row, with the columns in order from the root. Shape: `Sizes`, plus one. Written by: `carry`.
     ZD: Vec<f64>,
-    /// Zᵀ, row by row, with its zeros and ones. Shape: `Sizes`, and one. Written by: `carry`, `new`.
+    /// Zᵀ, row by row, including its zeros and ones. Shape: `Sizes`, plus one. Written by: `carry`, `new`.
     Zt: Vec<f64>,
-    /// M⁻¹, each row up to the diagonal. Shape: as Zt. Written by: `multiply`.
+    /// M⁻¹, each row up to the diagonal. Shape: same as Zt. Written by: `multiply`.
     rows: Vec<f64>,
 }
 
@@ -53,12 +54,12 @@ impl Scratch {
         }
     }
 
-    /// Whether it was made for this plan, or one of the same shape.
+    /// Returns whether the scratch was made for this plan, or for a plan of the same shape.
     pub(crate) fn fits(&self, plan: &Plan) -> bool {
         self.T.len() == plan.columns.support.len() && self.sizes == plan.columns.sizes
     }
 
-    /// M⁻¹, after `aba::factorize` or `aba::pass`, for columns that are shared.
+    /// Computes M⁻¹, after `aba::factorize` or `aba::pass`, for columns that are shared.
     #[inline(always)]
     pub(crate) fn inverse<V: Block<Number = f64>>(
         &mut self,
@@ -80,7 +81,7 @@ impl Scratch {
         mirror(&self.rows, self.sizes, Minv);
     }
 
-    /// Z, from the root to the tips.
+    /// Computes Z, from the root to the tips.
     #[inline(always)]
     fn carry(&mut self, l: &Limbs<'_>, w: &World<Four>, aba: &aba::Workspace<Four>) {
         let Self { T, ZD, Zt, .. } = self;
@@ -108,7 +109,7 @@ impl Scratch {
         }
     }
 
-    /// M rows of M⁻¹, up to the diagonal and somewhat beyond.
+    /// Computes M rows of M⁻¹, up to the diagonal and slightly beyond.
     #[inline(always)]
     fn multiply<V: Block<Number = f64>, const M: usize>(&mut self, block: &ColumnBlock) {
         let (mut start, end) = (0, block.first + M);
@@ -123,7 +124,7 @@ impl Scratch {
         }
     }
 
-    /// N vectors of each of M rows, from a column on.
+    /// Computes N vectors of each of M rows, starting at a column.
     #[inline(always)]
     fn part<V: Block<Number = f64>, const M: usize, const N: usize>(&mut self, block: &ColumnBlock, start: usize) {
         let Self { ZD, Zt, rows, sizes: Sizes { ZD: depth, Zt: width, rows: n }, .. } = self;
@@ -137,10 +138,10 @@ impl Scratch {
         let mut sums = [[V::zero(); N]; M];
         for (p, &e) in path.iter().enumerate() {
             if e >= start + many {
-                break; // what e carries stands further on
+                break; // columns that e carries come later
             }
             debug_assert!(e < *n);
-            // SAFETY: the plan's paths are of columns, of which Zt has a row each.
+            // SAFETY: the plan's paths consist of columns, and Zt has one row per column.
             let Zt = unsafe { Zt.get_unchecked(e * width + start..e * width + start + many) };
             let mut Z = [V::zero(); N];
             for x in 0..N {
@@ -163,18 +164,18 @@ impl Scratch {
     }
 }
 
-/// Writes the number of each lane to its place.
+/// Writes the number of each lane to its index.
 #[inline(always)]
 fn put(to: &mut [f64], at: &[u32; LANES], x: Four) {
     let x = x.to_array();
     for lane in 0..LANES {
         debug_assert!((at[lane] as usize) < to.len());
-        // SAFETY: the plan's places are below the sizes that the matrices were made for, which `fits` compares.
+        // SAFETY: the plan's indices are below the sizes for which the matrices were made; `fits` compares these sizes.
         unsafe { *to.get_unchecked_mut(at[lane] as usize) = x[lane] };
     }
 }
 
-/// A symmetric matrix from its rows up to the diagonal.
+/// Computes a symmetric matrix from its rows up to the diagonal.
 #[inline(always)]
 fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [Fused]) {
     assert!(n <= width && rows.len() >= n * width && X.len() >= n * n);
@@ -208,10 +209,10 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [Fused]
     }
 }
 
-/// Writes a block of rows, n numbers apart, from entry `at` on.
+/// Writes a block of rows, n numbers apart, starting at entry `at`.
 ///
 /// # Safety
-/// X has the entries up to that of the last row.
+/// X has at least the entries up to the end of the last row.
 #[inline(always)]
 unsafe fn write(X: &mut [Fused], at: usize, n: usize, block: &[Four; LANES]) {
     for r in 0..LANES {

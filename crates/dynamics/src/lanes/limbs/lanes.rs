@@ -1,4 +1,4 @@
-//! Steps in place of bodies, lanes in place of numbers.
+//! Layout for passes with steps instead of bodies and lanes instead of numbers.
 #![allow(unsafe_code)]
 
 use super::{LANES, Plan};
@@ -18,7 +18,7 @@ use core::ops::{AddAssign, Range};
 pub(crate) type Four = Short;
 const _: () = assert!(<Four as Scalar>::LANES == LANES);
 
-/// Steps in place of bodies, lanes in place of numbers.
+/// Layout of a robot with limbs: steps instead of bodies, lanes instead of numbers.
 pub(crate) struct Limbs<'a> {
     pub(crate) steps: &'a [Step],
     pub(crate) support: &'a [LaneColumn],
@@ -33,10 +33,10 @@ pub(crate) struct Limbs<'a> {
     geometry: u64,
 }
 
-/// The vectors that something is made of.
+/// Returns the vectors of which a value consists.
 ///
 /// # Safety
-/// `T` is made of nothing else: a struct of spatial algebra or of kinematics, all `repr(C)`.
+/// `T` consists of vectors only: a struct of spatial algebra or of kinematics, all `repr(C)`.
 #[inline(always)]
 unsafe fn vectors<T>(x: &mut T) -> &mut [Four] {
     const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
@@ -44,31 +44,31 @@ unsafe fn vectors<T>(x: &mut T) -> &mut [Four] {
     unsafe { core::slice::from_raw_parts_mut(core::ptr::from_mut(x).cast(), size_of::<T>() / size_of::<Four>()) }
 }
 
-/// The numbers of structs, those of a vector side by side.
+/// Returns the numbers of structs; the numbers of a vector are adjacent.
 ///
 /// # Safety
 /// As for `vectors`.
 #[inline(always)]
 pub(crate) unsafe fn numbers<T>(of: &[T]) -> &[f64] {
     const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
-    // SAFETY: by the caller; a vector is its numbers.
+    // SAFETY: by the caller; a vector consists of its numbers.
     unsafe { core::slice::from_raw_parts(of.as_ptr().cast(), size_of_val(of) / size_of::<f64>()) }
 }
 
-/// The same, to be written.
+/// Returns the numbers of structs, mutably.
 ///
 /// # Safety
 /// As for `vectors`.
 #[inline(always)]
 pub(crate) unsafe fn numbers_mut<T>(of: &mut [T]) -> &mut [f64] {
     const { assert!(size_of::<T>().is_multiple_of(size_of::<Four>()) && align_of::<T>() == align_of::<Four>()) };
-    // SAFETY: by the caller; a vector is its numbers.
+    // SAFETY: by the caller; a vector consists of its numbers.
     unsafe { core::slice::from_raw_parts_mut(of.as_mut_ptr().cast(), size_of_val(of) / size_of::<f64>()) }
 }
 
 #[inline(always)]
 fn moved<T: Copy>(mut x: T, by: &Move) -> T {
-    // SAFETY: passes keep structs of vectors.
+    // SAFETY: passes store structs of vectors.
     let numbers = unsafe { vectors(&mut x) };
     for k in 0..numbers.len() {
         numbers[k] = by.apply::<Gate>(numbers[k]);
@@ -76,13 +76,13 @@ fn moved<T: Copy>(mut x: T, by: &Move) -> T {
     x
 }
 
-/// What comes from some steps or slots, each number into its lane.
+/// Sums values of some steps or slots, each number moved to its lane.
 #[inline(always)]
 fn gathered<T: Copy>(of: &[T], from: &[(usize, Move)]) -> T {
     let mut x = moved(of[from[0].0], &from[0].1);
     for (at, by) in &from[1..] {
         let mut y = moved(of[*at], by);
-        // SAFETY: passes keep structs of vectors.
+        // SAFETY: passes store structs of vectors.
         let (x, y) = unsafe { (vectors(&mut x), vectors(&mut y)) };
         for k in 0..x.len() {
             x[k] += y[k];
@@ -124,7 +124,7 @@ impl Layout for Limbs<'_> {
     }
     #[inline(always)]
     fn armature(&self, i: usize, k: usize) -> Four {
-        let mut armature = [1.0; LANES]; // of a lane without a joint: nothing is divided by 0
+        let mut armature = [1.0; LANES]; // value for lanes without a joint, avoids a division by 0
         let from = self.coordinates[self.steps[i].idx_v + k].from;
         for lane in 0..LANES {
             if from[lane] < self.armature.len() {
@@ -161,7 +161,7 @@ impl Layout for Limbs<'_> {
     fn stack_index(&self, i: usize) -> usize {
         i
     }
-    /// All bodies, when the pass has gone down to the last step.
+    /// Returns all bodies after the last step, and none before.
     #[inline(always)]
     fn closed_by(&self, i: usize) -> &[usize] {
         if i + 1 == self.steps.len() { self.closed } else { &[] }
@@ -178,7 +178,7 @@ impl Layout for Limbs<'_> {
     fn sum_lanes<T>(&self, i: usize, x: &mut T) {
         let [first, others @ ..] = &self.steps[i].bodies;
         if others.iter().all(|other| other == first) {
-            // SAFETY: passes keep structs of vectors.
+            // SAFETY: passes store structs of vectors.
             let numbers = unsafe { vectors(x) };
             for k in 0..numbers.len() {
                 numbers[k] = sum::<Gate>(numbers[k]);
@@ -202,7 +202,7 @@ impl Layout for Limbs<'_> {
     fn column(&self, i: usize) -> usize {
         self.steps[i].idx_v
     }
-    /// Nothing: that is done where the lanes' efforts are put together.
+    /// Does nothing: armature torque is added when the lanes' efforts are combined.
     #[inline(always)]
     fn add_armature_torque(&self, _: &[Four], _: &mut [Four]) {}
 }
@@ -217,7 +217,7 @@ impl<'a> Limbs<'a> {
         Self { steps, support, pairs, copies, predecessors, closed, turns, coordinates, armature, gravity, geometry }
     }
 
-    /// What stands at the predecessor of an entry of the support.
+    /// Returns the value at the predecessor of an entry of the support.
     #[inline(always)]
     pub(crate) fn predecessor<T: Copy>(&self, of: &[T], entry: usize) -> T {
         match &self.predecessors[entry] {
@@ -226,7 +226,7 @@ impl<'a> Limbs<'a> {
         }
     }
 
-    /// The places of a pair.
+    /// Returns the matrix indices of a pair.
     #[inline(always)]
     pub(crate) fn pair(&self, e: LaneColumn, k: usize) -> &Pair {
         debug_assert!(e.pair + k < self.pairs.len());
@@ -234,13 +234,14 @@ impl<'a> Limbs<'a> {
         unsafe { self.pairs.get_unchecked(e.pair + k) }
     }
 
-    /// Sets the entries of a pair in each lane, the first lane's last.
+    /// Sets the entries of a pair, the first lane's last.
     #[inline(always)]
     fn put(matrix: &mut [Fused], at: &[u32; LANES], value: Four) {
         let value = value.to_fused();
         for lane in (0..LANES).rev() {
             debug_assert!((at[lane] as usize) < matrix.len());
-            // SAFETY: a plan's pairs are entries of nv × nv matrices, which all matrices here are: see `clear`.
+            // SAFETY: a plan's pairs index entries of nv × nv matrices, and all matrices here have this size: see
+            // `clear`.
             unsafe { *matrix.get_unchecked_mut(at[lane] as usize) = value[lane] };
         }
     }
@@ -248,7 +249,7 @@ impl<'a> Limbs<'a> {
 
 impl Columns for Limbs<'_> {
     type Column = LaneColumn;
-    /// The how manieth of its joint.
+    /// Index of the column within its joint.
     type OwnColumn = usize;
     type Number = Fused;
 

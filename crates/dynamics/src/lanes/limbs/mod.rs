@@ -1,4 +1,4 @@
-//! The limbs of one robot side by side: passes over the schedule of [`condyle_model::limbs`], four bodies at a time.
+//! Limbs of one robot in parallel lanes: passes over the schedule of [`condyle_model::limbs`], four bodies at a time.
 
 mod constrained;
 pub(crate) mod forces;

@@ -1,4 +1,4 @@
-//! A pass over steps of four bodies.
+//! Pass over steps of four bodies.
 #![allow(unsafe_code)]
 
 use super::lanes::Four;
@@ -16,16 +16,15 @@ use condyle_spatial::gate::{Fused, Rename, is, same};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::{Array, Force, Inertia, Scalar};
 
-/// What passes in lanes write.
+/// Scratch and results of passes in lanes.
 #[derive(Clone, Debug)]
 pub(crate) struct Scratch {
-    /// The arguments. Shape: positions, coordinates, coordinates, steps of the plan. Written by: `load`.
+    /// Arguments. Shape: positions, coordinates, coordinates, steps of the plan. Written by: `load`.
     pub q: Array<Four>,
     pub v: Array<Four>,
     pub x: Array<Four>,
     pub f_ext: Array<Force<Four>>,
-    /// An argument, with a 0 for the lanes that have no joint. Shape: the larger of nq and nv, + 1.
-    /// Written by: `gather`.
+    /// Copy of an argument, with a 0 for lanes without a joint. Shape: max(nq, nv) + 1. Written by: `gather`.
     padded: Array<Fused>,
     pub world: World<Four>,
     pub rnea: rnea::Workspace<Four>,
@@ -37,7 +36,7 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
-    /// For a model with limbs, on a processor that can.
+    /// Allocates the scratch for a model with limbs, if the processor supports lanes.
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
         let plan = model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
         let (steps, nv) = (plan.steps.len(), plan.state.coordinates.len());
@@ -58,7 +57,7 @@ impl Scratch {
         }))
     }
 
-    /// Whether it was made for this plan, or one of the same shape.
+    /// Returns whether the scratch was made for this plan, or for a plan of the same shape.
     pub(crate) fn fits(&self, plan: &Plan) -> bool {
         (self.q.len(), self.v.len(), self.f_ext.len(), self.world.S.len())
             == (
@@ -71,18 +70,18 @@ impl Scratch {
     }
 }
 
-/// The arguments of inverse or of forward dynamics.
+/// Arguments of inverse or forward dynamics.
 #[derive(Clone, Copy)]
 pub(crate) struct Arguments<'a, S = Fused> {
     pub q: &'a [S],
     pub v: &'a [S],
-    /// An acceleration or an effort.
+    /// Acceleration or effort.
     pub x: &'a [S],
     pub f_ext: &'a [Force<S>],
 }
 
 impl<'a, S> Arguments<'a, S> {
-    /// The same numbers.
+    /// Returns the same numbers as `Fused`.
     ///
     /// # Safety
     /// `S` is `f64`.
@@ -95,7 +94,7 @@ impl<'a, S> Arguments<'a, S> {
     }
 }
 
-/// Brings the arguments into lanes.
+/// Loads the arguments into lanes.
 #[inline(always)]
 pub(crate) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
     gather(&plan.state.positions, &mut to.padded, from.q, &mut to.q);
@@ -126,7 +125,7 @@ pub(crate) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
     }
 }
 
-/// A vector of the robot's, lane by lane.
+/// Gathers a vector of the robot into lanes.
 #[inline(always)]
 fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]) {
     padded[..x.len()].copy_from_slice(x);
@@ -135,7 +134,7 @@ fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]
     for (Source { from: [i, j, k, l], ratio, offset }, to) in sources.iter().zip(to) {
         let number = |at: &usize| {
             debug_assert!(*at < padded.len());
-            // SAFETY: a plan's sources are places in a vector of the robot's, or the one past its end.
+            // SAFETY: a plan's sources are indices into a vector of the robot, or one past its end.
             unsafe { padded.get_unchecked(*at) }.0
         };
         let x = Four::from_array([number(i), number(j), number(k), number(l)]);
@@ -143,14 +142,14 @@ fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]
     }
 }
 
-/// Takes a vector in coordinates out of the lanes: the transpose of `gather`.
+/// Copies a vector in coordinates out of the lanes: the transpose of `gather`.
 #[inline(always)]
 pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [Fused]) {
     let numbers = lanes(from);
     assert!(numbers.len() == LANES * plan.state.coordinates.len(), "lanes of another robot");
     for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
         debug_assert!(at < numbers.len());
-        // SAFETY: a plan's places are those of its coordinates in the lanes, all of which are there.
+        // SAFETY: the plan's indices locate its coordinates in the lanes, and the lanes hold all coordinates.
         *to = Fused(unsafe { *numbers.get_unchecked(at) });
     }
     for &(k, at, ratio) in &plan.state.followers {
