@@ -105,7 +105,7 @@ impl Limits {
     }
 }
 
-/// Limits, losses and rotor inertia of a joint; by default there are none.
+/// Limits, losses and rotor inertia of a joint. By default, limits are missing and the other values are 0.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointOptions {
     /// Lower and upper limit of position (rad, m), for joints with one coordinate.

@@ -29,7 +29,7 @@ impl Reader<'_> {
             _ => return Err(wrong(format!("type: `{kind}` is none of hinge, slide, ball and free"))),
         };
         let joint = joint.normalized().map_err(wrong)?;
-        // limits of effort, damping and friction: see beside.rs
+        // the module `beside` adds limits of effort, damping and friction
         let mut options = JointOptions { armature: number("armature")?, ..JointOptions::default() };
         if joint == Joint::FreeFlyer {
             return Ok((joint, Se3::identity(), Se3::identity(), options));
