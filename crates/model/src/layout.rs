@@ -51,8 +51,8 @@ pub trait Layout {
     /// Adds x to the parent's entry of an array indexed by body.
     fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// The place of body i on the stack of a pass that goes down and up the branches, one after the other: the bodies on its
-    /// way from the world, which has place 0. There the pass keeps what it needs of a body until its subtree is closed.
+    /// Returns the index of body i on the stack of a depth-first pass: the number of bodies on its path from the world,
+    /// which has index 0. The stack keeps the data of a body until its subtree is closed.
     fn stack_index(&self, i: usize) -> usize;
     /// Returns the bodies whose subtrees end with body i, children before parents.
     fn closed_by(&self, i: usize) -> &[usize];
