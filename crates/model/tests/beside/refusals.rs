@@ -1,4 +1,4 @@
-//! Errors, limits of files, and models that are changed.
+//! Errors, limits of files, and changed models.
 
 use super::*;
 
@@ -74,7 +74,7 @@ fn errors() {
     }
 }
 
-/// A file that multiplies what it has is refused at once.
+/// A file that multiplies its content is refused at once.
 #[test]
 fn what_files_may_multiply() {
     let keys = format!("<keyframe>{}</keyframe>", "<key/>".repeat(300_000));
@@ -93,7 +93,7 @@ fn what_files_may_multiply() {
     assert_eq!(said, format!("<string>:1: <motor>: {what}"));
 }
 
-/// Additions stay with the parts of a robot that is changed.
+/// Additions to the tree stay with their parts when a robot is changed.
 #[test]
 fn models_that_are_changed() {
     let ball = "<geom size='0.1'/>";
