@@ -1,4 +1,4 @@
-//! Names that are unknown, misplaced or contradict each other.
+//! Unknown and misplaced names, and names that contradict each other.
 
 use super::*;
 
@@ -72,7 +72,7 @@ fn contradictions_are_errors() {
     }
     assert!(refused("", "", "<deformable><flex name='f'/></deformable>").contains("flex `f`: is not supported"));
     assert!(refused("<option><flag spring='off'/></option>", "", "").contains("spring: `off` is neither enable nor"));
-    // a class has one orientation, the last that it says; pos at the origin does not contradict
+    // a class has one orientation, the last one in it; pos at the origin does not contradict fromto
     let before = "<default><geom euler='90 0 0'/><default class='c'><geom quat='0 1 0 0'/></default></default>";
     let inside = "<body><joint/><geom class='c' type='box' size='0.1 0.2 0.3' pos='1 0 0' mass='1'/></body>";
     near("class", &inertia(&model(before, inside, "").bodies()[1])[4..7], &[0.13 / 3.0, 0.1 / 3.0, 0.05 / 3.0], 1e-12);
