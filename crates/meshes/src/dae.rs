@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn faults_are_reported() {
         let node = r##"<node id="n1">"##;
         for (from, to, said) in [
             ("<p>0 1 2</p>", "<p>0 1 7</p>", "no vertex is `7`"),

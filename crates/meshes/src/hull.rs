@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_and_odd_points_have_none() {
+    fn flat_and_invalid_points_have_no_hull() {
         let flat = |i: u32| [f64::from(i % 7), f64::from(i / 7), 3.0];
         assert_eq!(hull(&(0..40).map(flat).collect::<Vec<_>>()), None);
         assert_eq!(hull(&[]), None);

@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_parts_are_no_trouble() {
+    fn degenerate_parts_are_simplified() {
         assert!(simplify(&Part::default(), 12).triangles.is_empty());
         let point = Part { points: vec![[1.0; 3]; 3], triangles: vec![[0, 1, 2]], color: None };
         assert!(simplify(&point, 12).triangles.is_empty());

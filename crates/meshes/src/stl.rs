@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_and_costs_nothing() {
+    fn invalid_files_are_reported_at_once() {
         let mut lying = binary(u32::MAX, 1);
         lying[..5].copy_from_slice(b"other");
         assert!(read(&lying).unwrap_err().contains("4294967295 triangles need"));

@@ -80,7 +80,7 @@ fn positions_of_a_robot_with_fewer_joints() {
 }
 
 #[test]
-fn a_turn_without_limits_is_an_angle_or_its_cosine_and_sine() {
+fn a_continuous_joint_has_an_angle_or_its_cosine_and_sine() {
     let mut builder = ModelBuilder::new("wheel");
     let joint = Joint::Continuous { axis: Vec3::new(0.0, 0.0, 1.0) };
     builder.body("turn", WORLD, joint, Se3::identity(), Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(1.0)));
@@ -98,7 +98,7 @@ fn a_turn_without_limits_is_an_angle_or_its_cosine_and_sine() {
 }
 
 #[test]
-fn what_is_wrong_with_positions() {
+fn invalid_positions() {
     let value = r#"name="LF_HFE" value="0.7""#;
     let line = "<string>:9: joint `LF_HFE`";
     refused(&with(value, r#"name="LF_HFE""#), false, &format!("{line}: has no value"));
@@ -121,7 +121,7 @@ fn what_is_wrong_with_positions() {
 }
 
 #[test]
-fn an_appended_robot_is_numbered_behind_what_its_body_has_carried() {
+fn an_appended_robot_is_numbered_after_earlier_children() {
     let (quadruped, arm) = (robots::quadruped(), robots::arm7());
     let trunk = &quadruped.frames()[quadruped.frame("trunk").unwrap()];
     let at = Se3 { translation: Vec3::new(0.2, 0.0, 0.1), ..Se3::identity() };

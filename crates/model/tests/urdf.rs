@@ -73,7 +73,7 @@ fn limits_without_a_number() {
 
 /// Robots with such limits exist, and other readers accept them.
 #[test]
-fn limits_that_cannot_be_meant() {
+fn implausible_limits() {
     let said = |limit: &str| warnings(&robot("revolute", limit, ""));
     let odd = said("<limit effort='3' velocity='2'/>");
     assert_eq!(odd, ["joint `j`: both limits of position are 0: it cannot move"]);
@@ -458,7 +458,7 @@ fn inertias_that_are_not_complete() {
 }
 
 #[test]
-fn inertias_that_cannot_be_meant() {
+fn implausible_inertias() {
     let of = |mass: f64, moment: f64| {
         let mut builder = ModelBuilder::new("m");
         let inertia = Inertia::from_com(mass, Vec3::new(1.0, 2.0, 3.0), Sym3::diagonal(moment));

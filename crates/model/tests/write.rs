@@ -160,7 +160,7 @@ fn armature_is_written_as_the_inertia_of_a_rotor() {
 }
 
 #[test]
-fn what_a_urdf_cannot_say_is_an_error() {
+fn numbers_that_a_urdf_cannot_represent_are_errors() {
     let limited = |change: fn(&mut condyle_model::Limits)| {
         move |m: &Model| {
             let mut limits = m.limits().clone();
@@ -326,7 +326,7 @@ fn inertias_of_an_mjcf_come_back() {
 }
 
 #[test]
-fn what_an_mjcf_cannot_say_is_an_error() {
+fn numbers_that_an_mjcf_cannot_represent_are_errors() {
     let refused = |text: &str, end: &str, change: &dyn Fn(&Model) -> Model| {
         let said = written("refused", text, change).expect_err(end);
         assert!(said.contains(end), "{said}\n{end}");

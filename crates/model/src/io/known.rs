@@ -118,7 +118,7 @@ mod tests {
     use crate::io::xml::Amount;
 
     #[test]
-    fn what_is_not_known_warns_with_the_nearest_name() {
+    fn unknown_names_warn_with_the_nearest_name() {
         let known =
             Known::new("robot: name ; link joint\n link: name ; mass drawn*\n joint: name type ; axis\n axis: xyz");
         let left_out: &LeftOut = &[("joint", "type", "is not held")];

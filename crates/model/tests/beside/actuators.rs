@@ -198,7 +198,7 @@ fn armature_and_damping_of_actuators() {
 
 /// Every change of a robot's behaviour causes a warning with the element and the effect.
 #[test]
-fn what_actuators_lose_is_said() {
+fn lost_features_of_actuators_warn() {
     let cases = [
         ("<muscle joint='j' lengthrange='0 1'/>", "muscle", "it is left out of the table of actuators: it is a muscle"),
         (

@@ -76,7 +76,7 @@ fn errors() {
 
 /// A file that multiplies its content is refused at once.
 #[test]
-fn what_files_may_multiply() {
+fn limits_of_multiplied_content() {
     let keys = format!("<keyframe>{}</keyframe>", "<key/>".repeat(300_000));
     let text = one("", "<freejoint/>", &keys);
     let bodies = "<body><joint/><geom size='0.1'/></body>".repeat(100);

@@ -33,7 +33,7 @@ fn replicas_turn_and_move_on() {
 }
 
 #[test]
-fn what_refers_to_a_replica_is_copied_along() {
+fn elements_that_refer_to_a_replica_are_copied() {
     let other = LINK.replace("'b'", "'o'").replace("'j'", "'k'");
     let tree = format!("<replicate count='2'>{LINK}</replicate>{other}");
     let after =
@@ -96,7 +96,7 @@ fn parts_of_the_same_file_attached_again() {
 }
 
 #[test]
-fn files_with_settings_of_their_own() {
+fn attached_files_keep_their_own_settings() {
     let child = "<mujoco model='c'><compiler angle='radian' autolimits='false' boundmass='0.5'/><option gravity='0 0 -1'/>
         <default><joint damping='0.5'/><default class='q'><joint armature='2'/></default></default>
         <worldbody><site name='ws' pos='0 0 3'/><frame pos='1 0 0'><body name='d' pos='0 1 0' euler='0 0 1.5707963267948966'>
@@ -143,7 +143,7 @@ fn a_file_inside_of_itself() {
 }
 
 #[test]
-fn includes_beside_the_file_that_includes_them() {
+fn includes_next_to_the_including_file() {
     let files: [(&str, &[u8]); 4] = [
         ("top.xml", b"<mujoco><worldbody><include file='in/mid.xml'/></worldbody></mujoco>"),
         ("in/mid.xml", b"<x><body name='a'><joint/><geom size='0.1'/><include file='deep/part.xml'/></body></x>"),

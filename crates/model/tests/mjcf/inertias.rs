@@ -194,7 +194,7 @@ fn files_of_meshes() {
 }
 
 #[test]
-fn meshes_that_cannot_be() {
+fn invalid_meshes() {
     let flat = "<asset><mesh name='m' vertex='0 0 0 1 0 0 0 1 0 1 1 0'/></asset>";
     let inside = |geom: &str| format!("<body><joint/><geom type='mesh' {geom}/></body>");
     assert!(
@@ -217,7 +217,7 @@ fn meshes_that_cannot_be() {
 }
 
 #[test]
-fn what_is_fixed_to_the_world_counts() {
+fn bodies_fixed_to_the_world_have_mass() {
     let fixed = format!("<body><geom size='0.1' mass='7'/>{}</body>", body("", ""));
     assert_eq!(model("", &fixed, "").total_mass(), 9.0);
     near("scaled", &[model("<compiler settotalmass='3'/>", &fixed, "").total_mass()], &[3.0], 1e-15);

@@ -4,7 +4,7 @@ use super::*;
 use std::f64::consts::PI;
 
 #[test]
-fn ranges_limit_where_their_numbers_are_in_order() {
+fn ranges_are_limits_if_their_numbers_are_in_order() {
     let limits = |joint: &str, before: &str| {
         let model = model(before, &body(joint, ""), "");
         [model.limits().lower[0], model.limits().upper[0]]

@@ -30,7 +30,7 @@ fn unknown_names_warn_with_the_nearest_one() {
 }
 
 #[test]
-fn what_has_no_effect_is_known() {
+fn names_without_effect_are_known() {
     let before = "<compiler autolimits='true' usethread='false'><lengthrange mode='none'/></compiler><size memory='1M'/>
         <option timestep='0.01' integrator='implicit' magnetic='1 0 0'><flag contact='disable' energy='enable'/></option>
         <statistic extent='3'/><visual><global fovy='30'/></visual><custom><numeric name='n' data='1'/></custom>
@@ -79,7 +79,7 @@ fn contradictions_are_errors() {
 }
 
 #[test]
-fn what_a_model_cannot_hold_warns() {
+fn unsupported_features_warn() {
     for (before, inside, expected) in [
         ("<option density='1000'/>", body("", ""), "<option>: density 1000: forces of the medium"),
         ("<option viscosity='0.1'/>", body("", ""), "<option>: viscosity 0.1: forces of the medium"),

@@ -139,7 +139,7 @@ fn included_files() {
 
 /// A world may lack its sun, but not all of its models.
 #[test]
-fn worlds_that_include_what_is_missing() {
+fn worlds_with_missing_models() {
     let world = |inside: &str| {
         read(&format!(
             "<sdf version='1.6'><world name='w'><include><uri>model://no_sun_here</uri></include>{inside}</world></sdf>"

@@ -159,7 +159,7 @@ fn what_a_model_does_not_hold() {
 }
 
 #[test]
-fn values_that_are_none() {
+fn invalid_values() {
     let cases = [
         ("<link name='a'><gravity>no</gravity></link>", "link `a`: gravity: expected true or false, found `no`"),
         ("<static>yes</static><link name='a'/>", "model `m`: static: expected true or false, found `yes`"),
@@ -209,7 +209,7 @@ fn values_that_are_none() {
 
 /// Text after a number is dropped with a warning; text without a number is an error.
 #[test]
-fn numbers_with_something_behind() {
+fn numbers_followed_by_text() {
     let limit = |text: &str| {
         let axis = format!("<axis><xyz>0 0 1</xyz><limit><velocity>{text}</velocity></limit></axis>");
         let joint = joint("j", "revolute", ["a", "b"], &axis);

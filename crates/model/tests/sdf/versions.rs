@@ -5,7 +5,7 @@ use super::*;
 /// Tests the axis 0 0 1 of a joint whose child is rotated by 90° about x. It is z of the joint, or z of the model,
 /// which is y of the joint.
 #[test]
-fn the_version_says_in_which_frame_an_axis_is() {
+fn the_version_determines_the_frame_of_an_axis() {
     let axis = |version: &str, inside: &str| {
         let axis = format!("<axis><xyz>0 0 1</xyz>{inside}</axis>");
         let b = link_at("b", "0 0 1 1.5707963267948966 0 0");
@@ -41,7 +41,7 @@ fn the_version_says_in_which_frame_an_axis_is() {
 
 /// Up to version 1.6 a pose has the attribute `frame`, later `relative_to`.
 #[test]
-fn the_version_says_to_what_a_pose_is_relative() {
+fn the_version_determines_the_attribute_of_a_pose() {
     let z = |version: &str, name: &str| {
         let b = format!("<link name='b'><pose {name}='a'>0 0 1 0 0 0</pose>{INERTIAL}</link>");
         let ends = joint("j", "fixed", ["a", "b"], "");

@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn children_stand_on_lines_of_their_own_where_others_do() {
+    fn inserted_children_follow_the_line_breaks_of_others() {
         let insert = |text: &str| edited(text, |e, n| e.insert(&n.children[0], "<b/>"));
         assert_eq!(insert("<r>\n\t<a/>\n</r>"), "<r>\n\t<a>\n\t  <b/>\n\t</a>\n</r>");
         assert_eq!(insert("<r>\r\n  <a>\r\n    <c/></a></r>"), "<r>\r\n  <a>\r\n    <b/>\r\n    <c/></a></r>");
