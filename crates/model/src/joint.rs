@@ -61,8 +61,8 @@ pub enum Joint {
 /// sin θ]; the ratio must then be an integer, and the follower turns by ratio · θ + offset. If the leader has one
 /// number and the follower is continuous, the follower turns by ratio · q + offset.
 ///
-/// The follower's armature is added to the leader's coordinate as ratio² · armature, and its spring acts there, too. Its
-/// limits, damping and friction are ignored: as in Pinocchio, the coordinate has only the leader's values.
+/// The follower's armature is added to the leader's coordinate as ratio² · armature, and its spring acts there, too.
+/// Its limits, damping and friction are ignored: as in Pinocchio, the coordinate has only the leader's values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 /// needs as many pairs as the product of the lengths.
 const COMPARED: [usize; 2] = [128, 1 << 22];
 
-/// Returns the most similar name by [`distance`], among those that can be compared within the limit. The result is
+/// Returns the most similar name by [`distance`], among the names that can be compared within the limit. The result is
 /// empty if even this name differs in more than half of its characters.
 pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
     let [length, mut left] = COMPARED;

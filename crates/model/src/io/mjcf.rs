@@ -51,7 +51,8 @@ pub struct MjcfOptions {
     pub strict: bool,
     /// Kinds of warnings that are not errors, even if `strict` is set.
     pub allow: Vec<WarningKind>,
-    /// Folders that contain packages, or are packages, for `package://` addresses; see [`UrdfOptions`](crate::UrdfOptions).
+    /// Folders that contain packages, or are packages, for `package://` addresses; see
+    /// [`UrdfOptions`](crate::UrdfOptions).
     pub packages: Vec<PathBuf>,
     /// Whether a `<joint>` of `<equality>` with a linear `polycoef` lets joint1 follow joint2
     /// ([`Mimic`](crate::Mimic)), instead of becoming a [constraint](Model::constraints).
@@ -71,9 +72,9 @@ impl Model {
     /// bodies `name#1`, `name#2`, … without mass. A body without joints is merged into its parent. It stays as a frame,
     /// as sites do ([`FrameKind::User`]).
     ///
-    /// The frame of a model's body is at the body's last joint. The frame of the MJCF body has the kind
-    /// [`FrameKind::Link`] and the body's name; it differs from the former by the joint's `pos`. A free joint's q is
-    /// the pose of the MJCF body in the world; with `align` it is the pose of the frame of inertia, as in MuJoCo. Named
+    /// The frame of a model's body is at the body's last joint. The frame of the MJCF body is a separate frame of kind
+    /// [`FrameKind::Link`] with the body's name; both frames differ by the joint's `pos`. A free joint's q is the pose
+    /// of the MJCF body in the world; with `align` it is the pose of the frame of inertia, as in MuJoCo. Named
     /// `<frame>`s and cameras (of mode `fixed`) are frames of kind [`FrameKind::User`], too. If a site has the same
     /// name, they are named `frame:name` or `camera:name`.
     ///
@@ -254,7 +255,7 @@ impl<'a> Reader<'a> {
         &self.source(element).compiler
     }
 
-    /// Returns the element with the defaults of its class, or of the surrounding class if it names none.
+    /// Returns the element with the defaults of its class, or of the surrounding class if it names no class.
     fn of(&self, element: &'a Element, around: &'a str) -> Result<Attributes<'a>, Error> {
         self.source(element).defaults.of(element, around)
     }

@@ -86,7 +86,7 @@ impl Model {
     ///
     /// **Inertias.** A link without `<inertial>` has SDF's default of 1 kg and 1 kg m², and a warning. With
     /// `auto="true"` the inertia is computed from the collision shapes: boxes, spheres, ellipsoids, cylinders, cones
-    /// and capsules. The weight of a link without `<gravity>` is compensated:
+    /// and capsules. The weight of a link whose `<gravity>` is false is compensated:
     /// [`gravity_compensation`](Self::gravity_compensation).
     ///
     /// # Errors

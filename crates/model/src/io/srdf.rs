@@ -46,7 +46,8 @@ impl Model {
         self.group_states(&Element::parse(&text, &path.display().to_string(), &mut amount)?, strict)
     }
 
-    /// Reads the named positions of an SRDF from a string; see [`reference_configurations`](Self::reference_configurations).
+    /// Reads the named positions of an SRDF from a string; see
+    /// [`reference_configurations`](Self::reference_configurations).
     ///
     /// ```
     /// let arm = condyle_model::robots::arm7();

@@ -74,9 +74,10 @@ impl Model {
     /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the MJCF `original`. The
     /// rest of the file is copied; see [`write_urdf`](Self::write_urdf).
     ///
-    /// Attributes of elements override the attributes of their classes, so defaults stay unchanged. A changed inertia is written
-    /// as an `<inertial>`, even if geoms determined it before. Limits of effort are written as `actuatorfrcrange` of
-    /// the joint. The weight that `gravcomp` compensates is proportional to the mass, so it follows the new masses.
+    /// Attributes of elements override the attributes of their classes, so defaults stay unchanged. A changed inertia
+    /// is written as an `<inertial>`, even if geoms determined it before. Limits of effort are written as
+    /// `actuatorfrcrange` of the joint. The weight that `gravcomp` compensates is proportional to the mass, so it
+    /// follows the new masses.
     ///
     /// # Errors
     /// The errors of [`write_urdf`](Self::write_urdf). The file itself must contain the bodies and joints that differ:

@@ -47,7 +47,7 @@ impl Joint {
         }
     }
 
-    /// Computes the same for the given joints, in their order.
+    /// Computes the sine and cosine of the angles of the given joints, in their order.
     #[inline(always)]
     pub fn sin_cos_of<L: Layout>(l: &L, joints: &[usize], q: &[L::S], sin: &mut [L::S], cos: &mut [L::S]) {
         for (k, &i) in joints.iter().enumerate() {

@@ -34,7 +34,7 @@ impl Schedule {
         (nodes.len() >= WORTH * (schedule.bodies.len() - 1)).then_some(schedule)
     }
 
-    /// Creates a schedule that serves those bodies first which must not wait if `last` is to be the last step.
+    /// Creates a schedule. It first serves bodies that cannot wait if `last` is to be the last step.
     fn until(nodes: &[Node<f64>], last: usize) -> Self {
         let n = nodes.len();
         let mut children = vec![Vec::new(); n];

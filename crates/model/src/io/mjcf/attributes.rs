@@ -61,7 +61,7 @@ impl<'a> Defaults<'a> {
         Ok(())
     }
 
-    /// Returns the element with the defaults of its class, or of the surrounding class if it names none.
+    /// Returns the element with the defaults of its class, or of the surrounding class if it names no class.
     pub(super) fn of<'e>(&'e self, element: &'e Element, around: &'e str) -> Result<Attributes<'e>, Error> {
         let name = self.known(element, element.attribute("class").unwrap_or(around))?;
         Ok(Attributes { element, class: self.classes[name].get(element.tag.as_str()) })
@@ -90,7 +90,7 @@ impl<'a> Defaults<'a> {
     }
 }
 
-/// Attributes of an element; where the element has none, the attributes of its class.
+/// Attributes of an element; an attribute that the element lacks is taken from its class.
 pub(super) struct Attributes<'a> {
     pub(super) element: &'a Element,
     class: Option<&'a HashMap<&'a str, &'a str>>,

@@ -165,7 +165,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Copies those elements of the sections that refer to a copied part.
+    /// Copies elements of the sections; `referring` lists the elements that refer to a copied part.
     fn copy_referring(&mut self, referring: &[(usize, usize)], rename: &dyn Fn(&str) -> String) -> Result<(), Error> {
         for &at in referring {
             if let Some(copy) = self.sections.get(at).map(|e| copied(e, rename, 3)).transpose()? {

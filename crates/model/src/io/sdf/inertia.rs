@@ -155,7 +155,7 @@ fn shape(collision: &Element) -> Result<Inertia<f64>, Error> {
     })
 }
 
-/// Checks the flags of a model or link, and adds warnings about those that change how it moves.
+/// Checks the flags of a model or link, and adds warnings about flags that change how it moves.
 pub(super) fn flags(element: &Element, warnings: &mut Vec<Warning>) -> Result<(), Error> {
     for tag in ["static", "self_collide", "allow_auto_disable", "gravity", "must_be_base_link"] {
         flag(element, tag, false)?;

@@ -72,8 +72,8 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Reads the properties of an axis except its direction. In SDF, a limit of 1e16 or more is no limit, and neither is
-    /// a negative effort or velocity.
+    /// Reads the properties of an axis except its direction. In SDF, a limit of 1e16 or more is no limit, and neither
+    /// is a negative effort or velocity.
     pub(super) fn new(element: &Element, tag: &str, kind: Joint, warnings: &mut Vec<Warning>) -> Result<Self, Error> {
         let axis = element.child(tag);
         let (limit, dynamics) = (axis.and_then(|a| a.child("limit")), axis.and_then(|a| a.child("dynamics")));

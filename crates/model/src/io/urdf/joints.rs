@@ -34,7 +34,7 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
         "screw" if is_drakes => {
             let screw = joint.child("drake:screw_thread_pitch").ok_or_else(|| joint.wrong("has no thread pitch"))?;
             let [turn] = array(joint, screw, "value")?.ok_or_else(|| joint.wrong_inside(screw, "has no value"))?;
-            Joint::Helical { axis: axis()?, pitch: turn / core::f64::consts::TAU } // from metres per turn to metres per radian
+            Joint::Helical { axis: axis()?, pitch: turn / core::f64::consts::TAU } // m/turn to m/rad
         }
         "planar" => {
             let axis = Joint::Revolute { axis: axis()? }.normalized().map_err(|what| joint.wrong(what))?.axis();

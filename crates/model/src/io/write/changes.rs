@@ -27,9 +27,9 @@ pub(super) struct LinkChange {
     body: usize,
     /// Name of the link that takes the difference.
     pub(super) link: String,
-    /// Pose of that link in the body.
+    /// Pose in the body of the link that takes the difference.
     placement: Se3<f64>,
-    /// New inertia of that link, in the body's frame.
+    /// New inertia of the link that takes the difference, in the body's frame.
     inertia: Inertia<f64>,
     /// Names of the body's other links that have an inertia.
     others: Vec<String>,
