@@ -1,17 +1,19 @@
-//! DAE (COLLADA 1.4 and 1.5): the triangles of a scene, moved by its nodes, with the diffuse colours of its materials.
+//! DAE (COLLADA 1.4 and 1.5): reads the triangles of a scene, with the poses of its nodes and the diffuse colours of
+//! its materials.
 //!
-//! The unit of the file counts, its upward axis does not: so do RViz and Pinocchio's readers, for which robots are made.
+//! The unit of the file is applied, its upward axis is not. RViz and Pinocchio do the same, and robots are made for
+//! them.
 
 use super::part::{Part, Triangle, Words, full};
 use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::HashMap;
 
-/// The most levels of nested nodes, and the most nodes that are visited.
+/// Maximum depth of nested nodes, and maximum number of visited nodes.
 const DEEPEST: usize = 64;
 const MOST_NODES: usize = 100_000;
 
-/// The triangles of a DAE, a part for each material of each geometry that its scene shows.
+/// Reads the triangles of a DAE: one part for each material of each geometry that its scene shows.
 pub(super) fn read(text: &str) -> Result<Vec<Part>, String> {
     let document = Document::parse(text).map_err(|error| error.to_string())?;
     let root = document.root_element();
@@ -34,12 +36,12 @@ pub(super) fn read(text: &str) -> Result<Vec<Part>, String> {
     Ok(scene.parts)
 }
 
-/// The first child element of a name.
+/// Returns the first child element with a name.
 fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
     node.children().find(|child| child.tag_name().name() == name)
 }
 
-/// Points, and triangles between them.
+/// Points, and triangles as indices of points.
 type Soup = (Vec<[f64; 3]>, Vec<Triangle>);
 
 struct Scene<'a, 'i> {
@@ -50,12 +52,12 @@ struct Scene<'a, 'i> {
 }
 
 impl<'a, 'i> Scene<'a, 'i> {
-    /// The element that an address in the file names.
+    /// Returns the element whose address in the file is `url`.
     fn named(&self, url: &str) -> Option<Node<'a, 'i>> {
         self.ids.get(url.strip_prefix('#')?).copied()
     }
 
-    /// The geometries of a node and of all below it; `to_world` is the pose of its parent.
+    /// Adds the geometries of a node and of all nodes below it; `to_world` is the pose of its parent.
     fn visit(&mut self, node: Node<'a, 'i>, mut to_world: Matrix4<f64>, depth: usize) -> Result<(), String> {
         self.nodes += 1;
         if depth > DEEPEST || self.nodes > MOST_NODES {
@@ -80,7 +82,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    /// The triangles of a geometry; `instance` says which materials its symbols stand for.
+    /// Adds the triangles of a geometry; `instance` maps the symbols of materials to materials.
     fn geometry(
         &mut self,
         geometry: Node<'a, 'i>,
@@ -90,7 +92,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         let Some(mesh) = child(geometry, "mesh") else { return Ok(()) };
         for primitive in mesh.children() {
             if !matches!(primitive.tag_name().name(), "triangles" | "polylist" | "polygons") {
-                continue; // lines
+                continue; // lines, not triangles
             }
             let Some((points, triangles)) = self.primitive(primitive)? else { continue };
             let color = primitive.attribute("material").and_then(|symbol| self.color(instance, symbol));
@@ -104,7 +106,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    /// Points and triangles of a primitive, polygons as fans; nothing where it has no vertices.
+    /// Returns points and triangles of a primitive, with polygons split into fans; `None` if it has no vertices.
     fn primitive(&self, primitive: Node<'a, 'i>) -> Result<Option<Soup>, String> {
         let (mut stride, mut offset, mut vertices) = (1, 0, None);
         for input in primitive.children().filter(|node| node.tag_name().name() == "input") {
@@ -168,7 +170,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(Some((points, triangles)))
     }
 
-    /// The diffuse colour of the material that a symbol stands for.
+    /// Returns the diffuse colour of the material that is bound to a symbol.
     fn color(&self, instance: Option<Node<'a, 'i>>, symbol: &str) -> Option<[f64; 3]> {
         let bound = instance.and_then(|instance| {
             instance.descendants().find(|n| n.attribute("symbol") == Some(symbol))?.attribute("target")
@@ -180,7 +182,7 @@ impl<'a, 'i> Scene<'a, 'i> {
     }
 }
 
-/// The transform that an element of a node is, if it is one.
+/// Returns the transform that an element of a node describes; `None` if the element is no transform.
 fn transform(node: Node) -> Result<Option<Matrix4<f64>>, String> {
     let name = node.tag_name().name();
     if !matches!(name, "matrix" | "translate" | "rotate" | "scale") {
@@ -227,13 +229,13 @@ mod tests {
         assert_eq!(parts.len(), 2);
         assert_eq!((parts[0].triangles.len(), parts[0].color), (2, Some([0.1, 0.2, 0.3])));
         assert_eq!((parts[1].triangles.len(), parts[1].color), (1, None));
-        // (1, 0, 0): doubled, turned to y, two up, and half of it
+        // (1, 0, 0): scaled by 2, rotated to y, raised by 2, and all multiplied by the unit 0.5
         let p = parts[1].points[1];
         assert!(p.iter().zip([0.0, 1.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{p:?}");
     }
 
     #[test]
-    fn what_is_wrong_is_said() {
+    fn faults_are_reported() {
         let node = r##"<node id="n1">"##;
         for (from, to, said) in [
             ("<p>0 1 2</p>", "<p>0 1 7</p>", "no vertex is `7`"),

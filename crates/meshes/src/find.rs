@@ -1,19 +1,20 @@
-//! Where the file of a mesh is: beside its robot's file, in a package, in the folder that an MJCF names.
+//! Search for the file of a mesh: next to its robot's file, in a package, or in the folder that an MJCF names.
 
 use std::path::{Component, Path, PathBuf};
 
-/// Where files are looked for.
+/// Folders in which mesh files are searched.
 #[derive(Clone, Default)]
 pub struct Places {
-    /// The folder of the robot's file; none for a robot that comes along.
+    /// Folder of the robot's file; `None` for a built-in robot.
     pub folder: Option<PathBuf>,
-    /// Folders with packages in them.
+    /// Folders that contain packages.
     pub packages: Vec<PathBuf>,
 }
 
 impl Places {
-    /// The file of a path, a `package://`, `model://` or `file://` address. A package may be in `packages`, ROS_PACKAGE_PATH,
-    /// AMENT_PREFIX_PATH, or be a folder around the robot's file or beside such a folder.
+    /// Returns the file of a path, or of a `package://`, `model://` or `file://` address. A package is searched in
+    /// `packages`, ROS_PACKAGE_PATH and AMENT_PREFIX_PATH. Each folder above the robot's file may also be the package
+    /// or contain it.
     pub fn find(&self, address: &str) -> Result<PathBuf, String> {
         let inside = ["package://", "model://"].iter().find_map(|scheme| address.strip_prefix(scheme));
         let Some(inside) = inside else { return self.plain(address.strip_prefix("file://").unwrap_or(address)) };
@@ -32,7 +33,7 @@ impl Places {
         folders.extend(folder.iter().flat_map(|folder| folder.ancestors()).map(Path::to_owned));
         for folder in folders {
             let itself = folder.file_name().is_some_and(|name| name == package).then(|| folder.join(path));
-            // an address without a package, as `package:///meshes/a.stl`: from the folder itself
+            // an address without a package, such as `package:///meshes/a.stl`, is relative to the folder itself
             for file in [itself, Some(folder.join(package).join(path))].into_iter().flatten() {
                 if file.is_file() {
                     return Ok(file);

@@ -1,27 +1,29 @@
-//! Convex hulls, by quickhull: Barber, Dobkin, Huhdanpaa (1996). Points are rounded to a grid of 2⁴⁰ steps along their
-//! box, on which every test is an exact comparison of integers: flat, doubled and nearly flat points need no tolerance.
+//! Convex hulls by quickhull: Barber, Dobkin, Huhdanpaa (1996). Points are rounded to a grid with 2⁴⁰ steps along the
+//! longest side of their box. On the grid every test compares integers exactly, so flat, doubled and nearly flat points
+//! need no tolerance.
 
 use super::part::Triangle;
 
 /// Number of steps of the grid along the longest side of the box; chosen because a determinant then fits in an `i128`.
 const STEPS: f64 = (1u64 << 40) as f64;
 
-/// Corners on the grid.
+/// Coordinates of a point on the grid.
 type Point = [i64; 3];
 
-/// A triangle of a hull that grows.
+/// A triangle of a hull under construction.
 struct Face {
     corners: Triangle,
-    /// The faces across the edges that begin at each corner.
+    /// Neighbouring faces: entry k is the face across the edge that begins at corner k.
     across: [u32; 3],
-    /// (b − a) × (c − a), outwards.
+    /// Normal (b − a) × (c − a), outwards.
     normal: [i128; 3],
-    /// Points strictly outside, each one listed by a single face.
+    /// Points strictly outside; each point is listed by one face only.
     outside: Vec<u32>,
     is_part: bool,
 }
 
-/// The triangles of the convex hull of points, counter-clockwise from outside; none if all points lie in one plane.
+/// Returns the triangles of the convex hull of points, counter-clockwise seen from outside; `None` if all points lie in
+/// one plane.
 ///
 /// ```
 /// let corner = |i: u32| [0, 1, 2].map(|k| f64::from(i >> k & 1));
@@ -47,7 +49,7 @@ pub fn hull(points: &[[f64; 3]]) -> Option<Vec<Triangle>> {
     Some(hull.faces.into_iter().filter(|face| face.is_part).map(|face| face.corners).collect())
 }
 
-/// Points as steps of their box; none if they are one point, or not finite.
+/// Rounds points to grid coordinates in their box; `None` if all points coincide or one is not finite.
 fn grid(points: &[[f64; 3]]) -> Option<Vec<Point>> {
     let bound = |f: fn(f64, f64) -> f64, k: usize| points.iter().map(|p| p[k]).reduce(f).unwrap_or(0.0);
     let low = [0, 1, 2].map(|k| bound(f64::min, k));
@@ -69,7 +71,7 @@ fn dot(a: [i128; 3], b: [i128; 3]) -> i128 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// A tetrahedron of points far from one another, with the others shared out among its faces.
+/// Returns a tetrahedron of points far from each other; the other points are shared out among its faces.
 fn start(grid: Vec<Point>) -> Option<Hull> {
     let all = || 0..grid.len() as u32;
     let at = |p: u32| grid[p as usize];
@@ -82,7 +84,7 @@ fn start(grid: Vec<Point>) -> Option<Hull> {
     let normal = cross(edge, minus(at(c), at(a)));
     let height = |p: u32| dot(normal, minus(at(p), at(a)));
     let d = all().max_by_key(|&p| height(p).abs()).filter(|&p| height(p) != 0)?;
-    // d lies below the face of a, b and c
+    // d must lie below the face of a, b and c
     let [b, c] = if height(d) < 0 { [b, c] } else { [c, b] };
     let face = |corners, across| Face { corners, across, normal: [0; 3], outside: Vec::new(), is_part: true };
     let mut faces = vec![
@@ -111,12 +113,13 @@ struct Hull {
 }
 
 impl Hull {
-    /// n · (p − a): positive outside of a face.
+    /// Returns n · (p − a), which is positive outside of a face.
     fn above(&self, face: &Face, p: u32) -> i128 {
         dot(face.normal, minus(self.grid[p as usize], self.grid[face.corners[0] as usize]))
     }
 
-    /// Gives each point to the first face from `first` on outside of which it is; those inside are forgotten.
+    /// Gives each point to the first face, from index `first` on, that has it outside; points inside all faces are
+    /// dropped.
     fn share_out(&mut self, points: Vec<u32>, first: usize) {
         for p in points {
             if let Some(f) = (first..self.faces.len()).find(|&f| self.above(&self.faces[f], p) > 0) {
@@ -125,7 +128,7 @@ impl Hull {
         }
     }
 
-    /// Adds a point that is outside of a face: faces that see it make place for a cone over their rim.
+    /// Adds a point outside of a face: the faces that see the point are replaced by a cone over their rim.
     fn add(&mut self, p: u32, seen_by: u32) {
         let (mut visible, mut rim) = (vec![seen_by], Vec::new());
         self.faces[seen_by as usize].is_part = false;
@@ -147,7 +150,8 @@ impl Hull {
                 }
             }
         }
-        // the rim is a loop: its edges in order, each one beginning where another one ends
+        // the rim is a closed loop: sort its edges by their first corner, and connect each to the edge that begins at
+        // its end
         let first = self.faces.len();
         rim.sort_unstable();
         let begins = |rim: &[(u32, u32, u32)], corner: u32| first + rim.partition_point(|edge| edge.0 < corner);
@@ -175,7 +179,7 @@ impl Hull {
 mod tests {
     use super::hull;
 
-    /// Six times the volume inside of triangles.
+    /// Returns six times the volume that triangles enclose.
     fn volume(points: &[[f64; 3]], triangles: &[[u32; 3]]) -> f64 {
         let determinant = |[a, b, c]: [[f64; 3]; 3]| {
             a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) + a[2] * (b[0] * c[1] - b[1] * c[0])
@@ -183,7 +187,7 @@ mod tests {
         triangles.iter().map(|t| determinant(t.map(|p| points[p as usize]))).sum()
     }
 
-    /// Numbers from 0 to 1 in an order of their own.
+    /// Yields pseudo-random numbers from 0 to 1, the same in each run.
     fn numbers() -> impl Iterator<Item = f64> {
         let mut x = 1u64;
         std::iter::from_fn(move || {
@@ -197,7 +201,7 @@ mod tests {
         let mut random = numbers();
         for case in 0..60 {
             let count = 4 + case * 5;
-            // every third case on a coarse lattice: many points in a line, in a plane, twice
+            // every third case is on a coarse lattice: many points are collinear, coplanar or equal
             let mut number = || {
                 let x = random.next().unwrap();
                 if case % 3 == 0 { (4.0 * x).round() } else { x }
@@ -238,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_and_odd_points_have_none() {
+    fn flat_and_invalid_points_have_no_hull() {
         let flat = |i: u32| [f64::from(i % 7), f64::from(i / 7), 3.0];
         assert_eq!(hull(&(0..40).map(flat).collect::<Vec<_>>()), None);
         assert_eq!(hull(&[]), None);

@@ -1,9 +1,10 @@
-//! The meshes that a page shows: found, read, made small, and written for it.
+//! The meshes that a page shows: their files are found, read, simplified and written into the page.
 //!
-//! A page has at most 60 000 triangles, whatever its robot's files have: edges collapse in the largest parts first. Their
-//! points have 16 bits along each side of their box. What cannot be found or read is left out with a note: nothing needs it.
+//! A page has at most 60 000 triangles, whatever the files of its robot contain: edges of the largest parts collapse
+//! first. Points have 16 bits along each side of their box. Meshes that cannot be found or read are left out with a
+//! note, because a page works without them.
 //!
-//! Without the feature `page` the crate only reads triangles (STL, OBJ) and finds convex hulls.
+//! Without the feature `page`, the crate only reads triangles (STL, OBJ) and computes convex hulls.
 //!
 #![cfg_attr(feature = "page", doc = "```")]
 #![cfg_attr(not(feature = "page"), doc = "```ignore")]
@@ -38,23 +39,24 @@ pub use page::{Drawn, Meshes};
 use part::Part;
 use std::path::Path;
 
-/// A kind of file.
+/// Format of a mesh file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// Triangles, binary or as text.
+    /// STL: triangles, binary or as text.
     Stl,
-    /// Wavefront's, with its files of materials.
+    /// Wavefront OBJ, with its material files.
     Obj,
     /// COLLADA.
     #[cfg(feature = "page")]
     Dae,
 }
 
-/// The points of a mesh, and its triangles by the points' indices, counter-clockwise from outside; nothing is made smaller. Of
-/// an OBJ with several objects or groups, triangles of the first one and points of all: as MuJoCo reads it.
+/// Returns the points of a mesh, and its triangles as indices of points, counter-clockwise seen from outside. The mesh
+/// is not simplified. For an OBJ with several objects or groups, it returns the triangles of the first one and the
+/// points of all, as MuJoCo does.
 ///
 /// # Errors
-/// The fault of the file, with the line if it is an OBJ or an STL of text.
+/// The fault of the file, with the line for an OBJ or an STL in text form.
 pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
     if format == Format::Obj {
@@ -69,16 +71,16 @@ pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
     Ok((points, triangles))
 }
 
-/// A text without the mark of byte order that some editors put first.
+/// Decodes a text without the byte order mark that some editors write at its start.
 fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
     String::from_utf8_lossy(bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes))
 }
 
-/// Corners, and triangles by the corners' indices.
+/// Points, and triangles as indices of points.
 pub type Triangles = (Vec<[f64; 3]>, Vec<[u32; 3]>);
 
 impl Format {
-    /// The format that a file's ending says it has.
+    /// Returns the format that belongs to the extension of a path.
     pub fn of(path: &Path) -> Option<Self> {
         match &*path.extension()?.to_str()?.to_lowercase() {
             "stl" => Some(Self::Stl),
@@ -89,7 +91,7 @@ impl Format {
         }
     }
 
-    /// The parts of a file, whose points are numbers.
+    /// Reads the parts of a file; all coordinates are finite.
     pub(crate) fn read(self, bytes: &[u8], library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
         let parts = match self {
             Self::Stl => stl::read(bytes)?,

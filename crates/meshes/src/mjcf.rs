@@ -8,28 +8,28 @@ use std::path::Path;
 
 /// A mesh in a body's frame.
 pub struct Visual {
-    /// The name of the body; none for the world.
+    /// Name of the body; `None` for the world.
     pub body: Option<String>,
-    /// The address of its file, as [`crate::Meshes::get`] takes it.
+    /// Address of the mesh file, as [`crate::Meshes::get`] takes it.
     pub file: String,
-    /// Along its axes.
+    /// Scale along the axes of the mesh.
     pub scale: [f64; 3],
-    /// Of the mesh in the body; m.
+    /// Pose of the mesh in the body (m).
     pub pose: Isometry3<f64>,
-    /// Red, green, blue and opacity from 0 to 1.
+    /// Red, green, blue and opacity, each from 0 to 1.
     pub color: Option<[f64; 4]>,
 }
 
-/// The groups of geometries from this one on are for collisions, by custom.
+/// First group of collision geometries; by convention, all groups from this one on are for collisions.
 const COLLISION: u32 = 3;
-/// The most levels of bodies or classes.
+/// Maximum depth of nested bodies or classes.
 const DEEPEST: usize = 256;
 
 type Attributes<'a> = HashMap<(&'a str, &'a str), &'a str>;
 
 struct File<'a> {
     classes: HashMap<&'a str, Attributes<'a>>,
-    /// File and scale of each mesh, colour of each material, by name.
+    /// File and scale of each mesh, and colour of each material, by name.
     meshes: HashMap<String, (String, [f64; 3])>,
     materials: HashMap<&'a str, [f64; 4]>,
     degrees: bool,
@@ -37,7 +37,7 @@ struct File<'a> {
     found: Vec<Visual>,
 }
 
-/// The meshes of an MJCF; what is in files that it includes is left out.
+/// Returns the meshes of an MJCF; files that it includes are not read.
 pub fn visuals(text: &str) -> Vec<Visual> {
     let Ok(document) = Document::parse(text) else { return Vec::new() };
     let root = document.root_element();
@@ -85,7 +85,7 @@ fn four(text: &str) -> Option<[f64; 4]> {
 }
 
 impl<'a> File<'a> {
-    /// Notes a class, and those in it, which begin as it is.
+    /// Stores the attributes of a class, and of the classes nested in it, which inherit them.
     fn class(&mut self, node: Node<'a, '_>, name: &'a str, mut class: Attributes<'a>, depth: usize) {
         for kind in node.children().filter(|kind| kind.is_element() && !kind.has_tag_name("default")) {
             if let Some(tag) = ["geom", "mesh"].into_iter().find(|tag| kind.has_tag_name(*tag)) {
@@ -98,14 +98,14 @@ impl<'a> File<'a> {
         self.classes.insert(name, class);
     }
 
-    /// An attribute of an element, or of its class.
+    /// Returns an attribute of an element, or the default of its class.
     fn attribute(&self, node: Node<'a, '_>, name: &'a str, around: &'a str) -> Option<&'a str> {
         let tag = if node.has_tag_name("mesh") { "mesh" } else { "geom" };
         let class = self.classes.get(node.attribute("class").unwrap_or(around));
         node.attribute(name).or_else(|| class?.get(&(tag, name)).copied())
     }
 
-    /// The meshes of a body and of those below it; `pose` is that of a <frame> in the body.
+    /// Adds the meshes of a body and of the bodies below it; `pose` is the pose of the enclosing <frame> in the body.
     fn body(&mut self, node: Node<'a, '_>, name: Option<&'a str>, around: &'a str, pose: Isometry3<f64>, depth: usize) {
         if depth > DEEPEST {
             return;
@@ -134,7 +134,7 @@ impl<'a> File<'a> {
         let get = |key| self.attribute(geom, key, around);
         let Some((file, scale)) = get("mesh").and_then(|mesh| self.meshes.get(mesh)) else { return };
         let group = get("group").and_then(|group| group.trim().parse::<u32>().ok()).unwrap_or(0);
-        // A mesh with the type of a simple shape stands for the shape that fits it.
+        // A mesh whose type is a simple shape only defines the size of that shape.
         if group >= COLLISION || get("type").is_some_and(|kind| kind != "mesh") {
             return;
         }
@@ -144,7 +144,7 @@ impl<'a> File<'a> {
         self.found.push(Visual { body: body.map(str::to_owned), file, scale, pose, color });
     }
 
-    /// The pose that the attributes of an element give.
+    /// Returns the pose that the attributes of an element describe.
     fn pose<'b>(&self, get: &dyn Fn(&'static str) -> Option<&'b str>) -> Isometry3<f64> {
         let words = |key| get(key).map(Words::new);
         let three = |key| words(key).and_then(|mut words| words.numbers());
@@ -160,7 +160,7 @@ impl<'a> File<'a> {
                     _ => Vector3::z_axis(),
                 };
                 let turn = UnitQuaternion::from_axis_angle(&axis, x);
-                // a capital: about the axis as it was before all turns
+                // a capital letter is a rotation about the fixed axis, from before all rotations
                 turned = if letter.is_ascii_uppercase() { turn * turned } else { turned * turn };
             }
             Some(turned)

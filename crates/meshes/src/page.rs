@@ -1,4 +1,4 @@
-//! The meshes of a page, on their way into it.
+//! Collection of the meshes of a page.
 
 use super::Format;
 use super::find::Places;
@@ -9,44 +9,44 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// The most triangles of a page, and of one of its parts, whose corners have numbers of 16 bits.
+/// Maximum number of triangles of a page, and of one of its parts, whose corner indices have 16 bits.
 const MOST: usize = 60_000;
 const MOST_OF_PART: usize = 20_000;
-/// The fewest triangles that are left of a part, and the most parts.
+/// Smallest number of triangles to which a part is reduced, and maximum number of parts.
 const FEWEST: usize = 12;
 const MOST_PARTS: usize = MOST / FEWEST;
-/// The largest file that is read, and all of them together (bytes).
+/// Maximum size of one file, and of all files together (bytes).
 const LARGEST: u64 = 64 << 20;
 const LARGEST_SUM: u64 = 512 << 20;
 
-/// Meshes on their way into a page.
+/// Meshes that are collected for a page.
 #[derive(Default)]
 pub struct Meshes {
     places: Places,
     parts: Vec<Part>,
-    /// The numbers of a file's parts; nothing where it could not be read.
+    /// Indices of the parts of each file; empty if the file could not be read.
     files: HashMap<PathBuf, Range<usize>>,
     read: u64,
     wanted: usize,
-    /// Why meshes are left out: the first of the reasons, and how many they are.
+    /// First reason why a mesh is left out, and number of meshes that are left out.
     missing: Option<(String, usize)>,
 }
 
-/// A part of a mesh, by its number; with the colour that its file gives it.
+/// Part of a mesh, with the colour that the file gives it.
 pub struct Drawn {
-    /// Its number in what is [written](Meshes::written).
+    /// Index of the part in the [written](Meshes::written) list.
     pub part: usize,
-    /// Red, green and blue from 0 to 1.
+    /// Red, green and blue, each from 0 to 1.
     pub color: Option<[f64; 3]>,
 }
 
 impl Meshes {
-    /// None yet; their files are looked for in these places.
+    /// Creates an empty collection whose files are searched in `places`.
     pub fn new(places: Places) -> Self {
         Self { places, ..Self::default() }
     }
 
-    /// Returns the parts to draw for a mesh; none where its file is missing or wrong.
+    /// Returns the parts to draw for a mesh; empty if its file is missing or invalid.
     pub fn get(&mut self, address: &str) -> Vec<Drawn> {
         self.wanted += 1;
         let parts = match self.load(address) {
@@ -59,10 +59,10 @@ impl Meshes {
         self.drawn(parts)
     }
 
-    /// Returns the parts to draw for a mesh that is in memory; `library` gives the text of a file of materials by its name.
+    /// Returns the parts to draw for a mesh in memory; `library` returns the text of a material file, given its name.
     ///
     /// # Errors
-    /// The fault of the file, with the line if it is an OBJ or an STL of text.
+    /// The fault of the file, with the line for an OBJ or an STL in text form.
     pub fn add(
         &mut self,
         format: Format,
@@ -109,7 +109,7 @@ impl Meshes {
         })
     }
 
-    /// Keeps the parts of a mesh that have triangles, made small.
+    /// Simplifies and stores those parts of a mesh that have triangles.
     fn keep(
         &mut self,
         format: Format,
@@ -129,14 +129,14 @@ impl Meshes {
         Ok(first..self.parts.len())
     }
 
-    /// One line on what is left out, if anything is.
+    /// Returns one line about the meshes that are left out; `None` if none is left out.
     pub fn note(&self) -> Option<String> {
         let (what, count) = self.missing.as_ref()?;
         Some(format!("{count} of {} meshes are left out: {what}", self.wanted))
     }
 
-    /// All parts, small enough for a page: points and triangles as base64 of 16-bit numbers; a point is
-    /// `low + side n / 65535`.
+    /// Returns all parts, simplified for a page. Points and triangles are base64 of 16-bit numbers; a number n means
+    /// the coordinate `low + side n / 65535`.
     pub fn written(self) -> Vec<Value> {
         let most = level(self.parts.iter().map(|part| part.triangles.len()).collect());
         let small = |part: Part| {
@@ -146,7 +146,7 @@ impl Meshes {
     }
 }
 
-/// The most triangles that each part may have, so that all together have no more than [`MOST`].
+/// Returns the maximum number of triangles of a part for which all parts together have at most [`MOST`].
 fn level(mut counts: Vec<usize>) -> usize {
     counts.sort_unstable();
     let mut left = MOST;
@@ -167,12 +167,12 @@ fn encode(part: &Part) -> Value {
         if side[k] > 0.0 { (65535.0 * (p[k] - low[k]) / side[k]).round() as u16 } else { 0 }
     };
     let points = part.points.iter().flat_map(|p| [0, 1, 2].map(|k| number(p, k)));
-    // Corners have numbers below 3 MOST_OF_PART, which 16 bits hold.
+    // Corner indices are below 3 MOST_OF_PART, which fits in 16 bits.
     let corners = part.triangles.iter().flatten().map(|&c| c as u16);
     json!({"low": low, "side": side, "points": base64(points), "triangles": base64(corners)})
 }
 
-/// Numbers in base64, each with its lower byte first.
+/// Encodes numbers in base64, low byte first.
 fn base64(numbers: impl Iterator<Item = u16>) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let bytes: Vec<u8> = numbers.flat_map(u16::to_le_bytes).collect();

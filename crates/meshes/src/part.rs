@@ -1,27 +1,27 @@
-//! Triangles of one colour, and what readers of meshes share.
+//! Parts, which are triangles of one colour, and helpers of the mesh readers.
 
 use std::collections::HashMap;
 
-/// The most triangles that are read of one file.
+/// Maximum number of triangles that are read from one file.
 const MOST: usize = 4_000_000;
 
-/// The corners' numbers of a triangle.
+/// Indices of a triangle's three corners.
 pub(super) type Triangle = [u32; 3];
 
 /// Triangles of one colour.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Part {
-    /// m, but for the scale of who shows it.
+    /// Points (m, before the scale that a robot's file gives the mesh).
     pub points: Vec<[f64; 3]>,
-    /// By their corners' numbers, counter-clockwise from outside.
+    /// Triangles as indices of points, counter-clockwise seen from outside.
     pub triangles: Vec<Triangle>,
-    /// Red, green and blue from 0 to 1, where the file has a colour.
+    /// Red, green and blue, each from 0 to 1; `None` if the file has no colour.
     #[cfg_attr(not(feature = "page"), allow(dead_code))]
     pub color: Option<[f64; 3]>,
 }
 
 impl Part {
-    /// A part with those of many points that its triangles name.
+    /// Creates a part that contains only those points that its triangles use.
     pub(super) fn of(points: &[[f64; 3]], mut triangles: Vec<Triangle>, color: Option<[f64; 3]>) -> Self {
         let (mut numbers, mut own) = (HashMap::new(), Vec::new());
         for corner in triangles.iter_mut().flatten() {
@@ -34,12 +34,12 @@ impl Part {
     }
 }
 
-/// Refuses more triangles than a file may have.
+/// Returns an error if a file has more triangles than allowed.
 pub(super) fn full(triangles: usize) -> Result<(), String> {
     if triangles <= MOST { Ok(()) } else { Err(format!("has more than {MOST} triangles")) }
 }
 
-/// The words of a line or of a list.
+/// Iterator over the words of a line or a list.
 pub(super) struct Words<'a>(&'a str);
 
 impl<'a> Words<'a> {
@@ -47,7 +47,7 @@ impl<'a> Words<'a> {
         Self(text)
     }
 
-    /// The next word.
+    /// Returns the next word.
     pub(super) fn next(&mut self) -> Option<&'a str> {
         let text = self.0.trim_start();
         let end = text.find(char::is_whitespace).unwrap_or(text.len());
@@ -56,17 +56,17 @@ impl<'a> Words<'a> {
         (!word.is_empty()).then_some(word)
     }
 
-    /// The next word as a finite number.
+    /// Returns the next word as a finite number.
     pub(super) fn number(&mut self) -> Option<f64> {
         self.next()?.parse().ok().filter(|x: &f64| x.is_finite())
     }
 
-    /// The next three numbers.
+    /// Returns the next three numbers.
     pub(super) fn numbers(&mut self) -> Option<[f64; 3]> {
         Some([self.number()?, self.number()?, self.number()?])
     }
 
-    /// All that is left.
+    /// Returns the remaining text without surrounding spaces; `None` if it is empty.
     pub(super) fn rest(&self) -> Option<&'a str> {
         Some(self.0.trim()).filter(|text| !text.is_empty())
     }

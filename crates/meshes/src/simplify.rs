@@ -1,20 +1,21 @@
-//! Fewer triangles for the same shape: edges are collapsed where that changes least (Garland and Heckbert, "Surface
-//! simplification using quadric error metrics", SIGGRAPH 1997), after points that coincide have been made one.
+//! Simplification of meshes. Points that coincide are merged, then edges collapse where that changes the shape least
+//! (Garland and Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997).
 
 use super::part::Part;
 use nalgebra::Vector3;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap, HashSet};
 
-/// The cells along the longest side in which points are one, and how many triangles may be left before edges collapse.
+/// Number of grid cells along the longest side, and maximum number of triangles before edges collapse. If more are
+/// left, the cells become coarser.
 const CELLS: f64 = 32768.0;
 const MOST: usize = 200_000;
-/// The weight of the edges of an open surface beside its planes.
+/// Weight of the border edges of an open surface, relative to its planes.
 const BORDER: f64 = 10.0;
-/// How far a triangle may turn when a corner moves: the cosine.
+/// Minimum cosine of the angle by which a triangle may turn when a corner moves.
 const TURN: f64 = 0.2;
 
-/// A part with at most `target` triangles, 12 or more.
+/// Returns a simplified part with at most `target` triangles; `target` must be at least 12.
 pub(super) fn simplify(part: &Part, target: usize) -> Part {
     let mut cells = CELLS;
     let mut welded = weld(part, cells);
@@ -25,7 +26,7 @@ pub(super) fn simplify(part: &Part, target: usize) -> Part {
     if welded.triangles.len() > target {
         welded = Surface::new(&welded).collapse(target);
     }
-    // Many small pieces cannot lose edges: cells make them one.
+    // Many small pieces have no edges left to collapse; coarser cells merge the pieces.
     cells = cells.min(256.0);
     while welded.triangles.len() > target && cells > 1.0 {
         cells /= 2.0;
@@ -34,7 +35,7 @@ pub(super) fn simplify(part: &Part, target: usize) -> Part {
     welded
 }
 
-/// A part whose points in one cell are their mean, without the triangles that are gone then.
+/// Merges the points of each cell into their mean, and drops triangles that become degenerate or duplicates.
 fn weld(part: &Part, cells: f64) -> Part {
     let (low, high) = bounds(&part.points);
     let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
@@ -67,7 +68,7 @@ fn weld(part: &Part, cells: f64) -> Part {
     Part::of(&points, triangles, part.color)
 }
 
-/// The corners of the box around points.
+/// Returns the lower and upper corner of the box around points.
 pub(super) fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     let limits = |f: fn(f64, f64) -> f64, from| [0, 1, 2].map(|k| points.iter().map(|p| p[k]).fold(from, f));
     if points.is_empty() {
@@ -76,14 +77,14 @@ pub(super) fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     (limits(f64::min, f64::INFINITY), limits(f64::max, f64::NEG_INFINITY))
 }
 
-/// The sum of squared distances from planes, (x, 1)ᵀ Q (x, 1): the upper half of Q, row by row.
+/// Sum of squared distances from planes, (x, 1)ᵀ Q (x, 1): the upper half of Q, row by row.
 #[derive(Clone)]
 struct Quadric([f64; 10]);
 
 impl Quadric {
     const ZERO: Self = Self([0.0; 10]);
 
-    /// A plane through a point, with its unit normal.
+    /// Adds the plane through a point with a unit normal.
     fn add_plane(&mut self, normal: Vector3<f64>, point: Vector3<f64>, weight: f64) {
         let [x, y, z, w] = [normal.x, normal.y, normal.z, -normal.dot(&point)];
         let products = [x * x, x * y, x * z, x * w, y * y, y * z, y * w, z * z, z * w, w * w];
@@ -101,7 +102,8 @@ impl Quadric {
         (slopes[0] * x + slopes[1] * y + slopes[2] * z + ww).max(0.0)
     }
 
-    /// The point where it is least, by cofactors; it is far away or not finite where there is none.
+    /// Returns the point with the smallest sum, by cofactors. If no unique one exists, the result is far away or not
+    /// finite.
     fn least(&self) -> Vector3<f64> {
         let [xx, xy, xz, xw, yy, yz, yw, zz, zw, _] = self.0;
         let [a, b, c] = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
@@ -111,20 +113,21 @@ impl Quadric {
     }
 }
 
-/// An edge in the queue: its cost as bits, both ends, their changes.
+/// An edge in the queue: its cost as bits, its two ends, and the number of changes of each end when the cost was
+/// computed.
 type Edge = (u64, [u32; 2], [u32; 2]);
 
-/// A surface whose edges collapse, in a box of side 1.
+/// A surface whose edges are collapsed, scaled to a box of side 1.
 struct Surface {
     low: Vector3<f64>,
     side: f64,
     color: Option<[f64; 3]>,
     points: Vec<Vector3<f64>>,
     quadrics: Vec<Quadric>,
-    /// The changes of each point; what was reckoned before one is out of date.
+    /// Number of changes of each point; costs from before the last change are outdated.
     changes: Vec<u32>,
     triangles: Vec<Option<[u32; 3]>>,
-    /// The triangles at each point, some of them gone.
+    /// Triangles at each point; some of them may be deleted.
     around: Vec<Vec<u32>>,
     left: usize,
     edges: BinaryHeap<Reverse<Edge>>,
@@ -163,7 +166,7 @@ impl Surface {
         }
         for (&[a, b], &(count, unit)) in &faces {
             if count == 1 {
-                // the plane that holds the border, upright on its only triangle
+                // add the plane through the border edge, perpendicular to its only triangle
                 let (from, to) = (surface.points[a as usize], surface.points[b as usize]);
                 let along = to - from;
                 let normal = along.cross(&unit);
@@ -183,12 +186,12 @@ impl Surface {
         surface
     }
 
-    /// Where the ends of an edge would become one, and what it would cost.
+    /// Returns the cost of collapsing an edge, and the point where its ends merge.
     fn best(&self, a: u32, b: u32) -> (f64, Vector3<f64>) {
         let quadric = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
         let middle = 0.5 * (p + q);
-        // A flat part has no best point, or one far away.
+        // The optimum of a flat part may not exist or may be far away.
         let near = Some(quadric.least()).filter(|x| (x - middle).norm() <= (p - q).norm());
         let cost = |x: Vector3<f64>| (quadric.at(x), x);
         let ends = [middle, p, q]
@@ -199,13 +202,14 @@ impl Surface {
     }
 
     fn push(&mut self, a: u32, b: u32) {
-        // of edges that cost nothing the shortest first
+        // among edges without cost, the shortest comes first
         let length = (self.points[a as usize] - self.points[b as usize]).norm_squared();
         let cost = self.best(a, b).0 + 1e-9 * length;
         self.edges.push(Reverse((cost.to_bits(), [a, b], [a, b].map(|end| self.changes[end as usize]))));
     }
 
-    /// Whether the triangles around one end, but for those that the edge takes with it, keep their side.
+    /// Returns whether the triangles around one end keep their orientation; triangles that vanish with the edge do not
+    /// count.
     fn keeps(&self, moved: u32, other: u32, to: Vector3<f64>) -> bool {
         self.around[moved as usize].iter().filter_map(|&t| self.triangles[t as usize]).all(|t| {
             if t.contains(&other) {
@@ -221,7 +225,7 @@ impl Surface {
         })
     }
 
-    /// Collapses edges until so many triangles are left, or no edge can go.
+    /// Collapses edges until `target` triangles are left or no edge can collapse.
     fn collapse(mut self, target: usize) -> Part {
         while self.left > target {
             let Some(Reverse((_, [a, b], changes))) = self.edges.pop() else { break };
@@ -274,7 +278,7 @@ mod tests {
     use super::{bounds, simplify};
     use crate::part::Part;
 
-    /// A sphere of radius 1 as a soup of triangles.
+    /// Returns a sphere of radius 1 as unconnected triangles.
     fn sphere(n: usize) -> Part {
         let at = |i: usize, j: usize| {
             let (a, b) =
@@ -292,7 +296,7 @@ mod tests {
         part
     }
 
-    /// The volume that a closed surface encloses, from its outward side.
+    /// Returns the volume that a closed surface encloses.
     fn volume(part: &Part) -> f64 {
         let corner = |c: u32| nalgebra::Vector3::from(part.points[c as usize]);
         part.triangles.iter().map(|t| corner(t[0]).dot(&corner(t[1]).cross(&corner(t[2]))) / 6.0).sum()
@@ -327,11 +331,11 @@ mod tests {
     }
 
     #[test]
-    fn odd_parts_are_no_trouble() {
+    fn degenerate_parts_are_simplified() {
         assert!(simplify(&Part::default(), 12).triangles.is_empty());
         let point = Part { points: vec![[1.0; 3]; 3], triangles: vec![[0, 1, 2]], color: None };
         assert!(simplify(&point, 12).triangles.is_empty());
-        // many pieces that share nothing: cells make them few
+        // many pieces without shared points: coarser cells reduce their number
         let mut pieces = Part::default();
         for k in 0..5000u32 {
             let x = f64::from(k % 70);

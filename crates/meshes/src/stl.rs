@@ -1,15 +1,16 @@
-//! STL: triangles, binary or as text.
+//! Reader of STL: triangles, binary or as text.
 
 use super::part::{Part, Words, full};
 
-/// The bytes before the triangles of a binary file, and of each of them: a normal, three corners, two bytes of attributes.
+/// Number of bytes before the triangles of a binary file, and of each triangle: a normal, three corners, two bytes of
+/// attributes.
 const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 
-/// The triangles of an STL.
+/// Reads the triangles of an STL.
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Part>, String> {
     let mut part = Part::default();
-    // Binary files may begin with `solid` too: their length tells.
+    // Binary files may begin with `solid` too; their length distinguishes them.
     let count = bytes.get(80..HEAD).and_then(|n| <[u8; 4]>::try_from(n).ok()).map(u32::from_le_bytes);
     let length = count.and_then(|n| usize::try_from(n).ok()?.checked_mul(TRIANGLE)?.checked_add(HEAD));
     if let (Some(count), Some(length)) = (count, length)
@@ -74,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_said_and_costs_nothing() {
+    fn invalid_files_are_reported_at_once() {
         let mut lying = binary(u32::MAX, 1);
         lying[..5].copy_from_slice(b"other");
         assert!(read(&lying).unwrap_err().contains("4294967295 triangles need"));
@@ -83,7 +84,7 @@ mod tests {
         for bad in [&b""[..], b"solid \xff", b"facet"] {
             assert!(read(bad).is_err());
         }
-        // every beginning of a file is refused or read, and none brings the program down
+        // reading any prefix of a file returns a result or an error, but never panics
         let whole = binary(2, 2);
         for end in 0..whole.len() {
             let _ = read(&whole[..end]);

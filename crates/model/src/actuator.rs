@@ -3,17 +3,18 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Actuator of a robot, as its file describes it. Its ranges are part of [`Limits`](crate::Limits) already, its armature and
-/// damping of the joint's.
+/// Actuator of a robot, as its file describes it. [`Limits`](crate::Limits) already include its ranges; the values of
+/// the joint already include its armature and damping.
 ///
-/// With the control u, and the length l, which is the gear times the position that it drives, the actuator acts with the force
+/// Let u be the control, and the length l the gear times the position that the actuator drives. The actuator acts with
+/// the force
 ///
 /// ```text
 /// f = gain u + bias − kp l − kv l̇
 /// ```
 ///
-/// A motor has the gain 1 and nothing else; a servo of position has the gain kp, one of velocity the gain kv. The effort at the
-/// joint is gear · f.
+/// A motor has the gain 1, and all other numbers are 0. A position servo has the gain kp, a velocity servo the gain kv.
+/// The effort at the joint is gear · f.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Actuator<B = usize> {
@@ -21,28 +22,28 @@ pub struct Actuator<B = usize> {
     pub name: String,
     /// Joint, tendon or frame that is driven.
     pub transmission: Transmission<B>,
-    /// Gear: the effort at the joint for each unit of force (1, m). Hinges, slides and tendons have the first number. A ball has
-    /// three: an axis in its body. A frame has six, linear first, along its axes. A free joint has six too: a force along the
-    /// world's axes and a torque along the body's.
+    /// Gear: the effort at the joint for each unit of force (1, m). Hinges, slides and tendons use only the first
+    /// number. A ball joint uses three: an axis in its body. A frame uses six, linear first, along its axes. A free
+    /// joint uses six too: a force along the world's axes and a torque along the body's.
     pub gear: [f64; 6],
-    /// Force for each unit of control.
+    /// Gain: force for each unit of control.
     pub gain: f64,
-    /// Force without control, at length 0 and at rest (N, N m).
+    /// Bias: force without control, at length 0 and at rest (N, N m).
     pub bias: f64,
     /// Gain of position kp (N/m, N m/rad); 0 for a motor.
     pub kp: f64,
     /// Gain of velocity kv (N s/m, N m s/rad); 0 for a motor.
     pub kv: f64,
-    /// Least and greatest control; infinite where there is no limit.
+    /// Minimum and maximum control; infinite where there is no limit.
     #[cfg_attr(feature = "serde", serde(with = "range"))]
     pub control: (f64, f64),
-    /// Least and greatest force before the gear (N, N m); infinite where there is no limit.
+    /// Minimum and maximum force before the gear (N, N m); infinite where there is no limit.
     #[cfg_attr(feature = "serde", serde(with = "range"))]
     pub force: (f64, f64),
 }
 
-/// Thing that an [`Actuator`] drives. `B` is the type by which bodies are named: their index in a model,
-/// [`BodyId`](crate::BodyId) in a builder.
+/// Joint, tendon or frame that an [`Actuator`] drives. `B` is the type that identifies a body: its index in a model, or
+/// a [`BodyId`](crate::BodyId) in a builder.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -56,7 +57,7 @@ pub enum Transmission<B = usize> {
     Tendon {
         /// Name of the tendon.
         name: String,
-        /// Bodies whose joints it runs over, each with its coefficient (1, m/rad).
+        /// Bodies whose joints determine the tendon's length, each with the coefficient of its joint (1, m/rad).
         joints: Vec<(B, f64)>,
     },
     /// Frame on which the force acts as a wrench, along the frame's axes at its origin.
@@ -67,7 +68,7 @@ pub enum Transmission<B = usize> {
 }
 
 impl<B: Clone> Actuator<B> {
-    /// Names bodies and frames in another way; returns none if no body that it drives is left.
+    /// Maps bodies and frames to their new identifiers; returns `None` if none of the driven bodies is left.
     pub(crate) fn renamed<C>(
         &self,
         body: impl Fn(&B) -> Option<C>,
@@ -89,7 +90,7 @@ impl<B: Clone> Actuator<B> {
     }
 }
 
-/// Ranges in files of serde's formats: `null` stands for an infinite side.
+/// Serialization of ranges: `null` is an infinite side.
 #[cfg(feature = "serde")]
 mod range {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};

@@ -1,5 +1,5 @@
-//! Additions to the tree of a model: springs, gravity compensation, actuators, keyframes and constraints. How a builder takes
-//! them, how they follow a model that is changed, and how they are checked.
+//! Additions to the tree of a model: springs, gravity compensation, actuators, keyframes and constraints. This module
+//! adds them to a builder, keeps them when a model is changed, and checks them.
 
 use crate::actuator::{Actuator, Transmission};
 use crate::body::FrameKind;
@@ -16,10 +16,10 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 
-/// State of one joint in a keyframe: body, position, velocity.
+/// State of one joint in a keyframe: its body, position and velocity.
 type JointState = (BodyId, Vec<f64>, Vec<f64>);
 
-/// Additions of a builder. Bodies are named by [`BodyId`], frames by their index in the builder.
+/// Additions of a builder. A [`BodyId`] identifies a body, an index in the builder a frame.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Additions {
     springs: Vec<(BodyId, [f64; 3], Vec<f64>)>,
@@ -43,8 +43,8 @@ impl ModelBuilder {
         self.additions.springs.push((body, stiffness, rest.to_vec()));
     }
 
-    /// Carries `factor` times the weight of a part of a body: see [`GravityCompensation`]. The part's inertia is in a frame at
-    /// `placement` in the body's.
+    /// Compensates `factor` times the weight of a part of a body: see [`GravityCompensation`]. The part's inertia is
+    /// given in a frame at `placement` in the body's frame.
     pub fn compensate_gravity(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>, factor: f64) {
         let carried = placement.act(Inertia { rotational: Sym3::zero(), ..inertia }.scale(factor));
         self.add_compensation(body, carried.mass, carried.mass_com);
@@ -57,33 +57,35 @@ impl ModelBuilder {
         }
     }
 
-    /// Adds an actuator. It does not change limits, armature and damping: these are the joints' ([`JointOptions`]).
+    /// Adds an actuator. It does not change limits, armature and damping, which belong to the joints
+    /// ([`JointOptions`]).
     ///
     /// [`JointOptions`]: crate::JointOptions
     pub fn actuator(&mut self, actuator: Actuator<BodyId>) {
         self.additions.actuators.push(actuator);
     }
 
-    /// Adds a named state: for some bodies the position and velocity of their joint. The other joints are at their neutral
-    /// position and at rest.
+    /// Adds a named state: the positions and velocities of the joints of some bodies. The other joints are at their
+    /// neutral position and at rest.
     pub fn keyframe(&mut self, name: &str, joints: Vec<(BodyId, Vec<f64>, Vec<f64>)>) {
         self.additions.keyframes.push((name.to_owned(), joints));
     }
 
-    /// Adds a constraint: a point of one body and a point of another one coincide. Each is the origin of a frame at a placement
-    /// in its body. The frames are named `name#1` and `name#2`.
+    /// Adds a constraint by which a point of one body and a point of another one coincide. Each point is the origin of
+    /// a frame at a placement in its body. The frames are named `name#1` and `name#2`.
     pub fn constraint_point(&mut self, name: &str, at: [(BodyId, Se3<f64>); 2]) {
         let frames = self.constraint_frames(name, at);
         self.additions.constraints.push((name.to_owned(), Draft::Point(frames)));
     }
 
-    /// Adds a constraint: a frame of one body and a frame of another one coincide. The frames are named `name#1` and `name#2`.
+    /// Adds a constraint by which a frame of one body and a frame of another one coincide. The frames are named
+    /// `name#1` and `name#2`.
     pub fn constraint_rigid(&mut self, name: &str, at: [(BodyId, Se3<f64>); 2]) {
         let frames = self.constraint_frames(name, at);
         self.additions.constraints.push((name.to_owned(), Draft::Rigid(frames)));
     }
 
-    /// Adds a constraint between the positions of joints: q_f = Σ cᵢ q_lⁱ, or q_f = c₀ without a leader.
+    /// Adds a constraint between the positions of joints: q_f = Σ cᵢ q_lⁱ, or q_f = c₀ if `leader` is `None`.
     pub fn constraint_coupling(
         &mut self,
         name: &str,
@@ -102,8 +104,9 @@ impl ModelBuilder {
         [first, first + 1]
     }
 
-    /// Adds the additions of a model whose bodies went to `place` and whose frames begin at `first_frame`. Those of bodies that
-    /// are locked at q are left out, or act on the body that carries them.
+    /// Adds the additions of a model. `place` maps each body of the model to a body of the builder and a placement
+    /// there; the model's frames begin at index `first_frame`. Additions of bodies that are locked at q are left out,
+    /// or act on the body that carries them.
     pub(crate) fn append_additions(
         &mut self,
         model: &Model,
@@ -165,7 +168,7 @@ impl ModelBuilder {
 }
 
 impl Additions {
-    /// Scales the masses whose weight is carried.
+    /// Scales the masses whose weight is compensated.
     #[cfg(feature = "loaders")]
     pub(crate) fn scale_masses(&mut self, by: f64) {
         for (_, mass, mass_com) in &mut self.compensation {
@@ -173,7 +176,7 @@ impl Additions {
         }
     }
 
-    /// Puts the additions into the model that is built; `number` has the index of each body of the builder.
+    /// Moves the additions into the built model; `number` maps each body of the builder to its index in the model.
     pub(crate) fn add_to(self, model: &mut Model, number: &[usize]) -> Result<(), Error> {
         let Self { springs, compensation, actuators, keyframes, constraints } = self;
         let index = |id: BodyId| number[id.0];
@@ -220,7 +223,7 @@ impl Additions {
 }
 
 impl Model {
-    /// Returns the position of a joint with one degree of freedom (rad, m): the angle of one that turns without limits.
+    /// Returns the position of a joint with one degree of freedom (rad, m). For a continuous joint it is the angle.
     fn joint_position(&self, body: usize, q: &[f64]) -> f64 {
         let body = &self.bodies[body];
         let q = &q[body.idx_q..];

@@ -1,4 +1,4 @@
-//! The builder: a model, body by body.
+//! Builder that creates a model body by body.
 
 use crate::additions::Additions;
 use crate::body::{Body, Frame, FrameKind, JointOptions, Limits};
@@ -15,30 +15,30 @@ use alloc::vec::Vec;
 use condyle_linalg::check_index;
 use condyle_spatial::{Act, Inertia, Se3, Vec3};
 
-/// The name of a body of a builder. [`WORLD`] is the one that is always there.
+/// Identifier of a body in a builder. [`WORLD`] always exists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodyId(pub(crate) usize);
 
-/// The world, on which the first joints sit.
+/// World, which carries the first joints.
 pub const WORLD: BodyId = BodyId(0);
 
-/// The most degrees of freedom that the joints of a model may have: algorithms have matrices of their number by their
-/// number.
+/// Maximum number of degrees of freedom of all joints of a model; the algorithms use square matrices of this size.
 const MAX_DEGREES: usize = 4096;
-/// The most coordinates that a model may have whose joints follow others: its inertia matrix is factored as a dense one.
+/// Maximum number of coordinates of a model in which joints follow others; its inertia matrix is factored as a dense
+/// matrix.
 const MAX_SHARED: usize = 1024;
 
 #[derive(Clone, Debug)]
 struct Draft {
     body: Body,
     options: JointOptions,
-    /// Whether it stands between the joints of a chain, without mass on purpose.
+    /// Whether the body is an intermediate one between the joints of a chain and has no mass on purpose.
     between: bool,
-    /// The body whose joint it follows, and how.
+    /// Index of the body whose joint leads this one, and their relation.
     mimic: Option<(usize, Mimic)>,
 }
 
-/// Makes a [`Model`], body by body, parents first.
+/// Builder of a [`Model`], body by body, parents first.
 ///
 /// ```
 /// use condyle_model::{Inertia, Joint, ModelBuilder, Se3, Sym3, Vec3, WORLD};
@@ -63,7 +63,7 @@ pub struct ModelBuilder {
 }
 
 impl ModelBuilder {
-    /// A robot of no bodies yet, under the gravity (0, 0, −9.81) m/s².
+    /// Creates a robot without bodies, under the gravity (0, 0, −9.81) m/s².
     pub fn new(name: &str) -> Self {
         let world = Body {
             joint_name: "universe".to_owned(),
@@ -85,8 +85,8 @@ impl ModelBuilder {
         }
     }
 
-    /// Adds a body and its joint, both of this name, without limits. The joint sits at `placement` in the parent's
-    /// frame; `inertia` is in the body's frame, which is the joint's at position zero.
+    /// Adds a body and its joint, both with this name and without limits. The joint is at `placement` in the parent's
+    /// frame. `inertia` is in the body's frame, which is the joint's frame at position zero.
     pub fn body(
         &mut self,
         name: &str,
@@ -98,7 +98,7 @@ impl ModelBuilder {
         self.body_with((name, name), parent, joint, placement, inertia, JointOptions::default())
     }
 
-    /// Adds a body and its joint, with names of their own (body, joint) and all that a joint may have.
+    /// Adds a body and its joint, with separate names (body, joint) and with options for the joint.
     pub fn body_with(
         &mut self,
         (name, joint_name): (&str, &str),
@@ -123,10 +123,10 @@ impl ModelBuilder {
         BodyId(self.drafts.len() - 1)
     }
 
-    /// Fixes more inertia to a body: `inertia` is in a frame that is at `placement` in the body's.
+    /// Fixes additional inertia to a body: `inertia` is in a frame that is at `placement` in the body's frame.
     ///
     /// # Panics
-    /// If the body is not one of this builder's.
+    /// If the body does not belong to this builder.
     #[track_caller]
     pub fn merge(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>) {
         check_index("body", body.0, self.drafts.len(), "bodies");
@@ -138,7 +138,7 @@ impl ModelBuilder {
         self.frame_of_kind(name, FrameKind::User, body, placement);
     }
 
-    /// Adds a frame that stands for a link, for a joint, or for itself: two of different kinds may have one name.
+    /// Adds a frame of a link, of a joint, or of the user. Two frames of different kinds may have the same name.
     pub fn frame_of_kind(&mut self, name: &str, kind: FrameKind, body: BodyId, placement: Se3<f64>) {
         self.frames.push(Frame { name: name.to_owned(), kind, body: body.0, placement });
     }
@@ -152,41 +152,45 @@ impl ModelBuilder {
         self.additions.scale_masses(by);
     }
 
-    /// Marks a body without mass as one between the joints of a chain.
+    /// Marks a body as an intermediate one between the joints of a chain, which has no mass.
     pub(crate) fn between(&mut self, body: BodyId) {
         self.drafts[body.0].between = true;
     }
 
-    /// Lets a joint follow another one, in place of a coordinate of its own; see [`Mimic`]. A leader may follow a third joint: ratio
-    /// and offset are then composed.
+    /// Lets a joint follow another one, instead of having its own coordinate; see [`Mimic`]. If the leader follows a
+    /// third joint, ratios and offsets are composed.
     ///
     /// # Panics
-    /// If the follower is not one of this builder's bodies.
+    /// If the follower does not belong to this builder.
     #[track_caller]
     pub fn mimic(&mut self, follower: BodyId, leader: BodyId, mimic: Mimic) {
         check_index("follower", follower.0, self.drafts.len(), "bodies");
         self.drafts[follower.0].mimic = Some((leader.0, mimic));
     }
 
-    /// The acceleration of free fall (m/s²), in the world's frame.
+    /// Sets the acceleration of free fall (m/s²), in the world's frame.
     pub fn gravity(&mut self, gravity: Vec3<f64>) {
         self.gravity = gravity;
     }
 
-    /// Checks everything, numbers the bodies depth first (siblings in the order in which they were added), and freezes
-    /// the model.
+    /// Checks the robot, numbers its bodies depth first, and returns the model. Siblings keep the order in which they
+    /// were added.
     ///
     /// # Errors
-    /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`], [`Error::Frame`] and [`Error::Gravity`]: names, axes;
-    /// masses, damping, friction, armature, speeds and efforts below zero; limits that exclude each other; placements that
-    /// are none; numbers that are not finite, or so large that their products are not (above 1e30); what a mimic joint
-    /// follows. Every other way to make a model is checked alike. [`Error::Size`]: more than 4096 degrees of freedom, or
-    /// 1024 coordinates where joints follow others.
+    /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`], [`Error::Frame`] and [`Error::Gravity`]:
+    /// - equal names, or invalid axes;
+    /// - negative masses, damping, friction, armature, speeds or efforts;
+    /// - limits that exclude each other, or invalid placements;
+    /// - numbers that are not finite, or whose products may not be finite (above 1e30);
+    /// - invalid leaders of mimic joints.
+    ///
+    /// Every other function that returns a model makes the same checks. [`Error::Size`]: more than 4096 degrees of
+    /// freedom, or more than 1024 coordinates if joints follow others.
     pub fn build(self) -> Result<Model, Error> {
         self.build_with(&mut |_| Ok(()))
     }
 
-    /// Builds the model, which `complete` may change before it is checked.
+    /// Builds the model; `complete` may change it before it is checked.
     pub(crate) fn build_with(
         mut self,
         complete: &mut dyn FnMut(&mut Model) -> Result<(), Error>,
@@ -201,7 +205,7 @@ impl ModelBuilder {
         for frame in &mut self.frames {
             frame.body = number[frame.body];
         }
-        // coordinates: of the joints that have their own, in order; then of those that follow one
+        // coordinates: first of the joints that have their own, in order; then of the joints that follow one
         let mut coordinates = Coordinates::default();
         let mut bodies: Vec<Body> = Vec::with_capacity(order.len());
         for (i, &old) in order.iter().enumerate() {
@@ -255,7 +259,7 @@ impl ModelBuilder {
         Ok(model)
     }
 
-    /// The bodies depth first, each one's children in the order in which they were added.
+    /// Returns the bodies depth first; siblings keep the order in which they were added.
     fn depth_first(&self) -> Vec<usize> {
         let mut children = vec![Vec::new(); self.drafts.len()];
         for (i, draft) in self.drafts.iter().enumerate().skip(1) {
@@ -285,7 +289,7 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Names the world `universe`, or `universe_2`, … where a body or joint has that name.
+    /// Names the world `universe`, or `universe_2`, … if a body or joint has that name.
     fn name_world(&mut self) {
         let taken = |name: &str, drafts: &[Draft]| {
             drafts.iter().skip(1).any(|d| d.body.name == name || d.body.joint_name == name)
@@ -303,10 +307,10 @@ impl ModelBuilder {
         }
     }
 
-    /// Lets each joint that follows a follower follow that one's leader: q_f = r₁ (r₂ q + o₂) + o₁.
+    /// Replaces a leader that is a follower itself by its own leader: q_f = r₁ (r₂ q + o₂) + o₁.
     fn compose_mimics(&mut self) -> Result<(), Error> {
         for i in 1..self.drafts.len() {
-            // the joints on the way to the last leader; from there on each one's own mimic is composed already
+            // joints on the path to the last leader; after it, each joint's mimic is already composed
             let mut way = Vec::new();
             let mut at = i;
             while let Some((leader, _)) = self.drafts[at].mimic {
@@ -332,7 +336,7 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Checks names, bodies, joints and frames, and makes axes unit vectors.
+    /// Checks names, bodies, joints and frames, and normalizes axes.
     fn check(&mut self) -> Result<(), Error> {
         self.name_world();
         self.compose_mimics()?;
@@ -370,7 +374,7 @@ impl ModelBuilder {
     }
 }
 
-/// The numbers that a model has for each coordinate.
+/// Numbers of a model for each coordinate.
 #[derive(Default)]
 struct Coordinates {
     nq: usize,
@@ -383,7 +387,7 @@ struct Coordinates {
 }
 
 impl Coordinates {
-    /// Adds those of a joint, with their limits and losses.
+    /// Adds the coordinates of a joint, with their limits and losses.
     fn add(&mut self, joint: Joint, options: &JointOptions) {
         let (lower, upper) = match options.position {
             Some(limits) if joint.nq() == 1 => limits,

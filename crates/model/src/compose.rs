@@ -1,4 +1,4 @@
-//! Models from models: chains of joints, appended robots, locked joints, joints that follow others.
+//! Models made from models: chains of joints, appended robots, locked joints, joints that follow others.
 
 use crate::body::FrameKind;
 use crate::builder::{BodyId, ModelBuilder, WORLD};
@@ -11,16 +11,16 @@ use condyle_linalg::{check, check_index};
 use condyle_spatial::{Inertia, Se3, Vec3};
 
 impl ModelBuilder {
-    /// Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
+    /// Adds a body after several joints, each at a placement in the frame of the joint before it: a composite joint.
     ///
-    /// Its coordinates are those of the joints, one after the other. Between them are bodies without mass, named after
-    /// the last one: `name#1`, `name#2`, …. Returns the last body, which carries `inertia`.
+    /// Its coordinates are the coordinates of the joints, in order. Bodies without mass connect the joints; they are
+    /// named after the last body: `name#1`, `name#2`, …. Returns the last body, which carries `inertia`.
     ///
     /// - universal joint about unit vectors a and b: `[(Revolute { a }, placement), (Revolute { b }, identity)]`;
-    /// - a ball in roll-pitch-yaw angles (z, y, x): [`spherical_zyx`](Self::spherical_zyx).
+    /// - ball joint with roll-pitch-yaw angles (z, y, x): [`spherical_zyx`](Self::spherical_zyx).
     ///
     /// # Panics
-    /// If there are no joints.
+    /// If `joints` is empty.
     #[track_caller]
     pub fn chain(&mut self, name: &str, parent: BodyId, joints: &[(Joint, Se3<f64>)], inertia: Inertia<f64>) -> BodyId {
         let ((last, placement), before) = joints.split_last().expect("joints: expected at least one");
@@ -32,9 +32,9 @@ impl ModelBuilder {
         self.body(name, at, *last, *placement, inertia)
     }
 
-    /// Adds a body on a ball that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+    /// Adds a body on a ball joint that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
     ///
-    /// M is singular where q₁ = ±π/2. [`Joint::Spherical`] has no such place.
+    /// M is singular at q₁ = ±π/2. [`Joint::Spherical`] has no singularity.
     ///
     /// ```
     /// use condyle_model::{Inertia, ModelBuilder, Se3, Sym3, Vec3, WORLD};
@@ -53,7 +53,7 @@ impl ModelBuilder {
         self.chain(name, parent, &joints, inertia)
     }
 
-    /// Adds a whole robot, its world at `placement` in the frame of `parent`. All its names get `prefix` before them.
+    /// Adds a whole robot; its world is at `placement` in the frame of `parent`. `prefix` is put before all its names.
     ///
     /// ```
     /// use condyle_model::{ModelBuilder, Se3, Vec3, WORLD, robots};
@@ -70,8 +70,8 @@ impl ModelBuilder {
         self.append_locked(parent, placement, model, prefix, &[], &[]);
     }
 
-    /// Adds a whole robot, as `append` does, with some bodies fixed where they are at q. Returns where each body went: on which
-    /// body of this builder, and at which placement there.
+    /// Adds a whole robot, as `append` does, with some bodies fixed at their poses at q. Returns for each body of the
+    /// robot the body of this builder to which it belongs, and the placement there.
     fn append_locked(
         &mut self,
         parent: BodyId,
@@ -95,7 +95,7 @@ impl ModelBuilder {
             }
             let mut options = model.joint_options(body.idx_q, body.idx_v);
             if body.mimic.is_some() {
-                options.armature = 0.0; // the leader's has all of it
+                options.armature = 0.0; // the leader's armature includes it
             }
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
             let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);
@@ -118,7 +118,7 @@ impl ModelBuilder {
             let (on, pXb) = place[frame.body];
             self.frame_of_kind(&format!("{prefix}{}", frame.name), frame.kind, on, pXb * frame.placement);
         }
-        // a locked body's own frame stays, under its joint's name, as after a fixed joint
+        // the frame of a locked body stays, named after its joint, as after a fixed joint
         for &i in locked {
             let (name, (on, pXb)) = (format!("{prefix}{}", model.bodies[i].joint_name), place[i]);
             if !model.frames.iter().any(|f| f.kind == FrameKind::Joint && f.name == model.bodies[i].joint_name) {
@@ -131,10 +131,10 @@ impl ModelBuilder {
 }
 
 impl Model {
-    /// The same robot with some joints, named by their bodies, locked where they are at q.
+    /// Returns the same robot with some joints locked at q; `bodies` are the bodies that they carry.
     ///
-    /// Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
-    /// locked with it.
+    /// Each of these bodies is merged into the body that carries it, and stays as a frame. A joint that follows a
+    /// locked one is locked, too.
     ///
     /// ```
     /// use condyle_model::robots;
@@ -147,11 +147,11 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// Those of [`ModelBuilder::build`]; [`Error::Position`] if a number of `q` is not finite, or a rotation in it has not the
-    /// length 1.
+    /// The errors of [`ModelBuilder::build`]; [`Error::Position`] if a number of `q` is not finite, or if a rotation in
+    /// it does not have length 1.
     ///
     /// # Panics
-    /// If `q` has not nq numbers, or a body does not exist or is the world.
+    /// If `q` does not have nq numbers, or a body does not exist or is the world.
     #[track_caller]
     pub fn lock(&self, bodies: &[usize], q: &[f64]) -> Result<Self, Error> {
         check("q", q.len(), self.tree.nq);
@@ -168,11 +168,11 @@ impl Model {
         builder.build()
     }
 
-    /// This robot with another one on it, whose world is at `placement` in the frame of one of its bodies (0 is the world). All
-    /// names of the other one get `prefix` before them; gravity and name are this one's.
+    /// Returns this robot with another one attached, whose world is at `placement` in the frame of a body of this robot
+    /// (0 is the world). `prefix` is put before all names of the other robot. Gravity and name of this robot are kept.
     ///
-    /// The bodies of the other robot are numbered behind all that the body which carries them has carried before, as
-    /// Pinocchio's `appendModel` does.
+    /// The bodies of the other robot are numbered after all bodies that `body` carried before, as in Pinocchio's
+    /// `appendModel`.
     ///
     /// ```
     /// use condyle_model::{Se3, robots};
@@ -184,10 +184,10 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// Those of [`ModelBuilder::build`]: two bodies, joints or frames of one name.
+    /// The errors of [`ModelBuilder::build`]: two bodies, joints or frames with the same name.
     ///
     /// # Panics
-    /// If there is no such body.
+    /// If `body` does not exist.
     #[track_caller]
     pub fn append(&self, body: usize, placement: Se3<f64>, other: &Self, prefix: &str) -> Result<Self, Error> {
         check_index("body", body, self.bodies.len(), "bodies");
@@ -196,8 +196,8 @@ impl Model {
         builder.build()
     }
 
-    /// The same robot with one more joint that follows another one, in place of a coordinate of its own; both are named by
-    /// their bodies. Its limits are those of the one that it follows.
+    /// Returns the same robot with one joint that follows another one, instead of having its own coordinate. Each joint
+    /// is given by the index of its body. The limits are the limits of the leader.
     ///
     /// ```
     /// use condyle_model::{Mimic, robots};
@@ -208,8 +208,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// Those of [`ModelBuilder::build`]: [`Error::Joint`] if the joints are not of one degree of freedom, the leader follows
-    /// another joint itself, or another one follows the follower.
+    /// The errors of [`ModelBuilder::build`]: [`Error::Joint`] if a joint has more than one degree of freedom, if the
+    /// leader itself follows another joint, or if another joint follows the follower.
     ///
     /// # Panics
     /// If a body does not exist or is the world.
@@ -230,7 +230,7 @@ impl Model {
         check_index(name, i, self.bodies.len(), "bodies");
     }
 
-    /// A builder of this robot, and where each of its bodies is there.
+    /// Returns a builder of this robot, and for each body its identifier and placement there.
     fn to_builder(&self) -> (ModelBuilder, Vec<(BodyId, Se3<f64>)>) {
         let mut builder = ModelBuilder::new(&self.name);
         builder.gravity(self.gravity);

@@ -1,4 +1,4 @@
-//! The space of positions: a product of vector spaces and groups, with q ⊕ v on the tangent vectors v.
+//! Space of positions: a product of vector spaces and Lie groups, with q ⊕ v for tangent vectors v.
 
 use crate::joint::GroupJacobian;
 use crate::model::Model;
@@ -9,10 +9,10 @@ use condyle_spatial::Scalar;
 use condyle_spatial::simd::Kernel;
 use nalgebra::DMatrix;
 
-/// The greatest distance from zero (rad, m) of a random position in a coordinate that has no limits.
+/// Greatest magnitude (rad, m) of a random position in a coordinate without limits.
 const UNLIMITED: f64 = 3.0;
 
-/// The position in which every body is at its joint's frame: zeros, and rotations by nothing.
+/// Returns the position in which every body is at its joint's frame: coordinates are zero, rotations are the identity.
 ///
 /// ```
 /// use condyle_model::{neutral, robots};
@@ -26,8 +26,8 @@ pub fn neutral<R>(model: &Model<R>) -> Vec<f64> {
     q
 }
 
-/// A position drawn uniformly: between its limits, within ±3 (rad, m) where a coordinate has none, over the whole group
-/// for rotations. The result depends on nothing but the model and the generator.
+/// Returns a uniformly distributed random position: between the limits of a coordinate, within ±3 (rad, m) without
+/// limits, and over the whole group for rotations. The result depends only on the model and the generator.
 ///
 /// ```
 /// use condyle_model::{random_configuration, robots};
@@ -53,9 +53,9 @@ pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Ve
     q
 }
 
-/// q ⊕ v: the position after moving with the velocity v for one unit of time.
+/// Computes q ⊕ v: the position after moving with the velocity v for one unit of time.
 ///
-/// q: nq numbers; v: nv; out: nq. Allocates nothing.
+/// q: nq numbers; v: nv numbers; out: nq numbers. Does not allocate.
 ///
 /// ```
 /// use condyle_model::{difference, integrate, neutral, robots};
@@ -77,7 +77,7 @@ pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]
     S::enter(Integrate { model, q, v, out });
 }
 
-/// q ⊕ v, compiled for the level of its scalar.
+/// Kernel of q ⊕ v, compiled for the SIMD level of its scalar.
 struct Integrate<'a, S, R> {
     model: &'a Model<R>,
     q: &'a [S],
@@ -95,9 +95,9 @@ impl<S: Scalar, R> Kernel for Integrate<'_, S, R> {
     }
 }
 
-/// q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁, of rotations the shortest one.
+/// Computes q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁; for rotations, the shortest one.
 ///
-/// q0, q1: nq numbers; out: nv. Allocates nothing.
+/// q0, q1: nq numbers; out: nv numbers. Does not allocate.
 ///
 /// # Panics
 /// If an argument has the wrong length.
@@ -111,9 +111,9 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
     }
 }
 
-/// q₀ ⊕ t (q₁ ⊖ q₀): from q₀ at t = 0 to q₁ at t = 1 at a constant velocity.
+/// Computes q₀ ⊕ t (q₁ ⊖ q₀): the position on the path with constant velocity from q₀ at t = 0 to q₁ at t = 1.
 ///
-/// q0, q1, out: nq numbers; tangent: scratch of nv numbers, left at t (q₁ ⊖ q₀). Allocates nothing.
+/// q0, q1, out: nq numbers; tangent: scratch of nv numbers, which contains t (q₁ ⊖ q₀) afterwards. Does not allocate.
 ///
 /// ```
 /// use condyle_model::{interpolate, robots};
@@ -134,9 +134,9 @@ pub fn interpolate<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], t: S, tan
     integrate(model, q0, tangent, out);
 }
 
-/// ‖q₁ ⊖ q₀‖, with lengths (m) and angles (rad) counted alike.
+/// Returns ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) have equal weight.
 ///
-/// q0, q1: nq numbers; tangent: scratch of nv numbers, left at q₁ ⊖ q₀. Allocates nothing.
+/// q0, q1: nq numbers; tangent: scratch of nv numbers, which contains q₁ ⊖ q₀ afterwards. Does not allocate.
 ///
 /// # Panics
 /// If an argument has the wrong length.
@@ -151,10 +151,10 @@ pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mu
     sum.sqrt()
 }
 
-/// Brings quaternions and (cos, sin) pairs in q back to length 1, in place. The result of one of length 0, or with a number that
-/// is not finite, is not finite.
+/// Scales quaternions and (cos, sin) pairs in q to length 1, in place. If a length is 0 or a number is not finite, the
+/// result is not finite.
 ///
-/// q: nq numbers. Allocates nothing.
+/// q: nq numbers. Does not allocate.
 ///
 /// ```
 /// use condyle_model::{neutral, normalize, robots};
@@ -166,7 +166,7 @@ pub fn distance<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], tangent: &mu
 /// ```
 ///
 /// # Panics
-/// If `q` has not nq numbers.
+/// If `q` does not have nq numbers.
 #[track_caller]
 pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
     check("q", q.len(), model.nq());
@@ -185,13 +185,14 @@ pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
     }
 }
 
-/// Takes the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: the inverse of ∂(q ⊕ v)/∂q, in place.
+/// Maps the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: applies the inverse of ∂(q ⊕ v)/∂q, in
+/// place.
 ///
-/// Along a vector space nothing changes; along a group the frame of the body is turned back by exp(v).
-/// v: nv numbers; X: nv rows. Allocates nothing.
+/// Components of a vector space do not change; for a group, the body's frame is turned back by exp(v). v: nv numbers;
+/// X: nv rows. Does not allocate.
 ///
 /// # Panics
-/// If `v` has not nv numbers or `X` has not nv rows.
+/// If `v` does not have nv numbers or `X` does not have nv rows.
 #[track_caller]
 pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
     check("v", v.len(), model.nv());
@@ -215,12 +216,12 @@ pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
     }
 }
 
-/// The argument with respect to which a Jacobian of [`integrate`] is taken.
+/// Argument with respect to which a Jacobian of [`integrate`] is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntegrateArgument {
-    /// The position q.
+    /// Position q.
     Position,
-    /// The velocity v.
+    /// Velocity v.
     Velocity,
 }
 
@@ -233,28 +234,28 @@ impl IntegrateArgument {
     }
 }
 
-/// ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v, nv × nv, block-diagonal, between tangent spaces; it does not depend on q.
+/// Computes ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v, nv × nv, block-diagonal, between tangent spaces; it does not depend on q.
 ///
-/// v: nv numbers; J is overwritten. Allocates nothing.
+/// v: nv numbers; J is overwritten. Does not allocate.
 ///
 /// # Panics
-/// If `v` has not nv numbers or `J` is not nv × nv.
+/// If `v` does not have nv numbers or `J` is not nv × nv.
 #[track_caller]
 pub fn integrate_jacobian<S: Scalar, R>(model: &Model<R>, v: &[S], argument: IntegrateArgument, J: &mut DMatrix<S>) {
     block_diagonal(model, ("v", v), argument.jacobian(), S::one(), J);
 }
 
-/// The argument with respect to which a Jacobian of [`difference`] is taken.
+/// Argument with respect to which a Jacobian of [`difference`] is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DifferenceArgument {
-    /// The position q₀ that is subtracted.
+    /// Position q₀, which is subtracted.
     From,
-    /// The position q₁.
+    /// Position q₁.
     To,
 }
 
 impl DifferenceArgument {
-    /// The sign s for which the Jacobian is s · J_log(s · d).
+    /// Returns the sign s for which the Jacobian is s · J_log(s · d).
     fn sign<S: Scalar>(self) -> S {
         match self {
             Self::From => -S::one(),
@@ -263,18 +264,18 @@ impl DifferenceArgument {
     }
 }
 
-/// ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁, nv × nv, block-diagonal, between tangent spaces, given d = q₁ ⊖ q₀.
+/// Computes ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁, nv × nv, block-diagonal, between tangent spaces, given d = q₁ ⊖ q₀.
 ///
-/// d: nv numbers; J is overwritten. Allocates nothing.
+/// d: nv numbers; J is overwritten. Does not allocate.
 ///
 /// # Panics
-/// If `d` has not nv numbers or `J` is not nv × nv.
+/// If `d` does not have nv numbers or `J` is not nv × nv.
 #[track_caller]
 pub fn difference_jacobian<S: Scalar, R>(model: &Model<R>, d: &[S], argument: DifferenceArgument, J: &mut DMatrix<S>) {
     block_diagonal(model, ("d", d), GroupJacobian::Log, argument.sign(), J);
 }
 
-/// sign · J(sign · v), joint by joint, for a tangent vector v with the name that its caller gave it.
+/// Computes sign · J(sign · v), joint by joint; `name` is the caller's name of the tangent vector v.
 #[track_caller]
 fn block_diagonal<S: Scalar, R>(
     model: &Model<R>,
@@ -290,19 +291,21 @@ fn block_diagonal<S: Scalar, R>(
     group_blocks(model, v, which, sign, J);
 }
 
-/// The blocks of [`integrate_jacobian`] for joints whose positions are no vector space; all else in J stays.
+/// Computes the blocks of [`integrate_jacobian`] for joints whose positions are not a vector space; the rest of J is
+/// kept.
 #[doc(hidden)]
 pub fn integrate_jacobian_groups<S: Scalar>(model: &Model, v: &[S], argument: IntegrateArgument, J: &mut DMatrix<S>) {
     group_blocks(model, v, argument.jacobian(), S::one(), J);
 }
 
-/// The blocks of [`difference_jacobian`] for joints whose positions are no vector space; all else in J stays.
+/// Computes the blocks of [`difference_jacobian`] for joints whose positions are not a vector space; the rest of J is
+/// kept.
 #[doc(hidden)]
 pub fn difference_jacobian_groups<S: Scalar>(model: &Model, d: &[S], argument: DifferenceArgument, J: &mut DMatrix<S>) {
     group_blocks(model, d, GroupJacobian::Log, argument.sign(), J);
 }
 
-/// The blocks of sign · J(sign · v) for joints whose positions are no vector space.
+/// Computes the blocks of sign · J(sign · v) for joints whose positions are not a vector space.
 fn group_blocks<S: Scalar, R>(model: &Model<R>, v: &[S], which: GroupJacobian, sign: S, J: &mut DMatrix<S>) {
     for Space { joint, v: iv, .. } in model.tree.spaces.iter().filter(|space| !space.joint.commutes()) {
         let mut signed = [S::zero(); 6];

@@ -1,19 +1,19 @@
-//! Constraints with names that a robot's file has beside its tree: loops that two bodies close, and coupled joints.
+//! Named constraints that a robot's file has in addition to its tree: loops that two bodies close, and coupled joints.
 
 use alloc::string::String;
 
-/// Constraint beside the tree of a model. The algorithms of a tree do not know it; constrained dynamics takes it where a caller
+/// Constraint in addition to the tree of a model. Tree algorithms ignore it; constrained dynamics uses it if the caller
 /// asks for it.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModelConstraint {
-    /// Name.
+    /// Name of the constraint.
     pub name: String,
-    /// Motion that it holds.
+    /// Motion that the constraint prevents.
     pub kind: ModelConstraintKind,
 }
 
-/// Motion that a [`ModelConstraint`] holds.
+/// Motion that a [`ModelConstraint`] prevents.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
@@ -28,7 +28,8 @@ pub enum ModelConstraintKind {
         /// Indices of the frames.
         frames: [usize; 2],
     },
-    /// The position of a joint is a polynomial of another one's, q_f = Σ cᵢ q_lⁱ; without a leader it is c₀.
+    /// The position of a joint is a polynomial in the position of another one, q_f = Σ cᵢ q_lⁱ; without a leader it is
+    /// c₀.
     Coupling {
         /// Index of the body whose joint follows.
         follower: usize,

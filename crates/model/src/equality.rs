@@ -2,12 +2,13 @@
 
 use crate::model::Model;
 
-/// Two models are equal if they are the same robot, number by number: names, bodies, joints, frames, limits, losses,
-/// springs, armature, gravity, inertias, actuators, keyframes and constraints. All else follows from these.
+/// Two models are equal if they describe the same robot with equal numbers: names, bodies, joints, frames, limits,
+/// losses, springs, armature, gravity, inertias, actuators, keyframes and constraints. All other fields follow from
+/// these.
 ///
-/// A clone is equal to its model, and so is a model that was written and read again by a format that keeps all digits. The
-/// warnings of the loader do not count, nor whether single calls compute limbs side by side
-/// ([`with_limbs`](Model::with_limbs)), on which last digits depend. No model with a number that is not a number exists.
+/// A clone is equal to its model, and so is a model after writing and reading in a format that keeps all digits.
+/// Warnings of the loader are not compared. The setting of [`with_limbs`](Model::with_limbs) is not compared either,
+/// although last digits of results depend on it. No model contains NaN.
 impl<R: PartialEq> PartialEq for Model<R> {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name

@@ -1,169 +1,169 @@
-//! Errors in a robot's description.
+//! Errors in the description of a robot.
 
 use crate::warning::Warning;
 use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// An error in a robot's description, or in a name that was looked up in it.
+/// Error in the description of a robot, or in a name that was looked up in it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The file could not be read, or cannot be a robot's: it is no regular file, or too large.
+    /// The file could not be read, or it cannot be a robot's file: it is not a regular file, or it is too large.
     #[error("{file}: {what}")]
     File {
         /// Path as given, or `<string>`.
         file: String,
-        /// The operating system's word, or the size with the limit.
+        /// Message of the operating system, or the size with the limit.
         what: String,
     },
-    /// No folder has the file that a `package://` address names.
+    /// The file of a `package://` address was found in no folder.
     #[error("{address}: no such file in a package `{package}`; {}", where_looked(looked))]
     Package {
-        /// As given.
+        /// Address as given.
         address: String,
-        /// The package's name.
+        /// Name of the package.
         package: String,
-        /// The places at which it was looked for.
+        /// Paths at which the file was looked for.
         looked: Vec<String>,
     },
     /// The text is not XML.
     #[error("{file}:{line}: not well-formed XML: {what}")]
     Xml {
-        /// Path, or `<string>`.
+        /// Path of the file, or `<string>`.
         file: String,
-        /// Counted from 1.
+        /// Line number, from 1.
         line: u32,
-        /// The parser's word.
+        /// Message of the parser.
         what: String,
     },
-    /// An element of a URDF, MJCF or SDF is wrong.
+    /// An element of a URDF, MJCF or SDF is invalid.
     #[error("{file}:{line}: {element}: {what}")]
     Element {
-        /// Path, or `<string>`; of the included file, where it is in one.
+        /// Path of the file, or `<string>`; the included file if the element is in one.
         file: String,
-        /// The line on which the element begins, or the part of it that is wrong, counted from 1.
+        /// Line on which the element, or its invalid part, begins; from 1.
         line: u32,
-        /// For example ``joint `elbow` ``.
+        /// Element, for example ``joint `elbow` ``.
         element: String,
-        /// The fault, with the numbers.
+        /// Fault, with the numbers.
         what: String,
     },
-    /// A model would have more of something than a model can have.
+    /// A model would be larger than allowed.
     #[error("{found} {what}, at most {limit} are allowed in a model")]
     Size {
-        /// The things that are counted, for example `degrees of freedom`.
+        /// Counted things, for example `degrees of freedom`.
         what: &'static str,
-        /// The number that the model would have.
+        /// Number that the model would have.
         found: usize,
-        /// The greatest number that is allowed.
+        /// Maximum allowed number.
         limit: usize,
     },
-    /// A body given to a builder is wrong.
+    /// A body given to a builder is invalid.
     #[error("body `{body}`: {what}")]
     Body {
-        /// The body's name.
+        /// Name of the body.
         body: String,
-        /// The fault, with the numbers.
+        /// Fault, with the numbers.
         what: String,
     },
-    /// A joint given to a builder is wrong.
+    /// A joint given to a builder is invalid.
     #[error("joint `{joint}`: {what}")]
     Joint {
-        /// The joint's name.
+        /// Name of the joint.
         joint: String,
-        /// The fault, with the numbers.
+        /// Fault, with the numbers.
         what: String,
     },
-    /// A frame is wrong.
+    /// A frame is invalid.
     #[error("frame `{frame}`: {what}")]
     Frame {
-        /// The frame's name.
+        /// Name of the frame.
         frame: String,
-        /// The fault, with the numbers.
+        /// Fault, with the numbers.
         what: String,
     },
     /// A gravity is infinite or not a number.
     #[error("gravity: ({}, {}, {}) m/s² is not finite", gravity[0], gravity[1], gravity[2])]
     Gravity {
-        /// The acceleration as given (m/s²).
+        /// Acceleration as given (m/s²).
         gravity: [f64; 3],
     },
-    /// A position is none of the robot's.
+    /// A position is not a valid position of the robot.
     #[error("joint `{joint}`: {what}")]
     Position {
-        /// The joint's name.
+        /// Name of the joint.
         joint: String,
-        /// The fault, with the numbers.
+        /// Fault, with the numbers.
         what: String,
     },
-    /// A velocity is none of the robot's.
+    /// A velocity is not a valid velocity of the robot.
     #[error("joint `{joint}`: {what}")]
     Velocity {
-        /// The joint's name.
+        /// Name of the joint.
         joint: String,
-        /// The fault, with the numbers.
+        /// Fault, with the numbers.
         what: String,
     },
     /// A list in a model's file is too short or too long.
     #[error("{name}: expected {expected} entries, found {found}")]
     Length {
-        /// The name of the list, for example `limits.lower`.
+        /// Name of the list, for example `limits.lower`.
         name: &'static str,
-        /// The number of entries that it must have.
+        /// Required number of entries.
         expected: usize,
-        /// The number of entries that it has.
+        /// Actual number of entries.
         found: usize,
     },
-    /// A constraint cannot be.
+    /// A constraint is invalid.
     #[error("constraint {constraint}: {what}")]
     Constraint {
-        /// The constraint's number, counted from 0.
+        /// Index of the constraint, from 0.
         constraint: usize,
-        /// The fault, with the numbers.
+        /// Fault, with the numbers.
         what: String,
     },
-    /// The ground of a simulation cannot be.
+    /// The ground of a simulation is invalid.
     #[error("ground: {what}")]
     Ground {
-        /// The fault, with the names and the numbers.
+        /// Fault, with the names and the numbers.
         what: String,
     },
-    /// A strict loader met what is only odd.
+    /// A strict loader found something that is a warning otherwise.
     #[error("{file}: {warning}")]
     Strict {
-        /// Path, or `<string>`.
+        /// Path of the file, or `<string>`.
         file: String,
-        /// The warning.
+        /// Warning that a loader reports if it is not strict.
         warning: Warning,
     },
     /// Two bodies, joints or frames of one kind have the same name.
     #[error("two {} are named `{name}`", plural(kind))]
     Duplicate {
-        /// `body`, `joint` or `frame`.
+        /// Kind: `body`, `joint` or `frame`.
         kind: &'static str,
-        /// The name.
+        /// Name that occurs twice.
         name: String,
     },
     /// No frame has this name.
     #[error("unknown frame `{name}`{}", near_or(nearest, "; no frame has a similar name"))]
     UnknownFrame {
-        /// As asked for.
+        /// Name as given.
         name: String,
-        /// The most similar name there is; empty if none is similar.
+        /// Most similar existing name; empty if no name is similar.
         nearest: String,
     },
     /// No joint has this name.
     #[error("unknown joint `{name}`{}", near_or(nearest, "; no joint has a similar name"))]
     UnknownJoint {
-        /// As asked for.
+        /// Name as given.
         name: String,
-        /// The most similar name there is; empty if none is similar.
+        /// Most similar existing name; empty if no name is similar.
         nearest: String,
     },
 }
 
-/// The end of the message of [`Error::Package`].
+/// Returns the end of the message of [`Error::Package`].
 fn where_looked(looked: &[String]) -> String {
     if looked.is_empty() {
         return "there are no folders to look in (`packages`, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH)".to_owned();
@@ -171,7 +171,7 @@ fn where_looked(looked: &[String]) -> String {
     format!("looked for {}", looked.join(", "))
 }
 
-/// The end of a message about a name that is not there: the nearest one, or what is said if there is none.
+/// Returns the end of a message about an unknown name: the nearest name, or `otherwise` if no name is near.
 pub(crate) fn near_or(nearest: &str, otherwise: &str) -> String {
     if nearest.is_empty() { otherwise.to_owned() } else { format!("; nearest is `{nearest}`") }
 }

@@ -1,22 +1,23 @@
-//! The ten inertial parameters of a body, which of them are physical, and a parametrisation in which all are.
+//! The ten inertial parameters of a body, their physical validity, and a parametrisation in which all values are
+//! physical.
 //!
-//! In the body's frame, about its origin, in Pinocchio's order,
+//! In the body's frame, about its origin, in Pinocchio's order, they are
 //!
 //! ```text
 //! π = (m, m c_x, m c_y, m c_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz)
 //! ```
 //!
-//! A distribution of mass of positive density has these parameters if and only if its pseudo-inertia, the second
-//! moments of the points (x, y, z, 1), is positive definite (Wensing, Kim, Slotine, *Linear matrix inequalities for
-//! physically consistent inertial parameter identification*, 2018):
+//! A mass distribution with positive density has these parameters if and only if its pseudo-inertia is positive
+//! definite. The pseudo-inertia contains the second moments of the points (x, y, z, 1). Source: Wensing, Kim, Slotine,
+//! *Linear matrix inequalities for physically consistent inertial parameter identification*, 2018.
 //!
 //! ```text
 //! J = [Σ, m c; m cᵀ, m],   Σ = ½ tr(Ī) 1 − Ī
 //! ```
 //!
-//! Its Cholesky factor with the logarithm of the diagonal is a smooth one-to-one map between all of ℝ¹⁰ and the physical
-//! inertias (Rucker and Wensing, *Smooth parameterization of rigid-body inertia*, 2022), so that an
-//! identification needs no constraints:
+//! Its Cholesky factor, with the logarithm of the diagonal, is a smooth one-to-one map between ℝ¹⁰ and the physical
+//! inertias. An identification with these parameters therefore needs no constraints. Source: Rucker and Wensing,
+//! *Smooth parameterization of rigid-body inertia*, 2022.
 //!
 //! ```text
 //! θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃),   J = U Uᵀ,   U = eᵅ [e^d₁ s₁₂  s₁₃  t₁]
@@ -25,35 +26,35 @@
 //!                                                                      [ 0    0    0   1 ]
 //! ```
 //!
-//! so m = e²ᵅ and t is the centre of mass.
+//! Therefore m = e²ᵅ, and t is the centre of mass.
 
 use condyle_spatial::elementary::{exp, ln};
 use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 use nalgebra::{SMatrix, SVector};
 
-/// No body of positive density has this inertia.
+/// Reason why an inertia is not physical: no body of positive density has it.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotPhysical {
     /// The mass is not positive.
     #[error("mass is {mass} kg")]
     Mass {
-        /// m (kg).
+        /// Mass m (kg).
         mass: f64,
     },
-    /// The mass is spread negatively, or not at all, along some axis: a principal moment about the centre of mass is
-    /// not below the sum of the other two.
+    /// The second moment of mass along some axis is not positive: a principal moment about the centre of mass is not
+    /// smaller than the sum of the other two.
     #[error(
         "along some axis the second moment of mass about the centre of mass is {moment} kg m²: \
          a principal moment of inertia is not below the sum of the other two"
     )]
     Spread {
-        /// The first pivot of Σ about the centre of mass that is not positive (kg m²).
+        /// First pivot of Σ about the centre of mass that is not positive (kg m²).
         moment: f64,
     },
 }
 
-/// π: mass, mass times centre of mass, and the inertia about the origin, as ten numbers.
+/// Returns π: mass, mass times centre of mass, and the inertia about the origin, as ten numbers.
 ///
 /// ```
 /// use condyle_model::{Inertia, Sym3, Vec3, inertial_parameters};
@@ -67,21 +68,22 @@ pub fn from_inertia<S: Scalar>(I: Inertia<S>) -> [S; 10] {
     [I.mass, h.x, h.y, h.z, J.xx, J.xy, J.yy, J.xz, J.yz, J.zz]
 }
 
-/// The inertia with the ten parameters π; the inverse of [`from_inertia`].
+/// Returns the inertia with the ten parameters π; the inverse of [`from_inertia`].
 pub fn to_inertia<S: Scalar>([m, hx, hy, hz, xx, xy, yy, xz, yz, zz]: [S; 10]) -> Inertia<S> {
     Inertia { mass: m, mass_com: Vec3::new(hx, hy, hz), rotational: Sym3 { xx, xy, yy, xz, yz, zz } }
 }
 
-/// Σ = ½ tr(Ī) 1 − Ī, the second moments ∫ x xᵀ dm of the mass about the origin (kg m²).
+/// Returns Σ = ½ tr(Ī) 1 − Ī, the second moments ∫ x xᵀ dm of the mass about the origin (kg m²).
 fn second_moments<S: Scalar>(J: Sym3<S>) -> Sym3<S> {
     let half_trace = (J.xx + J.yy + J.zz) * S::splat(0.5);
     (-J).add_diagonal(half_trace)
 }
 
-/// J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): symmetric 4 × 4, in kg m², kg m and kg.
+/// Returns J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): symmetric 4 × 4, in kg m², kg m and
+/// kg.
 ///
-/// Linear in the parameters; positive definite if and only if the inertia is physical. Source: Wensing, Kim, Slotine
-/// (2018).
+/// J is linear in the parameters, and positive definite if and only if the inertia is physical. Source: Wensing, Kim,
+/// Slotine (2018).
 ///
 /// ```
 /// use condyle_model::{inertial_parameters::pseudo_inertia, robots};
@@ -98,19 +100,19 @@ pub fn pseudo_inertia<S: Scalar>(I: Inertia<S>) -> SMatrix<S, 4, 4> {
     )
 }
 
-/// U with J = U Uᵀ.
+/// Factor U with J = U Uᵀ.
 struct Factor {
-    /// eᵅ.
+    /// Scale eᵅ.
     scale: f64,
-    /// eᵅ (e^d₁, e^d₂, e^d₃).
+    /// Diagonal eᵅ (e^d₁, e^d₂, e^d₃).
     diagonal: Vec3<f64>,
-    /// eᵅ (s₁₂, s₂₃, s₁₃).
+    /// Entries eᵅ (s₁₂, s₂₃, s₁₃) above the diagonal.
     above: Vec3<f64>,
-    /// The centre of mass.
+    /// Centre of mass.
     t: Vec3<f64>,
 }
 
-/// The factor from the last column to the first; its pivots are the check.
+/// Computes the factor from the last column to the first; it exists if all pivots are positive.
 fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
     let positive = |moment: f64| if moment > 0.0 { Ok(moment.sqrt()) } else { Err(NotPhysical::Spread { moment }) };
     let mass = I.mass;
@@ -127,9 +129,9 @@ fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
     Ok(Factor { scale: mass.sqrt(), diagonal: Vec3::new(x, y, z), above: Vec3::new(xy, yz, xz), t })
 }
 
-/// Whether a body of positive density can have this inertia: J ≻ 0, by the pivots of its Cholesky factor.
+/// Checks whether a body of positive density can have this inertia: J ≻ 0, by the pivots of its Cholesky factor.
 ///
-/// Point masses, rods and plates are at the border, without volume, and are refused.
+/// Point masses, rods and plates have no volume; they are limit cases and are refused.
 ///
 /// # Errors
 /// [`NotPhysical`], with the first number that is not positive.
@@ -145,9 +147,10 @@ pub fn check(I: Inertia<f64>) -> Result<(), NotPhysical> {
     factor(I).map(|_| ())
 }
 
-/// θ, the log-Cholesky parameters of a physical inertia: any ten numbers, of which each tuple is another body.
+/// Returns θ, the log-Cholesky parameters of a physical inertia. Any ten numbers are valid, and different θ are
+/// different inertias.
 ///
-/// α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). Source: Rucker and Wensing (2022).
+/// α = ½ ln m; dᵢ: logarithms (of m); s: m; t: centre of mass (m). Source: Rucker and Wensing (2022).
 ///
 /// ```
 /// use condyle_model::{inertial_parameters::{from_log_cholesky, log_cholesky}, robots};
@@ -158,7 +161,7 @@ pub fn check(I: Inertia<f64>) -> Result<(), NotPhysical> {
 /// ```
 ///
 /// # Errors
-/// [`NotPhysical`]: what [`check`] refuses has no logarithm.
+/// [`NotPhysical`], if [`check`] refuses the inertia.
 pub fn log_cholesky(I: Inertia<f64>) -> Result<[f64; 10], NotPhysical> {
     let Factor { scale, diagonal, above, t } = factor(I)?;
     let d = diagonal.to_array().map(|x| ln(x / scale));
@@ -166,7 +169,7 @@ pub fn log_cholesky(I: Inertia<f64>) -> Result<[f64; 10], NotPhysical> {
     Ok([ln(scale), d[0], d[1], d[2], s.x, s.y, s.z, t.x, t.y, t.z])
 }
 
-/// U / eᵅ row by row, and e²ᵅ.
+/// Returns the rows of U / eᵅ, and e²ᵅ.
 fn rows<S: Scalar>(theta: &[S; 10]) -> ([[S; 4]; 3], S) {
     let &[alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = theta;
     let o = S::zero();
@@ -177,10 +180,11 @@ fn dot<S: Scalar>(a: [S; 4], b: [S; 4]) -> S {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul_add(b[2], a[3] * b[3])))
 }
 
-/// The inertia with the log-Cholesky parameters θ, physical whatever they are; the inverse of [`log_cholesky`].
+/// Returns the inertia with the log-Cholesky parameters θ, which is physical for all θ; the inverse of
+/// [`log_cholesky`].
 ///
-/// Ī = tr(Σ) 1 − Σ with Σ the upper left block of U Uᵀ. Source: Rucker and Wensing (2022). α within ±32 and
-/// dᵢ within ±64, to a rounding error that grows with their size.
+/// Ī = tr(Σ) 1 − Σ with Σ the upper left block of U Uᵀ. Source: Rucker and Wensing (2022). Valid for α within ±32 and
+/// dᵢ within ±64, up to a rounding error that grows with their size.
 pub fn from_log_cholesky<S: Scalar>(theta: [S; 10]) -> Inertia<S> {
     let ([x, y, z], mass) = rows(&theta);
     let moments = Sym3 { xx: dot(x, x), xy: dot(x, y), yy: dot(y, y), xz: dot(x, z), yz: dot(y, z), zz: dot(z, z) };
@@ -189,10 +193,11 @@ pub fn from_log_cholesky<S: Scalar>(theta: [S; 10]) -> Inertia<S> {
     Inertia { mass, mass_com: Vec3::new(x[3], y[3], z[3]).scale(mass), rotational: rotational.scale(mass) }
 }
 
-/// ∂π/∂θ, 10 × 10 and never singular: how the ten parameters change with the log-Cholesky parameters.
+/// Returns ∂π/∂θ, 10 × 10 and always invertible: the derivative of the ten parameters with respect to the log-Cholesky
+/// parameters.
 ///
-/// Source: Rucker and Wensing (2022). With `joint_torque_regressor` Y, Y ∂π/∂θ is the
-/// slope of the torques in θ.
+/// Source: Rucker and Wensing (2022). With Y from `joint_torque_regressor`, Y ∂π/∂θ is the derivative of the torques
+/// with respect to θ.
 ///
 /// ```
 /// use condyle_model::inertial_parameters::log_cholesky_jacobian;
@@ -205,7 +210,7 @@ pub fn log_cholesky_jacobian<S: Scalar>(theta: [S; 10]) -> SMatrix<S, 10, 10> {
     // e²ᵅ scales all parameters: ∂π/∂α = 2 π
     let pi = from_inertia(from_log_cholesky(theta));
     J.set_column(0, &SVector::<S, 10>::from_fn(|k, _| pi[k] + pi[k]));
-    // every other θ is (the logarithm of) the entry (row, column) of U / eᵅ
+    // each other θ is the entry (row, column) of U / eᵅ, or the logarithm of a diagonal entry
     const ENTRIES: [(usize, usize); 9] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
     for (k, &(row, column)) in ENTRIES.iter().enumerate() {
         let rate = if row == column { u[row][column] } else { S::one() } * mass;

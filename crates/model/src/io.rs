@@ -1,4 +1,4 @@
-//! Files of robots: URDF, MJCF, SDF, SRDF, and those of serde.
+//! Files of robots: URDF, MJCF, SDF, SRDF, and serde formats.
 
 #[cfg(feature = "serde")]
 mod description;
@@ -22,7 +22,7 @@ mod xml;
 #[cfg(feature = "loaders")]
 use condyle_spatial::{Mat3, Vec3};
 
-/// R = Rz(yaw) Ry(pitch) Rx(roll), as URDF and SDF have it (rad).
+/// Returns R = Rz(yaw) Ry(pitch) Rx(roll), the convention of URDF and SDF (rad).
 #[cfg(feature = "loaders")]
 fn from_rpy(rpy: [f64; 3]) -> Mat3<f64> {
     let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(f64::sin_cos);

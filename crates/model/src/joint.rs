@@ -1,9 +1,9 @@
-//! Joints: all that depends on the kind of a joint is in this file and its folder, the group of its positions in
-//! `joint/group.rs`, what passes ask of it in `joint/kinematics.rs`.
+//! Joints. All code that depends on the kind of a joint is in this file and its folder: the group of positions in
+//! `joint/group.rs`, and kinematics for the passes of algorithms in `joint/kinematics.rs`.
 //!
-//! A joint moves along some of the six unit motions of the body's frame, and these stay the same in that frame whatever
-//! its position: its motion subspace is constant in the body. The axis of a revolute or prismatic joint is turned to z
-//! when the model is built, so that inside, S is the same for all of them.
+//! A joint moves along some of the six unit motions of the body's frame. These motions are the same in that frame for
+//! all positions: the motion subspace is constant in the body. When a model is built, the axis of a revolute or
+//! prismatic joint is turned to z. Internally, S is therefore the same for all such joints.
 
 mod group;
 pub mod kinematics;
@@ -17,31 +17,31 @@ use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 pub use group::GroupJacobian;
 pub use motion::{ClassicalMotion, JointMotion};
 
-/// The kind of a joint, with what it needs to know.
+/// Kind of a joint, with its parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Joint {
     /// One angle about an axis: q = \[θ\], v = \[θ̇\].
     Revolute {
-        /// Unit vector in the body's frame.
+        /// Axis: a unit vector in the body's frame.
         axis: Vec3<f64>,
     },
     /// One angle about an axis, without limits: q = [cos θ, sin θ], v = \[θ̇\].
     Continuous {
-        /// Unit vector in the body's frame.
+        /// Axis: a unit vector in the body's frame.
         axis: Vec3<f64>,
     },
     /// One length along an axis: q = \[d\], v = \[ḋ\].
     Prismatic {
-        /// Unit vector in the body's frame.
+        /// Axis: a unit vector in the body's frame.
         axis: Vec3<f64>,
     },
     /// A screw: q = \[θ\], v = \[θ̇\], with `pitch` metres along the axis for each radian about it.
     Helical {
-        /// Unit vector in the body's frame.
+        /// Axis: a unit vector in the body's frame.
         axis: Vec3<f64>,
-        /// Metres per radian.
+        /// Pitch (m/rad).
         pitch: f64,
     },
     /// A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
@@ -54,14 +54,15 @@ pub enum Joint {
     FreeFlyer,
 }
 
-/// A joint that follows another one: its position is ratio · q + offset, q being the leader's position.
+/// Relation of a joint to the joint that it follows: its position is ratio · q + offset, where q is the leader's
+/// position.
 ///
-/// Both have one degree of freedom, and the leader has its own coordinate. A continuous leader has q = [cos θ, sin θ]: ratio is
-/// then a whole number, and what follows turns, by ratio · θ + offset. A continuous follower of a leader with one number
-/// turns by ratio · q + offset.
+/// Both joints have one degree of freedom, and the leader has its own coordinate. A continuous leader has q = [cos θ,
+/// sin θ]; the ratio must then be an integer, and the follower turns by ratio · θ + offset. If the leader has one
+/// number and the follower is continuous, the follower turns by ratio · q + offset.
 ///
-/// The follower's armature counts, as ratio² · armature of the leader's coordinate, and so does its spring. Its limits, damping and
-/// friction do not: as in Pinocchio, those of a coordinate are its leader's alone.
+/// The follower's armature is added to the leader's coordinate as ratio² · armature, and its spring acts there, too.
+/// Its limits, damping and friction are ignored: as in Pinocchio, the coordinate has only the leader's values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
@@ -70,12 +71,12 @@ pub struct Mimic {
     pub offset: f64,
 }
 
-/// The distance from 1 to which rounding takes the length of a vector that was divided by it.
+/// Tolerance for the length of a normalized vector, due to rounding.
 const UNIT: f64 = 1e-15;
 
 impl Joint {
-    /// The kind's name: `revolute`, `continuous`, `prismatic`, `helical`, `spherical`, `planar`, `translation` or
-    /// `free-flyer`.
+    /// Returns the name of the kind: `revolute`, `continuous`, `prismatic`, `helical`, `spherical`, `planar`,
+    /// `translation` or `free-flyer`.
     pub fn kind(self) -> &'static str {
         match self {
             Self::Revolute { .. } => "revolute",
@@ -89,7 +90,7 @@ impl Joint {
         }
     }
 
-    /// The number of entries of the position.
+    /// Returns the number of entries of the position.
     #[inline]
     pub fn nq(self) -> usize {
         match self {
@@ -101,14 +102,14 @@ impl Joint {
         }
     }
 
-    /// The number of degrees of freedom: the entries of the velocity.
+    /// Returns the number of degrees of freedom, which is the number of entries of the velocity.
     #[inline]
     pub fn nv(self) -> usize {
         self.axes().len()
     }
 
-    /// The unit motions of the frame (linear x, y, z, angular x, y, z) along which it moves: the columns of S. (A screw
-    /// moves along z as well, by its pitch.)
+    /// Returns the unit motions of the frame (linear x, y, z, angular x, y, z) along which the joint moves: the columns
+    /// of S. (A helical joint also moves along z, by its pitch.)
     #[doc(hidden)]
     #[inline(always)]
     pub fn axes(self) -> &'static [usize] {
@@ -122,7 +123,7 @@ impl Joint {
         }
     }
 
-    /// The axis of a joint that has one, as a unit vector in the body's frame.
+    /// Returns the axis as a unit vector in the body's frame; `None` if the joint has no axis.
     pub fn axis(self) -> Option<Vec3<f64>> {
         match self {
             Self::Revolute { axis }
@@ -133,14 +134,14 @@ impl Joint {
         }
     }
 
-    /// The same joint about or along a unit vector, or what is wrong with its axis or pitch.
+    /// Returns the same joint with a unit vector as its axis; the error describes an invalid axis or pitch.
     pub(crate) fn normalized(self) -> Result<Self, String> {
         let Some(axis) = self.axis() else { return Ok(self) };
         let norm = axis.norm_squared().sqrt();
         if !norm.is_normal() {
             return Err(format!("axis ({}, {}, {}) is no direction", axis.x, axis.y, axis.z));
         }
-        let unit = (norm - 1.0).abs() < UNIT; // to the last bit the same when it was normalised before
+        let unit = (norm - 1.0).abs() < UNIT; // a vector that was normalized before is kept to the last bit
         let axis = if unit { axis } else { axis.scale(1.0 / norm) };
         match self {
             Self::Helical { pitch, .. } if !pitch.is_finite() => Err(format!("pitch {pitch} is not finite")),
@@ -151,9 +152,11 @@ impl Joint {
         }
     }
 
-    /// The rotation bRz whose third column is the joint's axis: from the frame in which algorithms run to the body's.
+    /// Returns the rotation bRz whose third column is the joint's axis: from the frame used in algorithms to the body's
+    /// frame.
     ///
-    /// A permutation of axes, hence exact, for x, y and z; else the shortest rotation of z, or of −z, to the axis.
+    /// For x, y and z it is a permutation of axes, hence exact; otherwise it is the shortest rotation of z, or of −z,
+    /// to the axis.
     #[doc(hidden)]
     pub fn axis_rotation(self) -> Mat3<f64> {
         let Some(a) = self.axis() else { return Mat3::identity() };
@@ -178,11 +181,11 @@ impl Joint {
         }
     }
 
-    /// The kind as which a joint that follows another one is computed, or why it cannot follow. Its position has numbers of
-    /// the leader's kind: (cos, sin), or one.
+    /// Returns the kind of joint that computes a follower, or the reason why it cannot follow. Its position has the
+    /// form of the leader's position: (cos, sin), or one number.
     ///
-    /// The (cos, sin) of a leader tells its angle up to whole turns, and a whole multiple of it up to whole turns too;
-    /// what else would follow jumps wherever the leader completes a turn.
+    /// The (cos, sin) of a leader determines its angle up to whole turns, and integer multiples of the angle, too. With
+    /// any other ratio, the follower would jump whenever the leader completes a turn.
     pub(crate) fn as_follower(self, leader: Self, mimic: Mimic) -> Result<Self, String> {
         let turns = "a continuous joint's position is known up to whole turns only";
         match (leader, self) {
@@ -203,30 +206,30 @@ impl Joint {
         }
     }
 
-    /// Whether its pose is a rotation about z, and nothing else.
+    /// Returns whether the joint's pose is a pure rotation about z.
     #[doc(hidden)]
     pub fn turns_about_z(self) -> bool {
         matches!(self, Self::Revolute { .. } | Self::Continuous { .. })
     }
 
-    /// Whether the group of its positions is commutative, so that q ⊕ v has the Jacobian 1.
+    /// Returns whether the group of positions is commutative, so that q ⊕ v has the Jacobian 1.
     #[doc(hidden)]
     pub fn commutes(self) -> bool {
         !matches!(self, Self::Spherical | Self::Planar | Self::FreeFlyer)
     }
 
-    /// Whether the position of a joint that follows is ratio · q + offset of its leader's.
+    /// Returns whether the position of a follower is ratio · q + offset, where q is the leader's position.
     pub(crate) fn follows_by_sums(self) -> bool {
         !matches!(self, Self::Continuous { .. })
     }
 
-    /// Whether two joints are computed by the same operations.
+    /// Returns whether two joints are computed by the same operations.
     pub(crate) fn is_computed_as(self, other: Self) -> bool {
         let pitch = |joint| if let Self::Helical { pitch, .. } = joint { pitch } else { 0.0 };
         core::mem::discriminant(&self) == core::mem::discriminant(&other) && pitch(self) == pitch(other)
     }
 
-    /// The k-th number of the position of a joint that follows; q begins with its leader's.
+    /// Returns the k-th number of a follower's position; q begins with the leader's position.
     #[inline(always)]
     pub(crate) fn mimic_position<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
         match self {
@@ -235,7 +238,8 @@ impl Joint {
         }
     }
 
-    /// The part of a follower's offset that belongs to its placement: the pose by which its turned frame is moved.
+    /// Returns the part of a follower's offset that belongs to its placement: a pose that is applied to its turned
+    /// frame.
     pub(crate) fn mimic_offset(self, mimic: Mimic) -> Se3<f64> {
         match self {
             Self::Continuous { .. } => {
@@ -246,7 +250,7 @@ impl Joint {
         }
     }
 
-    /// Column k of S of a joint whose body is at oX, in the world's frame.
+    /// Returns column k of S in the world's frame, for a joint whose body is at oX.
     #[doc(hidden)]
     #[inline(always)]
     pub fn column<S: Scalar>(self, oX: &Se3<S>, k: usize) -> Motion<S> {
@@ -264,7 +268,7 @@ impl Joint {
         }
     }
 
-    /// S of a joint that turns about z.
+    /// Returns S of a joint that turns about z.
     #[doc(hidden)]
     #[inline(always)]
     pub fn column_about_z<S: Scalar>(oX: &Se3<S>) -> Motion<S> {
@@ -272,8 +276,8 @@ impl Joint {
     }
 }
 
-/// cos kθ and sin kθ from cos θ and sin θ, k a whole number: (cos θ + i sin θ)ᵏ by repeated squaring. It is rare, so it is
-/// kept out of the passes.
+/// Returns cos kθ and sin kθ for an integer k, given cos θ and sin θ: (cos θ + i sin θ)ᵏ by repeated squaring. It is
+/// rarely used, so it is not inlined into the passes.
 #[cold]
 #[inline(never)]
 fn multiple<S: Scalar>([cos, sin]: [S; 2], k: f64) -> [S; 2] {
@@ -301,7 +305,7 @@ impl<S: Scalar> Kernel for Multiple<'_, S> {
     }
 }
 
-/// X_T, then a rotation about z.
+/// Returns X_T, followed by a rotation about z.
 #[inline(always)]
 fn rotated_about_z<S: Scalar>(X_T: Se3<S>, sin: S, cos: S) -> Se3<S> {
     let Mat3 { x, y, z } = X_T.rotation;

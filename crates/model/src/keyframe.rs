@@ -1,16 +1,16 @@
-//! Positions of a robot that have names.
+//! Named states of a robot.
 
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// State with a name that a robot's file has, such as `home`.
+/// Named state in a robot's file, such as `home`.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Keyframe {
-    /// Name.
+    /// Name of the state.
     pub name: String,
-    /// Position, nq numbers.
+    /// Position q, nq numbers.
     pub q: Vec<f64>,
-    /// Velocity, nv numbers.
+    /// Velocity v, nv numbers.
     pub v: Vec<f64>,
 }

@@ -1,16 +1,18 @@
-//! Layouts: the views of model and state that passes have.
+//! Layouts: views of model and state in the passes of algorithms.
 //!
-//! An algorithm is written once, over [`Layout`]. It reaches its parent, its children's sums and its coordinates only
-//! through the verbs below, so that one source runs on
+//! Each algorithm is written once, for a [`Layout`]. It accesses its parent, the sums of its children and its
+//! coordinates only through the methods below. The same source therefore runs on
 //!
-//! - one state: the scalar is `f64` (or `f32`, or a dual number), the constants are `f64`;
-//! - several knots of a horizon side by side: the scalar holds a number for each knot, the constants are broadcast;
-//! - the limbs of one robot side by side: a body of the pass stands for a body of each limb, all of one joint kind.
+//! - one state: the scalar is `f64` (or `f32`, or a dual number), and constants are `f64`;
+//! - several knots of a horizon in parallel lanes: the scalar holds one number for each knot, and constants are
+//!   broadcast;
+//! - several limbs (branches of the tree) of one robot in parallel lanes: a body of the pass represents one body of
+//!   each limb, all with the same kind of joint.
 //!
-//! The first two are [`Single`]. A *column* is a degree of freedom of a joint, a *coordinate* an entry of v: several
-//! joints may share a coordinate (mimic joints), v_joint = G v with one entry in each row of G.
-//! [`joint_velocity`](Layout::joint_velocity) applies G, [`add_joint_effort`](Layout::add_joint_effort) Gᵀ,
-//! [`set_row`](Columns::set_row) and its like Gᵀ · G, and no algorithm knows more.
+//! The first two cases use [`Single`]. A *column* is a degree of freedom of a joint, a *coordinate* an entry of v.
+//! Several joints may share a coordinate (mimic joints): v_joint = G v with one entry in each row of G.
+//! [`joint_velocity`](Layout::joint_velocity) applies G, [`add_joint_effort`](Layout::add_joint_effort) applies Gᵀ, and
+//! methods like [`set_row`](Columns::set_row) apply Gᵀ · G. No algorithm needs to know more about it.
 
 use crate::joint::Joint;
 use crate::joint::turns::Turns;
@@ -20,104 +22,104 @@ use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3, Vec3};
 use core::marker::PhantomData;
 use core::ops::{AddAssign, Range};
 
-/// The bodies, joints and coordinates of a pass.
+/// Bodies, joints and coordinates of a pass.
 pub trait Layout {
-    /// The number that the pass computes with.
+    /// Scalar type of the pass.
     type S: Scalar;
 
-    /// The hash of the tree and of where its joints and frames are.
+    /// Returns the hash of the tree and of the placements of its joints and frames.
     fn geometry_hash(&self) -> u64;
-    /// The bodies in order, parents first; 0 is the world and not among them.
+    /// Returns the bodies in order, parents first; it excludes the world, body 0.
     fn bodies(&self) -> Range<usize>;
-    /// The kind of joint that carries body i, its axis turned to z.
+    /// Returns the kind of the joint that carries body i, with its axis turned to z.
     fn joint(&self, i: usize) -> Joint;
-    /// The joints that turn about z.
+    /// Returns the joints that turn about z.
     fn turns(&self) -> &Turns;
-    /// X_T: the joint's frame in the parent's.
+    /// Returns X_T: the joint's frame in the parent's frame.
     fn placement(&self, i: usize) -> Se3<Self::S>;
-    /// The body's inertia in its frame.
+    /// Returns the body's inertia in its frame.
     fn inertia(&self, i: usize) -> Inertia<Self::S>;
-    /// The acceleration of the world that stands for gravity, −g.
+    /// Returns the acceleration of the world that represents gravity, −g.
     fn minus_gravity(&self) -> Vec3<Self::S>;
-    /// The armature at degree of freedom k of joint i.
+    /// Returns the armature of degree of freedom k of joint i.
     fn armature(&self, i: usize, k: usize) -> Self::S;
-    /// The external force on body i, given per body in the body's public frame (or none at all).
+    /// Returns the external force on body i, which is given in the body's public frame; `None` if no forces are given.
     fn force(&self, f_ext: &[Force<Self::S>], i: usize) -> Option<Force<Self::S>>;
 
-    /// The parent's entry in an array by bodies.
+    /// Returns the parent's entry of an array indexed by body.
     fn parent<T: Copy>(&self, of: &[T], i: usize) -> T;
-    /// Adds to the parent's entry in an array by bodies.
+    /// Adds x to the parent's entry of an array indexed by body.
     fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// The place of body i on the stack of a pass that goes down and up the branches, one after the other: the bodies on its
-    /// way from the world, which has place 0. There the pass keeps what it needs of a body until its subtree is closed.
+    /// Returns the index of body i on the stack of a depth-first pass: the number of bodies on its path from the world,
+    /// which has index 0. The stack keeps the data of a body until its subtree is closed.
     fn stack_index(&self, i: usize) -> usize;
-    /// The bodies whose subtrees end with body i: children before parents.
+    /// Returns the bodies whose subtrees end with body i, children before parents.
     fn closed_by(&self, i: usize) -> &[usize];
-    /// The parent's entry on the stack.
+    /// Returns the parent's entry of the stack.
     fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T;
-    /// Adds to the parent's entry on the stack.
+    /// Adds x to the parent's entry of the stack.
     fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// Sums x up over the lanes in which body i stands: each may hold a part of what the body carries.
+    /// Sums x over the lanes of body i; each lane may hold a part of the sum over its children.
     fn sum_lanes<T>(&self, i: usize, x: &mut T);
 
-    /// The k-th number of the position of joint i.
+    /// Returns the k-th number of the position of joint i.
     fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
-    /// The k-th number of the velocity (or acceleration) of joint i.
+    /// Returns the k-th number of the velocity (or acceleration) of joint i.
     fn joint_velocity(&self, v: &[Self::S], i: usize, k: usize) -> Self::S;
-    /// Adds the effort along degree of freedom k of joint i to its coordinate's: the transpose of `joint_velocity`.
+    /// Adds the effort along degree of freedom k of joint i to its coordinate: the transpose of `joint_velocity`.
     fn add_joint_effort(&self, tau: &mut [Self::S], i: usize, k: usize, effort: Self::S);
 
-    /// The first of joint i's columns, in an array by columns.
+    /// Returns the index of joint i's first column, for arrays indexed by column.
     fn column(&self, i: usize) -> usize;
     /// Adds armature times acceleration to the efforts of all coordinates.
     fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
 }
 
-/// The columns from the root to a joint, and the entries that they have with the joint's own in matrices.
+/// Columns from the root to a joint, and their matrix entries together with the joint's own columns.
 ///
-/// The matrices have a row and a column for each coordinate and are stored by columns.
+/// Matrices have a row and a column for each coordinate, and are stored column by column.
 pub trait Columns: Layout {
-    /// Names a column, among those from the root to a joint.
+    /// Identifier of a column among the columns from the root to a joint.
     type Column: Copy;
-    /// Names a column of a body's own joint.
+    /// Identifier of a column of a body's own joint.
     type OwnColumn: Copy;
-    /// The number that matrices are made of.
+    /// Scalar type of matrices.
     type Number: Scalar;
 
-    /// The columns of all joints from the root to joint i, its own last.
+    /// Returns the columns of all joints from the root to joint i, its own columns last.
     fn support(&self, i: usize) -> &[Self::Column];
-    /// Column k of joint i.
+    /// Returns column k of joint i.
     fn own_column(&self, i: usize, k: usize) -> Self::OwnColumn;
-    /// The entry of a column in an array by columns.
+    /// Returns the entry of a column in an array indexed by column.
     fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
-    /// Copies entries of an array by columns to where `at` looks for them, if that is elsewhere.
+    /// Copies entries of an array indexed by column to the indices at which `at` reads them, if these differ.
     fn broadcast<T: Copy>(&self, of: &mut [T]);
-    /// Makes a matrix ready for `set_row` and `set_column`. Entries that are never set are 0.
+    /// Prepares a matrix for `set_row` and `set_column`. Entries that are never set are 0.
     fn clear(&self, matrix: &mut [Self::Number]);
-    /// Sets the entry in the row of a joint's own column and in the column e of its support, or adds to it if several
-    /// columns share it. To be called once for each pair of columns; that of the first body's last column with itself comes
-    /// last of all.
+    /// Sets the entry in the row of a joint's own column and in column e of its support, or adds to it if several
+    /// columns share it. It must be called once for each pair of columns. The pair of the first body's last column with
+    /// itself must be the last call.
     fn set_row(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
-    /// Sets the entry in the row of e and in the joint's own column, as `set_row` does.
+    /// Sets the entry in row e and in the joint's own column, as `set_row` does.
     fn set_column(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
     /// Adds the armature of all coordinates to the diagonal of a matrix.
     fn add_armature(&self, matrix: &mut [Self::Number]);
 }
 
-/// The entries of matrices for any pair of columns.
+/// Matrix entries for any pair of columns.
 pub trait Pairs: Columns<Number = <Self as Layout>::S> {
-    /// Sets the entry (row, column) of a matrix after `clear`, or adds to it if several columns share it. To be called once
-    /// for each pair of columns.
+    /// Sets the entry (row, column) of a matrix after `clear`, or adds to it if several columns share it. It must be
+    /// called once for each pair of columns.
     fn set_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
     /// Adds to the entry (row, column) of a matrix.
     fn add_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
 }
 
-/// One body at a time: of one state, or of several knots of a horizon in the lanes of the scalar.
+/// Layout with one body at a time, of one state or of several knots of a horizon in the lanes of the scalar.
 pub struct Single<'m, S, R> {
-    /// What passes ask for in each step is at hand, and not to be looked up in the model again after every store.
+    /// Data that passes need in each step; stored here so that it is not read from the model again after every store.
     nodes: &'m [Node<R>],
     closed: &'m [usize],
     turns: &'m Turns,
@@ -132,7 +134,7 @@ pub struct Single<'m, S, R> {
 }
 
 impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
-    /// The layout of a model.
+    /// Creates the layout of a model.
     #[inline(always)]
     pub fn new(model: &'m Model<R>) -> Self {
         let Model { tree, armature, gravity, geometry, .. } = model;

@@ -1,6 +1,6 @@
-//! Robot models: trees of bodies and joints, their files, and how algorithms walk them.
+//! Robot models: trees of bodies and joints, their files, and the views that algorithms have of them.
 //!
-//! A [`Model`] is made by a [`ModelBuilder`] or by a reader of URDF, MJCF or SDF, checked, and frozen:
+//! A [`Model`] is created by a [`ModelBuilder`], or by a reader of URDF, MJCF or SDF. It is checked and then immutable:
 //!
 //! ```
 //! use condyle_model::{integrate, neutral, robots};
@@ -12,39 +12,39 @@
 //!
 //! # Limits of files
 //!
-//! A file is refused, before memory or time is spent on it, if it is no regular file (a folder, a device, a pipe) or is
-//! larger than this; the error has the number and the limit.
+//! A file is refused before memory or time is spent on it if it is not a regular file (but a folder, a device or a
+//! pipe), or exceeds a limit. The error contains the number and the limit. At most are allowed:
 //!
-//! | of | at most |
-//! | --- | --- |
-//! | bytes in the files of a robot, included ones too | 67 108 864 |
-//! | tags in them, ends and comments counted | 1 048 576 |
-//! | equals signs in them | 4 194 304 |
-//! | levels of elements, those of included files counted where they come to stand | 256 |
-//! | attributes of an element | 256 |
-//! | included files of an SDF | 16 384 |
-//! | bytes in the names of an SDF, those of the models around each included | 67 108 864 |
-//! | tags and equals signs of an MJCF with the copies of `<replicate>` and `<attach>` | as above |
-//! | `<attach>` elements of an MJCF, and of the files that it attaches | 256 |
-//! | bytes in the files of meshes that give an MJCF mass | 536 870 912 |
-//! | attributes of all default classes of an MJCF, what they inherit included | 1 048 576 |
-//! | named positions (`<group_state>`) of an SRDF | 4096 |
-//! | numbers in the keyframes of an MJCF | 4 194 304 |
-//! | joints of the tendons that actuators of an MJCF drive | 1 048 576 |
-//! | actuators of an MJCF with `dampratio` | 4096 |
-//! | degrees of freedom of a model, however it is made | 4096 |
-//! | coordinates of a model whose joints follow others | 1024 |
+//! - 67 108 864 bytes in the files of a robot, including the files that it includes;
+//! - 1 048 576 tags in these files, including end tags and comments;
+//! - 4 194 304 equals signs in these files;
+//! - 256 levels of nested elements, where an included file counts at the depth of its include;
+//! - 256 attributes of an element;
+//! - 16 384 included files of an SDF;
+//! - 67 108 864 bytes in the full names of an SDF, which contain the names of the enclosing models;
+//! - the above numbers of tags and equals signs in an MJCF, including the copies of `<replicate>` and `<attach>`;
+//! - 256 `<attach>` elements of an MJCF and of the files that it attaches;
+//! - 536 870 912 bytes in the mesh files that determine masses of an MJCF;
+//! - 1 048 576 attributes of all default classes of an MJCF, including inherited ones;
+//! - 4096 named positions (`<group_state>`) of an SRDF;
+//! - 4 194 304 numbers in the keyframes of an MJCF;
+//! - 1 048 576 joints of the tendons that actuators of an MJCF drive;
+//! - 4096 actuators of an MJCF with `dampratio`;
+//! - 4096 degrees of freedom of any model;
+//! - 1024 coordinates of a model whose joints follow others.
 //!
-//! A `package://` address stays in its package, but for links there; the files that an MJCF or SDF includes may be anywhere. The
-//! nearest name in an error is looked for by the first 128 characters of names, and among as many as that takes a moment.
+//! A `package://` address cannot leave its package, except through links in it. The files that an MJCF or SDF includes
+//! may be anywhere. The search for the nearest name in an error compares the first 128 characters of names, and stops
+//! after a moment if there are many names.
 //!
-//! What the crates of algorithms need beside it is hidden from the documentation: the verbs by which a pass sees a model
-//! (`layout`), the tree of its turned frames and columns (`tree`), the schedule of its limbs (`limbs`).
+//! Some public modules for the algorithm crates are hidden from the documentation: the view that passes have of a model
+//! (`layout`), the tree of turned frames and columns (`tree`), and the schedule of limbs (`limbs`).
 //!
 //! # Features
-//! All are on by default. `loaders`: files of robots, and [`robots`]. `meshes`: masses and inertias of meshes in MJCF. `serde`:
-//! models to and from its formats. `threads`: those of rayon. `std`: the standard library, which all but `serde` need; without it the crate needs `alloc` and, for the
-//! functions of floats, the feature `libm`. Off by default is `urdf-rs`: models from `urdf_rs::Robot`.
+//! All features except `urdf-rs` are on by default. `loaders`: files of robots, and [`robots`]. `meshes`: masses and
+//! inertias of meshes in MJCF. `serde`: serialization of models. `threads`: the threads of rayon. `std`: the standard
+//! library, which all features except `serde` need. Without `std` the crate needs `alloc` and, for floating-point
+//! functions, the feature `libm`. `urdf-rs`: models from `urdf_rs::Robot`.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
 

@@ -1,11 +1,12 @@
-//! The limbs of one robot side by side: which bodies share a step of a pass, and in which lane each stands.
+//! Limbs, the branches of one robot, in parallel lanes: this module decides which bodies share a step of a pass, and in
+//! which lane each is.
 //!
-//! Bodies of different legs, arms or fingers do not wait for each other, so one pass can treat four of them at once, each
-//! in a lane of a vector register. All four must have joints of one kind, but whatever their axes: these are turned to z
-//! already. [`schedule`] says which bodies go together, [`steps`] what a pass needs of them, [`column_map`] where the
-//! entries of matrices stand.
+//! Bodies of different legs, arms or fingers do not depend on each other. One pass can therefore process four of them
+//! at once, each in a lane of a vector register. All four must have the same kind of joint, but may have different
+//! axes, because these are already turned to z. [`schedule`] selects the bodies of each step, [`steps`] collects the
+//! data that a pass needs, and [`column_map`] contains the indices of matrix entries.
 //!
-//! Robots with less than about two bodies a step, chains above all, are computed one body after the other.
+//! Robots with less than about two bodies per step, such as chains, are computed one body after the other.
 
 pub mod column_map;
 pub mod schedule;
@@ -18,27 +19,27 @@ use column_map::ColumnMap;
 use schedule::Schedule;
 use steps::{StateMap, Step};
 
-/// The number of bodies side by side.
+/// Number of bodies in parallel lanes.
 pub const LANES: usize = 4;
 
-/// A schedule, and what a pass needs of it. Step 0 is the world.
+/// Schedule of the steps, and the data that a pass needs. Step 0 is the world.
 #[derive(Clone, Debug)]
 pub struct Plan {
     schedule: Schedule,
-    /// The bodies as a pass sees them.
+    /// Bodies as a pass sees them.
     pub steps: Vec<Step>,
-    /// All steps but the world, the last first.
+    /// Indices of all steps except the world, the last step first.
     pub closed: Vec<usize>,
-    /// The steps that turn about z.
+    /// Steps whose joints turn about z.
     pub turns: Turns,
-    /// The places from which the numbers in lanes come.
+    /// Indices from which the numbers in lanes are read.
     pub state: StateMap,
-    /// The places of columns and of the entries of matrices.
+    /// Indices of columns and of matrix entries.
     pub columns: ColumnMap,
 }
 
 impl Plan {
-    /// The plan for a robot, if it has limbs enough.
+    /// Creates the plan for a robot; `None` if it has too few limbs.
     pub(crate) fn new(tree: &Tree<f64>) -> Option<Self> {
         if tree.nodes.iter().any(|node| node.mimic.is_some() && !node.joint.follows_by_sums()) {
             return None;
@@ -50,13 +51,13 @@ impl Plan {
         Some(Self { closed: (1..steps.len()).rev().collect(), schedule, steps, turns, state, columns })
     }
 
-    /// The step and lane of a body.
+    /// Returns the step and lane of a body.
     #[inline(always)]
     pub fn place(&self, body: usize) -> (usize, usize) {
         self.schedule.place[body]
     }
 
-    /// Whether a step's body is the same in all lanes: the world, or the one on which all others hang.
+    /// Returns whether a step has the same body in all lanes: the world, or the body that carries all others.
     #[inline(always)]
     pub fn in_all_lanes(&self, step: usize) -> bool {
         self.schedule.in_all_lanes(step)

@@ -1,4 +1,4 @@
-//! The magnitudes of a model's numbers: products of the largest ones are still numbers.
+//! Magnitudes of a model's numbers: products of the largest numbers must not overflow.
 
 use crate::error::Error;
 use crate::joint::Joint;
@@ -7,12 +7,12 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use condyle_spatial::{Inertia, Se3, Sym3, Vec3};
 
-/// The largest mass, length, inertia, gravity, armature, pitch or ratio of a model, in SI units. Inertia about a point that
-/// far away, the third power, can be multiplied by itself.
+/// Largest mass, length, inertia, gravity, armature, pitch or ratio of a model, in SI units; chosen because the inertia
+/// about a point at this distance, its third power, can be squared.
 const LARGEST: f64 = 1e30;
 
 impl Model {
-    /// Checks that no number is so large that dynamics overflow.
+    /// Checks that no number is so large that the dynamics overflow.
     pub(crate) fn check_magnitudes(&self) -> Result<(), Error> {
         for body in &self.bodies {
             let Inertia { mass, mass_com, rotational: Sym3 { xx, xy, yy, xz, yz, zz } } = body.inertia;
@@ -35,7 +35,7 @@ impl Model {
     }
 }
 
-/// Says what is wrong with a gravity.
+/// Checks that a gravity is finite and not too large.
 pub(crate) fn check_gravity(gravity: Vec3<f64>) -> Result<(), Error> {
     let gravity = gravity.to_array();
     if gravity.iter().any(|g| !g.is_finite()) {

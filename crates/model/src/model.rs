@@ -1,4 +1,4 @@
-//! The frozen description of a robot.
+//! Immutable description of a robot.
 
 use crate::actuator::Actuator;
 use crate::body::{Body, Frame, FrameKind, Limits};
@@ -20,14 +20,16 @@ use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::{Se3, Vec3};
 use core::fmt;
 
-/// A robot: bodies, joints, frames, inertias, limits. Frozen, checked when built, shared between threads.
+/// A robot: bodies, joints, frames, inertias, limits. It is checked when it is built, immutable, and can be shared
+/// between threads.
 ///
-/// Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names (of
-/// a URDF; as Pinocchio numbers them) or in which a builder was given them. `R` is the type of the constants: `f64`,
-/// or a dual number for derivatives with respect to inertias ([`with_inertias`](Self::with_inertias)).
+/// Body 0 is the world. The other bodies are numbered depth first, parents first. Siblings of a URDF are sorted by the
+/// names of their joints, as in Pinocchio; siblings of a builder keep the order in which they were added. `R` is the
+/// type of the constants: `f64`, or a dual number for derivatives with respect to inertias
+/// ([`with_inertias`](Self::with_inertias)).
 ///
-/// A model of plain numbers can be written to a file and read from it (serde). A file may be edited: what it says is
-/// checked as in [`ModelBuilder::build`](crate::ModelBuilder::build) when it is read.
+/// A model of plain numbers can be written to a file and read from it (serde). A file may be edited: when it is read,
+/// it is checked as in [`ModelBuilder::build`](crate::ModelBuilder::build).
 ///
 /// ```
 /// let arm = condyle_model::robots::arm7();
@@ -53,13 +55,13 @@ pub struct Model<R = f64> {
     /// First coordinates of the free joints with armature along their linear coordinates. Written by: `validate`.
     pub(crate) free_armature: Vec<usize>,
     pub(crate) gravity: Vec3<R>,
-    /// The robot as passes see it.
+    /// Tree of the robot, as passes see it.
     pub(crate) tree: Tree<R>,
-    /// The plan by which single calls compute several bodies at once, if they do.
+    /// Plan by which single calls compute several bodies at once, if they do.
     pub(crate) limbs: Option<Plan>,
-    /// A hash of all that constraints on frames are planned from: see `geometry_hash`.
+    /// Hash of all data on which constraints on frames are planned: see `geometry_hash`.
     pub(crate) geometry: u64,
-    /// Whether each body stands between the joints of a chain, without mass on purpose.
+    /// Whether each body is an intermediate one between the joints of a chain, without mass on purpose.
     pub(crate) between: Vec<bool>,
     pub(crate) warnings: Vec<Warning>,
     /// Bodies whose joints make M singular.
@@ -68,7 +70,8 @@ pub struct Model<R = f64> {
 
 condyle_spatial::alike!(Model);
 
-/// A copy of the model, to be shared: what owns an `Arc` of a model, as a simulation, can be made of `&model`.
+/// Copies the model into an `Arc`. An object that owns an `Arc` of a model, such as a simulation, can thus be created
+/// from `&model`.
 impl<R: Clone> From<&Model<R>> for Arc<Model<R>> {
     fn from(model: &Model<R>) -> Self {
         Self::new(model.clone())
@@ -76,58 +79,58 @@ impl<R: Clone> From<&Model<R>> for Arc<Model<R>> {
 }
 
 impl<R> Model<R> {
-    /// The robot's name.
+    /// Returns the robot's name.
     #[inline]
     pub fn name(&self) -> &str {
         &self.name
     }
-    /// nq, the number of entries of a position q.
+    /// Returns nq, the number of entries of a position q.
     #[inline(always)]
     pub fn nq(&self) -> usize {
         self.tree.nq
     }
-    /// nv, the number of degrees of freedom: the entries of v, a, τ and of a tangent vector.
+    /// Returns nv, the number of degrees of freedom: the number of entries of v, a, τ and of a tangent vector.
     #[inline(always)]
     pub fn nv(&self) -> usize {
         self.tree.nv
     }
-    /// All bodies; number 0 is the world.
+    /// Returns all bodies; body 0 is the world.
     #[inline(always)]
     pub fn bodies(&self) -> &[Body] {
         &self.bodies
     }
-    /// All frames.
+    /// Returns all frames.
     #[inline(always)]
     pub fn frames(&self) -> &[Frame] {
         &self.frames
     }
-    /// The limits.
+    /// Returns the limits.
     #[inline]
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
-    /// Viscous damping of each degree of freedom (N m s/rad, N s/m): stored, used by no algorithm unasked.
+    /// Returns the viscous damping of each degree of freedom (N m s/rad, N s/m): stored, but not applied by default.
     #[inline]
     pub fn damping(&self) -> &[f64] {
         &self.damping
     }
-    /// Coulomb friction of each degree of freedom (N m, N): stored, used by no algorithm unasked.
+    /// Returns the Coulomb friction of each degree of freedom (N m, N): stored, but not applied by default.
     #[inline]
     pub fn friction(&self) -> &[f64] {
         &self.friction
     }
-    /// Returns the coefficients d₁ and d₂ of each degree of freedom's damping d(v) = d₀ + d₁|v| + d₂v², in which d₀ is
-    /// [`damping`](Self::damping): stored, used by no algorithm unasked.
+    /// Returns the coefficients d₁ and d₂ of each degree of freedom's damping d(v) = d₀ + d₁|v| + d₂v², where d₀ is
+    /// [`damping`](Self::damping): stored, but not applied by default.
     #[inline]
     pub fn damping_polynomial(&self) -> &[[f64; 2]] {
         &self.damping_polynomial
     }
-    /// Returns the springs of joints: stored, used by no algorithm unasked.
+    /// Returns the springs of joints: stored, but not applied by default.
     #[inline]
     pub fn springs(&self) -> &[Spring] {
         &self.springs
     }
-    /// Returns the bodies whose weight is carried, all of it or a part: stored, used by no algorithm unasked.
+    /// Returns the bodies whose weight is compensated, entirely or in part: stored, but not applied by default.
     #[inline]
     pub fn gravity_compensation(&self) -> &[GravityCompensation] {
         &self.gravity_compensation
@@ -137,38 +140,38 @@ impl<R> Model<R> {
     pub fn actuators(&self) -> &[Actuator] {
         &self.actuators
     }
-    /// Returns the states that have names.
+    /// Returns the named states.
     #[inline]
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
     }
-    /// Returns the constraints beside the tree: loops and coupled joints. No algorithm of the tree knows them.
+    /// Returns the constraints in addition to the tree: loops and coupled joints. Tree algorithms ignore them.
     #[inline]
     pub fn constraints(&self) -> &[ModelConstraint] {
         &self.constraints
     }
-    /// Inertia of the rotor as seen at each joint (kg m², kg), part of M in every algorithm.
+    /// Returns the inertia of the rotor as seen at each joint (kg m², kg), which is part of M in every algorithm.
     #[inline(always)]
     pub fn armature(&self) -> &[R] {
         &self.armature
     }
-    /// The acceleration of free fall, in the world's frame (m/s²).
+    /// Returns the acceleration of free fall, in the world's frame (m/s²).
     #[inline(always)]
     pub fn gravity(&self) -> &Vec3<R> {
         &self.gravity
     }
-    /// Mass of all bodies, of what is fixed to the world too (kg).
+    /// Returns the mass of all bodies, including parts fixed to the world (kg).
     pub fn total_mass(&self) -> f64 {
         self.bodies.iter().map(|b| b.inertia.mass).sum()
     }
-    /// Whether some joints share a coordinate.
+    /// Returns whether some joints share a coordinate.
     #[inline(always)]
     pub fn has_mimic(&self) -> bool {
         self.tree.has_mimic()
     }
 
-    /// The number of the frame with this name: a link's, else the user's, else a joint's, else a
-    /// constraint's.
+    /// Returns the index of the frame with this name. Frames are searched in the order: links, frames of the user,
+    /// joints, constraints.
     ///
     /// # Errors
     /// [`Error::UnknownFrame`], with the nearest name.
@@ -183,7 +186,7 @@ impl<R> Model<R> {
             })
     }
 
-    /// The number of the body that the joint with this name carries.
+    /// Returns the index of the body that the joint with this name carries.
     ///
     /// # Errors
     /// [`Error::UnknownJoint`], with the nearest name.
@@ -195,62 +198,62 @@ impl<R> Model<R> {
     }
 }
 
-/// The model as passes see it.
+/// Methods for the view that passes have of the model.
 #[doc(hidden)]
 impl<R> Model<R> {
-    /// The bodies as passes see them.
+    /// Returns the bodies as passes see them.
     #[inline(always)]
     pub fn nodes(&self) -> &[Node<R>] {
         &self.tree.nodes
     }
-    /// The degrees of freedom of all joints.
+    /// Returns the degrees of freedom of all joints.
     #[inline(always)]
     pub fn columns(&self) -> &[Column] {
         &self.tree.columns
     }
-    /// The columns from the root to a body's joint, its own last.
+    /// Returns the columns from the root to a body's joint, its own last.
     #[inline(always)]
     pub fn support(&self, node: &Node<R>) -> &[usize] {
         self.tree.support(node)
     }
-    /// The number of pairs of a body and a column from the root to its joint.
+    /// Returns the number of pairs of a body and a column from the root to its joint.
     #[inline(always)]
     pub fn support_len(&self) -> usize {
         self.tree.support.len()
     }
-    /// The coordinates in which efforts are needed to move one of them.
+    /// Returns, for each coordinate, the coordinates in which efforts are needed to move it.
     #[inline(always)]
     pub fn nonzero_rows(&self) -> &[NonzeroRows] {
         &self.tree.nonzero_rows
     }
-    /// The bodies that float: with a free joint in the world.
+    /// Returns the floating bodies, which have a free joint in the world.
     pub fn floating(&self) -> impl Iterator<Item = usize> {
         let floats = |&i: &usize| self.nodes()[i].parent == 0 && self.nodes()[i].joint == Joint::FreeFlyer;
         (1..self.nodes().len()).filter(floats)
     }
-    /// First coordinates of the free joints with armature along their linear coordinates: an apparent mass in the axes of the
-    /// parent.
+    /// Returns the first coordinates of the free joints with armature along their linear coordinates: an apparent mass
+    /// in the axes of the parent.
     #[inline(always)]
     pub fn free_armature(&self) -> &[usize] {
         &self.free_armature
     }
-    /// The bodies, children before parents, in the order in which their subtrees are closed.
+    /// Returns the bodies, children before parents, in the order in which their subtrees are closed.
     #[inline(always)]
     pub fn closed(&self) -> &[usize] {
         &self.tree.closed
     }
-    /// The plan by which single calls compute several bodies at once, if they do.
+    /// Returns the plan by which single calls compute several bodies at once, if they do.
     #[inline(always)]
     pub fn limbs(&self) -> Option<&Plan> {
         self.limbs.as_ref()
     }
-    /// A hash of the parents, kinds of joints and coordinates: tells trees apart.
+    /// Returns a hash of the parents, kinds of joints and coordinates, which distinguishes trees.
     #[inline(always)]
     pub fn tree_hash(&self) -> u64 {
         self.tree.hash
     }
-    /// A hash of the tree and of where its joints and frames are. Robots with other inertias, armature, gravity, limits and
-    /// names have the same one, and so has a robot that was written and read again.
+    /// Returns a hash of the tree and of the placements of its joints and frames. It does not depend on inertias,
+    /// armature, gravity, limits and names, and it is kept when a robot is written and read again.
     #[inline(always)]
     pub fn geometry_hash(&self) -> u64 {
         self.geometry
@@ -258,7 +261,7 @@ impl<R> Model<R> {
 }
 
 impl Model {
-    /// The hash of the tree and of where its joints and frames are.
+    /// Computes the hash of the tree and of the placements of its joints and frames.
     pub(crate) fn hash_geometry(&self) -> u64 {
         let pose = |X: Se3<f64>| X.rotation.columns().into_iter().chain([X.translation]).flat_map(Vec3::to_array);
         let bodies = self.bodies.iter().flat_map(|b| {
@@ -272,7 +275,7 @@ impl Model {
     }
 }
 
-/// The tree of the inertia matrix M: columns are the degrees of freedom of the joints, rows the coordinates.
+/// Tree of the inertia matrix M: columns are the degrees of freedom of the joints, rows are the coordinates.
 impl<R> ColumnTree for Model<R> {
     fn rows(&self) -> usize {
         self.nv()

@@ -1,4 +1,4 @@
-//! Names that are similar to one that is not there.
+//! Names that are similar to an unknown one.
 
 #[cfg(feature = "loaders")]
 use crate::error::near_or;
@@ -6,12 +6,12 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// How much of a name is compared (characters), and the number of pairs of characters that are compared in all: the
-/// distance takes the product of the lengths.
+/// Number of characters of a name that are compared, and maximum number of compared pairs of characters. The distance
+/// needs as many pairs as the product of the lengths.
 const COMPARED: [usize; 2] = [128, 1 << 22];
 
-/// The most similar of some names ([`distance`]), as far as so many can be compared; empty if even that one differs in more
-/// than half of its characters.
+/// Returns the most similar name by [`distance`], among the names that can be compared within the limit. The result is
+/// empty if even this name differs in more than half of its characters.
 pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
     let [length, mut left] = COMPARED;
     let begin = |name: &str| name.chars().take(length).collect::<Vec<char>>();
@@ -32,10 +32,10 @@ pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> S
     best.1.to_owned()
 }
 
-/// The optimal string alignment distance: how many characters are to be put in, left out, replaced, or swapped with their
-/// neighbours (none of them twice), so that b becomes of a.
+/// Returns the optimal string alignment distance: the number of edits that turn a into b. An edit inserts, removes or
+/// replaces a character, or swaps two neighbours; no character is edited twice.
 fn distance(a: &[char], b: &[char]) -> usize {
-    // d_ij is that of the first i of a and the first j of b; of its rows, three are needed
+    // d_ij is the distance between the first i of a and the first j of b; only three of its rows are needed
     let (mut before, mut last, mut row) = (Vec::new(), Vec::new(), (0..=b.len()).collect::<Vec<usize>>());
     for i in 1..=a.len() {
         (before, last, row) = (last, row, before);
@@ -53,7 +53,7 @@ fn distance(a: &[char], b: &[char]) -> usize {
     row[b.len()]
 }
 
-/// The end of a message about a name that is not there: the nearest one, if there is one.
+/// Returns the end of a message about an unknown name: the nearest name, if there is one.
 #[cfg(feature = "loaders")]
 pub(crate) fn near(nearest: &str) -> String {
     near_or(nearest, "")

@@ -1,4 +1,4 @@
-//! The checks of a state that comes from outside: finite numbers, and rotations of length 1.
+//! Checks of states from outside: numbers must be finite, and rotations must have length 1.
 
 use crate::error::Error;
 use crate::model::Model;
@@ -8,8 +8,8 @@ use condyle_spatial::Scalar;
 use core::fmt;
 use core::ops::Range;
 
-/// Maximum distance from 1 of the length of a quaternion or of a pair (cos, sin) in a position; chosen because 0.707 in place
-/// of √½ is off by 1.5e-4, and an estimate that was integrated in single precision by less.
+/// Maximum difference between 1 and the length of a quaternion, or of a pair (cos, sin), in a position; chosen because
+/// the error is 1.5e-4 if √½ is written as 0.707. Integration in single precision causes a smaller error.
 const UNIT_ROUNDING: f64 = 1e-3;
 
 /// Maximum [`rotation_error`](condyle_spatial::Mat3::rotation_error) of a rotation matrix that is computed from a valid
@@ -52,8 +52,8 @@ impl fmt::Display for NotFinite {
 }
 
 impl Model {
-    /// Checks that a position is one of the robot's: finite numbers, and quaternions and (cos, sin) of length 1, up to 1e-3.
-    /// Algorithms take any numbers and do not look.
+    /// Checks that a position is valid for the robot: finite numbers, and quaternions and (cos, sin) of length 1, up to
+    /// 1e-3. Algorithms accept any numbers without a check.
     ///
     /// ```
     /// use condyle_model::{neutral, robots};
@@ -80,8 +80,8 @@ impl Model {
         }
     }
 
-    /// Checks that a state is one of the robot's: a position as [`check_position`](Self::check_position) has it, and
-    /// velocities that are finite.
+    /// Checks that a state is valid for the robot: a valid position (see [`check_position`](Self::check_position)), and
+    /// finite velocities.
     ///
     /// ```
     /// use condyle_model::{neutral, robots};
@@ -112,7 +112,7 @@ impl Model {
         Err(Error::Velocity { joint, what: NotFinite("v", k, v[k]).to_string() })
     }
 
-    /// The first invalid part of a position, without memory being allocated; q has nq numbers.
+    /// Returns the first invalid part of a position, without allocating; q must have nq numbers.
     #[doc(hidden)]
     pub fn position_fault(&self, q: &[f64]) -> Option<PositionFault> {
         self.position_parts().find_map(|(body, mut range, unit)| {
@@ -122,14 +122,15 @@ impl Model {
         })
     }
 
-    /// The first quaternion or pair (cos, sin) of a position that does not have length 1; q has nq numbers.
+    /// Returns the first quaternion or pair (cos, sin) of a position that does not have length 1; q must have nq
+    /// numbers.
     #[doc(hidden)]
     pub fn rotation_fault(&self, q: &[f64]) -> Option<PositionFault> {
         self.position_parts().find_map(|(body, _, unit)| unit_fault(body, unit?, q))
     }
 
-    /// Checks that [`normalize`](crate::normalize) can bring all rotations of a position to length 1: none has length 0 or one that
-    /// is not finite, up to the range of numbers.
+    /// Checks that [`normalize`](crate::normalize) can scale all rotations of a position to length 1: every squared
+    /// length must be finite, not 0, and not subnormal.
     ///
     /// # Errors
     /// [`Error::Position`].
@@ -148,18 +149,19 @@ impl Model {
         Ok(())
     }
 
-    /// Each rotation of a position that must have length 1: the joint's name, and the range in q.
+    /// Returns each rotation of a position that must have length 1: the joint's name, and the range in q.
     #[doc(hidden)]
     pub fn rotations(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
         self.position_parts().filter_map(|(body, _, unit)| Some((self.bodies[body].joint_name.as_str(), unit?)))
     }
 
-    /// The name of the joint that moves a body.
+    /// Returns the name of the joint that moves a body.
     fn joint_of(&self, body: usize) -> String {
         self.bodies[body].joint_name.clone()
     }
 
-    /// Each joint with coordinates of its own: its body, its range in q, and the part of it that has length 1.
+    /// Returns each joint with its own coordinates: its body, its range in q, and the part of the range that must have
+    /// length 1.
     fn position_parts(&self) -> impl Iterator<Item = (usize, Range<usize>, Option<Range<usize>>)> {
         let own = self.bodies.iter().enumerate().skip(1).filter(|(_, body)| body.mimic.is_none());
         own.map(|(i, body)| {
@@ -169,11 +171,11 @@ impl Model {
     }
 }
 
-/// The fault of a rotation in a range of q, if it does not have length 1.
+/// Returns the fault of a rotation in a range of q; `None` if it has length 1.
 #[doc(hidden)]
 pub fn unit_fault(body: usize, unit: Range<usize>, q: &[f64]) -> Option<PositionFault> {
     let value = Scalar::sqrt(q[unit.clone()].iter().map(|x| x * x).sum::<f64>());
-    // a NaN is a fault too
+    // a NaN is a fault, too
     let valid = (value - 1.0).abs() <= UNIT_ROUNDING;
     (!valid).then_some(PositionFault { body, first: unit.start, end: unit.end, value })
 }

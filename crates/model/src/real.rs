@@ -1,12 +1,12 @@
-//! The plain numbers in scalars of any type, by which a model of dual numbers is checked as one of plain numbers is.
+//! Real parts of scalars of any type, so that a model of dual numbers is checked like a model of plain numbers.
 
 use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 use core::any::Any;
 
-/// The real part of a scalar of one lane.
+/// Returns the real part of a scalar with one lane.
 ///
-/// Scalars can only be compared with others: of the numbers that it is not below, the real part is the largest, found by
-/// bisection of their bits, which are ordered as the numbers are.
+/// Scalars can only be compared. The real part is the largest number y for which x < y is false. It is found by
+/// bisection of the bits of numbers, which have the same order as the numbers.
 fn real<S: Scalar>(x: S) -> f64 {
     if let Some(&x) = (&x as &dyn Any).downcast_ref::<f64>() {
         return x;
@@ -22,26 +22,26 @@ fn real<S: Scalar>(x: S) -> f64 {
         *if is_below(number(middle)) { &mut beyond } else { &mut least } = middle;
     }
     let (double, single) = (number(least), f64::from(number(least) as f32));
-    if equals(single) { single } else { double } // many doubles are equal to one single
+    if equals(single) { single } else { double } // many doubles compare as equal to the same single
 }
 
-/// The place of a number among all numbers in order.
+/// Returns the rank of a number in the order of all numbers.
 fn place(x: f64) -> u64 {
     let bits = x.to_bits();
     if x.is_sign_negative() { !bits } else { bits | 1 << 63 }
 }
 
-/// The number at a place.
+/// Returns the number with a rank.
 fn number(bits: u64) -> f64 {
     f64::from_bits(if bits >> 63 == 0 { !bits } else { bits & !(1 << 63) })
 }
 
-/// The real parts of a vector.
+/// Returns the real parts of a vector.
 pub(crate) fn real_vector<S: Scalar>(x: Vec3<S>) -> Vec3<f64> {
     Vec3::from(x.to_array().map(real))
 }
 
-/// The real parts of an inertia.
+/// Returns the real parts of an inertia.
 pub(crate) fn real_inertia<S: Scalar>(I: Inertia<S>) -> Inertia<f64> {
     let Sym3 { xx, xy, yy, xz, yz, zz } = I.rotational;
     let [xx, xy, yy, xz, yz, zz] = [xx, xy, yy, xz, yz, zz].map(real);

@@ -1,4 +1,4 @@
-//! The tree of bodies as passes see it: turned frames, columns, ancestors.
+//! Tree of bodies as passes see it: turned frames, columns, ancestors.
 //!
 //! A *column* is a degree of freedom of a joint; a *coordinate* is an entry of v. Joints that mimic others share a
 //! coordinate, so several columns may have the same one.
@@ -12,87 +12,87 @@ use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use core::iter::successors;
 use core::ops::Range;
 
-/// A body as passes see it: its joint's axis is turned to z, and all that a pass needs stands side by side.
+/// A body as passes see it: its joint's axis is turned to z, and all data that a pass needs are stored together.
 #[derive(Clone, Debug)]
 pub struct Node<R> {
-    /// The kind of the joint, as which it is computed.
+    /// Kind of joint by which the body is computed.
     pub joint: Joint,
-    /// The parent's number.
+    /// Index of the parent.
     pub parent: usize,
-    /// The place in q at which the joint's position begins.
+    /// Index in q of the joint's first coordinate.
     pub idx_q: usize,
-    /// The place in v at which the joint's velocity begins.
+    /// Index in v of the joint's first degree of freedom.
     pub idx_v: usize,
-    /// The way in which the joint follows another one, if it does.
+    /// Relation to the leading joint, if the joint follows another one.
     pub mimic: Option<Mimic>,
-    /// The number of the joint's first column.
+    /// Index of the joint's first column.
     pub column: usize,
-    /// The place in `Tree::support` at which the columns from the root to this joint begin.
+    /// Index in `Tree::support` of the first column from the root to this joint.
     pub support: usize,
-    /// The number of columns from the root to this joint, its own included.
+    /// Number of columns from the root to this joint, including its own.
     pub depth: usize,
-    /// The number of bodies between it and the world, itself included.
+    /// Depth of the body: the number of bodies on the path from the world to it, itself included.
     pub level: usize,
-    /// The places in `Tree::closed`, from and to, of the bodies whose subtrees end with this body.
+    /// Range (first, end) in `Tree::closed` of the bodies whose subtrees end with this body.
     pub closed: (usize, usize),
     /// X_T, between turned frames.
     pub placement: Se3<R>,
-    /// The inertia in the turned frame.
+    /// Inertia in the turned frame.
     pub inertia: Inertia<R>,
-    /// bRz: the turned frame in the body's.
+    /// bRz: the turned frame in the body's frame.
     pub axis_rotation: Mat3<f64>,
 }
 
-/// A degree of freedom of a joint, and the coordinate that it follows.
+/// A degree of freedom of a joint, and the coordinate to which it belongs.
 #[derive(Clone, Debug)]
 pub struct Column {
-    /// The coordinate's number.
+    /// Index of the coordinate.
     pub coordinate: usize,
-    /// The joint's velocity divided by the coordinate's.
+    /// Ratio of the joint's velocity to the coordinate's velocity.
     pub ratio: f64,
-    /// The column before it on the way to the root.
+    /// Next column on the path to the root.
     pub parent: Option<usize>,
-    /// The column after the last of its subtree.
+    /// Index after the last column of its subtree.
     pub end: usize,
-    /// The number of columns between it and the root.
+    /// Number of columns between it and the root.
     pub depth: usize,
 }
 
 condyle_spatial::alike!(Column);
 
-/// Coordinates of one joint, or of several joints side by side whose coordinates are vectors.
+/// Coordinates of one joint, or of several consecutive joints whose positions are vectors.
 #[derive(Clone, Debug)]
 pub(crate) struct Space {
-    /// One of the joints.
+    /// Joint of these coordinates, or one of several.
     pub joint: Joint,
     pub q: Range<usize>,
     pub v: Range<usize>,
 }
 
-/// A robot's bodies and joints, as passes need them.
+/// Bodies and joints of a robot, as passes need them.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree<R> {
     pub nq: usize,
     pub nv: usize,
-    /// Shape: bodies, the world included.
+    /// Bodies. Shape: bodies, including the world.
     pub nodes: Vec<Node<R>>,
     pub columns: Vec<Column>,
-    /// The columns from the root to the joint of one body, then of the next, and so on.
+    /// Columns from the root to the joint of each body, body by body.
     pub support: Vec<usize>,
-    /// The bodies, children before parents.
+    /// Bodies, children before parents.
     pub closed: Vec<usize>,
-    /// The joints that turn about z.
+    /// Joints that turn about z.
     pub turns: Turns,
-    /// The coordinates in which efforts are needed to move one of them: those before and after it in the tree, and itself.
-    /// Shape: nv.
+    /// For each coordinate, the coordinates in which efforts are needed to move it: its ancestors and descendants in
+    /// the tree, and itself. Shape: nv.
     pub nonzero_rows: Vec<NonzeroRows>,
-    /// All coordinates, in order, in as few spaces as they make.
+    /// Spaces of all coordinates, in order; consecutive vector spaces are merged.
     pub spaces: Vec<Space>,
-    /// A hash of the parents, joints and coordinates: tells trees apart.
+    /// Hash of the parents, joints and coordinates, which distinguishes trees.
     pub hash: u64,
 }
 
-/// A hash of some numbers: Fowler, Noll, Vo (1991), FNV-1a, with words in place of bytes.
+/// Returns a hash of numbers: Fowler, Noll, Vo (1991), FNV-1a, with words instead of bytes.
 pub(crate) fn hash(words: impl Iterator<Item = u64>) -> u64 {
     words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
         let hash = (hash ^ word).wrapping_mul(0x100_0000_01b3);
@@ -101,7 +101,7 @@ pub(crate) fn hash(words: impl Iterator<Item = u64>) -> u64 {
 }
 
 impl Tree<f64> {
-    /// The tree of some bodies, depth first, whose coordinates are numbered.
+    /// Creates the tree of bodies in depth-first order, whose coordinates are already numbered.
     pub(crate) fn new(bodies: &[Body], nq: usize, nv: usize) -> Self {
         let mut tree = Self {
             nq,
@@ -128,7 +128,7 @@ impl Tree<f64> {
     }
 
     fn add_nodes(&mut self, bodies: &[Body]) {
-        let mut last_column: Vec<Option<usize>> = Vec::new(); // of each body or, failing one, of its ancestors
+        let mut last_column: Vec<Option<usize>> = Vec::new(); // of each body, or of its nearest ancestor with a column
         for (i, body) in bodies.iter().enumerate() {
             let axis_rotation = body.joint.axis_rotation();
             let bXz = Se3::new(axis_rotation, Vec3::zero());
@@ -175,7 +175,7 @@ impl Tree<f64> {
             });
             self.support.extend(path);
         }
-        // depth first, so a subtree's columns end where its last descendant's do
+        // in depth-first order, a subtree's columns end where the columns of its last descendant end
         for c in (0..self.columns.len()).rev() {
             self.columns[c].end = self.columns[c].end.max(c + 1);
             if let Some(p) = self.columns[c].parent {
@@ -184,8 +184,8 @@ impl Tree<f64> {
         }
     }
 
-    /// Depth first, a body after which no child stands closes its own subtree, and those of all ancestors of which it is
-    /// the last.
+    /// Finds the bodies whose subtrees end with each body. In depth-first order, a body without children closes its own
+    /// subtree, and the subtrees of all ancestors of which it is the last descendant.
     fn close_subtrees(&mut self) {
         let mut open = Vec::new();
         for i in 1..self.nodes.len() {
@@ -204,7 +204,7 @@ impl Tree<f64> {
             rows.extend(c + 1..self.columns[c].end);
             rows
         };
-        let all = || (0..self.nv).collect(); // joints that follow tie branches together
+        let all = || (0..self.nv).collect(); // followers connect branches
         let rows = (0..self.nv).map(|c| if self.has_mimic() { all() } else { related(c) });
         self.nonzero_rows = NonzeroRows::of_columns(rows.collect());
     }
@@ -227,30 +227,31 @@ impl Tree<f64> {
 }
 
 impl<R> Tree<R> {
-    /// First coordinates of the free joints.
+    /// Returns the first coordinates of the free joints.
     pub(crate) fn free_joints(&self) -> impl Iterator<Item = usize> {
         self.nodes[1..].iter().filter(|node| node.joint == Joint::FreeFlyer).map(|node| node.idx_v)
     }
 
-    /// Whether some joints share a coordinate.
+    /// Returns whether some joints share a coordinate.
     #[inline(always)]
     pub(crate) fn has_mimic(&self) -> bool {
         self.columns.len() != self.nv
     }
 
-    /// The columns from the root to a body's joint, its own last.
+    /// Returns the columns from the root to a body's joint, its own last.
     #[inline(always)]
     pub(crate) fn support(&self, node: &Node<R>) -> &[usize] {
         &self.support[node.support..node.support + node.depth]
     }
 
-    /// The joints that have coordinates of their own, with where these stand in q and in v.
+    /// Returns the joints that have their own coordinates, with their ranges in q and in v.
     pub(crate) fn coordinates(&self) -> impl Iterator<Item = (Joint, Range<usize>, Range<usize>)> + '_ {
         let own = self.nodes.iter().skip(1).filter(|n| n.mimic.is_none());
         own.map(|n| (n.joint, n.idx_q..n.idx_q + n.joint.nq(), n.idx_v..n.idx_v + n.joint.nv()))
     }
 
-    /// The same tree with constants of another type, given by functions of the placements and of (body, inertia).
+    /// Returns the same tree with constants of another type; one function converts placements, another returns the
+    /// inertia of a body.
     pub(crate) fn map<T>(
         &self,
         lift: impl Fn(Se3<R>) -> Se3<T>,

@@ -1,5 +1,5 @@
-//! The validation of a model, by whatever way it is made: numbers that none can have are errors; inertias that no body has
-//! and degrees of freedom along which M is singular are warnings.
+//! Validation of every model, however it is created. Invalid numbers are errors. Physically impossible inertias, and
+//! degrees of freedom along which M is singular, are warnings.
 
 use crate::body::{Body, Frame, JointOptions, Limits};
 use crate::configuration::random_configuration;
@@ -15,19 +15,19 @@ use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3, Sym3};
 use nalgebra::{DMatrix, Matrix3};
 use rand::{SeedableRng, rngs::StdRng};
 
-/// Rounding in a body's moments of inertia, as files have them: six digits.
+/// Relative rounding of a body's moments of inertia in files, which have six digits.
 const MOMENT_ROUNDING: f64 = 1e-6;
-/// A pivot that is smaller than this share of the products it is a sum of is rounding, and none.
+/// Pivots below this fraction of the sum of their products are rounding errors and count as 0.
 const PIVOT_ROUNDING: f64 = 1e-13;
-/// A pivot that is smaller than this is none (kg m², kg): its reciprocal may be no number.
+/// Minimum pivot (kg m², kg); the reciprocal of a smaller one may overflow.
 const LEAST_PIVOT: f64 = 1e-200;
-/// Positions at which M is looked at. A joint is called singular if it is so at all of them.
+/// Number of random positions at which M is tested. A joint is singular if it is singular at all of them.
 const SAMPLES: usize = 3;
-/// Greatest radius of gyration that a body may have without a warning (m). The largest ships and cranes have less; of public
-/// robots, those beyond have a wrong unit.
+/// Maximum radius of gyration of a body without a warning (m). The largest ships and cranes have less; public robots
+/// with more have a wrong unit.
 const LARGEST_RADIUS: f64 = 100.0;
 
-/// Says what is wrong with a body's inertia or placement.
+/// Checks a body's inertia and placement.
 pub(crate) fn check_body(Body { name, inertia: I, placement, .. }: &Body) -> Result<(), Error> {
     let wrong = |what: String| Err(Error::Body { body: name.clone(), what });
     if !(I.mass >= 0.0 && I.mass.is_finite()) {
@@ -40,7 +40,7 @@ pub(crate) fn check_body(Body { name, inertia: I, placement, .. }: &Body) -> Res
     check_placement(placement).or_else(wrong)
 }
 
-/// Says what is wrong with a frame's placement.
+/// Checks a frame's placement.
 pub(crate) fn check_frame(Frame { name, placement, .. }: &Frame) -> Result<(), Error> {
     check_placement(placement).map_err(|what| Error::Frame { frame: name.clone(), what })
 }
@@ -57,7 +57,7 @@ fn check_placement(X: &Se3<f64>) -> Result<(), String> {
 }
 
 impl JointOptions {
-    /// Says what is wrong with the numbers of a joint.
+    /// Checks the numbers of a joint.
     pub(crate) fn check(&self, joint: &str) -> Result<(), Error> {
         let wrong = |what: String| Err(Error::Joint { joint: joint.to_owned(), what });
         for (name, limits) in [("", self.position), (" of effort", self.effort)] {
@@ -85,7 +85,7 @@ impl JointOptions {
     }
 }
 
-/// Says what is odd about a body's inertia. The bodies between the joints of a chain have no mass on purpose.
+/// Adds warnings about a body's inertia. Intermediate bodies of a chain have no mass on purpose.
 fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     let (I, name) = (body.inertia, || body.name.clone());
     if I == Inertia::zero() {
@@ -117,7 +117,8 @@ fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Says with which limits a joint of one degree of freedom cannot work. A joint that follows has none of its own.
+/// Adds warnings about limits with which a joint of one degree of freedom cannot work. A follower does not have its own
+/// limits.
 fn check_limits(body: &Body, limits: &Limits, warnings: &mut Vec<Warning>) {
     if body.mimic.is_some() || body.joint.nv() != 1 {
         return;
@@ -136,7 +137,8 @@ fn check_limits(body: &Body, limits: &Limits, warnings: &mut Vec<Warning>) {
 }
 
 impl Model {
-    /// Checks all numbers of the model, and finds anew what is odd about it: the end of every way to make a model.
+    /// Checks all numbers of the model, and recomputes its warnings. Every function that creates a model ends with this
+    /// check.
     ///
     /// # Errors
     /// [`Error::Body`], [`Error::Frame`], [`Error::Joint`] and [`Error::Gravity`].
@@ -168,7 +170,7 @@ impl Model {
         Ok(())
     }
 
-    /// What a joint has of its own at these places of q and v.
+    /// Returns the options of a joint at index q of positions and index v of velocities.
     pub(crate) fn joint_options(&self, q: usize, v: usize) -> JointOptions {
         JointOptions {
             position: Some((self.limits.lower[q], self.limits.upper[q])),
@@ -181,7 +183,7 @@ impl Model {
         }
     }
 
-    /// Finds the joints along which M is singular, wherever the robot is.
+    /// Finds the joints along which M is singular at all positions.
     fn find_singular(&mut self) {
         let mut always = vec![true; self.bodies.len()];
         let mut rng = StdRng::seed_from_u64(0);
@@ -195,7 +197,7 @@ impl Model {
         self.singular = (1..self.bodies.len()).filter(|&i| always[i]).collect();
     }
 
-    /// The pivots D = Sᵀ Iᴬ S of the articulated bodies; a joint without one is passed over.
+    /// Finds singular joints by the pivots D = Sᵀ Iᴬ S of the articulated bodies; joints with pivot 0 are skipped.
     fn singular_by_bodies(&self, Placed { oX, S }: &Placed) -> Vec<bool> {
         let l = Single::<f64, f64>::new(self);
         let mut singular = vec![false; self.bodies.len()];
@@ -218,7 +220,7 @@ impl Model {
         singular
     }
 
-    /// The pivots of M, of robots whose joints share coordinates.
+    /// Finds singular joints by the pivots of M, for robots whose joints share coordinates.
     fn singular_by_matrix(&self, placed: &Placed) -> Vec<bool> {
         let mut M = self.inertia_matrix(placed);
         let diagonal = M.diagonal();
@@ -241,11 +243,11 @@ impl Model {
     }
 }
 
-/// The bodies and the columns of S in the world's frame, at one position.
+/// Poses of the bodies and columns of S in the world's frame, at one position.
 struct Placed {
-    /// oXi. Shape: bodies.
+    /// Poses oXi. Shape: bodies.
     oX: Vec<Se3<f64>>,
-    /// Shape: columns.
+    /// Columns of S. Shape: columns.
     S: Vec<Motion<f64>>,
 }
 
@@ -262,7 +264,8 @@ impl Placed {
 }
 
 impl Model {
-    /// Finds the free joints with armature along their linear coordinates: a mass in the axes of the parent, so one number.
+    /// Finds the free joints with armature along their linear coordinates. There, armature is a mass in the axes of the
+    /// parent, so its three numbers must be equal.
     fn find_free_armature(&mut self) -> Result<(), Error> {
         self.free_armature.clear();
         for body in self.bodies[1..].iter().filter(|body| body.joint == Joint::FreeFlyer) {
@@ -281,7 +284,7 @@ impl Model {
         Ok(())
     }
 
-    /// M, by composite rigid bodies: Featherstone (2008), table 6.2, in the world's frame.
+    /// Computes M by composite rigid bodies: Featherstone (2008), table 6.2, in the world's frame.
     fn inertia_matrix(&self, Placed { oX, S }: &Placed) -> DMatrix<f64> {
         let l = Single::<f64, f64>::new(self);
         let mut M = DMatrix::zeros(self.tree.nv, self.tree.nv);
@@ -307,18 +310,18 @@ impl Model {
 }
 
 impl<R> Model<R> {
-    /// Warnings about the robot, which is odd though it could be built.
+    /// Returns warnings about unusual properties of the robot.
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 
-    /// The bodies whose joints make M singular: nothing that they carry has inertia along them. Forward dynamics and
-    /// M⁻¹ refuse such a robot; armature on these joints cures it.
+    /// Returns the bodies whose joints make M singular, because nothing that they carry has inertia along them. Forward
+    /// dynamics and M⁻¹ refuse such a robot; armature on these joints solves the problem.
     pub fn singular_joints(&self) -> &[usize] {
         &self.singular
     }
 
-    /// Panics, with the joint's name, where M has no inverse.
+    /// Panics with the joint's name if M has no inverse.
     #[doc(hidden)]
     #[inline]
     #[track_caller]
@@ -329,7 +332,7 @@ impl<R> Model<R> {
     }
 }
 
-/// The panic of [`Model::check_regular`].
+/// Panics for [`Model::check_regular`].
 #[cold]
 #[inline(never)]
 #[track_caller]

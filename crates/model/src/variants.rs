@@ -1,4 +1,4 @@
-//! The same robot with something changed.
+//! Copies of a robot with a change.
 
 use crate::body::Limits;
 use crate::error::Error;
@@ -11,14 +11,14 @@ use condyle_linalg::check;
 use condyle_spatial::{Act, Constant, Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
 use core::any::Any;
 
-/// A few roundings of numbers about 1.
+/// Threshold of rounding errors: a few units in the last place of 1.
 const RESIDUE: f64 = 1e-15;
 
 impl<R: Scalar> Model<R> {
-    /// The same robot under another gravity (m/s², in the world's frame).
+    /// Returns the same robot under another gravity (m/s², in the world's frame).
     ///
     /// # Errors
-    /// [`Error::Gravity`] if it is not finite; of several lanes this is not looked at.
+    /// [`Error::Gravity`] if it is not finite; a gravity with several lanes is not checked.
     pub fn with_gravity(mut self, gravity: Vec3<R>) -> Result<Self, Error> {
         if R::LANES == 1 {
             check_gravity(real_vector(gravity))?;
@@ -27,11 +27,11 @@ impl<R: Scalar> Model<R> {
         Ok(self)
     }
 
-    /// The same robot with an armature of the type of its constants, which is not looked at: what records code makes it an
-    /// argument.
+    /// Returns the same robot with an armature that has the type of its constants. The armature is not checked, because
+    /// code generation makes it an argument.
     ///
     /// # Panics
-    /// If `armature` has not nv numbers.
+    /// If `armature` does not have nv numbers.
     #[doc(hidden)]
     #[track_caller]
     pub fn with_scalar_armature(mut self, armature: &[R]) -> Self {
@@ -43,16 +43,18 @@ impl<R: Scalar> Model<R> {
 }
 
 impl Model {
-    /// The same robot with another armature, one number for each degree of freedom (kg m², kg).
+    /// Returns the same robot with another armature, one number for each degree of freedom (kg m², kg).
     ///
-    /// Armature adds armature · q̈ to the efforts. Along the linear coordinates of a free joint it is an apparent mass without
-    /// weight: it resists the acceleration v̇ + ω × v of the body's origin in the axes of the joint's parent, as in MuJoCo.
+    /// Armature adds armature · q̈ to the efforts. Along the linear coordinates of a free joint, it is an apparent mass
+    /// without weight, as in MuJoCo. It resists the acceleration v̇ + ω × v of the body's origin, in the axes of the
+    /// joint's parent.
     ///
     /// # Errors
-    /// [`Error::Joint`] if one is negative or not finite, or if the three along the linear coordinates of a free joint differ.
+    /// [`Error::Joint`] if a number is negative or not finite, or if the three numbers along the linear coordinates of
+    /// a free joint differ.
     ///
     /// # Panics
-    /// If `armature` has not nv numbers.
+    /// If `armature` does not have nv numbers.
     #[track_caller]
     pub fn with_armature(mut self, armature: &[f64]) -> Result<Self, Error> {
         check("armature", armature.len(), self.nv());
@@ -61,7 +63,7 @@ impl Model {
         Ok(self)
     }
 
-    /// The same robot with other limits of position, velocity and effort.
+    /// Returns the same robot with other limits of position, velocity and effort.
     ///
     /// ```
     /// let arm = condyle_model::robots::arm7();
@@ -72,8 +74,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Length`] if there are not as many as coordinates, nq of position and nv of the others; [`Error::Joint`] if a
-    /// lower limit is above an upper one, or one of velocity is negative.
+    /// [`Error::Length`] if the number of limits is not nq for positions, or not nv for the others; [`Error::Joint`] if
+    /// a lower limit is above an upper one, or a limit of velocity is negative.
     pub fn with_limits(mut self, limits: Limits) -> Result<Self, Error> {
         for (name, found, expected) in [
             ("limits.lower", limits.lower.len(), self.nq()),
@@ -91,12 +93,12 @@ impl Model {
         Ok(self)
     }
 
-    /// The same robot with constants of another type, its inertias given by a function of (body, inertia).
+    /// Returns the same robot with constants of another type; a function of (body, inertia) returns its inertias.
     ///
-    /// With dual numbers, every algorithm then gives derivatives with respect to inertial parameters.
-    /// [`Body::inertia`](crate::Body::inertia) has their real parts, by which the robot is checked:
-    /// [`warnings`](Self::warnings) and [`singular_joints`](Self::singular_joints) are those of the new inertias. Inertias of
-    /// several lanes are not looked at: the model keeps what was found of the plain ones.
+    /// With dual numbers, every algorithm then computes derivatives with respect to inertial parameters.
+    /// [`Body::inertia`](crate::Body::inertia) contains their real parts, which are checked.
+    /// [`warnings`](Self::warnings) and [`singular_joints`](Self::singular_joints) refer to the new inertias. Inertias
+    /// with several lanes are not checked: the model keeps the results for the plain inertias.
     ///
     /// ```
     /// use condyle_model::{Inertia, robots};
@@ -157,8 +159,8 @@ impl Model {
         Ok(model)
     }
 
-    /// The same robot with zeros, ones and minus ones in its poses, and zeros in its inertias, where rounding has left numbers
-    /// next to them: what a right angle leaves would be computed with in code that is generated.
+    /// Returns the same robot without rounding errors next to 0, 1 and −1 in its poses, and next to 0 in its inertias.
+    /// Generated code would otherwise compute with the residues of right angles.
     #[doc(hidden)]
     #[must_use]
     pub fn without_residues(mut self) -> Self {
@@ -183,12 +185,13 @@ impl Model {
         self
     }
 
-    /// The same robot, with its limbs side by side in single calls or one body after the other.
+    /// Returns the same robot; single calls process its limbs in parallel lanes, or one body after the other.
     ///
-    /// Where it has limbs enough (four legs, two legs and two arms, fingers), `rnea`, `aba`, `crba`, `minv`, the derivatives
-    /// of the first two and `constrained_dynamics` compute four bodies of one state at a time if the processor has AVX2 or
-    /// NEON, two to three times as fast. A `Batch` never does, since its lanes hold states. The two ways add up in
-    /// different orders, so their results differ in the last digits; without limbs a single call gives the bits of a batch.
+    /// With enough limbs (four legs, two legs and two arms, fingers), single calls of some functions process four
+    /// bodies of one state at a time, if the processor has AVX2 or NEON. These functions are `rnea`, `aba`, `crba`,
+    /// `minv`, the derivatives of the first two, and `constrained_dynamics`; they are two to three times as fast. A
+    /// `Batch` never does so, because its lanes contain states. The two modes sum in different orders, so their results
+    /// differ in the last digits. Without limbs, a single call returns the same bits as a batch.
     ///
     /// ```
     /// let quadruped = condyle_model::robots::quadruped();

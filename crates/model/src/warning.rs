@@ -1,4 +1,4 @@
-//! Warnings about a robot: legal, but odd, left out or assumed.
+//! Warnings about a robot: valid but unusual, left out, or assumed.
 
 use crate::error::near_or;
 use crate::names::nearest;
@@ -6,7 +6,7 @@ use alloc::string::String;
 use core::fmt;
 use core::str::FromStr;
 
-/// Fact about a model or its file that a user should know. Loaders collect warnings, or refuse the model when they are strict.
+/// Fact about a model or its file that a user should know. Loaders collect warnings; strict loaders refuse the model.
 ///
 /// ```
 /// use condyle_model::{Model, SdfOptions, WarningKind};
@@ -23,7 +23,7 @@ use core::str::FromStr;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum Warning {
-    /// A body that moves has neither mass nor inertia.
+    /// A moving body has neither mass nor inertia.
     Massless {
         /// Name of the body.
         body: String,
@@ -32,29 +32,29 @@ pub enum Warning {
     Negative {
         /// Name of the body.
         body: String,
-        /// Least moment (kg m²).
+        /// Smallest moment (kg m²).
         moment: f64,
     },
-    /// One principal moment is larger than the sum of the others: no distribution of mass has such an inertia.
+    /// One principal moment is larger than the sum of the others: no mass distribution has such an inertia.
     Triangle {
         /// Name of the body.
         body: String,
-        /// Principal moments (kg m²), least first.
+        /// Principal moments (kg m²), smallest first.
         moments: [f64; 3],
     },
-    /// Nothing resists a joint: M is singular, and forward dynamics has no answer.
+    /// A joint moves nothing with inertia: M is singular, and forward dynamics has no solution.
     Singular {
         /// Name of the joint.
         joint: String,
     },
-    /// A body's inertia is possible, but cannot be meant.
+    /// A body's inertia is possible but implausible.
     Unlikely {
         /// Name of the body.
         body: String,
         /// Fault, with the numbers.
         what: String,
     },
-    /// Limits of a joint are possible, but the joint cannot work with them.
+    /// The limits of a joint are possible, but the joint cannot work with them.
     Limit {
         /// Name of the joint.
         joint: String,
@@ -67,25 +67,25 @@ pub enum Warning {
         place: Place,
         /// Element, for example ``joint `elbow` ``.
         element: String,
-        /// Name that is unknown, and the nearest known one.
+        /// Unknown name, and the nearest known one.
         what: String,
     },
-    /// A model cannot hold something that a file says.
+    /// A model cannot represent a feature of the file.
     LeftOut {
         /// Position in the file.
         place: Place,
         /// Element, for example ``joint `loop` ``.
         element: String,
-        /// Thing that is left out, and what becomes different.
+        /// Feature that is left out, and the effect of its absence.
         what: String,
     },
-    /// A file does not say something; a default is taken.
+    /// A value is missing in the file, and a default is used.
     Assumed {
         /// Position in the file.
         place: Place,
         /// Element, for example ``link `base` ``.
         element: String,
-        /// Thing that is missing, and its default.
+        /// Missing value, and its default.
         what: String,
     },
     /// A joint that could follow another one is left free.
@@ -94,7 +94,7 @@ pub enum Warning {
         place: Place,
         /// Element, for example ``joint `finger` ``.
         element: String,
-        /// Joint that it would follow.
+        /// Message that names the joint that it would follow.
         what: String,
     },
 }
@@ -103,7 +103,7 @@ pub enum Warning {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Place {
-    /// Path, or `<string>`; of the included file, where it is in one.
+    /// Path of the file, or `<string>`; the included file if the element is in one.
     pub file: String,
     /// Line, counted from 1.
     pub line: u32,
@@ -115,7 +115,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// Kind of a [`Warning`], by which a strict reader may allow it: `"left_out".parse()` gives one.
+/// Kind of a [`Warning`]; a strict reader can allow some kinds. Names can be parsed: `"left_out".parse()`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[allow(missing_docs)]
 #[non_exhaustive]
@@ -147,8 +147,8 @@ impl WarningKind {
         Self::Mimic,
     ];
 
-    /// Returns the kind's name: `massless`, `negative`, `triangle`, `singular`, `unlikely`, `limit`, `unknown`, `left_out`,
-    /// `assumed` or `mimic`.
+    /// Returns the kind's name: `massless`, `negative`, `triangle`, `singular`, `unlikely`, `limit`, `unknown`,
+    /// `left_out`, `assumed` or `mimic`.
     pub fn name(self) -> &'static str {
         let names = [
             "massless", "negative", "triangle", "singular", "unlikely", "limit", "unknown", "left_out", "assumed",
@@ -205,7 +205,7 @@ impl Warning {
         }
     }
 
-    /// Returns the name of the body or joint, or the element, that the warning is about.
+    /// Returns the subject of the warning: the name of the body or joint, or the element.
     pub fn subject(&self) -> &str {
         match self {
             Self::Massless { body }

@@ -1,4 +1,4 @@
-//! The same robot with one more frame.
+//! Copies of a robot with an additional frame.
 
 use crate::body::{Frame, FrameKind, FrameParent};
 use crate::error::Error;
@@ -9,11 +9,11 @@ use alloc::string::String;
 use condyle_spatial::Se3;
 
 impl Model {
-    /// The same robot with one more frame of the user's, the last one of [`frames`](Self::frames).
+    /// Returns the same robot with an additional frame of the user, the last one of [`frames`](Self::frames).
     ///
-    /// parent: the body or frame on which it is put, or a name; placement: pXf, the new frame in the parent's frame. All
-    /// numbers of bodies, frames and coordinates stay as they are, so scratch made for this robot fits the new one; what
-    /// is planned from frames, as a constraint set, does not.
+    /// `parent` is the body or frame to which the new frame is attached, or its name. `placement` is pXf, the new frame
+    /// in the parent's frame. All indices of bodies, frames and coordinates are kept, so scratch memory for this robot
+    /// fits the new one. Objects that are planned from frames, such as a constraint set, do not fit.
     ///
     /// ```
     /// use condyle_model::{FrameParent, Se3, Vec3, robots};
@@ -25,9 +25,9 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// [`Error::UnknownFrame`] if the parent is a name that neither a frame nor a body has; [`Error::Frame`] if the parent's
-    /// index is too large, the name is empty, or the placement is no rotation and translation, or is not finite;
-    /// [`Error::Duplicate`] if a frame has this name already: [`frame`](Self::frame) would not find the new one.
+    /// [`Error::UnknownFrame`] if the parent is a name that neither a frame nor a body has. [`Error::Frame`] if the
+    /// parent's index is too large, the name is empty, or the placement is invalid or not finite. [`Error::Duplicate`]
+    /// if a frame already has this name, because [`frame`](Self::frame) would not find the new one.
     pub fn with_frame<'a>(
         &self,
         name: &str,
@@ -52,7 +52,7 @@ impl Model {
         Ok(model)
     }
 
-    /// The body of a parent, and the parent's frame in the body's.
+    /// Returns the body of a parent, and the parent's frame in the body's frame.
     fn frame_parent(
         &self,
         parent: FrameParent<'_>,

@@ -1,11 +1,11 @@
-//! Models made from models, and their named positions.
+//! Models made from models, and named positions.
 
 use condyle_model::{Error, FrameKind, Joint, Mimic, Model, ModelBuilder, Se3, Vec3, WORLD, robots};
 use condyle_model::{Inertia, Sym3};
 
 const SRDF: &str = include_str!("../../dynamics/tests/data/quadruped.srdf");
 
-/// The text with one thing replaced.
+/// Returns the text with one replacement.
 fn with(what: &str, by: &str) -> String {
     assert_eq!(SRDF.matches(what).count(), 1, "{what}");
     SRDF.replace(what, by)
@@ -17,7 +17,7 @@ fn refused(text: &str, strict: bool, message: &str) {
     assert_eq!(said, message);
 }
 
-/// Models and builders are values that threads can share.
+/// Models and builders can be cloned and shared between threads.
 #[test]
 fn models_and_builders_are_values() {
     fn value<T: Clone + Send + Sync + std::fmt::Debug + 'static>(_: &T) {}
@@ -47,7 +47,7 @@ fn positions_have_names() {
     assert_eq!(positions[0].1, standing);
 }
 
-/// Names that are unknown have no effect, or are errors of a strict reader.
+/// Unknown names have no effect, or are errors of a strict reader.
 #[test]
 fn positions_with_unknown_names() {
     let text = |state: &str| format!("<robot name='r'><disable_collisions link1='a'/>\n{state}</robot>");
@@ -80,7 +80,7 @@ fn positions_of_a_robot_with_fewer_joints() {
 }
 
 #[test]
-fn a_turn_without_limits_is_an_angle_or_its_cosine_and_sine() {
+fn a_continuous_joint_has_an_angle_or_its_cosine_and_sine() {
     let mut builder = ModelBuilder::new("wheel");
     let joint = Joint::Continuous { axis: Vec3::new(0.0, 0.0, 1.0) };
     builder.body("turn", WORLD, joint, Se3::identity(), Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(1.0)));
@@ -98,7 +98,7 @@ fn a_turn_without_limits_is_an_angle_or_its_cosine_and_sine() {
 }
 
 #[test]
-fn what_is_wrong_with_positions() {
+fn invalid_positions() {
     let value = r#"name="LF_HFE" value="0.7""#;
     let line = "<string>:9: joint `LF_HFE`";
     refused(&with(value, r#"name="LF_HFE""#), false, &format!("{line}: has no value"));
@@ -121,7 +121,7 @@ fn what_is_wrong_with_positions() {
 }
 
 #[test]
-fn an_appended_robot_is_numbered_behind_what_its_body_has_carried() {
+fn an_appended_robot_is_numbered_after_earlier_children() {
     let (quadruped, arm) = (robots::quadruped(), robots::arm7());
     let trunk = &quadruped.frames()[quadruped.frame("trunk").unwrap()];
     let at = Se3 { translation: Vec3::new(0.2, 0.0, 0.1), ..Se3::identity() };
@@ -138,7 +138,7 @@ fn an_appended_robot_is_numbered_behind_what_its_body_has_carried() {
     let knee = quadruped.joint("LF_KFE").unwrap();
     let on_the_knee = quadruped.append(knee, at, &arm, "arm_").unwrap();
     assert_eq!(on_the_knee.joint("arm_joint1").unwrap(), knee + 1);
-    // the frames of the one that carries keep their numbers
+    // the frames of the carrying robot keep their indices
     for (k, frame) in quadruped.frames().iter().enumerate() {
         assert_eq!(both.frames()[k].name, frame.name);
     }

@@ -1,6 +1,7 @@
-//! Files that are large, deep or no files at all: an error with the number and the limit, or a model, and never a wait.
+//! Files that are large or deep, and paths that are not files: the result is an error with the number and the limit, or
+//! a model, without a long wait.
 //!
-//! No time is asserted: what is refused or linear here took half a minute to days when it was not.
+//! No time is asserted. Before these cases were refused or took linear time, they took between half a minute and days.
 
 use condyle_model::{Error, Joint, Mimic, MjcfOptions, Model, ModelBuilder, SdfOptions, Se3, UrdfOptions, Vec3, WORLD};
 use condyle_model::{Inertia, Sym3};
@@ -25,7 +26,7 @@ fn refused(result: Result<Model, Error>, end: &str) {
     assert!(said.ends_with(end), "{said}\n{end}");
 }
 
-/// Links in a row, joined by joints of a kind, all on one line.
+/// Returns a chain of links with joints of one kind, all on one line.
 fn row(count: usize, kind: &str) -> String {
     let mut text = String::from("<robot name='row'><link name='0'/>");
     for i in 1..=count {
@@ -101,10 +102,10 @@ fn attributes_and_namespaces() {
     refused(urdf(&wide), "the element on line 2 has 100001 attributes, at most 256 are allowed");
     let spaces = format!("<robot{}>{}</robot>", many(3000, "xmlns:a"), "<link name='a'/>".repeat(3000));
     refused(urdf(&spaces), "the element on line 1 has 3000 attributes, at most 256 are allowed");
-    // prefixes are part of names: their declarations cost nothing
+    // prefixes are part of names, so their declarations cost nothing
     let spaces: String = (0..100_000).map(|i| format!("<a xmlns:a{i}='a'/>")).collect();
     assert!(urdf(&format!("<robot>{spaces}<link name='a'/></robot>")).is_ok());
-    // comments have signs of their own, and common files a dozen of namespaces
+    // a comment may contain equals signs, and common files declare a dozen namespaces
     let comment = format!("<robot{}><!-- {} --><link name='a'/></robot>", many(12, "xmlns:a"), "=".repeat(100_000));
     assert!(urdf(&comment).is_ok());
 }
@@ -123,7 +124,7 @@ fn long_texts() {
     refused(sdf(&signs), &format!("4194305 equals signs, at most 4194304 {end}"));
 }
 
-/// Unknown names are listed up to a limit: each is compared with the known ones.
+/// Unknown names are listed up to a limit, because each is compared with the known ones.
 #[test]
 fn unknown_names() {
     let tags = "<linkjoint linkjoint='1'/>".repeat(500_000);
@@ -133,7 +134,7 @@ fn unknown_names() {
     assert!(last.ends_with("more than 1000 names are unknown or left out: the rest is not listed"), "{last}");
 }
 
-/// The nearest name is looked for among long names, and among many.
+/// The nearest name is found among long names, and among many names.
 #[test]
 fn long_names() {
     let a = "a".repeat(100_000);
@@ -148,7 +149,7 @@ fn long_names() {
     assert!(matches!(model.frame(&b), Err(Error::UnknownFrame { nearest, .. }) if nearest == a));
 }
 
-/// A line break or tab in a name is a space, as XML has it in every attribute; written as a character's number it stays.
+/// A line break or tab in a name becomes a space, as in every XML attribute; a character reference is kept.
 #[test]
 fn names_with_line_breaks() {
     for (written, read) in
@@ -163,7 +164,7 @@ fn names_with_line_breaks() {
     }
 }
 
-/// Frames that are attached to frames, and poses relative to poses: each is looked at once.
+/// Frames attached to frames, and poses relative to poses: each is visited once.
 #[test]
 fn attached_frames() {
     let row = |last: &str| {
@@ -181,7 +182,7 @@ fn attached_frames() {
     refused(sdf(&own_pose), "is attached to itself");
 }
 
-/// Classes have what they inherit: that is counted, too.
+/// Inherited attributes of classes are counted, too.
 #[test]
 fn default_classes() {
     let row: String = (0..250).map(|i| format!("<default class='c{i}'>")).collect();
@@ -193,7 +194,7 @@ fn default_classes() {
     refused(mjcf(&format!("<mujoco><default>{geoms}{wide}</default></mujoco>")), said);
 }
 
-/// A folder that goes with its test.
+/// A folder that is removed after its test.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -210,7 +211,7 @@ impl Drop for Folder {
     }
 }
 
-/// A file as each kind of robot, and as a part of one.
+/// Reads a file as each kind of robot, and as an included part of one.
 fn as_robots(path: &Path, folder: &Path) -> [Result<Model, Error>; 4] {
     let main = folder.join("main.xml");
     std::fs::write(&main, format!("<mujoco><include file='{}'/></mujoco>", path.display())).unwrap();
@@ -226,7 +227,7 @@ fn as_robots(path: &Path, folder: &Path) -> [Result<Model, Error>; 4] {
 fn large_files() {
     let folder = Folder::new("large");
     let path = folder.0.join("large.xml");
-    File::create(&path).unwrap().set_len(10_000_000_000).unwrap(); // without blocks: it takes no room
+    File::create(&path).unwrap().set_len(10_000_000_000).unwrap(); // without blocks: it takes no space on the disk
     for (k, result) in as_robots(&path, &folder.0).into_iter().enumerate() {
         let main = if k == 3 { std::fs::metadata(folder.0.join("main.xml")).unwrap().len() } else { 0 };
         let found = 10_000_000_000 + main;
@@ -240,7 +241,7 @@ fn large_files() {
     });
 }
 
-/// Files that are parts of one robot count together.
+/// Files that belong to one robot are counted together.
 #[test]
 fn large_parts() {
     let folder = Folder::new("parts");
@@ -250,10 +251,10 @@ fn large_parts() {
     write("main.xml", "<mujoco><include file='a.xml'/><include file='b.xml'/><include file='c.xml'/></mujoco>");
     let read = || Model::from_mjcf(folder.0.join("main.xml"), &MjcfOptions::default());
     refused(read(), "1200011 tags, at most 1048576 are allowed in the files of a robot");
-    // one file by two names is one file
+    // one file with two paths is one file
     write("main.xml", "<mujoco><include file='a.xml'/><include file='./a.xml'/></mujoco>");
     refused(read(), "<include>: `./a.xml` is already part of the model");
-    // levels count where they come to stand
+    // an included file counts at the depth of its include
     let nested = |inside: &str| format!("<mujoco>{}{inside}{}</mujoco>", "<a>".repeat(200), "</a>".repeat(200));
     write("main.xml", &nested("<include file='a.xml'/>"));
     write("a.xml", &nested(""));

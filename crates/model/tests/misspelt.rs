@@ -1,10 +1,10 @@
-//! Robots in which one name is misspelt: each reader says so, in whatever element or attribute it is.
+//! Robots with one misspelt name: each reader reports it, for every element and attribute.
 
 use condyle_model::{Error, MjcfOptions, Model, SdfOptions, UrdfOptions};
 use roxmltree::Document;
 use std::ops::Range;
 
-/// Robots in which most elements and attributes stand that have an effect.
+/// Robots that contain most elements and attributes with an effect.
 const URDF: &str = r#"<robot name="r" version="1.0">
   <link name="a"><inertial><origin xyz="0 0 1" rpy="0 0 0.1"/><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
   <link name="b"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
@@ -37,7 +37,7 @@ const MJCF: &str = r#"<mujoco model="m"><compiler angle="radian" autolimits="tru
   <keyframe><key name="home" qpos="0.1 0.2"/></keyframe>
 </mujoco>"#;
 
-/// Whatever a reader says: the warnings, or the error.
+/// Returns the messages of a reader: the warnings, or the error.
 fn said(read: &dyn Fn(&str) -> Result<Model, Error>, text: &str) -> Vec<String> {
     match read(text) {
         Ok(model) => model.warnings().iter().map(ToString::to_string).collect(),
@@ -45,7 +45,7 @@ fn said(read: &dyn Fn(&str) -> Result<Model, Error>, text: &str) -> Vec<String> 
     }
 }
 
-/// The places of an element's names in the text: of its tag at the beginning and the end, of each attribute.
+/// Returns the byte ranges of an element's names in the text: of its start and end tag together, and of each attribute.
 fn names(text: &str) -> Vec<Vec<Range<usize>>> {
     let document = Document::parse(text).unwrap();
     let mut places = Vec::new();
@@ -64,7 +64,7 @@ fn names(text: &str) -> Vec<Vec<Range<usize>>> {
     places
 }
 
-/// Each name with a letter too many.
+/// Checks that each name with an additional letter is reported.
 fn check(read: &dyn Fn(&str) -> Result<Model, Error>, text: &str) {
     let plain = said(read, text);
     assert!(read(text).is_ok(), "{plain:?}");
@@ -99,7 +99,7 @@ fn names_of_an_mjcf() {
     check(&|text| Model::from_mjcf_str(text, &MjcfOptions::default()), MJCF);
 }
 
-/// A strict reader refuses each of them.
+/// A strict reader refuses each unknown name.
 #[test]
 fn a_strict_reader_refuses() {
     let text = URDF.replace("<dynamics", "<dynamic");

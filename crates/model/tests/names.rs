@@ -1,8 +1,8 @@
-//! The nearest name in the error of one that is not there.
+//! The nearest name in the error about an unknown name.
 
 use condyle_model::{Error, Inertia, Joint, ModelBuilder, Se3, WORLD};
 
-/// All words of some letters with at most so many of them, the shorter ones first.
+/// Returns all words of the given letters up to a length, shorter words first.
 fn words(letters: &str, length: usize) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut from = 0;
@@ -16,7 +16,8 @@ fn words(letters: &str, length: usize) -> Vec<String> {
     words.split_off(1)
 }
 
-/// It is the first of the nearest by the optimal string alignment distance, of those of which no more than half differs.
+/// The result is the first name with the smallest optimal string alignment distance, among names that differ in at most
+/// half of their characters.
 #[test]
 fn nearest_names_are_those_of_strsim() {
     let mut builder = ModelBuilder::new("words");

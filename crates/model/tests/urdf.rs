@@ -1,4 +1,4 @@
-//! URDF: what changes the robot is read, or reported.
+//! URDF: everything that changes the robot is read or reported.
 #![allow(non_snake_case)]
 
 use condyle_model::{
@@ -10,7 +10,7 @@ const INERTIAL: &str = "<inertial><origin xyz='0.1 0 0'/><mass value='2'/>
 <inertia ixx='0.02' ixy='0' ixz='0' iyy='0.03' iyz='0' izz='0.04'/></inertial>";
 const LIMIT: &str = "<limit lower='-1' upper='1' effort='3' velocity='2'/>";
 
-/// Two links and a joint between them, and more in the robot.
+/// Returns a robot of two links and a joint between them, with additional content.
 fn robot(kind: &str, joint: &str, more: &str) -> String {
     let ends = "<parent link='a'/><child link='b'/>";
     let links = format!("<link name='a'/><link name='b'>{INERTIAL}</link>");
@@ -26,7 +26,7 @@ fn model(text: &str) -> Model {
     read(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Warnings of a robot, without the file's name.
+/// Returns the warnings of a robot, without the file's name.
 #[track_caller]
 fn warnings(text: &str) -> Vec<String> {
     model(text).warnings().iter().map(|w| w.to_string().replace("<string>:", "")).collect()
@@ -71,9 +71,9 @@ fn limits_without_a_number() {
     assert_eq!(limits("<limit lower='-1' upper='1' effort='inf' velocity='3'/>"), (3.0, -inf, inf));
 }
 
-/// Robots with such limits exist, and others' readers take them.
+/// Robots with such limits exist, and other readers accept them.
 #[test]
-fn limits_that_cannot_be_meant() {
+fn implausible_limits() {
     let said = |limit: &str| warnings(&robot("revolute", limit, ""));
     let odd = said("<limit effort='3' velocity='2'/>");
     assert_eq!(odd, ["joint `j`: both limits of position are 0: it cannot move"]);
@@ -118,7 +118,7 @@ fn limits_warn_in_every_format() {
     assert!(built.with_limits(limits).unwrap().warnings().is_empty());
 }
 
-/// Fields of version 1.2 that a model cannot hold.
+/// Fields of version 1.2 that a model cannot represent.
 #[test]
 fn limits_of_acceleration() {
     let with = |more: &str| robot("revolute", &LIMIT.replace("/>", &format!(" {more}/>")), "");
@@ -135,7 +135,8 @@ fn limits_of_acceleration() {
     assert!(warnings(&versioned).is_empty());
 }
 
-/// Numbers of Drake 1.51: X_WB of a body 1, 2 m along the joint's x and y, turned by 0.3 about its axis; the origin is at (1, 2, 3).
+/// Compares with Drake 1.51: X_WB of a body that is 1 and 2 m along the joint's x and y, and rotated by 0.3 about its
+/// axis. The origin is at (1, 2, 3).
 #[test]
 fn planes_of_planar_joints() {
     let frame = |axis: &str| {
@@ -152,7 +153,7 @@ fn planes_of_planar_joints() {
     for (axis, expected) in PLANAR {
         close(&frame(axis), expected);
     }
-    // the link keeps its axes, the inertia its place
+    // the link keeps its axes, and the inertia its pose
     let tilted = model(&robot("planar", "<axis xyz='1 0 0'/>", ""));
     let link = &tilted.frames()[tilted.frame("b").unwrap()];
     let back = link.placement.inverse();
@@ -361,7 +362,7 @@ fn rotors_of_transmissions() {
     assert_eq!(said("<mechanicalReducton>50</mechanicalReducton>"), [near]);
 }
 
-/// A third link with a joint that follows `j`, and a fourth one that follows that.
+/// Returns a robot with a third link whose joint follows `j`, and a fourth one whose joint follows the third.
 fn followers(first: &str, second: &str) -> String {
     let link = |name: &str, on: &str, joint: &str, mimic: &str| {
         format!(
@@ -393,7 +394,7 @@ fn mimics() {
     assert_eq!(said("joint='x'", "joint='j'"), "<string>:6: joint `k`: mimics `x`, which is no moving joint");
 }
 
-/// A chain of followers of any length takes time that grows as it does.
+/// The time for a chain of followers is proportional to its length.
 #[test]
 fn long_chains_of_mimics() {
     let hinge = Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) };
@@ -457,7 +458,7 @@ fn inertias_that_are_not_complete() {
 }
 
 #[test]
-fn inertias_that_cannot_be_meant() {
+fn implausible_inertias() {
     let of = |mass: f64, moment: f64| {
         let mut builder = ModelBuilder::new("m");
         let inertia = Inertia::from_com(mass, Vec3::new(1.0, 2.0, 3.0), Sym3::diagonal(moment));

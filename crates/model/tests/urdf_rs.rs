@@ -1,12 +1,12 @@
-//! Robots that urdf-rs has read are those that our own reader reads.
+//! Robots read by urdf-rs are equal to the robots of our own reader.
 
 use condyle_model::{Error, Joint, Model, UrdfOptions, robots};
 use std::path::Path;
 
-/// Faults that urdf-rs does not see.
+/// Faults that urdf-rs does not detect.
 const UNSEEN: [&str; 3] = ["limit", "belongs to xacro", "drake:"];
 
-/// Compares all that a robot of urdf-rs can have; warnings name another file.
+/// Compares everything that a robot of urdf-rs contains; warnings have another file name.
 fn compare(name: &str, text: &str, robot: &urdf_rs::Robot) -> bool {
     for root_joint in [None, Some(Joint::FreeFlyer)] {
         for mimic in [false, true] {
@@ -15,7 +15,7 @@ fn compare(name: &str, text: &str, robot: &urdf_rs::Robot) -> bool {
             let (ours, theirs) = match (ours, theirs) {
                 (Ok(ours), Ok(theirs)) => (ours, theirs),
                 (Err(_), Err(_)) => return false,
-                // zeros stand for an effort that is missing, and what urdf-rs does not know cannot be wrong
+                // zeros represent a missing effort, and information that urdf-rs drops cannot cause an error
                 (Err(ours), Ok(_)) if UNSEEN.iter().any(|what| ours.to_string().contains(what)) => return false,
                 (ours, theirs) => panic!("{name}: {:?} {:?}", ours.map(drop), theirs.map(drop)),
             };
@@ -23,7 +23,7 @@ fn compare(name: &str, text: &str, robot: &urdf_rs::Robot) -> bool {
             let drakes = |f: &&condyle_model::Frame| f.kind != condyle_model::FrameKind::User;
             assert!(ours.frames().iter().filter(drakes).eq(theirs.frames()), "{name}");
             for joint in ours.bodies()[1..].iter().filter(|b| matches!(b.joint, Joint::Continuous { .. })) {
-                let v = joint.idx_v; // a limit of 0 is none there
+                let v = joint.idx_v; // there, a limit of 0 means no limit
                 let is_none = |x: f64, y: f64| x == 0.0 && y.is_infinite();
                 let (a, b) = (ours.limits(), theirs.limits());
                 assert!(a.velocity[v] == b.velocity[v] || is_none(a.velocity[v], b.velocity[v]), "{name}");
@@ -46,7 +46,7 @@ fn embedded_robots() {
     }
 }
 
-/// The URDFs below the folders of `CONDYLE_ROBOTS`, where it is set.
+/// URDFs in the folders of `CONDYLE_ROBOTS`, if it is set.
 #[test]
 fn robots_of_others() {
     let folders = std::env::var_os("CONDYLE_ROBOTS").unwrap_or_default();

@@ -1,19 +1,19 @@
-//! Robots written into a copy of their file: what differs is edited, all else stays byte for byte, and the file gives the
-//! model back.
+//! Robots written into a copy of their file: only differences are edited, all other bytes are kept, and the file
+//! reproduces the model.
 #![allow(non_snake_case)] // I is an inertia
 
 use condyle_model::{Inertia, MjcfOptions, Model, Sym3, UrdfOptions, Vec3, robots};
 use std::fs;
 use std::path::PathBuf;
 
-/// A folder of a test's own.
+/// Creates a folder for one test.
 fn folder(test: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("condyle_write_{test}_{}", std::process::id()));
     fs::create_dir_all(&folder).expect("a temporary folder");
     folder
 }
 
-/// Text of a file after `change` was written into it.
+/// Returns the text of a file after `change` was written into it.
 fn written(test: &str, text: &str, change: impl Fn(&Model) -> Model) -> Result<String, String> {
     let is_urdf = text.contains("<robot");
     let read = |path: &PathBuf| match is_urdf {
@@ -52,7 +52,7 @@ fn close(a: Inertia<f64>, b: Inertia<f64>, what: &str) {
     assert!(same, "{what}: {a:?} and {b:?}");
 }
 
-/// Another inertia, which a body may have.
+/// Returns another physically possible inertia.
 fn other(i: usize) -> Inertia<f64> {
     let x = 1.0 + 0.1 * i as f64;
     let about = Sym3 { xx: 0.03 * x, xy: 0.001, yy: 0.04, xz: -0.002, yz: 0.003, zz: 0.05 };
@@ -60,7 +60,7 @@ fn other(i: usize) -> Inertia<f64> {
 }
 
 fn with_other_inertias(model: &Model) -> Model {
-    // the bodies between the joints of a chain have no mass, and no element
+    // intermediate bodies of a chain have no mass, and no element in the file
     let keeps = |i: usize| i == 0 || model.bodies()[i].name.contains('#');
     model.with_inertias(|i, I| if keeps(i) { I } else { other(i) }).expect("a model")
 }
@@ -146,7 +146,7 @@ fn armature_is_written_as_the_inertia_of_a_rotor() {
     let begin = "xmlns:k=\"about:k\">";
     let expected = LEG.replace(begin, &format!("{begin}{}{}", of("hip", "0.5"), of("ankle", "0.125")));
     assert_eq!(written("armature", LEG, armature).unwrap(), expected);
-    // a transmission that exists has a rotor added, or changed by its gear ratio
+    // an existing transmission gets a rotor, or its rotor changes according to its gear ratio
     let hip =
         "<transmission name='t'><joint name='hip'/><actuator name='m'><mechanicalReduction>5</mechanicalReduction>";
     let ankle = "<transmission name='u'><joint name='ankle'/><actuator name='n'><drake:gear_ratio value='2'/>";
@@ -160,7 +160,7 @@ fn armature_is_written_as_the_inertia_of_a_rotor() {
 }
 
 #[test]
-fn what_a_urdf_cannot_say_is_an_error() {
+fn numbers_that_a_urdf_cannot_represent_are_errors() {
     let limited = |change: fn(&mut condyle_model::Limits)| {
         move |m: &Model| {
             let mut limits = m.limits().clone();
@@ -213,13 +213,13 @@ fn links_that_fixed_joints_merge_keep_their_inertias() {
     let more = |m: &Model| m.with_inertias(|i, I| if i == 0 { I } else { I + other(i) }).unwrap();
     let new = written("merged", &text, more).unwrap();
     assert!(new.contains(&bolts), "{new}");
-    // the rest would be negative, or the inertia of no body: the moving link takes all
+    // the rest would be negative or physically impossible, so the moving link takes all
     let new = written("merged", &text, with_other_inertias).unwrap();
     assert_eq!(new.matches("<mass value='0'/>").count(), 2, "{new}");
     let small = |m: &Model| m.with_inertias(|i, I| if i == 1 { other(1).scale(0.1) } else { I }).unwrap();
     let new = written("merged", &text, small).unwrap();
     assert!(!new.contains(&bolts) && new.matches("<mass value='0'/>").count() == 2, "{new}");
-    // a moving link without mass leaves the difference to the heaviest one
+    // a moving link without mass leaves the difference to the heaviest link
     let light = text.replace("value = \"2.0\"", "value = \"0\"");
     let heavier = |m: &Model| m.with_inertias(|i, I| if i == 1 { I.scale(2.0) } else { I }).unwrap();
     let new = written("merged", &light, heavier).unwrap();
@@ -246,7 +246,7 @@ fn a_root_joint_is_found_in_the_model() {
     for (a, b) in model.bodies().iter().zip(file.bodies()) {
         close(a.inertia, b.inertia, &a.name);
     }
-    // a file may be its own original
+    // the new file may replace the original
     model.write_urdf(&path, &path).unwrap();
     fs::remove_dir_all(folder).unwrap();
 }
@@ -317,7 +317,7 @@ fn inertias_of_an_mjcf_come_back() {
         m.with_inertias(|i, I| if keeps(i) { I } else { I + other(i) }).unwrap()
     };
     let new = written("fingers", HAND, more).unwrap();
-    // one that geoms gave becomes an <inertial>; the fixed body keeps its own
+    // an inertia from geoms becomes an <inertial>; the fixed body keeps its own
     assert!(new.contains("<body name='palm'>\n      <inertial pos=\""), "{new}");
     assert!(new.contains("mass='0.25' diaginertia='0.01 0.02 0.025' euler='0 45 0'"), "{new}");
     let small = |m: &Model| m.with_inertias(|i, I| if i == 1 { other(1).scale(0.1) } else { I }).unwrap();
@@ -326,7 +326,7 @@ fn inertias_of_an_mjcf_come_back() {
 }
 
 #[test]
-fn what_an_mjcf_cannot_say_is_an_error() {
+fn numbers_that_an_mjcf_cannot_represent_are_errors() {
     let refused = |text: &str, end: &str, change: &dyn Fn(&Model) -> Model| {
         let said = written("refused", text, change).expect_err(end);
         assert!(said.contains(end), "{said}\n{end}");

@@ -1,5 +1,5 @@
-//! Files of xacro: which program is called, how, and what it may do. The programs here are scripts in a folder of their own, which
-//! is the PATH of a second process of this test.
+//! Xacro files: the programs that are called, their arguments, and their limits. The programs here are scripts in a
+//! separate folder, which is the PATH of a second process of this test.
 #![cfg(unix)]
 
 use condyle_model::{Model, UrdfOptions};
@@ -9,7 +9,7 @@ use std::process::Command;
 
 const ROBOT: &str = "<robot name='$*'><link name='$ROS_PACKAGE_PATH'/></robot>";
 
-/// Variable that has the arguments of the second process.
+/// Variable that contains the arguments of the second process.
 const ARGUMENTS: &str = "CONDYLE_TEST_XACRO_ARGUMENTS";
 
 fn folder(name: &str) -> PathBuf {
@@ -18,7 +18,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// Reads `robot.xacro` in a process that finds these programs only; returns name and link, or the error.
+/// Reads `robot.xacro` in a process that finds only these programs; returns name and link, or the error.
 fn read(name: &str, programs: &[(&str, &str)], arguments: &str) -> String {
     let folder = folder(name);
     for (name, script) in programs {
@@ -35,7 +35,8 @@ fn read(name: &str, programs: &[(&str, &str)], arguments: &str) -> String {
     said.split_once('[').unwrap().1.rsplit_once(']').unwrap().0.to_owned()
 }
 
-/// Reads in the process that [`read`] starts. The test itself starts one, whose program is found by its PATH alone.
+/// Reads in the process that [`read`] starts. The tests start a process of their own because programs are found by its
+/// PATH.
 #[test]
 fn in_a_process() {
     let Ok(arguments) = std::env::var(ARGUMENTS) else {
@@ -71,7 +72,7 @@ fn programs() {
     assert_eq!(said, format!("robot.xacro: {missing}: {how}"));
     let said = read("line", &[("xacro", "echo; echo '<robot><link/></robot>'")], "");
     assert_eq!(said, "robot.xacro (expanded):2: <link>: has no name");
-    // what it writes may be as long as a robot's files
+    // the output may be as long as a robot's files
     let large = "read() { echo \"<!-- $1$1 -->\"; }; echo \"<robot name='r'><link name='a'/>\"; \
                  i=0; while [ $i -lt 20000 ]; do read 0123456789012345678901234567890123456789; i=$((i+1)); done; echo '</robot>'";
     assert_eq!(read("large", &[("xacro", large)], ""), "r|a");

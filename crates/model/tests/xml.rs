@@ -1,8 +1,8 @@
-//! XML as real files have it: encodings, declarations, comments, document types, prefixes and entities.
+//! XML as in real files: encodings, declarations, comments, document types, prefixes and entities.
 
 use condyle_model::{Error, MjcfOptions, Model, SdfOptions, UrdfOptions};
 
-/// Robot with one joint, whose name has a character that encodings write in different ways.
+/// Robot with one joint, whose name contains a character that encodings represent differently.
 const ROBOT: &str = "<robot name='r'><link name='a'/><link name='b'/>
 <joint name='Gelenk für b' type='continuous'><parent link='a'/><child link='b'/></joint></robot>";
 
@@ -24,7 +24,7 @@ fn refused(text: &str, said: &str) {
     assert_eq!(urdf(text).unwrap_err().to_string(), format!("<string>:{said}"), "{text}");
 }
 
-/// Bytes of a text, each of whose characters is one byte.
+/// Returns the bytes of a text whose characters are one byte each.
 fn latin(text: &str) -> Vec<u8> {
     text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect()
 }
@@ -48,11 +48,11 @@ fn encodings() {
             assert_eq!(joint(file(name, &units(&text, unit)).unwrap()), "Gelenk für b");
         }
     }
-    // a text is decoded already, whatever it declares
+    // a string is already decoded, whatever it declares
     assert_eq!(joint(urdf(&declare("ISO-8859-1")).unwrap()), "Gelenk für b");
 }
 
-/// A byte that cannot be read has no effect in a comment; in a name it is an error with its line.
+/// An invalid byte has no effect in a comment; in a name it is an error with its line.
 #[test]
 fn bytes_that_are_not_in_the_encoding() {
     let robot = latin(ROBOT);
@@ -98,7 +98,7 @@ fn prologs() {
     assert_eq!(Model::from_mjcf_str(mjcf, &MjcfOptions::default()).unwrap().nv(), 1);
 }
 
-/// Lines are counted in the file, whatever stands before.
+/// Lines are counted from the beginning of the file.
 #[test]
 fn lines() {
     let good = "<robot\nname='r'>\n<!--\n--><![CDATA[\n]]><link name='a'/><link name='b'/>\n<joint\n name='j'\n type='x'/></robot>";
@@ -122,7 +122,7 @@ fn prefixes() {
     }
     let sdf = "<sdf version='1.9'><model name='m'><gz:note>x</gz:note><link name='a'/></model></sdf>";
     assert!(Model::from_sdf_str(sdf, &SdfOptions::default()).is_ok());
-    // macros of xacro are found by their prefix, declared or not, and by what a prefix stands for
+    // macros of xacro are found by their prefix, declared or not, and by the namespace of a prefix
     let expand = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
     refused(&with("<xacro:wheel/>"), &format!("2: <xacro:wheel>: belongs to xacro: {expand}"));
     let renamed = with("<x:wheel name='w'/>").replace("<robot ", "<robot xmlns:x='http://www.ros.org/wiki/xacro' ");
@@ -163,7 +163,7 @@ fn entities() {
     let lol = "<!DOCTYPE r [<!ENTITY a \"aaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><robot name='&b;'/>";
     refused(lol, "1: not well-formed XML: entity `&b;` is not expanded: write its text instead");
     let signs = format!("<robot name='{}'><link name='a'/></robot>", "&".repeat(1 << 20));
-    assert_eq!(urdf(&signs).unwrap().name().len(), 1 << 20); // each is looked at once
+    assert_eq!(urdf(&signs).unwrap().name().len(), 1 << 20); // each character is visited once
 }
 
 #[test]

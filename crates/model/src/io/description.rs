@@ -1,5 +1,5 @@
-//! Models in files of serde's formats: they have what a user may edit. All else follows from it, and is made and checked when
-//! a file is read.
+//! Models in serde formats. A file contains the fields that a user may edit. All other fields follow from these; they
+//! are computed and checked when a file is read.
 
 use crate::actuator::Actuator;
 use crate::body::{Body, Frame, Limits};
@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use condyle_spatial::{Inertia, Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// The fields of a model that stand in a file, each as in [`Model`].
+/// Fields of a model that a file contains, each as in [`Model`].
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -73,7 +73,7 @@ impl<'de> Deserialize<'de> for Model {
 }
 
 impl Description {
-    /// Builds the model anew.
+    /// Builds and checks the model.
     fn model(self) -> Result<Model, Error> {
         let mut builder = ModelBuilder::new(&self.name);
         builder.gravity(self.gravity);
@@ -102,7 +102,7 @@ impl Description {
         }
         (model.springs, model.gravity_compensation) = (self.springs, self.gravity_compensation);
         (model.actuators, model.keyframes, model.constraints) = (self.actuators, self.keyframes, self.constraints);
-        // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
+        // bodies `name#1`, … without mass are intermediate ones of a chain, unless a warning mentions them
         let warned: BTreeSet<&str> = warnings
             .iter()
             .filter_map(|w| if let Warning::Massless { body } = w { Some(&**body) } else { None })
@@ -114,7 +114,7 @@ impl Description {
         Ok(model)
     }
 
-    /// Adds the bodies, which must stand depth first.
+    /// Adds the bodies, which must be listed depth first.
     fn add_bodies(&self, builder: &mut ModelBuilder) -> Result<Vec<BodyId>, Error> {
         let Some(world) = self.bodies.first() else {
             return Err(Error::Length { name: "bodies", expected: 1, found: 0 });
@@ -134,7 +134,7 @@ impl Description {
             let options = Default::default();
             ids.push(builder.body_with(names, parent, body.joint, body.placement, body.inertia, options));
         }
-        builder.check_size()?; // before leaders are looked for among all bodies
+        builder.check_size()?; // before leaders are searched among all bodies
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             let Some(mimic) = body.mimic else { continue };
             let leads = |b: &Body| b.mimic.is_none() && b.idx_v == body.idx_v;
@@ -147,7 +147,7 @@ impl Description {
         Ok(ids)
     }
 
-    /// Checks how many numbers there are for each coordinate.
+    /// Checks the number of entries for each coordinate.
     fn check_coordinates(&self, nq: usize, nv: usize) -> Result<(), Error> {
         let Limits { lower, upper, velocity, effort_lower, effort_upper } = &self.limits;
         for (name, numbers, expected) in [

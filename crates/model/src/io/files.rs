@@ -1,13 +1,13 @@
-//! Files that a robot's file names: paths, and `package://name/path` addresses as ROS writes them.
+//! Files to which a robot's file refers: paths, and `package://name/path` addresses of ROS.
 
 use crate::error::Error;
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
-/// The beginning of the address of a file in a package.
+/// First part of the address of a file in a package.
 const SCHEME: &str = "package://";
 
-/// Returns the file that a path or a `package://` address names.
+/// Returns the path of the file at a path or a `package://` address.
 pub(crate) fn locate(path: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error> {
     match path.to_str().and_then(|p| p.strip_prefix(SCHEME)) {
         None => Ok(path.to_owned()),
@@ -18,15 +18,15 @@ pub(crate) fn locate(path: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error
     }
 }
 
-/// Returns the file that an address in a robot's file names: a `package://` or `file://` address, an absolute path, or a path
-/// relative to the folder of the file that has the address.
+/// Returns the path of the file at an address in a robot's file. The address is a `package://` or `file://` address, an
+/// absolute path, or a path relative to the folder of the file that contains the address.
 #[allow(dead_code)]
 pub(crate) fn resolve(address: &str, folder: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error> {
     let path = address.strip_prefix("file://").unwrap_or(address);
-    Ok(folder.join(locate(Path::new(path), packages)?)) // an absolute path stays as it is
+    Ok(folder.join(locate(Path::new(path), packages)?)) // an absolute path does not change
 }
 
-/// All folders in which packages may be, the most particular first.
+/// Returns all folders in which packages may be, in order of priority.
 fn folders(packages: &[PathBuf], ros: Option<OsString>, ament: Option<OsString>) -> Vec<PathBuf> {
     let split = |paths: Option<OsString>| -> Vec<PathBuf> {
         let paths = paths.unwrap_or_default();
@@ -36,22 +36,23 @@ fn folders(packages: &[PathBuf], ros: Option<OsString>, ament: Option<OsString>)
     packages.iter().cloned().chain(split(ros)).chain(installed).collect()
 }
 
-/// Places at which the models that an SDF includes may be.
+/// Folders in which the models that an SDF includes are searched.
 pub(crate) struct Search<'a> {
-    /// Folder of the file that includes them; a string has none.
+    /// Folder of the file that includes the models; `None` for a string.
     pub(crate) folder: Option<&'a Path>,
-    /// Folders that contain packages or models, or are one.
+    /// Folders that contain packages or models, or are one themselves.
     pub(crate) packages: &'a [PathBuf],
 }
 
-/// Variables of the environment that list folders with models.
+/// Environment variables that list folders with models.
 const MODEL_PATHS: [&str; 4] = ["GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "SDF_PATH", "GAZEBO_MODEL_PATH"];
 
-/// Returns the file, or the folder with a `model.config`, that an address of a model names: `model://`, `package://`, `file://`,
-/// or a path.
+/// Returns the file, or the folder with a `model.config`, at the address of a model: `model://`, `package://`,
+/// `file://`, or a path.
 ///
-/// A path may begin in the folder of the file that has the address. After that, addresses and paths are looked for in
-/// `packages`, that folder, those around it and the `models` in them, the folders of Gazebo's variables and those of ROS.
+/// A path may be relative to the folder of the file that contains the address. Otherwise, addresses and paths are
+/// searched in `packages`, in that folder and the folders above it, in the `models` folder of each, and in the folders
+/// of Gazebo's and ROS's variables.
 pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Error> {
     let (scheme, path) = address.split_once("://").map_or(("", address), |(scheme, path)| (scheme, path));
     let missing = |what: &str| Error::File { file: address.to_owned(), what: what.to_owned() };
@@ -81,8 +82,8 @@ pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Erro
     find(&prefix, path, &all, |path| path.exists())
 }
 
-/// The first such file: of a package in a folder, or of a folder that is the package itself. The path stays in the
-/// package, but for links that are in it.
+/// Returns the first existing file: in a package within a folder, or in a folder that is the package itself. The path
+/// cannot leave the package, except through links in it.
 fn find(scheme: &str, address: &str, folders: &[PathBuf], fits: fn(&Path) -> bool) -> Result<PathBuf, Error> {
     let (package, path) = address.split_once('/').unwrap_or((address, ""));
     let down = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);

@@ -1,40 +1,41 @@
-//! Known elements and attributes of a format, by parent. All else in a file is misspelt or misplaced, and has no effect: each is
-//! a warning with file, line and the nearest known name.
+//! Known elements and attributes of a format, by parent. All others in a file are misspelt or misplaced, and have no
+//! effect. Each causes a warning with file, line and the nearest known name.
 
 use super::xml::Element;
 use crate::names::{near, nearest};
 use crate::warning::Warning;
 use std::collections::HashMap;
 
-/// Elements and attributes of a format.
+/// Known elements and attributes of a format.
 ///
-/// They are written as a text with a line for each type of element:
+/// They are written as a text with one line for each type of element:
 ///
 /// ```text
 /// type: attribute attribute … ; child child=type child* …
 /// ```
 ///
-/// The type of a child is its tag, unless `=type` names another one. `*` marks a child that is known and whose inside is not
-/// looked at. A child whose type has no line has neither attributes nor children.
+/// The type of a child is its tag, unless `=type` names another type. `*` marks a known child whose content is not
+/// checked. A child whose type has no line has neither attributes nor children.
 pub(crate) struct Known {
     types: HashMap<&'static str, Type>,
 }
 
-/// Type of element: what may stand in it.
+/// Type of element: its allowed attributes and children.
 #[derive(Default)]
 struct Type {
     attributes: Vec<&'static str>,
-    /// Tag and type of each child; the type is empty if the inside of the child is not looked at.
+    /// Tag and type of each child; the type is empty if the content of the child is not checked.
     children: Vec<(&'static str, &'static str)>,
 }
 
-/// Maximum number of warnings about one file; chosen because a nearest name is looked for in each.
+/// Maximum number of warnings about one file; chosen because each one searches for the nearest name.
 const MAX_WARNINGS: usize = 1000;
 
-/// Type of a child whose inside is not looked at.
+/// Type of a child whose content is not checked.
 const OPEN: &str = "";
 
-/// Things that a format has and a model cannot hold: the type of an element, its attribute or child, and what becomes different.
+/// Features that a format has and a model cannot represent: the type of an element, its attribute or child, and the
+/// effect of its absence.
 pub(crate) type LeftOut = [(&'static str, &'static str, &'static str)];
 
 impl Known {
@@ -56,7 +57,8 @@ impl Known {
         Self { types }
     }
 
-    /// Warns of all that is not known in an element, whose type is its tag, and of what a model cannot hold.
+    /// Adds warnings about unknown parts of an element, whose type is its tag, and about features that a model cannot
+    /// represent.
     pub(crate) fn check(&self, root: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
         if let Some((&name, _)) = self.types.get_key_value(root.tag.as_str()) {
             self.check_as(name, root, left_out, warnings);
@@ -68,7 +70,7 @@ impl Known {
         }
     }
 
-    /// Warns of all that is not known in an element of a type.
+    /// Adds warnings about an element of a given type.
     fn check_as(&self, name: &'static str, element: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
         let (none, is_full) = (Type::default(), |warnings: &[Warning]| warnings.len() >= MAX_WARNINGS);
         let known = self.types.get(name).unwrap_or(&none);
@@ -101,7 +103,7 @@ impl Known {
         }
     }
 
-    /// Says that an element is unknown, or misplaced in its parent.
+    /// Returns the message that an element is unknown, or misplaced in its parent.
     fn misplaced(&self, known: &Type, parent: &Element, tag: &str) -> String {
         let near = near(&nearest(tag, known.children.iter().map(|(tag, _)| *tag)));
         let elsewhere = self.types.values().any(|t| t.children.iter().any(|(known, _)| *known == tag));
@@ -116,7 +118,7 @@ mod tests {
     use crate::io::xml::Amount;
 
     #[test]
-    fn what_is_not_known_warns_with_the_nearest_name() {
+    fn unknown_names_warn_with_the_nearest_name() {
         let known =
             Known::new("robot: name ; link joint\n link: name ; mass drawn*\n joint: name type ; axis\n axis: xyz");
         let left_out: &LeftOut = &[("joint", "type", "is not held")];

@@ -1,4 +1,4 @@
-//! Robots from MJCF, the format of MuJoCo: kinematics, inertias, limits.
+//! Reader of MJCF, the format of MuJoCo: kinematics, inertias, limits.
 
 mod actuator;
 mod assets;
@@ -41,72 +41,78 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use tree::Placed;
 
-/// The known elements and attributes of MJCF, by parent, of MuJoCo 4.0 and before.
+/// Known elements and attributes of MJCF, by parent, up to MuJoCo 4.0.
 const ELEMENTS: &str = include_str!("mjcf/elements.txt");
 
-/// Options of reading an MJCF.
+/// Options for reading an MJCF.
 #[derive(Clone, Debug, Default)]
 pub struct MjcfOptions {
     /// Whether a warning ([`Model::warnings`]) is an error.
     pub strict: bool,
-    /// Kinds of warnings that are no errors, though `strict` is set.
+    /// Kinds of warnings that are not errors, even if `strict` is set.
     pub allow: Vec<WarningKind>,
-    /// Folders that contain packages, or are packages, for `package://` addresses; see [`UrdfOptions`](crate::UrdfOptions).
+    /// Folders that contain packages, or are packages, for `package://` addresses; see
+    /// [`UrdfOptions`](crate::UrdfOptions).
     pub packages: Vec<PathBuf>,
-    /// Whether a `<joint>` of `<equality>` with a linear `polycoef` lets joint1 follow joint2 ([`Mimic`](crate::Mimic)),
-    /// instead of being a [constraint](Model::constraints) beside the tree.
+    /// Whether a `<joint>` of `<equality>` with a linear `polycoef` lets joint1 follow joint2
+    /// ([`Mimic`](crate::Mimic)), instead of becoming a [constraint](Model::constraints).
     pub mimic: bool,
-    /// Whether a mesh with mass that cannot be read weighs nothing and is reported in [`Model::warnings`], instead of being
-    /// an error.
+    /// Whether a mesh that cannot be read gets no mass and a warning in [`Model::warnings`], instead of causing an
+    /// error.
     pub weightless_meshes: bool,
 }
 
 impl Model {
-    /// Reads an MJCF file, and the files that it includes.
+    /// Reads an MJCF file and the files that it includes.
     ///
-    /// Joints keep MuJoCo's order, so q and v read as its `qpos` and `qvel`, but that our quaternions are x, y, z, w
-    /// and a free joint's velocity is in the body's frame (MuJoCo: linear velocity in the world's). A hinge has one
-    /// number, limits or not ([`Joint::Revolute`](crate::Joint::Revolute)). Several joints on one body become a chain, with bodies without
-    /// mass, `name#1`, `name#2`, …, between them. A body without joints is merged into its parent and stays as a
-    /// frame, as do sites ([`FrameKind::User`]).
+    /// Joints keep MuJoCo's order, so q and v correspond to its `qpos` and `qvel`, with two differences. Quaternions
+    /// are x, y, z, w, and the velocity of a free joint is in the body's frame (in MuJoCo its linear velocity is in the
+    /// world's frame). A hinge has one coordinate, with or without limits
+    /// ([`Joint::Revolute`](crate::Joint::Revolute)). Several joints of one body become a chain, with intermediate
+    /// bodies `name#1`, `name#2`, … without mass. A body without joints is merged into its parent. It stays as a frame,
+    /// as sites do ([`FrameKind::User`]).
     ///
-    /// A body of the model sits where its last joint is: the frame of the MJCF body, of kind [`FrameKind::Link`] and
-    /// with the body's name, is apart from it by that joint's `pos`. A free joint's q is the pose of the MJCF body in
-    /// the world; with `align` its frame is the frame of inertia, as in MuJoCo. Named `<frame>`s and cameras (of mode
-    /// `fixed`) are frames of kind [`FrameKind::User`] too; one whose name a site has is named `frame:name` or
-    /// `camera:name`.
+    /// The frame of a model's body is at the body's last joint. The frame of the MJCF body is a separate frame of kind
+    /// [`FrameKind::Link`] with the body's name; both frames differ by the joint's `pos`. A free joint's q is the pose
+    /// of the MJCF body in the world; with `align` it is the pose of the frame of inertia, as in MuJoCo. Named
+    /// `<frame>`s and cameras (of mode `fixed`) are frames of kind [`FrameKind::User`], too. If a site has the same
+    /// name, they are named `frame:name` or `camera:name`.
     ///
-    /// Read are `<compiler>` (all that has an effect on a model), default classes, `<include>`, `<replicate>`, `<attach>`
-    /// with files that have settings of their own, gravity and flags, `<frame>`, `<inertial>`, masses of geoms. Included
-    /// files are looked for in the main file's folder, then beside the file that includes them. Masses and inertias of meshes follow MuJoCo's
-    /// rules (`inertia` of `<mesh>`), with the feature `meshes`; so do primitives that are fitted to meshes.
+    /// The reader supports `<compiler>` (everything that affects a model), default classes, `<include>`, `<replicate>`,
+    /// `<frame>`, `<inertial>`, masses of geoms, gravity and flags. It also supports `<attach>` of files with their own
+    /// settings. Included files are searched in the main file's folder, then in the folder of the file that includes
+    /// them. With the feature `meshes`, masses and inertias of meshes follow MuJoCo's rules (`inertia` of `<mesh>`),
+    /// and so do primitives that are fitted to meshes.
     ///
-    /// Springs ([`springs`](Self::springs)), damping, friction and armature are those of the compiled MuJoCo model:
-    /// `springdamper` and `dampratio` follow from the inertia in the pose that the file has drawn, and actuators add
-    /// armature and damping, gear² times. A `<fixed>` tendon that moves with one coordinate adds its spring, losses,
-    /// armature and range to that coordinate. `gravcomp` becomes a [gravity compensation](Self::gravity_compensation).
+    /// Springs ([`springs`](Self::springs)), damping, friction and armature are equal to the values in the compiled
+    /// MuJoCo model. `springdamper` and `dampratio` are evaluated with the inertia in the initial configuration of the
+    /// file. Actuators add gear² times their armature and damping. A `<fixed>` tendon that moves with one coordinate
+    /// adds its spring, losses, armature and range to that coordinate. `gravcomp` becomes a [gravity
+    /// compensation](Self::gravity_compensation).
     ///
-    /// Limits of effort are sums over the actuators of a joint, clipped to its `actuatorfrcrange`. An actuator gives its
-    /// `forcerange`, and the range of its control times gain if its force depends on nothing else, both times gear. A joint
-    /// without actuators has its `actuatorfrcrange`, or no limit; forces at sites limit no joint. Several actuators of a
-    /// ball or a tendon over several joints give a box around what they can reach. [`actuators`](Self::actuators) has
-    /// those of joints, fixed tendons and sites, but muscles, plugins and dampers.
+    /// Limits of effort are sums over the actuators of a joint, clipped to its `actuatorfrcrange`. An actuator
+    /// contributes its `forcerange` times gear. If its force depends only on the control, it also contributes the
+    /// control range times gain and gear. A joint without actuators has its `actuatorfrcrange`, or no limit; forces at
+    /// sites limit no joint. For several actuators of a ball joint, or a tendon over several joints, the limits are a
+    /// box around the reachable efforts. [`actuators`](Self::actuators) lists the actuators of joints, fixed tendons
+    /// and sites, except muscles, plugins and dampers.
     ///
-    /// `connect`, `weld` and `joint` of `<equality>` become [`constraints`](Self::constraints), if they are active. One
-    /// without a name is named by its kind and number: `weld1`. With [`MjcfOptions::mimic`], joints follow others in the
-    /// tree instead; damping, friction, springs and efforts of a follower then act on its leader's coordinate. Keyframes
-    /// without a name are named `key0`, `key1`, … by their number.
+    /// Active `connect`, `weld` and `joint` elements of `<equality>` become [`constraints`](Self::constraints). Without
+    /// a name, a constraint is named by its kind and number: `weld1`. With [`MjcfOptions::mimic`], joints follow others
+    /// in the tree instead. Damping, friction, springs and efforts of a follower then act on its leader's coordinate.
+    /// Keyframes without a name are named by their number: `key0`, `key1`, ….
     ///
-    /// An unknown, misspelt or misplaced name is a [warning](Model::warnings), and so is everything with an effect that a
-    /// model cannot hold: tendons over several coordinates, activations and delays of actuators, the range of a ball joint,
-    /// forces of a medium, bodies that a program moves (`mocap`). Sensors, visuals and contacts have no part in a model.
-    /// `composite`, `flexcomp`, flexes and plugins of bodies are errors, and so is a mesh with mass that cannot be read,
-    /// unless it is on a body fixed to the world (but see [`MjcfOptions::weightless_meshes`]). Contradictions are errors,
-    /// as in MuJoCo.
+    /// An unknown, misspelt or misplaced name is a [warning](Model::warnings). So is each effect that a model cannot
+    /// represent: tendons over several coordinates, activations and delays of actuators, the range of a ball joint,
+    /// forces of a medium, bodies moved by a program (`mocap`). Sensors, visuals and contacts are ignored. `composite`,
+    /// `flexcomp`, flexes and plugins of bodies are errors. A mesh with mass that cannot be read is an error, unless it
+    /// is on a body fixed to the world, or [`MjcfOptions::weightless_meshes`] is set. Contradictions are errors, as in
+    /// MuJoCo.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and what
-    /// [`ModelBuilder::build`] finds. What the files may have at most stands at the [beginning](crate#limits-of-files).
+    /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and the
+    /// errors of [`ModelBuilder::build`]. The limits of files are listed in the [crate
+    /// documentation](crate#limits-of-files).
     pub fn from_mjcf(path: impl AsRef<Path>, options: &MjcfOptions) -> Result<Self, Error> {
         let mut files = Files::new(Known::new(ELEMENTS));
         files.read(path.as_ref())?;
@@ -131,17 +137,17 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// As [`from_mjcf`](Self::from_mjcf).
+    /// The errors of [`from_mjcf`](Self::from_mjcf).
     pub fn from_mjcf_str(text: &str, options: &MjcfOptions) -> Result<Self, Error> {
         let mut files = Files::new(Known::new(ELEMENTS));
         files.parse(text, "<string>", None)?;
         model(&files, options)
     }
 
-    /// Reads a text that stands in the place of a file: the path names it in errors, and includes are found beside it.
+    /// Reads a text instead of a file: the path names it in errors, and its folder is searched for included files.
     ///
     /// # Errors
-    /// As [`from_mjcf`](Self::from_mjcf).
+    /// The errors of [`from_mjcf`](Self::from_mjcf).
     #[doc(hidden)]
     pub fn from_mjcf_text(text: &str, path: impl AsRef<Path>, options: &MjcfOptions) -> Result<Self, Error> {
         let mut files = Files::new(Known::new(ELEMENTS));
@@ -150,13 +156,13 @@ impl Model {
     }
 }
 
-/// A file with settings of its own.
+/// A file with its own settings.
 struct Source<'a> {
     root: &'a Element,
     compiler: Compiler,
     defaults: Defaults<'a>,
     assets: Assets<'a>,
-    /// The folder of the file; a string has none.
+    /// Folder of the file; `None` for a string.
     #[cfg_attr(not(feature = "meshes"), allow(dead_code))]
     folder: Option<&'a Path>,
 }
@@ -190,19 +196,19 @@ fn model(files: &Files, options: &MjcfOptions) -> Result<Model, Error> {
 
 struct Reader<'a> {
     options: &'a MjcfOptions,
-    /// m/s².
+    /// Gravity (m/s²).
     gravity: Vec3<f64>,
-    /// The files with settings of their own, the main one first.
+    /// Files with their own settings, the main one first.
     sources: &'a [Source<'a>],
-    /// The number of bodies so far: MuJoCo's number of the last one.
+    /// Number of bodies so far, which is MuJoCo's index of the last one.
     bodies: usize,
-    /// The elements that have names, by kind and name.
+    /// Named elements, by kind and name.
     names: HashMap<(&'static str, String), &'a Element>,
     joints: Joints<'a>,
-    /// Pose in the world that the file has drawn, for each body of the builder.
+    /// Pose of each body of the builder in the world, in the initial configuration of the file.
     poses: Vec<Se3<f64>>,
     solids: Solids,
-    /// The mass of all bodies so far (kg).
+    /// Mass of all bodies so far (kg).
     mass: f64,
     /// Named frames and cameras so far.
     placed: Vec<Placed<'a>>,
@@ -240,7 +246,7 @@ impl<'a> Reader<'a> {
         Ok(model)
     }
 
-    /// The settings of the file that an element is from.
+    /// Returns the settings of the file that contains an element.
     fn source(&self, element: &Element) -> &'a Source<'a> {
         &self.sources[element.source]
     }
@@ -249,12 +255,12 @@ impl<'a> Reader<'a> {
         &self.source(element).compiler
     }
 
-    /// The element with the defaults of its class or, failing one, of the class around it.
+    /// Returns the element with the defaults of its class, or of the surrounding class if it names no class.
     fn of(&self, element: &'a Element, around: &'a str) -> Result<Attributes<'a>, Error> {
         self.source(element).defaults.of(element, around)
     }
 
-    /// The element's own name, or one that nobody has.
+    /// Returns the element's name, or a name that is not yet used.
     fn name(&mut self, kind: &'static str, element: &'a Element, otherwise: &str) -> Result<String, Error> {
         let own = element.attribute("name").filter(|n| !n.is_empty());
         let mut name = own.unwrap_or(otherwise).to_owned();

@@ -1,4 +1,4 @@
-//! Robots from SDF, the format of Gazebo: kinematics, inertias, limits, springs, loops.
+//! Reader of SDF, the format of Gazebo: kinematics, inertias, limits, springs, loops.
 
 mod convert;
 mod include;
@@ -23,75 +23,83 @@ use include::Includes;
 use reader::Reader;
 use std::path::{Path, PathBuf};
 
-/// Options of reading an SDF.
+/// Options for reading an SDF.
 #[derive(Clone, Debug, Default)]
 pub struct SdfOptions {
-    /// Joint between the world and each root link, a link that no joint carries. The first is named `root_joint`, the others
-    /// `root_joint#2` and so on. None fixes root links to the world.
+    /// Joint between the world and each root link, which is a link that no joint carries. The first joint is named
+    /// `root_joint`, the others `root_joint#2` and so on. `None` fixes root links to the world.
     pub root_joint: Option<Joint>,
     /// Whether a warning ([`Model::warnings`]) is an error.
     pub strict: bool,
-    /// Kinds of warnings that are no errors, though `strict` is set.
+    /// Kinds of warnings that are not errors, even if `strict` is set.
     pub allow: Vec<WarningKind>,
-    /// Folders that contain packages or models, or are one, for `package://` and `model://` addresses; see
+    /// Folders that contain packages or models, or are one themselves, for `package://` and `model://` addresses; see
     /// [`UrdfOptions`](crate::UrdfOptions).
     pub packages: Vec<PathBuf>,
     /// Whether an axis with a `<mimic>` follows another one ([`Mimic`](crate::Mimic)), instead of being free.
     pub mimic: bool,
-    /// Name of the one model to read. None reads all models of the file into one robot.
+    /// Name of the only model to read. `None` reads all models of the file into one robot.
     pub model: Option<String>,
 }
 
 impl Model {
-    /// Reads an SDF file, of version 1.0 or 1.2 to 1.12.
+    /// Reads an SDF file of version 1.0 or 1.2 to 1.12.
     ///
-    /// An older version is converted by the rules of the format's own library. Up to 1.4 an axis is in the model's frame, up
-    /// to 1.6 in the joint's frame unless `use_parent_model_frame` is true; later ones are `expressed_in` a frame.
+    /// An older version is converted by the rules of the format's own library. Up to version 1.4 an axis is in the
+    /// model's frame. Up to 1.6 it is in the joint's frame, unless `use_parent_model_frame` is true. In later versions
+    /// it is `expressed_in` a frame.
     ///
-    /// **Models.** All models of a file, or of its first world, become one robot; [`SdfOptions::model`] names one instead. The
-    /// names of several models begin with the model's name: `robot::arm`. Names in nested models do, too. An `<include>` is
-    /// replaced by its model. Its address may be a path, relative to the file, or begin with `model://`, `package://` or
-    /// `file://`. Models are looked for in [`SdfOptions::packages`], in the folder of the file, those around it and their
-    /// `models`, and in the folders that GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH, SDF_PATH, GAZEBO_MODEL_PATH and ROS's variables list. A
-    /// model of a world that cannot be found is left out, with a warning; elsewhere it is an error.
+    /// **Models.** All models of a file, or of its first world, become one robot; [`SdfOptions::model`] selects one
+    /// instead. If there are several models, all names begin with the name of the model: `robot::arm`. So do names in
+    /// nested models. An `<include>` is replaced by its model. Its address may be a path relative to the file, or begin
+    /// with `model://`, `package://` or `file://`. Models are searched in:
+    /// - [`SdfOptions::packages`];
+    /// - the folder of the file, the folders above it, and the folder `models` in each of these;
+    /// - the folders listed in GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH, SDF_PATH, GAZEBO_MODEL_PATH and ROS's
+    ///   variables.
     ///
-    /// **Tree.** Joints are walked breadth first, in the order of the file: from the world, then from each root link. A joint
-    /// whose parent is met in no other way is walked from its child: its position stays the same, but for a ball. Links that
-    /// are joined to the world, the links of static models, and root links without a root joint stand where the file puts
-    /// them. With a root joint, q is the pose of the root link in the world.
+    /// If a model of a world is not found, it is left out with a warning; elsewhere this is an error.
     ///
-    /// **Loops.** A joint that would give a link a second parent closes a loop. It becomes a constraint of its name in
-    /// [`constraints`](Self::constraints). A fixed joint holds two frames together and a ball two points. A revolute joint
-    /// holds two points, 1 m apart on its axis; the second constraint is called `name#2`. Their six rows repeat one: solve them
-    /// with a damping. Of a universal joint only the point is held. Prismatic joints and screws are left out. A gearbox
-    /// becomes a coupling of two joints. What is not held is reported in [`warnings`](Self::warnings).
+    /// **Tree.** Joints are visited breadth first, in the order of the file: from the world, then from each root link.
+    /// If the parent of a joint cannot be reached otherwise, the joint is visited from its child. Its position stays
+    /// the same, except for a ball joint. Links that are joined to the world, links of static models, and root links
+    /// without a root joint stay at their poses in the file. With a root joint, q is the pose of the root link in the
+    /// world.
     ///
-    /// **Joints.** `revolute` has one number, limits or not ([`Joint::Revolute`]); `continuous` has q = [cos, sin], as
-    /// in a URDF; `ball` is [`Joint::Spherical`]; `universal` and `revolute2` become two revolute joints, the first
-    /// called `name#1`, with a body `child#1` between them. `screw` is [`Joint::Helical`], by its `screw_thread_pitch`
-    /// or the older `thread_pitch`. The body of the model sits at the joint's frame: the child link is a frame
-    /// ([`FrameKind::Link`](crate::FrameKind::Link)) apart from it by the joint's `<pose>`. Siblings are numbered in the order
-    /// of the file. Damping, friction and springs are stored; Drake's `drake:rotor_inertia` and `drake:gear_ratio` give the
-    /// armature.
+    /// **Loops.** A joint that would give a link a second parent closes a loop. It becomes a constraint with its name
+    /// in [`constraints`](Self::constraints). A fixed joint constrains two frames, and a ball joint two points. A
+    /// revolute joint constrains two points, 1 m apart on its axis; the second constraint is named `name#2`. One of its
+    /// six rows is redundant, so solve them with a damping. For a universal joint only the point is constrained.
+    /// Prismatic and screw joints are left out. A gearbox becomes a coupling of two joints. Motions that are not
+    /// constrained are reported in [`warnings`](Self::warnings).
+    ///
+    /// **Joints.** `revolute` has one coordinate, with or without limits ([`Joint::Revolute`]). `continuous` has q =
+    /// [cos, sin], as in a URDF. `ball` is [`Joint::Spherical`]. `universal` and `revolute2` become two revolute
+    /// joints, the first named `name#1`, with a body `child#1` between them. `screw` is [`Joint::Helical`], with its
+    /// `screw_thread_pitch` or the older `thread_pitch`. The frame of the model's body is the joint's frame; the child
+    /// link is a separate frame ([`FrameKind::Link`](crate::FrameKind::Link)), which differs from it by the joint's
+    /// `<pose>`. Siblings are numbered in the order of the file. Damping, friction and springs are stored. Drake's
+    /// `drake:rotor_inertia` and `drake:gear_ratio` determine the armature.
     ///
     /// **Poses** may be `relative_to` links, joints, frames and models. `<frame>`s and nested models become
     /// [`FrameKind::User`](crate::FrameKind::User).
     ///
-    /// **Inertias.** A link without `<inertial>` has SDF's 1 kg and 1 kg m², and a warning. With `auto="true"` the inertia is
-    /// that of the collision shapes: boxes, spheres, ellipsoids, cylinders, cones and capsules. The weight of a link without
-    /// `<gravity>` is carried: [`gravity_compensation`](Self::gravity_compensation).
+    /// **Inertias.** A link without `<inertial>` has SDF's default of 1 kg and 1 kg m², and a warning. With
+    /// `auto="true"` the inertia is computed from the collision shapes: boxes, spheres, ellipsoids, cylinders, cones
+    /// and capsules. The weight of a link whose `<gravity>` is false is compensated:
+    /// [`gravity_compensation`](Self::gravity_compensation).
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and what
-    /// [`ModelBuilder::build`](crate::ModelBuilder::build) finds. What a file may have at most stands at the
-    /// [beginning](crate#limits-of-files).
+    /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and the
+    /// errors of [`ModelBuilder::build`](crate::ModelBuilder::build). The limits of files are listed in the [crate
+    /// documentation](crate#limits-of-files).
     pub fn from_sdf(path: impl AsRef<Path>, options: &SdfOptions) -> Result<Self, Error> {
         let mut includes = Includes::new(&options.packages);
         let root = includes.file(path.as_ref(), 1)?;
         model(&root, includes, options)
     }
 
-    /// Reads an SDF from a string; see [`from_sdf`](Self::from_sdf). It includes no files by relative paths.
+    /// Reads an SDF from a string, which cannot include files by relative paths; see [`from_sdf`](Self::from_sdf).
     ///
     /// ```
     /// use condyle_model::{Model, SdfOptions};
@@ -111,7 +119,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// As [`from_sdf`](Self::from_sdf).
+    /// The errors of [`from_sdf`](Self::from_sdf).
     pub fn from_sdf_str(text: &str, options: &SdfOptions) -> Result<Self, Error> {
         let mut includes = Includes::new(&options.packages);
         let root = includes.string(text)?;
@@ -119,7 +127,7 @@ impl Model {
     }
 }
 
-/// Builds the robot of a file, all of whose includes are in their places.
+/// Builds the robot of a file whose includes are already replaced.
 fn model(root: &Element, includes: Includes, options: &SdfOptions) -> Result<Model, Error> {
     let Includes { mut warnings, missing, .. } = includes;
     let (world, others) = (root.child("world"), root.all("world").skip(1));

@@ -1,4 +1,4 @@
-//! Positions with names, from SRDF: MoveIt's description of what a robot's groups of joints are for.
+//! Named positions from SRDF, MoveIt's description of the semantics of a robot.
 
 use super::known::Known;
 use super::xml::{Amount, Element, numbers};
@@ -10,7 +10,7 @@ use crate::model::Model;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Table of [`Known`]: MoveIt's elements, and those of Pinocchio and HPP.
+/// Table of [`Known`]: elements of MoveIt, Pinocchio and HPP.
 const KNOWN: &str = "\
 robot: name version ; group* group_state end_effector* virtual_joint* passive_joint* disable_collisions* enable_collisions* \
     disable_default_collisions* link_sphere_approximation* joint_property* chain_property* rotor_params* gripper* handle* \
@@ -19,22 +19,23 @@ group_state: name group ; joint
 joint: name value
 ";
 
-/// The most `<group_state>`s that a file may have: each is as many numbers as a position of the robot has.
+/// Maximum number of `<group_state>`s in a file; chosen because each one is stored as a whole position of the robot.
 const MAX_STATES: usize = 4096;
 
 impl Model {
     /// Reads the named positions of an SRDF file, its `<group_state>`s: (name, q) in the order of the file.
     ///
-    /// A `<joint>` of a state has as many numbers as q has for it, or the angle if it turns without limits; joints that are not
-    /// mentioned stay as in [`neutral`]. States of one name, such as `home` of an arm and of its hand, are one position. An SRDF
-    /// is often shared by robots with fewer joints: those that this one has not are passed over, or errors if `strict`. Joints
-    /// that follow others have no number of their own. All else in the file (groups, pairs that cannot collide, …) is ignored:
-    /// names that are unknown, misspelt or misplaced too, unless `strict`.
+    /// A `<joint>` of a state has as many numbers as q has for it, or one angle if the joint is continuous. Joints that
+    /// are not mentioned stay as in [`neutral`]. States with the same name, such as `home` of an arm and of its hand,
+    /// form one position. An SRDF is often shared by robots with fewer joints: joints that this robot does not have are
+    /// ignored, or are errors if `strict`. Joints that follow others do not have their own number. All other elements
+    /// of the file (groups, pairs that cannot collide, …) are ignored. Unknown, misspelt or misplaced names are ignored
+    /// too, unless `strict`.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Xml`] and [`Error::Element`], with file, line and element: what is no number, more or fewer
-    /// numbers than a joint has, rotations whose length is not 1. [`Error::Strict`]: an unknown name, if `strict`. What a file may have at most stands at the
-    /// [beginning](crate#limits-of-files).
+    /// [`Error::File`], [`Error::Xml`] and [`Error::Element`], with file, line and element: invalid numbers, a wrong
+    /// number of numbers for a joint, rotations whose length is not 1. [`Error::Strict`]: an unknown name, if `strict`.
+    /// The limits of files are listed in the [crate documentation](crate#limits-of-files).
     pub fn reference_configurations(
         &self,
         path: impl AsRef<Path>,
@@ -45,7 +46,8 @@ impl Model {
         self.group_states(&Element::parse(&text, &path.display().to_string(), &mut amount)?, strict)
     }
 
-    /// Reads the named positions of an SRDF from a string; see [`reference_configurations`](Self::reference_configurations).
+    /// Reads the named positions of an SRDF from a string; see
+    /// [`reference_configurations`](Self::reference_configurations).
     ///
     /// ```
     /// let arm = condyle_model::robots::arm7();
@@ -58,7 +60,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// As [`reference_configurations`](Self::reference_configurations).
+    /// The errors of [`reference_configurations`](Self::reference_configurations).
     pub fn reference_configurations_str(&self, text: &str, strict: bool) -> Result<Vec<(String, Vec<f64>)>, Error> {
         self.group_states(&Element::parse(text, "<string>", &mut Amount::default())?, strict)
     }
@@ -106,7 +108,7 @@ impl Model {
     }
 }
 
-/// Sets what a `<joint>` of a state says; a joint that follows another one has no position of its own.
+/// Sets the position of a joint from a `<joint>` of a state, unless the joint follows another one.
 fn set(body: &Body, element: &Element, q: &mut [f64]) -> Result<(), Error> {
     let x = numbers(text(element, "value")?).map_err(|what| element.wrong(format!("value: {what}")))?;
     if body.mimic.is_some() {
@@ -124,7 +126,7 @@ fn set(body: &Body, element: &Element, q: &mut [f64]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The text of an attribute that must be there.
+/// Returns the text of a required attribute.
 fn text<'a>(element: &'a Element, attribute: &str) -> Result<&'a str, Error> {
     let text = element.attribute(attribute).filter(|text| !text.trim().is_empty());
     text.ok_or_else(|| element.wrong(format!("has no {attribute}")))

@@ -1,4 +1,4 @@
-//! Robots from URDF: kinematics, inertias, limits. Meshes are never looked at.
+//! Reader of URDF: kinematics, inertias, limits. It never opens meshes.
 
 mod elements;
 mod joints;
@@ -19,55 +19,58 @@ use crate::warning::WarningKind;
 use reader::Reader;
 use std::path::{Path, PathBuf};
 
-/// Options of reading a URDF.
+/// Options for reading a URDF.
 #[derive(Clone, Debug, Default)]
 pub struct UrdfOptions {
-    /// The joint between the world and the root link, named `root_joint` (`root_joint_2`, … where the file has a joint of that
-    /// name); none fixes the root link to the world.
+    /// Joint between the world and the root link, named `root_joint`, or `root_joint_2`, … if the file has a joint of
+    /// that name. `None` fixes the root link to the world.
     pub root_joint: Option<Joint>,
-    /// Whether joints with a `<mimic>` share the coordinate of the joint they follow, instead of having their own; see
+    /// Whether joints with a `<mimic>` share the coordinate of their leader, instead of having their own; see
     /// [`Mimic`](crate::Mimic).
     pub mimic: bool,
     /// Whether a warning ([`Model::warnings`]) is an error.
     pub strict: bool,
-    /// Kinds of warnings that are no errors, though `strict` is set.
+    /// Kinds of warnings that are not errors, even if `strict` is set.
     pub allow: Vec<WarningKind>,
-    /// Folders that have packages in them, or are packages, for `package://` addresses; before those that the
-    /// environment names in `ROS_PACKAGE_PATH` and, with `/share` behind them, in `AMENT_PREFIX_PATH`.
+    /// Folders that contain packages, or are packages, for `package://` addresses. They are searched before the folders
+    /// in the environment variable `ROS_PACKAGE_PATH`, and before `/share` in the folders of `AMENT_PREFIX_PATH`.
     pub packages: Vec<PathBuf>,
     /// Arguments of a file whose name ends in `.xacro`, by name and value (`name:=value`).
     pub arguments: Vec<(String, String)>,
 }
 
 impl Model {
-    /// Reads a URDF file, given by its path or as `package://name/path/in/the/package`
-    /// ([`UrdfOptions::packages`]).
+    /// Reads a URDF file, given by its path or as `package://name/path/in/the/package` ([`UrdfOptions::packages`]).
     ///
-    /// Fixed joints are merged into the body that they sit on and stay as frames; siblings are numbered in the order of
-    /// their joints' names (bytes), as Pinocchio does. Versions 1.0 to 1.2 are read; where there is none, 1.0, in which an
-    /// `<origin>` has no quaternion.
+    /// The child of a fixed joint is merged into the body that carries the joint, and stays as a frame. Siblings are
+    /// numbered in the order of their joints' names (bytes), as in Pinocchio. Versions 1.0 to 1.2 are supported. A file
+    /// without a version has version 1.0, in which an `<origin>` has no quaternion.
     ///
-    /// - A planar joint moves in the plane normal to its axis, 1 0 0 if it is missing, as the format and Drake have it: the z of
-    ///   its frame is the axis, by the shortest rotation. Pinocchio's plane is always normal to z.
-    /// - A revolute or prismatic joint needs a limit with effort and velocity. A continuous one may have either. A negative effort
-    ///   or velocity is no limit, and neither are position limits in reverse order; both warn.
-    /// - A `<transmission>` with a rotor's inertia J (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a reduction n
-    ///   (`mechanicalReduction`, `drake:gear_ratio`) gives armature n² J. A reduction alone warns.
-    /// - Drake's `<frame>`s are frames, its joints `ball`, `screw` and `planar` are joints.
+    /// - A planar joint moves in the plane normal to its axis, as the format and Drake define it; a missing axis is 1 0
+    ///   0. The z axis of its frame is rotated to the axis by the shortest rotation. Pinocchio's plane is always normal
+    ///   to z.
+    /// - A revolute or prismatic joint needs a limit with effort and velocity. A continuous joint may have either. A
+    ///   negative effort or velocity is not a limit, and neither are position limits in reverse order; both cause a
+    ///   warning.
+    /// - A `<transmission>` with a rotor's inertia J (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a
+    ///   reduction n (`mechanicalReduction`, `drake:gear_ratio`) results in the armature n² J. A reduction alone causes
+    ///   a warning.
+    /// - Drake's `<frame>`s become frames; its joints `ball`, `screw` and `planar` are supported.
     ///
-    /// A name that is unknown, misspelt or misplaced is a warning, and so is all that a model cannot hold
-    /// ([`Model::warnings`]). Shapes,
-    /// materials, sensors, controllers, calibrations, soft limits of a `<safety_controller>` and entries of `<gazebo>` about
-    /// contact, looks and numerics have no effect and no warning; the meshes that are named need not be there.
+    /// An unknown, misspelt or misplaced name causes a warning, and so does each feature that a model cannot represent
+    /// ([`Model::warnings`]). Some elements are ignored without a warning: shapes, materials, sensors, controllers,
+    /// calibrations, soft limits of a `<safety_controller>`, and entries of `<gazebo>` about contact, looks and
+    /// numerics. Mesh files need not exist.
     ///
-    /// A file whose name ends in `.xacro` is expanded first: by the program `xacro`, or else `xacrodoc`, which must be installed and
-    /// may take a minute. It gets [`UrdfOptions::arguments`] and the folders of packages (`ROS_PACKAGE_PATH`). xacro evaluates
-    /// expressions of Python: expand files of those only whom you trust. Lines in messages are those of the expanded text.
+    /// A file whose name ends in `.xacro` is expanded first, by the program `xacro` or else `xacrodoc`. One of them
+    /// must be installed; it may take a minute. It receives [`UrdfOptions::arguments`] and the folders of packages
+    /// (`ROS_PACKAGE_PATH`). xacro evaluates Python expressions, so expand only files that you trust. Line numbers in
+    /// messages refer to the expanded text.
     ///
     /// # Errors
-    /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), and what
-    /// [`ModelBuilder::build`](crate::ModelBuilder::build) finds. What a file may have at most stands at the
-    /// [beginning](crate#limits-of-files).
+    /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), and the
+    /// errors of [`ModelBuilder::build`](crate::ModelBuilder::build). The limits of files are listed in the [crate
+    /// documentation](crate#limits-of-files).
     pub fn from_urdf(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Self, Error> {
         let path = files::locate(path.as_ref(), &options.packages)?;
         let name = path.display().to_string();
@@ -80,14 +83,14 @@ impl Model {
         Reader::new(&Element::parse(&text, &name, &mut amount)?)?.model(options)
     }
 
-    /// Returns the URDF of a file of xacro.
+    /// Returns the URDF that a xacro file expands to.
     #[doc(hidden)]
     pub fn expand_xacro(path: &Path, options: &UrdfOptions) -> Result<String, Error> {
-        Amount::default().read(path)?; // a file that can be one
+        Amount::default().read(path)?; // checks size and kind of the file
         xacro::expand(path, &options.arguments, &options.packages)
     }
 
-    /// Reads a URDF from a string, which errors and warnings call by the name of a file.
+    /// Reads a URDF from a string; `file` is its name in errors and warnings.
     #[doc(hidden)]
     pub fn from_urdf_text(text: &str, file: &str, options: &UrdfOptions) -> Result<Self, Error> {
         Reader::new(&Element::parse(text, file, &mut Amount::default())?)?.model(options)
@@ -111,14 +114,14 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// As [`from_urdf`](Self::from_urdf).
+    /// The errors of [`from_urdf`](Self::from_urdf).
     pub fn from_urdf_str(text: &str, options: &UrdfOptions) -> Result<Self, Error> {
         check_arguments("<string>", options)?;
         Self::from_urdf_text(text, "<string>", options)
     }
 }
 
-/// Refuses arguments for a file that has no use for them.
+/// Returns an error if there are arguments for a file that is not xacro.
 fn check_arguments(file: &str, options: &UrdfOptions) -> Result<(), Error> {
     let what = || "has arguments of xacro, but its name does not end in `.xacro`".to_owned();
     if options.arguments.is_empty() { Ok(()) } else { Err(Error::File { file: file.to_owned(), what: what() }) }

@@ -1,9 +1,9 @@
-//! Robots written into a copy of their file: inertias, limits, losses and armature. All else stays byte for byte.
+//! Writing of robots into a copy of their file: inertias, limits, losses and armature. All other bytes are kept.
 //!
-//! A format edits the text of the original at the elements that differ. The new text is then read again: the reader is the
-//! judge of what a file says. Where other elements have a share (links that fixed joints merge, the armature of an
-//! actuator), the share is the difference between the number written and the number read. It is taken off once. A file that
-//! then does not give the model back is not written.
+//! A format edits the original text at the elements that differ. Then the new text is read again, because only the
+//! reader defines what a file means. Other elements may contribute to a number: links that fixed joints merge, or the
+//! armature of an actuator. Their contribution is the difference between the number written and the number read; it is
+//! subtracted once. If the file then does not reproduce the model, it is not written.
 
 mod changes;
 mod edits;
@@ -20,26 +20,27 @@ use edits::Edits;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Files of one kind: how they are read, and where their numbers stand.
+/// File format: its reader, and the elements that contain its numbers.
 trait Format {
-    /// Reads a text that stands in the place of the original.
+    /// Reads a text instead of the original file.
     fn read(&self, text: &str) -> Result<Model, Error>;
-    /// Returns the mass of each link that the file gives an inertia (kg), by the link's name.
+    /// Returns the mass (kg) of each link for which the file specifies an inertia, by name.
     fn masses(&self, root: &Element) -> HashMap<String, f64>;
     /// Edits the elements of a text.
     fn edit(&self, edits: &mut Edits, root: &Element, changes: &Changes) -> Result<(), String>;
 }
 
 impl Model {
-    /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the URDF `original`, and all else
-    /// of the file as it is there.
+    /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the URDF `original`. The
+    /// rest of the file is copied.
     ///
-    /// Only what differs from the original is edited, so an unchanged robot gives the same bytes. `original` may be `path`.
-    /// Reading the new file gives this model back, up to rounding.
+    /// Only numbers that differ from the original are edited, so an unchanged robot results in the same bytes.
+    /// `original` may be `path`. Reading the new file reproduces this model, up to rounding.
     ///
-    /// A body of several links, merged by fixed joints, has their sum. The link that its joint carries takes all of the
-    /// difference; if that link has no mass, the heaviest one does. If that would leave it an inertia that no body has, or
-    /// less than a thousandth of the body's mass, it takes the whole inertia and the others get none.
+    /// The inertia of a body is the sum over its links, which fixed joints merge. The link that the body's joint
+    /// carries takes the whole difference; if that link has no mass, the heaviest link does. The result must be a
+    /// physical inertia with at least a thousandth of the body's mass. Otherwise this link takes the whole inertia and
+    /// the others get none.
     ///
     /// ```
     /// use condyle_model::{Model, UrdfOptions, robots};
@@ -55,12 +56,13 @@ impl Model {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
-    /// An armature is written as the rotor inertia of the joint's `<transmission>`, in the words of Drake.
+    /// An armature is written as the rotor inertia of the joint's `<transmission>`, with Drake's tags.
     ///
     /// # Errors
-    /// [`Error::File`], with the thing and both numbers, if the file cannot say it or the two are different robots: joints,
-    /// frames and gravity must be those of the original. A URDF has one number for the efforts in both directions, and no
-    /// infinite limits. The file must be in UTF-8, and no xacro. Errors of [`from_urdf`](Self::from_urdf).
+    /// [`Error::File`], with the quantity and both numbers, if the file cannot represent it or the robots are
+    /// different. Joints, frames and gravity must be equal to the original's. A URDF has one number for the efforts in
+    /// both directions, and no infinite limits. The file must be in UTF-8, and must not be xacro. Also the errors of
+    /// [`from_urdf`](Self::from_urdf).
     pub fn write_urdf(&self, path: impl AsRef<Path>, original: impl AsRef<Path>) -> Result<(), Error> {
         let original = Original::read(original.as_ref())?;
         let root = urdf::root(&original.root).and_then(|root| self.bodies.iter().skip(1).find(|b| b.name == root));
@@ -69,29 +71,30 @@ impl Model {
         write(self, path.as_ref(), &original, &urdf::Urdf { options })
     }
 
-    /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the MJCF `original`, and all else
-    /// of the file as it is there; see [`write_urdf`](Self::write_urdf).
+    /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the MJCF `original`. The
+    /// rest of the file is copied; see [`write_urdf`](Self::write_urdf).
     ///
-    /// Attributes of elements go before those of their classes, so defaults stay as they are. A changed inertia is written
-    /// as an `<inertial>`, also where geoms gave it before. Limits of effort are written as `actuatorfrcrange` of the joint.
-    /// The weight that `gravcomp` carries is a factor of the mass, so it follows the new masses.
+    /// Attributes of elements override the attributes of their classes, so defaults stay unchanged. A changed inertia
+    /// is written as an `<inertial>`, even if geoms determined it before. Limits of effort are written as
+    /// `actuatorfrcrange` of the joint. The weight that `gravcomp` compensates is proportional to the mass, so it
+    /// follows the new masses.
     ///
     /// # Errors
-    /// As [`write_urdf`](Self::write_urdf). The file itself must have the bodies and joints that differ: those of an
-    /// included file, or made by `replicate` or `attach`, have no element to edit. An MJCF has no speed limits, and its
-    /// compiler must not replace inertias (`inertiafromgeom`) or scale them (`settotalmass`). Errors of
-    /// [`from_mjcf`](Self::from_mjcf).
+    /// The errors of [`write_urdf`](Self::write_urdf). The file itself must contain the bodies and joints that differ:
+    /// if they are in an included file, or made by `replicate` or `attach`, there is no element to edit. An MJCF has no
+    /// speed limits. Its compiler must not replace inertias (`inertiafromgeom`) or scale them (`settotalmass`). Also
+    /// the errors of [`from_mjcf`](Self::from_mjcf).
     pub fn write_mjcf(&self, path: impl AsRef<Path>, original: impl AsRef<Path>) -> Result<(), Error> {
         let original = Original::read(original.as_ref())?;
         let mimic = self.bodies.iter().any(|b| b.mimic.is_some());
         let mut format = mjcf::Mjcf { path: original.path, options: MjcfOptions { mimic, ..MjcfOptions::default() } };
-        // a mesh without a file has no mass
+        // meshes without a file get no mass
         format.options.weightless_meshes = format.read(&original.text).is_err();
         write(self, path.as_ref(), &original, &format)
     }
 }
 
-/// The file that is copied.
+/// The original file, which is copied.
 struct Original<'a> {
     path: &'a Path,
     text: String,
@@ -115,7 +118,7 @@ impl<'a> Original<'a> {
         Error::File { file: self.path.display().to_string(), what }
     }
 
-    /// Returns the text with other numbers.
+    /// Returns the original text with the changed numbers.
     fn edited(&self, format: &impl Format, changes: &Changes) -> Result<String, Error> {
         let mut edits = Edits::new(&self.text);
         format.edit(&mut edits, &self.root, changes).map_err(|what| self.wrong(what))?;

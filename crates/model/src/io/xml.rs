@@ -1,6 +1,6 @@
-//! XML as the readers want it: elements that know their file and line.
+//! XML as the readers need it: elements that know their file and line.
 //!
-//! The text is measured first, so that neither memory nor time nor the stack can be spent on it.
+//! The size of a text is checked first, so that it can exhaust neither memory, time nor the stack.
 
 mod encoding;
 mod parse;
@@ -16,35 +16,35 @@ use std::io::Read;
 use std::path::Path;
 use std::rc::Rc;
 
-/// The most bytes that the files of one robot may have together.
+/// Maximum number of bytes of all files of one robot together.
 const MAX_BYTES: usize = 64 << 20;
-/// The most tags that they may have together, each comment and each end of an element counted.
+/// Maximum number of tags of all files together; comments and end tags count, too.
 const MAX_TAGS: usize = 1 << 20;
-/// The most equals signs that they may have together: as many attributes, and memory for them.
+/// Maximum number of equals signs of all files together; it limits the number of attributes, and the memory for them.
 const MAX_EQUALS: usize = 1 << 22;
-/// The most attributes of an element.
+/// Maximum number of attributes of an element.
 const MAX_ATTRIBUTES: usize = 256;
-/// The most levels of nested elements: one level for each body of a chain in MJCF, and then some.
+/// Maximum depth of nested elements; chosen because a chain in MJCF needs one level for each body.
 pub(crate) const MAX_DEPTH: usize = 256;
 
-/// Element, with all that is in it. A prefix is part of a name (`gz:note`); declarations of prefixes are left out.
+/// Element with its content. A prefix is part of a name (`gz:note`); declarations of prefixes are dropped.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
     pub(crate) tag: String,
     pub(crate) attributes: Vec<(String, String)>,
     pub(crate) text: String,
     pub(crate) children: Vec<Element>,
-    /// Path, or `<string>`.
+    /// Path of the file, or `<string>`.
     pub(crate) file: Rc<str>,
-    /// Counted from 1.
+    /// Line number, from 1.
     pub(crate) line: u32,
     /// Byte index of its `<` in the text of the file.
     pub(crate) at: usize,
-    /// The index of the file with settings of its own that the element is from; 0 for the main one.
+    /// Index of the element's file, among the files with their own settings; 0 is the main file.
     pub(crate) source: usize,
 }
 
-/// The amount of text that has been read for one robot.
+/// Amount of text that has been read for one robot.
 #[derive(Default)]
 pub(crate) struct Amount {
     bytes: usize,
@@ -53,7 +53,7 @@ pub(crate) struct Amount {
 }
 
 impl Amount {
-    /// The text of a file, unless it is no regular file or too large.
+    /// Reads the text of a file; an error if it is not a regular file or too large.
     pub(crate) fn read(&self, path: &Path) -> Result<String, Error> {
         let wrong = |what: String| Error::File { file: path.display().to_string(), what };
         if let Some(text) = path.to_str().map(str::trim_start).filter(|text| text.starts_with('<')) {
@@ -63,7 +63,7 @@ impl Amount {
             return Err(Error::File { file, what: what.to_owned() });
         }
         let said = |e: std::io::Error| wrong(e.to_string());
-        // before it is opened: to open a pipe is to wait for its writer
+        // check this before opening, because opening a pipe waits for its writer
         let kind = std::fs::metadata(path).map_err(said)?;
         if !kind.is_file() {
             let found = if kind.is_dir() { "a folder" } else { "a device, pipe or socket" };
@@ -82,7 +82,7 @@ impl Amount {
         Ok(encoding::decode(bytes))
     }
 
-    /// Counts copies of an element that a file asks for, as if they stood in it.
+    /// Counts copies of an element that a file requests, as if the file contained them.
     pub(crate) fn add_copies(&mut self, element: &Element, count: usize) -> Result<(), Error> {
         let (mut tags, mut equals, mut waiting) = (0usize, 0usize, vec![element]);
         while let Some(e) = waiting.pop() {
@@ -99,7 +99,7 @@ impl Amount {
         Ok(())
     }
 
-    /// Counts what is in a text, and says which limit it is above.
+    /// Counts bytes, tags and equals signs of a text; the error names the exceeded limit.
     fn add(&mut self, text: &str) -> Result<(), String> {
         let (bytes, count) = (text.as_bytes(), |byte| count(text.as_bytes(), byte));
         (self.bytes, self.tags, self.equals) =
@@ -120,7 +120,7 @@ fn too_many(found: u64, what: &str, limit: usize) -> String {
 }
 
 impl Model {
-    /// Reads the text of a robot's file, in any of the encodings that its readers know.
+    /// Reads the text of a robot's file, in any encoding that the readers support.
     ///
     /// # Errors
     /// [`Error::File`].
@@ -131,7 +131,7 @@ impl Model {
 }
 
 impl Element {
-    /// The root element of a text.
+    /// Parses the root element of a text.
     pub(crate) fn parse(text: &str, file: &str, amount: &mut Amount) -> Result<Self, Error> {
         amount.add(text).map_err(|what| Error::File { file: file.to_owned(), what })?;
         if is_path(text) {
@@ -153,7 +153,7 @@ impl Element {
         self.children.iter().filter(move |c| c.tag == tag)
     }
 
-    /// For example ``joint `elbow` ``.
+    /// Returns a name for messages, for example ``joint `elbow` ``.
     pub(crate) fn label(&self) -> String {
         match self.attribute("name").filter(|n| !n.is_empty()) {
             Some(name) => format!("{} `{name}`", self.tag),
@@ -161,12 +161,12 @@ impl Element {
         }
     }
 
-    /// An error that names this element.
+    /// Returns an error that names this element.
     pub(crate) fn wrong(&self, what: impl Into<String>) -> Error {
         self.wrong_inside(self, what)
     }
 
-    /// Returns the model that was read from this root, unless it has a warning that a strict reader does not allow.
+    /// Returns the model that was read from this root; an error if the reader is strict and a warning is not allowed.
     pub(crate) fn accepted(&self, model: Model, is_strict: bool, allow: &[WarningKind]) -> Result<Model, Error> {
         match model.warnings.iter().find(|warning| !allow.contains(&warning.kind())) {
             Some(warning) if is_strict => Err(Error::Strict { file: self.file.to_string(), warning: warning.clone() }),
@@ -174,52 +174,52 @@ impl Element {
         }
     }
 
-    /// Returns the position of this element.
+    /// Returns file and line of this element.
     pub(crate) fn place(&self) -> Place {
         Place { file: self.file.to_string(), line: self.line }
     }
 
-    /// Returns the warning of an unknown, misspelt or misplaced name in this element.
+    /// Returns a warning about an unknown, misspelt or misplaced name in this element.
     pub(crate) fn unknown(&self, what: impl Into<String>) -> Warning {
         Warning::Unknown { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns the warning of something in this element that a model cannot hold.
+    /// Returns a warning about a feature of this element that a model cannot represent.
     pub(crate) fn left_out(&self, what: impl Into<String>) -> Warning {
         Warning::LeftOut { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// As [`left_out`](Self::left_out), at the line of something inside this element.
+    /// Returns a warning as [`left_out`](Self::left_out) does, with the line of an element inside this one.
     pub(crate) fn left_out_inside(&self, inside: &Self, what: impl Into<String>) -> Warning {
         Warning::LeftOut { place: inside.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns the warning of a default that is taken where this element says nothing.
+    /// Returns a warning about a default that is used because this element does not specify a value.
     pub(crate) fn assumed(&self, what: impl Into<String>) -> Warning {
         Warning::Assumed { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns the warning of a joint that could follow another one and is left free.
+    /// Returns a warning about a joint that could follow another one but is left free.
     pub(crate) fn mimic(&self, what: impl Into<String>) -> Warning {
         Warning::Mimic { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// An error that names this element, and the line of one inside it.
+    /// Returns an error that names this element, and the line of an element inside it.
     pub(crate) fn wrong_inside(&self, inside: &Self, what: impl Into<String>) -> Error {
         Error::Element { file: inside.file.to_string(), line: inside.line, element: self.label(), what: what.into() }
     }
 }
 
-/// What to do with the macros of xacro, which no reader expands.
+/// Advice about macros of xacro, which no reader expands.
 const EXPAND: &str = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
 
-/// Whether a text that was given as that of a robot is a path.
+/// Returns whether a text that was given instead of a robot's text is a path.
 fn is_path(text: &str) -> bool {
     let known = |extension: &OsStr| ["urdf", "xml", "mjcf", "sdf", "xacro"].iter().any(|known| extension == *known);
     !text.contains('<') && Path::new(text.trim()).extension().is_some_and(known)
 }
 
-/// Finite numbers with spaces between them.
+/// Parses finite numbers separated by spaces.
 pub(crate) fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite());
     let wrong = |word: &str| match word.contains("${") {
@@ -229,7 +229,7 @@ pub(crate) fn numbers(text: &str) -> Result<Vec<f64>, String> {
     text.split_whitespace().map(|w| number(w).ok_or_else(|| wrong(w))).collect()
 }
 
-/// The numbers of a text: finite ones, as many as there must be.
+/// Parses exactly N finite numbers.
 pub(crate) fn array<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let x = numbers(text)?;
     <[f64; N]>::try_from(x).map_err(|x| {
@@ -238,13 +238,13 @@ pub(crate) fn array<const N: usize>(text: &str) -> Result<[f64; N], String> {
     })
 }
 
-/// A number that may be infinite, but is one.
+/// Parses a number that may be infinite but not NaN.
 pub(crate) fn bound(text: &str) -> Result<f64, String> {
     let x: Option<f64> = text.trim().parse().ok().filter(|x: &f64| !x.is_nan());
     x.ok_or_else(|| format!("`{}` is no number", text.trim()))
 }
 
-/// Numbers as they stand in a file.
+/// Writes numbers separated by spaces, as in a file.
 pub(crate) fn words(numbers: &[f64]) -> String {
     numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }

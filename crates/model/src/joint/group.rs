@@ -1,4 +1,4 @@
-//! The group of a joint's positions: `q ⊕ δ` is its exponential, with δ in the body's frame.
+//! Lie group of a joint's positions: `q ⊕ δ` multiplies by the exponential of δ, with δ in the body's frame.
 
 use super::{Joint, rotated_about_z};
 use condyle_spatial::Quaternion;
@@ -6,7 +6,7 @@ use condyle_spatial::lie::{self, MotionMap};
 use condyle_spatial::{Motion, Scalar, Se3, Vec3};
 
 impl Joint {
-    /// The position that leaves the body at its joint's frame.
+    /// Sets the position at which the body is at its joint's frame.
     pub(crate) fn neutral(self, q: &mut [f64]) {
         q.fill(0.0);
         match self {
@@ -18,7 +18,7 @@ impl Joint {
         }
     }
 
-    /// The coordinates of the joint that are a vector of length 1.
+    /// Returns the range of coordinates that form a vector of length 1.
     pub(crate) fn unit_part(self) -> Option<core::ops::Range<usize>> {
         match self {
             Self::Continuous { .. } => Some(0..2),
@@ -29,7 +29,8 @@ impl Joint {
         }
     }
 
-    /// A position drawn uniformly: lengths and angles between their limits, rotations over the whole group.
+    /// Sets a uniformly distributed random position: lengths and angles between their limits, rotations over the whole
+    /// group.
     pub(crate) fn random(self, rng: &mut impl rand::Rng, lower: &[f64], upper: &[f64], q: &mut [f64]) {
         use rand::RngExt;
         for ((q, &lower), &upper) in q.iter_mut().zip(lower).zip(upper) {
@@ -51,7 +52,7 @@ impl Joint {
         }
     }
 
-    /// q ⊕ v: the position after moving with v for one unit of time.
+    /// Computes q ⊕ v: the position after moving with v for one unit of time.
     #[inline(always)]
     pub(crate) fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
         match self {
@@ -69,7 +70,7 @@ impl Joint {
             _ => {
                 let (R, p) = self.pose(q);
                 let (dR, dp) = lie::exp6(self.twist(v));
-                // of the quaternions r and −r, the one nearer to where it was
+                // of the quaternions r and −r, use the one that is nearer to q
                 let sign = S::select(dR.scalar.lt(S::zero()), -S::one(), S::one());
                 let dR = Quaternion { vector: dR.vector.scale(sign), scalar: dR.scalar * sign };
                 self.set_pose((R * dR).normalize(), p + R.to_rotation() * dp, out);
@@ -77,7 +78,7 @@ impl Joint {
         }
     }
 
-    /// q₁ ⊖ q₀: the v with q₀ ⊕ v = q₁.
+    /// Computes q₁ ⊖ q₀: the v with q₀ ⊕ v = q₁.
     pub(crate) fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
@@ -99,7 +100,8 @@ impl Joint {
         }
     }
 
-    /// A Jacobian of the joint's group, at tangent vector v, as a map of twists; `None` where it is the identity.
+    /// Returns a Jacobian of the joint's group at the tangent vector v, as a map of twists; `None` if it is the
+    /// identity.
     #[doc(hidden)]
     pub fn jacobian<S: Scalar>(self, which: GroupJacobian, v: &[S]) -> Option<MotionMap<S>> {
         if self.commutes() {
@@ -116,7 +118,7 @@ impl Joint {
         })
     }
 
-    /// The tangent vector as a twist of the body.
+    /// Converts a tangent vector to a twist of the body.
     #[inline(always)]
     fn twist<S: Scalar>(self, v: &[S]) -> Motion<S> {
         let mut m = [S::zero(); 6];
@@ -126,7 +128,7 @@ impl Joint {
         m.into()
     }
 
-    /// X_J(q) of the joints whose group is not commutative.
+    /// Returns X_J(q) of a joint whose group is not commutative.
     #[inline(always)]
     fn pose<S: Scalar>(self, q: &[S]) -> (Quaternion<S>, Vec3<S>) {
         match self {
@@ -140,7 +142,7 @@ impl Joint {
         }
     }
 
-    /// The inverse of `pose`.
+    /// Sets q to a pose; the inverse of `pose`.
     #[inline(always)]
     fn set_pose<S: Scalar>(self, R: Quaternion<S>, p: Vec3<S>, q: &mut [S]) {
         let (u, w) = (R.vector, R.scalar);
@@ -153,13 +155,13 @@ impl Joint {
     }
 }
 
-/// A Jacobian of a joint's group: those that integrating and taking differences need.
+/// Jacobian of a joint's group, for integration and differences.
 #[derive(Clone, Copy)]
 pub enum GroupJacobian {
-    /// ∂(q ⊕ v)/∂v.
+    /// Derivative ∂(q ⊕ v)/∂v.
     Exp,
-    /// ∂(q₁ ⊖ q₀)/∂q₁ at q₁ ⊖ q₀ = v.
+    /// Derivative ∂(q₁ ⊖ q₀)/∂q₁ at q₁ ⊖ q₀ = v.
     Log,
-    /// ∂(q ⊕ v)/∂q.
+    /// Derivative ∂(q ⊕ v)/∂q.
     Transport,
 }

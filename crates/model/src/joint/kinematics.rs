@@ -1,28 +1,28 @@
-//! Kinematics of joints: the placement and the motion of a body, and the efforts that a force exerts.
+//! Kinematics of joints: the placement and the motion of a body, and the joint efforts of a force.
 
 use super::turns::Turns;
 use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;
 use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, alike};
 
-/// The sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. What stands at other bodies, and behind the
-/// last one, has no meaning.
+/// Sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. Entries of other bodies, and entries after
+/// the last body, have no meaning.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct JointSinCos<S> {
-    /// Shape: bodies, in whole steps. Written by: `Joint::sin_cos`.
+    /// Sines. Shape: bodies, rounded up to whole steps. Written by: `Joint::sin_cos`.
     pub sin: Array<S>,
-    /// Shape: as sin. Written by: `Joint::sin_cos`.
+    /// Cosines. Shape: as sin. Written by: `Joint::sin_cos`.
     pub cos: Array<S>,
 }
 
 alike!(JointSinCos { sin, cos });
 
 impl<S: Scalar> JointSinCos<S> {
-    /// As many as are computed at once: two vectors.
+    /// Number of entries that are computed at once: two vectors.
     pub const STEP: usize = if S::LANES == 1 { 8 } else { 2 };
 
-    /// Allocates room for some bodies, the world included.
+    /// Allocates entries for a number of bodies, including the world.
     pub fn new(bodies: usize) -> Self {
         let n = bodies.next_multiple_of(Self::STEP);
         Self { sin: vec![S::zero(); n].into(), cos: vec![S::zero(); n].into() }
@@ -31,7 +31,7 @@ impl<S: Scalar> JointSinCos<S> {
 
 #[doc(hidden)]
 impl Joint {
-    /// The sine and cosine of the angle by which each joint turns about z, all of them at once.
+    /// Computes the sine and cosine of the angles of all joints that turn about z, at once.
     #[inline(always)]
     pub fn sin_cos<L: Layout>(l: &L, q: &[L::S], JointSinCos { sin, cos }: &mut JointSinCos<L::S>) {
         let (Turns { runs, followers, circles }, sin, cos) = (l.turns(), &mut sin[..], &mut cos[..]);
@@ -47,7 +47,7 @@ impl Joint {
         }
     }
 
-    /// The same of some joints, in their order.
+    /// Computes the sine and cosine of the angles of the given joints, in their order.
     #[inline(always)]
     pub fn sin_cos_of<L: Layout>(l: &L, joints: &[usize], q: &[L::S], sin: &mut [L::S], cos: &mut [L::S]) {
         for (k, &i) in joints.iter().enumerate() {
@@ -63,14 +63,14 @@ impl Joint {
         }
     }
 
-    /// The sine and cosine that stand in q.
+    /// Returns the sine and cosine that are stored in q.
     #[inline(always)]
     fn sin_cos_in<L: Layout>(l: &L, i: usize, q: &[L::S]) -> (L::S, L::S) {
         let at = if let Self::Planar = l.joint(i) { 2 } else { 0 };
         (l.position(q, i, at + 1), l.position(q, i, at))
     }
 
-    /// λXi = X_T X_J(q), for joint i of a pass.
+    /// Returns λXi = X_T X_J(q) for joint i of a pass.
     #[inline(always)]
     pub fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
         let (sin, cos) = match l.joint(i) {
@@ -81,13 +81,13 @@ impl Joint {
         Self::placement_with(l, i, q, sin, cos)
     }
 
-    /// λXi = X_T X_J(q), for joint i of a pass, whose sine and cosine are known.
+    /// Returns λXi = X_T X_J(q) for joint i of a pass, given its sine and cosine.
     #[inline(always)]
     pub fn placement_with<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         Self::placement_on(l, i, l.placement(i), q, sin, cos)
     }
 
-    /// X_T X_J(q), for any X_T.
+    /// Returns X_T X_J(q) for any X_T.
     #[inline(always)]
     pub fn placement_on<L: Layout>(l: &L, i: usize, X_T: Se3<L::S>, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         match l.joint(i) {
@@ -115,7 +115,7 @@ impl Joint {
         }
     }
 
-    /// S v of joint i in the body's frame, for the velocity or acceleration coordinates v.
+    /// Returns S v of joint i in the body's frame, for coordinates v of velocity or acceleration.
     #[inline(always)]
     pub fn motion<L: Layout>(l: &L, i: usize, v: &[L::S]) -> JointMotion<L::S> {
         match l.joint(i) {
@@ -135,7 +135,7 @@ impl Joint {
         }
     }
 
-    /// Sᵀ f of joint i, added to the coordinates τ.
+    /// Adds Sᵀ f of joint i to the coordinates τ.
     #[inline(always)]
     pub fn project<L: Layout>(l: &L, i: usize, f: Force<L::S>, tau: &mut [L::S]) {
         match l.joint(i) {

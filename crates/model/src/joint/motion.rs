@@ -1,15 +1,15 @@
-//! The motion of a joint, and how it adds to that of a body.
+//! Motion of a joint, and its addition to the motion of a body.
 
 use condyle_spatial::{Mat3, Motion, Scalar, Vec3};
 
-/// A joint's velocity S q̇ or acceleration S q̈ in the body's frame, in the form that costs least to compute with.
+/// Velocity S q̇ or acceleration S q̈ of a joint in the body's frame, in the form that is cheapest to compute with.
 #[derive(Clone, Copy)]
 pub enum JointMotion<S> {
-    /// About z.
+    /// Motion about z.
     Revolute(S),
-    /// Along z.
+    /// Motion along z.
     Prismatic(S),
-    /// Along several axes.
+    /// Motion along several axes.
     General(Motion<S>),
 }
 
@@ -26,20 +26,20 @@ impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
     }
 }
 
-/// The rotation of a body and the acceleration of its origin, as the equations of Newton and Euler need them.
+/// Rotation of a body and acceleration of its origin, as needed for the equations of Newton and Euler.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct ClassicalMotion<S> {
-    /// ω.
+    /// Angular velocity ω.
     pub w: Vec3<S>,
-    /// ω̇.
+    /// Angular acceleration ω̇.
     pub dw: Vec3<S>,
-    /// The classical acceleration of the origin.
+    /// Classical acceleration of the origin.
     pub a: Vec3<S>,
 }
 
 impl<S: Scalar> ClassicalMotion<S> {
-    /// K = ω̇× + ω× ω×: a point r of the body has the acceleration a + K r.
+    /// Returns K = ω̇× + ω× ω×: a point r of the body has the acceleration a + K r.
     #[inline(always)]
     pub fn centripetal(&self) -> Mat3<S> {
         let (w, dw, minus) = (self.w, self.dw, -self.w);
@@ -56,13 +56,13 @@ impl<S: Scalar> ClassicalMotion<S> {
 condyle_spatial::alike!(ClassicalMotion { w, dw, a });
 
 impl<S: Scalar> JointMotion<S> {
-    /// The motion with all its six numbers.
+    /// Returns all six numbers of the motion.
     #[inline(always)]
     fn motion(self) -> Motion<S> {
         Motion::zero() + self
     }
 
-    /// Adds a joint that moves with this velocity and with the acceleration aJ to what the body would do without it:
+    /// Returns the motion of a body, given its motion without the joint, and the joint's velocity and acceleration aJ:
     /// ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J.
     #[inline(always)]
     pub fn added_to(

@@ -1,23 +1,23 @@
-//! Joints that turn about z, and where their angles stand.
+//! Joints that turn about z, and the indices of their angles.
 
 use super::Joint;
 use alloc::vec::Vec;
 
-/// The joints that turn about z, found once, so that no pass looks at each.
+/// Joints that turn about z, collected once so that passes need not inspect each joint.
 #[derive(Clone, Debug, Default)]
 pub struct Turns {
-    /// Joints whose angles stand in q. Of some that follow each other, as their angles do: the first joint, the place of its
-    /// angle, and how many.
+    /// Runs of consecutive joints with consecutive angles in q: the first joint, the index of its angle, and the number
+    /// of joints.
     pub(super) runs: Vec<[usize; 3]>,
-    /// Joints whose angles are computed from those of others.
+    /// Joints whose angles are computed from the angles of other joints.
     pub(super) followers: Vec<usize>,
-    /// Joints whose cosines and sines stand in q.
+    /// Joints whose cosines and sines are stored in q.
     pub(super) circles: Vec<usize>,
 }
 
 impl Turns {
-    /// Those among some joints, from that of body 1 on, each with the place of its position in q and whether it follows
-    /// another one.
+    /// Collects the joints that turn about z. `joints` yields for each body, from body 1 on: its joint, the index of
+    /// its position in q, and whether it follows another joint.
     pub(crate) fn of(joints: impl Iterator<Item = (Joint, usize, bool)>) -> Self {
         let mut turns = Self::default();
         for (k, (joint, idx_q, follows)) in joints.enumerate() {

@@ -1,12 +1,12 @@
-//! The map of columns: which columns of other steps those of a step meet in matrices, and where the entries of such pairs
-//! stand.
+//! Map of columns: the columns of other steps that share matrix entries with the columns of a step, and the indices of
+//! these entries.
 //!
-//! Of the bodies of a step, those before them stand in the same lanes, step by step, until a limb hangs on a body in
-//! another lane. Columns from there to the root are copied: into places behind those of all columns, once a call, so that
-//! whatever comes further out finds all that it needs in its own lanes.
+//! The ancestors of a step's bodies are usually in the same lanes, until a limb is attached to a body in another lane.
+//! The columns from there to the root are copied, once per call, to indices after all columns. Then all descendants
+//! find the columns that they need in their own lanes.
 //!
-//! What belongs to a column and changes from body to body on the way out (as the columns of M⁻¹'s factor do) has a place
-//! for each entry of the support.
+//! Data of a column may change from body to body on the way outwards, such as the columns of the factor of M⁻¹. They
+//! have a slot for each entry of the support.
 
 use super::LANES;
 use super::schedule::Schedule;
@@ -16,74 +16,74 @@ use alloc::vec::Vec;
 use condyle_spatial::moves::Move;
 use core::iter::successors;
 
-/// The places of columns and of the entries of matrices.
+/// Indices of columns and of matrix entries.
 #[derive(Clone, Debug)]
 pub struct ColumnMap {
-    /// The columns from the root to each step's joints, step by step.
+    /// Columns from the root to each step's joints, step by step.
     pub support: Vec<LaneColumn>,
-    /// The pairs of each such column with the step's own.
+    /// Pairs of each such column with the step's own columns.
     pub pairs: Vec<Pair>,
-    /// The copies of columns that stand behind those of all steps: the columns, and how their lanes change.
+    /// Copies of columns, stored after the columns of all steps: their sources, and the changes of lanes.
     pub copies: Vec<Vec<(usize, Move)>>,
-    /// For each entry of the support, the one before it on the way out.
+    /// Predecessor of each entry of the support: the entry of the step before it on the way outwards.
     pub predecessors: Vec<Predecessor>,
-    /// All columns, those after one another together.
+    /// Blocks of all columns; a block consists of consecutive columns.
     pub blocks: Vec<ColumnBlock>,
-    /// The sizes of the matrices that hold Z.
+    /// Sizes of the matrices that contain Z.
     pub sizes: Sizes,
 }
 
-/// A column of each lane, among those from the root to a step's joints.
+/// A column in each lane, among the columns from the root to a step's joints.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneColumn {
-    /// The place in arrays by columns.
+    /// Index in arrays indexed by column.
     pub column: usize,
-    /// The place in `ColumnMap::pairs` of its pairs with the step's own columns, one after the other.
+    /// Index in `ColumnMap::pairs` of its pairs with the step's own columns, which are consecutive.
     pub pair: usize,
 }
 
-/// The places of the entries of a pair of columns, one in each lane, in a matrix stored by columns. Lanes that have no such
-/// pair point to an entry that is set after all others, and there by the first lane.
+/// Indices of the entries of a pair of columns, one in each lane, in a matrix stored by columns. Lanes without such a
+/// pair point to an entry that the first lane sets after all others.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
-    /// The entry in the row of the step's own column.
+    /// Index of the entry in the row of the step's own column.
     pub in_row: [u32; LANES],
-    /// The entry in the column of the step's own column.
+    /// Index of the entry in the column of the step's own column.
     pub in_column: [u32; LANES],
-    /// The entry of Z D⁻¹.
+    /// Index of the entry of Z D⁻¹.
     pub in_ZD: [u32; LANES],
-    /// The entry of Zᵀ.
+    /// Index of the entry of Zᵀ.
     pub in_Zt: [u32; LANES],
 }
 
-/// The entry from which an entry of the support gets what changes on the way out.
+/// Source from which an entry of the support gets the data that change on the way outwards.
 #[derive(Clone, Debug)]
 pub enum Predecessor {
-    /// One entry, in the same lanes; the step's own columns come from themselves.
+    /// One entry, in the same lanes; for the step's own columns, the entry itself.
     InPlace(usize),
     /// Several entries, or other lanes.
     Moved(Vec<(usize, Move)>),
 }
 
-/// A run of columns of which each carries the next.
+/// A run of columns, each of which is the parent of the next.
 #[derive(Clone, Debug)]
 pub struct ColumnBlock {
-    /// The first of them.
+    /// First column of the run.
     pub first: usize,
-    /// Their number.
+    /// Number of columns.
     pub count: usize,
-    /// All columns from the root to the last of them.
+    /// All columns from the root to the last column of the run.
     pub path: Vec<usize>,
 }
 
-/// The sizes of the two matrices that hold Z = L⁻¹, where M = Lᵀ D L is the inertia matrix.
+/// Sizes of the two matrices that contain Z = L⁻¹, where M = Lᵀ D L is the inertia matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Sizes {
-    /// The number of rows of both.
+    /// Number of rows of both matrices.
     pub rows: usize,
-    /// The length of a row of Z D⁻¹, which has the columns from the root on.
+    /// Length of a row of Z D⁻¹, which contains the columns from the root on.
     pub ZD: usize,
-    /// The length of a row of Zᵀ, which has all columns, in whole vectors.
+    /// Length of a row of Zᵀ, which contains all columns, rounded up to whole vectors.
     pub Zt: usize,
 }
 
@@ -93,21 +93,21 @@ impl Sizes {
         Self { rows: tree.nv, ZD: depth, Zt: tree.nv.next_multiple_of(2 * LANES) }
     }
 
-    /// The place behind all rows of Z D⁻¹, where lanes without a body write.
+    /// Returns the index after all rows of Z D⁻¹, to which lanes without a body write.
     pub fn end_of_ZD(self) -> usize {
         self.rows * self.ZD
     }
 
-    /// The place behind all rows of Zᵀ, where lanes without a body write.
+    /// Returns the index after all rows of Zᵀ, to which lanes without a body write.
     pub fn end_of_Zt(self) -> usize {
         self.rows * self.Zt
     }
 }
 
-/// The greatest number of columns of a block.
+/// Maximum number of columns of a block.
 const COUNT: usize = 4;
 
-/// The blocks of all columns.
+/// Returns the blocks of all columns.
 fn blocks(tree: &Tree<f64>) -> Vec<ColumnBlock> {
     let columns = &tree.columns;
     let mut blocks: Vec<ColumnBlock> = Vec::new();
@@ -124,28 +124,28 @@ fn blocks(tree: &Tree<f64>) -> Vec<ColumnBlock> {
     blocks
 }
 
-/// A column on the way from the root to the body of a lane.
+/// A column on the path from the root to the body of a lane.
 #[derive(Clone, Copy)]
 struct Ancestor {
-    /// The place in arrays by columns.
+    /// Index in arrays indexed by column.
     column: usize,
-    /// The lane in which it stands.
+    /// Lane of the column.
     lane: usize,
     coordinate: usize,
-    /// The entry of the support of the step before.
+    /// Entry of the support of the step before.
     entry: usize,
 }
 
-/// An entry of the support under construction: the place in arrays by columns, and the coordinate in each lane.
+/// An entry of the support under construction: the index in arrays indexed by column, and the coordinate in each lane.
 type Draft = (usize, [Option<usize>; LANES]);
 
 impl ColumnMap {
-    /// The map for the steps of a schedule, which are told where their support stands.
+    /// Creates the map for the steps of a schedule, and sets the ranges of their support.
     pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule, steps: &mut [Step]) -> Self {
         let sizes = Sizes::new(tree);
         let (support, pairs, copies, predecessors) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut map = Self { support, pairs, copies, predecessors, blocks: blocks(tree), sizes };
-        let first = schedule.bodies.get(1).map_or(0, |bodies| bodies[0]); // whose last column is set last, in the first lane
+        let first = schedule.bodies.get(1).map_or(0, |bodies| bodies[0]); // its last column is set last, in the first lane
         let last = tree.nodes[first].idx_v + tree.nodes[first].joint.nv().saturating_sub(1);
         let unused = (last * (tree.nv + 1)) as u32;
         let mut drafts: Vec<Vec<Draft>> = vec![Vec::new()];
@@ -178,14 +178,14 @@ impl ColumnMap {
                 }
             }
             let end = map.support.len();
-            map.predecessors.extend((map.predecessors.len()..end).map(Predecessor::InPlace)); // the step's own
+            map.predecessors.extend((map.predecessors.len()..end).map(Predecessor::InPlace)); // the step's own columns
             steps[s].support = (first, end);
             drafts.push(draft);
         }
         map
     }
 
-    /// The columns before those of step s, with copies of what stands elsewhere.
+    /// Returns the columns before the columns of step s; columns in other lanes are copied.
     fn ancestors(
         &mut self,
         tree: &Tree<f64>,
@@ -204,7 +204,7 @@ impl ColumnMap {
             paths[lane] = drafts[step].iter().enumerate().filter_map(ancestor).collect();
         }
         let longest = paths.iter().map(Vec::len).max().unwrap_or(0);
-        let behind = steps.last().map_or(0, |last| last.idx_v + last.joint.nv()); // the columns of all steps
+        let behind = steps.last().map_or(0, |last| last.idx_v + last.joint.nv()); // number of columns of all steps
         (0..longest)
             .map(|at| {
                 let here = [0, 1, 2, 3].map(|lane| paths[lane].get(at).copied());
@@ -213,7 +213,7 @@ impl ColumnMap {
                     Some(entry) => Predecessor::InPlace(entry),
                     None => Predecessor::Moved(moves(entries)),
                 });
-                // a column in all lanes is in this one, too
+                // a column that is in all lanes is in this lane, too
                 let in_all = |column: usize| schedule.shared && column < steps[1].joint.nv();
                 let columns = [0, 1, 2, 3]
                     .map(|lane| here[lane].map(|a| (a.column, if in_all(a.column) { lane } else { a.lane })));
@@ -227,15 +227,15 @@ impl ColumnMap {
     }
 }
 
-/// The place from which all lanes have what they need, each from the same lane, if there is one: of each lane, (place, lane)
-/// is given.
+/// Returns the index from which all lanes read, if it is one index and each lane reads its own lane. `from` contains
+/// (index, lane) for each lane.
 fn in_place(from: [Option<(usize, usize)>; LANES]) -> Option<usize> {
     let (first, _) = from.iter().flatten().next()?;
     let stays = |(lane, from): (usize, &Option<(usize, usize)>)| from.is_none_or(|from| from == (*first, lane));
     from.iter().enumerate().all(stays).then_some(*first)
 }
 
-/// The places from which lanes have what they need, and how it changes lanes, where `in_place` finds no single one.
+/// Returns the indices from which lanes read, and the changes of lanes; for use if `in_place` returns `None`.
 fn moves(from: [Option<(usize, usize)>; LANES]) -> Vec<(usize, Move)> {
     let mut places: Vec<usize> = from.iter().flatten().map(|x| x.0).collect();
     places.sort_unstable();

@@ -1,44 +1,44 @@
-//! The schedule: which bodies go together.
+//! Schedule of the bodies: the bodies of each step.
 //!
-//! A list schedule: step after step takes up to four bodies whose parents are done, those with the longest way to their tips
-//! first, and leaves each in its parent's lane, which it waits for if there is time. The body on which all others hang stands
-//! in all lanes, each of which adds up what its own limbs exert on it.
+//! This is list scheduling. Each step takes up to four bodies whose parents are done, and prefers bodies with the
+//! longest path to their tips. It assigns each body to its parent's lane; a body waits for that lane if there is time.
+//! The body that carries all others is in all lanes. Each lane sums up the forces of its own limbs on this body.
 
 use super::LANES;
 use crate::tree::Node;
 use alloc::vec::Vec;
 
-/// The number of bodies a step, the world counted, from which limbs side by side pay: two legs of six joints each, under one
-/// trunk, just do.
+/// Minimum number of bodies per step, including the world, for which parallel lanes are faster; two legs of six joints
+/// under one trunk just reach it.
 const WORTH: usize = 2;
 
-/// The bodies of each step, and the step of each body.
+/// Bodies of each step, and the step of each body.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
-    /// The bodies of each step, one in each lane, 0 where there is none.
+    /// Bodies of each step, one in each lane; 0 is an empty lane.
     pub bodies: Vec<[usize; LANES]>,
-    /// The step and lane of each body.
+    /// Step and lane of each body.
     pub place: Vec<(usize, usize)>,
-    /// Whether the first step is one body in all lanes.
+    /// Whether the first step has one body in all lanes.
     pub shared: bool,
 }
 
 impl Schedule {
-    /// The schedule for a robot, if it has limbs enough.
+    /// Creates the schedule for a robot; `None` if it has too few limbs.
     pub(super) fn new(nodes: &[Node<f64>]) -> Option<Self> {
-        // Who has the longest way goes first: that tells how many steps there are. Then who has time to wait for a lane
-        // waits.
+        // First serve the bodies with the longest paths, which determines the number of steps. Then let bodies wait for
+        // a lane if there is time.
         let hasty = Self::until(nodes, 0);
         let patient = Self::until(nodes, hasty.bodies.len() - 1);
         let schedule = if patient.bodies.len() > hasty.bodies.len() { hasty } else { patient };
         (nodes.len() >= WORTH * (schedule.bodies.len() - 1)).then_some(schedule)
     }
 
-    /// A schedule in which bodies that must not wait, if `last` is to be the last step, are served first.
+    /// Creates a schedule. It first serves bodies that cannot wait if `last` is to be the last step.
     fn until(nodes: &[Node<f64>], last: usize) -> Self {
         let n = nodes.len();
         let mut children = vec![Vec::new(); n];
-        let mut height = vec![0; n]; // bodies on the longest way to a tip
+        let mut height = vec![0; n]; // number of bodies on the longest path to a tip
         for i in (1..n).rev() {
             children[nodes[i].parent].push(i);
             height[nodes[i].parent] = height[nodes[i].parent].max(height[i] + 1);
@@ -86,13 +86,13 @@ impl Schedule {
         schedule
     }
 
-    /// Whether a step's body is the same in all lanes: the world, or the one on which all others hang.
+    /// Returns whether a step has the same body in all lanes: the world, or the body that carries all others.
     #[inline(always)]
     pub(super) fn in_all_lanes(&self, step: usize) -> bool {
         step == 0 || (step == 1 && self.shared)
     }
 
-    /// The step of the parent of the body in a lane, and the lane in which it stands for that body.
+    /// Returns the step of the parent of the body in a lane, and the lane from which that body reads its parent.
     pub(super) fn parent(&self, nodes: &[Node<f64>], step: usize, lane: usize) -> (usize, usize) {
         let (parent, its) = self.place[nodes[self.bodies[step][lane]].parent];
         (parent, if self.in_all_lanes(parent) { lane } else { its })

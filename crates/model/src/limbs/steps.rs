@@ -1,4 +1,4 @@
-//! The steps of a pass: its bodies, lane by lane, and where their numbers come from.
+//! Steps of a pass: their bodies in lanes, and the indices from which their numbers are read.
 
 use super::LANES;
 use super::schedule::Schedule;
@@ -8,71 +8,72 @@ use alloc::vec::Vec;
 use condyle_spatial::moves::Move;
 use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
 
-/// Four bodies as a pass sees them; what is in lanes comes first, so that no vector crosses a line of the cache.
+/// Four bodies as a pass sees them. Data in lanes come first, so that no vector crosses a cache line.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct Step {
     /// X_T, between turned frames.
     pub placement: Se3<[f64; LANES]>,
-    /// The inertia in the turned frame.
+    /// Inertia in the turned frame.
     pub inertia: Inertia<[f64; LANES]>,
-    /// bRz: the turned frame in the body's.
+    /// bRz: the turned frame in the body's frame.
     pub axis_rotation: Mat3<[f64; LANES]>,
-    /// The kind of their joints.
+    /// Kind of the bodies' joints.
     pub joint: Joint,
-    /// The bodies, 0 in a lane without one.
+    /// Indices of the bodies; 0 in an empty lane.
     pub bodies: [usize; LANES],
-    /// The place at which the positions of their joints begin among those in lanes.
+    /// Index of the first number of their positions, in arrays in lanes.
     pub idx_q: usize,
-    /// The place at which the velocities of their joints begin among those in lanes.
+    /// Index of the first number of their velocities, in arrays in lanes.
     pub idx_v: usize,
-    /// The places of their parents.
+    /// Steps and lanes of their parents.
     pub parents: Parents,
-    /// The places in `ColumnMap::support`, from and to, of the columns from the root to their joints.
+    /// Range (first, end) in `ColumnMap::support` of the columns from the root to their joints.
     pub support: (usize, usize),
-    /// Whether nothing hangs on any of its bodies.
+    /// Whether none of the bodies has children.
     pub tip: bool,
 }
 
-/// The places of the parents of a step's bodies.
+/// Steps and lanes of the parents of a step's bodies.
 #[derive(Clone, Debug)]
 pub enum Parents {
-    /// The parents are in one step, each in its child's lane.
+    /// One step contains all parents, each in its child's lane.
     InPlace(usize),
-    /// The parents are in several steps or in other lanes.
+    /// Several steps, or other lanes, contain the parents.
     Moved {
-        /// The steps from which something comes, and how its lanes change.
+        /// Steps from which data are read, and the changes of lanes.
         from: Vec<(usize, Move)>,
-        /// The steps to which something goes, and how its lanes change.
+        /// Steps to which data are added, and the changes of lanes.
         to: Vec<(usize, Move)>,
     },
 }
 
-/// The places from which the four numbers of a position or a velocity come: each is the robot's times `ratio`, plus `offset`.
+/// Indices from which the four numbers of a position or a velocity are read: each is the robot's number times `ratio`,
+/// plus `offset`.
 #[derive(Clone, Copy, Debug)]
 pub struct Source {
-    /// The places in the robot's q or v; one past its end in a lane without a joint.
+    /// Indices in the robot's q or v; one past the end in a lane without a joint.
     pub from: [usize; LANES],
-    /// The ratios of joints that follow others; else 1.
+    /// Ratios of joints that follow others; otherwise 1.
     pub ratio: [f64; LANES],
-    /// The offsets of joints that follow others; else 0.
+    /// Offsets of joints that follow others; otherwise 0.
     pub offset: [f64; LANES],
 }
 
-/// The places from which the numbers in lanes come, and to which they go.
+/// Indices from which the numbers in lanes are read, and to which they are written.
 #[derive(Clone, Debug)]
 pub struct StateMap {
-    /// The positions of all steps.
+    /// Sources of the positions of all steps.
     pub positions: Vec<Source>,
-    /// The degrees of freedom of all steps.
+    /// Sources of the degrees of freedom of all steps.
     pub coordinates: Vec<Source>,
-    /// The place of each coordinate's number among those in lanes.
+    /// Index in lanes of the number of each coordinate.
     pub leaders: Vec<usize>,
-    /// The joints that follow others: coordinate, place of the number in lanes, ratio.
+    /// Joints that follow others: coordinate, index of the number in lanes, ratio.
     pub followers: Vec<(usize, usize, f64)>,
 }
 
-/// The steps of a schedule; their columns are still to be mapped.
+/// Creates the steps of a schedule; their columns are mapped later.
 pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule) -> (Vec<Step>, StateMap) {
     let mut state =
         StateMap { positions: Vec::new(), coordinates: Vec::new(), leaders: vec![0; tree.nv], followers: Vec::new() };
@@ -84,7 +85,7 @@ pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule) -> (Vec<Step>, StateMap
         if s > 0 {
             state.add(tree, schedule, s, joint);
         }
-        // the first lane carries what a body in all lanes weighs
+        // if a body is in all lanes, only the first lane has its inertia
         let carried = |lane: usize| match bodies[lane] {
             0 => Inertia::zero(),
             _ if schedule.in_all_lanes(s) && lane > 0 => Inertia::zero(),
@@ -116,7 +117,7 @@ impl StateMap {
     fn add(&mut self, tree: &Tree<f64>, schedule: &Schedule, s: usize, joint: Joint) {
         let bodies = schedule.bodies[s];
         let mut neutral = vec![0.0; joint.nq()];
-        joint.neutral(&mut neutral); // where there is no joint
+        joint.neutral(&mut neutral); // for lanes without a joint
         let mimics = bodies.map(|i| tree.nodes[i].mimic);
         let ratio = mimics.map(|m| m.map_or(1.0, |m| m.ratio));
         for (k, neutral) in neutral.into_iter().enumerate() {
@@ -140,9 +141,9 @@ impl StateMap {
     }
 }
 
-/// The places of the parents of step s.
+/// Returns the steps and lanes of the parents of step s.
 fn parents(tree: &Tree<f64>, schedule: &Schedule, s: usize) -> Parents {
-    // of each lane with a body: its parent's step and lane
+    // for each lane with a body: its parent's step and lane
     let at: Vec<(usize, (usize, usize))> = (0..LANES)
         .filter(|&lane| schedule.bodies[s][lane] > 0)
         .map(|lane| (lane, schedule.parent(&tree.nodes, s, lane)))
@@ -159,7 +160,7 @@ fn parents(tree: &Tree<f64>, schedule: &Schedule, s: usize) -> Parents {
         let mut pairs: Vec<_> =
             at.iter().filter(|(_, (s, _))| *s == source).map(|(lane, (_, its))| (*its, *lane)).collect();
         from.push((source, Move::new(&pairs)));
-        // upwards, no two into one lane at once
+        // towards the root: no two lanes may be added to the same lane at once
         while !pairs.is_empty() {
             let (mut now, mut later) = (Vec::<(usize, usize)>::new(), Vec::new());
             for (its, lane) in pairs {

@@ -1,8 +1,8 @@
-//! Limits of effort, the table of actuators, their classes, armature and damping.
+//! Limits of effort, the list of actuators, their classes, armature and damping.
 
 use super::*;
 
-/// The extremes of `qfrc_actuator` at rest, over all controls.
+/// Compares limits with the extremes of `qfrc_actuator` at rest, over all controls.
 #[test]
 fn actuators_limit_effort() {
     const INF: f64 = f64::INFINITY;
@@ -19,7 +19,7 @@ fn actuators_limit_effort() {
         (HINGE, "<motor joint='j' gear='0'/>", [0.0, 0.0]),
         (HINGE, "<general joint='j' gainprm='-4' ctrlrange='-1 2'/>", [-8.0, 4.0]),
         (HINGE, "<general joint='j' gainprm='2' biastype='affine' biasprm='3' ctrlrange='-1 2'/>", [1.0, 7.0]),
-        // a servo has no limit but that of its force: it depends on the length
+        // a servo has only its force limit, because its force depends on the length
         (HINGE, "<position joint='j' kp='100' ctrlrange='-1 1'/>", [-INF, INF]),
         (HINGE, "<position joint='j' kp='100' ctrlrange='-1 1' forcerange='-7 8' gear='2'/>", [-14.0, 16.0]),
         (HINGE, "<velocity joint='j' kv='100' ctrlrange='-1 1' forcerange='-7 8'/>", [-7.0, 8.0]),
@@ -27,7 +27,7 @@ fn actuators_limit_effort() {
         (HINGE, "<cylinder joint='j' area='3' bias='1 0 0' ctrlrange='1 2'/>", [1.0, 7.0]),
         (HINGE, "<dcmotor joint='j' motorconst='0.1 0.4' resistance='2' saturation='0 5'/>", [-1.0, 1.0]),
         (HINGE, "<intvelocity joint='j' kp='7' inheritrange='1' forcerange='-3 4'/>", [-3.0, 4.0]),
-        // several add up, and the joint clips the sum
+        // the forces of several actuators are added, and the joint clips the sum
         (
             HINGE,
             "<motor joint='j' gear='-2' forcerange='-1 3'/><motor joint='j' gear='3' ctrlrange='-2 1'/>",
@@ -52,7 +52,8 @@ fn actuators_limit_effort() {
     assert_eq!(effort(&off), [-INF, INF]);
 }
 
-/// The force of an actuator on a tendon is clipped to the tendon's range, then to its own: `qfrc_actuator`.
+/// Compares with `qfrc_actuator`: the force of an actuator on a tendon is clipped to the tendon's range, then to the
+/// actuator's range.
 #[test]
 fn tendons_limit_effort() {
     let tendon = "<tendon><fixed name='t' actuatorfrcrange='-3 3'><joint joint='j' coef='-2'/></fixed></tendon>";
@@ -70,7 +71,7 @@ fn tendons_limit_effort() {
     assert_eq!(said(&shared), [format!("<string>:1: fixed `t`: {what}")]);
 }
 
-/// A ball takes the axis that the gear is; a joint that floats keeps limits along the axes of its body alone.
+/// The gear of an actuator is the axis in a ball joint. A free joint has limits along the axes of its body only.
 #[test]
 fn balls_and_free_joints() {
     let ball = driven("<joint name='j' type='ball'/>", "<motor joint='j' gear='1 -2 0' ctrlrange='-3 4'/>");
@@ -86,7 +87,7 @@ fn balls_and_free_joints() {
     assert!(parent.actuators().is_empty());
 }
 
-/// `actuator_gainprm` and `actuator_biasprm`.
+/// Compares with `actuator_gainprm` and `actuator_biasprm`.
 #[test]
 fn laws_of_actuators() {
     let cases = [
@@ -121,8 +122,9 @@ fn laws_of_actuators() {
     assert_eq!(site.frames()[frame].name, "s");
 }
 
-/// `actuator_gainprm`, `actuator_biasprm`, `actuator_gear`, `actuator_ctrlrange` of elements without numbers of their own. A
-/// kind inherits its law from the innermost class whose last default is of its kind or `<general>`, all else from any.
+/// Compares with `actuator_gainprm`, `actuator_biasprm`, `actuator_gear` and `actuator_ctrlrange` of elements without
+/// their own numbers. A kind inherits its law from the innermost class whose last default has the same kind or is
+/// `<general>`. It inherits all other attributes from any class.
 #[test]
 fn classes_of_actuators() {
     let servo = "<position kp='100' kv='10'/>";
@@ -154,7 +156,7 @@ fn classes_of_actuators() {
         let a = &found.actuators()[0];
         close(&[a.gain, a.bias, a.kp, a.kv], &expected);
     }
-    // a list may be shorter than that of the class
+    // a list may be shorter than the list of the class
     let shared = "<default><motor gear='5 0 1' ctrlrange='-1 1' armature='0.1'/></default>";
     let found = model(shared, HINGE, "<actuator><position joint='j' gear='2'/></actuator>");
     assert_eq!(found.actuators()[0].gear, [2.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
@@ -165,7 +167,7 @@ fn classes_of_actuators() {
     assert_eq!(found.damping_polynomial(), [[5.0, 6.0]]);
 }
 
-/// `mj_fullM` and `qfrc_damper`: rotors count gear² times.
+/// Compares with `mj_fullM` and `qfrc_damper`: rotors count gear² times.
 #[test]
 fn armature_and_damping_of_actuators() {
     let found = driven(
@@ -194,9 +196,9 @@ fn armature_and_damping_of_actuators() {
     close(found.damping_polynomial().as_flattened(), &[8.0 * 200.0, 16.0 * 300.0]);
 }
 
-/// Every change of what a robot does is said: element, and what becomes different.
+/// Every change of a robot's behaviour causes a warning with the element and the effect.
 #[test]
-fn what_actuators_lose_is_said() {
+fn lost_features_of_actuators_warn() {
     let cases = [
         ("<muscle joint='j' lengthrange='0 1'/>", "muscle", "it is left out of the table of actuators: it is a muscle"),
         (

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// `eq_data`: anchors in body1 and body2, and the relative orientation.
+/// Compares with `eq_data`: anchors in body1 and body2, and the relative orientation.
 #[test]
 fn loops_and_couplings() {
     let text = "<mujoco><worldbody><body name='a' pos='1 2 3' quat='1 2 3 4'><joint name='p' axis='0 1 0' ref='15' pos='.1 .2 .3'/>
@@ -16,7 +16,7 @@ fn loops_and_couplings() {
     let found = read(text).unwrap();
     let names: Vec<&str> = found.constraints().iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["connect1", "w", "weld2", "joint1", "weld3", "joint2"]);
-    // each frame of a constraint, in the body or site whose name follows
+    // returns the two frames of a constraint, relative to the bodies or sites in `of`
     let placed = |k: usize, of: [&str; 2]| {
         let frames = match found.constraints()[k].kind {
             ModelConstraintKind::Point { frames } | ModelConstraintKind::Rigid { frames } => frames,
@@ -38,7 +38,7 @@ fn loops_and_couplings() {
     let [first, second] = placed(1, ["c", "e"]);
     close(&place(first), &[-1.54, -2.964, 0.848]);
     close(&place(second), &[0.1, 0.2, 0.3]);
-    // the quaternion (0, −0.7071, −0.4243, −0.5657) turns x, y and z to
+    // the quaternion (0, −0.7071, −0.4243, −0.5657) maps x, y and z to
     let turned = [first.rotation.x, first.rotation.y, first.rotation.z].map(|axis| axis.to_array());
     close(turned.as_flattened(), &[0.0, 0.6, 0.8, 0.6, -0.64, 0.48, 0.8, 0.48, -0.36]);
     assert!(matches!(found.constraints()[1].kind, ModelConstraintKind::Rigid { .. }));
@@ -63,12 +63,12 @@ fn loops_and_couplings() {
     };
     assert_eq!(coefficients, [0.25, 0.0, 0.0, 0.0, 0.0]);
     assert!(said(&found).is_empty());
-    // both bodies are one here
+    // here both bodies are parts of one body
     let held = model("", &format!("{HINGE}<body name='c'/>"), "<equality><weld body1='b' body2='c'/></equality>");
     assert_eq!(said(&held), ["<string>:1: <weld>: both ends are fixed to one body, which no constraint can move"]);
 }
 
-/// Chains of followers have one leader; a circle of them is held beside the tree.
+/// A chain of followers has one leader; a circle of followers becomes a constraint.
 #[test]
 fn followers_of_followers() {
     let ball = "<geom size='0.1'/>";
@@ -100,7 +100,7 @@ fn followers_of_followers() {
     assert!(free.warnings().iter().all(|warning| warning.kind() == WarningKind::Mimic));
 }
 
-/// `key_qpos` and `mj_objectVelocity` along the body's axes.
+/// Compares with `key_qpos`, and with `mj_objectVelocity` along the body's axes.
 #[test]
 fn keyframes() {
     let ball = "<geom size='0.1'/>";
@@ -122,14 +122,14 @@ fn keyframes() {
     let refused = |keys: &str, expected: &str| assert_eq!(read(&text(keys)).unwrap_err().to_string(), expected);
     refused("<key qpos='1 2'/>", "<string>:2: <key>: qpos: expected 12 numbers, found 2");
     refused("<key name='k' qvel='1'/>", "<string>:2: key `k`: qvel: expected 10 numbers, found 1");
-    // the numbers of the first joints alone, as in MuJoCo
+    // as in MuJoCo, a list may contain the numbers of the first joints only
     let short = read(&text("<key name='k' qpos='1 2 3 2 0 0 2' qvel='0 0 0 0 0 1'/>")).unwrap();
     close(&short.keyframes()[0].q, &[1.0, 2.0, 3.0, 0.0, 0.0, half, half, 0.0, 0.0, 0.0, 1.0, 0.25]);
     close(&short.keyframes()[0].v, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
     let expected = "<string>:2: key `k`: qpos: has 7 of 12 numbers; the other joints are as drawn";
     assert_eq!(short.warnings()[0].to_string(), expected);
     refused("<key name='k'/><key name='k'/>", "<string>:1: <mujoco>: two keyframes have the same name");
-    // coordinates of joints that follow are left out
+    // coordinates of followers are left out
     let hinges = format!(
         "<mujoco><worldbody><body><joint name='a'/>{ball}</body><body><joint name='b'/>{ball}</body></worldbody>
         <equality><joint joint1='a' joint2='b'/></equality><keyframe><key qpos='1 2' qvel='3 4'/></keyframe></mujoco>"

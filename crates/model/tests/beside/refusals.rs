@@ -1,4 +1,4 @@
-//! Errors, limits of files, and models that are changed.
+//! Errors, limits of files, and changed models.
 
 use super::*;
 
@@ -74,9 +74,9 @@ fn errors() {
     }
 }
 
-/// A file that multiplies what it has is refused at once.
+/// A file that multiplies its content is refused at once.
 #[test]
-fn what_files_may_multiply() {
+fn limits_of_multiplied_content() {
     let keys = format!("<keyframe>{}</keyframe>", "<key/>".repeat(300_000));
     let text = one("", "<freejoint/>", &keys);
     let bodies = "<body><joint/><geom size='0.1'/></body>".repeat(100);
@@ -93,7 +93,7 @@ fn what_files_may_multiply() {
     assert_eq!(said, format!("<string>:1: <motor>: {what}"));
 }
 
-/// Additions stay with the parts of a robot that is changed.
+/// Additions to the tree stay with their parts when a robot is changed.
 #[test]
 fn models_that_are_changed() {
     let ball = "<geom size='0.1'/>";

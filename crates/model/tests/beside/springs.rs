@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// `jnt_stiffness`, `qpos_spring`, `dof_damping`.
+/// Compares with `jnt_stiffness`, `qpos_spring` and `dof_damping`.
 #[test]
 fn springs_of_joints() {
     let found = model("", "<joint axis='0 1 0' stiffness='5 1 2' springref='10' ref='30' damping='3 1 2'/>", "");
@@ -15,15 +15,15 @@ fn springs_of_joints() {
     assert_eq!(found.springs()[0].rest, [10.0]);
     let found = model("", "<joint type='ball' stiffness='5' springref='10'/>", "");
     assert_eq!(found.springs()[0].rest, [0.0, 0.0, 0.0, 1.0]);
-    // replaces the linear parts
+    // springdamper replaces the linear coefficients
     let both = "<joint axis='0 1 0' springdamper='0.5 1' stiffness='9' damping='3 1 2' armature='0.1'/>";
     let found = model("", both, "");
     close(&[found.springs()[0].stiffness[0], found.damping()[0]], &[0.6, 0.6]);
     assert_eq!(found.damping_polynomial(), [[1.0, 2.0]]);
 }
 
-/// `jnt_stiffness`, `dof_damping` and `actuator_biasprm` of robots whose joints carry others: the inertia is that of J M⁻¹ Jᵀ,
-/// with rotors of joints and tendons, in the pose that the file has drawn.
+/// Compares with `jnt_stiffness`, `dof_damping` and `actuator_biasprm` of robots whose joints carry others. The inertia
+/// is the inverse of J M⁻¹ Jᵀ, with rotors of joints and tendons, in the initial configuration of the file.
 #[test]
 fn springs_and_gains_from_inertia() {
     let text = format!(
@@ -61,7 +61,8 @@ fn springs_and_gains_from_inertia() {
     close(&rest[3..], &[0.02980901962620916, 0.34071865342161006, 0.08189960831908934, 0.9361168066628592]);
 }
 
-/// `qfrc_spring`, `qfrc_damper`, `ten_length`: a tendon over one joint is a spring, a damper and a limit of that joint.
+/// Compares with `qfrc_spring`, `qfrc_damper` and `ten_length`: a tendon over one joint is a spring, a damper and a
+/// limit of that joint.
 #[test]
 fn tendons_over_one_joint() {
     let fixed = |attributes: &str| {
@@ -80,7 +81,7 @@ fn tendons_over_one_joint() {
         -(found.damping()[0] + found.damping_polynomial()[0][0] * v + found.damping_polynomial()[0][1] * v * v) * v
     };
     close(&[d(0.7)], &[-27.104]);
-    // by default it rests where the joint does
+    // by default it rests where the joint rests
     let found = model("", "<joint name='j' axis='0 1 0' springref='20'/>", &fixed("stiffness='3'"));
     close(&found.springs()[0].rest, &[0.3490658503988659]);
     let found = model("", HINGE, &fixed("range='-1 0.5'"));
@@ -98,7 +99,7 @@ fn tendons_over_one_joint() {
     assert_eq!(said(&slack), [format!("<string>:1: fixed `t`: {what}")]);
 }
 
-/// `mj_fullM`: what a diagonal cannot hold is said, and only that.
+/// Compares with `mj_fullM`: only effects that a diagonal cannot represent cause warnings.
 #[test]
 fn tendons_over_several_joints() {
     let text = |first: &str, second: &str, attributes: &str| {
@@ -150,7 +151,7 @@ fn weight_is_compensated() {
     assert_eq!(said(&found), [format!("<string>:1: joint `j`: {what}")]);
 }
 
-/// `qfrc_passive`, and what `disable` does to forces and limits.
+/// Compares with `qfrc_passive`, and tests the effect of `disable` on forces and limits.
 #[test]
 fn switches() {
     let joint = "<joint name='j' axis='0 1 0' stiffness='1' damping='2' frictionloss='3' range='-10 10'/>";

@@ -21,19 +21,19 @@ fn replicas_turn_and_move_on() {
     ]) {
         near(&body.name, &flat(&body.placement), &expected, 1e-12);
     }
-    // inner suffixes come first; as many digits as the count has
+    // inner suffixes come first; a suffix has as many digits as the count
     let nested = replicate("count='2'", &replicate("count='10' sep='_'", LINK));
     assert_eq!(names(&model("", &nested, ""))[..2], ["b_000", "b_010"]);
     assert_eq!(names(&model("", &nested, ""))[19], "b_091");
     assert_eq!(names(&model("", &replicate("count='0'", LINK), "")), [""; 0]);
-    // what has no name gets none
+    // unnamed elements stay unnamed
     let class = "<default><default class='c'><joint armature='3'/></default></default>";
     let unnamed = model(class, &replicate("count='2' childclass='c'", "<body><joint/><geom size='0.1'/></body>"), "");
     assert_eq!((names(&unnamed), unnamed.armature()), (vec!["body1", "body2"], &[3.0, 3.0][..]));
 }
 
 #[test]
-fn what_refers_to_a_replica_is_copied_along() {
+fn elements_that_refer_to_a_replica_are_copied() {
     let other = LINK.replace("'b'", "'o'").replace("'j'", "'k'");
     let tree = format!("<replicate count='2'>{LINK}</replicate>{other}");
     let after =
@@ -73,7 +73,7 @@ fn parts_of_the_same_file_attached_again() {
     assert_eq!(names(&twice), ["b", "p-b"]);
     near("place", &flat(&twice.bodies()[2].placement)[..3], &[1.0, 2.0, 3.0], 1e-12);
     assert_eq!(twice.actuators().iter().map(|a| a.name.as_str()).collect::<Vec<_>>(), ["m", "p-m"]);
-    // frames around what is attached stay where they are; the class around it comes along
+    // frames around the attached part are not copied, but the class around it is
     let framed =
         "<frame pos='5 0 0' childclass='c'><frame name='f' pos='0 1 0'><body name='x'><joint/><geom size='0.1'/></body>
         </frame></frame><frame pos='0 0 7'><attach frame='f' prefix='p-'/></frame>";
@@ -96,7 +96,7 @@ fn parts_of_the_same_file_attached_again() {
 }
 
 #[test]
-fn files_with_settings_of_their_own() {
+fn attached_files_keep_their_own_settings() {
     let child = "<mujoco model='c'><compiler angle='radian' autolimits='false' boundmass='0.5'/><option gravity='0 0 -1'/>
         <default><joint damping='0.5'/><default class='q'><joint armature='2'/></default></default>
         <worldbody><site name='ws' pos='0 0 3'/><frame pos='1 0 0'><body name='d' pos='0 1 0' euler='0 0 1.5707963267948966'>
@@ -143,14 +143,14 @@ fn a_file_inside_of_itself() {
 }
 
 #[test]
-fn includes_beside_the_file_that_includes_them() {
+fn includes_next_to_the_including_file() {
     let files: [(&str, &[u8]); 4] = [
         ("top.xml", b"<mujoco><worldbody><include file='in/mid.xml'/></worldbody></mujoco>"),
         ("in/mid.xml", b"<x><body name='a'><joint/><geom size='0.1'/><include file='deep/part.xml'/></body></x>"),
         ("in/deep/part.xml", b"<mujocoinclude><site name='s' pos='0 0 2'/></mujocoinclude>"),
         ("deep/part.xml", b"<mujocoinclude><site name='s' pos='0 0 5'/></mujocoinclude>"),
     ];
-    // the main file's folder goes first
+    // the main file's folder has priority
     near("site", &placement(&Folder::new("first", &files).read("top.xml").unwrap(), "s")[..3], &[0.0, 0.0, 5.0], 0.0);
     let beside = Folder::new("beside", &files[..3]).read("top.xml").unwrap();
     near("site", &placement(&beside, "s")[..3], &[0.0, 0.0, 2.0], 0.0);

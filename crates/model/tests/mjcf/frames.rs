@@ -20,7 +20,7 @@ fn sites_cameras_and_frames_are_frames() {
 }
 
 #[test]
-fn a_name_that_a_site_has_stays_the_sites() {
+fn a_site_keeps_its_name() {
     let inside = "<camera name='x' pos='3 0 0'/><frame name='x' pos='2 0 0'/><site name='x' pos='1 0 0'/>";
     let model = model("", &body("", inside), "");
     for (name, at) in [("x", 1.0), ("frame:x", 2.0), ("camera:x", 3.0)] {

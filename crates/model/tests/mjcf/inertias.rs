@@ -2,10 +2,10 @@
 
 use super::*;
 
-/// MuJoCo finds the principal axes of a mesh to 1e-7 only.
+/// Tolerance for meshes: MuJoCo computes their principal axes only up to 1e-7.
 const MESH: f64 = 1e-7;
 
-/// A mesh with a dent, and a body that has it.
+/// Returns a file with a dented mesh, and a body with this mesh.
 fn mesh(attributes: &str, geom: &str, before: &str) -> String {
     let points = "vertex='0 0 0  1 0 0  0 2 0  0 0 3  0.4 0.4 0.4'";
     let faces = "face='0 2 1  0 1 3  0 3 2  1 2 4  2 3 4  3 1 4'";
@@ -57,7 +57,7 @@ fn rules_of_meshes() {
     );
     let moved = "inertia='exact' scale='1 -2 3' refpos='0.1 0 0' refquat='0 1 0 0'";
     weighs(&mesh(moved, "type='mesh'", ""), &mirrored, MESH);
-    // the mass that is given, and points without triangles
+    // an explicit mass, and points without triangles
     let given = read(&mesh("", "type='mesh' mass='6'", "")).unwrap();
     assert_eq!(given.total_mass(), 6.0);
     weighs(&mesh("inertia='exact'", "type='mesh'", "").replace("face=", "user="), &convex, MESH);
@@ -194,7 +194,7 @@ fn files_of_meshes() {
 }
 
 #[test]
-fn meshes_that_cannot_be() {
+fn invalid_meshes() {
     let flat = "<asset><mesh name='m' vertex='0 0 0 1 0 0 0 1 0 1 1 0'/></asset>";
     let inside = |geom: &str| format!("<body><joint/><geom type='mesh' {geom}/></body>");
     assert!(
@@ -207,7 +207,7 @@ fn meshes_that_cannot_be() {
     let inside_out = mesh("inertia='exact' scale='1 1 1'", "type='mesh'", "").replace("0 2 1  0 1 3", "0 1 2  0 3 1");
     let inside_out = inside_out.replace("0 3 2  1 2 4  2 3 4  3 1 4", "0 2 3  1 4 2  2 4 3  3 4 1");
     assert!(read(&inside_out).unwrap_err().to_string().contains("is negative: its triangles are inside out"));
-    // a body that is fixed to the world is read nevertheless, and one with an inertial needs no mesh
+    // a body that is fixed to the world is read nevertheless, and a body with an <inertial> needs no mesh
     let fixed = model(flat, "<body name='w'><geom type='mesh' mesh='m'/></body>", "");
     assert!(said(&fixed, WarningKind::LeftOut)[0].contains("the mass of a mesh on body `w` is left out"));
     assert_eq!(model(flat, &body("", "<geom type='mesh' mesh='m'/>"), "").warnings(), []);
@@ -217,11 +217,11 @@ fn meshes_that_cannot_be() {
 }
 
 #[test]
-fn what_is_fixed_to_the_world_counts() {
+fn bodies_fixed_to_the_world_have_mass() {
     let fixed = format!("<body><geom size='0.1' mass='7'/>{}</body>", body("", ""));
     assert_eq!(model("", &fixed, "").total_mass(), 9.0);
     near("scaled", &[model("<compiler settotalmass='3'/>", &fixed, "").total_mass()], &[3.0], 1e-15);
-    // geoms of the world itself weigh nothing
+    // geoms of the world itself have no mass
     assert_eq!(model("", &format!("<geom size='1'/>{}", body("", "")), "").total_mass(), 2.0);
     let field = "<asset><hfield name='h' nrow='2' ncol='2' size='1 2 3 4'/></asset>";
     assert_eq!(model(field, "<body><joint/><geom type='hfield' hfield='h'/></body>", "").total_mass(), 44000.0);
@@ -232,7 +232,7 @@ fn geoms_in_place_of_an_inertial() {
     let both = body("", "<geom size='0.1' mass='5'/>");
     assert_eq!(model("<compiler inertiafromgeom='true'/>", &both, "").total_mass(), 5.0);
     assert_eq!(model("<compiler inertiafromgeom='auto'/>", &both, "").total_mass(), 2.0);
-    // the inertial stays where no geom has mass
+    // the <inertial> is used if no geom has mass
     let light = body("", "<geom size='0.1' mass='0'/>");
     assert_eq!(model("<compiler inertiafromgeom='true'/>", &light, "").total_mass(), 2.0);
 }

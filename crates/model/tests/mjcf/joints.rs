@@ -1,10 +1,10 @@
-//! Limits of joints, joints in frames, and joints that are free.
+//! Limits of joints, joints in frames, and free joints.
 
 use super::*;
 use std::f64::consts::PI;
 
 #[test]
-fn ranges_limit_where_their_numbers_are_in_order() {
+fn ranges_are_limits_if_their_numbers_are_in_order() {
     let limits = |joint: &str, before: &str| {
         let model = model(before, &body(joint, ""), "");
         [model.limits().lower[0], model.limits().upper[0]]
@@ -50,7 +50,7 @@ fn joints_in_frames() {
     let body = &model.bodies()[1];
     near("anchor", &flat(&body.placement)[..3], &[1.0, 1.9, 3.0], 1e-12);
     near("axis", &body.joint.axis().unwrap().to_array(), &[0.0, 0.0, 1.0], 1e-12);
-    // MuJoCo's is in the body's frame, from which the model's is apart by the anchor
+    // MuJoCo's inertia is in the body's frame, which differs from the model's frame by the anchor
     let expected = [2.0, 1.1 - 1.0, 2.0 - 1.9, 3.0 - 3.0, 0.02, 0.04, 0.03, 0.0, 0.0, 0.0];
     near("inertia", &inertia(body), &expected, 1e-12);
     assert_eq!(model.armature(), [3.0]);
@@ -69,7 +69,7 @@ fn free_joints() {
     let site = [0.601_774_446_315_367_6, -0.190_594_781_415_027_53, -0.575_844_984_086_267_7];
     near("site", &placement(&model, "s")[..3], &site, 1e-12);
     assert_eq!(placement(&model, "f"), flat(&Se3::identity()));
-    // not with a body on it, and not unless it is asked for
+    // not with a child body, and only on request
     for (from, to) in
         [("<site", "<body><joint/><geom size='0.1'/></body><site"), (" align='true'", ""), ("true", "false")]
     {

@@ -1,5 +1,5 @@
-//! The structure of MJCF: names, frames, copies, files, geoms and meshes. Numbers are those of MuJoCo 4.0, of its compiled model or
-//! of `mj_forward`.
+//! Structure of MJCF: names, frames, copies, files, geoms and meshes. Expected numbers are from MuJoCo 4.0: its
+//! compiled model, or `mj_forward`.
 
 #![allow(non_snake_case)]
 
@@ -18,7 +18,7 @@ fn read(text: &str) -> Result<Model, Error> {
     Model::from_mjcf_str(text, &MjcfOptions::default())
 }
 
-/// A robot with something before its tree, in it, and after it.
+/// Returns a robot with text before its tree, in it, and after it.
 fn robot(before: &str, inside: &str, after: &str) -> String {
     format!("<mujoco>{before}<worldbody>{inside}</worldbody>{after}</mujoco>")
 }
@@ -28,18 +28,18 @@ fn model(before: &str, inside: &str, after: &str) -> Model {
     read(&robot(before, inside, after)).unwrap()
 }
 
-/// The error of a robot that is refused.
+/// Returns the error of an invalid robot.
 #[track_caller]
 fn refused(before: &str, inside: &str, after: &str) -> String {
     read(&robot(before, inside, after)).expect_err(inside).to_string()
 }
 
-/// The warnings of a kind.
+/// Returns the warnings of a kind.
 fn said(model: &Model, kind: WarningKind) -> Vec<String> {
     model.warnings().iter().filter(|w| w.kind() == kind).map(ToString::to_string).collect()
 }
 
-/// A body on a hinge that turns about y.
+/// Returns a body on a hinge that turns about y.
 fn body(joint: &str, inside: &str) -> String {
     format!("<body name='b' pos='0 0 1'><joint name='j' axis='0 1 0' {joint}/>{INERTIAL}{inside}</body>")
 }
@@ -53,7 +53,7 @@ fn near(what: &str, found: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
-/// The placement of a frame in its body: position, then the rotation by rows.
+/// Returns the placement of a frame in its body: position, then the rotation by rows.
 #[track_caller]
 fn placement(model: &Model, name: &str) -> Vec<f64> {
     flat(&model.frames()[model.frame(name).unwrap()].placement)
@@ -64,7 +64,7 @@ fn flat(X: &Se3<f64>) -> Vec<f64> {
     [X.translation, R.x, R.y, R.z].iter().flat_map(|v| v.to_array()).collect()
 }
 
-/// Mass, centre of mass, and the inertia about it (xx, yy, zz, xy, xz, yz).
+/// Returns mass, centre of mass, and the inertia about it (xx, yy, zz, xy, xz, yz).
 fn inertia(body: &Body) -> Vec<f64> {
     let (m, com, I) =
         (body.inertia.mass, body.inertia.mass_com.scale(1.0 / body.inertia.mass), body.inertia.rotational);
@@ -74,7 +74,7 @@ fn inertia(body: &Body) -> Vec<f64> {
     [&[m, x, y, z][..], &about, &mixed].concat()
 }
 
-/// A folder of files, removed when it is dropped.
+/// A folder of files, which is removed when it is dropped.
 struct Folder(PathBuf);
 
 impl Folder {

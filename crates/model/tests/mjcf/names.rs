@@ -1,4 +1,4 @@
-//! Names that are unknown, misplaced or contradict each other.
+//! Unknown and misplaced names, and names that contradict each other.
 
 use super::*;
 
@@ -30,7 +30,7 @@ fn unknown_names_warn_with_the_nearest_one() {
 }
 
 #[test]
-fn what_has_no_effect_is_known() {
+fn names_without_effect_are_known() {
     let before = "<compiler autolimits='true' usethread='false'><lengthrange mode='none'/></compiler><size memory='1M'/>
         <option timestep='0.01' integrator='implicit' magnetic='1 0 0'><flag contact='disable' energy='enable'/></option>
         <statistic extent='3'/><visual><global fovy='30'/></visual><custom><numeric name='n' data='1'/></custom>
@@ -72,14 +72,14 @@ fn contradictions_are_errors() {
     }
     assert!(refused("", "", "<deformable><flex name='f'/></deformable>").contains("flex `f`: is not supported"));
     assert!(refused("<option><flag spring='off'/></option>", "", "").contains("spring: `off` is neither enable nor"));
-    // a class has one orientation, the last that it says; pos at the origin does not contradict
+    // a class has one orientation, the last one in it; pos at the origin does not contradict fromto
     let before = "<default><geom euler='90 0 0'/><default class='c'><geom quat='0 1 0 0'/></default></default>";
     let inside = "<body><joint/><geom class='c' type='box' size='0.1 0.2 0.3' pos='1 0 0' mass='1'/></body>";
     near("class", &inertia(&model(before, inside, "").bodies()[1])[4..7], &[0.13 / 3.0, 0.1 / 3.0, 0.05 / 3.0], 1e-12);
 }
 
 #[test]
-fn what_a_model_cannot_hold_warns() {
+fn unsupported_features_warn() {
     for (before, inside, expected) in [
         ("<option density='1000'/>", body("", ""), "<option>: density 1000: forces of the medium"),
         ("<option viscosity='0.1'/>", body("", ""), "<option>: viscosity 0.1: forces of the medium"),

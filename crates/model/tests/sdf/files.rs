@@ -17,7 +17,7 @@ fn models_in_models() {
     let m = read(&format!("<sdf version='1.9'>{text}</sdf>")).unwrap();
     let names: Vec<_> = m.bodies().iter().skip(1).map(|b| (b.joint_name.as_str(), b.name.as_str())).collect();
     assert_eq!(names, [("shoulder", "inner::arm"), ("inner::wrist", "inner::hand")]);
-    // the tip stands where the pose of the model is; the frame of inner is fixed to its first link, the arm
+    // the tip is at the pose of the model; the frame of inner is fixed to its first link, the arm
     let base = frame(&m, "base", FrameKind::Link);
     let tip = m.bodies()[1].placement * frame(&m, "inner::tip", FrameKind::User);
     close(&tip.translation.to_array(), &[1.0, 2.0, 3.0]);
@@ -35,7 +35,7 @@ fn models_in_models() {
     assert!(error.contains("link `hand`: no link, joint or frame is named `base`"), "{error}");
 }
 
-/// A frame is fixed to the link that its model's frame is fixed to, not to the world.
+/// A frame is fixed to the same link as its model's frame, not to the world.
 #[test]
 fn the_frame_of_a_model_moves_with_its_link() {
     let inside =
@@ -99,7 +99,7 @@ fn included_files() {
     assert_eq!(frame(&m, "part::arm", FrameKind::Link).translation, Vec3::new(0.0, -0.1, 1.4));
     assert_eq!(said(&m).iter().filter(|w| w.contains("no joint carries it")).count(), 0, "{:?}", said(&m));
 
-    // merged: its names are the model's, its frame keeps its place
+    // merged: the names are in the outer model, and its frame keeps its pose
     write(
         &folder,
         "robots/robot.sdf",
@@ -131,15 +131,15 @@ fn included_files() {
     assert!(error("<uri>model://empty</uri>").contains("names no <sdf> file"));
     write(&folder, "models/empty/model.config", "<model><sdf>gone.sdf</sdf></model>");
     assert!(error("<uri>model://empty</uri>").contains("there is no file"));
-    // errors inside name their file
+    // errors inside an included file name that file
     write(&folder, "models/bad/model.sdf", "<sdf version='1.5'>\n<model name='a'><link/></model></sdf>");
     assert!(error("<uri>model://bad</uri>").contains("bad/model.sdf:2: <link>: has no name"));
     fs::remove_dir_all(&folder).unwrap();
 }
 
-/// A world without its sun is a world; a world of missing models alone is none.
+/// A world may lack its sun, but not all of its models.
 #[test]
-fn worlds_that_include_what_is_missing() {
+fn worlds_with_missing_models() {
     let world = |inside: &str| {
         read(&format!(
             "<sdf version='1.6'><world name='w'><include><uri>model://no_sun_here</uri></include>{inside}</world></sdf>"
@@ -155,7 +155,7 @@ fn worlds_that_include_what_is_missing() {
     assert!(world("").unwrap_err().to_string().contains("no_sun_here"));
 }
 
-/// Files that include each other, deep and long names: an error at once.
+/// Files that include each other, deep nesting and long names: each is an error at once.
 #[test]
 fn files_that_grow() {
     let folder = folder("grow");

@@ -1,6 +1,6 @@
-//! SDF: versions, models in models, files that include others, what a model cannot hold, and errors.
+//! SDF: versions, models in models, files that include others, features that a model cannot represent, and errors.
 //!
-//! Poses and inertias were made with Drake 1.51, which reads SDF by the format's own library.
+//! Expected poses and inertias are from Drake 1.51, which reads SDF with the format's own library.
 #![allow(non_snake_case)]
 
 use condyle_model::{Error, FrameKind, Joint, Model, ModelConstraintKind, SdfOptions, Se3, Vec3, Warning, WarningKind};
@@ -12,7 +12,7 @@ mod tree;
 mod values;
 mod versions;
 
-/// Sums and products of a few numbers.
+/// Relative tolerance for sums and products of a few numbers.
 const ROUNDING: f64 = 1e-12;
 
 const INERTIAL: &str = "<inertial><pose>0.1 0 0 0 0 0</pose><mass>2</mass>
@@ -22,7 +22,7 @@ fn read(text: &str) -> Result<Model, Error> {
     Model::from_sdf_str(text, &SdfOptions::default())
 }
 
-/// Reads a model of a version, the inside of `<model>`.
+/// Reads a model of a version, given the content of `<model>`.
 fn model(version: &str, inside: &str) -> Model {
     let text = format!("<sdf version='{version}'><model name='m'>{inside}</model></sdf>");
     read(&text).unwrap_or_else(|e| panic!("{e}\n{text}"))
@@ -32,7 +32,7 @@ fn link(name: &str) -> String {
     format!("<link name='{name}'>{INERTIAL}</link>")
 }
 
-/// A link that stands somewhere.
+/// Returns a link with a pose.
 fn link_at(name: &str, pose: &str) -> String {
     format!("<link name='{name}'><pose>{pose}</pose>{INERTIAL}</link>")
 }
@@ -58,7 +58,7 @@ fn close(ours: &[f64], theirs: &[f64]) {
     assert!(near, "{ours:?}\n{theirs:?}");
 }
 
-/// A folder for one test, empty.
+/// Creates an empty folder for one test.
 fn folder(name: &str) -> PathBuf {
     let folder = std::env::temp_dir().join(format!("condyle_sdf_{name}_{}", std::process::id()));
     let _ = fs::remove_dir_all(&folder);

@@ -1,4 +1,4 @@
-//! Trees of SDF: placement, static and several models, roots, loops, gearboxes, springs, followers.
+//! Trees of SDF: placement, static models, several models, roots, loops, gearboxes, springs, followers.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn placement_frames() {
     assert_eq!(z("placement_frame='b'", ""), Err(expected.to_owned()));
 }
 
-/// Nothing of a static model moves, nor of the models in it.
+/// Neither a static model nor the models in it move.
 #[test]
 fn static_models() {
     let turn = |name: &str, ends| joint(name, "revolute", ends, "<axis><xyz>0 0 1</xyz></axis>");
@@ -33,7 +33,7 @@ fn static_models() {
     let free = SdfOptions { root_joint: Some(Joint::FreeFlyer), ..SdfOptions::default() };
     let text = format!("<sdf version='1.9'><model name='m'>{inside}</model></sdf>");
     assert_eq!(Model::from_sdf_str(&text, &free).unwrap().nv(), 0);
-    // a robot that stands on a static model
+    // a robot on a static model
     let robot = format!("<model name='r'>{}</model>", link("base"));
     let ground = format!("<model name='ground'><static>1</static>{}</model>", link("plane"));
     let on = turn("on", ["ground::plane", "r::base"]);
@@ -73,7 +73,7 @@ fn several_models() {
     assert!(warned.iter().any(|w| w.ends_with("world `second`: is not the first world of the file, and is left out")));
 }
 
-/// Links that no joint carries: each is a root.
+/// Each link that no joint carries is a root.
 #[test]
 fn several_roots() {
     let turn = joint("j", "revolute", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");
@@ -90,7 +90,7 @@ fn several_roots() {
     };
     assert_eq!(names(&text), ["root_joint", "j", "root_joint#2"]);
     assert_eq!(names(&text.replace("'j'", "'root_joint'")), ["root_joint#2", "root_joint", "root_joint#3"]);
-    // beside links on the world
+    // the other links are connected to the world
     let anchored = text.replace("</model>", &format!("{}</model>", joint("w", "fixed", ["world", "a"], "")));
     assert_eq!(names(&anchored), ["j", "root_joint"]);
     let warned = said(&read(&anchored).unwrap());
@@ -98,7 +98,7 @@ fn several_roots() {
     assert!(warned[0].contains("link `c`"), "{warned:?}");
 }
 
-/// A joint whose parent is met in no other way carries the parent on its child, about the axis turned around.
+/// If the parent of a joint is not reached otherwise, the child carries the parent, and the axis is reversed.
 #[test]
 fn joints_walked_from_their_child() {
     let turn = |name: &str, ends| joint(name, "revolute", ends, "<axis><xyz>0 1 0</xyz></axis>");
@@ -112,7 +112,7 @@ fn joints_walked_from_their_child() {
     assert!(said(&model("1.9", &ball))[0].contains("its position is that of the parent, seen from the child"));
 }
 
-/// A ring of links: the joint that is met last becomes a constraint, whose frames coincide where the file puts the links.
+/// A ring of links: the last visited joint becomes a constraint, whose frames coincide at the links' poses in the file.
 #[test]
 fn loops() {
     let ring = |kind: &str, inside: &str| {
@@ -126,7 +126,7 @@ fn loops() {
         else {
             panic!("no frames");
         };
-        // at q = 0 each body is where its joint is
+        // at q = 0 each body is at its joint
         frames.map(|f| {
             let frame = &m.frames()[f];
             (frame.body, m.bodies()[frame.body].placement * frame.placement)
@@ -148,7 +148,7 @@ fn loops() {
     let m = ring("revolute", axis);
     assert_eq!(names(&m), ["close", "close#2"]);
     let [X, Y] = [ends(&m, 0)[0].1, ends(&m, 1)[0].1];
-    let c = Vec3::new(0.0, 0.0, 1.0); // the origin of c, which is turned about y by 0.2
+    let c = Vec3::new(0.0, 0.0, 1.0); // the origin of c, which is rotated about y by 0.2
     close(
         &(X.translation - c).to_array(),
         &[0.2 * 0.2f64.cos() + 0.1 * 0.2f64.sin(), 0.0, 0.1 * 0.2f64.cos() - 0.2 * 0.2f64.sin()],
@@ -166,7 +166,7 @@ fn loops() {
     assert!(said(&cross)[0].ends_with("only its point is held, and it may turn about all axes"));
 }
 
-/// θ₂ = −ratio θ₁, each about its axis and seen from the reference body.
+/// θ₂ = −ratio θ₁: each angle is about its axis, relative to the reference body.
 #[test]
 fn gearboxes() {
     let geared = |axes: [&str; 2], reference: &str| {
@@ -256,7 +256,7 @@ fn chains_of_followers() {
     assert!(chain(&mimic("l")).unwrap_err().to_string().ends_with("mimic: follows itself, through others"));
 }
 
-/// References mean the link where a link and a joint share a name, as in older files.
+/// If a link and a joint have the same name, as in older files, references mean the link.
 #[test]
 fn joints_named_as_links() {
     let turn = joint("b", "revolute", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");

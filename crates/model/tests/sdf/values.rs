@@ -1,8 +1,8 @@
-//! Values of SDF: inertias, names that are unknown, numbers that are none, elements of Drake.
+//! Values of SDF: inertias, unknown names, invalid numbers, elements of Drake.
 
 use super::*;
 
-/// Mass, mass times centre, and moments about the link: xx yy zz xy xz yz. Drake's numbers.
+/// Compares mass, mass times centre, and moments about the link (xx yy zz xy xz yz) with Drake's numbers.
 #[test]
 fn inertias_of_shapes() {
     let of = |inertial: &str, collisions: &str| {
@@ -38,7 +38,7 @@ fn inertias_of_shapes() {
         let worst = found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-11, "{shape}: {found:?}");
     }
-    // the density of the link for shapes without one, water for those of a link without one; a mass scales all
+    // a shape without a density uses the link's density, or the density of water; an explicit mass scales the result
     let density = |inertial: &str| of(inertial, &collision("", "<box><size>1 1 1</size></box>")).unwrap();
     assert_eq!(density("<inertial auto='1'><density>700</density></inertial>").0[0], 700.0);
     let (found, warned) = density(auto);
@@ -47,7 +47,7 @@ fn inertias_of_shapes() {
     let (found, warned) = density("<inertial auto='true'><mass>6</mass></inertial>");
     close(&found, &[6.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
     assert!(warned.is_empty());
-    // a shape may stand relative to a frame
+    // a shape may be relative to a frame
     let (found, _) =
         of(auto, &collision("<pose relative_to='f'>1 0 0 0 0 0</pose>", "<box><size>1 1 1</size></box>")).unwrap();
     close(&found[1..4], &[0.0, 0.0, 1000.0]);
@@ -83,7 +83,8 @@ fn missing_inertias() {
     warned(&frame, "inertial: the pose is in the link's frame, not relative to `a`");
 }
 
-/// Misspelt and misplaced elements warn, and so do known ones that a model cannot hold. Drawn and sensed things do not.
+/// Misspelt and misplaced elements cause warnings, and so do known ones that a model cannot represent. Visual elements
+/// and sensors do not.
 #[test]
 fn what_a_model_does_not_hold() {
     let turn = |inside: &str| joint("j", "revolute", ["a", "b"], inside);
@@ -158,7 +159,7 @@ fn what_a_model_does_not_hold() {
 }
 
 #[test]
-fn values_that_are_none() {
+fn invalid_values() {
     let cases = [
         ("<link name='a'><gravity>no</gravity></link>", "link `a`: gravity: expected true or false, found `no`"),
         ("<static>yes</static><link name='a'/>", "model `m`: static: expected true or false, found `yes`"),
@@ -200,15 +201,15 @@ fn values_that_are_none() {
         let error = read(&text).expect_err(what).to_string();
         assert!(error.contains(what), "{error}\n{what}");
     }
-    // empty ones are the default, and a type may have capitals
+    // empty elements mean the default, and a type may have capitals
     let m = model("1.9", "<static/><link name='a'><pose/><gravity/></link><link name='b'/>
       <joint name='j' type='Revolute'><parent>a</parent><child>b</child><axis><xyz/><limit><upper/></limit></axis></joint>");
     assert_eq!((m.nv(), m.limits().upper[0]), (1, f64::INFINITY));
 }
 
-/// Text behind a number is dropped, with a warning; text without a number is an error.
+/// Text after a number is dropped with a warning; text without a number is an error.
 #[test]
-fn numbers_with_something_behind() {
+fn numbers_followed_by_text() {
     let limit = |text: &str| {
         let axis = format!("<axis><xyz>0 0 1</xyz><limit><velocity>{text}</velocity></limit></axis>");
         let joint = joint("j", "revolute", ["a", "b"], &axis);
@@ -233,7 +234,7 @@ fn numbers_with_something_behind() {
     assert!(limit("fast").unwrap_err().to_string().ends_with("joint `j`: velocity: `fast` is no number"));
 }
 
-/// Elements of Drake: a rotor is armature, ratio² times its inertia; a joint of its own kinds is an error.
+/// Elements of Drake: a rotor adds armature, ratio² times its inertia; one of Drake's own joints is an error.
 #[test]
 fn elements_of_drake() {
     let of = |inside: &str, model: &str| {
@@ -254,7 +255,7 @@ fn elements_of_drake() {
     assert!(error.ends_with("drake:joint `k`: joints of Drake's own are not supported: `planar`"), "{error}");
 }
 
-/// A screw without a pitch turns once for each metre.
+/// A screw without a pitch turns once per metre.
 #[test]
 fn a_screw_without_a_pitch() {
     let screw = joint("j", "screw", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");

@@ -1,10 +1,11 @@
-//! SDF by version: frames of axes and poses, attributes of the first version, flat names.
+//! Versions of SDF: frames of axes and poses, attributes of the first version, flat names.
 
 use super::*;
 
-/// The axis 0 0 1 of a joint whose child is turned by a quarter about x: z of the joint, or y of it, which is z of the model.
+/// Tests the axis 0 0 1 of a joint whose child is rotated by 90° about x. It is z of the joint, or z of the model,
+/// which is y of the joint.
 #[test]
-fn the_version_says_in_which_frame_an_axis_is() {
+fn the_version_determines_the_frame_of_an_axis() {
     let axis = |version: &str, inside: &str| {
         let axis = format!("<axis><xyz>0 0 1</xyz>{inside}</axis>");
         let b = link_at("b", "0 0 1 1.5707963267948966 0 0");
@@ -33,14 +34,14 @@ fn the_version_says_in_which_frame_an_axis_is() {
         close(&found, &of_joint);
         assert!(warned.iter().any(|w| w.contains("unknown element <use_parent_model_frame>")), "{warned:?}");
     }
-    // an axis without a direction is z, of the model too
+    // an axis without a direction is z, also in the model's frame
     let bare = |version| axis(version, "").0;
     close(&bare("1.4"), &of_model);
 }
 
-/// Up to version 1.6 a pose has a `frame`, later a `relative_to`.
+/// Up to version 1.6 a pose has the attribute `frame`, later `relative_to`.
 #[test]
-fn the_version_says_to_what_a_pose_is_relative() {
+fn the_version_determines_the_attribute_of_a_pose() {
     let z = |version: &str, name: &str| {
         let b = format!("<link name='b'><pose {name}='a'>0 0 1 0 0 0</pose>{INERTIAL}</link>");
         let ends = joint("j", "fixed", ["a", "b"], "");
@@ -52,7 +53,7 @@ fn the_version_says_to_what_a_pose_is_relative() {
     assert_eq!(z("1.7", "frame"), (1.0, 1));
 }
 
-/// Version 1.0 writes attributes where later ones write elements.
+/// Version 1.0 has attributes where later versions have elements.
 #[test]
 fn the_first_version() {
     let old = "<gazebo version='1.0'><world name='w'><physics type='ode'><gravity xyz='0 0 -2'/></physics>
@@ -77,7 +78,7 @@ fn the_first_version() {
     let (old, new) = (read(old).unwrap(), read(new).unwrap());
     assert_eq!(said(&old), Vec::<String>::new());
     assert_eq!(old, new);
-    // later versions know no such attributes
+    // later versions do not know these attributes
     let late =
         read("<sdf version='1.2'><model name='m'><link name='a'><inertial mass='2'/></link></model></sdf>").unwrap();
     assert!(said(&late)[0].contains("unknown attribute `mass`"), "{:?}", said(&late));
@@ -96,7 +97,7 @@ fn unknown_versions() {
     }
 }
 
-/// Old files wrote nested models flat: names and frames with `::`.
+/// Old files contain flattened nested models: names and frames with `::`.
 #[test]
 fn flat_names() {
     let inside = format!(

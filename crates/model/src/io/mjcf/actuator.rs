@@ -1,4 +1,4 @@
-//! Actuators: their numbers, with the defaults of their classes.
+//! Actuators: their parameters, with the defaults of their classes.
 
 use super::attributes::{Attributes, MAIN};
 use super::law::{KINDS, Law, Laws, fill};
@@ -7,10 +7,10 @@ use crate::io::xml::Element;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Interval of all numbers.
+/// Interval of all real numbers.
 pub(super) const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-/// A range, and whether it limits: if it does not say so, it limits where its numbers are in order.
+/// Range, and whether it is a limit; without a flag, it is a limit if its numbers are in ascending order.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Range {
     pub(super) numbers: [f64; 2],
@@ -18,7 +18,7 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// Reads the attributes of a range over what a class has.
+    /// Reads the attributes of a range; missing ones keep the values of the class.
     pub(super) fn read(mut self, a: &Attributes, range: &str, limited: &str) -> Result<Self, Error> {
         self.numbers = a.array(range)?.unwrap_or(self.numbers);
         if a.get(limited).is_some() {
@@ -27,7 +27,7 @@ impl Range {
         Ok(self)
     }
 
-    /// Returns the range if it limits. `name` is the name of its attribute.
+    /// Returns the range if it is a limit. `name` is the name of its attribute.
     pub(super) fn bounds(&self, e: &Element, name: &str, autolimits: bool) -> Result<Option<[f64; 2]>, Error> {
         let [lower, upper] = self.numbers;
         if self.limited == Some(true) && lower >= upper {
@@ -41,7 +41,7 @@ impl Range {
     }
 }
 
-/// Numbers of an actuator that do not depend on its kind.
+/// Parameters of an actuator that do not depend on its kind.
 #[derive(Clone)]
 pub(super) struct Mechanics {
     pub(super) gear: [f64; 6],
@@ -82,7 +82,7 @@ impl Mechanics {
         Ok(())
     }
 
-    /// Takes the limit of torque that a DC motor gives.
+    /// Sets the torque limit that follows from the parameters of a DC motor.
     fn saturate(&mut self, e: &Element, law: &Law) -> Result<(), Error> {
         if let Some(torque) = law.saturation(&Attributes::plain(e))? {
             self.force = Range { numbers: [-torque, torque], limited: Some(true) };
@@ -91,7 +91,7 @@ impl Mechanics {
     }
 }
 
-/// Default class: what an actuator has that says nothing.
+/// Default class: parameters of an actuator that does not specify them.
 #[derive(Clone, Default)]
 struct Class<'a> {
     mechanics: Rc<Mechanics>,
@@ -114,7 +114,7 @@ impl<'a> Classes<'a> {
         Ok(classes)
     }
 
-    /// Adds a class that begins as another one, and the classes inside it.
+    /// Adds a class that starts from another one, and its nested classes.
     fn add(&mut self, element: &'a Element, name: &'a str, mut class: Class<'a>) -> Result<(), Error> {
         for e in element.children.iter().filter(|e| KINDS.contains(&&*e.tag)) {
             let mechanics = Rc::make_mut(&mut class.mechanics);
@@ -130,7 +130,7 @@ impl<'a> Classes<'a> {
         Ok(())
     }
 
-    /// Returns the numbers of an element of `<actuator>`.
+    /// Returns the parameters of an element of `<actuator>`.
     pub(super) fn of(&self, e: &'a Element) -> Result<(Mechanics, Law<'a>), Error> {
         let name = e.attribute("class").unwrap_or(MAIN);
         let class = self.classes.get(name).ok_or_else(|| e.wrong(format!("no default class is named `{name}`")))?;
@@ -142,7 +142,7 @@ impl<'a> Classes<'a> {
     }
 }
 
-/// Returns an interval times a number.
+/// Returns an interval multiplied by a number.
 pub(super) fn scaled([lower, upper]: [f64; 2], by: f64) -> [f64; 2] {
     match by {
         0.0 => [0.0; 2],
@@ -151,24 +151,24 @@ pub(super) fn scaled([lower, upper]: [f64; 2], by: f64) -> [f64; 2] {
     }
 }
 
-/// Returns the interval of the numbers of one interval, clipped to another one.
+/// Clips the ends of an interval to another interval.
 pub(super) fn clipped(of: [f64; 2], [lower, upper]: [f64; 2]) -> [f64; 2] {
     of.map(|x| x.clamp(lower, upper))
 }
 
 impl Law<'_> {
-    /// Returns the interval of the activation, given those of the control and of the activation's limit.
+    /// Returns the interval of the activation, given the interval of the control and the limit of the activation.
     pub(super) fn activation(&self, control: [f64; 2], limit: [f64; 2]) -> [f64; 2] {
         match self.dynamics {
             "none" => control,
-            // it begins at 0, and comes near the control
+            // the activation begins at 0 and approaches the control
             "filter" | "filterexact" => clipped([control[0].min(0.0), control[1].max(0.0)], limit),
             "muscle" => [0.0, 1.0],
             _ => limit,
         }
     }
 
-    /// Returns the interval of the force that follows from the activation alone. It is finite if the force depends on neither
+    /// Returns the interval of forces for an interval of activations. It is finite if the force depends on neither
     /// length nor velocity.
     pub(super) fn force(&self, activation: [f64; 2]) -> [f64; 2] {
         let bias = if self.bias == "affine" { &self.biasprm[..3] } else { &[0.0; 3] };
@@ -178,7 +178,7 @@ impl Law<'_> {
         scaled(activation, self.gainprm[0]).map(|f| f + bias[0])
     }
 
-    /// Returns gain, bias, kp and kv of f = gain u + bias − kp l − kv l̇, or why the law has another form.
+    /// Returns gain, bias, kp and kv of f = gain u + bias − kp l − kv l̇, or the reason why the law has another form.
     pub(super) fn affine(&self) -> Result<[f64; 4], &'static str> {
         let [g, ..] = self.gainprm;
         let [b0, b1, b2, ..] = self.biasprm;

@@ -7,19 +7,19 @@ use crate::names::{near, nearest};
 use condyle_spatial::Vec3;
 use std::collections::HashMap;
 
-/// Attributes of a class, for each kind of element.
+/// Attributes of a class, by kind of element.
 type Class<'a> = HashMap<&'a str, HashMap<&'a str, &'a str>>;
 
-/// The most attributes that all classes may have together, what they inherit included.
+/// Maximum number of attributes of all classes together, including inherited ones.
 const MAX_INHERITED: usize = 1 << 20;
 
-/// The name of the class that elements have without being asked.
+/// Name of the default class of elements without a class.
 pub(super) const MAIN: &str = "main";
 
-/// All default classes, each complete with what it inherits.
+/// Default classes, each with the attributes that it inherits.
 pub(super) struct Defaults<'a> {
     classes: HashMap<&'a str, Class<'a>>,
-    /// The number of attributes, and of kinds of elements, of all classes.
+    /// Number of attributes and of kinds of elements of all classes.
     size: usize,
 }
 
@@ -37,7 +37,7 @@ impl<'a> Defaults<'a> {
         Ok(defaults)
     }
 
-    /// Adds a class that begins as another one, and the classes inside it.
+    /// Adds a class that starts from another one, and its nested classes.
     fn add(&mut self, element: &'a Element, name: &'a str, mut class: Class<'a>) -> Result<(), Error> {
         for kind in element.children.iter().filter(|c| c.tag != "default") {
             let inherited = class.entry(&kind.tag).or_default();
@@ -61,7 +61,7 @@ impl<'a> Defaults<'a> {
         Ok(())
     }
 
-    /// The element with the defaults of its class or, failing one, of the class around it.
+    /// Returns the element with the defaults of its class, or of the surrounding class if it names no class.
     pub(super) fn of<'e>(&'e self, element: &'e Element, around: &'e str) -> Result<Attributes<'e>, Error> {
         let name = self.known(element, element.attribute("class").unwrap_or(around))?;
         Ok(Attributes { element, class: self.classes[name].get(element.tag.as_str()) })
@@ -78,7 +78,7 @@ impl<'a> Defaults<'a> {
         Ok(Attributes { element, class: self.classes[name].get(kind) })
     }
 
-    /// The class's name, if there is such a class.
+    /// Returns the name of a class if the class exists.
     pub(super) fn known<'e>(&self, element: &Element, name: &'e str) -> Result<&'e str, Error> {
         if self.classes.contains_key(name) {
             return Ok(name);
@@ -90,14 +90,14 @@ impl<'a> Defaults<'a> {
     }
 }
 
-/// The attributes of an element, those of its class where it has none of its own.
+/// Attributes of an element; an attribute that the element lacks is taken from its class.
 pub(super) struct Attributes<'a> {
     pub(super) element: &'a Element,
     class: Option<&'a HashMap<&'a str, &'a str>>,
 }
 
 impl<'a> Attributes<'a> {
-    /// The attributes of an element that has no class.
+    /// Returns the attributes of an element without a class.
     pub(super) fn plain(element: &'a Element) -> Self {
         Self { element, class: None }
     }
@@ -106,13 +106,14 @@ impl<'a> Attributes<'a> {
         self.element.attribute(name).or_else(|| self.class?.get(name).copied())
     }
 
-    /// Returns the texts of an attribute, the class's first: an element may replace only the first numbers of a list.
+    /// Returns the texts of an attribute, the class's text first: an element may replace only the first numbers of a
+    /// list.
     pub(super) fn layers(&self, name: &str) -> impl Iterator<Item = &'a str> + use<'a> {
         let class = self.class.and_then(|class| class.get(name).copied());
         class.into_iter().chain(self.element.attribute(name))
     }
 
-    /// The value of an attribute, as a reader of text understands it, if it is there.
+    /// Converts the value of an attribute with `f`; `None` if the attribute is missing.
     fn read<T>(&self, name: &str, f: impl Fn(&str) -> Result<T, String>) -> Result<Option<T>, Error> {
         let read = |text| f(text).map_err(|what| self.element.wrong(format!("{name}: {what}")));
         self.get(name).map(read).transpose()
@@ -134,7 +135,7 @@ impl<'a> Attributes<'a> {
         Ok(self.array(name)?.map(Vec3::from))
     }
 
-    /// `true`, `false`, or a third word that means neither.
+    /// Returns `true` or `false`; `None` if the attribute is missing or has the third value.
     pub(super) fn flag(&self, name: &str, third: Option<&str>) -> Result<Option<bool>, Error> {
         let flag = |text: &str| match text {
             "true" => Ok(Some(true)),

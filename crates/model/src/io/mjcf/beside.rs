@@ -1,5 +1,5 @@
-//! Things of a file beside the tree of bodies, in the order in which they depend on each other: tendons and actuators add
-//! armature, springs may follow from inertia, and limits of effort are sums.
+//! Parts of a file besides the tree of bodies, read in the order in which they depend on each other. Tendons and
+//! actuators add armature, springs may follow from inertia, and limits of effort are sums.
 
 use super::Source;
 use super::keyframe;
@@ -13,8 +13,8 @@ use crate::model::Model;
 use crate::warning::Warning;
 use condyle_spatial::Se3;
 
-/// Adds what the file has beside the tree to the model, and says what is left out. `poses` has the pose of each body in the
-/// world that the file has drawn.
+/// Adds all parts of the file besides the tree to the model, and returns warnings about parts that are left out.
+/// `poses` contains the pose of each body in the world, in the initial configuration of the file.
 pub(super) fn add<'a>(
     model: &mut Model,
     root: &'a Element,
@@ -28,7 +28,7 @@ pub(super) fn add<'a>(
     let mut tendons = Tendons::read(root, sources, joints)?;
     let drives = Drives::read(root, sources, joints, &tendons, &on)?;
     drives.load(model, joints, &mut tendons, &lines, &on);
-    // armature of each column: of the joint, and of tendons
+    // armature of each column, from joints and tendons
     let mut armature = vec![0.0; model.tree.columns.len()];
     for joint in &joints.all {
         armature[joint.columns(model)].fill(joint.armature);
@@ -54,7 +54,7 @@ pub(super) fn add<'a>(
         model.limits.upper.fill(f64::INFINITY);
     }
     if !on.spring && !on.damper {
-        model.gravity_compensation.clear(); // MuJoCo has no passive forces then
+        model.gravity_compensation.clear(); // MuJoCo then has no passive forces
     }
     keyframe::add(model, root, joints, &mut warnings)?;
     Ok(warnings)

@@ -1,4 +1,4 @@
-//! The shapes that MuJoCo makes itself (`builtin` of `<mesh>`), point by point.
+//! Shapes that MuJoCo creates itself (`builtin` of `<mesh>`), with the same points.
 
 use condyle_meshes::Triangles;
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -7,10 +7,10 @@ use std::collections::HashMap;
 /// Maximum number of points of a shape.
 const MAX_POINTS: f64 = (1 << 20) as f64;
 
-/// Returns the points and triangles of a shape, which has no triangles where it is the hull of its points.
+/// Returns the points and triangles of a shape; if the shape is the convex hull of its points, the triangles are empty.
 pub(super) fn shape(kind: &str, params: &[f64]) -> Result<Triangles, String> {
     let wrong = || format!("builtin: a {kind} with params {} cannot be", crate::io::xml::words(params));
-    // a number of steps; numbers after the point do not count
+    // converts a number of steps to an integer; decimals are ignored
     let steps = |x: f64, least: f64, most: f64| {
         let x = x.trunc();
         if x >= least && x <= most { Ok(x as usize) } else { Err(wrong()) }
@@ -34,9 +34,9 @@ pub(super) fn shape(kind: &str, params: &[f64]) -> Result<Triangles, String> {
     }
 }
 
-/// An icosahedron on the unit sphere, each of its triangles divided into four some times.
+/// Returns an icosahedron on the unit sphere; each triangle is divided into four, `divisions` times.
 fn sphere(divisions: usize) -> Triangles {
-    // in floats, as MuJoCo
+    // in single precision, as in MuJoCo
     let phi = ((1.0 + 5f64.sqrt()) / 2.0) as f32;
     let norm = (1.0 + f64::from(phi * phi)).sqrt();
     let corner = |p: [f32; 3]| p.map(|x| (f64::from(x) / norm) as f32);
@@ -79,7 +79,7 @@ fn sphere(divisions: usize) -> Triangles {
     (points.into_iter().map(|p| p.map(f64::from)).collect(), triangles)
 }
 
-/// Half a unit sphere above a disc: rings of 4, 8, 12, … points, and the middle of the disc.
+/// Returns a unit hemisphere on a disc: rings of 4, 8, 12, … points, and the centre of the disc.
 fn hemisphere(rings: usize) -> Triangles {
     let equator = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
     let (mut points, mut triangles) = (vec![[0.0, 0.0, 1.0]], Vec::new());
@@ -117,12 +117,12 @@ fn hemisphere(rings: usize) -> Triangles {
     (points, triangles)
 }
 
-/// |cos ω|ᵐ and |sin ω|ᵐ, with their signs.
+/// Returns |cos ω|ᵐ and |sin ω|ᵐ, with the signs of cos ω and sin ω.
 fn powers(omega: f64, m: f64) -> [f64; 2] {
     [omega.cos(), omega.sin()].map(|x| x.abs().powf(m).copysign(x))
 }
 
-/// A superellipsoid: rings of points from pole to pole.
+/// Returns a superellipsoid: rings of points from pole to pole.
 fn supersphere(n: usize, e: f64, m: f64) -> Triangles {
     let (mut points, mut triangles) = (vec![[0.0, 0.0, -1.0]], Vec::new());
     for i in 1..n {
@@ -146,7 +146,7 @@ fn supersphere(n: usize, e: f64, m: f64) -> Triangles {
     (points, triangles)
 }
 
-/// A supertoroid.
+/// Returns a supertoroid.
 fn supertorus(n: usize, radius: f64, s: f64, t: f64) -> Triangles {
     let angle = |k: usize| TAU * k as f64 / n as f64;
     let (mut points, mut triangles) = (Vec::new(), Vec::new());
@@ -165,7 +165,7 @@ fn supertorus(n: usize, radius: f64, s: f64, t: f64) -> Triangles {
     (points, triangles)
 }
 
-/// Directions of a field of view (degrees), denser in the middle.
+/// Returns directions of a field of view (degrees), denser in the middle.
 fn wedge(count: [usize; 2], view: [f64; 2], gamma: f64) -> Vec<[f64; 3]> {
     let edge = |axis: usize, i: usize| {
         let x = -1.0 + 2.0 * i as f64 / count[axis] as f64;
@@ -179,7 +179,7 @@ fn wedge(count: [usize; 2], view: [f64; 2], gamma: f64) -> Vec<[f64; 3]> {
     (0..count[0]).flat_map(|i| (0..count[1]).map(move |j| (i, j))).map(|(i, j)| point(i, j)).collect()
 }
 
-/// A square of points at z = −1.
+/// Returns a square of points at z = −1.
 fn plate([x, y]: [usize; 2]) -> Triangles {
     let along = |i: usize, count: usize| -1.0 + (i as f64 + 0.5) * (2.0 / count as f64);
     let points = (0..x).flat_map(|i| (0..y).map(move |j| [along(i, x), along(j, y), -1.0])).collect();
@@ -190,7 +190,7 @@ fn plate([x, y]: [usize; 2]) -> Triangles {
     (points, triangles.collect())
 }
 
-/// A polygon at z = −1, and a smaller one or a tip at z = 1.
+/// Returns a polygon at z = −1, and a scaled polygon or a tip at z = 1.
 fn cone(edges: usize, radius: f64) -> Vec<[f64; 3]> {
     let ring = |r: f64, z: f64| {
         (0..edges).map(move |i| {

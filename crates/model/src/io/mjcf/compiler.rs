@@ -1,11 +1,11 @@
-//! The settings of `<compiler>`, and the poses that they give meaning to.
+//! Settings of `<compiler>`, and the poses whose meaning depends on them.
 
 use super::attributes::Attributes;
 use crate::error::Error;
 use crate::io::xml::Element;
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
 
-/// Whether bodies get their inertia from their geoms.
+/// Rule by which bodies get their inertia from their geoms.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum FromGeoms {
     Never,
@@ -13,33 +13,33 @@ pub(super) enum FromGeoms {
     Always,
 }
 
-/// The settings of `<compiler>`.
+/// Settings of `<compiler>`.
 pub(super) struct Compiler {
-    /// Radians in a unit of angle.
+    /// Unit of angle in radians.
     pub(super) angle: f64,
     eulerseq: Vec<u8>,
     pub(super) autolimits: bool,
     pub(super) from_geoms: FromGeoms,
-    /// Geoms of these groups count for inertia.
+    /// First and last group of the geoms that count for inertia.
     pub(super) groups: [f64; 2],
-    /// No body has less mass (kg), no principal moment of inertia is less (kg m²).
+    /// Minimum mass of a body (kg) and minimum principal moment of inertia (kg m²).
     pub(super) bounds: [f64; 2],
-    /// Whether principal moments that no body has are replaced by their mean.
+    /// Whether invalid principal moments are replaced by their mean.
     pub(super) balance: bool,
-    /// The mass to which all masses are scaled (kg).
+    /// Total mass to which all masses are scaled (kg).
     pub(super) total_mass: Option<f64>,
-    /// Whether a free joint sits in the frame of inertia of its body.
+    /// Whether a free joint is in the frame of inertia of its body.
     pub(super) align_free: bool,
-    /// The folder of meshes, and whether it replaces the folders in their addresses.
+    /// Folder of meshes, and whether it replaces the folders in their addresses.
     pub(super) mesh_folder: String,
     pub(super) strip_path: bool,
-    /// Whether a primitive that is fitted to a mesh has the box around it, instead of the box of its inertia.
+    /// Whether a primitive is fitted to the bounding box of a mesh, instead of to the box with the mesh's inertia.
     pub(super) fit_box: bool,
-    /// The rule of a mesh's inertia where the mesh has none (before MuJoCo 3.2.4).
+    /// Whether a mesh without its own rule uses `exact` instead of `legacy`; an attribute of MuJoCo before 3.2.4.
     pub(super) exact_meshes: bool,
 }
 
-/// The ways to give an orientation.
+/// Attributes that specify an orientation.
 pub(super) const ORIENTATIONS: [&str; 5] = ["quat", "axisangle", "xyaxes", "zaxis", "euler"];
 
 impl Compiler {
@@ -65,7 +65,7 @@ impl Compiler {
         Ok(compiler)
     }
 
-    /// Takes over what an element says.
+    /// Applies the attributes of an element.
     fn merge(&mut self, element: &Element) -> Result<(), Error> {
         let a = Attributes::plain(element);
         self.angle = match a.get("angle") {
@@ -111,7 +111,7 @@ impl Compiler {
         Ok(())
     }
 
-    /// The pose that pos and quat, axisangle, euler, xyaxes or zaxis give.
+    /// Returns the pose specified by pos and one of quat, axisangle, euler, xyaxes and zaxis.
     pub(super) fn pose(&self, a: &Attributes) -> Result<Se3<f64>, Error> {
         Ok(Se3::new(self.rotation(a)?, a.vector("pos")?.unwrap_or(Vec3::zero())))
     }
@@ -130,7 +130,7 @@ impl Compiler {
         if own.len() > 1 {
             return Err(a.element.wrong(format!("has {} orientations: {}", own.len(), own.join(", "))));
         }
-        // an element's own orientation goes before what its class says in another way, any other one before a quat
+        // an element's own orientation has priority over its class; within a class, quat has the lowest priority
         let inherited = || ORIENTATIONS.into_iter().rev().find(|n| a.get(n).is_some());
         match own.first().copied().or_else(inherited) {
             None | Some("quat") => {
@@ -157,26 +157,26 @@ impl Compiler {
         }
     }
 
-    /// The rotation by three angles about the axes of `eulerseq`.
+    /// Returns the rotation by three angles about the axes of `eulerseq`.
     pub(super) fn euler(&self, angles: [f64; 3]) -> Mat3<f64> {
         let mut R = Mat3::identity();
         for (axis, angle) in self.eulerseq.iter().zip(angles) {
             let mut v = [0.0; 3];
             v[usize::from(axis.to_ascii_lowercase() - b'x')] = 1.0;
             let turn = turn(v.into(), angle * self.angle);
-            // lower case: about the axes that turn with it
+            // lower case: about the axes that have turned already
             R = if axis.is_ascii_lowercase() { R * turn } else { turn * R };
         }
         R
     }
 }
 
-/// The rotation by an angle about a unit vector.
+/// Returns the rotation by an angle about a unit vector.
 pub(super) fn turn(axis: Vec3<f64>, angle: f64) -> Mat3<f64> {
     lie::exp3(axis.scale(angle)).to_rotation()
 }
 
-/// The shortest rotation that takes z to a unit vector.
+/// Returns the shortest rotation that maps z to a unit vector.
 pub(super) fn z_to(v: Vec3<f64>) -> Mat3<f64> {
     let axis = Vec3::new(-v.y, v.x, 0.0);
     let sin = axis.norm_squared().sqrt();
@@ -186,7 +186,7 @@ pub(super) fn z_to(v: Vec3<f64>) -> Mat3<f64> {
     turn(axis.scale(1.0 / sin), sin.atan2(v.z))
 }
 
-/// The pose of what goes from one point to another, and half the distance (m): its z axis points to the first one.
+/// Returns the pose of a geom between two points, and half the distance (m); its z axis points to the first point.
 pub(super) fn from_to(a: &Attributes, kind: &str) -> Result<Option<(Se3<f64>, f64)>, Error> {
     let Some([x0, y0, z0, x1, y1, z1]) = a.array("fromto")? else { return Ok(None) };
     if !matches!(kind, "capsule" | "cylinder" | "ellipsoid" | "box") {

@@ -12,10 +12,10 @@ use crate::warning::Warning;
 use condyle_spatial::{Quaternion, Se3, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// Body of the builder, and a pose in it.
+/// Body of the builder, and a pose in its frame.
 type At = (BodyId, Se3<f64>);
 
-/// Bodies and sites of a file by their names, and the poses of bodies that the file has drawn.
+/// Bodies and sites of a file by name, and the poses of bodies in its initial configuration.
 struct Places<'p> {
     named: HashMap<(bool, String), At>,
     /// Pose of each body of the builder in the world.
@@ -38,13 +38,13 @@ impl<'p> Places<'p> {
         }
     }
 
-    /// Returns the pose in the world that the file has drawn.
+    /// Returns the pose in the world, in the initial configuration of the file.
     fn drawn(&self, (BodyId(body), X): At) -> Se3<f64> {
         self.poses[body] * X
     }
 }
 
-/// Adds the constraints of a file to a builder, and says what is left out.
+/// Adds the constraints of a file to a builder, and returns warnings about constraints that are left out.
 pub(super) fn add(
     builder: &mut ModelBuilder,
     root: &Element,
@@ -131,7 +131,7 @@ pub(super) fn add(
     Ok(warnings)
 }
 
-/// Joints that follow others, which may follow others too.
+/// Joints that follow other joints, which may be followers too.
 #[derive(Default)]
 struct Followers {
     leaders: HashMap<usize, usize>,
@@ -139,7 +139,8 @@ struct Followers {
 }
 
 impl Followers {
-    /// Lets a joint follow another one, and returns whether it can: it follows none yet, and does not lead that one.
+    /// Lets a joint follow another one. Returns whether this is possible: the joint must not follow yet, and must not
+    /// lead the other one.
     fn add(&mut self, follower: usize, leader: usize) -> bool {
         if self.leaders.contains_key(&follower) || self.refused.contains(&follower) {
             return false;
@@ -157,7 +158,7 @@ impl Followers {
     }
 }
 
-/// Returns the frames that a loop holds together, and whether it holds their orientation too.
+/// Returns the two frames that a loop connects, and whether it also fixes their relative orientation.
 fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     let a = Attributes::plain(e);
     let rigid = e.tag == "weld" && a.number("torquescale")? != Some(0.0);
@@ -175,7 +176,7 @@ fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     let (b2, X2) = places.find(e, "body2")?.unwrap_or(world);
     let [W1, W2] = [places.drawn((b1, X1)), places.drawn((b2, X2))];
     if e.tag == "connect" {
-        // the anchor is a point of body1, and of body2 in the pose that the file has drawn
+        // the anchor is a point of body1, and the point of body2 that coincides with it in the initial configuration
         let anchor = point(anchor.ok_or_else(|| e.wrong("has no anchor"))?);
         return Ok(([(b1, X1 * anchor), (b2, X2 * (W2.inverse() * W1 * anchor))], rigid));
     }
@@ -192,7 +193,7 @@ fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     Ok(([(b1, X1 * relative), (b2, X2 * anchor)], rigid))
 }
 
-/// Returns the coefficients of a polynomial y − y₀ = Σ pᵢ (x − x₀)ⁱ in the powers of x, by Horner's rule.
+/// Returns the coefficients of the polynomial y − y₀ = Σ pᵢ (x − x₀)ⁱ in powers of x, by Horner's rule.
 fn shifted(p: [f64; 5], x0: f64, y0: f64) -> [f64; 5] {
     let mut c = [0.0; 5];
     for &coefficient in p.iter().rev() {

@@ -1,5 +1,5 @@
-//! `<replicate>` and `<attach>`: copies of a part of the tree, with names of their own, in its place. Elements of other sections
-//! that refer to nothing but the copied part are copied along, as MuJoCo does it.
+//! `<replicate>` and `<attach>`: each is replaced by copies of a part of the tree with their own names. Elements of
+//! other sections that refer only to the copied part are copied too, as in MuJoCo.
 
 use super::attributes::Attributes;
 use super::compiler::Compiler;
@@ -11,10 +11,10 @@ use condyle_spatial::Vec3;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Maximum number of `<attach>` elements of a robot; each one looks through the file that it attaches.
+/// Maximum number of `<attach>` elements of a robot; chosen because each one searches the file that it attaches.
 const MAX_ATTACHMENTS: usize = 256;
 
-/// Puts copies in place of every `<replicate>` and `<attach>` of a file in a folder.
+/// Replaces every `<replicate>` and `<attach>` of a file in a folder by copies.
 pub(super) fn expand(files: &mut Files, root: &mut Element, folder: Option<&Path>) -> Result<(), Error> {
     let mut attached = HashSet::new();
     if !looks_for(root, &mut attached) {
@@ -32,8 +32,8 @@ pub(super) fn expand(files: &mut Files, root: &mut Element, folder: Option<&Path
     Ok(())
 }
 
-/// Returns whether something is replicated or attached in an element. The parts of the same file that are attached are added to a
-/// set, and nothing where it is a part of another file.
+/// Returns whether an element contains `<replicate>` or `<attach>`. Adds the attached parts of the same file to
+/// `attached`, and `None` for a part of another file.
 fn looks_for(element: &Element, attached: &mut HashSet<Option<Name>>) -> bool {
     let mut any = element.tag == "replicate";
     if element.tag == "attach" {
@@ -44,7 +44,7 @@ fn looks_for(element: &Element, attached: &mut HashSet<Option<Name>>) -> bool {
     element.children.iter().fold(any, |any, child| looks_for(child, attached) || any)
 }
 
-/// Returns the kind and the name of the part of a file that is attached; none for all that is in its world.
+/// Returns kind and name of the attached part of a file; `None` if everything in the file's world is attached.
 fn part(attach: &Element) -> Option<(&'static str, &str)> {
     ["body", "frame"].into_iter().find_map(|kind| Some((kind, attach.attribute(kind)?)))
 }
@@ -73,14 +73,14 @@ struct Expansion<'f> {
     compiler: Compiler,
     models: Vec<(String, usize)>,
     sections: Sections,
-    /// The bodies and frames of this file that are attached in it again.
+    /// Bodies and frames of this file that are attached again in the same file.
     wanted: HashSet<Name>,
-    /// Those of them that have been met, with the class around each.
+    /// Parts of `wanted` that have been found, each with the class of its surroundings.
     found: HashMap<Name, (Element, Option<String>)>,
 }
 
 impl Expansion<'_> {
-    /// Expands what is in an element, which has a class around it and stands at a level.
+    /// Expands the content of an element at depth `level`; `class` is the class of its surroundings.
     fn inside(&mut self, element: &mut Element, class: Option<&str>, level: usize) -> Result<(), Error> {
         let own = element.attribute("childclass").map(str::to_owned);
         let class = own.as_deref().or(class);
@@ -102,7 +102,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Keeps a copy of what is attached again, with the class around it.
+    /// Stores a copy of an element that is attached again, with the class of its surroundings.
     fn remember(&mut self, element: &Element, class: Option<&str>) -> Result<(), Error> {
         let kind = if element.tag == "body" { "body" } else { "frame" };
         let name = element.attribute("name").map(|name| (kind, name.to_owned()));
@@ -113,7 +113,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// As [`remember`](Self::remember), for all that is in a copy.
+    /// Stores parts of a copy, as [`remember`](Self::remember) does for an element.
     fn remember_inside(&mut self, copy: &Element, class: Option<&str>) -> Result<(), Error> {
         if self.wanted.is_empty() || !matches!(&*copy.tag, "body" | "frame") {
             return Ok(());
@@ -165,7 +165,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Copies elements of this file's sections.
+    /// Copies elements of the sections; `referring` lists the elements that refer to a copied part.
     fn copy_referring(&mut self, referring: &[(usize, usize)], rename: &dyn Fn(&str) -> String) -> Result<(), Error> {
         for &at in referring {
             if let Some(copy) = self.sections.get(at).map(|e| copied(e, rename, 3)).transpose()? {
@@ -176,7 +176,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Adds what an `<attach>` names, of this file or of another one.
+    /// Adds the part of this file or of another one that an `<attach>` names.
     fn attach(
         &mut self,
         element: &Element,
@@ -249,7 +249,7 @@ impl Expansion<'_> {
     }
 }
 
-/// Returns a frame in place of an element, for what is in it.
+/// Returns an empty frame that replaces an element.
 fn wrapper(element: &Element, class: Option<&str>) -> Element {
     let (file, line, source) = (element.file.clone(), element.line, element.source);
     let attributes = class.map(|class| ("childclass".to_owned(), class.to_owned())).into_iter().collect();
@@ -265,7 +265,7 @@ fn wrapper(element: &Element, class: Option<&str>) -> Element {
     }
 }
 
-/// Returns a body or frame that has the class around it as its own, unless it names another one.
+/// Returns a body or frame with `class` as its own class, unless it specifies another one.
 fn with_class(mut element: Element, class: Option<&str>) -> Element {
     if let Some(class) = class.filter(|_| element.attribute("childclass").is_none()) {
         element.attributes.push(("childclass".to_owned(), class.to_owned()));
@@ -273,7 +273,7 @@ fn with_class(mut element: Element, class: Option<&str>) -> Element {
     element
 }
 
-/// Returns a body or frame below an element, with the class around it.
+/// Returns a body or frame inside an element, with the class of its surroundings.
 fn find<'e>(
     element: &'e Element,
     kind: &str,
@@ -287,7 +287,7 @@ fn find<'e>(
     })
 }
 
-/// Returns the names in a part of a tree.
+/// Returns the names in a part of the tree.
 fn names(elements: &[Element]) -> Vec<Name> {
     let (mut names, mut waiting) = (Vec::new(), elements.iter().collect::<Vec<_>>());
     while let Some(e) = waiting.pop() {
@@ -300,7 +300,7 @@ fn names(elements: &[Element]) -> Vec<Name> {
     names
 }
 
-/// Returns a copy of an element, which comes to stand at a level, with other names and references to them.
+/// Returns a copy of an element for depth `level`, with renamed names and references.
 fn copied(element: &Element, rename: &dyn Fn(&str) -> String, level: usize) -> Result<Element, Error> {
     if level > MAX_DEPTH {
         let what = format!("stands at level {level}, copies counted: at most {MAX_DEPTH} are allowed");

@@ -1,4 +1,4 @@
-//! Inertias of bodies, given or from their geoms.
+//! Inertias of bodies, explicit or computed from geoms.
 
 use super::attributes::Attributes;
 use super::compiler::{Compiler, ORIENTATIONS, from_to};
@@ -12,17 +12,17 @@ use nalgebra::Matrix3;
 
 /// Density of a geom that has neither mass nor density (kg/m³).
 const DENSITY: f64 = 1000.0;
-/// Volumes (m³) and areas (m²) below this weigh nothing, as in MuJoCo.
+/// Minimum volume (m³), area (m²) and mass (kg) of a geom that counts, as in MuJoCo.
 const LEAST_VOLUME: f64 = 1e-14;
 
-/// Inertia in its principal axes.
+/// Inertia in principal axes.
 #[derive(Clone, Copy)]
 pub(super) struct Weight {
-    /// kg.
+    /// Mass (kg).
     pub(super) mass: f64,
-    /// The centre of mass and the principal axes.
+    /// Centre of mass and principal axes.
     pub(super) pose: Se3<f64>,
-    /// kg m².
+    /// Principal moments (kg m²).
     pub(super) moments: [f64; 3],
 }
 
@@ -31,12 +31,13 @@ impl Weight {
         self.pose.act(Inertia::from_com(self.mass, Vec3::zero(), diagonal(self.moments)))
     }
 
-    /// The same weight seen from a frame in which its own frame is at X.
+    /// Returns the same weight, expressed in a frame in which its current frame has the pose X.
     pub(super) fn seen_from(self, X: Se3<f64>) -> Self {
         Self { pose: X * self.pose, ..self }
     }
 
-    /// Several weights as one: that one if it is alone, or their sum with axes by MuJoCo's method.
+    /// Returns the sum of weights and its principal axes. A single weight keeps its axes; the axes of a sum follow
+    /// MuJoCo's method.
     pub(super) fn sum(weights: &[Self]) -> Option<(Inertia<f64>, Se3<f64>)> {
         let sum = weights.iter().fold(Inertia::zero(), |sum, w| sum + w.inertia());
         match weights {
@@ -47,19 +48,19 @@ impl Weight {
     }
 }
 
-/// The centre of mass and the principal axes of an inertia.
+/// Returns the centre of mass and the principal axes of an inertia.
 fn axes(I: Inertia<f64>) -> Se3<f64> {
     let (com, about) = central(I);
     Se3::new(principal(about).1, com)
 }
 
-/// The centre of mass, and the rotational inertia about it.
+/// Returns the centre of mass, and the rotational inertia about it.
 fn central(I: Inertia<f64>) -> (Vec3<f64>, Sym3<f64>) {
     let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
     (com, I.rotational - Inertia::from_com(I.mass, com, Sym3::zero()).rotational)
 }
 
-/// An `<inertial>`, in the body's frame, and its principal axes there.
+/// Returns the inertia of an `<inertial>` in the body's frame, and the pose of its principal axes.
 pub(super) fn inertial(compiler: &Compiler, a: &Attributes) -> Result<(Inertia<f64>, Se3<f64>), Error> {
     let needed = |name: &str| a.element.wrong(format!("has no {name}"));
     a.get("pos").ok_or_else(|| needed("pos"))?;
@@ -83,8 +84,8 @@ pub(super) fn inertial(compiler: &Compiler, a: &Attributes) -> Result<(Inertia<f
     Ok((X.act(Inertia::from_com(mass, Vec3::zero(), I)), X * Se3::new(R, Vec3::zero())))
 }
 
-/// A body's inertia as the compiler corrects it: mass and principal moments not below their bounds, and moments that no
-/// distribution of mass has balanced.
+/// Returns a body's inertia with the corrections of the compiler. Mass and principal moments are raised to their
+/// bounds, and physically impossible moments are balanced.
 pub(super) fn corrected(compiler: &Compiler, body: &Element, I: Inertia<f64>) -> Result<Inertia<f64>, Error> {
     let ([least_mass, least_moment], balance) = (compiler.bounds, compiler.balance);
     if least_mass <= 0.0 && least_moment <= 0.0 && !balance {
@@ -106,7 +107,7 @@ pub(super) fn corrected(compiler: &Compiler, body: &Element, I: Inertia<f64>) ->
     Ok(Inertia::from_com(I.mass.max(least_mass), com, about))
 }
 
-/// Whether a geom counts for the inertia of its body, and has mass.
+/// Returns whether a geom counts for the inertia of its body, and has mass.
 pub(super) fn is_heavy(compiler: &Compiler, a: &Attributes) -> Result<bool, Error> {
     let group = a.number("group")?.unwrap_or(0.0);
     let (mass, density) = (a.number("mass")?, a.number("density")?.unwrap_or(DENSITY));
@@ -114,8 +115,8 @@ pub(super) fn is_heavy(compiler: &Compiler, a: &Attributes) -> Result<bool, Erro
     Ok(heavy && (compiler.groups[0]..=compiler.groups[1]).contains(&group))
 }
 
-/// A heavy geom's weight, in the frame in which the geom's pose is; `mesh` is the one that it names, `field` the half sides of
-/// the box of its height field.
+/// Returns the weight of a heavy geom, in the frame in which the geom's pose is given. `mesh` is the mesh of the geom;
+/// `field` contains the half sides of the box of its height field.
 pub(super) fn geom(
     compiler: &Compiler,
     a: &Attributes,
@@ -149,7 +150,7 @@ pub(super) fn geom(
     Ok((mass > LEAST_VOLUME).then(|| Weight { mass, pose: X, moments: unit.map(|x| mass * x) }))
 }
 
-/// The pose and the size of a primitive.
+/// Returns the pose and the size of a primitive.
 fn sized(compiler: &Compiler, a: &Attributes, kind: &str) -> Result<(Se3<f64>, Vec<f64>), Error> {
     let length = match kind {
         "sphere" => 1,
@@ -174,7 +175,8 @@ fn sized(compiler: &Compiler, a: &Attributes, kind: &str) -> Result<(Se3<f64>, V
     Ok((X, size))
 }
 
-/// The pose and the size of a primitive that is fitted to a mesh: to the box that has the mesh's inertia, or to the box around it.
+/// Returns the pose and the size of a primitive that is fitted to a mesh: to the box with the mesh's inertia, or to its
+/// bounding box.
 fn fitted(compiler: &Compiler, a: &Attributes, kind: &str, mesh: &Solid) -> Result<(Se3<f64>, Vec<f64>), Error> {
     let (center, [x, y, z]) = if compiler.fit_box { mesh.bounding_box() } else { (Vec3::zero(), mesh.inertia_box()) };
     let round = if compiler.fit_box { x.max(y) } else { (x + y) / 2.0 };
@@ -192,7 +194,7 @@ fn fitted(compiler: &Compiler, a: &Attributes, kind: &str, mesh: &Solid) -> Resu
     Ok((X, size.into_iter().map(|x| scale * x).collect()))
 }
 
-/// Volume (m³), and principal moments for each kilogram (m²), of a full primitive.
+/// Returns the volume (m³) and the principal moments per kilogram (m²) of a solid primitive.
 fn solid(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
     let a = size[0];
     match kind {
@@ -219,7 +221,7 @@ fn solid(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
     }
 }
 
-/// Area (m²), and principal moments for each kilogram (m²), of the surface of a primitive.
+/// Returns the area (m²) and the principal moments per kilogram (m²) of the surface of a primitive.
 fn hollow(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
     let a = size[0];
     match kind {
@@ -235,13 +237,13 @@ fn hollow(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
             let h = 2.0 * size[1];
             let (tube, ball) = (2.0 * PI * a * h, 4.0 * PI * a * a);
             let (t, b) = (tube / (tube + ball), ball / (tube + ball));
-            // a half shell has its centre of mass at a/2
+            // the centre of mass of a half shell is at a/2
             let (center, far) = (a / 2.0, h / 2.0 + a / 2.0);
             let ends = 2.0 / 3.0 * a * a + far * far - center * center;
             let across = t * (a * a / 2.0 + h * h / 12.0) + b * ends;
             (tube + ball, [across, across, t * a * a + b * 2.0 / 3.0 * a * a])
         }
-        // Thomsen's formula for the area; moments of a layer of 1 µm, as MuJoCo has them
+        // Thomsen's formula for the area; moments of a layer of 1 µm, as in MuJoCo
         "ellipsoid" => {
             let (b, c, p) = (size[1], size[2], 1.6075);
             let area = 4.0 * PI * (((a * b).powf(p) + (b * c).powf(p) + (c * a).powf(p)) / 3.0).powf(1.0 / p);
@@ -254,7 +256,7 @@ fn hollow(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
             let areas = [y * z, z * x, x * y].map(|area| 8.0 * area); // both sides across each axis
             let total: f64 = areas.iter().sum();
             let [across_x, across_y, across_z] = areas.map(|area| area / total);
-            // ∫ x² over the sides: x² on those across x, x²/3 on the others
+            // ∫ x² over the sides: x² on the sides across x, x²/3 on the others
             let square = |half: f64, across: f64| half * half * (across + (1.0 - across) / 3.0);
             let [xx, yy, zz] = [square(x, across_x), square(y, across_y), square(z, across_z)];
             (total, [yy + zz, xx + zz, xx + yy])

@@ -1,4 +1,4 @@
-//! Files in files: those that are included, and those with settings of their own that are attached.
+//! Files in files: included ones, and attached ones with their own settings.
 
 use super::expand;
 use super::sections::Sections;
@@ -9,27 +9,27 @@ use crate::warning::Warning;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Known attributes and elements that a model cannot hold, and what becomes different.
+/// Known attributes and elements that a model cannot represent, and the effect of their absence.
 const LEFT_OUT: &LeftOut = &[];
 
-/// A file with settings of its own, with all that is included, replicated and attached in it in its place.
+/// A file with its own settings, after all `<include>`, `<replicate>` and `<attach>` elements have been replaced.
 pub(super) struct File {
     pub(super) root: Element,
-    /// The folder of the file; a string has none.
+    /// Folder of the file; `None` for a string.
     pub(super) folder: Option<PathBuf>,
-    /// Elements of its sections, once it has been attached.
+    /// Elements of its sections, after the file has been attached.
     pub(super) sections: Option<Sections>,
 }
 
-/// The files of a robot.
+/// Files of a robot.
 pub(super) struct Files {
     known: Known,
-    /// The main file first. A file that is being read has no entry yet.
+    /// Files, the main file first. A file that is still being read is `None`.
     pub(super) files: Vec<Option<File>>,
-    /// The files that are being read, outermost first.
+    /// Files that are being read, outermost first.
     open: Vec<PathBuf>,
     pub(super) amount: Amount,
-    /// The number of `<attach>`s so far.
+    /// Number of `<attach>` elements so far.
     pub(super) attachments: usize,
     pub(super) warnings: Vec<Warning>,
 }
@@ -40,13 +40,13 @@ impl Files {
         Self { known, files: Vec::new(), open: Vec::new(), amount, attachments: 0, warnings: Vec::new() }
     }
 
-    /// Reads a file with settings of its own, and returns its index.
+    /// Reads a file with its own settings, and returns its index.
     pub(super) fn read(&mut self, path: &Path) -> Result<usize, Error> {
         let text = self.amount.read(path)?;
         self.read_text(path, &text)
     }
 
-    /// As [`read`](Self::read), of a text that stands in the place of the file.
+    /// Reads a text instead of the file at `path`, as [`read`](Self::read) does.
     pub(super) fn read_text(&mut self, path: &Path, text: &str) -> Result<usize, Error> {
         let own = path.canonicalize().unwrap_or(path.to_owned());
         if self.open.contains(&own) {
@@ -59,7 +59,7 @@ impl Files {
         Ok(index)
     }
 
-    /// As [`read`](Self::read), of a text; without a folder it cannot name files.
+    /// Reads a text, as [`read`](Self::read) does; without a folder it cannot refer to files.
     pub(super) fn parse(&mut self, text: &str, file: &str, folder: Option<&Path>) -> Result<usize, Error> {
         let mut root = Element::parse(text, file, &mut self.amount)?;
         let seen = self.open.last().cloned().into_iter().collect();
@@ -78,7 +78,7 @@ impl Files {
     }
 }
 
-/// Marks an element and all in it as a file's.
+/// Marks an element and its content as part of the file with index `source`.
 fn belongs_to(element: &mut Element, source: usize) {
     element.source = source;
     for child in &mut element.children {
@@ -86,17 +86,17 @@ fn belongs_to(element: &mut Element, source: usize) {
     }
 }
 
-/// Puts what is in included files in place of the `<include>`s.
+/// Replacement of `<include>` elements by the content of the included files.
 struct Includes<'a> {
-    /// The folder of the main file.
+    /// Folder of the main file.
     top: Option<&'a Path>,
-    /// The files so far, without links.
+    /// Files so far, with links resolved.
     seen: HashSet<PathBuf>,
     amount: &'a mut Amount,
 }
 
 impl Includes<'_> {
-    /// Puts what is included somewhere in an element, which stands at a level and in a file in a folder, in its place.
+    /// Replaces all `<include>` elements inside an element at depth `level`, whose file is in `folder`.
     fn resolve(&mut self, element: &mut Element, folder: Option<&Path>, level: usize) -> Result<(), Error> {
         if level > MAX_DEPTH {
             let what = format!("stands at level {level}, files included: at most {MAX_DEPTH} are allowed");
@@ -112,14 +112,14 @@ impl Includes<'_> {
             let (Some(top), Some(folder)) = (self.top, folder) else {
                 return Err(child.wrong(format!("a string has no folder to find `{file}` in")));
             };
-            // as MuJoCo: in the main file's folder, or else beside the including file
+            // as MuJoCo does: in the main file's folder, or else next to the including file
             let path = Some(top.join(file)).filter(|path| path.exists()).unwrap_or_else(|| folder.join(file));
             if !self.seen.insert(path.canonicalize().unwrap_or(path.clone())) {
                 return Err(child.wrong(format!("`{file}` is already part of the model")));
             }
             let text = self.amount.read(&path).map_err(|e| child.wrong(e.to_string()))?;
             let mut included = Element::parse(&text, &path.display().to_string(), self.amount)?;
-            // its children come to stand where it was included
+            // its children take the depth of the `<include>`
             self.resolve(&mut included, Some(path.parent().unwrap_or(Path::new(""))), level)?;
             element.children.append(&mut included.children);
         }

@@ -12,10 +12,11 @@ use crate::warning::Warning;
 use condyle_spatial::{Quaternion, Vec3};
 use std::collections::HashSet;
 
-/// Most numbers that all keyframes may have together.
+/// Maximum number of coordinates of all keyframes together.
 const MAX_NUMBERS: usize = 1 << 22;
 
-/// Adds the keyframes of a file. As in MuJoCo, joints for which a list has no numbers are as the file draws them, and at rest.
+/// Adds the keyframes of a file. As in MuJoCo, joints without numbers in a list keep the initial configuration of the
+/// file and are at rest.
 pub(super) fn add(
     model: &mut Model,
     root: &Element,
@@ -75,7 +76,7 @@ pub(super) fn add(
                 position[at..].copy_from_slice(&unit);
             }
             if let (Joint::FreeFlyer, &[.., x, y, z, w]) = (joint.joint, &position[..]) {
-                // v is along the body's axes, qvel along the world's: v = Rᵀ qvel
+                // v is along the body's axes, qvel along the world's axes: v = Rᵀ qvel
                 let R = Quaternion::new(x, y, z, w).to_rotation();
                 let turned = R.transpose_mul(Vec3::new(velocity[0], velocity[1], velocity[2]));
                 velocity[..3].copy_from_slice(&turned.to_array());
@@ -91,12 +92,13 @@ pub(super) fn add(
     Ok(())
 }
 
-/// Returns the name that a keyframe has in its file.
+/// Returns the name that the file gives to a keyframe.
 fn own(e: &Element) -> Option<&str> {
     e.attribute("name").filter(|name| !name.is_empty())
 }
 
-/// Returns x, y, z, w of a quaternion w, x, y, z, with length 1. One of length 0 is no rotation, as in MuJoCo.
+/// Returns x, y, z, w of a quaternion w, x, y, z, normalized. A quaternion of length 0 becomes the identity, as in
+/// MuJoCo.
 fn unit(quaternion: &[f64]) -> [f64; 4] {
     let [w, x, y, z] = [0, 1, 2, 3].map(|k| quaternion[k]);
     let norm = (w * w + x * x + y * y + z * z).sqrt();

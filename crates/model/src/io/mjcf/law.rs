@@ -1,5 +1,5 @@
-//! Laws of actuators: how control, length and velocity give a force. Each kind of element sets the numbers of one general law,
-//! and each has defaults of its own in a class.
+//! Laws of actuators: the force as a function of control, length and velocity. Each kind of element sets the parameters
+//! of one general law, and each kind has its own defaults in a class.
 
 use super::attributes::Attributes;
 use crate::error::Error;
@@ -27,7 +27,7 @@ pub(super) const KINDS: [&str; 13] = [
     "plugin",
 ];
 
-/// Law of an actuator with the length l and the activation a, which follows the control u:
+/// Law of an actuator with length l and activation a, which follows the control u:
 ///
 /// ```text
 /// f = gain(l, l̇) · a + bias(l, l̇)
@@ -39,13 +39,13 @@ pub(super) struct Law<'a> {
     pub(super) bias: &'a str,
     pub(super) dynprm: [f64; PARAMETERS],
     pub(super) gainprm: [f64; PARAMETERS],
-    /// Numbers b of an affine bias b₀ + b₁ l + b₂ l̇. A positive b₂ of a servo is a damping ratio.
+    /// Coefficients b of an affine bias b₀ + b₁ l + b₂ l̇. A positive b₂ of a servo is a damping ratio.
     pub(super) biasprm: [f64; PARAMETERS],
-    /// Share of the target's range that the control has, or 0.
+    /// Ratio of the control range to the range of the driven joint or tendon; 0 if the range is not inherited.
     pub(super) inherit: f64,
-    /// Inputs of a kind that has several.
+    /// Selected inputs of a kind that has several.
     pub(super) input: Option<&'a str>,
-    /// Names of what a model cannot hold of a DC motor.
+    /// Name of a feature of a DC motor that a model cannot represent.
     pub(super) extra: &'static str,
 }
 
@@ -58,15 +58,15 @@ impl Default for Law<'_> {
     }
 }
 
-/// Law of a default class: that of its last default, of whatever kind.
+/// Law of a default class: the law of its last default of any kind.
 struct ClassLaw<'a> {
     kind: &'a str,
     law: Law<'a>,
-    /// Law of the class around it.
+    /// Law of the enclosing class.
     outer: Option<Rc<Self>>,
 }
 
-/// Laws of a default class and of those around it.
+/// Laws of a default class and of the classes that enclose it.
 #[derive(Clone, Default)]
 pub(super) struct Laws<'a> {
     outer: Option<Rc<ClassLaw<'a>>>,
@@ -74,13 +74,13 @@ pub(super) struct Laws<'a> {
 }
 
 impl<'a> Laws<'a> {
-    /// Returns the laws of a class inside this one, before it has defaults.
+    /// Returns the initial laws of a class nested in this one, before its defaults are read.
     pub(super) fn inner(&self) -> Self {
         Self { outer: self.own.clone().or_else(|| self.outer.clone()), own: None }
     }
 
-    /// Returns the law of an element of `<actuator>`. A kind inherits from the innermost class whose last default is of the
-    /// same kind or `<general>`; a `<general>` inherits from any.
+    /// Returns the law of an element of `<actuator>`. It inherits from the innermost class whose last default has the
+    /// same kind or is `<general>`. A `<general>` inherits from any class.
     pub(super) fn of(&self, e: &'a Element, viscous: f64) -> Result<Law<'a>, Error> {
         let kind = e.tag.as_str();
         let mut class = self.own.as_ref().or(self.outer.as_ref());
@@ -97,7 +97,7 @@ impl<'a> Laws<'a> {
         Ok(law)
     }
 
-    /// Takes an element of a default class, and returns its law.
+    /// Adds an element of a default class, and returns its law.
     pub(super) fn add(&mut self, e: &'a Element, viscous: f64) -> Result<Law<'a>, Error> {
         let law = self.of(e, viscous)?;
         self.own = Some(Rc::new(ClassLaw { kind: &e.tag, law, outer: self.outer.clone() }));
@@ -106,7 +106,7 @@ impl<'a> Laws<'a> {
 }
 
 impl<'a> Law<'a> {
-    /// Returns the law with which a kind begins that inherits from a general law.
+    /// Returns the initial law of a kind that inherits from a general law.
     fn begin(&self, kind: &str) -> Self {
         let mut law = Self::default();
         let [fixed, affine] = ["fixed", "affine"].map(|gain| self.gain == gain);
@@ -271,7 +271,7 @@ impl<'a> Law<'a> {
         Ok(())
     }
 
-    /// Returns the greatest torque of a DC motor that its `saturation` allows.
+    /// Returns the torque limit that `saturation` sets for a DC motor.
     pub(super) fn saturation(&self, a: &Attributes<'a>) -> Result<Option<f64>, Error> {
         let mut given = [0.0; 3];
         fill(a, "saturation", &mut given)?;
@@ -284,7 +284,7 @@ impl<'a> Law<'a> {
     }
 }
 
-/// Writes the numbers of an attribute over the first ones of an array, as MuJoCo reads numbers that may be fewer.
+/// Overwrites the first entries of an array with the numbers of an attribute; as in MuJoCo, it may have fewer numbers.
 pub(super) fn fill(a: &Attributes, name: &str, to: &mut [f64]) -> Result<(), Error> {
     for text in a.layers(name) {
         let wrong = |what: String| a.element.wrong(format!("{name}: {what}"));

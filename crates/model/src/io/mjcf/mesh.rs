@@ -6,7 +6,7 @@ use super::principal::principal;
 use condyle_spatial::Sym3;
 use condyle_spatial::{Se3, Vec3};
 
-/// Volumes (m³) and areas (m²) below this are none, as in MuJoCo.
+/// Minimum volume (m³) and area (m²) of a valid mesh, as in MuJoCo.
 #[cfg(feature = "meshes")]
 const LEAST: f64 = 1e-15;
 
@@ -15,24 +15,24 @@ const LEAST: f64 = 1e-15;
 pub(super) struct Solid {
     /// Volume (m³), or the area of a shell (m²).
     pub(super) volume: f64,
-    /// The centre of mass and the principal axes, in the frame of the mesh's points.
+    /// Centre of mass and principal axes, in the frame of the mesh's points.
     pub(super) pose: Se3<f64>,
-    /// Principal moments for each kilogram (m²), greatest first.
+    /// Principal moments per kilogram (m²), greatest first.
     pub(super) moments: [f64; 3],
-    /// The least and greatest coordinates of the points in its principal axes (m).
+    /// Minimum and maximum coordinates of the points along the principal axes (m).
     pub(super) bounds: [[f64; 3]; 2],
-    /// Number of corners of the hull that it is, if it is one.
+    /// Number of corners, if the mesh is its convex hull.
     pub(super) corners: Option<usize>,
 }
 
 impl Solid {
-    /// Half the sides of the box that has the same inertia (m): Iₓ = m (y² + z²)/3.
+    /// Returns half the sides of the box that has the same inertia (m): Iₓ = m (y² + z²)/3.
     pub(super) fn inertia_box(&self) -> [f64; 3] {
         let [x, y, z] = self.moments;
         [y + z - x, x + z - y, x + y - z].map(|sum| 0.5 * (6.0 * sum).max(0.0).sqrt())
     }
 
-    /// The centre and half the sides of the box around it, in its principal axes (m).
+    /// Returns the centre and half the sides of the bounding box, along the principal axes (m).
     pub(super) fn bounding_box(&self) -> (Vec3<f64>, [f64; 3]) {
         let [low, high] = self.bounds;
         let center = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
@@ -40,17 +40,17 @@ impl Solid {
     }
 }
 
-/// The part of a mesh that has mass.
+/// Rule that selects the part of a mesh that has mass.
 #[cfg(feature = "meshes")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Rule {
-    /// The convex hull.
+    /// Convex hull.
     Convex,
-    /// Volume inside of the surface.
+    /// Volume inside the surface.
     Exact,
-    /// The pyramids over all triangles from the centroid of the surface, each counted as positive.
+    /// Pyramids from the centroid of the surface to all triangles, each with positive volume.
     Legacy,
-    /// The surface.
+    /// Surface.
     Shell,
 }
 
@@ -65,7 +65,8 @@ impl Rule {
 
 #[cfg(feature = "meshes")]
 impl Solid {
-    /// The inertia of triangles, which are counter-clockwise from outside; of the hull of the points where there are none.
+    /// Computes the inertia of triangles, counter-clockwise seen from outside. Without triangles, it is the inertia of
+    /// the convex hull of the points.
     pub(super) fn new(points: &[Vec3<f64>], mut triangles: Vec<[u32; 3]>, rule: Rule) -> Result<Self, String> {
         let is_hull = triangles.is_empty() || rule == Rule::Convex;
         if is_hull {
@@ -84,7 +85,7 @@ impl Solid {
             return Err(format!("its surface of {area} m² is too small"));
         }
         centroid = centroid.scale(1.0 / area);
-        // a pyramid's part of the volume, or a triangle's of the area
+        // volume of a pyramid, or area of a triangle
         let part = |[a, b, c]: [Vec3<f64>; 3]| match rule {
             Rule::Shell => (b - a).cross(c - a).norm_squared().sqrt() / 2.0,
             Rule::Legacy => (a.dot(b.cross(c)) / 6.0).abs(),
@@ -94,7 +95,7 @@ impl Solid {
         for t in &triangles {
             let t = corners(t, centroid);
             let v = part(t);
-            // centre of a pyramid from its tip; MuJoCo takes the same one for a triangle
+            // centre of mass of a pyramid, relative to its tip; MuJoCo uses the same point for a triangle
             (volume, com) = (volume + v, com + (t[0] + t[1] + t[2]).scale(v / 4.0));
         }
         if volume < LEAST {

@@ -1,16 +1,17 @@
-//! Principal axes in MuJoCo's order and with its signs, on which frames of inertia and fitted geoms depend.
+//! Principal axes in MuJoCo's order and with its signs; frames of inertia and fitted geoms depend on them.
 
 use condyle_spatial::{Mat3, Quaternion, Sym3};
 
-/// Off-diagonal entries below this part of the greatest moment are rounding. MuJoCo stops at 1e-7 for meshes.
+/// Threshold for off-diagonal entries, relative to the greatest moment, below which they are rounding errors. MuJoCo
+/// stops at 1e-7 for meshes.
 const ROUNDING: f64 = 1e-15;
-/// Moments that differ by less than this part are equal, and keep their order.
+/// Relative difference below which moments are equal and keep their order.
 const EQUAL: f64 = 1e-12;
-/// Maximum number of rotations; MuJoCo's. Each one squares the largest entry beside the diagonal, once that is small.
+/// Maximum number of rotations, as in MuJoCo. Once small, the largest off-diagonal entry converges quadratically.
 const MAX_ROTATIONS: usize = 500;
 
-/// Principal moments, greatest first, and the rotation R with I = R diag(moments) Rᵀ: Jacobi's method, each time about the axis
-/// of the largest entry beside the diagonal.
+/// Returns the principal moments, greatest first, and the rotation R with I = R diag(moments) Rᵀ. Jacobi's method: each
+/// rotation is about the axis of the largest off-diagonal entry.
 pub(super) fn principal(I: Sym3<f64>) -> ([f64; 3], Mat3<f64>) {
     let full = I.full();
     let mut quaternion = Quaternion::identity();
@@ -45,7 +46,7 @@ pub(super) fn principal(I: Sym3<f64>) -> ([f64; 3], Mat3<f64>) {
         let [x, y, z] = vector;
         quaternion = (quaternion * Quaternion::new(x, y, z, (1.0 - sin * sin).sqrt())).normalize();
     }
-    // greatest first; an exchange of two axes turns by a quarter about the third one
+    // greatest first; exchanging two axes is a quarter turn about the third one
     for first in [0, 1, 0] {
         if moments[first] < moments[first + 1] * (1.0 - EQUAL) {
             moments.swap(first, first + 1);

@@ -1,4 +1,4 @@
-//! Inertia along joints in the pose that a file has drawn. Stiffness and damping may be given relative to it.
+//! Inertia along joints in the initial configuration of a file. Stiffness and damping may be specified relative to it.
 
 use crate::body::Frame;
 use crate::joint::Joint;
@@ -6,20 +6,20 @@ use crate::layout::{Columns, Layout, Single};
 use crate::model::Model;
 use condyle_spatial::{Act, ArticulatedInertia, Force, Motion, Se3, Vec3};
 
-/// Articulated bodies of a model in the pose that its file has drawn, in the world's frame.
+/// Articulated bodies of a model in the initial configuration of its file, in the world's frame.
 pub(super) struct Reference<'m> {
     model: &'m Model,
     poses: &'m [Se3<f64>],
-    /// Columns of S.
+    /// Columns of the motion subspace S.
     S: Vec<Motion<f64>>,
-    /// U = Iᴬ S, by columns.
+    /// Forces U = Iᴬ S, by column.
     U: Vec<Force<f64>>,
-    /// D = Sᵀ Iᴬ S + armature, by columns.
+    /// Inertias D = Sᵀ Iᴬ S + armature, by column.
     D: Vec<f64>,
 }
 
 impl<'m> Reference<'m> {
-    /// Takes the pose of each body of the model, and the armature of each column.
+    /// Computes the articulated bodies, given the pose of each body and the armature of each column.
     pub(super) fn new(model: &'m Model, poses: &'m [Se3<f64>], armature: &[f64]) -> Self {
         let l = Single::<f64, f64>::new(model);
         let turned = |i: usize| Se3::new(model.tree.nodes[i].axis_rotation, Vec3::zero());
@@ -40,8 +40,8 @@ impl<'m> Reference<'m> {
         Self { model, poses, S, U, D }
     }
 
-    /// Returns J M⁻¹ Jᵀ, given the entries of J at some columns: the acceleration of a length by a unit force along it. Its
-    /// reciprocal is the mass that moves with the length.
+    /// Returns J M⁻¹ Jᵀ, given the entries of J at some columns: the acceleration of a length due to a unit force along
+    /// it. Its reciprocal is the effective mass along the length.
     pub(super) fn response(&self, J: &[(usize, f64)]) -> f64 {
         let l = Single::<f64, f64>::new(self.model);
         let mut u = vec![0.0; self.S.len()];

@@ -1,19 +1,19 @@
-//! Tendons, equality constraints and actuators, which come along when what they refer to is replicated or attached.
+//! Tendons, equality constraints and actuators; they are copied together with the part of the tree to which they refer.
 
 use crate::io::xml::Element;
 use std::collections::{HashMap, HashSet};
 
-/// The sections, in the order in which one may refer to another.
+/// Sections, ordered so that each one refers only to itself and earlier ones.
 const SECTIONS: [&str; 3] = ["tendon", "equality", "actuator"];
 
-/// The kind of a thing that has a name, and the name.
+/// Kind and name of a named element.
 pub(super) type Name = (&'static str, String);
 
-/// The elements of the sections of a file.
+/// Elements of the sections of a file.
 pub(super) struct Sections {
-    /// An element that was replaced by copies is none.
+    /// Elements by section; `None` after an element was replaced by copies.
     elements: [Vec<Option<Element>>; 3],
-    /// The elements of each section, by the first thing that they refer to.
+    /// Indices of the elements of each section, by the first name to which they refer.
     by_reference: [HashMap<Name, Vec<usize>>; 3],
 }
 
@@ -31,7 +31,7 @@ impl Sections {
         sections
     }
 
-    /// Puts them back, each kind into one section at the end of the file.
+    /// Puts the elements back, each kind into one section at the end of the file.
     pub(super) fn put_back(self, root: &mut Element) {
         root.children.retain(|child| !SECTIONS.contains(&&*child.tag));
         for (tag, elements) in SECTIONS.into_iter().zip(self.elements) {
@@ -50,7 +50,7 @@ impl Sections {
         self.elements[section].push(Some(element));
     }
 
-    /// The elements all of whose references are names of a part of the tree, or tendons of such, by section and index.
+    /// Returns section and index of all elements that refer only to `names`, or to tendons that do so.
     pub(super) fn of(&self, mut names: Vec<Name>) -> Vec<(usize, usize)> {
         let mut known: HashSet<Name> = names.iter().cloned().collect();
         let mut found = Vec::new();
@@ -74,7 +74,7 @@ impl Sections {
         found
     }
 
-    /// The element of a section.
+    /// Returns an element of a section.
     pub(super) fn get(&self, (section, index): (usize, usize)) -> Option<&Element> {
         self.elements[section][index].as_ref()
     }
@@ -85,7 +85,8 @@ impl Sections {
     }
 }
 
-/// The kind of thing that an attribute names, if it names one in the tree or a tendon.
+/// Returns the kind of element to which an attribute refers; `None` if it refers to neither an element of the tree nor
+/// a tendon.
 pub(super) fn kind_of(attribute: &str) -> Option<&'static str> {
     match attribute {
         "joint" | "jointinparent" | "joint1" | "joint2" => Some("joint"),
@@ -97,7 +98,7 @@ pub(super) fn kind_of(attribute: &str) -> Option<&'static str> {
     }
 }
 
-/// The things that an element of a section refers to; the world is everywhere.
+/// Returns the names to which an element of a section refers, except the world.
 fn references(element: &Element) -> Vec<Name> {
     let all = std::iter::once(element).chain(&element.children).flat_map(|e| &e.attributes);
     let named = all.filter_map(|(attribute, value)| Some((kind_of(attribute)?, value.clone())));

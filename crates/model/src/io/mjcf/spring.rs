@@ -1,4 +1,4 @@
-//! Joints of a file, with their springs and losses, and coordinates of the model as seen through what moves with them.
+//! Joints of a file, with their springs and losses, and lengths as linear functions of the model's coordinates.
 
 use super::attributes::Attributes;
 use super::law::fill;
@@ -13,7 +13,7 @@ use condyle_spatial::{Quaternion, Se3};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Switches of `<option>`: what MuJoCo does not compute where they are `disable`.
+/// Switches of `<option>`; MuJoCo does not compute features that are set to `disable`.
 pub(super) struct Switches {
     pub(super) spring: bool,
     pub(super) damper: bool,
@@ -22,7 +22,7 @@ pub(super) struct Switches {
     pub(super) equality: bool,
     pub(super) actuation: bool,
     pub(super) clamp: bool,
-    /// Groups of actuators that do not act.
+    /// Groups of disabled actuators.
     pub(super) groups: Vec<f64>,
 }
 
@@ -56,22 +56,22 @@ impl Switches {
 /// Joint of a file.
 pub(super) struct FileJoint<'a> {
     pub(super) element: &'a Element,
-    /// Index of the body that it carries.
+    /// Index of the body that the joint carries.
     pub(super) body: usize,
     pub(super) joint: Joint,
-    /// Position of a hinge or slide in the pose that the file has drawn (rad, m).
+    /// Position of a hinge or slide in the initial configuration of the file (rad, m).
     pub(super) reference: f64,
-    /// Pose of the body of a free joint there.
+    /// Pose of the body of a free joint in the initial configuration.
     pub(super) pose: Se3<f64>,
     stiffness: [f64; 3],
     /// Position at which the spring of a hinge or slide is at rest.
     rest: f64,
-    /// Time constant (s) and damping ratio from which stiffness and damping follow, or zeros.
+    /// Time constant (s) and damping ratio that determine stiffness and damping, or zeros.
     spring_damper: [f64; 2],
     damping: [f64; 3],
     friction: f64,
     pub(super) armature: f64,
-    /// Least and greatest effort that actuators may have together.
+    /// Minimum and maximum effort of all actuators together.
     pub(super) effort: Option<[f64; 2]>,
     pub(super) range: [f64; 2],
     /// Whether the spring yields.
@@ -81,7 +81,7 @@ pub(super) struct FileJoint<'a> {
 }
 
 impl<'a> FileJoint<'a> {
-    /// Reads what a joint has beside its kinematics; `angle` is the number of radians in a unit of angle.
+    /// Reads the properties of a joint except its kinematics; `angle` is the unit of angle in radians.
     pub(super) fn read(a: &Attributes<'a>, joint: Joint, angle: f64, autolimits: bool) -> Result<Self, Error> {
         let plain = Attributes::plain(a.element);
         let a = if a.element.tag == "freejoint" { &plain } else { a };
@@ -119,12 +119,12 @@ impl<'a> FileJoint<'a> {
         })
     }
 
-    /// Returns the joint with the index of its body, and the pose of the file's body that is drawn.
+    /// Returns the joint with the index of its body, and the body's pose in the initial configuration of the file.
     pub(super) fn on(self, body: usize, pose: Se3<f64>) -> Self {
         Self { body, pose, ..self }
     }
 
-    /// Returns the joint's position in the pose that the file has drawn.
+    /// Returns the joint's position in the initial configuration of the file.
     pub(super) fn drawn(&self) -> Vec<f64> {
         match self.joint {
             Joint::Spherical => vec![0.0, 0.0, 0.0, 1.0],
@@ -136,18 +136,18 @@ impl<'a> FileJoint<'a> {
         }
     }
 
-    /// Returns the columns of its degrees of freedom.
+    /// Returns the columns of the joint's degrees of freedom.
     pub(super) fn columns(&self, model: &Model) -> Range<usize> {
         let first = model.tree.nodes[self.body].column;
         first..first + self.joint.nv()
     }
 
-    /// Finds stiffness and damping that are given by a time constant and a damping ratio. `response` is the acceleration of a
-    /// column by a unit effort.
+    /// Computes stiffness and damping from a time constant and a damping ratio. `response` is the acceleration of a
+    /// column due to a unit effort.
     pub(super) fn find_spring(&mut self, columns: Range<usize>, response: &dyn Fn(usize) -> f64) {
         let [time, ratio] = self.spring_damper;
         if time > 0.0 {
-            // the mean inertia along the joint, and its oscillator
+            // mean inertia along the joint, and the oscillator with this inertia
             let nv = columns.len() as f64;
             let sum: f64 = columns.map(response).sum();
             let inertia = nv / sum.max(LEAST);
@@ -179,7 +179,7 @@ impl<'a> FileJoint<'a> {
         }
     }
 
-    /// Returns whether stiffness and damping follow from the inertia.
+    /// Returns whether stiffness and damping are computed from the inertia.
     pub(super) fn has_spring_damper(&self) -> bool {
         self.spring_damper[0] > 0.0
     }
@@ -190,10 +190,10 @@ impl<'a> FileJoint<'a> {
     }
 }
 
-/// Least number by which MuJoCo divides.
+/// Smallest divisor that MuJoCo uses.
 const LEAST: f64 = 1e-15;
 
-/// Joints of a file, in the order of MuJoCo's.
+/// Joints of a file, in MuJoCo's order.
 #[derive(Default)]
 pub(super) struct Joints<'a> {
     pub(super) all: Vec<FileJoint<'a>>,
@@ -222,7 +222,7 @@ impl<'a> Joints<'a> {
     }
 }
 
-/// Length that moves with one coordinate: l = slope · q + offset.
+/// Length that depends on one coordinate only: l = slope · q + offset.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
     /// Index of the coordinate in v.
@@ -234,7 +234,8 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// Returns the position of the joint that carries a body, which may follow another one.
+    /// Returns the position of the joint that carries a body, as a function of its leader's coordinate if it follows
+    /// another joint.
     pub(super) fn of(model: &Model, body: usize) -> Self {
         let Body { idx_v: dof, mimic, .. } = model.bodies[body];
         match mimic {
@@ -247,12 +248,12 @@ impl Line {
         }
     }
 
-    /// Returns the line of another degree of freedom of the same joint.
+    /// Returns the line of degree of freedom k of the same joint.
     pub(super) fn at(self, k: usize) -> Self {
         Self { dof: self.dof + k, ..self }
     }
 
-    /// Returns the sum of lengths, each times a coefficient, if all move with one coordinate.
+    /// Returns the sum of lengths, each times a coefficient; `None` unless all depend on the same coordinate.
     pub(super) fn sum(lines: &[(Self, f64)]) -> Option<Self> {
         let &(first, _) = lines.first()?;
         let mut sum = Self { slope: 0.0, offset: 0.0, ..first };
@@ -263,7 +264,8 @@ impl Line {
         lines.iter().all(|(line, _)| line.dof == first.dof).then_some(sum)
     }
 
-    /// Adds damping d(l̇) = d₀ + d₁|l̇| + d₂l̇² and Coulomb friction of the length: with l̇ = k q̇, the effort is −k d(k q̇) k q̇.
+    /// Adds damping d(l̇) = d₀ + d₁|l̇| + d₂l̇² and Coulomb friction of the length: with l̇ = k q̇, the effort is −k
+    /// d(k q̇) k q̇.
     pub(super) fn resist(self, model: &mut Model, [d0, d1, d2]: [f64; 3], friction: f64) {
         let k = self.slope.abs();
         model.damping[self.dof] += d0 * k * k;
@@ -273,12 +275,12 @@ impl Line {
         model.friction[self.dof] += friction * k;
     }
 
-    /// Adds inertia of the length.
+    /// Adds an inertia that moves with the length.
     pub(super) fn inertia(self, model: &mut Model, armature: f64) {
         model.armature[self.dof] += self.slope * self.slope * armature;
     }
 
-    /// Adds a spring that rests at a length: with x = l − rest = k Δ, the effort is −k (s₀ + s₁ x + s₂ x²) x.
+    /// Adds a spring with the given rest length: with x = l − rest = k Δ, the effort is −k (s₀ + s₁ x + s₂ x²) x.
     pub(super) fn spring(self, model: &mut Model, [s0, s1, s2]: [f64; 3], rest: f64) {
         let k = self.slope;
         if k != 0.0 {
@@ -287,7 +289,8 @@ impl Line {
         }
     }
 
-    /// Limits the length, and returns whether it could: limits that exclude those of the joint are left out.
+    /// Limits the length, and returns whether this was possible: limits that exclude the joint's own limits are
+    /// ignored.
     pub(super) fn limit(self, model: &mut Model, [lower, upper]: [f64; 2]) -> bool {
         if self.slope == 0.0 {
             return true;

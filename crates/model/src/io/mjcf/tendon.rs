@@ -1,4 +1,5 @@
-//! Tendons whose length is a sum of joint positions. One that moves with a single coordinate acts as its joint does.
+//! Tendons whose length is a sum of joint positions. A tendon that depends on a single coordinate acts on that
+//! coordinate.
 
 use super::Source;
 use super::actuator::Range;
@@ -15,10 +16,10 @@ use std::collections::HashMap;
 pub(super) struct Tendon<'a> {
     pub(super) element: &'a Element,
     pub(super) name: String,
-    /// Joints that it runs over, each with its coefficient; a spatial tendon has none.
+    /// Joints of a fixed tendon, each with its coefficient; empty for a spatial tendon.
     pub(super) joints: Vec<(usize, f64)>,
     stiffness: [f64; 3],
-    /// Lengths between which its spring is slack.
+    /// Lengths between which the spring is slack.
     rest: [f64; 2],
     pub(super) damping: [f64; 3],
     friction: f64,
@@ -27,7 +28,7 @@ pub(super) struct Tendon<'a> {
     is_plastic: bool,
     pub(super) range: [f64; 2],
     limits: Option<[f64; 2]>,
-    /// Least and greatest force that actuators may have together.
+    /// Minimum and maximum force of all actuators together.
     pub(super) effort: Option<[f64; 2]>,
 }
 
@@ -43,7 +44,7 @@ impl<'a> Tendons<'a> {
         let mut tendons = Self::default();
         for e in root.all("tendon").flat_map(|section| &section.children) {
             if !matches!(&*e.tag, "fixed" | "spatial") {
-                continue; // the table of known elements says so
+                continue; // the table of known elements reports it
             }
             let taken = e.attribute("name").and_then(|name| tendons.named.insert(name, tendons.all.len()));
             if taken.is_some() {
@@ -113,14 +114,14 @@ impl<'a> Tendon<'a> {
         })
     }
 
-    /// Returns the line of its length, if it moves with one coordinate.
+    /// Returns the tendon's length as a line, if it depends on one coordinate only.
     pub(super) fn line(&self, lines: &[Line]) -> Option<Line> {
         let over: Vec<_> = self.joints.iter().map(|&(joint, coefficient)| (lines[joint], coefficient)).collect();
         Line::sum(&over)
     }
 
-    /// Adds what it does to the coordinate that it moves with, or says what is left out. Its armature is added to that of the
-    /// columns.
+    /// Adds the tendon's effects to its coordinate, or warnings about effects that are left out. Adds the tendon's
+    /// armature to the armature of the columns.
     pub(super) fn add_to(
         &self,
         model: &mut Model,
@@ -178,7 +179,7 @@ impl<'a> Tendon<'a> {
         }
     }
 
-    /// Returns whether one of its joints carries another one.
+    /// Returns whether one joint of the tendon carries another one.
     fn is_coupled(&self, model: &Model, joints: &Joints) -> bool {
         let mut over = vec![false; model.bodies.len()];
         self.joints.iter().for_each(|(joint, _)| over[joints.all[*joint].body] = true);

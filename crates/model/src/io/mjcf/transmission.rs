@@ -1,4 +1,4 @@
-//! Transmissions of actuators: the table of a model, and limits of effort, armature and damping at the joints.
+//! Transmissions of actuators: a model's list of actuators, and limits of effort, armature and damping at the joints.
 
 use super::Source;
 use super::actuator::{ALL, Classes, Mechanics, clipped, scaled};
@@ -16,16 +16,16 @@ use crate::warning::Warning;
 use condyle_spatial::Vec3;
 use std::collections::{HashMap, HashSet};
 
-/// Most joints that the tendons of all actuators may have together.
+/// Maximum number of joints of the tendons of all actuators together.
 const MAX_DRIVEN: usize = 1 << 20;
 
-/// Thing that an actuator drives.
+/// Joint, tendon or site that an actuator drives.
 enum Target<'a> {
     Joint(usize),
     Tendon(usize),
-    /// Site by its name.
+    /// Name of a site.
     Site(&'a str),
-    /// Nothing that a model has: why.
+    /// Reason why a model does not have the driven thing.
     Else(&'static str),
 }
 
@@ -35,7 +35,7 @@ struct Drive<'a> {
     mechanics: Mechanics,
     law: Law<'a>,
     target: Target<'a>,
-    /// Whether the axes of a ball or free joint are the parent's.
+    /// Whether the axes of a ball or free joint are fixed in the parent.
     in_parent: bool,
     control: [f64; 2],
     force: [f64; 2],
@@ -47,7 +47,8 @@ pub(super) struct Drives<'a> {
     all: Vec<Drive<'a>>,
 }
 
-/// Most actuators whose gain of velocity is a damping ratio: each takes the acceleration of the whole robot.
+/// Maximum number of actuators whose velocity gain is a damping ratio; chosen because each one needs the acceleration
+/// of the whole robot.
 const MAX_RATIOS: usize = 4096;
 
 impl<'a> Drives<'a> {
@@ -96,7 +97,7 @@ impl<'a> Drives<'a> {
         Ok(Self { all })
     }
 
-    /// Adds armature and damping, which count gear² times at what is driven.
+    /// Adds armature and damping, multiplied by gear², to the driven joints and tendons.
     pub(super) fn load(
         &self,
         model: &mut Model,
@@ -127,12 +128,12 @@ impl<'a> Drives<'a> {
         }
     }
 
-    /// Returns whether a gain of velocity is given by a damping ratio.
+    /// Returns whether a velocity gain is specified by a damping ratio.
     pub(super) fn has_ratios(&self) -> bool {
         self.all.iter().any(|drive| drive.law.has_ratio())
     }
 
-    /// Returns the number of actuators on each tendon.
+    /// Returns the number of actuators of each tendon.
     fn on_tendons(&self, tendons: &Tendons, on: &Switches) -> Vec<usize> {
         let mut counts = vec![0; tendons.all.len()];
         for drive in self.all.iter().filter(|drive| drive.acts(on)) {
@@ -143,7 +144,7 @@ impl<'a> Drives<'a> {
         counts
     }
 
-    /// Returns the table of actuators, and says what is left out.
+    /// Returns the list of actuators, and adds warnings about features that are left out.
     pub(super) fn table(
         &self,
         model: &Model,
@@ -235,8 +236,8 @@ impl<'a> Drives<'a> {
         Ok(table)
     }
 
-    /// Sets the limits of effort of all coordinates: sums over the actuators of each joint, clipped to its `actuatorfrcrange`,
-    /// and sums over the joints that move with each coordinate.
+    /// Sets the limits of effort of all coordinates. The efforts of the actuators of each joint are summed and clipped
+    /// to its `actuatorfrcrange`; the results are summed over the joints that depend on each coordinate.
     pub(super) fn limit(
         &self,
         model: &mut Model,
@@ -276,12 +277,13 @@ impl<'a> Drives<'a> {
 }
 
 impl Drive<'_> {
-    /// Returns whether it acts.
+    /// Returns whether the actuator is enabled.
     fn acts(&self, on: &Switches) -> bool {
         on.actuation && !on.groups.contains(&self.mechanics.group)
     }
 
-    /// Returns the columns on which a unit of force acts, with the effort there, where these do not depend on positions.
+    /// Returns the columns on which a unit force acts, with the effort at each, as far as these do not depend on
+    /// positions.
     fn moments(&self, model: &Model, joints: &Joints, tendons: &Tendons) -> Vec<(usize, f64)> {
         let gear = self.mechanics.gear;
         let first = |j: usize| joints.all[j].columns(model).start;
@@ -289,7 +291,7 @@ impl Drive<'_> {
             Target::Joint(j) => match joints.all[j].joint {
                 Joint::Spherical | Joint::FreeFlyer if self.in_parent => Vec::new(),
                 Joint::Spherical => (0..3).map(|k| (first(j) + k, gear[k])).filter(|x| x.1 != 0.0).collect(),
-                // its force is along the world's axes; v is along the body's
+                // its force is along the world's axes, v along the body's axes
                 Joint::FreeFlyer => (3..6).map(|k| (first(j) + k, gear[k])).filter(|x| x.1 != 0.0).collect(),
                 _ => vec![(first(j), gear[0])],
             },
@@ -303,12 +305,12 @@ impl Drive<'_> {
 }
 
 impl Law<'_> {
-    /// Returns whether the gain of velocity of a servo is given by a damping ratio.
+    /// Returns whether the velocity gain of a servo is specified by a damping ratio.
     fn has_ratio(&self) -> bool {
         matches!(self.affine(), Ok([gain, _, kp, kv]) if gain == kp && kv < 0.0)
     }
 
-    /// Says what becomes different because a model has no activation and one control.
+    /// Returns the effect of the fact that a model has no activation and only one control.
     fn left_out(&self) -> &'static str {
         let inputs = self.input.unwrap_or(if self.gain == "pid" { "pos vel" } else { "voltage" });
         match self.dynamics {
@@ -325,7 +327,7 @@ impl Law<'_> {
     }
 }
 
-/// Returns what an element drives.
+/// Returns the joint, tendon or site that an element drives.
 fn target<'a>(e: &'a Element, joints: &Joints, tendons: &Tendons) -> Result<Target<'a>, Error> {
     let named = ["joint", "jointinparent", "tendon", "site", "cranksite", "body"];
     let mut found = named.into_iter().filter_map(|kind| Some((kind, e.attribute(kind)?)));
@@ -347,7 +349,7 @@ fn target<'a>(e: &'a Element, joints: &Joints, tendons: &Tendons) -> Result<Targ
     })
 }
 
-/// Returns the range that a control has from what it drives.
+/// Returns the range of the control that follows from the range of the driven joint or tendon.
 fn inherited(e: &Element, law: &Law, target: &Target, joints: &Joints, tendons: &Tendons) -> Result<[f64; 2], Error> {
     let [lower, upper] = match *target {
         Target::Joint(j) if joints.all[j].joint.nv() == 1 => joints.all[j].range,

@@ -13,7 +13,7 @@ use crate::io::xml::Element;
 use crate::joint::Joint;
 use condyle_spatial::{Act, Inertia, Se3};
 
-/// The parts of a body, with those inside its `<frame>`s, each with the pose of the `<frame>` around it.
+/// Parts of a body, including the content of its `<frame>`s, each with the pose of the surrounding `<frame>`.
 #[derive(Default)]
 pub(super) struct Parts<'a> {
     inertial: Option<(&'a Element, Se3<f64>)>,
@@ -23,23 +23,23 @@ pub(super) struct Parts<'a> {
     cameras: Vec<(Attributes<'a>, Se3<f64>)>,
     /// Named frames, each with its own pose.
     frames: Vec<(&'a Element, Se3<f64>)>,
-    /// The bodies in it, each with its own pose, and the class for what is in it.
+    /// Child bodies, each with its own pose and the class of its surroundings.
     bodies: Vec<(&'a Element, Se3<f64>, &'a str)>,
 }
 
-/// A body that waits for its turn.
+/// A body that is not yet added.
 struct Waiting<'a> {
     element: &'a Element,
     class: &'a str,
-    /// The body of the model of which the parent is a part.
+    /// Body of the model to which the parent belongs.
     on: BodyId,
-    /// The pose in that body.
+    /// Pose in that body.
     placement: Se3<f64>,
     /// Whether the parent is the world itself.
     top: bool,
 }
 
-/// A named frame or camera, which becomes a frame once the names of all sites are known.
+/// A named frame or camera, which becomes a frame when the names of all sites are known.
 pub(super) struct Placed<'a> {
     element: &'a Element,
     body: BodyId,
@@ -67,12 +67,12 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Sorts what is in a body; `X` is the pose of the `<frame>` that it is in.
+    /// Sorts the content of a body by kind; `X` is the pose of the surrounding `<frame>`.
     fn gather(&self, inside: &'a Element, X: Se3<f64>, class: &'a str, parts: &mut Parts<'a>) -> Result<(), Error> {
         let defaults = |e: &Element| &self.source(e).defaults;
         let own = inside.attribute("childclass").map_or(Ok(class), |c| defaults(inside).known(inside, c))?;
         for e in &inside.children {
-            let around = if e.source == inside.source { own } else { MAIN }; // a file has classes of its own
+            let around = if e.source == inside.source { own } else { MAIN }; // each file has its own classes
             let pose = || Ok::<_, Error>(X * self.compiler(e).pose(&Attributes::plain(e))?);
             match e.tag.as_str() {
                 "joint" => parts.joints.push((self.of(e, around)?, X)),
@@ -97,7 +97,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Adds a body: its parts, the body of the model that it is part of, and its pose there.
+    /// Adds a body. Returns its parts, the body of the model to which it belongs, and its pose there.
     fn body(&mut self, builder: &mut ModelBuilder, w: &Waiting<'a>) -> Result<(Parts<'a>, BodyId, Se3<f64>), Error> {
         let mut parts = Parts::default();
         self.gather(w.element, Se3::identity(), w.class, &mut parts)?;
@@ -128,7 +128,7 @@ impl<'a> Reader<'a> {
                     Some(_) => a.flag("align", Some("auto"))?,
                 };
                 if align.unwrap_or(self.compiler(w.element).align_free) && parts.bodies.is_empty() {
-                    jXl = axes.inverse(); // the body's frame is put into its principal axes
+                    jXl = axes.inverse(); // the principal axes become the body's frame
                 }
                 Se3::identity() // its q is the body's pose in the world
             } else {
@@ -166,7 +166,7 @@ impl<'a> Reader<'a> {
         Ok((parts, body, bXl))
     }
 
-    /// Adds the named sites of a body, and keeps its named frames and cameras for later.
+    /// Adds the named sites of a body, and stores its named frames and cameras for later.
     fn frames(
         &mut self,
         builder: &mut ModelBuilder,
@@ -187,7 +187,7 @@ impl<'a> Reader<'a> {
             self.name("frame", element, "")?;
             self.placed.push(Placed { element, body, placement: bXl * X });
         }
-        // others turn towards something, and are fixed to no body
+        // cameras of other modes follow a target and are not fixed to a body
         let is_fixed = |a: &Attributes| a.get("mode").is_none_or(|mode| mode == "fixed");
         for (a, X) in parts.cameras.iter().filter(|(a, _)| has_name(a) && is_fixed(a)) {
             self.name("camera", a.element, "")?;
@@ -197,7 +197,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Adds the named frames and cameras, frames first. One whose name is taken is named `frame:name` or `camera:name`.
+    /// Adds the named frames and cameras, frames first. If a name is taken, the frame is named `frame:name` or
+    /// `camera:name`.
     pub(super) fn place(&mut self, builder: &mut ModelBuilder) {
         let mut placed = std::mem::take(&mut self.placed);
         placed.sort_by_key(|p| p.element.tag != "frame");
@@ -211,7 +212,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// The body's inertia in its own frame, and its principal axes there.
+    /// Returns the body's inertia in its own frame, and the pose of its principal axes there.
     fn inertia(
         &mut self,
         element: &'a Element,
@@ -239,7 +240,8 @@ impl<'a> Reader<'a> {
         Ok((geometry::corrected(compiler, element, sum)?, axes))
     }
 
-    /// A geom's weight on a body, in the body's frame or that of the `<frame>` around the geom; none if it weighs nothing.
+    /// Returns the weight of a geom, in the frame of the body or of the surrounding `<frame>`; `None` if it has no
+    /// mass.
     fn weight(&mut self, body: &Element, a: &Attributes<'a>, moves: bool) -> Result<Option<Weight>, Error> {
         let source = self.source(a.element);
         if moves && a.get("type") == Some("plane") {
@@ -289,12 +291,12 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Whether a joint is a free one.
+/// Returns whether a joint is a free joint.
 fn is_free(a: &Attributes) -> bool {
     a.element.tag == "freejoint" || a.get("type") == Some("free")
 }
 
-/// Puts the bodies on a body in line, the first of them on top.
+/// Adds the children of a body to the stack, the first child on top.
 fn wait<'a>(waiting: &mut Vec<Waiting<'a>>, parts: &Parts<'a>, on: BodyId, bXl: Se3<f64>, top: bool) {
     let next = parts.bodies.iter().rev();
     waiting.extend(next.map(|&(element, X, class)| Waiting { element, class, on, placement: bXl * X, top }));

@@ -1,20 +1,20 @@
-//! Versions of SDF. An older file is converted to the newest version, by the rules of the format's own library: every reader
-//! after this one knows one version.
+//! Versions of SDF. An older file is converted to the newest version, by the rules of the format's own library. All
+//! later stages handle the newest version only.
 
 use super::values::flag;
 use crate::error::Error;
 use crate::io::xml::Element;
 
-/// Versions of the format, without their `1.`. There has never been a 1.1.
+/// Versions of the format, without the prefix `1.`. Version 1.1 does not exist.
 const VERSIONS: [u32; 12] = [0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
 /// Newest version.
 pub(super) const NEWEST: u32 = VERSIONS[VERSIONS.len() - 1];
-/// Tag of the root element. Version 1.0 to 1.2 may write `gazebo`.
+/// Tag of the root element. Versions 1.0 to 1.2 may use `gazebo`.
 const ROOT: &str = "sdf";
-/// Frame of the model that an element stands in.
+/// Name of the frame of the enclosing model.
 pub(super) const MODEL: &str = "__model__";
 
-/// Attributes that became elements in version 1.2, by the tag that has them.
+/// Attributes that became elements in version 1.2, by the tag that had them.
 const ATTRIBUTES: &[(&str, &[&str])] = &[
     ("model", &["static"]),
     ("link", &["gravity", "self_collide", "kinematic"]),
@@ -26,7 +26,7 @@ const ATTRIBUTES: &[(&str, &[&str])] = &[
     ("limit", &["lower", "upper", "effort", "velocity"]),
 ];
 
-/// Elements whose one attribute became their text in version 1.2, with the tag that they have since.
+/// Elements whose only attribute became their text in version 1.2, with their new tag.
 const TEXTS: &[(&str, &str, &str)] = &[
     ("origin", "pose", "pose"),
     ("parent", "link", "parent"),
@@ -62,7 +62,7 @@ pub(super) fn convert(root: &mut Element) -> Result<(), Error> {
     Ok(())
 }
 
-/// Reads the version of a file, without its `1.`.
+/// Returns the version of a file, without the prefix `1.`.
 fn version(root: &Element) -> Result<u32, Error> {
     if root.tag != ROOT && root.tag != "gazebo" {
         return Err(root.wrong("the root element of an SDF is <sdf>"));
@@ -79,7 +79,7 @@ fn version(root: &Element) -> Result<u32, Error> {
     found.ok_or_else(|| root.wrong(format!("version `{text}` is unknown; known are {}", known())))
 }
 
-/// Element that says that an axis is in the frame of the model, up to version 1.6.
+/// Element that specifies, up to version 1.6, whether an axis is in the frame of the model.
 const FLAG: &str = "use_parent_model_frame";
 
 /// Returns the models of a root element and of its worlds.
@@ -91,14 +91,14 @@ fn models(root: &mut Element) -> impl Iterator<Item = &mut Element> {
     inside.filter(|child| child.tag == "model")
 }
 
-/// Does something to each axis of the joints that stand in a model.
+/// Applies a change to each axis of the joints of a model.
 fn axes(model: &mut Element, change: &mut dyn FnMut(&mut Element)) {
     for joint in model.children.iter_mut().filter(|c| c.tag == "joint") {
         joint.children.iter_mut().filter(|c| matches!(&*c.tag, "axis" | "axis2")).for_each(&mut *change);
     }
 }
 
-/// Turns attributes into elements: version 1.0.
+/// Turns attributes into elements (conversion from version 1.0).
 fn attributes_to_elements(element: &mut Element) {
     if let Some((_, names)) = ATTRIBUTES.iter().find(|(tag, _)| *tag == element.tag) {
         for name in *names {
@@ -127,7 +127,7 @@ fn attributes_to_elements(element: &mut Element) {
     }
 }
 
-/// Moves the gravity from the physics of a world to the world: version 1.5.
+/// Moves the gravity from the physics of a world to the world (conversion from version 1.5).
 fn gravity_of_physics(world: &mut Element) {
     let physics = world.children.iter_mut().find(|c| c.tag == "physics");
     let gravity = physics.and_then(|p| {
@@ -137,7 +137,7 @@ fn gravity_of_physics(world: &mut Element) {
     world.children.extend(gravity);
 }
 
-/// Renames the `frame` of poses, and turns the flag of axes into `expressed_in`: version 1.6.
+/// Renames the `frame` of poses, and turns the flag of axes into `expressed_in` (conversion from version 1.6).
 fn frames(element: &mut Element) -> Result<(), Error> {
     if element.tag == "plugin" || element.tag.contains(':') {
         return Ok(());

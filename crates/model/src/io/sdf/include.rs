@@ -1,4 +1,4 @@
-//! Files of an SDF: the included models in place of the `<include>`s, all of one version, everything unknown in them reported.
+//! Files of an SDF. Includes are replaced by their models, converted to one version, and unknown names are reported.
 
 use super::convert::convert;
 use super::schema::{KNOWN, LEFT_OUT};
@@ -12,10 +12,10 @@ use crate::io::xml::{Amount, Element, MAX_DEPTH};
 use crate::warning::Warning;
 use std::path::{Path, PathBuf};
 
-/// Name of the file that says which file of a folder is its model, and its older name.
+/// Name of the file that lists the model files of a folder, and its older name.
 const CONFIGS: [&str; 2] = ["model.config", "manifest.xml"];
 
-/// Maximum number of included files: opening more takes longer than a second.
+/// Maximum number of included files; chosen because opening more takes longer than a second.
 const MAX_INCLUDES: usize = 16_384;
 
 /// Reader of a robot's files.
@@ -23,12 +23,12 @@ pub(super) struct Includes<'o> {
     amount: Amount,
     known: Known,
     packages: &'o [PathBuf],
-    /// Files that are being read, each one included by the one before it.
+    /// Files that are being read, each included by the previous one.
     open: Vec<PathBuf>,
     /// Number of includes so far.
     count: usize,
     pub(super) warnings: Vec<Warning>,
-    /// Fault of the first model of a world that was left out since its file could not be found.
+    /// Error of the first model of a world that was left out because its file was not found.
     pub(super) missing: Option<Error>,
 }
 
@@ -38,7 +38,7 @@ impl<'o> Includes<'o> {
         Self { amount, known, packages, open: Vec::new(), count: 0, warnings: Vec::new(), missing: None }
     }
 
-    /// Reads a file and all that it includes; its root stands at a level.
+    /// Reads a file and all files that it includes; its root is at depth `level`.
     pub(super) fn file(&mut self, path: &Path, level: usize) -> Result<Element, Error> {
         let text = self.amount.read(path)?;
         let root = Element::parse(&text, &path.display().to_string(), &mut self.amount)?;
@@ -49,7 +49,7 @@ impl<'o> Includes<'o> {
         Ok(root)
     }
 
-    /// Reads a string and all that it includes.
+    /// Reads a string and all files that it includes.
     pub(super) fn string(&mut self, text: &str) -> Result<Element, Error> {
         let root = Element::parse(text, "<string>", &mut self.amount)?;
         self.expand(root, None, 1)
@@ -63,7 +63,7 @@ impl<'o> Includes<'o> {
         Ok(root)
     }
 
-    /// Puts the included models in the place of the includes in an element, which stands at a level.
+    /// Replaces the includes inside an element at depth `level` by the included models.
     fn children(&mut self, element: &mut Element, folder: Option<&Path>, level: usize) -> Result<(), Error> {
         if level > MAX_DEPTH {
             let what = format!("stands at level {level}, files included: at most {MAX_DEPTH} are allowed");
@@ -73,7 +73,7 @@ impl<'o> Includes<'o> {
             match &*child.tag {
                 "include" => match self.include(&mut child, folder, level + 1) {
                     Ok(model) => element.children.extend(model),
-                    // a world without its sun and ground is a world
+                    // a world is usable without its sun and ground
                     Err(Fault::Missing(what)) if element.tag != "model" => {
                         self.warnings.push(child.left_out(format!("the included model is left out: {what}")));
                         self.missing = self.missing.take().or_else(|| Some(child.wrong(what)));
@@ -91,7 +91,8 @@ impl<'o> Includes<'o> {
         Ok(())
     }
 
-    /// Returns the model that an `<include>` names, with what it says of it: none if the file has only lights or actors.
+    /// Returns the model of an `<include>`, with the changes that the element specifies; `None` if the file has only
+    /// lights or actors.
     fn include(
         &mut self,
         include: &mut Element,
@@ -150,7 +151,7 @@ impl<'o> Includes<'o> {
         Ok(Some(model))
     }
 
-    /// Returns the file of a folder with a model: that of the newest version that is known.
+    /// Returns the model file of a folder: the file with the newest known version.
     fn model_of(&mut self, folder: &Path) -> Result<PathBuf, Fault> {
         let Some(config) = CONFIGS.iter().map(|name| folder.join(name)).find(|path| path.is_file()) else {
             let plain = folder.join("model.sdf");
@@ -163,7 +164,7 @@ impl<'o> Includes<'o> {
             let version = sdf.attribute("version")?.trim().strip_prefix("1.")?.parse::<u32>().ok()?;
             (version <= super::convert::NEWEST).then_some(version)
         };
-        // of two files of one version the first one
+        // of two files with the same version, the first one
         let best = root.all("sdf").reduce(|best, sdf| if minor(sdf) > minor(best) { sdf } else { best });
         let name = best.map(|sdf| sdf.text.trim()).filter(|name| !name.is_empty());
         let name = name.ok_or_else(|| root.wrong("names no <sdf> file"))?;
@@ -173,7 +174,7 @@ impl<'o> Includes<'o> {
 
 /// Fault of an include.
 enum Fault {
-    /// The file cannot be found.
+    /// The file was not found.
     Missing(String),
     Other(Error),
 }

@@ -1,4 +1,4 @@
-//! Inertias of the links of an SDF: as it gives them, or of the shapes of a link.
+//! Inertias of the links of an SDF: explicit, or computed from the shapes of a link.
 
 use super::scopes::Scopes;
 use super::values::{attribute, flag, number, pose, relative_to, three};
@@ -8,7 +8,7 @@ use crate::warning::Warning;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use core::f64::consts::PI;
 
-/// Density of a shape that has none (kg/m³).
+/// Density of a shape that does not specify one (kg/m³).
 const WATER: f64 = 1000.0;
 
 /// Returns the inertia of a link, in the link's frame.
@@ -55,7 +55,7 @@ pub(super) fn inertia(scopes: &Scopes, item: usize, warnings: &mut Vec<Warning>)
     Ok(pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
 }
 
-/// Returns the sum of the inertias of a link's collision shapes, scaled to a mass if that is a number.
+/// Returns the sum of the inertias of a link's collision shapes, scaled to `mass` unless it is NaN.
 fn of_shapes(
     scopes: &Scopes,
     item: usize,
@@ -142,7 +142,7 @@ fn shape(collision: &Element) -> Result<Inertia<f64>, Error> {
         "capsule" => {
             let (r, l) = (length("radius")?, length("length")?);
             let (rod, ball) = (PI * r * r * l, 4.0 / 3.0 * PI * r * r * r);
-            // the halves of the ball have their centres of mass 3 r/8 beyond the ends of the rod
+            // the centres of mass of the half balls are 3 r/8 beyond the ends of the rod
             let across = rod * (r * r / 4.0 + l * l / 12.0) + ball * (0.4 * r * r + l * l / 4.0 + 0.375 * l * r);
             let along = rod * r * r / 2.0 + ball * 0.4 * r * r;
             let m = rod + ball;
@@ -155,7 +155,7 @@ fn shape(collision: &Element) -> Result<Inertia<f64>, Error> {
     })
 }
 
-/// Checks the truths of a model or link, and warns of those that change how it moves.
+/// Checks the flags of a model or link, and adds warnings about flags that change how it moves.
 pub(super) fn flags(element: &Element, warnings: &mut Vec<Warning>) -> Result<(), Error> {
     for tag in ["static", "self_collide", "allow_auto_disable", "gravity", "must_be_base_link"] {
         flag(element, tag, false)?;

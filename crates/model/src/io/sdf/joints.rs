@@ -10,14 +10,14 @@ use crate::joint::Joint;
 use crate::warning::Warning;
 use condyle_spatial::Vec3;
 
-/// One degree of freedom of a joint, or three of a ball.
+/// Motion with one degree of freedom of a joint, or with the three of a ball joint.
 pub(super) struct Motion {
     pub(super) joint: Joint,
-    /// Tag of the element that describes it.
+    /// Tag of the element that describes the motion.
     pub(super) tag: &'static str,
 }
 
-/// Returns what a joint does, one motion on the other.
+/// Returns the motions of a joint, in order from the parent to the child.
 pub(super) fn motions(scopes: &Scopes, edge: &Edge, warnings: &mut Vec<Warning>) -> Result<Vec<Motion>, Error> {
     let axis = |tag: &'static str| scopes.axis(edge.item, tag);
     let first =
@@ -40,7 +40,7 @@ pub(super) fn motions(scopes: &Scopes, edge: &Edge, warnings: &mut Vec<Warning>)
     })
 }
 
-/// Returns the joint that moves the parent as the child of this one: q is the same, but for a ball.
+/// Returns the joint that moves the parent relative to the child; q is the same, except for a ball joint.
 pub(super) fn reversed(joint: Joint) -> Joint {
     match joint {
         Joint::Revolute { axis } => Joint::Revolute { axis: -axis },
@@ -51,7 +51,7 @@ pub(super) fn reversed(joint: Joint) -> Joint {
     }
 }
 
-/// The metres of a screw for each radian, positive where the thread is right-handed.
+/// Returns the pitch of a screw (m/rad), positive for a right-handed thread.
 fn pitch(joint: &Element, warnings: &mut Vec<Warning>) -> Result<f64, Error> {
     let read = |tag| number(joint, Some(joint), tag, f64::NAN);
     let (each_turn, radians) = (read("screw_thread_pitch")?, read("thread_pitch")?);
@@ -59,7 +59,7 @@ fn pitch(joint: &Element, warnings: &mut Vec<Warning>) -> Result<f64, Error> {
         warnings.push(joint.assumed("has no screw_thread_pitch: 1 m for each turn, as SDF has it"));
         return Ok(1.0 / core::f64::consts::TAU);
     }
-    // thread_pitch: radians for each metre, positive where the thread is left-handed
+    // thread_pitch: radians for each metre, positive for a left-handed thread
     let pitch = if each_turn.is_nan() { -1.0 / radians } else { each_turn / core::f64::consts::TAU };
     if pitch.is_finite() { Ok(pitch) } else { Err(joint.wrong("has no finite screw_thread_pitch")) }
 }
@@ -67,13 +67,13 @@ fn pitch(joint: &Element, warnings: &mut Vec<Warning>) -> Result<f64, Error> {
 /// Limits, losses and spring of an axis.
 pub(super) struct Axis {
     pub(super) options: JointOptions,
-    /// Stiffness (N m/rad, N/m), and the position at which it is at rest.
+    /// Stiffness (N m/rad, N/m), and rest position.
     pub(super) spring: (f64, f64),
 }
 
 impl Axis {
-    /// Reads what an axis has besides its direction. 1e16 and more is SDF's way to say that there is no limit, and so is a
-    /// negative effort or velocity.
+    /// Reads the properties of an axis except its direction. In SDF, a limit of 1e16 or more is no limit, and neither
+    /// is a negative effort or velocity.
     pub(super) fn new(element: &Element, tag: &str, kind: Joint, warnings: &mut Vec<Warning>) -> Result<Self, Error> {
         let axis = element.child(tag);
         let (limit, dynamics) = (axis.and_then(|a| a.child("limit")), axis.and_then(|a| a.child("dynamics")));
@@ -106,7 +106,7 @@ impl Axis {
         Ok(Self { options, spring })
     }
 
-    /// Names what the axis has that only a joint of the tree can have.
+    /// Returns the names of properties that only a joint of the tree can have.
     pub(super) fn extras(&self) -> Vec<&'static str> {
         let (lower, upper) = self.options.position.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
         let has = [
@@ -120,7 +120,8 @@ impl Axis {
     }
 }
 
-/// Inertia of the rotor as seen at a joint, ratio² times its own: Drake's elements, which it reads for joints that have a motor.
+/// Returns the inertia of the rotor as seen at a joint, ratio² times its own inertia. Its elements are specific to
+/// Drake, which reads them for joints with a motor.
 fn rotor(joint: &Element, effort: Option<f64>, kind: Joint) -> Result<f64, Error> {
     if kind.nv() != 1 || effort == Some(0.0) {
         return Ok(0.0);
@@ -130,7 +131,7 @@ fn rotor(joint: &Element, effort: Option<f64>, kind: Joint) -> Result<f64, Error
     Ok(ratio * ratio * read("drake:rotor_inertia", 0.0)?)
 }
 
-/// Warns of what the physics of a joint says that has no part in a model.
+/// Adds warnings about physics parameters of a joint that a model cannot represent.
 pub(super) fn motor(joint: &Element, warnings: &mut Vec<Warning>) -> Result<(), Error> {
     let ode = joint.child("physics").and_then(|p| p.child("ode"));
     for tag in ["max_force", "velocity"] {

@@ -1,4 +1,4 @@
-//! Constraints of an SDF: the joints that close loops, and gearboxes.
+//! Constraints of an SDF: joints that close loops, and gearboxes.
 
 use super::joints::{Axis, Motion};
 use super::reader::Reader;
@@ -11,10 +11,10 @@ use condyle_spatial::{Se3, Vec3};
 use std::collections::HashMap;
 
 impl Reader<'_> {
-    /// Adds what holds the loop that a joint closes, and warns of what is not held.
+    /// Adds the constraints of a joint that closes a loop, and warnings about motions that they do not constrain.
     ///
-    /// A fixed joint holds two frames together, a ball two points. A revolute joint holds two points of its axis, 1 m apart:
-    /// six rows, of which one says again that their distance stays.
+    /// A fixed joint constrains two frames, a ball joint two points. A revolute joint constrains two points of its
+    /// axis, 1 m apart. One of their six rows is redundant, because the distance of the points is constant.
     pub(super) fn close(&mut self, builder: &mut ModelBuilder, edge: &Edge) -> Result<(), Error> {
         let Edge { element, item, parent, child, .. } = *edge;
         let scope = self.scopes.items[item].scope;
@@ -78,10 +78,10 @@ impl Reader<'_> {
         gearboxes.iter().try_for_each(|edge| self.gearbox(builder, edge, &turns))
     }
 
-    /// Adds the coupling of a gearbox, θ₂ = −ratio θ₁, or warns that it is left out.
+    /// Adds the coupling of a gearbox, θ₂ = −ratio θ₁, or a warning that it is left out.
     ///
-    /// θ₁ is the angle of the parent from the reference body about `<axis>`, θ₂ that of the child about `<axis2>`: each belongs
-    /// to a joint between the link and the reference body.
+    /// θ₁ is the angle of the parent relative to the reference body about `<axis>`, and θ₂ the angle of the child about
+    /// `<axis2>`. Each is the angle of a joint between that link and the reference body.
     fn gearbox(
         &mut self,
         builder: &mut ModelBuilder,
@@ -121,7 +121,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Returns the body of the first of some joints about an axis of a gearbox, and the sign of its turn.
+    /// Returns the body of the first joint whose axis is parallel to an axis of a gearbox, and the sign of its
+    /// rotation.
     fn turn(&self, gearbox: &Edge, tag: &'static str, joints: &[(usize, f64)]) -> Result<Option<(BodyId, f64)>, Error> {
         for &(i, sign) in joints {
             let edge = &self.edges[i];
@@ -139,10 +140,10 @@ impl Reader<'_> {
     }
 }
 
-/// Difference from 1 of the cosine between two axes that are one: files have six digits.
+/// Tolerance for 1 minus the cosine between two parallel axes; files have six digits.
 const PARALLEL: f64 = 1e-6;
 
-/// Lists names, with the verb: `limits, damping are`.
+/// Returns a list of names with its verb: `limits, damping are`.
 fn are(names: &[&str]) -> String {
     let verb = if names == ["limits"] || names.len() > 1 { "are" } else { "is" };
     format!("{} {verb}", names.join(", "))

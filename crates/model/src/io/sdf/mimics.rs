@@ -1,4 +1,4 @@
-//! The axes of an SDF that follow others, and gearboxes, which couple two axes.
+//! Axes of an SDF that follow others.
 
 use super::scopes::Scopes;
 use super::values::number;
@@ -9,19 +9,19 @@ use crate::joint::Mimic;
 use crate::warning::Warning;
 use std::collections::HashMap;
 
-/// The bodies that move about or along each axis, by the joint and the axis's tag, and those that follow.
+/// Bodies that move about or along each axis, by joint and tag of the axis, and the followers among them.
 #[derive(Default)]
 pub(super) struct Axes<'a> {
     bodies: HashMap<(usize, &'static str), BodyId>,
-    /// The joint, its `<mimic>`, the body that follows.
+    /// Joint, its `<mimic>` element, and the body that follows.
     followers: Vec<(usize, &'a Element, BodyId)>,
 }
 
-/// Drake's element for a joint that follows another one.
+/// Tag of Drake's element for a joint that follows another one.
 const DRAKE: &str = "drake:mimic";
 
 impl<'a> Axes<'a> {
-    /// Remembers an axis of a joint.
+    /// Adds an axis of a joint.
     pub(super) fn add(&mut self, item: usize, joint: &'a Element, tag: &'static str, body: BodyId) {
         self.bodies.insert((item, tag), body);
         let mimic = joint.child(tag).and_then(|axis| axis.child("mimic")).or_else(|| joint.child(DRAKE));
@@ -33,7 +33,7 @@ impl<'a> Axes<'a> {
         self.bodies.get(&(item, tag)).copied()
     }
 
-    /// Lets the followers follow, or warns that they are free.
+    /// Couples the followers to their leaders, or adds warnings that they are free.
     pub(super) fn follow(
         &self,
         scopes: &Scopes,
@@ -46,7 +46,7 @@ impl<'a> Axes<'a> {
             warnings.extend(self.followers.iter().map(|&(item, ..)| scopes.items[item].element.mimic(what)));
             return Ok(());
         }
-        builder.check_size()?; // before chains of followers are walked
+        builder.check_size()?; // before chains of followers are traversed
         let mut rules: HashMap<usize, (BodyId, Mimic)> = HashMap::new();
         for &(item, mimic, follower) in &self.followers {
             let joint = scopes.items[item].element;

@@ -1,4 +1,4 @@
-//! Poses in an SDF: each is relative to something that has a name.
+//! Poses in an SDF: each is relative to a named item.
 
 use super::convert::MODEL;
 use super::scopes::{Item, Place, Scopes, WORLD_SCOPE};
@@ -7,7 +7,7 @@ use crate::error::Error;
 use condyle_spatial::{Se3, Vec3};
 
 impl Scopes<'_> {
-    /// Returns what the pose of an item is relative to.
+    /// Returns the item to which the pose of an item is relative.
     fn reference(&self, item: usize) -> Result<Place, Error> {
         let Item { element, scope, .. } = self.items[item];
         let otherwise = match &*element.tag {
@@ -19,7 +19,7 @@ impl Scopes<'_> {
         self.find_in(scope, name).ok_or_else(|| element.wrong(self.missing(item, name)))
     }
 
-    /// Returns the frame of a model that `placement_frame` puts where the pose of the model is.
+    /// Returns the frame that `placement_frame` names, which is placed at the pose of the model, and its scope.
     fn placement(&self, item: usize) -> Result<Option<(usize, usize)>, Error> {
         let Item { element, inside, .. } = self.items[item];
         let name = element.attribute("placement_frame").filter(|n| !n.is_empty());
@@ -33,9 +33,9 @@ impl Scopes<'_> {
         }
     }
 
-    /// Finds all poses, each after those on which it depends.
+    /// Computes all poses, each after the poses on which it depends.
     pub(super) fn resolve(&mut self) -> Result<(), Error> {
-        // 0: not met, 1: met, 2: known
+        // 0: not visited, 1: being visited, 2: known
         let mut state = vec![0u8; self.items.len()];
         for first in 0..self.items.len() {
             let mut path = if state[first] == 0 { vec![(first, self.begin(first, &mut state)?)] } else { Vec::new() };
@@ -61,7 +61,7 @@ impl Scopes<'_> {
         Ok(())
     }
 
-    /// Returns the items on whose poses that of an item depends.
+    /// Returns the items on whose poses the pose of an item depends.
     fn begin(&self, item: usize, state: &mut [u8]) -> Result<Vec<usize>, Error> {
         state[item] = 1;
         let mut found = Vec::new();
@@ -85,7 +85,7 @@ impl Scopes<'_> {
         })
     }
 
-    /// Adds the items whose poses make the pose of one in the frame of a scope.
+    /// Adds the items whose poses determine the pose of an item in the frame of a scope.
     fn chain(&self, at: Place, scope: usize, found: &mut Vec<usize>) {
         if at == self.scopes[scope].own {
             return;
@@ -95,8 +95,8 @@ impl Scopes<'_> {
         self.climb(at, scope, up);
     }
 
-    /// Visits the scopes from that of an item up to the first one that is around another scope too, and those from there up to
-    /// it; whether a scope is around the item is told.
+    /// Visits the scopes from the scope of an item, and from another scope, up to their first common scope. `visit`
+    /// receives the index of a scope, and whether it contains the item.
     fn climb(&self, at: Place, scope: usize, mut visit: impl FnMut(usize, bool)) {
         let (mut a, mut b) = (at.map_or(WORLD_SCOPE, |item| self.items[item].scope), scope);
         while a != b {
@@ -130,7 +130,7 @@ impl Scopes<'_> {
         self.in_scope(Some(item), WORLD_SCOPE)
     }
 
-    /// cXj: the pose of a joint in its child link, exactly what the file says where it says that.
+    /// Returns cXj: the pose of a joint in its child link, exactly as in the file if the file specifies it.
     pub(super) fn joint_in_child(&self, joint: usize, child: usize) -> Result<Se3<f64>, Error> {
         let Item { element, scope, pose: mXj, .. } = self.items[joint];
         match self.reference(joint)? {
@@ -139,7 +139,7 @@ impl Scopes<'_> {
         }
     }
 
-    /// Reads a joint's axis, in the joint's frame.
+    /// Reads the axis of a joint, in the joint's frame.
     pub(super) fn axis(&self, joint: usize, tag: &str) -> Result<Vec3<f64>, Error> {
         let Item { element, scope, pose: mXj, .. } = self.items[joint];
         let axis = element.child(tag).ok_or_else(|| element.wrong(format!("has no <{tag}>")))?;

@@ -1,4 +1,4 @@
-//! From the links and joints of an SDF to bodies: where each link is, and on which body.
+//! Conversion of the links and joints of an SDF to bodies: the body and the placement of each link.
 
 use super::SdfOptions;
 use super::inertia::{flags, inertia};
@@ -17,23 +17,23 @@ use crate::warning::Warning;
 use condyle_spatial::{Act, Inertia, Se3, Vec3};
 use std::collections::HashSet;
 
-/// Name of the joint that carries a root.
+/// Name of the joint that carries a root link.
 const ROOT_JOINT: &str = "root_joint";
 
 /// Reader of the models of a file.
 pub(super) struct Reader<'a> {
     pub(super) scopes: Scopes<'a>,
-    /// The joints in the order of the file, but for gearboxes and those between links that are fixed to the world.
+    /// Joints in the order of the file, except gearboxes and joints between links that are fixed to the world.
     pub(super) edges: Vec<Edge<'a>>,
     pub(super) gearboxes: Vec<Edge<'a>>,
     pub(super) axes: Axes<'a>,
     pub(super) warnings: Vec<Warning>,
-    /// Body and placement of each item that is a link, once it is placed.
+    /// Body and placement of each item; valid for links that have been placed.
     placed: Vec<(BodyId, Se3<f64>)>,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads names, poses and joints of some models, and of the world around them.
+    /// Reads names, poses and joints of models, and of the world around them.
     pub(super) fn new(world: &'a Element, models: &[&'a Element], warnings: Vec<Warning>) -> Result<Self, Error> {
         let mut scopes = Scopes::new(world, models)?;
         let placed = vec![(WORLD, Se3::identity()); scopes.items.len()];
@@ -57,7 +57,7 @@ impl<'a> Reader<'a> {
         Ok(Self { scopes, edges, gearboxes, axes: Axes::default(), warnings: reader_warnings, placed })
     }
 
-    /// Returns the body on which a link, or the world, is, and where.
+    /// Returns the body to which a link, or the world, belongs, and its placement there.
     pub(super) fn place(&self, link: Place) -> (BodyId, Se3<f64>) {
         link.map_or((WORLD, Se3::identity()), |item| self.placed[item])
     }
@@ -95,7 +95,7 @@ impl<'a> Reader<'a> {
         builder.build().map_err(|e| self.at_element(e))
     }
 
-    /// Puts the roots on their joints, or on the world, and walks the trees on them.
+    /// Attaches the root links to their joints, or to the world, and adds their trees.
     fn roots(&mut self, builder: &mut ModelBuilder, tree: &Tree, root_joint: Option<Joint>) -> Result<(), Error> {
         let is_one = tree.roots.len() == 1 && !self.edges.iter().any(|e| e.parent.is_none());
         let taken: HashSet<String> = self.scopes.all("joint").map(|item| self.scopes.name(item).to_owned()).collect();
@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Fixes a link to the world where it stands. The inertia of a static one has no part in anything, and is not warned of.
+    /// Fixes a link to the world at its pose. The inertia of a static link has no effect, so it causes no warnings.
     fn fix(&mut self, builder: &mut ModelBuilder, link: usize) -> Result<(), Error> {
         let mut unsaid = Vec::new();
         let warnings = if self.scopes.is_static(link) { &mut unsaid } else { &mut self.warnings };
@@ -139,7 +139,7 @@ impl<'a> Reader<'a> {
         self.put(builder, link, (WORLD, oXl), inertia)
     }
 
-    /// Remembers where a link is, whose inertia is in the link's frame, and adds its frame.
+    /// Stores the body and placement of a link, and adds the link's frame; `inertia` is in the link's frame.
     fn put(
         &mut self,
         builder: &mut ModelBuilder,
@@ -155,7 +155,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Adds the joints and links on some links, or on the world, depth first.
+    /// Adds the joints and links that some links, or the world, carry, depth first.
     fn walk(&mut self, builder: &mut ModelBuilder, tree: &Tree, from: &[Place]) -> Result<(), Error> {
         let on = |at: Place| tree.on.get(&at).into_iter().flatten().rev().copied();
         let mut waiting: Vec<(usize, bool)> = from.iter().rev().flat_map(|&at| on(at)).collect();
@@ -241,7 +241,7 @@ impl<'a> Reader<'a> {
         self.put(builder, link, (body, at * jXl), in_link)
     }
 
-    /// Adds the frames of the file, and those of nested models.
+    /// Adds the frames of the file and of nested models.
     fn frames(&mut self, builder: &mut ModelBuilder) -> Result<(), Error> {
         for item in 0..self.scopes.items.len() {
             let element = self.scopes.items[item].element;
@@ -261,7 +261,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Names the element of a fault that the builder found.
+    /// Replaces an error of the builder by one that names the element in the file.
     fn at_element(&self, error: Error) -> Error {
         let (tag, name, what) = match &error {
             Error::Body { body, what } => ("link", body, what),

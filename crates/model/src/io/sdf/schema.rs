@@ -1,9 +1,9 @@
-//! Known elements and attributes of SDF 1.2 to 1.12, as they stand after older versions are converted, and those that a model
-//! cannot hold.
+//! Known elements and attributes of SDF 1.2 to 1.12, after the conversion of older versions, and those that a model
+//! cannot represent.
 
 use crate::io::known::LeftOut;
 
-/// Elements and attributes, by parent; see [`Known`](crate::io::known::Known).
+/// Known elements and attributes, by parent; see [`Known`](crate::io::known::Known).
 pub(super) const KNOWN: &str = "
 sdf: version ; world model include actor* light*
 world: name ; model include joint frame gravity magnetic_field* physics* scene* light* gui* actor* plugin* state* model_state* \
@@ -31,7 +31,7 @@ joint_softness: ; cfm erp
 frame: name attached_to ; pose
 ";
 
-/// Things that SDF has and a model cannot hold.
+/// Features of SDF that a model cannot represent.
 pub(super) const LEFT_OUT: &LeftOut = &[
     ("world", "population", "the models of a population are left out"),
     ("world", "state", "the positions of a saved state are left out: models stand where their <pose> puts them"),

@@ -1,5 +1,5 @@
-//! Names and poses of an SDF. Each model is a scope: what stands in it is named from there, `inner::link` in a model inside it,
-//! and has a pose in the frame of the model.
+//! Names and poses of an SDF. Each model is a scope: names in it are relative to the model, `inner::link` for a link of
+//! a nested model, and poses are in the frame of the model.
 
 use super::convert::MODEL;
 use super::values::{flag, text};
@@ -9,39 +9,39 @@ use crate::names::{near, nearest};
 use condyle_spatial::Se3;
 use std::collections::HashMap;
 
-/// Name under which everything knows the world.
+/// Name of the world in every scope.
 pub(super) const WORLD_LINK: &str = "world";
-/// Attribute of a model whose elements stand in the scope around it: an `<include merge="true">`.
+/// Attribute of a model whose elements belong to the enclosing scope: an `<include merge="true">`.
 pub(super) const MERGED: &str = "__merge__";
-/// Maximum number of bytes in all names, those of the models around each included: a name in nested models repeats theirs.
+/// Maximum number of bytes of all full names; the name of an item in nested models contains the names of these models.
 const MAX_NAMES: usize = 64 << 20;
 /// Index of the scope of the world.
 pub(super) const WORLD_SCOPE: usize = 0;
 
-/// Model, or the world.
+/// Scope: a model, or the world.
 pub(super) struct Scope<'a> {
     element: &'a Element,
-    /// Beginning of the names in it, for example `robot::arm::`.
+    /// Prefix of the names in the scope, for example `robot::arm::`.
     prefix: String,
-    /// Item that is the model itself; none is the world.
+    /// Item of the model itself; `None` for the world.
     pub(super) own: Option<usize>,
-    /// Scope in which the model stands, and the number of scopes around it.
+    /// Enclosing scope, and number of all enclosing scopes.
     pub(super) parent: usize,
     pub(super) depth: usize,
-    /// Whether its links are fixed to the world: the model, or one around it, is static.
+    /// Whether the links of the scope are fixed to the world, because the model or an enclosing one is static.
     is_static: bool,
-    /// First link and first model in it.
+    /// First link and first model of the scope.
     first: [Option<usize>; 2],
 }
 
 /// Link, joint, frame or model.
 pub(super) struct Item<'a> {
     pub(super) element: &'a Element,
-    /// Scope in which it stands.
+    /// Scope that contains the item.
     pub(super) scope: usize,
-    /// Name from the world.
+    /// Full name, from the world.
     name: String,
-    /// Scope of a model.
+    /// Scope of the item, if it is a model.
     pub(super) inside: Option<usize>,
     /// Pose in the frame of the scope.
     pub(super) pose: Se3<f64>,
@@ -54,17 +54,17 @@ pub(super) struct Scopes<'a> {
     names: HashMap<String, usize>,
     joints: HashMap<String, usize>,
     bytes: usize,
-    /// Beginning of all names that is not told: the one model of a file.
+    /// Prefix that is removed from all names: the name of the only model of a file.
     single: String,
-    /// Links to which items are attached, as far as they were asked for; none is the world.
+    /// Links to which items are attached, as far as they were computed; `None` is the world.
     attached: HashMap<usize, Option<usize>>,
 }
 
-/// Something that has a pose: an item, or the world.
+/// An item with a pose; `None` is the world.
 pub(super) type Place = Option<usize>;
 
 impl<'a> Scopes<'a> {
-    /// Names everything in some models, and in the world around them, and finds the poses.
+    /// Collects the names in models, and in the world around them, and computes the poses.
     pub(super) fn new(world: &'a Element, models: &[&'a Element]) -> Result<Self, Error> {
         let mut scopes = Self {
             scopes: Vec::new(),
@@ -93,7 +93,7 @@ impl<'a> Scopes<'a> {
         }
         if let [model] = models {
             let single = format!("{}::", model.attribute("name").unwrap_or_default());
-            // unless the world has something of the same name
+            // unless the world has an item of the same name
             let mut in_world = scopes.items.iter().filter(|item| item.scope == WORLD_SCOPE && item.inside.is_none());
             if !in_world.any(|item| scopes.names.contains_key(&format!("{single}{}", item.name))) {
                 scopes.single = single;
@@ -103,7 +103,7 @@ impl<'a> Scopes<'a> {
         Ok(scopes)
     }
 
-    /// Adds a model and all that stands in it.
+    /// Adds a model and its content.
     fn model(&mut self, element: &'a Element, parent: usize) -> Result<(), Error> {
         let own = self.insert(element, parent)?;
         let is_merged = element.attribute(MERGED).is_some();
@@ -150,7 +150,7 @@ impl<'a> Scopes<'a> {
         let index = self.items.len();
         let tag = &*element.tag;
         if let Some(&other) = self.names.get(&full) {
-            // SDF 1.6 and before let a link and a joint share a name; then only the link can be referred to
+            // up to SDF 1.6 a link and a joint may share a name; the name then refers to the link
             let found = self.items[other].element;
             if found.tag == tag || ![tag, &found.tag].iter().any(|t| matches!(*t, "link" | "joint")) {
                 let what = format!("the name is taken by the {} on line {}", found.tag, found.line);
@@ -175,7 +175,7 @@ impl<'a> Scopes<'a> {
         Ok(index)
     }
 
-    /// Returns the name of an item in the model that is read.
+    /// Returns the name of an item in the resulting model.
     pub(super) fn name(&self, item: usize) -> &str {
         let name = &*self.items[item].name;
         name.strip_prefix(&self.single).unwrap_or(name)
@@ -186,23 +186,23 @@ impl<'a> Scopes<'a> {
         self.items.iter().enumerate().filter(move |(_, item)| item.element.tag == tag).map(|(i, _)| i)
     }
 
-    /// Whether an item is the frame of a merged model, or of the one model of a file.
+    /// Returns whether an item is the frame of a merged model, or of the only model of a file.
     pub(super) fn is_hidden(&self, item: usize) -> bool {
         self.items[item].element.attribute(MERGED).is_some()
             || self.single.strip_suffix("::") == Some(&self.items[item].name)
     }
 
-    /// Whether the links beside an item are fixed to the world.
+    /// Returns whether the links in the scope of an item are fixed to the world.
     pub(super) fn is_static(&self, item: usize) -> bool {
         self.scopes[self.items[item].scope].is_static
     }
 
-    /// Finds what a name means beside an item.
+    /// Finds the item to which a name refers in the scope of another item.
     pub(super) fn find(&self, beside: usize, name: &str) -> Option<Place> {
         self.find_in(self.items[beside].scope, name)
     }
 
-    /// Finds the joint that a name means beside an item.
+    /// Finds the joint to which a name refers in the scope of another item.
     pub(super) fn joint(&self, beside: usize, name: &str) -> Option<usize> {
         self.joints.get(&format!("{}{name}", self.scopes[self.items[beside].scope].prefix)).copied()
     }
@@ -215,12 +215,12 @@ impl<'a> Scopes<'a> {
         }
         let full = format!("{}{name}", self.scopes[scope].prefix);
         let get = |name: &str| self.names.get(name).copied();
-        // the frame of a nested model, also as older files have it: a frame `inner::__model__`
+        // the frame of a nested model; older files name it `inner::__model__`
         let inner = || full.strip_suffix(MODEL).and_then(|n| n.strip_suffix("::")).and_then(get);
         get(&full).or_else(inner).or_else(|| get(&format!("{full}::{MODEL}"))).map(Some)
     }
 
-    /// Says that no item has a name.
+    /// Returns the end of a message about an unknown name: the nearest name with a tag in a scope.
     pub(super) fn near(&self, scope: usize, name: &str, tag: &str) -> String {
         let prefix = &self.scopes[scope].prefix;
         let fits = |item: &&Item| tag.is_empty() || item.element.tag == tag;
@@ -235,7 +235,7 @@ impl<'a> Scopes<'a> {
         format!("no link, joint or frame is named `{name}`{near}")
     }
 
-    /// Returns the link that a joint's parent or child names, perhaps through frames; none is the world.
+    /// Returns the link to which a joint's parent or child refers, possibly through frames; `None` is the world.
     pub(super) fn link(&mut self, joint: usize, tag: &str) -> Result<Place, Error> {
         let Item { element, scope, .. } = self.items[joint];
         let name = text(element, tag).ok_or_else(|| element.wrong(format!("has no {tag}")))?;
@@ -245,7 +245,7 @@ impl<'a> Scopes<'a> {
         }
     }
 
-    /// Returns the link to which an item is attached; none is the world. Errors name `of`.
+    /// Returns the link to which an item is attached; `None` is the world. Errors name `of`.
     pub(super) fn attached(&mut self, at: Place, of: &Element) -> Result<Place, Error> {
         let (mut at, mut path) = (at, Vec::new());
         let link = loop {

@@ -1,4 +1,4 @@
-//! Small faults of an SDF that its own library reads over: each is a warning here.
+//! Small faults of an SDF that the format's own library ignores; here each is a warning.
 
 use crate::io::xml::{self, Element};
 use crate::warning::Warning;
@@ -6,19 +6,19 @@ use crate::warning::Warning;
 /// Tags of elements in which these faults change a robot.
 const PARENTS: &str = " sdf world model include link inertial inertia joint axis axis2 dynamics limit mimic ";
 
-/// Tags of elements that have one number.
+/// Tags of elements that contain one number.
 const NUMBERS: &str = " mass density ixx ixy ixz iyy iyz izz lower upper effort velocity damping friction spring_stiffness \
   spring_reference multiplier offset reference screw_thread_pitch thread_pitch gearbox_ratio ";
 
-/// Tags of other elements that stand once in their parent.
+/// Tags of other elements that may occur only once in their parent.
 const SINGLE: &str = " pose static gravity kinematic self_collide enable_wind inertial inertia parent child axis axis2 xyz dynamics \
   limit mimic uri name placement_frame gearbox_reference_body ";
 
-/// Maximum number of characters of a number with something behind it.
+/// Maximum number of characters of a number that is followed by other text.
 const MAX_NUMBER: usize = 32;
 
-/// Warns of elements that stand twice, of which the first counts, and of gravity in the physics of a world. Drops what stands
-/// behind a number in its element, with a warning.
+/// Adds warnings about repeated elements, of which the first counts, and about gravity in the physics of a world.
+/// Removes text after the number in an element, with a warning.
 pub(super) fn tidy(element: &mut Element, warnings: &mut Vec<Warning>) {
     let is_in = |tag: &str, tags: &str| tags.contains(&format!(" {tag} "));
     let mut seen: Vec<String> = Vec::new();

@@ -1,13 +1,13 @@
-//! The tree in the graph that the joints of an SDF make of its links.
+//! Spanning tree of the graph of links and joints of an SDF.
 
 use super::scopes::{Place, Scopes};
 use crate::error::Error;
 use crate::io::xml::Element;
 use std::collections::{HashMap, HashSet, VecDeque};
 
-/// Types of joints, but for gearboxes, which only couple two others.
+/// Types of joints, except gearboxes, which only couple two other joints.
 const KINDS: [&str; 8] = ["fixed", "revolute", "continuous", "prismatic", "screw", "ball", "universal", "revolute2"];
-/// Type of a joint that couples two others.
+/// Type of a joint that couples two other joints.
 pub(super) const GEARBOX: &str = "gearbox";
 
 /// A joint, and the links that it connects; no link is the world.
@@ -15,7 +15,7 @@ pub(super) const GEARBOX: &str = "gearbox";
 pub(super) struct Edge<'a> {
     pub(super) element: &'a Element,
     pub(super) item: usize,
-    /// In small letters.
+    /// Type of the joint in lower case.
     pub(super) kind: String,
     pub(super) parent: Place,
     pub(super) child: usize,
@@ -43,20 +43,22 @@ impl<'a> Edge<'a> {
     }
 }
 
-/// A spanning tree, and what is not part of it.
+/// A spanning tree, and the joints that close loops.
 #[derive(Default)]
 pub(super) struct Tree {
-    /// Links on which no joint carries another one: each begins a tree of its own.
+    /// Root links, which no joint carries; each is the root of its own tree.
     pub(super) roots: Vec<usize>,
-    /// Joints that carry others from each link, or from the world. A joint whose child carries its parent is reversed.
+    /// Joints that each link, or the world, carries, and whether they are reversed: in a reversed joint the child
+    /// carries the parent.
     pub(super) on: HashMap<Place, Vec<(usize, bool)>>,
     /// Joints that close loops.
     pub(super) loops: Vec<usize>,
 }
 
 impl Tree {
-    /// Walks the joints breadth first in the order of the file: from the world and the links that are fixed to it, then from
-    /// each link that is the child of no joint. A joint is walked from its child only where no other walk meets its parent.
+    /// Visits the joints breadth first in the order of the file: first from the world and the links fixed to it, then
+    /// from each link that is no child of a joint. A joint is visited from its child only if its parent is not reached
+    /// otherwise.
     pub(super) fn new(edges: &[Edge], links: &[usize], fixed: &[usize]) -> Self {
         let (mut below, mut above): (HashMap<Place, Vec<usize>>, HashMap<usize, Vec<usize>>) = Default::default();
         for (i, edge) in edges.iter().enumerate() {

@@ -1,11 +1,11 @@
-//! Values in the elements of an SDF: truths, numbers, vectors and poses.
+//! Values in the elements of an SDF: booleans, numbers, vectors and poses.
 
 use crate::error::Error;
 use crate::io::from_rpy;
 use crate::io::xml::{self, Element};
 use condyle_spatial::{Quaternion, Se3, Vec3};
 
-/// Reads a truth as the format has it: `true`, `false`, `1` or `0`, in any case.
+/// Parses a boolean of the format: `true`, `false`, `1` or `0`, in upper or lower case.
 pub(super) fn truth(text: &str) -> Result<bool, String> {
     match text.trim() {
         "1" => Ok(true),
@@ -16,7 +16,7 @@ pub(super) fn truth(text: &str) -> Result<bool, String> {
     }
 }
 
-/// Reads the truth in a child; `otherwise` if the child is missing or empty.
+/// Reads the boolean in a child; `otherwise` if the child is missing or empty.
 pub(super) fn flag(of: &Element, tag: &str, otherwise: bool) -> Result<bool, Error> {
     match of.child(tag).filter(|e| !e.text.trim().is_empty()) {
         Some(e) => truth(&e.text).map_err(|what| of.wrong_inside(e, format!("{tag}: {what}"))),
@@ -24,7 +24,7 @@ pub(super) fn flag(of: &Element, tag: &str, otherwise: bool) -> Result<bool, Err
     }
 }
 
-/// Reads the truth of an attribute; false if it is missing.
+/// Reads the boolean of an attribute; false if it is missing.
 pub(super) fn attribute(of: &Element, inside: &Element, name: &str) -> Result<bool, Error> {
     match inside.attribute(name) {
         Some(text) => truth(text).map_err(|what| of.wrong_inside(inside, format!("{}: {name}: {what}", inside.tag))),
@@ -32,12 +32,13 @@ pub(super) fn attribute(of: &Element, inside: &Element, name: &str) -> Result<bo
     }
 }
 
-/// Reads the name in a child; none if the child is missing or empty.
+/// Reads the name in a child; `None` if the child is missing or empty.
 pub(super) fn text<'a>(of: &'a Element, tag: &str) -> Option<&'a str> {
     of.child(tag).map(|e| e.text.trim()).filter(|t| !t.is_empty())
 }
 
-/// Reads the `<pose>` inside something, or none: x y z, then roll pitch yaw or a quaternion x y z w. Errors name `of`.
+/// Reads the `<pose>` in an element: x y z, then roll pitch yaw or a quaternion x y z w. Without a `<pose>`, returns
+/// the identity. Errors name `of`.
 pub(super) fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
     let Some(pose) = inside.child("pose") else { return Ok(Se3::identity()) };
     let wrong = |what: String| of.wrong_inside(pose, format!("pose: {what}"));

@@ -1,12 +1,12 @@
-//! Children and attributes of elements. Errors name the link or joint (`of`), and the line inside it. Of several children with one
-//! tag the first counts, as in urdfdom; [`check_repeated`] warns of the others.
+//! Children and attributes of elements. Errors name the link or joint (`of`), and the line inside it. If a tag occurs
+//! several times, the first element counts, as in urdfdom; [`check_repeated`] warns about the others.
 
 use crate::error::Error;
 use crate::io::xml::{self, Element};
 use crate::warning::Warning;
 use condyle_spatial::Vec3;
 
-/// Warns of the second child with a tag, unless it is equal to the first.
+/// Adds a warning about the second child with a tag, unless it is equal to the first.
 pub(super) fn check_repeated(of: &Element, element: &Element, warnings: &mut Vec<Warning>) {
     for tag in REPEATED {
         let mut all = element.all(tag);
@@ -18,7 +18,7 @@ pub(super) fn check_repeated(of: &Element, element: &Element, warnings: &mut Vec
     }
 }
 
-/// Elements of which a link, joint or inertia has one.
+/// Tags of elements that occur only once in a link, joint or inertia.
 const REPEATED: [&str; 12] = [
     "inertial",
     "origin",
@@ -34,23 +34,24 @@ const REPEATED: [&str; 12] = [
     "calibration",
 ];
 
-/// Whether two elements say the same.
+/// Returns whether two elements have the same tag, attributes and children.
 fn is_equal(a: &Element, b: &Element) -> bool {
     let children = || a.children.iter().zip(&b.children).all(|(a, b)| is_equal(a, b));
     (&a.tag, &a.attributes) == (&b.tag, &b.attributes) && a.children.len() == b.children.len() && children()
 }
 
-/// Returns the child with a tag, of which there is one.
+/// Returns the child with a tag; an error if it is missing.
 pub(super) fn needed<'a>(of: &'a Element, tag: &str) -> Result<&'a Element, Error> {
     of.child(tag).ok_or_else(|| of.wrong(format!("has no <{tag}>")))
 }
 
-/// Returns the attribute, which must be there.
+/// Returns the text of an attribute; an error if it is missing.
 pub(super) fn text<'a>(of: &Element, inside: &'a Element, name: &str) -> Result<&'a str, Error> {
     inside.attribute(name).ok_or_else(|| of.wrong_inside(inside, format!("{} has no {name}", inside.tag)))
 }
 
-/// Returns the attribute as a reader of text understands it, if it is there. Errors name the attribute and its value.
+/// Converts the value of an attribute with `f`; `None` if the attribute is missing. Errors name the attribute and its
+/// value.
 pub(super) fn read<T>(
     of: &Element,
     inside: &Element,
@@ -61,12 +62,12 @@ pub(super) fn read<T>(
     inside.attribute(name).map(f).transpose().map_err(wrong)
 }
 
-/// Returns the numbers of an attribute, if it is there.
+/// Returns the numbers of an attribute; `None` if the attribute is missing.
 pub(super) fn array<const N: usize>(of: &Element, inside: &Element, name: &str) -> Result<Option<[f64; N]>, Error> {
     read(of, inside, name, xml::array)
 }
 
-/// Returns the vector of an attribute, if it is there.
+/// Returns the vector of an attribute; `None` if the attribute is missing.
 pub(super) fn vector(of: &Element, inside: &Element, name: &str) -> Result<Option<Vec3<f64>>, Error> {
     Ok(array(of, inside, name)?.map(Vec3::from))
 }

@@ -8,14 +8,14 @@ use crate::joint::Joint;
 use crate::warning::Warning;
 use condyle_spatial::{Mat3, Vec3};
 
-/// Joint that moves, and the rotation of its frame in its link's frame.
+/// A moving joint, and the rotation of its frame in its link's frame.
 pub(super) struct Moving {
     pub(super) joint: Joint,
-    /// R_lj of a planar joint, whose z is its axis. All others have the link's frame.
+    /// Rotation R_lj of a planar joint, whose z axis is the joint's axis. Other joints use the link's frame.
     pub(super) rotation: Option<Mat3<f64>>,
 }
 
-/// Returns the joint, or none if it is fixed.
+/// Returns the joint; `None` if it is fixed.
 pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Option<Moving>, Error> {
     let axis = || match joint.child("axis") {
         Some(axis) => vector(joint, axis, "xyz")?.ok_or_else(|| joint.wrong_inside(axis, "axis has no xyz")),
@@ -34,7 +34,7 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
         "screw" if is_drakes => {
             let screw = joint.child("drake:screw_thread_pitch").ok_or_else(|| joint.wrong("has no thread pitch"))?;
             let [turn] = array(joint, screw, "value")?.ok_or_else(|| joint.wrong_inside(screw, "has no value"))?;
-            Joint::Helical { axis: axis()?, pitch: turn / core::f64::consts::TAU } // metres of a turn, of a radian
+            Joint::Helical { axis: axis()?, pitch: turn / core::f64::consts::TAU } // m/turn to m/rad
         }
         "planar" => {
             let axis = Joint::Revolute { axis: axis()? }.normalized().map_err(|what| joint.wrong(what))?.axis();
@@ -60,8 +60,8 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
     kind.normalized().map(|joint| Some(Moving { joint, rotation })).map_err(|what| joint.wrong(what))
 }
 
-/// Returns the shortest rotation that turns z to a unit vector u: I + \[v\]× + \[v\]×² / (1 + u_z), with v = z × u. It is exact for
-/// x, y and z. Drake has the same, the half turn about x for −z included.
+/// Returns the shortest rotation that maps z to a unit vector u: I + \[v\]× + \[v\]×² / (1 + u_z), with v = z × u. It
+/// is exact for x, y and z. It is equal to Drake's, also for −z, where it is a half turn about x.
 fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
     let Vec3 { x, y, z } = u;
     let v2 = x * x + y * y; // |v|² = (1 + z)(1 − z)
@@ -73,7 +73,7 @@ fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
     Mat3 { x: Vec3::new(1.0 - k * x * x, xy, -x), y: Vec3::new(xy, 1.0 - k * y * y, -y), z: u }
 }
 
-/// Returns the limits and losses of a joint that moves.
+/// Returns the limits and losses of a moving joint.
 pub(super) fn options(joint: &Element, kind: Joint, warnings: &mut Vec<Warning>) -> Result<JointOptions, Error> {
     let (limit, dynamics) = (joint.child("limit"), joint.child("dynamics"));
     let mut options = JointOptions::default();

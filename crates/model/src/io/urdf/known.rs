@@ -1,6 +1,6 @@
-//! Known elements and attributes of a URDF: those of its schema, versions 1.0 to 1.2, and those of the programs that write and
-//! read them (ROS control, Gazebo, Drake, Bullet, MuJoCo). Shapes, sensors, controllers, soft limits and calibrations have no
-//! effect on a model: they are known, and there is no warning.
+//! Known elements and attributes of a URDF: of its schema, versions 1.0 to 1.2, and of the programs that write and read
+//! it (ROS control, Gazebo, Drake, Bullet, MuJoCo). Shapes, sensors, controllers, soft limits and calibrations do not
+//! affect a model. They are known and cause no warning.
 
 use super::elements::check_repeated;
 use crate::io::known::{Known, LeftOut};
@@ -64,7 +64,8 @@ const LEFT_OUT: &LeftOut = &[
     ("transmission", "gap_joint", COUPLED),
 ];
 
-/// Warns of all in a robot that is unknown, misspelt or misplaced, and of what a model cannot hold.
+/// Adds warnings about unknown, misspelt and misplaced names in a robot, and about features that a model cannot
+/// represent.
 pub(super) fn check(robot: &Element, warnings: &mut Vec<Warning>) {
     static TABLE: OnceLock<Known> = OnceLock::new();
     TABLE.get_or_init(|| Known::new(KNOWN)).check(robot, LEFT_OUT, warnings);
@@ -78,7 +79,7 @@ pub(super) fn check(robot: &Element, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Warns of text in links and joints, whose values are all attributes.
+/// Adds warnings about text in links and joints, because all their values are attributes.
 fn check_text(element: &Element, warnings: &mut Vec<Warning>) {
     let text = element.text.trim();
     if !text.is_empty() {
@@ -97,7 +98,8 @@ fn check_text(element: &Element, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Warns of an entry of `<gazebo>` by which the robot is another one there. All others concern contact, looks and numerics.
+/// Returns a warning about an entry of `<gazebo>` that changes the robot there. Other entries concern contact, looks
+/// and numerics.
 fn changed_by_gazebo(entry: &Element) -> Option<Warning> {
     let is_on = matches!(entry.text.trim(), "1" | "true" | "True" | "TRUE");
     let what = match &*entry.tag {

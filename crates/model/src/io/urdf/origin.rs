@@ -1,4 +1,4 @@
-//! Placements in a URDF: `<origin>`, which has had quaternions since version 1.1.
+//! Placements in a URDF: `<origin>`, which may have a quaternion since version 1.1.
 
 use super::elements::{array, vector};
 use crate::error::Error;
@@ -6,18 +6,18 @@ use crate::io::from_rpy;
 use crate::io::xml::Element;
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3};
 
-/// The distance from 1 that the length of a quaternion may have: three digits are enough for 0.707 in place of √½.
+/// Allowed difference between the length of a quaternion and 1; three digits, such as 0.707 for √½, are enough.
 const UNIT_ROUNDING: f64 = 1e-3;
 
-/// The placements of a robot, by the version of its URDF.
+/// Rules for the placements of a robot, by the version of its URDF.
 #[derive(Clone, Copy)]
 pub(super) struct Origins {
-    /// Whether `quat_xyzw` has a meaning: in versions 1.1 and 1.2 it does, not so in 1.0.
+    /// Whether `quat_xyzw` is allowed: in versions 1.1 and 1.2, but not in 1.0.
     quaternions: bool,
 }
 
 impl Origins {
-    /// The rules by the version that a robot names, or 1.0.
+    /// Returns the rules for the version of a robot; without a version, it is 1.0.
     pub(super) fn of(robot: &Element) -> Result<Self, Error> {
         match robot.attribute("version").unwrap_or("1.0") {
             "1.0" => Ok(Self { quaternions: false }),
@@ -26,12 +26,12 @@ impl Origins {
         }
     }
 
-    /// The `<origin>` inside something, or none. Errors name `of`.
+    /// Returns the pose of the `<origin>` in an element, or the identity if it is missing. Errors name `of`.
     pub(super) fn pose(self, of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
         inside.child("origin").map_or(Ok(Se3::identity()), |origin| self.pose_of(of, origin))
     }
 
-    /// Returns the placement that the attributes of an element name. Errors name `of`.
+    /// Returns the placement that the attributes of an element specify. Errors name `of`.
     pub(super) fn pose_of(self, of: &Element, origin: &Element) -> Result<Se3<f64>, Error> {
         let rotation = match (array(of, origin, "rpy")?, array(of, origin, "quat_xyzw")?) {
             (Some(_), Some(_)) => return Err(of.wrong_inside(origin, "origin has both rpy and quat_xyzw")),
@@ -46,7 +46,7 @@ impl Origins {
     }
 }
 
-/// The rotation of a quaternion whose length is 1, up to rounding.
+/// Returns the rotation of a quaternion whose length must be 1, up to rounding.
 fn unit(xyzw: [f64; 4]) -> Result<Mat3<f64>, String> {
     let length = xyzw.iter().map(|x| x * x).sum::<f64>().sqrt();
     if (length - 1.0).abs() > UNIT_ROUNDING {

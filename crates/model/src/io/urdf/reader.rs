@@ -1,4 +1,4 @@
-//! The tree of a URDF: links, joints and frames, and the model that they make.
+//! Tree of a URDF: links, joints and frames, and the model built from them.
 
 use super::UrdfOptions;
 use super::elements::{array, needed, text};
@@ -29,17 +29,17 @@ pub(super) struct Reader<'a> {
     robot: &'a Element,
     origins: Origins,
     links: HashMap<&'a str, &'a Element>,
-    /// The names of the joints, in the order of the file.
+    /// Names of the joints, in the order of the file.
     order: Vec<&'a str>,
     joints: HashMap<&'a str, Edge<'a>>,
-    /// The root link.
+    /// Name of the root link.
     root: &'a str,
-    /// The joints on each link, in the order of their names.
+    /// Joints that each link carries, sorted by name.
     children: HashMap<&'a str, Vec<&'a str>>,
 }
 
 impl<'a> Reader<'a> {
-    /// Finds all links and joints, and their tree.
+    /// Collects all links and joints, and finds their tree.
     pub(super) fn new(robot: &'a Element) -> Result<Self, Error> {
         if robot.tag != "robot" {
             return Err(robot.wrong("the root element of a URDF is <robot>"));
@@ -67,7 +67,8 @@ impl<'a> Reader<'a> {
         Ok(reader)
     }
 
-    /// Finds root and children: every link but one is the child of one joint, and all hang together.
+    /// Finds root and children. Every link except the root must be the child of exactly one joint, and all links must
+    /// be connected.
     fn find_tree(&mut self) -> Result<(), Error> {
         let links: Vec<&str> = self.robot.all("link").filter_map(|l| l.attribute("name")).collect();
         let mut parent: HashMap<&str, &str> = HashMap::new();
@@ -108,7 +109,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Returns the model.
+    /// Builds the model.
     pub(super) fn model(&self, options: &UrdfOptions) -> Result<Model, Error> {
         let mut warnings = Vec::new();
         known::check(self.robot, &mut warnings);
@@ -129,7 +130,7 @@ impl<'a> Reader<'a> {
             }
         };
         builder.frame_of_kind(self.root, FrameKind::Link, root, Se3::identity());
-        // depth first: each joint waits with the body that it sits on, and its link's placement there
+        // depth first: each entry has a joint, the body that carries it, and the placement of its parent link there
         let (mut bodies, mut links) = (HashMap::new(), HashMap::from([(self.root, (root, Se3::identity()))]));
         let mut waiting: Vec<(&str, BodyId, Se3<f64>)> = Vec::new();
         let wait = |waiting: &mut Vec<_>, link: &str, body: BodyId, bXl: Se3<f64>| {
@@ -139,7 +140,7 @@ impl<'a> Reader<'a> {
         wait(&mut waiting, self.root, root, Se3::identity());
         while let Some((name, parent, pXl)) = waiting.pop() {
             let Edge { element, child: link, .. } = self.joints[name];
-            let pXl = pXl * self.origins.pose(element, element)?; // the child's
+            let pXl = pXl * self.origins.pose(element, element)?; // now the placement of the child
             let inertia = self.inertia(self.links[link], &mut warnings)?;
             let (body, bXl) = match joints::kind(element, &mut warnings)? {
                 None => {
@@ -177,8 +178,8 @@ impl<'a> Reader<'a> {
         self.robot.accepted(model, options.strict, &options.allow)
     }
 
-    /// Returns the name of the joint between the world and the root link: `root_joint`, or `root_joint_2`, … where the robot has
-    /// a joint of that name.
+    /// Returns the name of the joint between the world and the root link: `root_joint`, or `root_joint_2`, … if the
+    /// robot has a joint of that name.
     fn root_joint(&self) -> String {
         let mut name = String::from("root_joint");
         for k in 2.. {
@@ -207,7 +208,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Lets joints follow others, or warns that they are free.
+    /// Couples followers to their leaders, or adds warnings that they are free.
     fn add_mimics(
         &self,
         builder: &mut ModelBuilder,
@@ -234,7 +235,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Returns the link's inertia in the link's frame. Parts that are missing are 0, as Drake has it, with a warning.
+    /// Returns the link's inertia in the link's frame. Missing numbers are 0, as in Drake, with a warning.
     fn inertia(&self, link: &Element, warnings: &mut Vec<Warning>) -> Result<Inertia<f64>, Error> {
         let Some(inertial) = link.child("inertial") else { return Ok(Inertia::zero()) };
         let mut missing = Vec::new();
@@ -265,7 +266,7 @@ impl<'a> Reader<'a> {
         Ok(self.origins.pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
     }
 
-    /// The error that the builder found, with the line of the link or joint.
+    /// Adds the line of the link or joint to an error of the builder.
     fn locate(&self, error: Error) -> Error {
         let own = "the name belongs to the library";
         let (link, joint) =

@@ -6,14 +6,14 @@ use std::collections::BTreeMap;
 
 /// Tags of a rotor's inertia about its axis (kg m²).
 const ROTOR: [&str; 5] = ["drake:rotor_inertia", "rotorInertia", "rotor_inertia", "motorInertia", "motor_inertia"];
-/// Tags of the turns of a rotor for one turn of its joint.
+/// Tags of the number of turns of a rotor per turn of its joint.
 const RATIO: [&str; 5] = ["drake:gear_ratio", "mechanicalReduction", "mechanical_reduction", "gearRatio", "gear_ratio"];
 
 /// Armatures by the name of the joint (kg m²), each with its transmission.
 pub(super) type Armatures<'a> = BTreeMap<&'a str, (f64, &'a Element)>;
 
-/// Returns the armature n² J of each joint whose transmission has both a reduction n and a rotor's inertia J. Others warn, unless
-/// their reduction is 1 and they have no rotor.
+/// Returns the armature n² J of each joint whose transmission has both a reduction n and a rotor's inertia J. Adds
+/// warnings about others, unless their reduction is 1 and they have no rotor.
 pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> Armatures<'a> {
     let mut found = BTreeMap::new();
     for transmission in robot.all("transmission") {
@@ -37,7 +37,7 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
                 .map(|n| format!("has a reduction of {n} and no rotor inertia: M has no inertia of the rotor")),
             Some((element, inertia)) => {
                 if element.tag == ROTOR[0] {
-                    ratio = Some(find(&RATIO[..1]).map_or(1.0, |(_, n)| n)); // as Drake has it
+                    ratio = Some(find(&RATIO[..1]).map_or(1.0, |(_, n)| n)); // as in Drake
                 }
                 match (ratio, name) {
                     (Some(n), Some(name)) if inertia >= 0.0 => {

@@ -1,4 +1,4 @@
-//! Robots that urdf-rs has read: written as the elements of a URDF, for the one reader.
+//! Conversion of robots that urdf-rs has read: they become URDF elements for the reader of this crate.
 
 use super::UrdfOptions;
 use super::reader::Reader;
@@ -9,14 +9,14 @@ use ::urdf_rs::{Inertial, Joint, JointType, Link, Pose, Robot};
 use std::rc::Rc;
 
 impl Model {
-    /// Converts a robot that urdf-rs has read: the same model as [`from_urdf`](Self::from_urdf) reads from its file, except for what
-    /// `urdf_rs::Robot` does not have.
+    /// Converts a robot that urdf-rs has read. The result is the model that [`from_urdf`](Self::from_urdf) reads from
+    /// the same file, except for information that `urdf_rs::Robot` lacks.
     ///
-    /// - A limit that is missing has zeros there. Zeros of a continuous joint are taken as no limit; zeros of a revolute or prismatic
-    ///   joint stay, and warn. A missing effort is no error.
-    /// - A planar joint without an axis has 1 0 0, and no warning that says so.
-    /// - Versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions, frames and joints of Drake, and all
-    ///   that is unknown or left out are not there: they have neither effect nor warning.
+    /// - A missing limit is represented by zeros. Zeros of a continuous joint mean that it has no limit. Zeros of a
+    ///   revolute or prismatic joint are limits and cause a warning. A missing effort is not an error.
+    /// - A planar joint without an axis has the axis 1 0 0, without a warning about it.
+    /// - Some elements are missing, and have neither effect nor warning: versions and quaternions (`quat_xyzw`), limits
+    ///   of acceleration and jerk, transmissions, frames and joints of Drake, and all unknown names.
     ///
     /// Needs the feature `urdf-rs`.
     ///
@@ -28,8 +28,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// As [`from_urdf`](Self::from_urdf). The file in a message is `<urdf-rs>`, the line the index of the link or joint, counted
-    /// from 1.
+    /// The errors of [`from_urdf`](Self::from_urdf). In a message, the file is `<urdf-rs>`, and the line is the index
+    /// of the link or joint, counted from 1.
     pub fn from_urdf_robot(robot: &Robot, options: &UrdfOptions) -> Result<Self, Error> {
         let file: Rc<str> = "<urdf-rs>".into();
         let links = robot.links.iter().map(link);
@@ -41,7 +41,7 @@ impl Model {
     }
 }
 
-/// Sets the line of elements to their index.
+/// Sets the line of each element to its index, counted from 1.
 fn numbered(elements: impl Iterator<Item = Element>) -> impl Iterator<Item = Element> {
     (1..).zip(elements).map(|(line, element)| with_line(element, line))
 }
@@ -71,7 +71,7 @@ fn element(tag: &str, attributes: &[(&str, &str)], children: Vec<Element>) -> El
     }
 }
 
-/// Returns an element whose attributes are numbers, each written such that it is read as the same one.
+/// Returns an element whose attributes are numbers, each written with enough digits to read the same number again.
 fn numbers(tag: &str, attributes: &[(&str, &[f64])]) -> Element {
     let mut element = element(tag, &[], Vec::new());
     let words = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
@@ -92,7 +92,7 @@ fn link(link: &Link) -> Element {
     element("link", &[("name", &link.name)], vec![inertial])
 }
 
-/// As [`numbers`], with one number in each attribute.
+/// Returns an element whose attributes contain one number each; see [`numbers`].
 fn element_of_numbers(tag: &str, attributes: &[(&str, f64)]) -> Element {
     let attributes: Vec<(&str, &[f64])> = attributes.iter().map(|(name, x)| (*name, std::slice::from_ref(x))).collect();
     numbers(tag, &attributes)

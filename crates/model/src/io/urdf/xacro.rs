@@ -1,4 +1,4 @@
-//! Files of xacro: a program expands them, without a shell and within a time.
+//! Expansion of xacro files by an external program, without a shell and with a time limit.
 
 use crate::error::Error;
 use std::ffi::{OsStr, OsString};
@@ -9,16 +9,17 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Programs that expand, in the order in which they are tried: of ROS, and of PyPI, where it needs no ROS.
+/// Programs that expand xacro, in the order in which they are tried: the first is part of ROS, the second is from PyPI
+/// and needs no ROS.
 const PROGRAMS: [&str; 2] = ["xacro", "xacrodoc"];
-/// Maximum time of a program; large robots take a few seconds.
+/// Maximum running time of a program; large robots take a few seconds.
 const MAX_TIME: Duration = Duration::from_secs(60);
-/// Maximum length of what a program writes (bytes); one more than a robot's files may have.
+/// Maximum length of a program's output (bytes); one more than the limit for a robot's files.
 const MAX_BYTES: u64 = (64 << 20) + 1;
-/// Number of bytes of a program's message that stand in an error.
+/// Maximum number of bytes of a program's message in an error.
 const MESSAGE: usize = 2000;
 
-/// Whether a path is that of a file to be expanded.
+/// Returns whether a path is the path of a xacro file.
 pub(super) fn is_xacro(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "xacro")
 }
@@ -53,14 +54,14 @@ enum Failure {
     Said(String),
 }
 
-/// Runs a program, and returns what it writes.
+/// Runs a program, and returns its output.
 fn run(program: &str, path: &Path, arguments: &[(String, String)], packages: &[PathBuf]) -> Result<String, Failure> {
     let failed = |e: std::io::Error| match e.kind() {
         std::io::ErrorKind::NotFound => Failure::Missing,
         _ => Failure::Said(e.to_string()),
     };
     let mut command = Command::new(program);
-    // a path that begins with a dash would be an option
+    // a path that begins with a dash would be parsed as an option
     command.arg(if path.is_absolute() { path.to_owned() } else { Path::new(".").join(path) });
     if program == PROGRAMS[1] {
         command.args(packages.iter().flat_map(|folder| [OsStr::new("--pkg-dir"), folder.as_os_str()]));
@@ -83,7 +84,7 @@ fn run(program: &str, path: &Path, arguments: &[(String, String)], packages: &[P
         let _ = child.wait();
         return Err(Failure::Said(format!("is not done after {} s", MAX_TIME.as_secs())));
     };
-    // a pipe may stay open where another process has it
+    // a pipe may stay open if another process holds it
     let text = |from: Receiver<Vec<u8>>| from.recv_timeout(Duration::from_secs(1)).unwrap_or_default();
     if status.success() {
         return String::from_utf8(text(output)).map_err(|e| Failure::Said(e.to_string()));
@@ -93,7 +94,7 @@ fn run(program: &str, path: &Path, arguments: &[(String, String)], packages: &[P
     Err(Failure::Said(if message.is_empty() { status.to_string() } else { message }))
 }
 
-/// Reads a pipe on a thread of its own, up to [`MAX_BYTES`].
+/// Reads a pipe on a separate thread, up to [`MAX_BYTES`].
 fn read(pipe: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
     let (sender, receiver) = channel();
     thread::spawn(move || {
@@ -106,7 +107,7 @@ fn read(pipe: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
     receiver
 }
 
-/// Returns the folders in which packages are, before those of the environment.
+/// Returns the search path: the folders of packages, followed by the folders of the environment.
 fn search_path(packages: &[PathBuf]) -> OsString {
     let ros = std::env::var_os("ROS_PACKAGE_PATH").unwrap_or_default();
     let folders = packages.iter().cloned().chain(std::env::split_paths(&ros));

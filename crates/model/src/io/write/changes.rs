@@ -1,4 +1,4 @@
-//! Numbers of a model that differ from those of its file.
+//! Numbers of a model that differ from the numbers in its file.
 
 use crate::body::{Body, FrameKind};
 use crate::inertial_parameters;
@@ -8,31 +8,32 @@ use condyle_spatial::{Act, Inertia, Se3};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Largest relative difference that is rounding: inertias go through the frames of several links.
+/// Maximum relative difference that counts as rounding; chosen because inertias are transformed between the frames of
+/// several links.
 pub(super) const ROUNDING: f64 = 1e-9;
-/// Largest relative difference that is surely rounding, and no share of another element.
+/// Maximum relative difference that is certainly rounding, and not the contribution of another element.
 pub(super) const NO_SHARE: f64 = 1e-14;
-/// Least share of a body's mass that a link may be left with: below it, its centre of mass would have few digits.
+/// Minimum fraction of a body's mass that a link may keep; with less, its centre of mass would have few digits.
 const LEAST_SHARE: f64 = 1e-3;
 
-/// Numbers that a file is to say otherwise.
+/// Numbers that must change in a file.
 pub(super) struct Changes {
     pub(super) links: Vec<LinkChange>,
     pub(super) joints: Vec<JointChange>,
 }
 
-/// New inertia of a body, as its links have it.
+/// New inertia of a body, distributed over its links.
 pub(super) struct LinkChange {
     body: usize,
     /// Name of the link that takes the difference.
     pub(super) link: String,
-    /// Pose of that link in the body.
+    /// Pose in the body of the link that takes the difference.
     placement: Se3<f64>,
-    /// New inertia of the link, in the body's frame.
+    /// New inertia of the link that takes the difference, in the body's frame.
     inertia: Inertia<f64>,
     /// Names of the body's other links that have an inertia.
     others: Vec<String>,
-    /// Names of the links that get no inertia.
+    /// Names of the links whose inertia becomes zero.
     pub(super) emptied: Vec<String>,
 }
 
@@ -44,11 +45,11 @@ pub(super) struct JointChange {
     pub(super) is_prismatic: bool,
     /// Numbers of the joint, in the order of [`NUMBERS`].
     values: [f64; 10],
-    /// Whether each differs from the file's.
+    /// Whether each number differs from the number in the file.
     differs: [bool; 10],
 }
 
-/// Numbers that a file has for each joint; the first two belong to q, the others to v.
+/// Names of the numbers that a file has for each joint; the first two belong to q, the others to v.
 const NUMBERS: [&str; 10] = [
     "lower limit",
     "upper limit",
@@ -61,10 +62,10 @@ const NUMBERS: [&str; 10] = [
     "friction",
     "armature",
 ];
-/// Position of the damping in [`NUMBERS`]: from here on, elements of a file add up.
+/// Index of the damping in [`NUMBERS`]; from this index on, several elements of a file may add up.
 const LOSSES: usize = 5;
 
-/// The numbers of a model, in the order of [`NUMBERS`].
+/// Returns the numbers of a model, in the order of [`NUMBERS`].
 fn numbers(model: &Model) -> [Vec<f64>; 10] {
     let limits = model.limits.clone();
     let polynomial = |k: usize| model.damping_polynomial.iter().map(|d| d[k]).collect();
@@ -82,63 +83,63 @@ fn numbers(model: &Model) -> [Vec<f64>; 10] {
     ]
 }
 
-/// The slots of a joint in the k-th of its [`numbers`].
+/// Returns the slots of a joint in the k-th of its [`numbers`].
 fn slots(body: &Body, k: usize) -> Range<usize> {
     if k < 2 { body.idx_q..body.idx_q + body.joint.nq() } else { body.idx_v..body.idx_v + body.joint.nv() }
 }
 
 impl JointChange {
-    /// Some of the numbers, if one of them differs.
+    /// Returns N numbers from index `first` on; `None` if none of them differs.
     fn some<const N: usize>(&self, first: usize) -> Option<[f64; N]> {
         let differs = self.differs[first..first + N].contains(&true);
         differs.then(|| std::array::from_fn(|k| self.values[first + k]))
     }
 
-    /// Least and greatest position (rad, m).
+    /// Returns the minimum and maximum position (rad, m).
     pub(super) fn position(&self) -> Option<[f64; 2]> {
         self.some(0)
     }
 
-    /// Greatest speed (rad/s, m/s).
+    /// Returns the maximum speed (rad/s, m/s).
     pub(super) fn velocity(&self) -> Option<f64> {
         self.some(2).map(|[x]| x)
     }
 
-    /// Least and greatest effort (N m, N).
+    /// Returns the minimum and maximum effort (N m, N).
     pub(super) fn effort(&self) -> Option<[f64; 2]> {
         self.some(3)
     }
 
-    /// Viscous damping, and its coefficients with the speed.
+    /// Returns the coefficients of damping: constant, with the speed, and with its square.
     pub(super) fn damping(&self) -> Option<[f64; 3]> {
         self.some(LOSSES)
     }
 
-    /// Coulomb friction (N m, N).
+    /// Returns the Coulomb friction (N m, N).
     pub(super) fn friction(&self) -> Option<f64> {
         self.some(8).map(|[x]| x)
     }
 
-    /// Inertia of the rotor as seen at the joint (kg m², kg).
+    /// Returns the inertia of the rotor as seen at the joint (kg m², kg).
     pub(super) fn armature(&self) -> Option<f64> {
         self.some(9).map(|[x]| x)
     }
 
-    /// Greatest speed, and least and greatest effort, whether they differ or not.
+    /// Returns the maximum speed, and the minimum and maximum effort, even if they do not differ.
     pub(super) fn all_limits(&self) -> (f64, [f64; 2]) {
         (self.values[2], [self.values[3], self.values[4]])
     }
 }
 
 impl LinkChange {
-    /// The new inertia in the frame of the link.
+    /// Returns the new inertia in the frame of the link.
     pub(super) fn inertia(&self) -> Inertia<f64> {
         self.placement.act_inv(self.inertia)
     }
 }
 
 impl Changes {
-    /// Compares two models of one robot; `masses` are those of its links (kg).
+    /// Compares two models of one robot; `masses` are the masses of its links (kg), by name.
     pub(super) fn new(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Self, String> {
         match different_robot(model, was) {
             Some(what) => Err(what),
@@ -150,7 +151,8 @@ impl Changes {
         self.links.is_empty() && self.joints.is_empty()
     }
 
-    /// Takes the shares of other elements off, given what the file says with the changes; returns whether there are changes.
+    /// Subtracts the contributions of other elements, given the model that the changed file describes. Returns whether
+    /// there are changes.
     pub(super) fn take_shares_off(&mut self, model: &Model, now: &Model) -> bool {
         for change in &mut self.links {
             let (wanted, found) = (model.bodies[change.body].inertia, now.bodies[change.body].inertia);
@@ -173,7 +175,7 @@ impl Changes {
     }
 }
 
-/// Finds the bodies with other inertias.
+/// Finds the bodies whose inertia differs.
 fn links(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Vec<LinkChange>, String> {
     let mut changes = Vec::new();
     for (i, (body, before)) in model.bodies.iter().zip(&was.bodies).enumerate() {
@@ -202,7 +204,7 @@ fn links(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Ve
     Ok(changes)
 }
 
-/// Finds the joints with other limits, losses or armature.
+/// Finds the joints whose limits, losses or armature differ.
 fn joints(model: &Model, was: &Model) -> Result<Vec<JointChange>, String> {
     let (new, old, mut changes) = (numbers(model), numbers(was), Vec::new());
     for (i, body) in model.bodies.iter().enumerate().skip(1).filter(|(_, b)| b.mimic.is_none()) {
@@ -223,7 +225,7 @@ fn joints(model: &Model, was: &Model) -> Result<Vec<JointChange>, String> {
     Ok(changes)
 }
 
-/// The first thing by which two models are different robots, whatever their numbers.
+/// Returns the first property, except numbers that can be written, in which two models differ.
 fn different_robot(model: &Model, file: &Model) -> Option<String> {
     let alike = |a: &Body, b: &Body| {
         let names = (&a.name, &a.joint_name) == (&b.name, &b.joint_name);
@@ -258,7 +260,7 @@ fn different_robot(model: &Model, file: &Model) -> Option<String> {
     others.into_iter().find(|(same, _)| !same).map(|(_, what)| format!("{what} of the model and of the file differ"))
 }
 
-/// The first difference between a model and what a file says, beyond a relative rounding.
+/// Returns the first difference between a model and the model in a file that exceeds a relative rounding error.
 pub(super) fn difference(model: &Model, file: &Model, rounding: f64) -> Option<String> {
     if let Some(what) = different_robot(model, file) {
         return Some(what);
@@ -281,13 +283,13 @@ pub(super) fn difference(model: &Model, file: &Model, rounding: f64) -> Option<S
     None
 }
 
-/// Whether two numbers are equal up to rounding; of those below 0.001, such as small armatures that were added up, as if
-/// they were 0.001.
+/// Returns whether two numbers are equal up to rounding. The tolerance of numbers below 0.001, such as sums of small
+/// armatures, is the tolerance of 0.001.
 fn close(a: f64, b: f64, rounding: f64) -> bool {
     a == b || (a - b).abs() <= rounding * a.abs().max(b.abs()).max(1e-3)
 }
 
-/// Whether two inertias are equal up to rounding: |m c| is at most √(m tr Ī).
+/// Returns whether two inertias are equal up to rounding: |m c| is at most √(m tr Ī).
 fn alike(a: Inertia<f64>, b: Inertia<f64>, rounding: f64) -> bool {
     let size = |I: Inertia<f64>| (I.rotational.xx.abs() + I.rotational.yy.abs() + I.rotational.zz.abs()).max(1e-300);
     let (mass, size) = (a.mass.abs().max(b.mass.abs()), size(a).max(size(b)));

@@ -1,22 +1,22 @@
-//! Edits of an XML text by byte ranges: all that is not edited stays byte for byte.
+//! Edits of an XML text by byte ranges; all other bytes are kept.
 
 use crate::io::xml::Element;
 use condyle_spatial::{Inertia, Sym3, Vec3};
 use std::ops::Range;
 
-/// The pieces of a text that are replaced, each a byte range with its new text.
+/// Replaced pieces of a text, each a byte range with its new text.
 pub(super) struct Edits<'a> {
     text: &'a str,
     pieces: Vec<(Range<usize>, String)>,
 }
 
 impl<'a> Edits<'a> {
-    /// No edits of a text.
+    /// Creates an empty list of edits of a text.
     pub(super) fn new(text: &'a str) -> Self {
         Self { text, pieces: Vec::new() }
     }
 
-    /// Sets an attribute of an element to numbers, in as few digits as give each number back.
+    /// Sets an attribute of an element to numbers, with the fewest digits from which each number can be read back.
     pub(super) fn set(&mut self, element: &Element, name: &str, numbers: &[f64]) {
         self.set_text(element, name, &words(numbers));
     }
@@ -41,9 +41,10 @@ impl<'a> Edits<'a> {
         }
     }
 
-    /// Inserts an element as the first child of another one, on a line of its own where the other children have one.
+    /// Inserts an element as the first child of another one, on its own line if the other children have their own
+    /// lines.
     ///
-    /// An element without an end tag gets one, so it takes one child only.
+    /// An element without an end tag gets one, so only one child can be inserted into it.
     pub(super) fn insert(&mut self, element: &Element, xml: &str) {
         let (tag, own) = (StartTag::new(self.text, element), self.indent(element));
         let child = element.children.first().map(|child| self.indent(child));
@@ -60,7 +61,7 @@ impl<'a> Edits<'a> {
         }
     }
 
-    /// The text with all edits.
+    /// Returns the text with all edits.
     pub(super) fn apply(mut self) -> String {
         self.pieces.sort_by_key(|(range, _)| (range.start, range.end));
         let (mut new, mut end) = (String::with_capacity(self.text.len() + 1024), 0);
@@ -72,7 +73,7 @@ impl<'a> Edits<'a> {
         new + &self.text[end..]
     }
 
-    /// The line break and the white space before an element; none if something else stands before it on its line.
+    /// Returns the line break and the white space before an element; `None` if other text precedes it on its line.
     fn indent(&self, element: &Element) -> Option<&'a str> {
         let before = &self.text[..element.at];
         let line = before.trim_end_matches([' ', '\t']);
@@ -81,7 +82,7 @@ impl<'a> Edits<'a> {
     }
 }
 
-/// The start tag of an element in its text.
+/// Start tag of an element in its text.
 struct StartTag {
     /// Name and byte range of each attribute, from its name to its closing quote.
     attributes: Vec<(String, Range<usize>)>,
@@ -92,7 +93,7 @@ struct StartTag {
 }
 
 impl StartTag {
-    /// Finds the parts of a tag that a parser has accepted.
+    /// Finds the parts of a tag that the parser has accepted.
     fn new(text: &str, element: &Element) -> Self {
         let (mut at, mut attributes) = (element.at + 1 + element.tag.len(), Vec::new());
         let mut content_end = at;
@@ -119,7 +120,7 @@ impl StartTag {
     }
 }
 
-/// Numbers with spaces between them, each in as few digits as give it back.
+/// Writes numbers separated by spaces, with the fewest digits from which each can be read back.
 pub(super) fn words(numbers: &[f64]) -> String {
     let word = |x: &f64| {
         let text = format!("{x:?}");
@@ -128,7 +129,7 @@ pub(super) fn words(numbers: &[f64]) -> String {
     numbers.iter().map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// Mass (kg), centre of mass (m), and inertia about it (kg m²), as files have them.
+/// Returns mass (kg), centre of mass (m), and inertia about it (kg m²), the form used in files.
 pub(super) fn about_com(I: Inertia<f64>) -> Result<(f64, [f64; 3], Sym3<f64>), String> {
     if I.mass == 0.0 {
         return match I.mass_com == Vec3::zero() {
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn children_stand_on_lines_of_their_own_where_others_do() {
+    fn inserted_children_follow_the_line_breaks_of_others() {
         let insert = |text: &str| edited(text, |e, n| e.insert(&n.children[0], "<b/>"));
         assert_eq!(insert("<r>\n\t<a/>\n</r>"), "<r>\n\t<a>\n\t  <b/>\n\t</a>\n</r>");
         assert_eq!(insert("<r>\r\n  <a>\r\n    <c/></a></r>"), "<r>\r\n  <a>\r\n    <b/>\r\n    <c/></a></r>");

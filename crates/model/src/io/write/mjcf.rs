@@ -11,7 +11,7 @@ use condyle_spatial::Inertia;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// An MJCF, the path for what it includes, and how it is read.
+/// An MJCF: the path relative to which files are included, and options of the reader.
 pub(super) struct Mjcf<'a> {
     pub(super) path: &'a Path,
     pub(super) options: MjcfOptions,
@@ -52,7 +52,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// Finds the joints and the bodies of a body, those in its frames too.
+/// Finds the joints and child bodies of a body, including those in its frames.
 fn gather<'a>(element: &'a Element, joints: &mut Vec<&'a Element>, bodies: &mut Vec<&'a Element>) {
     for child in &element.children {
         match &*child.tag {
@@ -64,12 +64,12 @@ fn gather<'a>(element: &'a Element, joints: &mut Vec<&'a Element>, bodies: &mut 
     }
 }
 
-/// An element's own name, or another one.
+/// Returns the name of an element, or another name if it has none.
 fn name(element: &Element, otherwise: impl Fn() -> String) -> String {
     element.attribute("name").filter(|n| !n.is_empty()).map_or_else(otherwise, str::to_owned)
 }
 
-/// The value of a compiler's attribute; the last one counts.
+/// Returns the value of a compiler's attribute; the last one counts.
 fn compiler<'a>(root: &'a Element, name: &str) -> Option<&'a str> {
     let sections = root.children.iter().filter(|section| section.tag == "compiler");
     sections.rev().find_map(|section| section.attribute(name))
@@ -83,7 +83,7 @@ impl Format for Mjcf<'_> {
     fn masses(&self, root: &Element) -> HashMap<String, f64> {
         let mass = |body: &Element| match (body.child("inertial"), body.child("geom")) {
             (Some(inertial), _) => inertial.attribute("mass")?.trim().parse().ok(),
-            (None, geom) => geom.map(|_| f64::MIN_POSITIVE), // some mass, which gives way to an <inertial>
+            (None, geom) => geom.map(|_| f64::MIN_POSITIVE), // some mass, which an <inertial> replaces
         };
         let bodies = Elements::new(root).bodies.into_iter();
         bodies.filter_map(|(name, body)| Some((name, mass(body)?))).collect()
@@ -114,10 +114,10 @@ impl Format for Mjcf<'_> {
     }
 }
 
-/// Gives a body an inertia, in the body's frame.
+/// Sets the inertia of a body, in the body's frame.
 fn inertial(edits: &mut Edits, body: &Element, I: Inertia<f64>) -> Result<(), String> {
     let (mass, com, J) = about_com(I)?;
-    // MuJoCo takes a full inertia only if it is positive definite
+    // MuJoCo accepts a full inertia only if it is positive definite
     let (moments, numbers) = match [J.xy, J.xz, J.yz] {
         [0.0, 0.0, 0.0] => ("diaginertia", vec![J.xx, J.yy, J.zz]),
         [xy, xz, yz] => ("fullinertia", vec![J.xx, J.yy, J.zz, xy, xz, yz]),
@@ -130,13 +130,13 @@ fn inertial(edits: &mut Edits, body: &Element, I: Inertia<f64>) -> Result<(), St
     edits.set(inertial, "pos", &com);
     edits.set(inertial, "mass", &[mass]);
     edits.set(inertial, moments, &numbers);
-    // the new inertia is along the axes of the body
+    // the axes of the new inertia are the axes of the body
     let others = ["diaginertia", "fullinertia", "quat", "axisangle", "xyaxes", "zaxis", "euler"];
     others.into_iter().filter(|name| *name != moments).for_each(|name| edits.remove(inertial, name));
     Ok(())
 }
 
-/// Gives a joint its limits, losses and armature.
+/// Sets the limits, losses and armature of a joint.
 fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange, degrees: bool) -> Result<(), String> {
     if joint.tag == "freejoint" {
         return Err("a <freejoint> has neither limits, losses nor armature: write <joint type=\"free\">".to_owned());

@@ -10,19 +10,19 @@ use crate::model::Model;
 use condyle_spatial::Inertia;
 use std::collections::{HashMap, HashSet};
 
-/// A URDF, and how it is read.
+/// A URDF, with the options of its reader.
 pub(super) struct Urdf {
     pub(super) options: UrdfOptions,
 }
 
-/// Returns the name of the link that is the child of no joint.
+/// Returns the name of the link that is no child of a joint.
 pub(super) fn root(robot: &Element) -> Option<&str> {
     let children: HashSet<&str> =
         named(robot, "joint").into_values().filter_map(|j| j.child("child")?.attribute("link")).collect();
     named(robot, "link").into_keys().find(|link| !children.contains(link))
 }
 
-/// The links or joints of a robot by name.
+/// Returns the links or joints of a robot by name.
 fn named<'a>(robot: &'a Element, tag: &'a str) -> HashMap<&'a str, &'a Element> {
     robot.all(tag).filter_map(|element| Some((element.attribute("name")?, element))).collect()
 }
@@ -61,7 +61,7 @@ impl Format for Urdf {
     }
 }
 
-/// Gives a link an inertia, in the link's frame.
+/// Sets the inertia of a link, in the link's frame.
 fn inertial(edits: &mut Edits, link: &Element, I: Inertia<f64>) -> Result<(), String> {
     let (mass, com, J) = about_com(I)?;
     let moments = [("ixx", J.xx), ("ixy", J.xy), ("ixz", J.xz), ("iyy", J.yy), ("iyz", J.yz), ("izz", J.zz)];
@@ -75,7 +75,7 @@ fn inertial(edits: &mut Edits, link: &Element, I: Inertia<f64>) -> Result<(), St
     match inertial.child("origin") {
         Some(origin) => {
             edits.set(origin, "xyz", &com);
-            // the new inertia is along the axes of the link
+            // the axes of the new inertia are the axes of the link
             let turned = |name: &&str| {
                 let numbers = origin.attribute(name).unwrap_or_default().split_whitespace();
                 numbers.map(str::parse::<f64>).any(|x| x != Ok(0.0))
@@ -92,7 +92,7 @@ fn inertial(edits: &mut Edits, link: &Element, I: Inertia<f64>) -> Result<(), St
     Ok(())
 }
 
-/// Gives a joint its limits and losses.
+/// Sets the limits and losses of a joint.
 fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange) -> Result<(), String> {
     let finite = |name: &'static str, x: f64| match x.is_finite() {
         true => Ok((name, x)),
@@ -138,12 +138,12 @@ fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange) -> Resul
     Ok(())
 }
 
-/// Rotor inertia of a transmission, as Drake and our reader have it.
+/// Tag of the rotor inertia of a transmission, for Drake and our reader.
 const ROTOR: &str = "drake:rotor_inertia";
-/// Turns of the rotor for one turn of its joint; 1 where a transmission says nothing.
+/// Tag of the number of turns of the rotor per turn of its joint; 1 if it is missing.
 const RATIO: &str = "drake:gear_ratio";
 
-/// Gives a joint an armature: the rotor inertia J of its transmission, with the armature n² J.
+/// Sets the armature of a joint: the rotor inertia J of its transmission, where the armature is n² J.
 fn transmission(edits: &mut Edits, robot: &Element, joint: &str, armature: f64) {
     let drives = |t: &&Element| t.all("joint").map(|j| j.attribute("name")).eq([Some(joint)]);
     let own = robot.all("transmission").filter(drives).find(|t| t.all("actuator").count() == 1);
@@ -162,7 +162,7 @@ fn transmission(edits: &mut Edits, robot: &Element, joint: &str, armature: f64) 
     }
 }
 
-/// An element with numbers for attributes.
+/// Returns an element whose attributes are numbers.
 fn element(tag: &str, attributes: &[(&str, f64)]) -> String {
     let attributes = attributes.iter().map(|&(name, x)| format!(" {name}=\"{}\"", words(&[x])));
     format!("<{tag}{}/>", attributes.collect::<String>())

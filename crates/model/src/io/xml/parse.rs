@@ -1,7 +1,7 @@
-//! Parser of XML: one pass from a text to elements. It accepts the same files as the readers that robots are written for
-//! (tinyxml2): prefixes without a declaration, dashes in comments, a declaration that is not at the beginning.
+//! Parser of XML: one pass from a text to elements. It accepts the same files as tinyxml2, on which the usual readers
+//! of robots are based: prefixes without a declaration, dashes in comments, a declaration that is not at the beginning.
 //!
-//! An element inside a document type has no effect, and its entities are not expanded: nothing in a file can grow.
+//! Elements inside a document type have no effect, and its entities are not expanded, so a text cannot grow.
 
 use super::encoding::{INVALID, declared};
 use super::{EXPAND, Element, MAX_ATTRIBUTES, MAX_DEPTH};
@@ -11,31 +11,31 @@ use std::rc::Rc;
 /// Maximum length of an entity's name.
 const MAX_ENTITY: usize = 64;
 
-/// Parser: position in a text, and the elements that are open there.
+/// Parser state: the position in a text, and the open elements.
 struct Parser<'a> {
     text: &'a str,
-    /// Bytes that are read.
+    /// Number of bytes read so far.
     at: usize,
-    /// Line of the byte at `counted`.
+    /// Line of the byte at index `counted`.
     line: u32,
     counted: usize,
     file: Rc<str>,
     /// Tag and line of each open element.
     tags: Vec<(&'a str, u32)>,
-    /// Open elements, of at most [`MAX_DEPTH`] levels.
+    /// Open elements, at most [`MAX_DEPTH`].
     open: Vec<Element>,
     root: Option<Element>,
-    /// First element below the deepest level, and the number of levels.
+    /// First element below the maximum depth, and the depth of nesting.
     too_deep: Option<(Element, usize)>,
-    /// Prefixes of xacro's macros.
+    /// Prefixes of xacro macros.
     macros: Vec<&'a str>,
-    /// Whether a byte of the file was not in its encoding.
+    /// Whether a byte of the file was invalid in its encoding.
     is_damaged: bool,
 }
 
-/// Returns the root element of a text.
+/// Parses the root element of a text.
 pub(super) fn parse(text: &str, file: &str) -> Result<Element, Error> {
-    let text = text.trim_end_matches('\0'); // the end of a text in C
+    let text = text.trim_end_matches('\0'); // terminating zero of a C string
     let mut parser = Parser {
         text,
         at: if text.starts_with('\u{feff}') { '\u{feff}'.len_utf8() } else { 0 },
@@ -62,7 +62,7 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Element, Error> {
 }
 
 impl<'a> Parser<'a> {
-    /// Reads up to the next tag, and that one. Returns whether there was one.
+    /// Reads text and the next tag after it. Returns whether there was a tag.
     fn step(&mut self) -> Result<bool, Error> {
         let rest = &self.text[self.at..];
         let length = rest.find('<').unwrap_or(rest.len());
@@ -106,7 +106,7 @@ impl<'a> Parser<'a> {
         Ok(true)
     }
 
-    /// Goes behind an end, and returns the text before it.
+    /// Moves past an end marker, and returns the text before it.
     fn skip(&mut self, begin: usize, rest: &'a str, end: &str, what: &str) -> Result<&'a str, Error> {
         let Some(length) = rest.find(end) else { return Err(self.wrong(format!("{what} is never closed"))) };
         self.at += begin + length + end.len();
@@ -148,7 +148,7 @@ impl<'a> Parser<'a> {
 
     /// Reads the attributes of an element and the end of its tag. Returns whether the element is empty.
     fn attributes(&mut self, tag: &str, element: &mut Element) -> Result<bool, Error> {
-        let mut others = 0; // declarations of namespaces, and those beyond the limit
+        let mut others = 0; // declarations of namespaces, and attributes beyond the limit
         loop {
             let rest = self.text[self.at..].trim_start();
             self.at = self.text.len() - rest.len();
@@ -199,7 +199,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Closes the element that is open, whose tag this must be.
+    /// Closes the innermost open element, whose tag must be `name`.
     fn close(&mut self, name: &str) -> Result<(), Error> {
         match self.tags.pop() {
             Some((tag, _)) if tag == name => {}
@@ -237,7 +237,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Returns a text with its characters' numbers and its five entities in their place. Blanks of an attribute are spaces.
+    /// Decodes character references and the five entities of a text. In an attribute, white space becomes spaces.
     fn decoded(&self, text: &str, is_attribute: bool) -> Result<String, Error> {
         let special = |b: &u8| *b == b'&' || *b == b'\r' || is_attribute && matches!(*b, b'\n' | b'\t');
         self.check_encoding(text)?;
@@ -267,7 +267,7 @@ impl<'a> Parser<'a> {
         Ok(decoded)
     }
 
-    /// Refuses a text that has a byte that is not in the encoding of its file.
+    /// Returns an error if a text contains a byte that is invalid in the encoding of its file.
     fn check_encoding(&self, text: &str) -> Result<(), Error> {
         if !self.is_damaged || !text.contains(INVALID) {
             return Ok(());
@@ -279,21 +279,21 @@ impl<'a> Parser<'a> {
         }))
     }
 
-    /// Returns the line that is read.
+    /// Returns the current line.
     fn count_lines(&mut self) -> u32 {
         let between = &self.text.as_bytes()[self.counted..self.at];
         (self.line, self.counted) = (self.line + count(between, b'\n') as u32, self.at);
         self.line
     }
 
-    /// Returns the error of a text that is no XML.
+    /// Returns an error about a text that is not XML.
     fn wrong(&self, what: impl Into<String>) -> Error {
         let line = 1 + count(&self.text.as_bytes()[..self.at], b'\n') as u32;
         Error::Xml { file: self.file.to_string(), line, what: what.into() }
     }
 }
 
-/// Returns the length of a document type, its `>` included, or none if it has no end.
+/// Returns the length of a document type including its `>`; `None` if its end is missing.
 fn end_of_type(text: &str) -> Option<usize> {
     let (mut at, mut is_subset) = (0, false);
     loop {
@@ -312,12 +312,13 @@ fn end_of_type(text: &str) -> Option<usize> {
     }
 }
 
-/// Returns the number of bytes of a kind.
+/// Counts the occurrences of a byte.
 pub(super) fn count(bytes: &[u8], byte: u8) -> usize {
     bytes.iter().filter(|&&b| b == byte).count()
 }
 
-/// Whether a text between `&` and `;` is the name of an entity or the number of a character. A `&` elsewhere is a sign.
+/// Returns whether the text between `&` and `;` is the name of an entity or the number of a character. Any other `&` is
+/// literal.
 fn is_entity(name: &str) -> bool {
     let name = name.strip_prefix('#').unwrap_or(name);
     !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b))

@@ -1,18 +1,18 @@
-//! XML for other parsers: the text of a robot, without what they refuse.
+//! XML for other parsers: the text of a robot, without constructs that they refuse.
 
 use super::{Amount, Element};
 use crate::error::Error;
 use crate::model::Model;
 
 impl Model {
-    /// Returns the text of a file's bytes.
+    /// Decodes the bytes of a file.
     #[doc(hidden)]
     pub fn decoded(bytes: Vec<u8>) -> String {
         super::encoding::decode(bytes)
     }
 
-    /// Returns a text with the same elements on the same lines, which every parser of XML reads: without a document type, comments
-    /// and prefixes.
+    /// Returns a text with the same elements on the same lines that every XML parser can read: without a document type,
+    /// comments and prefixes.
     #[doc(hidden)]
     pub fn well_formed(text: &str) -> Result<String, Error> {
         let mut written = Written { text: String::with_capacity(text.len()), line: 1 };
@@ -27,7 +27,7 @@ struct Written {
 }
 
 impl Written {
-    /// Writes an element on its line, or on the first line after it that is free.
+    /// Writes an element on its line, or on the first free line after it.
     fn element(&mut self, element: &Element) {
         let name = |name: &str| name.replace(':', "-");
         while self.line < element.line {
@@ -57,7 +57,7 @@ impl Written {
                 '&' => self.text += "&amp;",
                 '<' => self.text += "&lt;",
                 '"' => self.text += "&quot;",
-                '\n' => self.text += "&#10;", // no line of the file
+                '\n' => self.text += "&#10;", // so that no line is added
                 '\t' => self.text += "&#9;",
                 c if c.is_control() => {}
                 c => self.text.push(c),
