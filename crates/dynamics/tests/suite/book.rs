@@ -1,4 +1,4 @@
-//! Inverse dynamics in the form of the book, beside the formulation that the library uses.
+//! Inverse dynamics as in Featherstone's book, compared with the formulation of the library.
 
 use crate::common;
 
@@ -7,12 +7,12 @@ use condyle_dynamics::ReferenceFrame::Local;
 use condyle_dynamics::{Act, Cross, Data, Force, Model, Motion, Se3, Vec3, forward_kinematics, rnea};
 use nalgebra::{DMatrix, DVector};
 
-/// Sums over all bodies, relative to the largest number.
+/// Tolerance of sums over all bodies, relative to the largest number.
 const ROUNDING: f64 = 1e-11;
 const TREES: u64 = 20;
 
-/// τ by Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 5.1, in body coordinates. Joints that follow another one
-/// have their columns of S in the coordinate of their leader.
+/// Computes τ by Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 5.1, in body coordinates. For a joint
+/// that follows another one, the columns of S refer to the coordinate of its leader.
 fn book(model: &Model, State { q, v, a, f_ext, .. }: &State) -> Vec<f64> {
     let (bodies, nv) = (model.bodies().len(), model.nv());
     let mut data = Data::new(model);
