@@ -15,7 +15,7 @@ struct Attempt {
 }
 
 impl AugmentedLagrangian {
-    /// Makes a second attempt if the first one failed: from x̂₀ at all knots and the controls that hold it still, with
+    /// Makes a second attempt after a failed one: from x̂₀ at all knots and the controls that hold it still, with
     /// multipliers of zero. Returns the status of the better attempt, and keeps its solution and outcome. A converged
     /// attempt is better; otherwise the attempt with the smaller violation is.
     ///

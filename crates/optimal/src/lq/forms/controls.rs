@@ -23,7 +23,8 @@ impl Controls {
     }
 
     /// Computes L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y, for the controls that are not at a
-    /// bound. Stores Qu, Quu and, if there are bounds, k in the knot. Returns the number of these controls.
+    /// bound. Stores Qu and Quu in the knot and, if there are bounds, k in the scratch. Returns the number of these
+    /// controls.
     ///
     /// # Errors
     /// The control and its pivot, if the pivot is not positive.
