@@ -252,7 +252,7 @@ fn contradictions() {
     assert!(common::relative(d.a, &a) < CONDITIONED);
 }
 
-/// Without constraints, it equals forward dynamics, and an impact changes nothing.
+/// Without constraints, constrained dynamics equals forward dynamics, and an impact changes nothing.
 #[test]
 fn no_constraint() {
     for (seed, model) in all_models(4).iter().enumerate() {

@@ -27,7 +27,7 @@ use std::time::Duration;
 /// ```text
 /// derivatives   at the iterate, if it is new
 /// sweep         k, K, Vx, Vxx; repeated with a larger regularisation while Quu is not positive definite
-/// line search   for α = 1, ½, ¼, …: a rollout that keeps the fraction 1 − α of each gap; accepted if it lowers the cost
+/// line search   for α = 1, ½, ¼, …: a rollout that keeps 1 − α of each gap; accepted if it lowers the cost
 ///               by more than `accept` times the expected α (d₁ + ½ α d₂), or, while gaps exist, raises it by less
 ///               than `accept_ascent` times that
 /// ```
