@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs the tests of vectors on a 64-bit Arm that qemu plays, where there is what this takes (`tests/targets.sh install arm`):
-# a compiler for it, aarch64-linux-gnu-gcc to link with the C library, and qemu-aarch64-static or qemu-aarch64.
+# Runs the tests of vectors on a 64-bit Arm that qemu emulates. It needs a compiler for Arm, aarch64-linux-gnu-gcc to link with
+# the C library, and qemu-aarch64-static or qemu-aarch64 (`tests/targets.sh install arm`). Without them it prints NOT RUN.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . tests/targets.sh
@@ -23,27 +23,28 @@ libc=$(aarch64-linux-gnu-gcc -print-file-name=libc.so.6)
 
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc
 export CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="$qemu -L $(realpath "$(dirname "$libc")/..")"
-export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}/arm # to run beside other builds
+export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}/arm # separate from other builds
 export CARGO_PROFILE_DEV_DEBUG=false
-export CONDYLE_EMULATED=1 # fewer cases of what takes minutes
+export CONDYLE_EMULATED=1 # fewer cases in tests that take minutes
 
 packages=(spatial linalg dynamics ${CONDYLE_FULL:+optimal})
 
-# All programs of one build, so that what they share is compiled once. $1, …: which of them, and `--` with the names of tests.
+# Builds all programs at once, so that shared code is compiled once. $1, …: the programs to run, then `--` and names of tests.
 run() {
     "${cargo[@]}" test --locked --target $target "${packages[@]/#/--package=condyle-}" "$@"
 }
 
-# registers and packers; dense kernels; batches, limbs and products of all results, except how much memory they take; in `./test full` sweeps too
+# registers and packers; dense kernels; batches, branches in lanes and products of all results, without the test of memory use;
+# in `./test full` also sweeps
 run --test vectors --test products --test sin_cos --test kernels --test tree ${CONDYLE_FULL:+--test lqr} -- --skip memory_by_state
 checked=vectors
 if [ -n "${CONDYLE_FULL:-}" ]; then
-    # knots side by side, but for derivatives that are differences of thousands of calls
+    # knots side by side, except derivatives by differences of thousands of calls
     run --test contacts -- --skip derivatives_
     checked=contacts
 fi
 
-# a vector instruction that was not inlined shows in any program that has kernels
+# any program with kernels shows vector instructions that were not inlined
 programs=$(run --test $checked --no-run --message-format=json | sed -nE 's/.*"executable":"([^"]+)".*/\1/p')
 for program in ${programs:?}; do
     "${PYTHON:-python3}" tests/symbols.py "$program"

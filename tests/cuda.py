@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Compiles generated CUDA for robots of several sizes, without a GPU, and prints what each kernel uses.
+"""Compiles generated CUDA for robots of several sizes, without a GPU, and prints the resources that each kernel uses.
 
     python tests/cuda.py [--install] [--shares [ROBOT ...]]
 
 It needs the installed package `condyle`, and NVIDIA's wheels with the run-time compiler and the assembler; --install
-puts them where this Python finds them. Without them it says NOT RUN. It fails if a kernel does not compile, or if an
-expected one is not in the result.
+installs them into this Python. Without them it prints NOT RUN. It fails if a kernel does not compile, or if an expected
+kernel is missing.
 
-With --shares it prints the table of docs/generated.md instead, of robots of example-robot-data: the instructions of a
-state, and the bytes that it reads from and writes to a thread's memory since registers do not suffice, in the machine
-code of kernels that are split among several threads; NVIDIA's disassembler counts them. Code runs straight through but
-for what large angles and quotients of tiny numbers take, which is counted once.
+With --shares it prints the table of docs/generated.md instead, for robots of example-robot-data. For kernels that are
+split among several threads, the table shows the instructions per state in the machine code. It also shows the bytes
+spilled to and from a thread's memory. NVIDIA's disassembler counts them. The code has no branches, except for large
+angles and quotients of tiny numbers, which are counted once.
 """
 
 import argparse
@@ -26,7 +26,7 @@ import condyle.cuda
 
 WHEELS = ["nvidia-cuda-nvrtc-cu12==12.9.86", "nvidia-cuda-nvcc-cu12==12.9.86", "nvidia-cuda-nvdisasm==13.5.37"]
 CAPABILITY = (9, 0)
-"""Hopper."""
+"""Compute capability of the Hopper architecture."""
 FUNCTIONS = {
     "arm7": ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives", "frames", "centroidal"],
     "quadruped": ["rnea", "aba", "rnea_derivatives", "aba_derivatives", "constrained_dynamics"],
@@ -40,11 +40,11 @@ USED = re.compile(
 )
 LABEL = re.compile(r"^(?:\.text\.)?\$?([\w$]+):", re.MULTILINE)
 INSTRUCTION = re.compile(r"^\s+/\*[0-9a-f]{4,}\*/\s+(?:@!?\w+\s+)?([A-Z][A-Z0-9_.]*)")
-"""A line of machine code: the address, perhaps the condition, the operation."""
+"""Pattern of a line of machine code: the address, optionally the condition, the operation."""
 
 
 def wheel(pattern: str) -> Path | None:
-    """A file of NVIDIA's wheels."""
+    """Finds a file of NVIDIA's wheels."""
     found = importlib.util.find_spec("nvidia")
     for folder in (found.submodule_search_locations or []) if found else []:
         for path in sorted(Path(folder).glob(pattern)):
@@ -53,7 +53,7 @@ def wheel(pattern: str) -> Path | None:
 
 
 def assembled(ptxas: Path, made: bytes) -> tuple[str, bytes]:
-    """What the assembler says that kernels use, and the machine code."""
+    """Returns the assembler's report on the resources of kernels, and the machine code."""
     with TemporaryDirectory() as folder:
         source, cubin = Path(folder) / "kernel.ptx", Path(folder) / "kernel.cubin"
         source.write_bytes(made.rstrip(b"\0"))
@@ -66,7 +66,7 @@ def assembled(ptxas: Path, made: bytes) -> tuple[str, bytes]:
 
 
 def used(said: str, kernel: str) -> tuple[int, int, int]:
-    """The registers of a thread, and the bytes of its stack and of spills."""
+    """Returns the registers of a thread, and the bytes of its stack and of spills."""
     found = {entry: (int(registers), int(stack or 0)) for entry, registers, stack in USED.findall(said)}
     if kernel not in found:
         sys.exit(f"{kernel}: it is not in what was compiled:\n{said}")
@@ -74,7 +74,7 @@ def used(said: str, kernel: str) -> tuple[int, int, int]:
 
 
 def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
-    """The instructions of each share, and the bytes that it moves between registers and the thread's memory."""
+    """Returns the instructions of each share, and the bytes that it moves between registers and the thread's memory."""
     with NamedTemporaryFile(suffix=".cubin") as file:
         file.write(cubin)
         file.flush()
@@ -92,13 +92,13 @@ def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
             sums[0] += 1
             sums[1] += width if operation.startswith(("LDL", "STL")) else 0
     if len(counts) > 1:
-        counts.pop("", None)  # what calls the shares
+        counts.pop("", None)  # the code that calls the shares
     instructions, moved = zip(*counts.values(), strict=True)
     return list(instructions), list(moved)
 
 
 def table(robots: list[str], ptxas: Path, nvdisasm: Path) -> None:
-    """What kernels take for each number of shares; in brackets the number that is taken by itself."""
+    """Prints the resources of kernels for each number of shares; the default number is in brackets."""
     from example_robot_data.robots_loader import ROBOTS, getModelPath
 
     print("| robot, function, type | shares | registers | stack | instructions | bytes moved |")

@@ -3,7 +3,8 @@
 
     python3 tests/documentation.py
 
-Fails if the first page lists more names than a reader can take in, or if a page shows names that serve our own crates.
+Fails if the first page lists more names than a reader can grasp, or if a page shows names meant only for our own
+crates.
 """
 
 import html
@@ -14,15 +15,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST = 70
-"""The largest number of names on the first page: modules, types, traits, functions, constants."""
+"""Maximum number of names on the first page: modules, types, traits, functions, constants."""
 INTERNAL = re.compile(r"\b(Alike|Fused|LaneDual|Lanes|Rename|Unused|Witness)\b")
 CRATES = ["condyle", "condyle_dynamics", "condyle_model", "condyle_optimal", "condyle_spatial", "condyle_wholebody"]
 REEXPORTED = {"nalgebra", "num_dual", "rand"}
-"""Modules of other crates."""
+"""Names of re-exported modules of other crates."""
 
 
 def text(page: str) -> str:
-    """The words of a page, without its tags."""
+    """Returns the words of a page, without its tags."""
     return html.unescape(re.sub(r"<[^>]*>", " ", page))
 
 

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
-# Checks that each feature of each crate can be left out: none is on, one is, all but one are. Then it runs the unit tests of what
-# needs no standard library without it (dynamics runs without it in tests/embedded.sh), and kernels with a driver that has no GPU.
+# Checks that each crate compiles without features, with each single feature, and with all features except one. Then it runs the
+# unit tests of crates that support it without the standard library (tests/embedded.sh does this for dynamics). Finally it runs
+# CUDA kernels with a driver that has no GPU.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
-# $1: a crate; $2: a feature that it must have, or none; $3, …: features that it may have.
+# $1: a crate; $2: a required feature, or empty; $3, …: optional features.
 check() {
     local crate=$1 needed=$2 feature others combinations
     shift 2

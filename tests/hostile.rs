@@ -1,15 +1,15 @@
-//! What comes from outside, mutated: an error or something that can be used, never a panic. A bounded run, the same each time,
-//! of what `fuzz/` runs for as long as one likes.
+//! Mutated external inputs give an error or a usable result, never a panic. This is a bounded, reproducible run of the
+//! fuzz targets in `fuzz/`.
 
 #[path = "../fuzz/src/hostile.rs"]
-#[allow(unreachable_pub)] // to the targets it is a module of a library
+#[allow(unreachable_pub)] // the fuzz targets use it as a module of a library
 mod hostile;
 
 use hostile::{Kind, mutated};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-/// Says which input it was, if there is a panic.
+/// Input that is printed if there is a panic.
 struct Case<'a>(Kind, u64, &'a [u8]);
 
 impl Drop for Case<'_> {
@@ -20,7 +20,8 @@ impl Drop for Case<'_> {
     }
 }
 
-/// Seeds are good; of so many mutated ones, in `./test full` of four times as many, some are, and some are not.
+/// Checks `count` mutated inputs, or four times as many in `./test full`. The seeds are valid; of the mutated inputs,
+/// some are valid and some are not.
 fn run(kind: Kind, count: u64) {
     let count = if std::env::var_os("CONDYLE_FULL").is_some() { 4 * count } else { count };
     let seeds = kind.seeds();

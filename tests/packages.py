@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Packs every crate that is published, in the order in which they need each other, and looks into the packages.
+"""Packs every published crate, in the order of their dependencies, and checks the packages.
 
     python3 tests/packages.py [--verify]
 
-Fails if a package lacks its licences, its README, what the registry shows of it, or a file that its sources include,
-needs a crate that is published later or one without a version, or is above the registry's limit. --verify also compiles
-each package from what is in it, as `cargo publish --dry-run` does.
+A package must have its licences, its README, the metadata that the registry shows, and all files that its sources
+include. Each dependency must have a version and be published earlier. The size must be within the registry's limit.
+Otherwise the program fails. --verify also compiles each package from its own files, as `cargo publish --dry-run` does.
 """
 
 import argparse
@@ -21,9 +21,9 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = ["spatial", "linalg", "meshes", "model", "dynamics", "optimal", "wholebody", "", "codegen", "cli"]
-"""Each crate after those that it needs; the one without a name of its own is the façade."""
+"""Folders of the crates, each after its dependencies; the empty name is the façade."""
 LARGEST = 10 * 1024 * 1024
-"""The limit of crates.io on a package, in bytes."""
+"""Maximum size of a package on crates.io, in bytes."""
 REQUIRED = {"Cargo.toml", "Cargo.lock", "LICENSE-MIT", "LICENSE-APACHE", "README.md"}
 INCLUDED = re.compile(r"include_(?:str|bytes)!\(\s*\"([^\"]+)\"")
 FIELDS = ["description", "license", "readme", "keywords", "categories", "rust_version"]
@@ -34,14 +34,14 @@ def crate_name(name: str) -> str:
 
 
 def manifests() -> dict[str, dict[str, Any]]:
-    """What cargo knows of the crates of the workspace, by their names."""
+    """Returns cargo's metadata of the workspace's crates, by name."""
     command = ["cargo", "metadata", "--locked", "--no-deps", "--format-version", "1"]
     told = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
     return {manifest["name"]: manifest for manifest in json.loads(told)["packages"]}
 
 
 def faults(package: Path, manifest: dict[str, Any], before: set[str]) -> list[str]:
-    """What is wrong with one package, `before` being the crates that are published before it."""
+    """Returns the faults of one package; `before` are the crates published before it."""
     found = []
     if package.stat().st_size > LARGEST:
         found.append(f"{package.stat().st_size} bytes, at most {LARGEST} are allowed")
@@ -60,7 +60,7 @@ def faults(package: Path, manifest: dict[str, Any], before: set[str]) -> list[st
     found += [f"`{field}` is missing" for field in FIELDS if not manifest[field]]
     for needed in manifest["dependencies"]:
         name, development = needed["name"], needed["kind"] == "dev"
-        if needed["req"] == "*" and name != manifest["name"]:  # its own features for its tests are left out
+        if needed["req"] == "*" and name != manifest["name"]:  # itself: features for its tests
             found.append(f"the dependency {name} has no version")
         if name.startswith("condyle") and not development and name not in before:
             found.append(f"{name} is published after it")

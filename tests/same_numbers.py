@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Compares what two programs have printed: the same words, and the same numbers but for rounding.
+"""Compares the output of two programs: the words must be equal, and the numbers equal up to rounding.
 
     python3 tests/same_numbers.py ONE OTHER [--rounding 1e-12] [--only WORD]
 
-Each number may differ by the rounding times the largest of its line. --rounding 0 asks for the same numbers; --only
-takes the lines that begin with a word.
+Each number may differ by the rounding times the largest number of its line. With --rounding 0 numbers must be equal;
+--only selects the lines that begin with a word.
 """
 
 import argparse

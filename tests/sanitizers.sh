@@ -1,17 +1,17 @@
 #!/usr/bin/env bash
-# Runs the tests in Rust under AddressSanitizer, which reports accesses outside of allocated memory, and the tests of threads
-# under ThreadSanitizer, which reports two threads at the same memory. ThreadSanitizer needs Rust's library compiled too, and so
-# its sources (rustup component add rust-src).
+# Runs the Rust tests under AddressSanitizer, which reports accesses outside allocated memory, and the tests of threads under
+# ThreadSanitizer, which reports data races. ThreadSanitizer requires compiling Rust's library, and therefore its sources (rustup
+# component add rust-src).
 #
-# `tests/sanitizers.sh products` runs one small program alone: products of all matrices that calls and batches return, under
-# AddressSanitizer, at every SIMD level that this machine has.
+# `tests/sanitizers.sh products` only runs one small program: products of all matrices that calls and batches return, under
+# AddressSanitizer, at every SIMD level of this machine.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 root=$(rustc --print sysroot)
 host=$(rustc -vV | sed -n 's/^host: //p')
 
-# sanitized NAME RUNTIME ARGUMENT...: runs tests under a sanitizer, of which the compiler has the runtime.
+# sanitized NAME RUNTIME ARGUMENT...: runs tests under a sanitizer, if the compiler includes its runtime.
 sanitized() {
     local name=$1 runtime=$2
     shift 2
@@ -19,7 +19,7 @@ sanitized() {
         echo "NOT RUN: the compiler has no sanitizer '$name' for $host"
         return
     fi
-    # which are not stable
+    # sanitizers are not stable features
     RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Z sanitizer=$name" CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target}/$name \
         cargo test --locked --target "$host" "$@"
 }
@@ -30,7 +30,7 @@ if [ "${1:-}" = products ]; then
         aarch64-*) levels=(baseline neon) ;;
         *) levels=(baseline) ;;
     esac
-    # few features and no debug information, so that little is compiled; a process for each level
+    # few features and no debug information, so that little is compiled; one process per SIMD level
     export CARGO_PROFILE_DEV_DEBUG=false
     for level in "${levels[@]}"; do
         CONDYLE_LEVEL=$level sanitized address asan --package condyle-dynamics --no-default-features --features std \

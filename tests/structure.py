@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Prints the structure: modules that use each other in a circle, and with --sizes the program's size and build time.
+"""Prints cycles of modules that use each other, and with --sizes the program's size and build time.
 
     python3 tests/structure.py [--sizes]
 
-Fails if a circle has more than three modules, and with --sizes if the program has more than 5.7 MB of code or one of
-its functions more than 64 KB. A module and its children count as one where the child reaches up to its parent only.
---sizes builds the program from nothing in a folder of its own (some minutes) and needs `nm` and `size`.
+Fails if a cycle has more than three modules. With --sizes it also fails if the program has more than 5.7 MB of code or
+one of its functions more than 64 KB. A module and its children count as one if the child uses only its parent. --sizes
+builds the program from scratch in a separate folder (some minutes) and needs `nm` and `size`.
 """
 
 import argparse
@@ -30,7 +30,7 @@ def without_comments(text: str) -> str:
 
 
 def paths(tree: str, prefix: Module = ()) -> list[Module]:
-    """The paths that a `use` tree names."""
+    """Returns the paths in a `use` tree."""
     parts, depth, start = [], 0, 0
     for i, c in enumerate(tree):
         depth += (c == "{") - (c == "}")
@@ -54,10 +54,10 @@ def modules(source: Path) -> dict[Module, Path]:
 
 
 def arrows(source: Path) -> dict[Module, set[Module]]:
-    """Which modules each module uses."""
+    """Returns the modules that each module uses."""
     files = modules(source)
     texts = {module: without_comments(path.read_text(encoding="utf-8")) for module, path in files.items()}
-    shown = {}  # what the crate's root shows, and from where
+    shown = {}  # names that the crate's root re-exports, with their modules
     for tree in re.findall(r"\bpub(?:\(crate\))? use ([^;]+);", texts.get((), "")):
         shown.update({path[-1]: path for path in paths(tree)})
     uses: dict[Module, set[Module]] = {}
@@ -83,7 +83,7 @@ def arrows(source: Path) -> dict[Module, set[Module]]:
 
 
 def circles(uses: dict[Module, set[Module]]) -> list[list[Module]]:
-    """Sets of modules each of which reaches all others (Tarjan)."""
+    """Returns sets of modules in which each module reaches all others (Tarjan)."""
     order: dict[Module, int] = {}
     low: dict[Module, int] = {}
     stack: list[Module] = []
@@ -111,7 +111,7 @@ def circles(uses: dict[Module, set[Module]]) -> list[list[Module]]:
 
 
 def sizes() -> bool:
-    """Prints build time, code and the largest functions of the program; whether they are small enough."""
+    """Prints build time, code size and the largest functions of the program; returns whether they are small enough."""
     with TemporaryDirectory() as target:
         begin = time.monotonic()
         subprocess.run(

@@ -1,9 +1,10 @@
-"""Fails if a vector instruction of a built library stands in a function of its own.
+"""Fails if a vector instruction of a built library is a separate function.
 
     python3 tests/symbols.py LIBRARY
 
-A closure or helper that the compiler does not inline into the code of a level turns each vector instruction in it into
-a call: still right, but several times slower, and nothing else would tell. What fills memory once is let pass.
+If the compiler does not inline a closure or helper into the code of a SIMD level, each of its vector instructions
+becomes a call. The results are still correct, but computed several times more slowly, and nothing else would reveal it.
+Instructions that only fill memory once are allowed.
 """
 
 import re
@@ -16,13 +17,13 @@ from tempfile import TemporaryDirectory
 
 OUTLINED = re.compile(r"core_arch::(?:x86::(?:avx|fma)\w*|(?:aarch64|arm_shared)::neon)::(?:\w+::)*(\w+)")
 FILLING = re.compile(r"_set1_|^vdupq_n_")
-"""Of a new `Data`, with zeros."""
+"""Instructions that fill a new `Data` with zeros."""
 FOREIGN = re.compile(r"^_mm256_movemask_epi8$")
-"""Of a crate that searches text; no numbers here are integers of eight bits."""
+"""Instruction of a crate that searches text; Condyle does not use integers of eight bits."""
 
 
 def outlined(library: Path) -> list[str]:
-    """The vector instructions that are functions."""
+    """Returns the vector instructions that are functions."""
     symbols = subprocess.run(["nm", "-C", library], check=True, capture_output=True, text=True).stdout
     if "condyle" not in symbols:
         sys.exit(f"{library}: expected symbols of condyle, found none")

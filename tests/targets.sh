@@ -1,14 +1,15 @@
 #!/usr/bin/env bash
-# Finds a compiler for another kind of processor, for tests/arm.sh, tests/embedded.sh and tests/wasm.sh, which read this file:
-# the one in use, or the system's, if it has the target's library or the sources of the library, which then are compiled first.
+# Finds a compiler for another kind of processor, for tests/arm.sh, tests/embedded.sh and tests/wasm.sh, which source this file.
+# It is the compiler in use or the system's, if it has the target's library, or the library's sources, which are compiled first.
 #
 #     tests/targets.sh install arm|embedded|wasm
 #
-# installs what one of these tests takes: the library by rustup, or where that has none, Debian's compiler with the sources; what
-# links and runs the tests by apt-get (with sudo, unless you are root). Nothing else installs anything into the system.
+# installs the requirements of one of these tests. The library comes from rustup; if rustup fails, Debian's compiler with the
+# sources is installed. Linkers and emulators come from apt-get (with sudo, unless you are root). No other script installs
+# anything into the system.
 
-# $1: a target; $2: the crates of the library that it takes. Sets `cargo`, the command to call in place of cargo, and `linker`,
-# where the compiler brings none for what has no C library; or says what is missing, and fails.
+# $1: a target; $2: the required crates of the library. Sets `cargo`, the command to use instead of cargo. Sets `linker` if the
+# compiler lacks one for targets without a C library. Otherwise prints what is missing, and fails.
 compiler_for() {
     local target=$1 crates=$2 way compiler root
     for way in library sources; do
@@ -30,7 +31,7 @@ compiler_for() {
     return 1
 }
 
-# LLVM's linker, of the newest version that there is.
+# Prints the newest installed version of LLVM's linker.
 own_linker() {
     case $1 in
         wasm*) compgen -c wasm-ld ;;
@@ -38,7 +39,7 @@ own_linker() {
     esac | sort --version-sort | tail -1
 }
 
-# Whether a compiler is one that the workspace allows.
+# Returns whether the workspace supports the version of a compiler.
 is_recent() {
     local oldest version
     oldest=$(sed -nE 's/^rust-version = "(.*)"/\1/p' Cargo.toml)
@@ -46,7 +47,7 @@ is_recent() {
     printf '%s\n' "$oldest" "$version" | sort --version-sort --check=quiet
 }
 
-# Debian's Rust that it builds browsers with, which is not as old as its other one.
+# Debian's Rust packages for building browsers, which are newer than its other Rust packages.
 debian_rust=(rustc-web cargo-web rust-web-src)
 
 install() {

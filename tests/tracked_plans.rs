@@ -1,5 +1,6 @@
-//! The trot and the walk of the examples, planned by FDDP, are tracked by whole-body control: on ground of our own constrained
-//! dynamics, each command solved, its forces within their cones, and the optimum of its program.
+//! Whole-body control tracks the trot and the walk of the examples, planned by FDDP. The ground is simulated by our own
+//! constrained dynamics. Each command is solved, its forces lie within their cones, and it is the optimum of its
+//! program.
 #![cfg(all(feature = "loaders", feature = "optimal", feature = "wholebody"))]
 
 #[path = "../examples/support/ground.rs"]
@@ -20,27 +21,28 @@ const FRICTION: f64 = 0.7;
 const SOLE: [f64; 2] = [0.2, 0.1]; // m
 const DT: f64 = 1e-3; // s
 
-/// Conditions of optimality are looked at every so many ticks.
+/// Number of ticks between two checks of the optimality conditions.
 const EACH: usize = 8;
-/// How far a force may leave its cone (N): the solver's tolerance is 1e-9, relative to the weight.
+/// Maximum violation of a cone by a force (N): the solver's tolerance is 1e-9, relative to the weight.
 const CONE: f64 = 1e-6;
-/// How far the centre of mass may leave its plan (m): the plan's knots are 10 ms and more apart, and feet land earlier or later.
+/// Maximum distance of the centre of mass from its plan (m): the plan's knots are at least 10 ms apart, and feet land
+/// earlier or later.
 const ASTRAY: f64 = 0.03;
 
-/// The force lies in the cone about a normal n.
+/// Returns whether the force lies in the cone about a normal n.
 fn in_cone(f: &Force<f64>, n: Vec3<f64>) -> bool {
     let f_n = f.linear.dot(n);
     (f.linear - n.scale(f_n)).norm_squared().sqrt() <= FRICTION * f_n + CONE
 }
 
-/// Tracks a gait to its end, for a moment more.
+/// Tracks a gait to its end, and a moment longer.
 fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[Task], damping: f64) {
     let touches = gait.touches();
     let (solution, times) = gait.solve().unwrap();
     let plan = plan_of(robot, &solution, &times, &touches, 0.02).unwrap();
     let contact_gains = Gains { stiffness: 0.0, damping };
-    // So that how the feet share the load is decided well above rounding; and a gap that is small beside 1 where the objective is,
-    // whose tolerance is relative to the solver's own units.
+    // The force weight determines the feet's shares of the load well above rounding. The tolerance, which is relative
+    // to the solver's own units, makes the gap small compared with 1 in units of the objective.
     let settings = Settings { contact_gains, force_weight: 1e-5, tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(robot, contacts, tasks, settings).unwrap();
     let x0 = &solution.x(0)[..robot.nq()];
@@ -56,7 +58,7 @@ fn track(robot: &Arc<Model>, gait: Gait, contacts: &[FrictionContact], tasks: &[
         controller.track(&plan, tick as f64 * DT, &mut references);
         let Command { tau, forces, status, .. } = controller.step(&world.q, &world.v, &references).clone();
         assert_eq!(status, Status::Solved, "tick {tick}");
-        // Points stand on level ground; the normal of a sole turns with it, which may land on an edge.
+        // Points stand on level ground. The normal of a sole turns with the sole, which may land on an edge.
         for (f, here) in forces.iter().zip(&controller.hold(&world.q).unwrap().contacts) {
             let n = if contacts.len() == 2 { here.pose.rotation.z } else { Vec3::new(0.0, 0.0, 1.0) };
             assert!(in_cone(f, n), "tick {tick}: {f:?}");

@@ -1,8 +1,8 @@
-// Prints what a WebAssembly module prints, the example `numbers`, run by Node.js, or in headless Chromium:
+// Runs the example `numbers` as a WebAssembly module in Node.js or headless Chromium, and prints its output:
 //
 //     node tests/wasm.mjs MODULE.wasm baseline|simd128 [chromium]
 //
-// Chromium is the one of tests/page/run.sh; CHROMIUM names another.
+// tests/page/run.sh installs Chromium; CHROMIUM names another browser.
 import { existsSync } from "node:fs";
 import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Looks into a wheel as one who installs it: its size, its tag, its licences, what it links to, and that it computes.
+"""Checks a wheel from an installer's view: its size, tag, licences, linked libraries, and a computation.
 
     python3 tests/wheel.py WHEEL [--install]
 
-Fails if the wheel is above 8 MB, is not for the stable interface of Python 3.10, lacks its licences or types, or, on
-Linux, if its library needs others than those that a manylinux tag allows, or newer symbols of the C library than its
-tag promises. --install puts it into a virtual environment that has nothing else, and computes there.
+Fails if the wheel is above 8 MB, is not for the stable interface of Python 3.10, or lacks its licences or types. On
+Linux it also fails if the library needs others than a manylinux tag allows, or newer symbols of the C library than its
+tag promises. --install installs the wheel into an empty virtual environment, and computes there.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 LARGEST = 8 * 1000 * 1000
-"""Bytes."""
+"""Maximum size of a wheel, in bytes."""
 TAG = re.compile(r"condyle-[^-]+-cp310-abi3-(.+)\.whl")
 ALLOWED = {
     "libc.so.6",
@@ -30,7 +30,7 @@ ALLOWED = {
     "ld-linux-x86-64.so.2",
     "ld-linux-aarch64.so.1",
 }
-"""The libraries that the manylinux policies leave to the system, as far as Rust programs use them."""
+"""Libraries that the manylinux policies leave to the system, as far as Rust programs use them."""
 PROGRAM = """
 import condyle, numpy as np
 arm = condyle.robots.arm7()
@@ -42,7 +42,7 @@ assert np.abs(condyle.crba(arm, data, q) @ condyle.minv(arm, data, q) - np.eye(7
 
 
 def linked(library: Path, platform: str) -> list[str]:
-    """What is wrong with the libraries and symbols that a Linux library needs."""
+    """Returns the faults of the libraries and symbols that a Linux library needs."""
     if shutil.which("objdump") is None:
         print("NOT RUN: there is no objdump to look at the libraries with")
         return []

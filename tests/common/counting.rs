@@ -1,5 +1,5 @@
-//! An allocator that counts what each thread asks for.
-#![allow(unsafe_code)] // it cannot be written without
+//! Allocator that counts the allocations of each thread.
+#![allow(unsafe_code)] // an allocator requires unsafe code
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
@@ -11,13 +11,13 @@ thread_local! {
 
 struct Counting;
 
-// SAFETY: every request goes to the system's allocator unchanged; counting touches a thread-local without a destructor
-// and allocates nothing itself.
+// SAFETY: every request is passed to the system's allocator unchanged. Counting accesses a thread-local without a
+// destructor and does not allocate.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.set(COUNT.get() + 1);
         BYTES.set(BYTES.get() + layout.size());
-        // SAFETY: the caller's promise about `layout` is the one that is asked for.
+        // SAFETY: `System.alloc` has the same requirement on `layout`, which the caller fulfils.
         unsafe { System.alloc(layout) }
     }
 
@@ -30,21 +30,21 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// The number of allocations of this thread so far.
-#[allow(dead_code)] // by some of the tests
+/// Returns the number of allocations of this thread so far.
+#[allow(dead_code)] // used by some of the tests
 pub(crate) fn allocated() -> usize {
     COUNT.get()
 }
 
-/// How often a call allocates, on this thread.
+/// Returns the number of allocations that a call makes on this thread.
 pub(crate) fn allocations(f: impl FnOnce()) -> usize {
     let before = COUNT.get();
     f();
     COUNT.get() - before
 }
 
-/// How many bytes a call allocates on this thread, freed or not.
-#[allow(dead_code)] // by some of the tests
+/// Returns the number of bytes that a call allocates on this thread, freed or not.
+#[allow(dead_code)] // used by some of the tests
 pub(crate) fn bytes(f: impl FnOnce()) -> usize {
     let before = BYTES.get();
     f();

@@ -1,11 +1,11 @@
-//! The place at which a panic is reported, for tests that a caller's mistake is reported at the caller's line.
+//! Location and message of a panic, for tests that a caller's mistake is reported at the caller's line.
 #![allow(dead_code)] // each program uses a part of it
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
 
-/// Place and message of a panic.
+/// Location and message of a panic.
 #[derive(Debug, Default)]
 pub(crate) struct Panic {
     pub(crate) file: String,
@@ -14,11 +14,11 @@ pub(crate) struct Panic {
 }
 
 thread_local! {
-    /// The last panic of this thread, while the thread waits for one.
+    /// Last panic of this thread, while the thread waits for one.
     static SEEN: RefCell<Option<Panic>> = const { RefCell::new(None) };
 }
 
-/// Calls a function and returns its panic; `None` if it does not panic. Other threads may panic meanwhile.
+/// Calls a function and returns its panic; `None` if it does not panic. Other threads may panic at the same time.
 pub(crate) fn panic_of(call: impl FnOnce()) -> Option<Panic> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

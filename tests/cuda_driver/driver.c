@@ -1,16 +1,16 @@
-/* A driver of CUDA without a GPU, for tests: its devices are this processor, their memory is the host's, but as far away.
+/* CUDA driver without a GPU, for tests. Its devices are this processor. Their memory is host memory, but separate from it.
  *
  *     cc -shared -fPIC -o libcuda.so.1 driver.c -ldl -lpthread
  *
- * It has the functions that Condyle calls, with the driver's semantics as far as a mistake would show:
- * - What goes to a stream waits, and runs only when something that is ordered after it is waited for: what is not ordered is
- *   seen to be missing. The legacy default stream is ordered with all that are not "non-blocking".
- * - Device memory can be touched by kernels and copies only: anything else is a segmentation fault. It begins as NaN, a guard
- *   follows it, and what has been freed is never there again.
- * - Handles, pointers, sizes, and the context that must be current, are checked. What a driver would silently allow is told by
- *   `fake_complaint`. `fake_live` counts what has been made and not been destroyed, `fake_fail` lets a function fail.
+ * It provides the functions that Condyle calls, with the driver's semantics as far as a mistake would show:
+ * - Operations on a stream wait, and run only when something ordered after them is waited for. A missing order is thus
+ *   detected. The legacy default stream is ordered with all streams that are not "non-blocking".
+ * - Only kernels and copies can access device memory: any other access is a segmentation fault. Device memory begins as NaN, a
+ *   guard follows it, and freed memory is never reused.
+ * - Handles, pointers, sizes, and the context that must be current are checked. `fake_complaint` reports mistakes that a driver
+ *   would silently allow. `fake_live` counts the objects that were created and not destroyed, `fake_fail` makes a function fail.
  *
- * Kernels are those that nvrtc.c has compiled: shared libraries with a function that runs one thread. */
+ * Kernels are compiled by nvrtc.c: shared libraries with a function that runs one thread. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <pthread.h>
@@ -35,7 +35,7 @@ enum { PARAMETERS = 64, DEVICES = 2, PAGE = 4096, LARGEST = 640 };
 typedef struct Op {
     int kind, done;
     Stream *stream;
-    long after; /* WAIT: the operation */
+    long after; /* WAIT: index of the operation */
     Thread *thread;
     int parameters;
     void *values[PARAMETERS];
@@ -70,7 +70,7 @@ static void complain(const char *format, ...) {
     va_end(arguments);
 }
 
-/* What every function begins with. */
+/* Runs at the beginning of every function. */
 static CUresult enter(const char *name, int needs_context) {
     if (failing_with && !strcmp(failing, name)) {
         int code = failing_with;
@@ -93,7 +93,7 @@ long fake_live(int kind) { return live[kind]; }
 const char *fake_complaint(void) { return complaint; }
 void fake_fail(const char *name, int code) { snprintf(failing, sizeof failing, "%s", name); failing_with = code; }
 void fake_devices(int count) { devices = count; }
-/* Blocks, threads of a block, rows of blocks. */
+/* Returns the number of launches; `last` receives blocks, threads of a block, and rows of blocks of the last one. */
 long fake_launches(unsigned *last) { memcpy(last, last_launch, sizeof last_launch); return launches; }
 long fake_pending(void) { long n = 0; for (long k = 0; k < op_count; k++) n += !ops[k]->done; return n; }
 
@@ -110,7 +110,7 @@ static void open_memory(int open) {
         if (blocks[k].alive) mprotect(blocks[k].base, blocks[k].mapped - PAGE, open ? PROT_READ | PROT_WRITE : PROT_NONE);
 }
 
-/* What lies between a block's end and its guard page is as it was. */
+/* Checks that the memory between a block's end and its guard page is unchanged. */
 static void check_ends(void) {
     for (size_t k = 0; k < block_count; k++) {
         Block *b = &blocks[k];
@@ -126,7 +126,7 @@ static Stream *stream_of(void *handle) {
     return stream->alive ? stream : NULL;
 }
 
-/* Whether the second operation must wait for the first one because of their streams. */
+/* Returns whether the second operation must wait for the first one because of their streams. */
 static int ordered(const Op *a, const Op *b) {
     const Stream *s = a->stream, *t = b->stream;
     return s == t || (s->context == t->context && ((s->legacy && !t->nonblocking) || (t->legacy && !s->nonblocking)));
@@ -143,11 +143,11 @@ static void execute(Op *op) {
     open_memory(0);
 }
 
-/* Runs an operation after those that it waits for. */
+/* Runs an operation after the operations that it waits for. */
 static void run(long k) {
     Op *op = ops[k];
     if (op->done) return;
-    op->done = 1; /* nothing before it waits for it */
+    op->done = 1; /* no earlier operation waits for it */
     for (long j = 0; j < k; j++)
         if (!ops[j]->done && ordered(ops[j], op)) run(j);
     if (op->kind == WAIT && op->after >= 0) run(op->after);
@@ -193,7 +193,7 @@ CUresult cuDeviceGetName(char *name, int length, int device) {
 CUresult cuDeviceGetAttribute(int *value, int attribute, int device) {
     API("cuDeviceGetAttribute", 0, switch (attribute) {
         case 16: *value = 4; break;      /* multiprocessors */
-        case 75: *value = 9; break;      /* compute capability: 9.0, and 9.9, which no compiler knows */
+        case 75: *value = 9; break;      /* compute capability: 9.0, and 9.9, which no compiler supports */
         case 76: *value = 9 * device; break;
         default: status = INVALID_VALUE; });
 }
@@ -232,7 +232,7 @@ CUresult cuMemFree_v2(CUdeviceptr pointer) {
         Block *b = block_of((char *)pointer, 0, CONTEXT);
         if (!b || b->base != (char *)pointer) { complain("memory is freed that is not there"); REFUSE(INVALID_VALUE) }
         drain(NULL, CONTEXT);
-        b->alive = 0; /* the addresses stay taken */
+        b->alive = 0; /* the addresses are never reused */
         live[0]--;);
 }
 CUresult cuPointerGetAttribute(void *value, int attribute, CUdeviceptr pointer) {
@@ -266,11 +266,11 @@ CUresult cuStreamCreate(Stream **stream, unsigned flags) {
 CUresult cuStreamDestroy_v2(Stream *stream) {
     API("cuStreamDestroy_v2", 1,
         if (!stream_of(stream) || (uintptr_t)stream <= 2) { complain("a stream is destroyed that is not there"); REFUSE(INVALID_HANDLE) }
-        stream->alive = 0; live[1]--;); /* its work goes on; the handle stays taken */
+        stream->alive = 0; live[1]--;); /* its work continues; the handle is never reused */
 }
 CUresult cuStreamSynchronize(void *handle) {
     pthread_mutex_lock(&lock);
-    if (failing_with && !strcmp(failing, "cuStreamSynchronize")) drain(stream_of(handle), NULL); /* no copy is left */
+    if (failing_with && !strcmp(failing, "cuStreamSynchronize")) drain(stream_of(handle), NULL); /* all copies are completed */
     pthread_mutex_unlock(&lock);
     API("cuStreamSynchronize", 1, Stream *s = stream_of(handle); if (!s) REFUSE(INVALID_HANDLE) drain(s, NULL););
 }

@@ -1,10 +1,10 @@
-/* NVIDIA's run-time compiler without a GPU, for tests: it gives the text to the system's C++ compiler.
+/* NVIDIA's run-time compiler without a GPU, for tests: it passes the source to the system's C++ compiler.
  *
  *     cc -shared -fPIC -o libnvrtc.so.12 nvrtc.c
  *
- * What it makes is a line of text that names a shared library, where `fake_thread_NAME` runs one thread of the kernel NAME: the
- * text is what a GPU would get, with CUDA's words as macros. driver.c loads it. The libraries are gone when the process ends.
- * CXX names another compiler than g++. */
+ * The result is a line of text that names a shared library. Its function `fake_thread_NAME` runs one thread of the kernel NAME.
+ * The library is compiled from the source for a GPU, with CUDA's keywords as macros. driver.c loads it. The libraries are deleted
+ * when the process ends. CXX names another compiler than g++. */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
@@ -56,7 +56,7 @@ int nvrtcDestroyProgram(Program **program) {
     return OK;
 }
 
-/* For each kernel a function that runs one thread with values that parameters point to, and the number of parameters. */
+/* Writes, for each kernel, a function that runs one thread, and the number of parameters; parameters are pointers to values. */
 static void add_kernels(FILE *file, const char *text) {
     static const char HEAD[] = "extern \"C\" __global__ void ";
     for (const char *p = text; (p = strstr(p, HEAD));) {
@@ -119,7 +119,7 @@ int nvrtcCompileProgram(Program *program, int count, const char **options) {
 
 int nvrtcGetProgramLogSize(Program *program, size_t *size) { *size = strlen(program->log) + 1; return OK; }
 int nvrtcGetProgramLog(Program *program, char *log) { strcpy(log, program->log); return OK; }
-/* As NVIDIA's: the size of what there is, and 0 of the other kind. */
+/* As NVIDIA's: the size of the existing kind, and 0 for the other kind. */
 int nvrtcGetCUBINSize(Program *program, size_t *size) { *size = program->is_cubin ? strlen(program->image) + 1 : 0; return OK; }
 int nvrtcGetCUBIN(Program *program, char *image) { strcpy(image, program->image); return OK; }
 int nvrtcGetPTXSize(Program *program, size_t *size) { *size = strlen(program->image) + 1; return OK; }

@@ -1,7 +1,7 @@
-// The pages of plans in headless Chromium: an arm that reaches, a quadruped that trots, meshes. PAGES names their folder.
+// Tests the pages of plans in headless Chromium: an arm that reaches, a quadruped that trots, meshes. PAGES names their folder.
 //
-// Looks at what a reader meets: no request, no error, a robot that moves with slider, player and keys, a gait, dark mode,
-// small windows, paper, and a link to a time. Pictures are left in PAGES.
+// Checks a reader's view: no request, no error, a robot that moves with slider, player and keys, a gait, dark mode, small
+// windows, printing, and a link to a time. Pictures are written to PAGES.
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
 import { join } from "node:path";
@@ -10,7 +10,7 @@ import { pathToFileURL } from "node:url";
 import puppeteer from "puppeteer-core";
 
 const folder = process.env.PAGES;
-const PATIENCE = 300_000; // ms: pictures are drawn without a graphics card, beside whatever else the machine does
+const PATIENCE = 300_000; // ms; pictures are drawn without a GPU, on a machine that may be busy
 let browser;
 
 before(async () => {
@@ -58,7 +58,7 @@ for (const name of ["reach", "trot"]) {
   test(`${name}: play, pause and keys`, async () => {
     const { page, wrong } = await open(name);
     await page.select("#speed", "0.1");
-    // The page itself pauses: where machines are slow, the motion is at its end before it is told to from here.
+    // The page itself pauses: on slow machines, the motion would end before a command from here arrives.
     const pausing = page.evaluate(() => new Promise((done) => {
       const look = () => {
         if (Number(document.querySelector("#clock b").textContent) <= 0.02) return requestAnimationFrame(look);
@@ -73,7 +73,7 @@ for (const name of ["reach", "trot"]) {
     await settled(page);
     assert.equal(await clock(page), paused);
     await page.evaluate(() => document.activeElement.blur());
-    for (let k = 0; k < 2; k++) await page.keyboard.press("ArrowRight"); // the first may go less than what the clock shows
+    for (let k = 0; k < 2; k++) await page.keyboard.press("ArrowRight"); // the first step may be shorter than the clock's resolution
     const stepped = await clock(page);
     assert.ok(stepped > paused);
     await page.keyboard.press("Space");
@@ -102,7 +102,7 @@ for (const name of ["reach", "trot"]) {
     await page.screenshot({ path: join(folder, `${name}_dark.png`) });
     await page.setViewport({ width: 360, height: 640 });
     await page.waitForFunction((wide) => document.querySelector("#view canvas").clientWidth !== wide, {}, wide);
-    await page.waitForFunction(() => document.documentElement.scrollWidth <= innerWidth); // nothing sticks out, once all have their sizes
+    await page.waitForFunction(() => document.documentElement.scrollWidth <= innerWidth); // after layout, nothing overflows
     await page.screenshot({ path: join(folder, `${name}_narrow.png`) });
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: "light" }]);
     assert.notEqual(await colour(page), dark);
@@ -133,7 +133,7 @@ test("meshes of three kinds of files are drawn in their colours, where they belo
     const corners = (b) => shapes[b].flatMap((shape) => cornersOf(shape, scene.meshes[shape.part]).map((p) => p.toArray()));
     const geometry = meshesOf(scene.bodies[1].shapes, scene.meshes)[0][1];
     const { position, normal } = geometry.attributes;
-    // the corners stand on the box of the mesh, and each normal points away from its middle
+    // the corners lie on the box of the mesh, and each normal points away from its centre
     let outward = true;
     for (let i = 0; i < position.count; i++) outward &&= position.getX(i) * normal.getX(i) + position.getY(i) * normal.getY(i) + (position.getZ(i) - 0.2) * normal.getZ(i) > 0;
     return { counts: shapes.map((s) => s.length), corners: corners(2), vertices: position.count, outward };
@@ -155,8 +155,8 @@ for (const name of ["trot", "talos"]) {
   test(`${name}: the script of a frame, measured (ms)`, { skip: !existsSync(join(folder, `${name}.html`)) }, async () => {
     const page = await browser.newPage();
     page.setDefaultTimeout(PATIENCE);
-    await page.setViewport({ width: 480, height: 400 }); // small: without a GPU a frame's pixels take longer than its script
-    // all that asks to run before a frame is drawn runs under a clock; callbacks of one frame have one time stamp
+    await page.setViewport({ width: 480, height: 400 }); // small, because without a GPU the pixels of a frame take longer than its script
+    // measures all callbacks that run before a frame is drawn; callbacks of one frame have the same time stamp
     await page.evaluateOnNewDocument(() => {
       window.frames_ms = new Map();
       const own = window.requestAnimationFrame.bind(window);
@@ -170,7 +170,7 @@ for (const name of ["trot", "talos"]) {
     await settled(page);
     await page.evaluate(() => { window.frames_ms.clear(); document.getElementById("loop").click(); document.getElementById("play").click(); });
     const enough = page.waitForFunction(() => window.frames_ms.size > 120, { timeout: 30_000 });
-    await enough.catch(() => {}); // a slow machine draws fewer: they are counted below
+    await enough.catch(() => {}); // a slow machine draws fewer frames, which are counted below
     const times = (await page.evaluate(() => [...window.frames_ms.values()])).sort((a, b) => a - b);
     const at = (share) => times[Math.min(Math.floor(share * times.length), times.length - 1)].toFixed(2);
     const triangles = await page.evaluate(() => JSON.parse(document.getElementById("data").textContent).scene.meshes.reduce((sum, mesh) => sum + numbersOf(mesh.triangles).length / 3, 0));

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Tests the page of `condyle plan` in headless Chromium. Needs Node.js with npm, which installs the browser and what drives
-# it into .venv/page; left out, with a word, where there is no Node.js or nothing can be installed. CHROMIUM names a browser
-# of your own. Pictures are left in .venv/page/pages.
+# Tests the page of `condyle plan` in headless Chromium. Needs Node.js with npm, which installs the browser and its driver
+# into .venv/page. Without Node.js, or if the installation fails, the test is skipped with a message. CHROMIUM names another
+# browser. Pictures are written to .venv/page/pages.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
@@ -24,10 +24,10 @@ fi
 "$program" plan --out "$folder/pages/reach.html" >/dev/null
 "$program" plan --example trot >"$folder/pages/trot.toml"
 "$program" plan "$folder/pages/trot.toml" --out "$folder/pages/trot.html" >/dev/null
-# A motion that is too short to arrive is good enough for a picture: 1 is no error here.
+# A motion that does not reach its target still gives a picture: exit status 1 is not an error here.
 plan() { "$program" plan "$@" >/dev/null 2>"$folder/pages/notes" || [ $? = 1 ] || { cat "$folder/pages/notes"; exit 1; }; }
 plan --robot crates/cli/tests/boxes/boxes.urdf --target 0.2,0.1,0.6 --knots 40 --out "$folder/pages/meshes.html"
-# A humanoid with meshes, where the environment of the peers has one: what the script of a frame costs is measured on it.
+# A humanoid with meshes, if the environment of the peers contains one: the time of the script per frame is measured with it.
 talos=$(find .venv/pinocchio -path '*talos_data/robots/talos_reduced.urdf' 2>/dev/null | head -1)
 rm -f "$folder/pages/talos.html"
 if [ -n "$talos" ]; then

@@ -1,4 +1,4 @@
-//! Several knots of a horizon side by side: the proof that one source runs on lanes.
+//! Several knots of a horizon side by side: one source also runs on lanes.
 #![allow(non_snake_case)]
 
 mod common;
@@ -110,14 +110,14 @@ fn bits(x: &[f64]) -> Vec<u64> {
     x.iter().map(|x| x.to_bits()).collect()
 }
 
-/// An iteration of Newton's method after the one that has converged changes rounding only.
+/// Tolerance of Newton's method: an iteration after convergence changes rounding only.
 const CONVERGED: f64 = 1e-12;
 
-/// Each lane has the very bits of a call of its own, on every joint type; not-a-numbers in the other lane or not.
-/// What steps in all lanes or in none has the numbers.
+/// Each lane has the same bits as a single call, on every joint type, even if the other lane contains NaN. Functions
+/// that step in all lanes or in none have the same numbers up to rounding.
 #[test]
 fn lanes_are_single_calls() {
-    pin(Level::Baseline).unwrap(); // where nothing is fused, as in `Lanes2`
+    pin(Level::Baseline).unwrap(); // a level without fused operations, as in `Lanes2`
     for (seed, model) in all_models(15).iter().enumerate() {
         let mut rng = rng(seed as u64);
         let knots = [Input::<f64>::random(model, &mut rng), Input::random(model, &mut rng)];

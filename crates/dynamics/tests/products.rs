@@ -1,8 +1,8 @@
 //! Products of every matrix that a call or a batch returns, with vectors and with matrices, compared with plain loops.
 //!
-//! nalgebra multiplies without looking at bounds, so the layout of each matrix must be one that it multiplies rightly
-//! (its issue 1616: a product with a view whose rows are not adjacent writes out of bounds). This program is small:
-//! `tests/products.sh` compiles it with AddressSanitizer, and runs it at every SIMD level of the machine.
+//! nalgebra multiplies without checking bounds, so it must support the layout of each matrix. (Its issue 1616: a
+//! product with a view whose rows are not adjacent writes out of bounds.) This program is small: `tests/products.sh`
+//! compiles it with AddressSanitizer, and runs it at every SIMD level of the machine.
 #![allow(non_snake_case)]
 
 use condyle_dynamics::level::level;
@@ -10,13 +10,13 @@ use condyle_dynamics::*;
 use nalgebra::{DMatrix, DVector, DVectorView, Dim, Dyn, Matrix, Storage};
 use std::collections::BTreeSet;
 
-/// Some roundings of sums of few terms, relative to the largest product.
+/// Tolerance: some roundings of sums of few terms, relative to the largest product.
 const ROUNDING: f64 = 1e-12;
 
-/// States of a batch: several groups of lanes, the last one not full.
+/// Number of states of a batch: several groups of lanes, the last one not full.
 const STATES: usize = 19;
 
-/// Numbers without a pattern, in (−1, 1).
+/// Returns numbers without a pattern, in (−1, 1).
 fn numbers(n: usize, seed: usize) -> Vec<f64> {
     (0..n).map(|k| ((k + 1) as f64 * 12.9898 + seed as f64 * 78.233).sin()).collect()
 }
@@ -29,7 +29,7 @@ fn matrix(rows: usize, columns: usize) -> DMatrix<f64> {
     DMatrix::from_vec(rows, columns, numbers(rows * columns, 2))
 }
 
-/// A B by three plain loops.
+/// Computes A B by three plain loops.
 fn plain(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
     let mut C = DMatrix::zeros(A.nrows(), B.ncols());
     for i in 0..A.nrows() {
@@ -42,7 +42,7 @@ fn plain(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
     C
 }
 
-/// A vector as a matrix of one column.
+/// Returns a vector as a matrix of one column.
 fn column(x: &DVector<f64>) -> DMatrix<f64> {
     DMatrix::from_column_slice(x.len(), 1, x.as_slice())
 }
@@ -58,7 +58,7 @@ fn equal<R: Dim, C: Dim>(found: &Matrix<f64, R, C, impl Storage<f64, R, C>>, exp
     }
 }
 
-/// Multiplies one of nalgebra's matrices in all ways that differ inside nalgebra.
+/// Multiplies one of nalgebra's matrices in all ways for which nalgebra has different code.
 fn multiply(what: &str, M: &Matrix<f64, Dyn, Dyn, impl Storage<f64, Dyn, Dyn>>) {
     let (m, n) = M.shape();
     let copy = DMatrix::from_fn(m, n, |i, j| M[(i, j)]);
@@ -76,7 +76,7 @@ fn multiply(what: &str, M: &Matrix<f64, Dyn, Dyn, impl Storage<f64, Dyn, Dyn>>) 
     let mut out = x.clone();
     out.gemv_tr(1.0, M, &y, 0.0);
     equal(&out, &transposed, what);
-    equal(&(M * &few), &plain(&copy, &few), what); // small products and large ones have ways of their own
+    equal(&(M * &few), &plain(&copy, &few), what); // nalgebra has different code for small and large products
     equal(&(M * &many), &plain(&copy, &many), what);
     equal(&(M * many.columns(1, 7)), &plain(&copy, &many.columns(1, 7).into_owned()), what);
     let left = matrix(8, m);
@@ -91,7 +91,7 @@ fn multiply(what: &str, M: &Matrix<f64, Dyn, Dyn, impl Storage<f64, Dyn, Dyn>>) 
     }
 }
 
-/// Multiplies a matrix of one state of a batch with all that it is multiplied with.
+/// Multiplies a matrix of one state of a batch by all types of operands.
 fn multiply_state(what: &str, M: StateMatrix<'_, f64>) {
     let (m, n) = M.shape();
     let copy = DMatrix::from_fn(m, n, |i, j| M[(i, j)]);
@@ -150,7 +150,7 @@ fn axis(k: usize) -> Vec3<f64> {
     Vec3::from(core::array::from_fn(|i| f64::from(u8::from(i == k % 3))))
 }
 
-/// A chain of n joints.
+/// Creates a chain of n joints.
 fn chain(n: usize) -> Model {
     let (mut builder, mut at) = (ModelBuilder::new("chain"), WORLD);
     for k in 0..n {
@@ -160,7 +160,7 @@ fn chain(n: usize) -> Model {
     builder.build().unwrap()
 }
 
-/// A floating trunk with four legs of three joints, which single calls compute side by side.
+/// Creates a floating trunk with four legs of three joints, which single calls compute side by side.
 fn walker() -> Model {
     let mut builder = ModelBuilder::new("walker");
     let trunk = builder.body("trunk", WORLD, Joint::FreeFlyer, Se3::identity(), rod());
@@ -194,7 +194,7 @@ impl States {
     }
 }
 
-/// Contacts at the last two frames, if the robot is free enough for them.
+/// Returns contacts at the last two frames, if the robot has enough freedom for them.
 fn contacts(model: &Model) -> Vec<ContactConstraint> {
     let frames = (0..model.frames().len()).rev().take(2);
     if model.nv() < 6 { Vec::new() } else { frames.map(ContactConstraint::point).collect() }
@@ -208,7 +208,7 @@ macro_rules! multiply {
     }};
 }
 
-/// Every single call that returns a matrix.
+/// Tests every single call that returns a matrix.
 fn single_calls(model: &Model) {
     let States { q, v, x, f_ext } = &States::new(model, 1);
     let (m, d, nv) = (model, &mut Data::<f64>::new(model), model.nv());
@@ -242,7 +242,7 @@ fn single_calls(model: &Model) {
     multiply!("constrained_inverse_dynamics_derivatives", inverse, multiply:
         M, dtau_dq, dtau_dv, dacceleration_dq, dacceleration_dv);
 
-    // those that are written to matrices of the caller's
+    // functions that write to matrices of the caller
     let mut J = DMatrix::zeros(c.rows(), nv);
     c.jacobian(&mut J);
     multiply("jacobian of constraints", &J);
@@ -283,7 +283,7 @@ fn single_calls(model: &Model) {
     multiply("factor of Cholesky", dense.lower());
 }
 
-/// Every function of a batch that returns matrices, by name.
+/// Tests every function of a batch that returns matrices; returns their names.
 fn batches(model: &Model) -> BTreeSet<&'static str> {
     let States { q, v, x, f_ext } = &States::new(model, STATES);
     let (m, b) = (model, &mut Batch::new(model, STATES, 1));
@@ -351,7 +351,7 @@ fn batches(model: &Model) -> BTreeSet<&'static str> {
     called
 }
 
-/// The names of the functions of a batch whose results have matrices, as the sources say.
+/// Returns the names of the functions of a batch whose results have matrices, read from the source files.
 fn functions_with_matrices() -> BTreeSet<String> {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/src/batch");
     let mut names = BTreeSet::new();

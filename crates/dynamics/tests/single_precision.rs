@@ -1,8 +1,8 @@
-//! Batches of `f32`: twice as many lanes as of `f64`, and as good as seven digits can be, in every function.
+//! Batches of `f32` in every function: twice as many lanes as with `f64`, and the accuracy that seven digits allow.
 #![allow(non_snake_case)]
 
 mod common;
-#[allow(dead_code)] // the tests of `f64` compare bits with single calls
+#[allow(dead_code)] // only the tests of `f64` compare bits with single calls
 #[path = "vectors/table.rs"]
 mod table;
 
@@ -12,13 +12,12 @@ use condyle_dynamics::level::{Level, pin};
 use condyle_dynamics::{Batch, ContactConstraint, Data, Model, Proximal, crba};
 use table::{Found, States, table};
 
-/// 1e3 roundings of the largest number: sums over some twenty bodies, of terms that cancel.
+/// Tolerance: 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
 const ROUNDINGS: f64 = 1e3 * f32::EPSILON as f64;
-/// Odd, and more than a vector holds.
+/// Number of states: odd, and more than a vector register holds.
 const STATES: usize = 19;
 
-/// A number of a result as far as it depends on M⁻¹, and so on its condition number: the result may be wrong by as much as
-/// that times a rounding.
+/// Functions whose result depends on M⁻¹: their relative error may be a rounding times the condition number of M.
 const INVERTS: [&str; 11] = [
     "aba",
     "minv",
@@ -33,7 +32,7 @@ const INVERTS: [&str; 11] = [
     "impulse_dynamics_derivatives",
 ];
 
-/// The largest condition number of M in some states.
+/// Returns the largest condition number of M over some states.
 fn condition(model: &Model, states: &[Input<f64>]) -> f64 {
     let mut data = Data::new(model);
     let of = |state: &Input<f64>| {
@@ -43,19 +42,19 @@ fn condition(model: &Model, states: &[Input<f64>]) -> f64 {
     states.iter().map(of).fold(1.0, f64::max)
 }
 
-/// One contact, which is not redundant.
+/// Returns one contact, which is not redundant.
 fn contact(model: &Model) -> Vec<ContactConstraint> {
     let last = model.bodies().len() - 1;
     let frame = model.frames().iter().position(|f| f.body == last).expect("each body has a frame");
     vec![ContactConstraint { kd: 3.0, ..ContactConstraint::point(frame) }]
 }
 
-/// At each level, each function in `f32` beside that in `f64` at the same states.
+/// Compares each function in `f32` with the same function in `f64`, at the same states and at each SIMD level.
 #[test]
 fn every_function_in_single_precision() {
     let mut worst = Vec::new();
     for model in embedded().map(|model| model.with_limbs(false)) {
-        // states that both precisions have
+        // states that both precisions represent exactly
         let mut rng = common::rng(3);
         let narrow: Vec<Input<f32>> =
             (0..STATES).map(|_| Input::<f64>::random(&model, &mut rng).map(|x| x as f32)).collect();

@@ -1,11 +1,11 @@
-//! Robots by `package://` addresses: folders that are given, folders of the environment, and what is said of a package
-//! that is in none of them.
+//! Robots with `package://` addresses: given folders, folders of the environment, and the error for a package that none
+//! of them contains.
 
 use condyle_dynamics::{Error, Model, UrdfOptions, robots};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A folder with packages in it, for one test.
+/// Folder with packages in it, for one test.
 struct Workspace(PathBuf);
 
 impl Workspace {
@@ -42,11 +42,11 @@ fn folders_that_are_given() {
     let arm = "package://arm_description/urdf/arm.urdf";
     assert_eq!(load(arm, &[&share, &src]).unwrap().nv(), 7);
     assert_eq!(load(arm, &[&src.join("arm_description")]).unwrap().nv(), 7); // the package itself
-    // the first folder that has it
+    // the first folder that contains the package is used
     let dog = "package://dog_description/dog.urdf";
     assert_eq!(load(dog, &[&src, &share]).unwrap().nv(), 12);
     assert_eq!(load(dog, &[&share, &src]).unwrap().nv(), 32);
-    // a plain path is no address
+    // a plain path is not an address
     let file = workspace.0.join("src/arm_description/urdf/arm.urdf");
     assert_eq!(load(file.to_str().unwrap(), &[]).unwrap().nv(), 7);
 }
@@ -58,7 +58,7 @@ fn a_missing_package_is_named() {
     for (address, package, end) in [
         ("package://nowhere/a.urdf", "nowhere", "nowhere/a.urdf"),
         ("package://arm_description/b.urdf", "arm_description", "arm_description/b.urdf"),
-        ("package://arm_description/urdf", "arm_description", "arm_description/urdf"), // a folder
+        ("package://arm_description/urdf", "arm_description", "arm_description/urdf"), // a folder, not a file
         ("package://arm_description", "arm_description", "arm_description/"),
     ] {
         let error = load(address, &[&src]).unwrap_err();
@@ -72,7 +72,7 @@ fn a_missing_package_is_named() {
     assert!(matches!(load("package://", &[&src]), Err(Error::Package { .. })));
 }
 
-/// An address names a file of its package, and no other, whether that is there or not.
+/// An address names a file of its package and no other, whether the file exists or not.
 #[test]
 fn addresses_stay_in_their_package() {
     let workspace = Workspace::new("inside");
@@ -92,7 +92,7 @@ fn addresses_stay_in_their_package() {
     assert!(load("package://arm_description/./urdf//arm.urdf", &[&src]).is_ok());
 }
 
-/// ROS_PACKAGE_PATH, then AMENT_PREFIX_PATH; in a process of its own, whose environment can be chosen.
+/// Uses ROS_PACKAGE_PATH, then AMENT_PREFIX_PATH, in a separate process with its own environment.
 #[test]
 fn folders_of_the_environment() {
     const CHILD: &str = "CONDYLE_CHILD";
@@ -115,7 +115,7 @@ fn folders_of_the_environment() {
     run(Some(src.clone()), None, "12");
     run(None, Some(install.clone()), "32");
     run(Some(src.clone()), Some(install.clone()), "12");
-    // several folders, and some that have no name
+    // several folders, and some empty names
     let empty = workspace.0.join("nothing");
     let several =
         |first: &Path, second: &Path| Some(std::env::join_paths([first, Path::new(""), second]).unwrap().into());
@@ -126,7 +126,7 @@ fn folders_of_the_environment() {
     run(None, None, &format!("{dog}: no such file in a package `dog_description`; {nowhere}"));
 }
 
-/// Shapes are never looked at, wherever their meshes are.
+/// Shapes are never read, wherever their meshes are.
 #[test]
 fn meshes_are_not_needed() {
     let mesh = |tag: &str| format!(r#"<{tag}><geometry><mesh filename="package://nowhere/a.stl"/></geometry></{tag}>"#);

@@ -1,9 +1,9 @@
-//! Numbers of dynamics and of optimal control, one line each, and how long an iteration of FDDP takes: to compare the levels of
-//! vector instructions, and processors.
+//! Prints results of dynamics and of optimal control, one line each, and the duration of an iteration of FDDP. The
+//! output compares processors and SIMD levels.
 //!
 //! ```text
 //! CONDYLE_LEVEL=baseline cargo run --release -p condyle-optimal --example numbers
-//! WASM_PROFILE=release tests/wasm.sh    # the same in a browser, beside this machine
+//! WASM_PROFILE=release tests/wasm.sh    # the same in a browser, next to this machine
 //! ```
 
 use condyle_dynamics::{
@@ -16,9 +16,9 @@ use std::error::Error;
 use std::fmt::Write;
 use std::sync::Arc;
 
-/// The feet of the quadruped.
+/// Feet of the quadruped.
 const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
-/// Solves of which the fastest is timed: enough of them for a browser, which compiles anew what runs often.
+/// Number of solves, of which the fastest is timed; a browser needs many, because it recompiles code that runs often.
 const SOLVES: usize = if cfg!(debug_assertions) { 1 } else { 300 };
 
 fn main() {
@@ -31,7 +31,7 @@ fn main() {
     print!("{numbers}");
 }
 
-/// A page that this runs in. It says at which level, has a clock, and takes what is printed.
+/// Web page in which the program runs. It selects whether vectors are used, provides a clock, and receives the output.
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 #[allow(unsafe_code)]
 mod page {
@@ -40,11 +40,11 @@ mod page {
 
     #[link(wasm_import_module = "page")]
     unsafe extern "C" {
-        /// Whether vectors are to be used.
+        /// Returns whether vectors are used.
         safe fn vectors() -> bool;
-        /// The time (ms).
+        /// Returns the time (ms).
         safe fn now() -> f64;
-        /// Takes some text.
+        /// Receives a piece of text.
         safe fn take(text: *const u8, length: usize);
     }
 
@@ -59,7 +59,7 @@ mod page {
     }
 }
 
-/// All numbers.
+/// Computes all lines of the output.
 fn report() -> Result<String, Box<dyn Error>> {
     let mut text = String::new();
     for model in [robots::arm7(), robots::quadruped()] {
@@ -72,19 +72,19 @@ fn report() -> Result<String, Box<dyn Error>> {
     Ok(text)
 }
 
-/// n numbers between −1 and 1, other ones for each seed.
+/// Returns n numbers between −1 and 1, different ones for each seed.
 fn numbers(seed: usize, n: usize) -> Vec<f64> {
     (0..n).map(|k| ((seed * 131 + k * 29 + 17) % 101) as f64 / 50.0 - 1.0).collect()
 }
 
-/// A position away from the neutral one.
+/// Returns a position away from the neutral one.
 fn position(model: &Model, seed: usize) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &q.clone(), &numbers(seed, model.nv()), &mut q);
     q
 }
 
-/// Single calls.
+/// Prints the results of single calls.
 fn calls(model: &Model, text: &mut String) -> std::fmt::Result {
     let (name, nv, mut data) = (model.name(), model.nv(), Data::new(model));
     for seed in 0..4 {
@@ -104,7 +104,7 @@ fn calls(model: &Model, text: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// States side by side, one more than fills the lanes.
+/// Prints the results of a batch of states, one more than fills the lanes.
 fn batch(model: &Model, text: &mut String) -> std::fmt::Result {
     const STATES: usize = 9;
     let all = |of: &dyn Fn(usize) -> Vec<f64>| (0..STATES).flat_map(of).collect::<Vec<f64>>();
@@ -115,7 +115,7 @@ fn batch(model: &Model, text: &mut String) -> std::fmt::Result {
     writeln!(text, "{} batch aba {:?}", model.name(), batch.aba(model, &q, &v, &a, &[]))
 }
 
-/// A quadruped on its feet.
+/// Prints the results of a quadruped on its feet.
 fn contacts(text: &mut String) -> Result<(), Box<dyn Error>> {
     let robot = robots::quadruped();
     let mut data = Data::new(&robot);
@@ -128,32 +128,32 @@ fn contacts(text: &mut String) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// The quadruped with bent knees.
+/// Returns the quadruped's position with bent knees.
 fn standing() -> Vec<f64> {
     let mut q = neutral(&robots::quadruped());
     (0..4).for_each(|leg| (q[8 + 3 * leg], q[9 + 3 * leg]) = (0.7, -1.4));
     q
 }
 
-/// A problem with a warm start.
+/// Problem with a warm start.
 struct Task {
     problem: Problem,
     xs: Vec<f64>,
     us: Vec<f64>,
 }
 
-/// An arm reaches for a point.
+/// Creates the task of an arm that reaches for a point.
 fn reach() -> Result<Task, Box<dyn Error>> {
     const KNOTS: usize = 50;
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.3, 0.4, -0.2, 1.2, 0.1, 0.8, 0.2], vec![0.0; 7]].concat();
     let state = || Residual::State { reference: x0.clone() };
-    // where the arm is free to move, rounding would choose
+    // without these weights, rounding would decide where the arm is free to move
     let rest = || Activation::Weighted([[0.1; 7], [1.0; 7]].concat());
     let effort = Residual::Control { reference: vec![0.0; 7] };
     let mut data = Data::new(&*arm);
     let tool = forward_kinematics(&arm, &mut data, &x0[..7]).frame(arm.frame("tool")?).translation;
-    // near: what rounding does on a long way grows
+    // the target is near, because rounding errors grow over a long distance
     let target = tool + Vec3::new(0.05, -0.04, 0.06);
     let point = Residual::FrameTranslation { frame: "tool".into(), target };
     let running =
@@ -166,7 +166,7 @@ fn reach() -> Result<Task, Box<dyn Error>> {
     Ok(Task { problem: Problem::new(x0, vec![Box::new(knot)], vec![0; KNOTS], end)?, xs, us })
 }
 
-/// A quadruped raises its trunk, on four feet.
+/// Creates the task of a quadruped that raises its trunk, on four feet.
 fn rise() -> Result<Task, Box<dyn Error>> {
     const KNOTS: usize = 30;
     let robot = Arc::new(robots::quadruped());
@@ -197,7 +197,7 @@ fn rise() -> Result<Task, Box<dyn Error>> {
     Ok(Task { problem: Problem::new(x0.clone(), vec![Box::new(knot)], vec![0; KNOTS], end)?, xs, us })
 }
 
-/// The iterates of FDDP, and the time of one.
+/// Prints the iterates of FDDP, and the time of one iteration.
 fn solve(name: &str, Task { mut problem, xs, us }: Task, text: &mut String) -> Result<(), Box<dyn Error>> {
     let mut solver = Fddp::new(&problem);
     let mut fastest = f64::INFINITY;

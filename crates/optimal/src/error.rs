@@ -1,216 +1,216 @@
-//! What can be wrong with a problem, a warm start or the settings, found before a solve begins.
+//! Faults of a problem, a warm start or the settings, found before a solve begins.
 
-/// A fault of a problem, a warm start or the settings.
+/// Fault of a problem, a warm start or the settings.
 ///
-/// How a solve *ends* is no error: see [`Status`](crate::Status).
+/// The outcome of a solve is not an error: see [`Status`](crate::Status).
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A horizon needs at least one knot before the terminal one.
+    /// The horizon lacks a knot before the terminal one.
     #[error("the horizon is empty: a problem needs at least one knot before the terminal one")]
     EmptyHorizon,
 
-    /// The actions have states without a number, as robots of fixed joints only have: there is nothing to control.
+    /// The states have no entries, as with a robot that has only fixed joints: nothing can be controlled.
     #[error("the states have no numbers: a problem needs at least one")]
     EmptyState,
 
-    /// A knot names an action model that the problem does not hold.
+    /// A knot uses the index of an action model that the problem does not contain.
     #[error("knot {knot}: there is no action model {index}, the problem holds {models}")]
     UnknownModel {
-        /// The knot that names the model.
+        /// Knot that uses the model.
         knot: usize,
-        /// The index it names.
+        /// Index of the model.
         index: usize,
-        /// The number of models in the problem.
+        /// Number of models in the problem.
         models: usize,
     },
 
-    /// A model that is made for the end of a horizon serves a knot before it.
+    /// A model made for the end of a horizon is used at an earlier knot.
     #[error(
         "knot {knot}: models[{index}] has no next state, as an action of the end; a running one has a duration or an impact"
     )]
     NoNextState {
-        /// The knot.
+        /// Index of the knot.
         knot: usize,
-        /// The index of the model.
+        /// Index of the model.
         index: usize,
     },
 
-    /// The terminal model has controls, as only knots before the end have.
+    /// The terminal model has controls, which only earlier knots may have.
     #[error("terminal: expected an action without controls (a robot's has no duration), found one of nu = {nu}")]
     TerminalControls {
-        /// The number of its controls.
+        /// Number of its controls.
         nu: usize,
     },
 
-    /// A problem with an action that has no copy is to be copied.
+    /// A problem cannot be copied, because one of its actions cannot.
     #[error("{}: cannot be copied, as its `fork` returns `None`", model_name(*.model))]
     NoCopy {
-        /// The index of the model; none for the terminal one.
+        /// Index of the model; `None` for the terminal one.
         model: Option<usize>,
     },
 
-    /// A solver is to go on from a solution that it has not.
+    /// A solver cannot resume, because it does not have a solution.
     #[error("resume: there is no solution to go on from; call solve first")]
     NothingToResume,
 
-    /// A dimension of one knot's action model differs from what the problem or the solver needs.
+    /// A dimension of one knot's action model differs from the expected one.
     #[error("node {node}: expected {name} = {expected}, found {found}")]
     Dimension {
-        /// The knot; the horizon itself for the terminal one.
+        /// Index of the knot; N for the terminal one.
         node: usize,
-        /// `nx`, `ndx`, `nu`, or which bounds.
+        /// Name of the dimension: `nx`, `ndx`, `nu`, or the name of the bounds.
         name: &'static str,
-        /// What the problem or the solver needs.
+        /// Dimension that the problem or the solver expects.
         expected: usize,
-        /// What the action model says.
+        /// Dimension of the action model.
         found: usize,
     },
 
-    /// A vector or a horizon has another length than the problem needs.
+    /// A vector or a horizon does not have the expected length.
     #[error("`{name}`: expected length {expected}, found {found}")]
     Length {
-        /// The argument.
+        /// Name of the argument.
         name: &'static str,
-        /// The length that the problem needs.
+        /// Expected length.
         expected: usize,
-        /// The length given.
+        /// Given length.
         found: usize,
     },
 
-    /// An entry of the initial state or of the warm start is infinite or not a number.
+    /// An entry of the initial state or of the warm start is infinite or NaN.
     #[error("`{name}[{index}]` is {value}, which is not finite")]
     NotFinite {
-        /// The argument.
+        /// Name of the argument.
         name: &'static str,
-        /// The position in the flattened argument.
+        /// Index in the flat argument.
         index: usize,
-        /// The entry.
+        /// Value of the entry.
         value: f64,
     },
 
-    /// A state is none of the robot's.
+    /// A state is invalid for the robot.
     #[error("`{name}`, knot {knot}: {what}")]
     State {
-        /// The argument.
+        /// Name of the argument.
         name: &'static str,
-        /// The knot.
+        /// Index of the knot.
         knot: usize,
-        /// The fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
 
-    /// A number of things is beyond what memory is asked for.
+    /// A number exceeds its limit, which bounds the memory used.
     #[error("{name}: {found} is more than the limit of {most}")]
     Size {
-        /// The thing that is counted.
+        /// Name of the counted quantity.
         name: &'static str,
-        /// The number.
+        /// Given number.
         found: usize,
-        /// The limit.
+        /// Largest allowed number.
         most: usize,
     },
 
     /// No control satisfies the bounds of a knot.
     #[error("knot {knot}: control {control} must be at least {lower} and at most {upper}")]
     Bounds {
-        /// The knot.
+        /// Index of the knot.
         knot: usize,
-        /// The entry of its control.
+        /// Index of the control's entry.
         control: usize,
-        /// Its least value.
+        /// Lower bound.
         lower: f64,
-        /// Its greatest value.
+        /// Upper bound.
         upper: f64,
     },
 
     /// No value satisfies the bounds of a constraint.
     #[error("knot {knot}: constraint {row} must be at least {lower} and at most {upper}")]
     Constraint {
-        /// The knot.
+        /// Index of the knot.
         knot: usize,
-        /// The entry of the constraint.
+        /// Index of the constraint's row.
         row: usize,
-        /// Its least value.
+        /// Lower bound.
         lower: f64,
-        /// Its greatest value.
+        /// Upper bound.
         upper: f64,
     },
 
     /// A term of a robot's cost does not fit the robot.
     #[error("cost `{name}`: {what}")]
     Cost {
-        /// The term's name.
+        /// Name of the term.
         name: String,
-        /// What does not fit, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
 
     /// A limit does not fit the robot.
     #[error("limit `{name}`{}: {what}", at(*.knot))]
     Limit {
-        /// The limit's name.
+        /// Name of the limit.
         name: String,
-        /// The knot, if it is a limit of one.
+        /// Index of the knot, if the limit belongs to one.
         knot: Option<usize>,
-        /// What does not fit, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
 
-    /// A friction or wrench cone makes no sense.
+    /// A friction or wrench cone is invalid.
     #[error("cone: {what}")]
     Cone {
-        /// The fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
 
     /// A contact does not fit the robot, or the contacts before it.
     #[error("contact `{name}`: {what}")]
     Contact {
-        /// The contact's name, or that of a number that all contacts share.
+        /// Name of the contact, or of a quantity that all contacts share.
         name: String,
-        /// What does not fit, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
 
-    /// A robot's drives do not fit it, or it cannot be driven.
+    /// The drives do not fit the robot, or the robot cannot be driven.
     #[error("actuation: {what}")]
     Actuation {
-        /// What does not fit, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
 
-    /// A knot's duration must be above zero.
+    /// The duration of a knot is not positive.
     #[error("a knot of {dt} s: its duration must be above 0")]
     TimeStep {
-        /// The duration (s).
+        /// Duration (s).
         dt: f64,
     },
 
-    /// A setting lies outside of the range in which it makes sense.
+    /// A setting is outside its valid range.
     #[error("setting `{name}` is {value}, but it must be {allowed}")]
     Setting {
-        /// The field of [`Settings`](crate::Settings).
+        /// Name of the field of [`Settings`](crate::Settings).
         name: &'static str,
-        /// Its value.
+        /// Value of the setting.
         value: f64,
-        /// The range.
+        /// Valid range.
         allowed: &'static str,
     },
 }
 
-/// Which knot an error is about.
+/// Names the knot of an error.
 fn at(knot: Option<usize>) -> String {
     knot.map_or_else(String::new, |t| format!(" of knot {t}"))
 }
 
-/// The argument of [`Problem::new`](crate::Problem::new) that an error is about.
+/// Names the argument of [`Problem::new`](crate::Problem::new) that an error is about.
 fn model_name(model: Option<usize>) -> String {
     model.map_or_else(|| "terminal".to_owned(), |index| format!("models[{index}]"))
 }
 
 impl Error {
-    /// `Ok` if `found` has `expected` entries, all of them finite.
+    /// Returns `Ok` if `found` has `expected` entries, all of them finite.
     pub(crate) fn check(name: &'static str, found: &[f64], expected: usize) -> Result<(), Self> {
         if found.len() != expected {
             return Err(Self::Length { name, expected, found: found.len() });
@@ -218,12 +218,12 @@ impl Error {
         Self::check_finite(name, found)
     }
 
-    /// `Ok` if there are at most so many.
+    /// Returns `Ok` if `found` is at most `most`.
     pub(crate) fn check_size(name: &'static str, found: usize, most: usize) -> Result<(), Self> {
         if found > most { Err(Self::Size { name, found, most }) } else { Ok(()) }
     }
 
-    /// `Ok` if all entries are finite.
+    /// Returns `Ok` if all entries are finite.
     pub(crate) fn check_finite(name: &'static str, found: &[f64]) -> Result<(), Self> {
         match found.iter().position(|x| !x.is_finite()) {
             Some(index) => Err(Self::NotFinite { name, index, value: found[index] }),
@@ -232,7 +232,7 @@ impl Error {
     }
 }
 
-/// Panics with the argument's name if its length is wrong: for callers inside a program, in release builds too.
+/// Panics with the argument's name if its length is wrong. For calls inside a program; also checked in release builds.
 #[track_caller]
 pub(crate) fn assert_length(name: &str, found: usize, expected: usize) {
     assert!(found == expected, "`{name}` has length {found}, expected {expected}");

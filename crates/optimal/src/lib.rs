@@ -4,33 +4,36 @@
 //! minimise   ℓ_N(x_N) + Σₜ ℓₜ(xₜ, uₜ)      subject to   x₀ = x̂₀,   xₜ₊₁ = φₜ(xₜ, uₜ),   t = 0 … N − 1
 //! ```
 //!
-//! # The pieces
-//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. It is asked for a group of knots,
-//!   or of step lengths, at a time, so that it can compute several in the lanes of a vector register.
-//! - A [`Problem`] is a horizon of them.
-//! - Around a trajectory the problem is linear and quadratic in the changes δx, δu; each knot is then an [`LqNode`].
-//!   The [`Sweep`] solves such a problem from the last knot to the first: feedback gains and value functions.
+//! # Overview
+//! - An [`ActionModel`] is one knot's dynamics φ and cost ℓ with their derivatives. It is evaluated for a group of
+//!   knots, or of step lengths, at a time, so that it can compute several in the lanes of a vector register.
+//! - A [`Problem`] is a horizon of action models.
+//! - Around a trajectory, the problem is approximated as linear-quadratic in the changes δx, δu; each knot is then an
+//!   [`LqNode`]. The [`Sweep`] solves this problem from the last knot to the first, and computes feedback gains and
+//!   value functions.
 //! - [`Fddp`] repeats derivatives, sweep and line search until the trajectory is optimal, and returns a [`Solution`]:
 //!   the trajectory, its feedback, a [`Status`], and a record of each [`Iteration`]. Controls may be bounded.
-//! - [`AugmentedLagrangian`] repeats that until general constraints hold, those of [`Constrained`] actions and a robot's
-//!   [`Limit`](robot::Limit)s.
-//! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is what its name says.
-//! - [`AutoDiff`] makes an action of dynamics and a cost that are written for any scalar: exact derivatives by dual numbers.
-//!   [`AutoDiffConstraint`] does so with a path constraint, [`robot::OwnResidual::autodiff`] with a robot's residual.
-//! - [`NumDiff`] differentiates any action by finite differences: the oracle for tests of written derivatives.
+//! - [`AugmentedLagrangian`] repeats this until general constraints hold: the constraints of [`Constrained`] actions
+//!   and a robot's [`Limit`](robot::Limit)s.
+//! - [`Lqr`] is linear dynamics with a quadratic cost, as an action; [`Unicycle`] is a unicycle as an action.
+//! - [`AutoDiff`] turns dynamics and a cost that are written for any scalar into an action with exact derivatives by
+//!   dual numbers. [`AutoDiffConstraint`] does the same for a path constraint, [`robot::OwnResidual::autodiff`] for a
+//!   robot's residual.
+//! - [`NumDiff`] differentiates any action by finite differences: a reference for tests of hand-written derivatives.
 //!
-//! Nothing outside [`robot`] knows what a robot is: a state is a list of nx numbers, on which an action may define ⊕ and ⊖
-//! ([`integrate`](ActionModel::integrate), [`difference`](ActionModel::difference)) with ndx numbers for a change.
+//! Only the module [`robot`] depends on robots. Everywhere else a state is a list of nx numbers, on which an action may
+//! define ⊕ and ⊖ ([`integrate`](ActionModel::integrate), [`difference`](ActionModel::difference)), with ndx numbers
+//! for a change.
 //!
 //! # Conventions
 //! - Trajectories are flat: x₀ … x_N one after the other, then u₀ … u_{N−1}, each with the nu of its knot.
 //! - Derivatives are taken in the tangent space: A is ndx × ndx, whatever nx is.
 //! - The gap at a knot is f = φ(x, u) ⊖ x⁺; at the start x̂₀ ⊖ x₀. A warm start may have gaps.
-//! - The feedback is u = ū + α k + K (x ⊖ x̄). Crocoddyl has the opposite sign of k and K; otherwise the iterates of
-//!   [`Fddp`] are those of its `SolverFDDP`.
+//! - The feedback is u = ū + α k + K (x ⊖ x̄). In Crocoddyl, k and K have the opposite sign; otherwise [`Fddp`] and
+//!   Crocoddyl's `SolverFDDP` produce the same iterates.
 //! - Problems, solvers and solutions are `Send` and `Sync`. A problem is copied by [`Problem::try_clone`].
-//! - A wrong shape inside a program panics at the caller's line, with the argument's name; a wrong problem, warm start or setting is an
-//!   [`Error`] before a solve begins; how a solve ended is its [`Status`].
+//! - A wrong shape inside a program panics at the caller's line, with the argument's name. A wrong problem, warm start
+//!   or setting is an [`Error`] before a solve begins. The outcome of a solve is its [`Status`].
 //!
 //! # Example
 //! A pendulum swings up, from hanging (θ = 0) to upright (θ = π).

@@ -1,12 +1,12 @@
-//! Matrices from files of serde's formats, as nalgebra writes them: (numbers column after column, rows, columns). Each must
-//! have as many numbers as it says.
+//! Matrices from files of serde's formats, as nalgebra writes them: (numbers column after column, rows, columns). The
+//! number of entries must equal rows × columns.
 
 use crate::lq::LqNode;
 use nalgebra::DMatrix;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer};
 
-/// A matrix as it stands in a file.
+/// Matrix as stored in a file.
 #[derive(Deserialize)]
 struct Written(Vec<f64>, usize, usize);
 
@@ -21,12 +21,12 @@ impl Written {
     }
 }
 
-/// A matrix, if there is one.
+/// Reads a matrix, if it is present.
 pub(crate) fn optional_matrix<'de, D: Deserializer<'de>>(from: D) -> Result<Option<DMatrix<f64>>, D::Error> {
     Option::<Written>::deserialize(from)?.map(Written::matrix).transpose()
 }
 
-/// Some matrices.
+/// Reads a list of matrices.
 pub(crate) fn matrices<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<DMatrix<f64>>, D::Error> {
     Vec::<Written>::deserialize(from)?.into_iter().map(Written::matrix).collect()
 }

@@ -1,4 +1,4 @@
-//! The clock of a solve: the system's, or in a browser, which has none for Rust, one that the host gives.
+//! Clock of a solve: the system's, or in a browser, where Rust lacks one, a clock given by the host.
 
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 mod host;

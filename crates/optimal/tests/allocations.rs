@@ -1,4 +1,4 @@
-//! A solve allocates nothing, once the solver and its trace exist.
+//! A solve does not allocate, once the solver and its trace exist.
 
 mod common;
 #[path = "../../../tests/common/counting.rs"]
@@ -22,7 +22,7 @@ fn a_sweep_allocates_nothing() {
     assert_eq!(allocations(|| sweep.run(&nodes, 1e-9).unwrap()), 0);
 }
 
-/// On one thread: what rayon allocates to share work is its own.
+/// Runs on one thread, because rayon itself allocates to share work.
 #[test]
 fn a_sweep_in_segments_allocates_nothing() {
     let mut random = random();
@@ -134,7 +134,7 @@ fn a_robots_solve_allocates_nothing() {
     }
 }
 
-/// A gait of every kind of knot and residual: stance, an impact, and flight by Runge–Kutta.
+/// A gait contains every kind of knot and residual: stance, an impact, and flight by Runge–Kutta.
 #[test]
 fn a_gait_allocates_nothing() {
     let model = std::sync::Arc::new(robots::quadruped());
@@ -195,7 +195,7 @@ fn a_gait_allocates_nothing() {
     });
     assert_eq!(second, 0);
     assert!(solver.solution().trace.iter().any(|i| i.accepted));
-    // with copies for three threads, once they are made
+    // with copies for three threads, after the copies exist
     solver.settings.threads = 3;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     let count = pool.install(|| {
@@ -207,7 +207,7 @@ fn a_gait_allocates_nothing() {
     assert_eq!(count, 0);
 }
 
-/// Multipliers, bounds and penalties move in place.
+/// Changing multipliers, bounds and penalties does not allocate.
 #[test]
 fn a_constrained_solve_of_a_robot_allocates_nothing() {
     let arm = std::sync::Arc::new(robots::arm7());
@@ -243,7 +243,7 @@ fn a_constrained_solve_of_a_robot_allocates_nothing() {
     }
 }
 
-/// The feet stand at first; then they push harder than they may, and rows awake that were not there.
+/// At first the feet stand. Then their forces exceed the limits, and rows become active that were inactive before.
 #[test]
 fn active_rows_allocate_nothing() {
     let model = std::sync::Arc::new(robots::quadruped());
@@ -280,7 +280,7 @@ fn active_rows_allocate_nothing() {
     assert_eq!(counts[0], counts[2], "{counts:?}");
 }
 
-/// The height of the tool above a slope.
+/// Height of the tool above a slope.
 struct Height(usize);
 
 impl GenericResidual for Height {
@@ -293,7 +293,7 @@ impl GenericResidual for Height {
     }
 }
 
-/// A residual of one's own is computed in memory that is there, and a target is changed in place.
+/// User-defined residuals use existing memory, and a target is changed without allocation.
 #[test]
 fn own_residuals_and_changed_targets_allocate_nothing() {
     let arm = std::sync::Arc::new(robots::arm7());

@@ -1,4 +1,4 @@
-//! Actions that are written for any scalar: exact derivatives of both orders, on manifolds too.
+//! Actions that are written for any scalar: exact derivatives of both orders, also on manifolds.
 #![allow(non_snake_case)]
 
 use condyle_dynamics::{Data, Model, aba, difference, integrate, neutral, robots};
@@ -14,13 +14,13 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Two exact ways, through a factorisation of M.
+/// Tolerance between two exact methods, through a factorisation of M.
 const EXACT: f64 = 1e-9;
-/// Central differences of first and second order, of functions of order one to a hundred.
+/// Tolerance of central differences of first and second order, for functions of order one to a hundred.
 const DIFFERENCES: f64 = 1e-4;
 const DT: f64 = 0.05;
 
-/// A robot by semi-implicit Euler, with the cost ½ (‖x ⊖ x₀‖² + ‖u‖²) Δt.
+/// Robot with semi-implicit Euler steps and the cost ½ (‖x ⊖ x₀‖² + ‖u‖²) Δt.
 #[derive(Clone)]
 struct Steps {
     model: Arc<Model>,
@@ -75,7 +75,7 @@ fn close(what: &str, a: &DMatrix<f64>, b: &DMatrix<f64>, tolerance: f64) {
     assert!(error < tolerance, "{what} is off by {error:e}");
 }
 
-/// A random state near neutral.
+/// Returns a random state near neutral.
 fn state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
@@ -154,7 +154,7 @@ fn an_action_of_any_scalar_is_solved() {
     assert_eq!(solution.status, Status::Converged);
 }
 
-/// The height of a point on a unit circle, x = (cos φ, sin φ), and what turns it.
+/// Height of a point on a unit circle, x = (cos φ, sin φ), and a function of φ and u.
 #[derive(Clone)]
 struct OnCircle;
 
@@ -175,7 +175,8 @@ impl GenericConstraint for OnCircle {
     }
 }
 
-/// ∂(sin φ)/∂φ = cos φ and ∂(t u cos φ)/∂(φ, u) = (−t u sin φ, t cos φ), along the circle, whatever was in the matrices.
+/// ∂(sin φ)/∂φ = cos φ and ∂(t u cos φ)/∂(φ, u) = (−t u sin φ, t cos φ), along the circle. The matrices are
+/// overwritten.
 #[test]
 fn constraints_of_any_scalar_are_differentiated_along_the_manifold() {
     let (x, u) = ([0.8, 0.6], [3.0]);
@@ -185,7 +186,7 @@ fn constraints_of_any_scalar_are_differentiated_along_the_manifold() {
         assert!(constraint.calc_diff(2, &x, &u, &mut gx, &mut gu));
         assert_eq!((gx.as_slice(), gu.as_slice()), (&[0.8, -6.0 * 0.6][..], &[0.0, 1.6][..]));
     }
-    // at the end there are no controls
+    // the terminal knot has no controls
     let (mut gx, mut gu) = (DMatrix::zeros(1, 1), DMatrix::zeros(1, 0));
     #[derive(Clone)]
     struct Top;

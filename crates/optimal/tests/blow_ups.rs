@@ -1,4 +1,4 @@
-//! Solves that blow up give back their best iterate, and go on from there.
+//! Solves that diverge return their best iterate, and a resumed solve starts there.
 #![allow(non_snake_case)] // K
 
 use condyle_dynamics::{Vec3, robots};
@@ -6,7 +6,8 @@ use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle_optimal::{AugmentedLagrangian, Fddp, Problem, Status, Sweep};
 use std::sync::Arc;
 
-/// An arm reaches for a point in 50 knots, and nothing but a tiny weight keeps its efforts small, and bounds that are far away.
+/// Creates the problem of an arm that reaches for a point in 50 knots. Only a tiny weight on its efforts and distant
+/// bounds limit the efforts.
 fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Problem, Vec<f64>) {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
@@ -22,19 +23,19 @@ fn reckless_reach(dt: f64, effort: f64, point: f64, bound: Option<f64>) -> (Prob
     (problem, x0.repeat(51))
 }
 
-/// Time steps, weights of efforts and of the point. Which of them blow up depends on the last digit of sums, hence on the
-/// processor's vectors; with so many, some do on each.
+/// Returns time steps, weights of efforts and weights of the point. Which of them diverge depends on the last digit of
+/// sums, and so on the processor's vectors. There are enough cases for some to diverge on each processor.
 fn reckless() -> impl Iterator<Item = (f64, f64, f64)> {
     const EFFORTS: [f64; 7] = [1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2];
     let weights = |dt| EFFORTS.into_iter().flat_map(move |effort| [1e2, 1e3, 1e4].map(|point| (dt, effort, point)));
     [0.02, 0.05, 0.03, 0.04].into_iter().flat_map(weights)
 }
 
-/// So many blow-ups are looked at.
+/// Number of diverging solves that are checked.
 const ENOUGH: usize = 4;
 
-/// Crocoddyl's rules accept a step into an iterate that costs 1e16 times as much, where nothing can be computed any more:
-/// the trace says so, but the solution is the iterate before it, and the next solve begins there.
+/// Crocoddyl's rules may accept a step to an iterate that costs 1e16 times as much, where nothing can be computed. The
+/// trace records this step. The solution is the iterate before it, and the next solve begins there.
 #[test]
 fn a_solve_that_blows_up_returns_its_best_iterate() {
     let mut blown_up = 0;
@@ -57,12 +58,12 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
             continue;
         };
         if trace[before - 1].cost > 1e5 {
-            continue; // it blows up in several steps
+            continue; // it diverges in several steps
         }
         blown_up += 1;
         let last = trace.last().unwrap();
         assert!(last.accepted && last.cost > 1e8 * (1.0 + trace[0].cost), "{last:?}");
-        // the iterate before the blow-up: its cost and gap are in the trace, one record apart
+        // the iterate before the divergence: its cost and its gap are in consecutive records of the trace
         assert!(solution.cost < 1e5, "{}", solution.cost);
         assert_eq!((solution.cost, solution.gap), (trace[before - 1].cost, trace[before].gap));
         let (mut nodes, mut numbers) = (vec![0.0; 50 * 14], vec![0.0; 51]);
@@ -70,7 +71,7 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
         assert!((numbers.iter().sum::<f64>() - solution.cost).abs() < 1e-12 * (1.0 + solution.cost));
         assert!(solution.K.iter().flat_map(|K| K.iter()).all(|x| x.is_finite()));
         assert!(solution.k.iter().any(|k| k.amax() > 0.0));
-        // a resume begins there and ends no worse
+        // a resumed solve begins there and does not end worse
         assert!(next.gap <= solution.gap && next.cost.is_finite(), "{} {}", next.gap, next.cost);
         assert!(next.trace.first().is_some_and(|first| first.gap == solution.gap));
         let (other, again, _) = run(2);
@@ -80,8 +81,8 @@ fn a_solve_that_blows_up_returns_its_best_iterate() {
     assert_eq!(blown_up, ENOUGH);
 }
 
-/// The same with bounds on the controls, whose steps are quadratic programs: the solve accepts an iterate that costs more than
-/// a hundred times as much, no direction can be found there, and it goes back.
+/// The same with bounds on the controls, where steps are quadratic programs. The solve accepts an iterate that costs
+/// more than a hundred times as much. No direction can be found there, so the solve restores an earlier iterate.
 #[test]
 fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
     let mut blown_up = 0;
@@ -99,7 +100,7 @@ fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
         blown_up += 1;
         assert!(last.accepted, "{last:?}");
         let most = solution.trace.iter().map(|i| i.gap).fold(0.0, f64::max);
-        // at its first step it goes back to the guess, whose gap nothing has closed yet
+        // after a failure at its first step it restores the guess, whose gap is not yet closed
         let is_guess = solution.xs == xs;
         assert!(solution.cost < last.cost && (solution.gap < most || is_guess), "{} {}", solution.cost, solution.gap);
         assert!(solution.us.iter().all(|u| u.abs() <= 1e6));
@@ -113,7 +114,7 @@ fn a_bounded_solve_that_blows_up_returns_its_best_iterate() {
     assert_eq!(blown_up, ENOUGH);
 }
 
-/// The feedback of a solution that a solve went back to is that of the sweep there.
+/// If a solve restores an iterate, the feedback of its solution comes from a sweep at that iterate.
 #[test]
 fn the_feedback_is_that_of_the_iterate() {
     let mut blown_up = reckless().filter_map(|(dt, effort, point)| {
@@ -139,7 +140,7 @@ fn the_feedback_is_that_of_the_iterate() {
     }
 }
 
-/// What blows up within the augmented Lagrangian leaves it its best iterate too, measured.
+/// A diverging solve within the augmented Lagrangian also returns its best iterate, with measured residuals.
 #[test]
 fn a_constrained_solve_that_blows_up_says_how_far_its_best_iterate_is() {
     let mut blown_up = reckless().filter_map(|(dt, effort, point)| {

@@ -1,5 +1,5 @@
-//! What makes no sense is refused by name, with its numbers, where it is given: never a NaN, a wrong result or an abort
-//! later.
+//! Invalid arguments are reported by name, with their numbers, where they are given. They never cause a NaN, a wrong
+//! result or an abort later.
 
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Error as ModelError, Force, Mat3, Motion, Se3, Vec3, neutral, robots,
@@ -19,7 +19,7 @@ fn half_turned() -> Mat3<f64> {
     Mat3 { x: Vec3::new(0.5, 0.0, 0.0), ..Mat3::identity() }
 }
 
-/// What is said of a term of a standing quadruped.
+/// Returns the error text for a term of a standing quadruped.
 fn said(residual: Residual, activation: Activation) -> String {
     let quadruped = Arc::new(robots::quadruped());
     let foot = Contact::new("foot", ContactConstraint::rigid(quadruped.frame("LF_foot").unwrap()));
@@ -41,12 +41,12 @@ fn rotations_that_are_none_are_refused() {
     let cone = FrictionCone { rotation: half_turned(), ..FrictionCone::new(0.5) };
     let grip = Residual::FrictionCone { contact: "foot".to_owned(), cone };
     assert!(said(grip, plain.clone()).starts_with("cost `c`: its cone's rotation is none"));
-    // a reference state is a state
+    // a reference state must be a valid state
     let mut reference = [neutral(&robots::quadruped()), vec![0.0; 18]].concat();
     reference[6] = 0.5;
     let message = "cost `c`: its reference: joint `root_joint`: its rotation, q[3..7], has the length 0.5, expected 1";
     assert_eq!(said(Residual::State { reference }, plain), message);
-    // the target of a contact, when it is planned and when it is changed
+    // the target of a contact must be valid, both when it is created and when it is changed
     let quadruped = robots::quadruped();
     let foot = ContactConstraint::point(quadruped.frame("LF_foot").unwrap());
     let bad = |change: fn(&mut ContactConstraint)| {
@@ -54,7 +54,7 @@ fn rotations_that_are_none_are_refused() {
         change(&mut contact);
         let mut set = ConstraintSet::<f64>::new(&quadruped, &[foot]).unwrap();
         let changed = set.set_target(0, contact.target).unwrap_err();
-        assert_eq!(set.target(0), foot.target); // that of before stays
+        assert_eq!(set.target(0), foot.target); // the previous target is kept
         let planned = ConstraintSet::<f64>::new(&quadruped, &[contact]).map(|_| ()).unwrap_err();
         assert_eq!(planned, changed);
         let ModelError::Constraint { constraint: 0, what } = planned else { panic!("{planned}") };
@@ -133,7 +133,7 @@ fn states_are_states() {
     assert_eq!(error.to_string(), format!("`xs`, knot 2: {what}"));
     bad[3..7].fill(0.0);
     assert!(problem.set_x0(&bad).is_err());
-    // 0.707 in place of √½ is let through
+    // 0.707 instead of √½ is accepted
     bad[3..7].copy_from_slice(&[0.707, 0.0, 0.0, 0.707]);
     assert_eq!(problem.set_x0(&bad), Ok(()));
 }
@@ -186,7 +186,7 @@ fn settings_that_make_no_sense_are_refused() {
     assert_eq!(error.to_string(), "setting `max_solves` is 0, but it must be at least 1");
 }
 
-/// An action of any size that computes nothing.
+/// Action of any size that computes nothing.
 struct Huge {
     nx: usize,
     nu: usize,
@@ -227,7 +227,7 @@ fn sizes_beyond_memory_are_refused_before_it_is_asked_for() {
     assert_eq!(knot.set_limits(1_000_000_000, vec![]), Err(far));
 }
 
-/// A problem as a file has it, with one thing in another way.
+/// Reads a problem from a file in which `change` has modified one part.
 fn file(change: impl FnOnce(&mut Value)) -> Result<(), String> {
     let arm = robots::arm7();
     let effort = Cost::new("effort", 1.0, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);

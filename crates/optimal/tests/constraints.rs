@@ -1,4 +1,4 @@
-//! Constrained problems: the optima of IPOPT, the conditions of optimality, and what has no solution.
+//! Constrained problems: comparison with IPOPT's optima, the conditions of optimality, and infeasible problems.
 
 #![allow(non_snake_case)] // Q
 
@@ -12,11 +12,13 @@ use condyle_optimal::{
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 
-/// Both solvers stop at residuals of 1e-7 or less; the cost is flat there, states and controls follow the residuals.
+/// Tolerances: both solvers stop at residuals of 1e-7 or less. The cost is flat there; states and controls follow the
+/// residuals.
 const COST: f64 = 1e-6;
 const TRAJECTORY: f64 = 1e-4;
 
-/// lower ≤ C (x, u) + distance ≤ upper, where `disc` replaces the first row by the squared distance from a point.
+/// Constraint lower ≤ C (x, u) + distance ≤ upper. With `disc`, its first row is replaced by the squared distance from
+/// a point.
 struct Rows {
     c: DMatrix<f64>,
     lower: Vec<f64>,
@@ -102,7 +104,8 @@ fn compare(reference: &Value, running: Constrained, terminal: Constrained) {
     }
 }
 
-/// Around a disc to rest at the origin: an inequality of the state that is not convex, bounds, equalities at the end.
+/// The state moves around a disc and comes to rest at the origin. This problem has a nonconvex inequality on the state,
+/// bounds, and terminal equalities.
 #[test]
 fn parking_is_ipopts() {
     let reference = reference("park");
@@ -132,7 +135,7 @@ fn catching_a_pole_is_ipopts() {
     compare(&reference("catch"), running, Constrained::new(Box::new(last), Box::new(Rows::new(&end))));
 }
 
-/// Of a linear-quadratic problem with equalities at the end the optimum is the solution of one linear system.
+/// The optimum of a linear-quadratic problem with terminal equalities is the solution of one linear system.
 #[test]
 fn equalities_of_a_linear_problem_are_a_linear_system() {
     let mut random = random();
@@ -191,7 +194,7 @@ fn equalities_of_a_linear_problem_are_a_linear_system() {
     }
 }
 
-/// The terms of the augmented Lagrangian are differentiated rightly, whatever side of its bounds a constraint is on.
+/// The derivatives of the augmented Lagrangian's terms are correct, on either side of a constraint's bounds.
 #[test]
 fn derivatives_are_those_of_the_terms() {
     let rows = || {
@@ -209,7 +212,7 @@ fn derivatives_are_those_of_the_terms() {
     }
 }
 
-/// NaN once the state has moved.
+/// Constraint that returns NaN once the state has moved.
 struct Broken;
 
 impl PathConstraint for Broken {
@@ -251,7 +254,7 @@ fn a_constraint_that_is_not_a_number_never_counts_as_met() {
 #[test]
 fn what_cannot_be_met_is_said() {
     let solve = |lower: f64, upper: f64, u: f64| {
-        // x after 10 steps of 0.1 at u ≤ 1 is at most 1 further on
+        // after 10 steps of 0.1 with u ≤ 1, x has increased by at most 1
         let rows = Rows::new(&[(&[0.0, 0.0, 0.0, 1.0, 0.0], -u, u)]);
         let end = Rows::new(&[(&[1.0, 0.0, 0.0], lower, upper)]);
         let running = Constrained::new(Box::new(Unicycle { nu: 2, lanes: 1 }), Box::new(rows));
@@ -269,7 +272,7 @@ fn what_cannot_be_met_is_said() {
     assert_eq!((worst.row, worst.entry, worst.amount), (0, 0, outcome.primal));
     let (status, outcome) = solve(0.5, 0.8, 1.0);
     assert_eq!(status, Ok(Status::Converged));
-    assert!(outcome.multipliers[10][0] < 0.0); // the lower bound holds it
+    assert!(outcome.multipliers[10][0] < 0.0); // the lower bound is active
     assert!(outcome.worst.is_none_or(|worst| worst.amount == outcome.primal && outcome.primal <= 1e-6));
     let error = solve(2.0, 1.0, 1.0).0.unwrap_err().to_string();
     assert_eq!(error, "knot 10: constraint 0 must be at least 2 and at most 1");
@@ -293,7 +296,8 @@ fn a_solve_that_stops_early_claims_nothing() {
     assert!(!matches!(status, Status::Infeasible | Status::ConstraintsViolated), "{status:?}");
 }
 
-/// A row of the initial state is a proof at a knot without controls; with controls a user's constraint might depend on them.
+/// At a knot without controls, a violated constraint on the initial state proves infeasibility. With controls, a user's
+/// constraint might depend on them.
 #[test]
 fn what_is_infeasible_is_proved() {
     let solve = |nu: usize| {
@@ -314,7 +318,7 @@ fn what_is_infeasible_is_proved() {
     let worst = outcome.worst.unwrap();
     assert_eq!((worst.knot, worst.row, worst.amount), (0, 0, 0.25));
     assert_eq!(worst.to_string(), "knot 0: constraint 0 is 2.500e-1 beyond its bound");
-    // the other constraint holds, and the solve did not spoil its penalty for nothing
+    // the other constraint holds, and the penalty has not risen in vain
     assert!((solution.x(10)[0] - 0.5).abs() < 1e-6 && outcome.penalty < 1e8, "{}", outcome.penalty);
     let (solution, outcome) = solve(2);
     assert!(!matches!(solution.status, Status::Infeasible | Status::Converged), "{:?}", solution.status);

@@ -1,4 +1,5 @@
-//! Robots under limits: closed forms, the optimum of IPOPT, cones that hold, and the same by other ways.
+//! Robots with limits: comparisons with closed forms, with IPOPT's optimum, and with other formulations; friction cones
+//! hold.
 #![allow(non_snake_case)] // G
 
 #[path = "limits/starts.rs"]
@@ -20,10 +21,11 @@ use serde_json::Value;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Both solvers stop at residuals of 1e-7 or less; the cost is flat there, states and controls follow the residuals.
+/// Tolerances: both solvers stop at residuals of 1e-7 or less. The cost is flat there; states and controls follow the
+/// residuals.
 const COST: f64 = 1e-6;
 const TRAJECTORY: f64 = 1e-4;
-/// How well constraints hold at the end of a solve, and the gradient vanishes.
+/// Tolerances of the constraints and of the gradient at the end of a solve.
 const PRIMAL: f64 = 1e-7;
 const DUAL: f64 = 1e-6;
 
@@ -35,7 +37,7 @@ fn control(nu: usize) -> Residual {
     Residual::Control { reference: vec![0.0; nu] }
 }
 
-/// A solver with sharp tolerances.
+/// Returns a solver with tight tolerances.
 fn solver(problem: &Problem) -> AugmentedLagrangian {
     let mut solver = AugmentedLagrangian::new(problem);
     solver.settings = ConstraintSettings { tolerance: PRIMAL, tolerance_dual: DUAL, ..ConstraintSettings::default() };
@@ -61,12 +63,12 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
 }
 
-/// The efforts of the arm may be so large (N m); its second joint alone needs 29.6 to hold it at first.
+/// Largest effort of the arm (N m); holding the initial posture takes 29.6 at the second joint.
 const WEAK: f64 = 30.0;
 const ARM: [f64; 14] = [0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 
-/// A cart on rails goes to a place and stops there, G u = d, at the cost ½ Δt ‖u‖²: u = Gᵀ(G Gᵀ)⁻¹ d, and the
-/// multipliers are −Δt (G Gᵀ)⁻¹ d. With a bound on u, that too is held.
+/// A cart on rails goes to a point and stops there, G u = d, at the cost ½ Δt ‖u‖². The solution is u = Gᵀ(G Gᵀ)⁻¹ d,
+/// with the multipliers −Δt (G Gᵀ)⁻¹ d. An additional bound on u is satisfied, too.
 #[test]
 fn a_cart_is_a_closed_form() {
     let mut builder = ModelBuilder::new("cart");
@@ -107,8 +109,8 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().flat_map(of).collect()
 }
 
-/// The arm comes to rest with its tool at a point, with bounds on efforts and speeds that are active; by efforts and by
-/// accelerations as controls.
+/// The arm comes to rest with its tool at a point, with active bounds on efforts and speeds. The controls are efforts,
+/// then accelerations.
 #[test]
 fn reaching_is_ipopts() {
     let data: Value = serde_json::from_str(include_str!("data/ipopt.json")).unwrap();
@@ -156,14 +158,14 @@ fn reaching_is_ipopts() {
         let tool =
             forward_kinematics(&arm, &mut Data::new(&arm), &solution.x(horizon)[..7]).frame(arm.frame("tool").unwrap());
         assert!(largest_difference(&tool.translation.to_array(), &target) < 2.0 * PRIMAL);
-        // 7 efforts and 14 states a knot, 3 + 14 at the end; some of them hold
+        // 7 efforts and 14 states per knot, 3 + 14 at the terminal knot; some of them are active
         assert!(outcome.multipliers[..horizon].iter().all(|y| y.len() == 21));
         assert_eq!(outcome.multipliers[horizon].len(), 17);
         assert!(outcome.multipliers.iter().flatten().filter(|y| **y != 0.0).count() > 20);
     }
 }
 
-/// |u| ≤ bound, as a user writes it.
+/// Constraint |u| ≤ bound, as a user writes it.
 struct Weak {
     lower: Vec<f64>,
     upper: Vec<f64>,
@@ -186,7 +188,8 @@ impl PathConstraint for Weak {
     }
 }
 
-/// The same bounds as a robot's limit, as a constraint of the user's, half and half, and with other ways of computing.
+/// The same bounds give the same optimum as a robot's limit, as a user's constraint, half and half, and with other
+/// settings.
 #[test]
 fn limits_and_constraints_find_one_optimum() {
     let arm = Arc::new(robots::arm7());
@@ -240,7 +243,7 @@ fn limits_and_constraints_find_one_optimum() {
         assert!((theirs.cost - outcome.cost).abs() < COST * outcome.cost, "way {k}");
         assert!(largest_difference(&other, &us) < 10.0 * TRAJECTORY, "way {k}");
         for (y, found) in outcome.multipliers[..horizon].iter().zip(&theirs.multipliers) {
-            // a robot's limits come first, then those of a constraint around it
+            // the rows of a robot's limits come first, then the rows of a constraint around it
             let found: Vec<_> = match found.len() {
                 7 => found.clone(),
                 _ => [&found[..2], &found[9..]].concat(),
@@ -279,7 +282,7 @@ fn a_stance_does_not_slip() {
         let residual = Residual::FrictionCone { contact: foot.into(), cone: cone.clone() };
         Limit::new(foot, residual, lower.clone(), upper.clone())
     };
-    // the largest excess of a force beyond its cone along a trajectory, and how many rows are at their bounds
+    // largest excess of a force beyond its cone along a trajectory, and the number of rows at their bounds
     let slip = |xs: &[f64], us: &[f64]| {
         let (mut data, mut set) = (Data::new(&model), ConstraintSet::new(&model, &held).unwrap());
         let (mut worst, mut active) = (f64::NEG_INFINITY, 0);
@@ -316,7 +319,7 @@ fn a_stance_does_not_slip() {
     assert!(bound.cost > free.cost, "what is bound costs more");
 }
 
-/// With another integrator limits hold at the knots.
+/// With another integrator, limits hold at the knots.
 #[test]
 fn limits_hold_with_runge_kutta() {
     let arm = Arc::new(robots::arm7());
@@ -336,7 +339,7 @@ fn limits_hold_with_runge_kutta() {
     assert!(speeds.iter().all(|v| *v < 0.3 + PRIMAL) && speeds.iter().any(|v| (v - 0.3).abs() < 1e-6), "{speeds:?}");
 }
 
-/// To FDDP alone a limit is the barrier 10 · ½ (excess)², as a cost of that weight per Δt is.
+/// For FDDP alone, a limit is the barrier 10 · ½ (excess)², the same as a cost with that weight per Δt.
 #[test]
 fn alone_a_limit_is_a_barrier() {
     let arm: Arc<Model> = Arc::new(robots::arm7());
@@ -352,7 +355,7 @@ fn alone_a_limit_is_a_barrier() {
     let [one, other] = [by_cost, by_limit].map(|knot| {
         let end = FreeDynamics::terminal(arm.clone(), costs()).unwrap();
         let mut problem = Problem::new(ARM.to_vec(), vec![Box::new(knot)], vec![0; 10], Box::new(end)).unwrap();
-        // a solver of constraints leaves nothing behind
+        // after a constrained solve, the problem's multipliers are reset
         AugmentedLagrangian::new(&problem).solve(&mut problem, &ARM.repeat(11), &[0.0; 70]).unwrap();
         Fddp::new(&problem).solve(&mut problem, &ARM.repeat(11), &[0.0; 70]).unwrap().clone()
     });
@@ -360,7 +363,7 @@ fn alone_a_limit_is_a_barrier() {
     assert!((one.cost - other.cost).abs() < 1e-9 * one.cost && largest_difference(&one.us, &other.us) < 1e-6);
 }
 
-/// The height of a foot and its product with a control, without derivatives or with those of the Jacobian.
+/// Height of a foot, and its product with a control; the derivatives come from the Jacobian or are missing.
 struct Step {
     model: Arc<Model>,
     frame: usize,
@@ -396,7 +399,7 @@ impl PathConstraint for Step {
     }
 }
 
-/// Constraints without derivatives have those of differences in the tangent space.
+/// For constraints without derivatives, differences in the tangent space are used.
 #[test]
 fn constraints_need_no_derivatives() {
     let model = Arc::new(robots::quadruped());
@@ -420,7 +423,7 @@ fn constraints_need_no_derivatives() {
     assert!((written.Q - other.Q).amax() < 1e-7 && (written.S - other.S).amax() < 1e-7);
 }
 
-/// A receding horizon that goes on from its multipliers finds what one without them does, in fewer iterations.
+/// A receding horizon that keeps its multipliers finds the same solution as one without them, in fewer iterations.
 #[test]
 fn a_receding_horizon_keeps_its_multipliers() {
     let (arm, horizon) = (Arc::new(robots::arm7()), 12);
@@ -460,7 +463,7 @@ fn a_receding_horizon_keeps_its_multipliers() {
     }
     println!("{} iterations with multipliers, {} without, {active} controls at a limit", iterations[0], iterations[1]);
     assert!(active > 0 && 3 * iterations[0] < 2 * iterations[1]);
-    // once more from where it is: nothing is left to do
+    // once more from the solution: no work is left
     let (us, multipliers) = (solver.solution().us.clone(), solver.outcome().multipliers.clone());
     let again = solver.resume(&mut problem).unwrap();
     assert!(again.status == Status::Converged && largest_difference(&again.us, &us) < TRAJECTORY);
@@ -468,7 +471,7 @@ fn a_receding_horizon_keeps_its_multipliers() {
     assert_eq!(solver.outcome().solves, 1);
     let worst = multipliers.iter().zip(&solver.outcome().multipliers).map(|(a, b)| largest_difference(a, b));
     assert!(worst.fold(0.0, f64::max) < 1e-3);
-    // the time is that of all solves, and what is left of it is measured
+    // the time limit applies to all solves together, and the remaining violation is measured
     solver.inner.time_budget = Some(Duration::ZERO);
     problem.set_x0(&ARM).unwrap();
     let late = solver.resume(&mut problem).unwrap();

@@ -7,13 +7,13 @@ use common::{Linear, random, random_euler_node, random_matrix, random_node};
 use condyle_optimal::{ActionModel, Fddp, LqNode, Lqr, NumDiff, Problem, Settings, Status, Sweep, SweepError};
 use nalgebra::{DMatrix, DVector};
 
-/// Random problems with entries of size one, whose value functions grow to 1e3 or so over the horizon.
+/// Tolerance of random problems with entries of size one, whose value functions grow to about 1e3 over the horizon.
 const RESIDUAL: f64 = 1e-9;
 
-/// A sum of some dozen products in another order.
+/// Tolerance of a sum of some dozen products in another order.
 const ROUNDING: f64 = 1e-13;
 
-/// Second differences with steps of 1e-4 are good to about 1e-7.
+/// Tolerance of second differences: with steps of 1e-4 they are accurate to about 1e-7.
 const DIFFERENCES: f64 = 1e-6;
 
 /// The solution of a random LQ problem, from gains and value functions, satisfies the Karush–Kuhn–Tucker conditions.
@@ -79,7 +79,7 @@ fn regularised_step_is_the_textbook_one() {
     }
 }
 
-/// Whether it knows the form of A and B or not, a sweep finds the same, at knots of all sizes.
+/// With or without known structure of A and B, a sweep gives the same result, at knots of all sizes.
 #[test]
 fn the_form_of_euler_steps_changes_nothing() {
     let mut random = random();
@@ -143,7 +143,7 @@ fn sweep_names_the_knot_that_is_not_convex() {
     assert_eq!(sweep.run(&nodes, 1e5), Err(SweepError::NotFinite { knot: 3 }));
 }
 
-/// One full step from any start, gaps or not; the second iteration finds nothing left to do.
+/// One full step solves from any start, with or without gaps; the second iteration only confirms it.
 #[test]
 fn fddp_solves_an_lqr_in_one_iteration() {
     let mut random = random();
@@ -160,7 +160,7 @@ fn fddp_solves_an_lqr_in_one_iteration() {
     let us = random_matrix(&mut random, problem.control_range(horizon).end, 1);
 
     let mut solver = Fddp::new(&problem);
-    // The regularisation turns the first step by about its size.
+    // The regularisation changes the first step by about its own size.
     solver.settings =
         Settings { tolerance: 1e-6, regularisation_start: 1e-15, regularisation_min: 1e-15, ..Settings::default() };
     let solution = solver.solve(&mut problem, xs.as_slice(), us.as_slice()).unwrap();
@@ -173,7 +173,7 @@ fn fddp_solves_an_lqr_in_one_iteration() {
     assert!(solution.gap < 1e-12 && solution.feasible);
 }
 
-/// The action's derivatives, and its cost and next state against the sums written out.
+/// Compares the action's derivatives, its cost and next state with sums written out.
 #[test]
 fn an_lqr_is_its_node() {
     let mut random = random();
@@ -198,7 +198,7 @@ fn an_lqr_is_its_node() {
     assert!((&written.q - &numeric.q).amax() < DIFFERENCES && (&written.r - &numeric.r).amax() < DIFFERENCES);
 }
 
-/// Where the best control is far beyond its bound, it is the bound.
+/// Where the optimal control is far beyond its bound, the control equals the bound.
 #[test]
 fn bounds_of_a_node_are_those_of_its_action() {
     let (mut knot, mut end) = (LqNode::zeros(1, 1), LqNode::zeros(1, 0));

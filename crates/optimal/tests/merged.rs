@@ -1,4 +1,4 @@
-//! An action for each knot: models of a robot that differ in costs, references and weights only are computed as one, with
+//! One action per knot: models of a robot that differ only in costs, references and weights are computed as one, with
 //! the same bits.
 
 use condyle_dynamics::{ContactConstraint, Model, Vec3, neutral, robots};
@@ -20,7 +20,7 @@ fn quadratic(name: &str, weight: f64, residual: Residual) -> Cost {
     Cost::new(name, weight, residual, Activation::Quadratic)
 }
 
-/// The costs of knot t: references and weights differ; every third knot looks at a foot more.
+/// Returns the costs of knot t: references and weights differ, and every third knot has a cost for one more foot.
 fn costs(model: &Model, t: usize) -> Vec<Cost> {
     let time = t as f64;
     let com = Residual::CenterOfMass { target: Vec3::new(0.01 * time, 0.0, 0.35) };
@@ -47,7 +47,7 @@ fn contacts(model: &Model, names: &[&str]) -> Vec<Contact> {
     names.iter().map(|name| Contact::new(name, foot(name))).collect()
 }
 
-/// Six knots on two feet, an impact, six on four feet: an action for each of them, or one for each phase.
+/// Creates six knots on two feet, an impact, and six knots on four feet, with one action per knot or one per phase.
 fn gait(apart: bool, limited: bool) -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let x0 = x0(&model);
@@ -138,7 +138,7 @@ fn limits_of_each_knot_are_its_own() {
     assert!(one.1.iter().flatten().any(|y| *y != 0.0));
 }
 
-/// What is changed through one of the models is its own, also of the copies that threads have.
+/// A change through one of the models affects only this model, also in the copies of other threads.
 #[test]
 fn a_model_that_was_merged_is_changed_alone() {
     let (mut apart, xs, us) = gait(true, false);
@@ -160,7 +160,7 @@ fn a_model_that_was_merged_is_changed_alone() {
     assert!(apart.model_mut::<ImpulseDynamics>(4).is_none() && apart.model_mut::<ContactDynamics>(13).is_none());
 }
 
-/// A horizon that moves on: each knot keeps its model, and the last gets the one that is named.
+/// When a horizon moves, each knot keeps its model, and the last knot gets the specified one.
 #[test]
 fn models_move_with_their_knots() {
     let model = Arc::new(robots::quadruped());
@@ -187,7 +187,7 @@ fn models_move_with_their_knots() {
     }
 }
 
-/// What differs in more than costs stays apart: the bits are those of the actions alone.
+/// Models that differ in more than costs are not merged: the bits equal the bits of the single actions.
 #[test]
 fn other_dynamics_stay_apart() {
     let model = Arc::new(robots::arm7());
@@ -248,7 +248,7 @@ fn without_a_solution_there_is_nothing_to_resume() {
     assert!(solver.resume(&mut problem).is_ok());
 }
 
-/// Statics and steps of Newton agree, with controls that hold the state; accelerations there vanish.
+/// Statics and Newton steps give the same controls that hold a state; the accelerations there vanish.
 #[test]
 fn what_holds_a_state_still_is_found() {
     let arm = Arc::new(robots::arm7());
@@ -264,8 +264,8 @@ fn what_holds_a_state_still_is_found() {
     assert!(seen[0].1.iter().all(|a| a.abs() < 1e-10) && seen[1].1 == held);
 }
 
-/// The derivatives of the unicycle, of both orders, are those of differences; iterations are those of Crocoddyl
-/// (`tests/peers/crocoddyl/test_actions.py`).
+/// Both orders of the unicycle's derivatives equal differences. `tests/peers/crocoddyl/test_actions.py` compares its
+/// iterations with Crocoddyl.
 #[test]
 fn a_unicycle_has_the_derivatives_of_differences() {
     use condyle_optimal::{Hessian, NumDiff, Unicycle};
@@ -289,7 +289,7 @@ fn a_unicycle_has_the_derivatives_of_differences() {
     }
 }
 
-/// The forces of the feet bear the weight of a robot that stands.
+/// The forces at the feet bear the weight of a standing robot.
 #[test]
 fn outputs_of_a_stance_bear_its_weight() {
     let (mut problem, xs, us) = gait(true, false);
@@ -302,7 +302,8 @@ fn outputs_of_a_stance_bear_its_weight() {
     });
     let feet = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"].map(|foot| format!("force/{foot}"));
     assert_eq!(names[2..], feet);
-    // the axes of a foot turn with its leg; the sum of the forces is the weight, that of their norms is no less
+    // the axes of a foot turn with its leg; the sum of the forces is the weight, so the sum of their norms is at least
+    // the weight
     assert!(norms >= 9.81 * model.total_mass() - 1e-6 && norms < 2.0 * 9.81 * model.total_mass(), "{norms}");
     let mut accelerations = vec![];
     problem.outputs(9, &xs[..37], &u, &mut |name, numbers| {

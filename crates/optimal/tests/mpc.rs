@@ -1,4 +1,4 @@
-//! Model predictive control: horizons that move on, solves with little time, solutions that are kept.
+//! Model predictive control: moving horizons, solves with little time, stored solutions.
 
 #[path = "mpc/budgets.rs"]
 mod budgets;
@@ -14,11 +14,11 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Solves of the same problem from different warm starts differ by the regularisation, 1e-9 of entries of size one that
-/// grow along the horizon.
+/// Tolerance of solves of the same problem from different warm starts. They differ by the regularisation, 1e-9 of
+/// entries of size one, which grows along the horizon.
 const SAME: f64 = 1e-5;
 
-/// Linear-quadratic knots with 3, 0 and 2 controls; the horizon may begin at any of them.
+/// Creates linear-quadratic knots with 3, 0 and 2 controls; the horizon may begin at any of them.
 fn linear(stages: &[usize], x0: &[f64]) -> Problem {
     let mut random = random();
     let models = [3, 0, 2].map(|nu| {
@@ -64,7 +64,7 @@ fn a_shifted_horizon_is_solved_like_a_new_one() {
     }
 }
 
-/// One iteration a step keeps a pole up that is pushed, and allocates nothing (see `allocations.rs`).
+/// With one iteration per step, a pole that is pushed stays up. The solves allocate nothing (see `allocations.rs`).
 #[test]
 fn a_closed_loop_stands_up_to_pushes() {
     let mut problem = cartpole(&[0.0, 0.2, 0.0, 0.0], 40, 1);
@@ -100,7 +100,7 @@ fn a_solve_without_time_returns_what_it_has() {
     let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
     assert_eq!((solution.status, &solution.xs, solution.trace.len()), (Status::TimeLimit, &xs, 0));
 
-    // What an observer spends counts too: the second iteration does not begin.
+    // The observer's time counts too: the second iteration does not begin.
     solver.settings.time_budget = Some(Duration::from_millis(200));
     let mut seen = 0;
     let pause = |_: &Iteration| {
@@ -111,7 +111,7 @@ fn a_solve_without_time_returns_what_it_has() {
     assert_eq!((solution.status, seen, solution.trace.len()), (Status::TimeLimit, 1, 1));
     assert_eq!(solution.cost, solution.trace[0].cost);
 
-    // Without any time the gains are those of the solve before, a knot further on.
+    // Without any time, the gains come from the previous solve, shifted by one knot.
     problem.shift(0).unwrap();
     solver.shift(&mut problem).unwrap();
     solver.settings.time_budget = Some(Duration::ZERO);
@@ -120,7 +120,7 @@ fn a_solve_without_time_returns_what_it_has() {
         moved.status == Status::TimeLimit && moved.K[..49] == solution.K[1..] && moved.xs[..200] == solution.xs[4..]
     );
 
-    // With time enough it is the same solve.
+    // With enough time, the solve is the same.
     solver.settings.time_budget = Some(Duration::from_secs(100));
     let mut problem = cartpole(&HANGING, 50, 1);
     let limited = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap().clone();
@@ -152,14 +152,14 @@ fn a_solution_survives_a_file() {
     let solution = solver.solve(&mut problem, &xs, &[0.0; 50]).unwrap();
     let text = serde_json::to_string(solution).unwrap();
     let read: Solution = serde_json::from_str(&text).unwrap();
-    // serde_json reads a decimal number to within its last bit.
+    // serde_json reads a decimal number with an error of at most its last bit.
     let close =
         |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-14 * b.abs());
     assert!(close(&read.xs, &solution.xs) && close(&read.us, &solution.us) && close(read.x(50), solution.x(50)));
     assert!(read.K.iter().zip(&solution.K).all(|(a, b)| close(a.as_slice(), b.as_slice())));
     assert!(read.status == solution.status && read.trace.len() == solution.trace.len());
     assert!(text.contains("\"status\":\"converged\""));
-    // files of earlier versions have no overrun and no projection
+    // files of earlier versions lack overrun and projection
     let mut earlier: Value = serde_json::from_str(&text).unwrap();
     assert!(earlier["timings"].as_object_mut().unwrap().remove("overrun").is_some());
     assert_eq!(serde_json::from_value::<Solution>(earlier).unwrap().timings.overrun, Duration::ZERO);
@@ -167,7 +167,8 @@ fn a_solution_survives_a_file() {
     assert!(settings.project_warm_start && settings.max_iterations == 7);
 }
 
-/// A solution from a file has the lengths of one horizon, or is refused before anything reads beyond them.
+/// The lengths of a solution from a file must fit one horizon. Otherwise it is rejected before anything reads out of
+/// range.
 #[test]
 fn a_solution_from_a_file_is_checked() {
     let mut problem = cartpole(&HANGING, 4, 1);
@@ -198,8 +199,8 @@ fn a_solution_from_a_file_is_checked() {
     assert!(refused("/shape/ndx", json!(3)).starts_with("knot 0: expected gains of 1 × 3"));
 }
 
-/// What knots have of their own moves with them: costs and limits, also of copies on other threads. A new last knot has
-/// what all have, until it is given something.
+/// Costs and limits that belong to single knots move with the knots, also in copies on other threads. A new last knot
+/// has the model's common costs and limits, until it gets its own.
 #[test]
 fn costs_and_limits_of_a_knot_move_with_it() {
     const HORIZON: usize = 9;
@@ -210,7 +211,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
         let effort = Residual::Control { reference: vec![0.0; 7] };
         vec![cost("effort", 1e-3, effort), cost("rest", 1e-1, Residual::State { reference: x0.clone() })]
     };
-    // of the knot that is the `time`-th since the beginning
+    // the cost of the knot with index `time`, counted from the beginning
     let own = |time: usize| {
         let target = Vec3::new(0.4, 0.01 * time as f64, 0.5);
         let follow = cost("follow", 10.0 + time as f64, Residual::FrameTranslation { frame: "tool".into(), target });
@@ -221,7 +222,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
         let effort = Residual::Control { reference: vec![0.0; 7] };
         if time % 3 == 1 { vec![Limit::new("weak", effort, vec![-weak; 7], vec![weak; 7])] } else { vec![] }
     };
-    // knots with and without something of their own
+    // knots with and without their own costs and limits
     let problem = |start: usize| {
         let mut knot = FreeDynamics::running(arm.clone(), 0.05, common()).unwrap();
         for t in 0..HORIZON {
@@ -246,7 +247,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
             problem.calc(&x0.repeat(HORIZON + 1), &us, &mut next, &mut costs);
             costs
         };
-        // the last knot has what all have
+        // the last knot has the common costs and limits
         let (mut plain, mut fresh) = (problem(start), problem(start));
         let last: &mut FreeDynamics = plain.model_mut(0).unwrap();
         last.set_costs(HORIZON - 1, common()).unwrap();
@@ -268,7 +269,7 @@ fn costs_and_limits_of_a_knot_move_with_it() {
     }
 }
 
-/// The copies of other threads are moved, not made anew, when nothing else has changed.
+/// Copies for other threads are shifted, not created again, if nothing else has changed.
 #[test]
 fn copies_move_along() {
     let (arm, x0) = (Arc::new(robots::arm7()), [vec![0.1; 7], vec![0.0; 7]].concat());

@@ -1,4 +1,4 @@
-//! What a solve says when something is wrong, and that it does not depend on how its work is grouped.
+//! A solve reports what is wrong, and its outcome does not depend on how its work is grouped.
 
 #![allow(non_snake_case)] // the names of the literature
 
@@ -14,7 +14,7 @@ use condyle_optimal::{
 use core::ops::ControlFlow;
 use std::time::Duration;
 
-/// The accuracy of [`NumDiff`] on costs and states of size 100: first and second derivatives.
+/// Accuracy of [`NumDiff`] on costs and states of size 100: first and second derivatives.
 const FIRST: f64 = 1e-6;
 const SECOND: f64 = 1e-3;
 
@@ -45,7 +45,8 @@ fn written_derivatives_agree_with_finite_differences() {
     compare_with_numdiff(Circle { nu: 1 }, &[0.6, 0.8], &[0.4]);
 }
 
-/// On a circle the problem is linear in the angle: one full step, across the gaps of a warm start that winds around.
+/// On a circle, the problem is linear in the angle. One full step solves it, across the gaps of a warm start that winds
+/// around the circle.
 #[test]
 fn a_state_may_live_on_a_manifold() {
     let circle = |angle: f64| [angle.cos(), angle.sin()];
@@ -75,7 +76,7 @@ fn the_pendulum_on_a_cart_stands_up() {
     let xs = solution.xs.clone();
     let us = solution.us.clone();
     assert_eq!(problem.rollout(&us).unwrap(), xs);
-    // A solve from the solution does not leave it.
+    // A solve that starts from the solution stays there.
     let again = solver.solve(&mut problem, &xs, &us).unwrap();
     assert!(again.status == Status::Converged && again.trace.len() <= 2);
 }
@@ -115,7 +116,7 @@ fn an_early_stop_returns_the_iterate_it_reached() {
     assert_eq!((solution.status, &solution.xs), (Status::MaxIterations, &xs));
 }
 
-/// x⁺ = x + u, ℓ = −½ c u²: more and more cost can be saved.
+/// Action x⁺ = x + u, ℓ = −½ c u², whose cost is unbounded below.
 struct Concave {
     nu: usize,
     curvature: f64,
@@ -151,7 +152,7 @@ fn a_problem_without_a_minimum_ends_at_the_largest_regularisation() {
     assert_eq!((solution.us.as_slice(), solution.trace.len()), (&[1.0; 3][..], 0));
 }
 
-/// Finite only while |x| < `limit`; its derivatives are NaN where `broken`.
+/// Action that is finite only while |x| < `limit`; with `broken` its derivatives are NaN.
 struct Bounded {
     nu: usize,
     lanes: usize,
@@ -200,11 +201,11 @@ fn what_is_not_finite_never_enters_a_solution() {
         assert!(!solution.cost.is_nan() && !solution.gap.is_nan());
         solution
     };
-    assert_eq!(solve(1.0, false, 1, 2.0).status, Status::NotFinite); // the warm start
-    assert_eq!(solve(9.0, true, 1, 0.0).status, Status::NotFinite); // the derivatives
+    assert_eq!(solve(1.0, false, 1, 2.0).status, Status::NotFinite); // the warm start is not finite
+    assert_eq!(solve(9.0, true, 1, 0.0).status, Status::NotFinite); // the derivatives are not finite
     assert_eq!(solve(9.0, false, 1, 0.0).status, Status::Converged);
     for lanes in [1, 4] {
-        let cut = solve(2.0, false, lanes, 0.0); // a full step leaves the bounds, a shorter one does not
+        let cut = solve(2.0, false, lanes, 0.0); // a full step exceeds `limit`, a shorter one does not
         assert!(cut.trace[0].step < 1.0 && cut.trace[0].accepted, "{:?}", cut.trace);
         assert!(cut.cost < 0.5 * 9.0 * 7.0);
     }
@@ -275,10 +276,10 @@ fn bounds_that_leave_no_control_are_refused_by_knot_and_number() {
     assert_eq!(error(&[infinite, 0.0], &[infinite, 1.0]), "knot 0: control 0 must be at least inf and at most inf");
     assert_eq!(error(&[0.0], &[1.0, 1.0]), "node 0: expected lower bounds = 2, found 1");
     assert_eq!(error(&[0.0, 0.0], &[1.0; 3]), "node 0: expected upper bounds = 2, found 3");
-    assert_eq!(solve(&[0.25, -0.5], &[0.25, 0.5]), Ok(Status::Converged)); // one control is as good as none
+    assert_eq!(solve(&[0.25, -0.5], &[0.25, 0.5]), Ok(Status::Converged)); // a single allowed control is valid
 }
 
-/// Without any finite number, bounds change nothing; a bound on one side only binds.
+/// Infinite bounds change nothing; a bound on one side only is active.
 #[test]
 fn a_bound_may_be_on_one_side() {
     let infinite = f64::INFINITY;
@@ -297,13 +298,14 @@ fn a_bound_may_be_on_one_side() {
     assert_eq!(bounded.status, Status::Converged);
     assert!(bounded.us.iter().all(|u| *u >= 0.8 * least) && bounded.us.contains(&(0.8 * least)));
     assert!(bounded.cost > free.cost);
-    // At a bound there is no feedback.
+    // At a bound, the feedback is zero.
     let t = bounded.us.iter().position(|u| *u == 0.8 * least).unwrap();
     assert!(bounded.K[t].amax() == 0.0);
 }
 
-/// The multipliers of a bounded optimum, checked without the solver: ∂J/∂u along the trajectory, from the adjoint
-/// recursion λ = q + Aᵀλ⁺, is zero where a control is free and pushes against the bound where it is not.
+/// Checks the multipliers of a bounded optimum independently of the solver. The gradient ∂J/∂u along the trajectory
+/// follows from the adjoint recursion λ = q + Aᵀλ⁺. It is zero where a control is free, and pushes against the bound
+/// otherwise.
 #[test]
 fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
     let bounds = [vec![-8.0], vec![6.0]];
@@ -327,7 +329,7 @@ fn a_bounded_optimum_satisfies_the_conditions_of_optimality() {
     assert!(at_bounds > 3, "{at_bounds}");
 }
 
-/// Notes how many trials it is asked for at once, at the first knot.
+/// Action that records, at the first knot, the number of trials evaluated together.
 struct Noting {
     action: Cartpole,
     groups: Vec<usize>,
@@ -357,8 +359,8 @@ impl ActionModel for Noting {
     }
 }
 
-/// The first step length is tried alone, and the second one if the last search needed no shorter one; the next four side by
-/// side and then the others, at most as many as there are lanes.
+/// The first step length is tried alone. The second one is also tried alone if the last search did not need a shorter
+/// one. Then the next four are tried side by side, and then the others; the number of lanes limits each group.
 #[test]
 fn a_refused_step_is_followed_by_the_others_at_once() {
     let alone = |lanes| if lanes == 1 { vec![1; 9] } else { vec![1, 4, 4] };
@@ -369,7 +371,7 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
         let mut problem = Problem::new(HANGING.to_vec(), vec![Box::new(noting)], vec![0; 50], Box::new(end)).unwrap();
         let mut solver = Fddp::new(&problem);
         let solution = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap();
-        // per line search: 1, and after a refusal as many of the groups as it took to find the step
+        // expected groups per line search: 1, and after a rejection as many groups as were needed to find the step
         let (mut expected, mut last) = (vec![], 0.0);
         for iteration in &solution.trace {
             expected.push(1);
@@ -387,7 +389,7 @@ fn a_refused_step_is_followed_by_the_others_at_once() {
     }
 }
 
-/// x⁺ = x + u, ℓ = ½ (x² + u²) + x⁴, with so many controls, at its leisure.
+/// Slow action x⁺ = x + u, ℓ = ½ (x² + u²) + x⁴, with the given number of controls.
 struct Slow(usize);
 
 impl ActionModel for Slow {
@@ -411,7 +413,7 @@ impl ActionModel for Slow {
     }
 }
 
-/// Ends a solve when it has been asked so often whether to go on, or has seen so many iterations.
+/// Observer that ends a solve after a given number of calls of `go_on` or of iterations.
 struct Impatient {
     questions: usize,
     iterations: usize,
@@ -429,7 +431,7 @@ impl Observer for Impatient {
     }
 }
 
-/// An observer ends a solve after an iteration, or within one that lasts; `resume` goes on from there, to the same end.
+/// An observer ends a solve after an iteration, or within a long one; `resume` continues from there, to the same end.
 #[test]
 fn observers_end_solves() {
     let mut problem = cartpole(&HANGING, 50, 1);
@@ -448,7 +450,7 @@ fn observers_end_solves() {
     let resumed = solver.resume(&mut problem).unwrap();
     assert!(resumed.status == Status::Converged && (resumed.cost - end.cost).abs() < 1e-6 * end.cost);
 
-    // a model that takes its time: the iteration is not waited for
+    // a slow model: the solve ends before the iteration does
     let mut problem =
         Problem::new(vec![1.0], vec![Box::new(NumDiff(Slow(1)))], vec![0; 5], Box::new(NumDiff(Slow(0)))).unwrap();
     let mut solver = Fddp::new(&problem);
@@ -458,7 +460,7 @@ fn observers_end_solves() {
         assert_eq!((solution.status, solution.trace.len()), (Status::Interrupted, 0));
     }
 
-    // around them, the augmented Lagrangian
+    // the same within the augmented Lagrangian
     let mut solver = AugmentedLagrangian::new(&problem);
     let observer = Impatient { questions: 9, iterations: 1 };
     let solution = solver.solve_with(&mut problem, &[1.0; 6], &[0.0; 5], observer).unwrap();
@@ -468,7 +470,7 @@ fn observers_end_solves() {
     assert_eq!(solution.status, Status::Interrupted);
 }
 
-/// Counts that memory depends on are limited; where a number only says when to stop, any is good.
+/// Settings that determine the use of memory are limited; a number that only ends the solve may have any value.
 #[test]
 fn settings_that_count_are_limited() {
     let mut problem = cartpole(&HANGING, 5, 1);
@@ -485,7 +487,7 @@ fn settings_that_count_are_limited() {
     assert_eq!(solver.solve(&mut problem, &[0.0; 24], &[0.0; 5]).unwrap().status, Status::Converged);
 }
 
-/// Where nothing is finite at all, the augmented Lagrangian is infinitely far, not NaN.
+/// If nothing is finite at all, the augmented Lagrangian's residuals are infinite, not NaN.
 #[test]
 fn what_is_nowhere_finite_is_infinitely_far() {
     let model = |nu| Bounded { nu, lanes: 1, limit: 1.0, broken: false };

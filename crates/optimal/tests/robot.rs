@@ -1,4 +1,4 @@
-//! The free dynamics of robots and their costs: exact derivatives, references, limits.
+//! Free dynamics of robots and their costs: exact derivatives, references, limits.
 #![allow(non_snake_case)] // the names of the literature
 
 use condyle_dynamics::{
@@ -12,9 +12,10 @@ use condyle_optimal::{ActionModel, Error, Fddp, Hessian, LqNode, NumDiff, Proble
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Central differences of a function with values and derivatives of order one are good to about 1e-9 of them.
+/// Tolerance of central differences: for a function with values and derivatives of order one they are accurate to about
+/// 1e-9.
 const DIFFERENCES: f64 = 1e-6;
-/// Two orders of the same sums, through a factorisation.
+/// Tolerance of two orders of the same sums, through a factorisation.
 const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
@@ -22,20 +23,20 @@ fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
     (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
 }
 
-/// A state around neutral, of which no joint is near a singularity of its group.
+/// Returns a random state around neutral; no joint is near a singularity of its group.
 fn random_state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
     [q, random(model.nv(), 1.0, rng)].concat()
 }
 
-/// The last frame, by its number and by its name.
+/// Returns the last frame, by its index and by its name.
 fn last_frame(model: &Model) -> (usize, FrameName) {
     let frames = model.frames();
     (frames.len() - 1, (&frames[frames.len() - 1]).into())
 }
 
-/// Every residual with every activation that fits it.
+/// Returns every residual with every activation that fits it.
 fn all_costs(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Cost> {
     let nv = model.nv();
     let (number, frame) = last_frame(model);
@@ -97,7 +98,7 @@ fn derivatives_are_those_of_the_action() {
     }
 }
 
-/// What an action says of the form of A and B is true: the sweep finds the same without knowing it.
+/// The structure of A and B reported by an action is correct: a sweep without it gives the same result.
 #[test]
 fn derivatives_have_the_form_of_euler_steps() {
     let mut rng = StdRng::seed_from_u64(8);
@@ -132,7 +133,7 @@ fn derivatives_have_the_form_of_euler_steps() {
     }
 }
 
-/// Of a residual that is linear in x and u the Gauss–Newton Hessian is the Hessian.
+/// For a residual that is linear in x and u, the Gauss–Newton Hessian is the exact Hessian.
 #[test]
 fn hessians_of_linear_residuals_are_exact() {
     let mut rng = StdRng::seed_from_u64(4);
@@ -174,8 +175,8 @@ fn a_cost_is_zero_at_its_reference() {
     assert_eq!(action.costs_mut().set_weight("rose", 3.0), Ok(false));
 }
 
-/// A residual of a frame looks at the frame of that name of whatever robot its action is made for: the number is that
-/// robot's.
+/// A residual of a frame refers to the frame by name. For each robot, its action looks up the index of the frame with
+/// that name.
 #[test]
 fn frames_travel_by_name() {
     let arm = robots::arm7();
@@ -191,7 +192,7 @@ fn frames_travel_by_name() {
         let reach = Cost::new("reach", 1.0, Residual::FrameTranslation { frame, target }, Activation::Quadratic);
         let mut action = FreeDynamics::terminal(two.clone(), vec![reach.clone()]).unwrap();
         assert_eq!(action.calc(0, &x, &[], &mut x.clone()), 0.0);
-        // another robot refuses it, wherever it is given
+        // another robot, which lacks the frame, is rejected everywhere
         let quadruped = Arc::new(robots::quadruped());
         let unknown = |error: Error| assert!(error.to_string().contains("`reach`: unknown frame `tool`"), "{error}");
         unknown(FreeDynamics::terminal(quadruped.clone(), vec![reach.clone()]).map(|_| ()).unwrap_err());
@@ -199,14 +200,14 @@ fn frames_travel_by_name() {
         unknown(end.set_costs(1, vec![reach.clone()]).unwrap_err());
         let limit = Limit::equality("reach", reach.residual.clone());
         unknown(end.with_limits(vec![limit]).map(|_| ()).unwrap_err());
-        // and so does a file of it
+        // and so is a file with this cost
         let knot = serde_json::to_string(&Knot::new(Dynamics::End, vec![reach.clone()])).unwrap();
         let read: Knot = serde_json::from_str(&knot).unwrap();
         assert_eq!(read.costs, [reach]);
         assert!(read.build(&two).is_ok());
         unknown(read.build(&quadruped).map(|_| ()).unwrap_err());
     }
-    // of two frames with one name the one of the wanted kind, else a link's
+    // among frames with the same name, the one of the requested kind is chosen, otherwise a link's
     let text = r#"<robot name="twice"><link name="base"/><link name="tip"/><joint name="tip" type="continuous">
         <parent link="base"/><child link="tip"/><axis xyz="0 0 1"/></joint></robot>"#;
     let twice = Model::from_urdf_str(text, &UrdfOptions::default()).unwrap();
@@ -214,7 +215,7 @@ fn frames_travel_by_name() {
     assert_eq!(twice.frames()[named(Some(FrameKind::Joint))].kind, FrameKind::Joint);
     assert_eq!(named(None), twice.frame("tip").unwrap());
     assert_ne!(named(None), named(Some(FrameKind::Joint)));
-    assert_eq!(named(Some(FrameKind::User)), named(None)); // for want of one
+    assert_eq!(named(Some(FrameKind::User)), named(None)); // because no such frame exists
 }
 
 #[test]
@@ -240,11 +241,11 @@ fn what_does_not_fit_is_refused_by_name() {
     assert_eq!(message(FreeDynamics::running(arm.clone(), 0.0, vec![])), "a knot of 0 s: its duration must be above 0");
 }
 
-/// r = (v₁ u₁, sin q₂ + u₂² + t), of a robot whose position has `nq` numbers.
+/// Residual r = (v₁ u₁, sin q₂ + u₂² + t), of a robot whose position has `nq` entries.
 struct OwnFunction {
     nq: usize,
     nv: usize,
-    /// The coordinates and controls that count.
+    /// Indices of the coordinates and controls that are used.
     place: [usize; 2],
 }
 
@@ -268,7 +269,7 @@ impl ResidualFunction for OwnFunction {
     }
 }
 
-/// The cost ℓ = 1 − cos q₁ + ½ q₂ u₁² + u₁ v₃ of the arm.
+/// User-defined cost ℓ = 1 − cos q₁ + ½ q₂ u₁² + u₁ v₃ of the arm.
 struct OwnCost {
     hessian: bool,
 }
@@ -308,8 +309,8 @@ impl ResidualFunction for OwnCost {
     }
 }
 
-/// A cost of one's own has its own gradient and Hessian in the node, times Δt and the weight; with another activation than
-/// the sum, here ½ r², the whole Hessian of that.
+/// The node contains the gradient and Hessian of a user-defined cost, times Δt and the weight. With another activation
+/// than the sum, here ½ r², it contains the whole Hessian of the activation's value.
 #[test]
 fn a_cost_of_ones_own_has_its_hessian() {
     let (arm, mut rng) = (Arc::new(robots::arm7()), StdRng::seed_from_u64(31));
@@ -344,7 +345,7 @@ fn a_cost_of_ones_own_has_its_hessian() {
     }
 }
 
-/// Iterates do not depend on the setting of the knots' form, and the optimum not on the Hessian.
+/// Iterates do not depend on the form of the knots, and the optimum does not depend on the Hessian.
 #[test]
 fn a_cost_of_ones_own_in_a_solve() {
     let arm = Arc::new(robots::arm7());
@@ -370,8 +371,8 @@ fn a_cost_of_ones_own_in_a_solve() {
     assert!((with.cost - gauss_newton.cost).abs() < 1e-7 * (1.0 + with.cost.abs()), "one optimum");
 }
 
-/// The derivatives of a residual of one's own are those of differences, and the solver's iterates do not depend on the form
-/// of its knots.
+/// The derivatives of a user-defined residual equal differences, and the solver's iterates do not depend on the form of
+/// its knots.
 #[test]
 fn a_residual_of_ones_own_is_one_among_others() {
     use condyle_dynamics::ContactConstraint;

@@ -1,4 +1,4 @@
-//! Full DDP: the curvature of the dynamics in the sweep.
+//! Full DDP: the sweep includes the curvature of the dynamics.
 #![allow(non_snake_case)]
 
 mod common;
@@ -15,20 +15,21 @@ use condyle_optimal::{ActionModel, Fddp, Hessian, LqNode, NumDiff, Problem, Stat
 use nalgebra::{DMatrix, DVector};
 use std::sync::Arc;
 
-/// Second central differences of functions of size one to ten.
+/// Tolerance of second central differences of functions of size one to ten.
 const DIFFERENCES: f64 = 1e-5;
 
-/// First central differences with this step are good to 1e-8 or so.
+/// Step of first central differences, and their tolerance; they are accurate to about 1e-8.
 const STEP: f64 = 6e-6;
 const SLOPES: f64 = 1e-7;
-/// As `DIFFERENCES`, for a robot: rounding grows with the condition of its inertia matrix, truncation with its sines' squares.
+/// Tolerance as `DIFFERENCES`, for a robot. Rounding grows with the condition number of its inertia matrix, and
+/// truncation with the squares of its sines.
 const VALUES: f64 = 1e-4;
-/// Both triangles are sums of the same numbers in different orders, of those of a factorisation.
+/// Tolerance of symmetry: both triangles are sums of the same results of a factorisation, in different orders.
 const SYMMETRY: f64 = 1e-12;
-/// What the condition of the arm's inertia matrix, 1e4, leaves of the bits of its inverse.
+/// Relative accuracy of the arm's inverse inertia matrix, whose condition number is 1e4.
 const ROUNDING: f64 = 1e-12;
 
-/// ψ(x, u) = ℓ(x, u) + ½ ‖φ(x, u)‖²: two knots as one that ends there.
+/// Function ψ(x, u) = ℓ(x, u) + ½ ‖φ(x, u)‖²: two knots combined into one terminal function.
 struct Chained<A>(A);
 
 impl<A: ActionModel> ActionModel for Chained<A> {
@@ -44,7 +45,8 @@ impl<A: ActionModel> ActionModel for Chained<A> {
     }
 }
 
-/// With it, the quadratic model of a horizon of one knot is the exact one: that of ℓ(x, u) + V(φ(x, u)).
+/// With the curvature, the quadratic model of a horizon of one knot is exact: it is the quadratic model of ℓ(x, u) +
+/// V(φ(x, u)).
 #[test]
 fn the_quadratic_model_is_exact() {
     let (x, u) = ([0.3, 0.7, -0.4, 1.3], [2.0]);
@@ -70,12 +72,13 @@ fn the_quadratic_model_is_exact() {
     assert!((&knot.Quu - &exact.R).amax() < DIFFERENCES, "{} {}", knot.Quu, exact.R);
     assert!((&knot.K - &K).amax() < DIFFERENCES * 10.0, "{} {K}", knot.K);
     assert!((&knot.Vxx - &Vxx).amax() < DIFFERENCES * 10.0, "{} {Vxx}", knot.Vxx);
-    // Without it, it is not.
+    // Without the curvature, it is not exact.
     sweep.run(&nodes, 0.0).unwrap();
     assert!((&sweep.knots()[0].Vxx - &Vxx).amax() > 100.0 * DIFFERENCES);
 }
 
-/// From near the optimum the error of a second-order step is the square of the one before; Gauss–Newton's is a fraction.
+/// Near the optimum, the error of a second-order step is the square of the previous error; with Gauss–Newton it is a
+/// fraction.
 #[test]
 fn convergence_is_quadratic() {
     let solve = |second_order: bool| {
@@ -83,7 +86,7 @@ fn convergence_is_quadratic() {
         let end = common::Cartpole { nu: 0, lanes: 1, weights: [100.0, 10.0, 10.0, 10.0, 0.0] };
         let mut problem = Problem::new(HANGING.to_vec(), models, vec![0; 50], Box::new(end)).unwrap();
         let mut solver = Fddp::new(&problem);
-        // Near the optimum of Gauss–Newton first, so that both go to the same one.
+        // First solve to near the optimum with Gauss–Newton, so that both methods converge to the same one.
         (solver.settings.tolerance, solver.settings.max_iterations) = (1e-4, 300);
         let near = solver.solve(&mut problem, &straight(&HANGING, &HANGING, 50), &[0.0; 50]).unwrap().clone();
         assert_eq!(near.status, Status::Converged);
@@ -97,7 +100,7 @@ fn convergence_is_quadratic() {
     assert!(newton.0 <= 4 && gauss_newton.0 >= 10, "{newton:?} {gauss_newton:?}");
 }
 
-/// Joints of every kind whose positions are a group, and a knee.
+/// Creates a model with every kind of joint whose positions form a group, and a knee.
 fn groups() -> Model {
     let limb = Inertia::from_com(1.3, Vec3::new(0.1, -0.05, -0.3), Sym3::diagonal(0.07));
     let at = |x: f64| Se3 { translation: Vec3::new(x, 0.2, -0.4), ..Se3::identity() };
@@ -111,7 +114,7 @@ fn groups() -> Model {
     robot.build().unwrap()
 }
 
-/// ∂²ψ against the differences of ∂ψ and of ψ, at random states.
+/// Compares ∂²ψ with differences of ∂ψ and of ψ, at random states.
 fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
     let mut random = random();
     let (nv, ndx, nu) = (model.nv(), action.ndx(), action.nu());
@@ -152,7 +155,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
             let above = gradient(&z);
             z[j] = -STEP;
             let below = gradient(&z);
-            // Both slopes are differences of numbers that carry a rounding of a few bits.
+            // Both gradients are differences of numbers with rounding errors of a few bits.
             let rounding = ROUNDING * (above.0.amax() + above.1.amax()) / STEP;
             let (x, u) = ((above.0 - below.0) / (2.0 * STEP), (above.1 - below.1) / (2.0 * STEP));
             let (ours_x, ours_u) = match j < ndx {
@@ -163,7 +166,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
             assert!((&ours_u - &u).amax() < SLOPES * largest + rounding, "{j}: {ours_u} {u}");
         }
 
-        // The same without the Jacobians of the groups, where there are some.
+        // The same without the Jacobians of the groups, if the model has such joints.
         if model.nq() > nv {
             let mut numeric = Hessian::zeros(ndx, nu);
             NumDiff(action.clone()).dynamics_hessian(0, &x, u, lambda, &mut numeric);
@@ -176,7 +179,7 @@ fn check<A: ActionModel + Clone>(model: &Model, mut action: A) {
     }
 }
 
-/// The second derivatives of a robot's dynamics are the differences of its first ones.
+/// The second derivatives of a robot's dynamics equal differences of its first derivatives.
 #[test]
 fn robots_give_theirs_exactly() {
     let arm = Arc::new(robots::arm7());
@@ -191,7 +194,7 @@ fn robots_give_theirs_exactly() {
     }
 }
 
-/// A body with four rotors, which push and twist it; a knot of it, or its end.
+/// Creates a knot or the terminal action of a body with four rotors, which push and twist it.
 fn quadrotor(running: bool) -> FreeDynamics {
     let frame = Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(0.02));
     let mut robot = ModelBuilder::new("quadrotor");
@@ -220,7 +223,7 @@ fn quadrotor(running: bool) -> FreeDynamics {
         .unwrap()
 }
 
-/// The costs' Hessians are exact, by differences, the dynamics' are the robot's own.
+/// Action with exact Hessians: the cost's Hessian by differences, the dynamics' Hessian from the robot.
 struct ExactCosts(NumDiff<FreeDynamics>);
 
 impl ActionModel for ExactCosts {
@@ -250,7 +253,7 @@ impl ActionModel for ExactCosts {
     }
 }
 
-/// A quadrotor that tumbles comes to rest: its thrust turns with it, and its turns do not commute.
+/// A tumbling quadrotor comes to rest: its thrust turns with it, and its rotations do not commute.
 #[test]
 fn convergence_is_quadratic_on_a_group() {
     const KNOTS: usize = 30;
@@ -267,7 +270,7 @@ fn convergence_is_quadratic_on_a_group() {
         };
         let mut problem = Problem::new(x0.to_vec(), vec![model(true)], vec![0; KNOTS], model(false)).unwrap();
         let mut solver = Fddp::new(&problem);
-        // Near the optimum of Gauss–Newton first, so that both go to the same one.
+        // First solve to near the optimum with Gauss–Newton, so that both methods converge to the same one.
         (solver.settings.tolerance, solver.settings.max_iterations) = (1e-2, 300);
         let near = solver.solve(&mut problem, &x0.repeat(KNOTS + 1), &[9.81 / 4.0; 4 * KNOTS]).unwrap().clone();
         assert_eq!(near.status, Status::Converged);
@@ -281,12 +284,13 @@ fn convergence_is_quadratic_on_a_group() {
         let ((newton, few), (gauss_newton, many)) = (solve(exact, true), solve(exact, false));
         assert!((newton - gauss_newton).abs() < 1e-8);
         assert!(2 * few.len() <= many.len(), "{few:?} {many:?}");
-        // What is left to gain is the square of the error: with all Hessians exact, each is a multiple of the square before.
+        // The remaining improvement is the square of the error: with all Hessians exact, each is a multiple of the
+        // previous one squared.
         assert!(!exact || few.windows(2).all(|stops| stops[1] < 10.0 * stops[0] * stops[0]), "{few:?}");
     }
 }
 
-/// Steps on a circle are linear in the angle: nothing curves.
+/// Steps on a circle are linear in the angle, so there is no curvature.
 #[test]
 fn numbers_on_a_manifold() {
     let mut hessian = Hessian::zeros(1, 1);

@@ -1,4 +1,4 @@
-//! A sweep in several segments at the same time finds what a sweep as one does.
+//! A sweep in several segments at the same time gives the same result as a sweep as one.
 #![allow(non_snake_case)]
 
 mod common;
@@ -11,11 +11,12 @@ use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use std::sync::Arc;
 
-/// Relative to the largest entry. As the other tests of the sweep: random problems with entries of size one, whose value
-/// functions grow to 1e3 or so; and the value functions of robots' problems have a condition of 1e6 or more.
+/// Tolerance relative to the largest entry. As in the other tests of the sweep, random problems with entries of size
+/// one have value functions of about 1e3. The value functions of robots' problems have a condition number of 1e6 or
+/// more.
 const SAME: f64 = 1e-9;
 
-/// Of the cost of an iterate, which forgives most of what a step is off.
+/// Tolerance of the cost of an iterate, on which an error of the step has only a small effect.
 const COST: f64 = 1e-9;
 
 fn largest(x: &[f64]) -> f64 {
@@ -31,7 +32,7 @@ fn assert_same(found: &[LqKnot], expected: &[LqKnot], case: &str) {
             .chain([&knot.Vx, &knot.k, &knot.Qu].map(|vector| vector.as_slice().to_vec()))
             .collect::<Vec<_>>()
     };
-    // Vectors vanish where the trajectory is good: what they are compared with is the largest of the horizon.
+    // Vectors vanish where the trajectory is good, so they are compared with the largest entry of the horizon.
     let mut scales = [0.0_f64; 6];
     for knot in expected {
         for (scale, field) in scales.iter_mut().zip(fields(knot)) {
@@ -48,7 +49,7 @@ fn assert_same(found: &[LqKnot], expected: &[LqKnot], case: &str) {
     }
 }
 
-/// The knots of a sweep as one, and of one in segments, of which both succeed.
+/// Returns the knots of a sweep as one, and of a sweep in segments; both must succeed.
 fn both(nodes: &[LqNode], segments: usize, regularisation: f64) -> (Vec<LqKnot>, Vec<LqKnot>) {
     let mut sweep = Sweep::new(nodes);
     sweep.run(nodes, regularisation).unwrap();
@@ -59,7 +60,7 @@ fn both(nodes: &[LqNode], segments: usize, regularisation: f64) -> (Vec<LqKnot>,
     (as_one, sweep.knots().to_vec())
 }
 
-/// Nodes of all kinds: dense and of Euler steps, with blocks and without, and numbers of controls that differ.
+/// Returns nodes of all kinds: dense or Euler steps, with or without blocks, and with different numbers of controls.
 fn problems() -> Vec<Vec<LqNode>> {
     let (mut random, root) = (random(), 0..6);
     let root = std::slice::from_ref(&root);
@@ -115,14 +116,14 @@ fn a_horizon_too_short_for_two_segments_is_swept_as_one() {
     assert_eq!(knots, as_one);
 }
 
-/// The minimum over all states and controls at once, by its Karush–Kuhn–Tucker system.
+/// Segments give the minimum over all states and controls at once, computed from its Karush–Kuhn–Tucker system.
 #[test]
 fn segments_solve_the_whole_problem() {
     let mut random = random();
     for nodes in problems().into_iter().take(3) {
         let (n, horizon) = (nodes[0].ndx(), nodes.len() - 1);
         let x0: DVector<f64> = random_matrix(&mut random, n, 1).column(0).into_owned();
-        // Unknown: x₁, …, then u₀, …, then the multipliers of x_{t+1} = A x + B u + f.
+        // Unknowns: x₁, …, then u₀, …, then the multipliers of x_{t+1} = A x + B u + f.
         let mut offsets = vec![horizon * n];
         for node in &nodes[..horizon] {
             offsets.push(offsets[offsets.len() - 1] + node.nu());
@@ -191,7 +192,7 @@ fn any_number_of_threads_finds_the_same_bits() {
     }
 }
 
-/// What stops a sweep as one stops one in segments, with the same words, wherever it is.
+/// A fault anywhere stops a sweep in segments with the same error as a sweep as one.
 #[test]
 fn failures_are_those_of_a_sweep_as_one() {
     let mut random = random();
@@ -221,7 +222,7 @@ fn failures_are_those_of_a_sweep_as_one() {
     }
 }
 
-/// Of these a segment alone has no minimum, or the value function is none of a convex problem.
+/// In these problems a single segment has no minimum, its value function is not convex, or controls are bounded.
 #[test]
 fn what_segments_cannot_do_is_swept_as_one() {
     let mut random = random();
@@ -245,7 +246,7 @@ fn what_segments_cannot_do_is_swept_as_one() {
     }
 }
 
-/// Digits that a link would lose are not lost: controls that cost 1e-12 of what states do.
+/// A link would lose digits if controls cost 1e-12 of the states' cost. The sweep does not lose them.
 #[test]
 fn cheap_controls_lose_no_digits() {
     let mut random = random();
@@ -261,7 +262,7 @@ fn cheap_controls_lose_no_digits() {
     }
 }
 
-/// States that nothing depends on leave the value function singular.
+/// If nothing depends on some states, the value function is singular.
 #[test]
 fn states_may_cost_nothing() {
     let mut random = random();
@@ -285,7 +286,8 @@ fn no_segment_at_all_is_refused() {
     Sweep::new(&[LqNode::zeros(2, 0)]).set_segments(0);
 }
 
-/// A quadruped that shifts its weight on four feet and then reaches with one, from a warm start with gaps.
+/// Creates the problem of a quadruped that shifts its weight on four feet and then reaches with one, from a warm start
+/// with gaps.
 fn quadruped() -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
@@ -342,14 +344,14 @@ fn a_robots_solve_makes_the_same_iterates() {
             assert!((a.cost - b.cost).abs() < COST * b.cost.abs(), "{a:?} {b:?}");
         }
         assert!(solution.xs != expected.xs, "not in segments");
-        // once more in as many, and then as one again
+        // once more with the same number of segments, and then as one again
         let again = solver.solve(&mut problem, &xs, &us).unwrap().xs.clone();
         assert_eq!(again, solver.solve(&mut problem, &xs, &us).unwrap().xs);
         solver.settings.segments = 1;
         assert_eq!(solver.solve(&mut problem, &xs, &us).unwrap().xs, expected.xs);
     }
 
-    // and of the last derivatives each knot
+    // also compare each knot of sweeps at the last derivatives
     let mut nodes = problem.nodes();
     problem.calc_diff(&expected.xs, &expected.us, &mut nodes);
     let mut random = random();

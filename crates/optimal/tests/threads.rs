@@ -1,4 +1,4 @@
-//! What several threads find is what one finds, to the last bit.
+//! Several threads give the same result as one, to the last bit.
 #![allow(non_snake_case)]
 
 mod common;
@@ -15,13 +15,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A gait of a quadruped of every kind of knot: stance, an impact, one by differences that cannot be copied, flight by
-/// Runge–Kutta and by Euler; in runs that are no multiples of lanes.
+/// Creates a gait of a quadruped with every kind of knot: stance, an impact, an impact by differences that cannot be
+/// copied, flight by Runge–Kutta and by Euler. The lengths of its runs are not multiples of the lanes.
 fn gait() -> (Problem, Vec<f64>, Vec<f64>) {
     gait_of(|impact| Box::new(NumDiff(impact)))
 }
 
-/// As [`gait`], with the impacts of the second kind that it is given.
+/// Creates the gait as [`gait`] does; `impact_again` creates the impacts of the second kind.
 fn gait_of(impact_again: fn(ImpulseDynamics) -> Box<dyn ActionModel>) -> (Problem, Vec<f64>, Vec<f64>) {
     let model = Arc::new(robots::quadruped());
     let mut q = neutral(&model);
@@ -84,8 +84,8 @@ fn any_number_of_threads_finds_the_same_bits() {
     assert!(solve(&mut problem, &xs, &us, 1) == expected);
 }
 
-/// After a step that was shorter than 1 the next length is tried beside the first, by copies, which all models have here:
-/// once the first is good, once it is not.
+/// After a step shorter than 1, the next length is tried concurrently with the first, by copies of the models. All
+/// models can be copied here. In one case the first length is good, in the other it is not.
 #[test]
 fn trials_beside_each_other_find_the_same_bits() {
     let (mut problem, xs, us) = gait_of(|impact| Box::new(impact));
@@ -106,7 +106,7 @@ fn trials_beside_each_other_find_the_same_bits() {
     assert!(solve(2) == expected, "the global pool");
 }
 
-/// A solver may turn to another problem of the same dimensions, also from one without a robot to one with knots in
+/// A solver can switch to another problem of the same dimensions, even from one without a robot to one with knots in
 /// inverse-dynamics form.
 #[test]
 fn a_solver_turns_to_another_problem() {
@@ -132,7 +132,7 @@ fn a_solver_turns_to_another_problem() {
     assert!(solve(Some(&other), 1) == expected && solve(Some(&other), 2) == expected);
 }
 
-/// A model that was changed is copied anew.
+/// A changed model is copied again.
 #[test]
 fn copies_follow_their_models() {
     let (mut problem, xs, us) = gait();
@@ -150,7 +150,7 @@ fn copies_follow_their_models() {
     assert!(after.cost != before.cost);
 }
 
-/// Models of other numbers of controls, in a horizon that moves on.
+/// Models with different numbers of controls, in a moving horizon.
 #[test]
 fn a_horizon_may_move() {
     let mut random = random();
@@ -171,7 +171,7 @@ fn a_horizon_may_move() {
     }
 }
 
-/// Where the first sweep fails, others follow, with more regularisation.
+/// If the first sweep fails, it is repeated with more regularisation.
 #[test]
 fn a_sweep_that_fails_is_repeated() {
     let mut random = random();
@@ -194,20 +194,20 @@ fn a_sweep_that_fails_is_repeated() {
     assert!(solve(2) == expected && solve(4) == expected);
 }
 
-/// No time for a single phase: the solve ends after the iteration that it always makes, on any number of threads.
+/// Without time for a single phase, the solve ends after the iteration that it always makes, on any number of threads.
 #[test]
 fn a_budget_holds_on_several_threads() {
     let (mut problem, xs, us) = gait();
     let mut solver = Fddp::new(&problem);
     (solver.settings.threads, solver.settings.max_iterations) = (3, 2);
-    let free = solver.solve(&mut problem, &xs, &us).unwrap().clone(); // how long phases last is known from here on
+    let free = solver.solve(&mut problem, &xs, &us).unwrap().clone(); // the durations of phases are known from here on
     solver.settings.time_budget = Some(Duration::from_nanos(1));
     let solution = solver.solve(&mut problem, &xs, &us).unwrap();
     assert!(solution.status == Status::TimeLimit && solution.trace == free.trace[..1]);
     assert!(solution.timings.overrun > Duration::ZERO);
 }
 
-/// A unicycle whose derivatives panic at one knot, on whichever thread it comes to.
+/// Unicycle whose derivatives panic at one knot, on whichever thread evaluates it.
 struct Fragile(Unicycle, usize);
 
 impl ActionModel for Fragile {
@@ -229,7 +229,7 @@ impl ActionModel for Fragile {
     }
 }
 
-/// A panic on one thread ends the solve, and no thread waits for what will not come.
+/// A panic on one thread ends the solve, and no thread waits for ever.
 #[test]
 fn a_panic_reaches_the_caller() {
     for fragile in [0, 17, 39] {

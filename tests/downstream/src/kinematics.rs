@@ -1,4 +1,4 @@
-//! Frames and points of a robot, forces at points, and the types they are made of.
+//! Frames and points of a robot, forces at points, and their types.
 
 use condyle::nalgebra::{DMatrix, DVector, Vector3};
 use condyle::{Batch, Data, Error, Force, Model, Se3, Vec3, aba, aba_derivatives, forward_velocities};
@@ -54,7 +54,7 @@ mod tests {
         Ok(())
     }
 
-    /// M (q̈ with − q̈ without) = Jᵀ f.
+    /// Checks M (q̈ with − q̈ without) = Jᵀ f.
     #[test]
     fn forces_at_points_act_by_the_jacobian() -> Result<(), Error> {
         let (arm, q, tau, push) = (with_pen(&robots::arm7())?, [0.3; 7], [0.0; 7], Vec3::new(1.0, -2.0, 3.0));

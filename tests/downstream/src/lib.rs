@@ -1,4 +1,4 @@
-//! The first day of a user: robots, points and forces, a plan, a controller and a simulation, by the façade alone.
+//! First steps of a user, with the façade alone: robots, points and forces, a plan, a controller and a simulation.
 #![deny(warnings)]
 
 #[cfg(feature = "control")]

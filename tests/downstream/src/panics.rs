@@ -1,4 +1,4 @@
-//! Panics for a caller's mistake point into this file.
+//! Panics for a caller's mistake report a line of this file.
 
 use condyle::{Data, robots};
 

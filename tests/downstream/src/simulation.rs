@@ -4,7 +4,7 @@ use condyle::simulation::{Control, Ground, Settings, Simulation, Status};
 use condyle::{Error, Model};
 use std::sync::Arc;
 
-/// Robot that falls onto its feet, whose joints are held by springs and dampers.
+/// Robot that falls onto its feet; springs and dampers hold its joints.
 pub struct Standing {
     simulation: Simulation,
     pose: Vec<f64>,

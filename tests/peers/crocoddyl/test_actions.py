@@ -1,4 +1,4 @@
-"""Built-in actions and drives, and problems with an action for each knot, as Crocoddyl's scripts have them."""
+"""Built-in actions and drives, and problems with one action per knot, as in Crocoddyl's scripts."""
 
 import crocoddyl
 import numpy as np
@@ -8,9 +8,9 @@ import pytest
 import condyle
 from condyle import optimal
 
-# The same sums in another order.
+# Tolerance of the same sums in another order.
 ROUNDING = 1e-12
-# Costs of iterates, as benches/peers/ocp.py compares them.
+# Tolerance of the costs of iterates, as in benches/peers/ocp.py.
 COST = 1e-6
 
 

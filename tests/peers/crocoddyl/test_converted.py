@@ -1,6 +1,7 @@
-"""`condyle.crocoddyl`: problems of Crocoddyl solved here, and our dynamics in Crocoddyl's solvers, with equal iterates.
+"""`condyle.crocoddyl`: Crocoddyl's problems solved here, and our dynamics in Crocoddyl's solvers, with equal iterates.
 
-The problems are those of `test_problems.py`; `test_residuals.py` converts all residuals, activations and integrators.
+The problems are the same as in `test_problems.py`; `test_residuals.py` converts all residuals, activations and
+integrators.
 """
 
 import subprocess
@@ -22,12 +23,12 @@ from ocp_converted import Converted
 from ocp_robots import NotRunError
 from ocp_theirs import Theirs
 
-# The same sums in another order, beside the largest number.
+# Tolerance of the same sums in another order, relative to the largest number.
 ROUNDING = 1e-11
 
 
 class Loose(Converted):
-    """The same where some actions are written in Python for Crocoddyl."""
+    """The same problem with some actions written in Python for Crocoddyl."""
 
     strict = False
 
@@ -38,7 +39,7 @@ def test_same_trace(name, solver):
     assert result["good"], result
 
 
-# The first solver of each file; nothing is compared where Crocoddyl does not repeat a single iteration of its own.
+# First solver of each file. Files are skipped if Crocoddyl does not reproduce a single iteration of its own.
 FIRST = {name: (name, solver) for name, solver in reversed(FILES) if ocp.CHAOTIC.get((name, solver)) != 0}
 
 
@@ -53,7 +54,7 @@ def test_same_trace_of_a_file(name, solver):
 
 
 class OnOurs(Theirs):
-    """A problem in Crocoddyl with our dynamics in its Euler steps."""
+    """Problem in Crocoddyl with our dynamics in its Euler steps."""
 
     def stage(self, stage):
         step = super().stage(stage)
@@ -72,11 +73,11 @@ def test_our_dynamics_in_their_solver(name, solver):
     spec, robot = PROBLEMS[name]()
     theirs, ours = Theirs(spec, robot, solver), OnOurs(spec, robot, solver)
     start = theirs.warm_start()
-    for found, expected in zip(ours.warm_start()[1], start[1], strict=True):  # by quasiStatic
+    for found, expected in zip(ours.warm_start()[1], start[1], strict=True):  # computed by quasiStatic
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7 * max(1.0, np.abs(expected).max(initial=0.0)))
     a, b = ours.solve(*start), theirs.solve(*start)
     assert ocp.agreeing(a.rows, b.rows) == len(a.rows) == len(b.rows)
-    # and back: what our dynamics run in is converted to the same
+    # and back: the actions with our dynamics are converted to the same problem
     again = condyle.crocoddyl.problem(ours.problem, strict=True)
     us = start[1] if len({len(u) for u in start[1]}) > 1 else np.array(start[1])
     first = condyle.crocoddyl.problem(theirs.problem, strict=True)
@@ -85,7 +86,7 @@ def test_our_dynamics_in_their_solver(name, solver):
 
 
 def arm():
-    """An arm in Crocoddyl: its state, drives, and a function that makes a sum of costs."""
+    """Creates an arm in Crocoddyl: its state, drives, and a function that creates a sum of costs."""
     model = pin.buildModelFromXML(condyle.robots.ARM7)
     state = crocoddyl.StateMultibody(model)
 
@@ -110,7 +111,7 @@ def shooting(state, drives, running, end, knots=5, constraints=None):
 
 
 def test_costs_of_controls_vanish_at_the_end():
-    """As Crocoddyl has it: what looks at controls, efforts or forces is zero in its terminal models."""
+    """As in Crocoddyl, residuals of controls, efforts or forces are zero in terminal models."""
     model = pin.buildModelFromXML(condyle.robots.HUMANOID, pin.JointModelFreeFlyer())
     state = crocoddyl.StateMultibody(model)
     drives, foot = crocoddyl.ActuationModelFloatingBase(state), model.getFrameId("left_sole")
@@ -144,7 +145,7 @@ def test_costs_of_controls_vanish_at_the_end():
         assert ours.costs[1] == data.cost == 0.0, residual
         problem.calc([x, x], [u])
         assert ours.costs[0] == pytest.approx(problem.runningDatas[0].cost, rel=1e-9) and ours.costs[0] > 0.0, residual
-    # one that is constant stays theirs
+    # a constant residual is not converted
     total = crocoddyl.CostModelSum(state, nu)
     effort = crocoddyl.ResidualModelJointEffort(state, drives, np.ones(nu), nu)
     total.addCost("term", crocoddyl.CostModelResidual(state, effort), 1.0)
@@ -158,7 +159,7 @@ def test_costs_of_controls_vanish_at_the_end():
 
 
 def test_a_residual_that_means_something_else_stays_theirs():
-    """Crocoddyl's residual of gravity in contact is without the forces that it is said to have."""
+    """Crocoddyl's residual of gravity in contact omits the forces that its documentation includes."""
     model = pin.buildModelFromXML(condyle.robots.HUMANOID, pin.JointModelFreeFlyer())
     state = crocoddyl.StateMultibody(model)
     drives = crocoddyl.ActuationModelFloatingBase(state)
@@ -213,12 +214,12 @@ def test_lqr():
     converted = condyle.crocoddyl.problem(theirs, strict=True)
     found = Fddp(converted, project_warm_start=False).solve(np.ones((11, 4)), np.zeros((10, 2)))
     assert found.cost == pytest.approx(solver.cost, rel=1e-9)
-    # the feedback has the other sign
+    # the feedback has the opposite sign
     np.testing.assert_allclose(found.K, -np.array([np.array(K) for K in solver.K]), atol=1e-8)
 
 
 class ActivationModelQuad(crocoddyl.ActivationModelQuad):
-    """A class of one's own with a name of Crocoddyl's, which is not taken for it: Σ r²."""
+    """User-defined class Σ r² with the name of one of Crocoddyl's classes, for which it must not be mistaken."""
 
     def calc(self, data, r):
         data.a_value = float(r @ r)
@@ -228,7 +229,7 @@ class ActivationModelQuad(crocoddyl.ActivationModelQuad):
 
 
 class Odd(crocoddyl.ActivationModelAbstract):
-    """An activation of one's own: Σ r⁴ / 4."""
+    """User-defined activation: Σ r⁴ / 4."""
 
     def __init__(self, n):
         crocoddyl.ActivationModelAbstract.__init__(self, n)
@@ -295,7 +296,7 @@ def test_a_robot_with_a_joint_that_is_not_here():
 
 
 class Circle(crocoddyl.StateAbstract):
-    """Points of a circle, (cos, sin), and a rate."""
+    """State space of points on a circle, (cos, sin), and a rate."""
 
     def __init__(self):
         crocoddyl.StateAbstract.__init__(self, 3, 2)
@@ -318,7 +319,7 @@ class Circle(crocoddyl.StateAbstract):
 
 
 class Turns(crocoddyl.ActionModelAbstract):
-    """An action of one's own on a manifold: a wheel turns to the angle 2."""
+    """User-defined action on a manifold: a wheel turns to the angle 2."""
 
     def __init__(self):
         crocoddyl.ActionModelAbstract.__init__(self, Circle(), 1, 2)

@@ -12,7 +12,7 @@ from example_robot_data.robots_loader import ROBOTS
 import condyle
 from condyle.optimal import Activation, Cost, Fddp, FreeDynamics, Problem, Residual
 
-# Crocoddyl repeats its own trace under a perturbation of 1e-12 to within 1e-6: less cannot be asked for.
+# Tolerance of costs: Crocoddyl reproduces its own trace under a perturbation of 1e-12 only to within 1e-6.
 COST = 1e-6
 
 SPEC = json.loads((Path(__file__).parent / "arm_panda.json").read_text())
@@ -29,13 +29,14 @@ SOLVERS = {
     "box fddp": crocoddyl.SolverBoxFDDP,
     "box ddp": crocoddyl.SolverBoxDDP,
 }
-# Efforts that the reach would like to exceed, on both sides, and that hold the arm up.
+# Bounds on efforts: the unbounded solution exceeds them on both sides, but they still hold the arm up.
 LOWER = np.array([-1.5, -22.0, -8.0, -5.0, -5.0, -5.0, -0.5, -0.5, -0.5])
 UPPER = np.array([9.0, 7.5, 21.0, 22.0, 4.0, 2.5, 0.5, 0.5, 0.5])
 
 
 def solve_theirs(xs, us, solver="fddp", **settings):
-    """Crocoddyl's solution, and what it said of each iteration: cost, step length, regularisation, feasibility."""
+    """Returns Crocoddyl's solution, and its trace: cost, step length, regularisation and feasibility of each
+    iteration."""
     state = crocoddyl.StateMultibody(pin.buildModelFromUrdf(URDF))
     actuation = crocoddyl.ActuationModelFull(state)
     frame = state.pinocchio.getFrameId(SPEC["frame"])
@@ -96,7 +97,7 @@ def warm_start(kind):
     xs, us = np.tile(X0, (SPEC["knots"] + 1, 1)), np.tile(hold, (SPEC["knots"], 1))
     if kind == "gaps":  # states that no controls lead to
         xs[1:, 1] += np.linspace(0.0, 0.3, SPEC["knots"])
-    if kind == "gap at the start":  # also where the horizon begins
+    if kind == "gap at the start":  # also at the beginning of the horizon
         xs[:, 3] += 0.1
     return xs, us
 
@@ -125,7 +126,7 @@ def test_same_optimum_and_gains():
     np.testing.assert_allclose(ours.cost, theirs.cost, rtol=1e-10)
     np.testing.assert_allclose(ours.xs, np.array(theirs.xs), atol=1e-6)
     np.testing.assert_allclose(ours.us, np.array(theirs.us), atol=1e-5)
-    np.testing.assert_allclose(-ours.K[0], np.array(theirs.K[0]), rtol=1e-6, atol=1e-6)  # the other sign there
+    np.testing.assert_allclose(-ours.K[0], np.array(theirs.K[0]), rtol=1e-6, atol=1e-6)  # opposite sign in Crocoddyl
 
 
 def test_one_iteration_is_the_same_to_rounding():

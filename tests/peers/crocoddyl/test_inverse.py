@@ -1,4 +1,4 @@
-"""Inverse dynamics, free and in contact, against Crocoddyl's: steps, costs, equations, derivatives, optima."""
+"""Inverse dynamics, free and in contact, compared with Crocoddyl: steps, costs, equations, derivatives, optima."""
 
 import crocoddyl
 import numpy as np
@@ -19,16 +19,16 @@ from condyle.optimal import (
     Residual,
 )
 
-# Sums of some hundred products in another order, beside the largest of the numbers.
+# Tolerance of sums of some hundred products in another order, relative to the largest number.
 ROUNDING = 1e-11
-# Optima of two solvers, each of which stops at a tolerance.
+# Tolerance of optima of two solvers, each of which stops at a tolerance.
 OPTIMUM = 1e-5
 DT = 0.02
 
 WORDS = {pin.LOCAL: "local", pin.LOCAL_WORLD_ALIGNED: "local_world_aligned"}
 TEXTS = {"arm7": condyle.robots.ARM7, "quadruped": condyle.robots.QUADRUPED, "humanoid": condyle.robots.HUMANOID}
-# Rows of contacts by their names, which Crocoddyl puts into the order of the alphabet; its inverse dynamics knows no
-# contacts in a plane.
+# Number of rows of each contact, by name; Crocoddyl orders contacts alphabetically. Its inverse dynamics does not
+# support contacts in a plane.
 CONTACTS = {
     "arm7": {},
     "quadruped": {"LF_foot": 3, "RF_foot": 1, "RH_foot": 3},
@@ -39,7 +39,7 @@ KP, KD = 5.0, 10.0
 
 
 class Robot:
-    """A robot in both libraries, drives of some joints, contacts, and a state."""
+    """Robot in both libraries, with drives of some joints, contacts, and a state."""
 
     def __init__(self, name, axes=pin.LOCAL, kinds=None, seed=1):
         floating, text = name != "arm7", TEXTS[name]
@@ -56,7 +56,7 @@ class Robot:
         self.u = rng.uniform(-3.0, 3.0, self.nv + self.rows)
 
     def contacts(self, nu):
-        """The contacts in both libraries."""
+        """Returns the contacts in both libraries."""
         ours, theirs = {}, crocoddyl.ContactModelMultiple(self.state, nu)
         for name, rows in self.kinds.items():
             frame, axes, gains = self.theirs.getFrameId(name), self.axes, np.array([KP, KD])
@@ -72,7 +72,7 @@ class Robot:
         return ours, theirs
 
     def costs(self, nu):
-        """Costs of the state, accelerations, efforts and forces in both libraries."""
+        """Returns costs of the state, accelerations, efforts and forces in both libraries."""
         state, nv, ours, theirs = self.state, self.nv, [], crocoddyl.CostModelSum(self.state, nu)
 
         def add(name, weight, residual, other, activation=None):
@@ -89,14 +89,14 @@ class Robot:
         add("effort", 1e-3, Residual.joint_effort(np.r_[np.zeros(passive), tau]), effort, driven)
         for name, rows in self.kinds.items():
             if rows < 3:
-                continue  # of which Crocoddyl's residual of a force does not say all
+                continue  # Crocoddyl's residual of a force does not contain all of its entries
             force, frame = np.linspace(0.0, 5.0, 6), self.theirs.getFrameId(name)
             other = crocoddyl.ResidualModelContactForce(state, frame, pin.Force(force), rows, nu, False)
             add(f"{name} force", 1e-2, Residual.contact_force(name, force), other)
         return ours, theirs
 
     def dynamics(self):
-        """Crocoddyl's inverse dynamics, and a function that makes ours with some more costs."""
+        """Returns Crocoddyl's inverse dynamics, and a function that creates ours with additional costs."""
         nu = self.nv + self.rows
         (costs, total), (contacts, held) = self.costs(nu), self.contacts(nu)
         if self.kinds:
@@ -106,14 +106,14 @@ class Robot:
         return theirs, lambda costs=costs: ContactInverseDynamics(self.ours, contacts, DT, costs)
 
     def node(self, action):
-        """The derivatives of a knot, and its evaluation."""
+        """Returns the derivatives of a knot, and its evaluation."""
         problem = Problem(self.x, [action], [0], FreeDynamics(self.ours, None, []))
         xs, us = np.array([self.x, self.x]), self.u[None]
         return problem.derivatives(xs, us)[0], problem.evaluate(xs, us)
 
 
 def close(found, expected, beside=0.0):
-    """They are the same up to rounding of their largest number, or of what was taken away."""
+    """Checks equality up to rounding of the largest number, or of `beside`, a number that was subtracted."""
     largest = max(np.abs(expected).max(initial=1.0), np.abs(beside).max())
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING * largest)
 
@@ -128,7 +128,7 @@ def hessian(node):
 
 @pytest.mark.parametrize(("name", "axes"), CASES)
 def test_step_and_costs(name, axes):
-    """The next state, costs of all kinds, and their derivatives, without those of the equations."""
+    """Compares the next state, costs of all kinds, and their derivatives; the equations are excluded."""
     robot = Robot(name, axes)
     dynamics, ours = robot.dynamics()
     step = crocoddyl.IntegratedActionModelEuler(dynamics, DT)
@@ -147,13 +147,13 @@ def test_step_and_costs(name, axes):
 
 @pytest.mark.parametrize(("name", "axes"), CASES)
 def test_equations(name, axes):
-    """h, Hx and Hu, row by row: a cost ½ h² of one row has the gradient h ∂h and the Hessian ∂hᵀ ∂h."""
+    """Compares h, Hx and Hu by row: a cost ½ h² of one row has the gradient h ∂h and the Hessian ∂hᵀ ∂h."""
     robot = Robot(name, axes)
     dynamics, ours = robot.dynamics()
     data = dynamics.createData()
     dynamics.calc(data, robot.x, robot.u)
     dynamics.calcDiff(data, robot.x, robot.u)
-    # Crocoddyl's rows follow the names of its constraints; those of forces are for contacts that do not hold
+    # Crocoddyl orders rows by the names of its constraints; rows of forces belong to inactive contacts
     first, residuals = 0, []
     names = [item.key() for item in dynamics.constraints.constraints]
     for key in (key for key in names if dynamics.constraints.getConstraintStatus(key)):
@@ -171,7 +171,7 @@ def test_equations(name, axes):
         only = Activation.weighted(np.eye(n)[k])
         node, value = robot.node(ours([Cost("row", 1.0 / DT, residual, only)]))
         h, H = data.h[row], np.r_[data.Hx[row], data.Hu[row]]
-        assert np.abs(h) > 1e-3  # or the gradient would say nothing
+        assert np.abs(h) > 1e-3  # otherwise the gradient would be too small to compare
         close(value.costs[0] - nothing.costs[0], 0.5 * h * h, nothing.costs[0])
         close(gradient(node) - gradient(bare), h * H, gradient(bare))
         close(hessian(node) - hessian(bare), np.outer(H, H), hessian(bare))
@@ -179,7 +179,7 @@ def test_equations(name, axes):
 
 @pytest.mark.parametrize("name", ["arm7", "quadruped", "humanoid"])
 def test_quasi_static(name):
-    """What holds a robot still, of all actions that have it."""
+    """Compares the controls that hold a robot still, for all actions that provide them."""
     kinds = {name: rows for name, rows in CONTACTS[name].items() if rows > 2}
     robot = Robot(name, kinds=kinds)
     x, state, drives = np.r_[robot.x[: robot.ours.nq], np.zeros(robot.nv)], robot.state, robot.drives
@@ -212,7 +212,7 @@ def test_quasi_static(name):
 
 
 def test_quasi_static_of_steps_and_other_actions():
-    """Of Runge-Kutta steps with controls that are polynomials in time, of the unicycle, and of linear dynamics."""
+    """Tests Runge-Kutta steps with controls that are polynomials in time, the unicycle, and linear dynamics."""
     robot, kinds = Robot("arm7"), crocoddyl.RKType.four
     x = np.r_[robot.x[:7], np.zeros(7)]
     dynamics = crocoddyl.DifferentialActionModelFreeFwdDynamics(
@@ -235,7 +235,8 @@ def test_quasi_static_of_steps_and_other_actions():
 
 @pytest.mark.parametrize(("name", "knots"), [("quadruped", 10), ("arm7", 10)])
 def test_optimum(name, knots):
-    """A motion over feet that stand, and one of an arm, by Crocoddyl's solver of equations and by ours of limits."""
+    """Compares a motion over standing feet, and one of an arm: Crocoddyl's solver of equations and our solver of
+    limits."""
     stands = dict.fromkeys(CONTACTS[name], 3)
     robot = Robot(name, pin.LOCAL_WORLD_ALIGNED, stands)
     dynamics, ours = robot.dynamics()

@@ -1,6 +1,6 @@
-"""Whole problems against Crocoddyl, iteration by iteration.
+"""Whole problems compared with Crocoddyl, iteration by iteration.
 
-They are those of `benches/peers/ocp_problems.py`, and the files of a folder, which CONDYLE_PROBLEMS can name.
+The problems are from `benches/peers/ocp_problems.py`, and from the files of a folder, which CONDYLE_PROBLEMS can name.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Every residual, activation and integrator against Crocoddyl's: the iterates that they lead to on a short horizon."""
+"""Every residual, activation and integrator compared with Crocoddyl's, by iterates on a short horizon."""
 
 import crocoddyl
 import numpy as np
@@ -19,7 +19,7 @@ from condyle.optimal import (
     WrenchCone,
 )
 
-# Three iterations of a few knots: rounding grows by the condition of the problem, some 1e4.
+# Tolerance of three iterations of a few knots: rounding grows with the condition number of the problem, some 1e4.
 SAME = 1e-9
 
 DT, KNOTS = 0.02, 4
@@ -27,7 +27,7 @@ RNG = np.random.default_rng(5)
 
 
 class Robot:
-    """A robot in both libraries, a bent posture, and its feet or tool."""
+    """Robot in both libraries, a bent posture, and its feet or tool."""
 
     def __init__(self, name):
         if name == "arm7":
@@ -179,7 +179,7 @@ def jump(r, nu):
     return crocoddyl.ResidualModelImpulseCoM(r.state), 1.0, Residual.impulse_center_of_mass(), 3
 
 
-# Not the velocity along the world's axes: Crocoddyl's Jacobian of it is not its derivative (0.3 off differences).
+# The velocity along the world's axes is excluded: Crocoddyl's Jacobian of it differs from differences by 0.3.
 ANY = {
     "state": state,
     "com": com,
@@ -205,7 +205,7 @@ ACTIVATIONS = {
 
 
 def costs(r, nu, make, activation):
-    """The same sum in both libraries: the term, and small ones that keep the problem convex."""
+    """Returns the same sum in both libraries: the term, and small terms that keep the problem convex."""
     residual, weight, ours, n = make(r, nu)
     theirs_activation, ours_activation = ACTIVATIONS[activation](n)
     total = crocoddyl.CostModelSum(r.state, nu)
@@ -221,7 +221,7 @@ def costs(r, nu, make, activation):
 
 
 def same_iterates(r, ours, theirs):
-    """Solves a horizon of a knot in both libraries, and compares three iterations."""
+    """Solves a horizon of one knot in both libraries, and compares three iterations."""
     end = crocoddyl.CostModelSum(r.state, r.nu)
     end.addCost("rest", crocoddyl.CostModelResidual(r.state, crocoddyl.ResidualModelState(r.state, r.goal, r.nu)), 1.0)
     last = crocoddyl.IntegratedActionModelEuler(
@@ -289,7 +289,7 @@ def test_runge_kutta(order):
         theirs.calc(data, r.x0, u)
         problem = Problem(r.x0, [ours], [0], FreeDynamics(r.ours, None, []))
         np.testing.assert_allclose(problem.rollout(u[None])[1], data.xnext, atol=1e-13)
-        if r is ARM and order != 3:  # otherwise Crocoddyl's derivatives are up to 6e-6 off central differences
+        if r is ARM and order != 3:  # otherwise Crocoddyl's derivatives differ from central differences by up to 6e-6
             same_iterates(r, ours, theirs)
 
 
@@ -301,7 +301,7 @@ def test_control_gravity():
 
 
 def partial_contacts(r, kind, axes):
-    """Contacts of both feet along a line or in a plane, in both libraries."""
+    """Returns contacts of both feet along a line or in a plane, in both libraries."""
     contacts, ours = crocoddyl.ContactModelMultiple(r.state, r.nu), {}
     word, R, x = "local" if axes == pin.LOCAL else "local_world_aligned", placement().rotation, 0.1
     for foot in r.feet:
@@ -310,7 +310,7 @@ def partial_contacts(r, kind, axes):
             made = crocoddyl.ContactModel1D(r.state, r.frame(foot), x, axes, R, r.nu, gains)
             constraint = condyle.ContactConstraint(foot, kind, None, word, *gains, at, axes=R.T)
         else:
-            # without kp: Crocoddyl takes the error of position along the world's axes whatever the frame's are
+            # without kp: Crocoddyl takes the error of position along the world's axes, whatever the frame's axes
             gains = np.array([0.0, 10.0])
             made = crocoddyl.ContactModel2D(r.state, r.frame(foot), np.zeros(2), r.nu, gains)
             constraint = condyle.ContactConstraint(foot, kind, kd=10.0)
@@ -332,7 +332,7 @@ def normal_force(r, nu):
         ("line", pin.LOCAL, normal_force),
         ("line", pin.LOCAL_WORLD_ALIGNED, normal_force),
         ("line", pin.LOCAL_WORLD_ALIGNED, acceleration),
-        ("plane", pin.LOCAL, friction),  # Crocoddyl's residual of a force knows no plane
+        ("plane", pin.LOCAL, friction),  # Crocoddyl's residual of a force does not support a plane
         ("plane", pin.LOCAL, acceleration),
     ],
 )
@@ -343,7 +343,7 @@ def test_contacts_along_axes(robot, kind, axes, term):
     dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, theirs, total, 0.0, True)
     knot = ContactDynamics(r.ours, ours, DT, mine)
     same_iterates(r, knot, crocoddyl.IntegratedActionModelEuler(dynamics, DT))
-    # what holds the robot still
+    # controls that hold the robot still
     x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
     np.testing.assert_allclose(knot.quasi_static(x), dynamics.quasiStatic(dynamics.createData(), x), atol=1e-7)
 
@@ -374,7 +374,7 @@ def test_control_polynomial(robot, integrator, controls):
         if free
         else crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, held, total, 0.0, True)
     )
-    # a quadratic needs a rule of three or four stages in Crocoddyl; by others its nodes are those of four
+    # in Crocoddyl, a quadratic needs a method of three or four stages; with others it has the nodes of four
     of = kind if kind == crocoddyl.RKType.three else crocoddyl.RKType.four
     polynomial = POLYNOMIALS[controls](r.nu, of)
     if kind is None:
@@ -391,5 +391,5 @@ def test_control_polynomial(robot, integrator, controls):
     np.testing.assert_allclose(at.costs[0], data.cost, rtol=1e-11)
     x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
     np.testing.assert_allclose(ours.quasi_static(x), theirs.quasiStatic(theirs.createData(), x), atol=1e-7)
-    if free and integrator != "runge_kutta_3":  # otherwise Crocoddyl's derivatives are off, see test_runge_kutta
+    if free and integrator != "runge_kutta_3":  # otherwise Crocoddyl's derivatives are inaccurate, see test_runge_kutta
         same_iterates(r, ours, theirs)

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Whole-body control in MuJoCo, all cases: what stands, the largest pushes that are survived, the trot of 20 s.
+"""Whole-body control in MuJoCo, all cases: disturbances, the largest survived pushes, and the trot of 20 s.
 
     .venv/pinocchio/bin/python tests/peers/mujoco/closed_loop.py [disturbances] [pushes] [--write]
 
-Without a name it makes both tables, in some minutes with a release build, all cores at work; with --write it puts them
-into docs/wholebody.md.
+Without a name it makes both tables, which takes some minutes on all cores with a release build. With --write it puts
+them into docs/wholebody.md.
 """
 
 import re
@@ -32,31 +32,30 @@ DISTURBANCES = {
     "10 %, five ticks late, more": Disturbance(0.1, 5, 1.2),
 }
 DIRECTIONS = range(0, 360, 30)
-"""In which TALOS is pushed: degrees from ahead, to the left."""
+"""Directions in which TALOS is pushed: degrees from ahead, to the left."""
 STIFFNESS = 20.0
-"""Of the PD hold: in parts of a joint's greatest effort for 1 rad."""
+"""Stiffness of the PD hold, as a fraction of a joint's maximum effort per rad."""
 PUSH = 20.0
-"""N s, in the table of disturbances."""
+"""Push in the table of disturbances (N s)."""
 LAWS = {"cones": {}, "pyramids of 4 sides": {"cone": Pyramid(4, True)}, "PD hold": {"stiffness": STIFFNESS}}
-"""Which controller keeps it on its feet."""
+"""Controllers that are compared."""
 FIRST, STRIDE, STEP = 40.0, 8.0, 2.0
-"""The search for the largest push begins with the first, goes on by the second, and ends when it is known to the third
-(N s)."""
+"""Parameters of the search for the largest push (N s): first push, step, and accuracy of the result."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
-    """A table in Markdown."""
+    """Returns a table in Markdown."""
     lines = [head, ["---"] * len(head), *rows]
     return "\n".join(f"| {' | '.join(str(cell) for cell in line)} |" for line in lines)
 
 
 def deviation(record: Record) -> float:
-    """The largest horizontal distance of the centre of mass from where it should be (mm)."""
+    """Returns the largest horizontal distance of the centre of mass from its reference (mm)."""
     return 1e3 * float(np.linalg.norm((record.com - record.wanted)[:, :2], axis=1).max())
 
 
 def cell(record: Record, unsolved: int) -> str:
-    """A run in some words."""
+    """Describes a run in some words."""
     if not record.stands:
         return f"falls after {record.t[-1]:.1f} s"
     failed = f", {unsolved} ticks unsolved" if unsolved else ""
@@ -64,7 +63,7 @@ def cell(record: Record, unsolved: int) -> str:
 
 
 def humanoid_cases() -> dict[str, Callable[[Humanoid], Record]]:
-    """What TALOS does."""
+    """Returns the motions of TALOS."""
     return {
         "stands, 5 s": lambda h: h.run(h.control(), 5.0),
         "shifts its weight by ± 6 cm, 8 s": lambda h: h.run(h.control(h.shift), 8.0),
@@ -74,7 +73,7 @@ def humanoid_cases() -> dict[str, Callable[[Humanoid], Record]]:
 
 
 def disturbances() -> str:
-    """What still stands."""
+    """Returns the table of disturbances: which motions the robot survives."""
     rows = []
     for name, case in humanoid_cases().items():
         cells = []
@@ -91,7 +90,7 @@ def disturbances() -> str:
 
 
 def largest(survives: Callable[[float], bool]) -> float:
-    """The largest push (N s) that is survived, where all weaker ones that were tried are."""
+    """Returns the largest survived push (N s) for which all weaker tested pushes are survived, too."""
     low = high = FIRST
     if survives(FIRST):
         while survives(high := low + STRIDE):
@@ -106,7 +105,7 @@ def largest(survives: Callable[[float], bool]) -> float:
 
 
 def pushed(direction: float, law: str) -> float:
-    """The largest push that TALOS survives in a direction (degrees): 3.5 s after its beginning it stands."""
+    """Returns the largest push in a direction (degrees) after which TALOS still stands 3.5 s later."""
     angle, settings = np.radians(direction), LAWS[law]
     unit = np.array([np.cos(angle), np.sin(angle), 0.0])
 
@@ -122,7 +121,7 @@ def pushed(direction: float, law: str) -> float:
 
 
 def pushes() -> str:
-    """The largest ones, around the circle."""
+    """Returns the table of the largest pushes, around the circle."""
     cases = list(product(DIRECTIONS, LAWS))
     with ProcessPoolExecutor() as pool:
         found = dict(zip(cases, pool.map(pushed, *zip(*cases, strict=True)), strict=True))
@@ -131,7 +130,7 @@ def pushes() -> str:
 
 
 def main() -> None:
-    """Prints the tables, and writes them if told to."""
+    """Prints the tables, and writes them if requested."""
     text = DOCUMENT.read_text(encoding="utf-8") if DOCUMENT.exists() else ""
     tables = {"disturbances": disturbances, "pushes": pushes}
     chosen = [name for name in sys.argv[1:] if name in tables] or list(tables)

@@ -8,10 +8,10 @@ T = TypeVar("T")
 
 
 class DrivenMjcf:
-    """The text of a robot, which MuJoCo may refuse: ranges may be empty, and classes may not fit."""
+    """Text of a robot, which MuJoCo may reject: ranges may be empty, and classes may not fit."""
 
     def __init__(self, seed: int) -> None:
-        """Writes the robot of a seed."""
+        """Writes the robot for a seed."""
         self.random = random.Random(seed)
         self.joints: list[tuple[str, str]] = []
         self.bodies: list[str] = []
@@ -30,36 +30,36 @@ class DrivenMjcf:
         )
 
     def number(self, lower: float = -1.0, upper: float = 1.0) -> float:
-        """A number of three digits."""
+        """Returns a number of three digits."""
         return round(self.random.uniform(lower, upper), 3)
 
     def numbers(self, count: int) -> str:
-        """Numbers between -1 and 1."""
+        """Returns numbers between -1 and 1."""
         return " ".join(str(self.number()) for _ in range(count))
 
     def range(self, size: float) -> str:
-        """Two numbers in order."""
+        """Returns two numbers in ascending order."""
         lower, upper = sorted((self.number(-size, size), self.number(-size, size)))
         return f"{lower} {upper + 0.01:.3f}"
 
     def chance(self, share: float) -> bool:
-        """Whether something is there, in a share of all cases."""
+        """Returns true in a fraction of all cases."""
         return self.random.random() < share
 
     def maybe(self, share: float, text: str) -> str:
-        """A text in a share of all cases, and nothing in the others."""
+        """Returns the text in a fraction of all cases, and an empty text otherwise."""
         return text if self.chance(share) else ""
 
     def pick(self, values: list[T]) -> T:
-        """One of some values."""
+        """Returns one of some values."""
         return self.random.choice(values)
 
     def polynomial(self, greatest: float) -> str:
-        """One coefficient or three."""
+        """Returns one coefficient or three."""
         return f"{self.number(0, greatest)}" + self.maybe(0.5, f" {self.number(0, 1)} {self.number(0, 1)}")
 
     def joint(self, name: str, kind: str) -> str:
-        """A joint with springs and losses."""
+        """Returns a joint with springs and losses."""
         self.joints.append((name, kind))
         text = f'<joint name="{name}" type="{kind}" '
         if kind in ("hinge", "slide"):
@@ -77,7 +77,7 @@ class DrivenMjcf:
         return text + self.maybe(0.25, f'springdamper="{self.number(0.1, 1)} {self.number(0.2, 2)}" ') + "/>"
 
     def body(self, depth: int, floats: bool = False) -> str:
-        """A body and those on it."""
+        """Returns a body and the bodies on it."""
         k = len(self.bodies)
         self.bodies.append(f"b{k}")
         kinds = [self.pick(["hinge", "hinge", "slide", "ball"]) for _ in range(self.pick([0, 1, 1, 1, 2]))]
@@ -91,7 +91,7 @@ class DrivenMjcf:
         return f'<body name="b{k}" {place}>{joints}{inertial}{site}{children}</body>'
 
     def tendon(self, k: int) -> str:
-        """A fixed tendon over one joint or two."""
+        """Returns a fixed tendon over one joint or two."""
         self.tendons.append(f"t{k}")
         attributes = [
             f'armature="{self.number(0, 1)}"',
@@ -108,7 +108,7 @@ class DrivenMjcf:
         return f'<fixed name="t{k}" {chosen}>{joints}</fixed>'
 
     def laws(self) -> dict[str, Callable[[], str]]:
-        """The attributes of each kind of actuator."""
+        """Returns the attributes of each kind of actuator."""
         gain = self.number
         return {
             "motor": lambda: "",
@@ -133,7 +133,7 @@ class DrivenMjcf:
         }
 
     def mechanics(self, kind: str) -> str:
-        """The attributes that all kinds of actuators have."""
+        """Returns the attributes that all kinds of actuators have."""
         text = self.maybe(0.6, f'gear="{self.number(-4, 4)}' + self.maybe(0.5, f" {self.numbers(5)}") + '" ')
         text += self.maybe(0.3, f'armature="{self.number(0, 1)}" ') + self.maybe(
             0.3, f'damping="{self.polynomial(1)}" '
@@ -145,11 +145,11 @@ class DrivenMjcf:
         return text
 
     def default(self, kind: str) -> str:
-        """A default of a class."""
+        """Returns a default of a class."""
         return f"<{kind} {self.laws()[kind]()} {self.mechanics(kind)}/>"
 
     def actuator(self, k: int) -> str:
-        """An actuator of a joint, a tendon or a site."""
+        """Returns an actuator of a joint, a tendon or a site."""
         kind = self.pick(sorted(self.laws()))
         targets = [f'site="s{self.random.randrange(len(self.bodies))}"']
         targets += [f'tendon="{name}"' for name in self.tendons]
@@ -158,7 +158,7 @@ class DrivenMjcf:
         return f'<{kind} name="a{k}" {self.pick(targets)} {attributes}/>'
 
     def constraint(self) -> str:
-        """A loop or a coupling."""
+        """Returns a loop or a coupling."""
         first, second = (self.random.randrange(len(self.bodies)) for _ in range(2))
         bodies = f'body1="b{first}" ' + self.maybe(0.8, f'body2="b{second}" ')
         relative = self.maybe(0.5, f'anchor="{self.numbers(3)}" ') + self.maybe(0.4, f'relpose="{self.numbers(7)}" ')

@@ -1,9 +1,9 @@
-"""Robots with one feature each: every element and attribute that MuJoCo's schema has, set in a small robot.
+"""Robots with one feature each: every element and attribute of MuJoCo's schema, set in a small robot.
 
     python tests/peers/mujoco/features.py [PATTERN]
 
-prints a line for each. A feature that changes what MuJoCo compiles (inertias, poses, limits, losses, actuators, …) must
-change our model in the same way, or be a warning or an error that names it. `test_features.py` asserts that.
+prints a line for each. A feature that changes MuJoCo's compiled model (inertias, poses, limits, losses, actuators, …)
+must change our model in the same way, or give a warning or an error that names it. `test_features.py` asserts this.
 """
 
 import fnmatch
@@ -21,7 +21,7 @@ import condyle
 from condyle import conventions
 
 SAME = 1e-9
-"""Inertia matrices, efforts and poses of both libraries, to this part of the largest number."""
+"""Tolerance of inertia matrices, efforts and poses, relative to the largest number."""
 
 INERTIAL = '<inertial pos="0.1 0.02 0.03" mass="2" diaginertia="0.02 0.03 0.04"/>'
 MESH = '<mesh name="mesh" vertex="0 0 0  0.2 0 0  0 0.3 0  0 0 0.1"/>'
@@ -46,7 +46,7 @@ HOLES = {"asset": MESH, "in_b": "", "in_c": "", "in_world": "", "after": "", "in
 ORIENTED = ["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"]
 ACTUATOR_TARGET = ["joint", "jointinparent", "tendon", "site", "refsite", "slidersite", "cranksite", "body"]
 
-# What is tried for an attribute until MuJoCo takes one that has an effect; others get GENERIC.
+# Values tried for an attribute until MuJoCo accepts one that has an effect; other attributes use GENERIC.
 VALUES = {
     "quat": ["0.8 0.2 0.4 0.4"],
     "axisangle": ["1 2 3 40"],
@@ -135,7 +135,7 @@ VISUAL = {
 
 
 def schema() -> Iterator[tuple[tuple[str, ...], list[str]]]:
-    """The path of each element and its attributes."""
+    """Yields the path of each element and its attributes."""
     path: list[str] = []
     attributes: list[str] = []
     for line in mujoco.mj_printSchema(False, False).splitlines():
@@ -151,8 +151,8 @@ def schema() -> Iterator[tuple[tuple[str, ...], list[str]]]:
 
 
 def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
-    """Elements of a path in which an attribute is set: the name of the case, the robot without the attribute, and the
-    robot with it, in which `@` stands for the attribute."""
+    """Yields test cases for an attribute of an element: the name, the robot without the attribute, and the robot
+    with it. In the latter, `@` is the placeholder of the attribute."""
 
     def robot(**holes: str) -> str:
         return ROBOT.format(**HOLES | holes)
@@ -217,7 +217,7 @@ def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
             ends = "joint1='j' joint2='l'" if kind == "joint" else "body1='b' body2='f' anchor='0.1 0 0'"
             holes = {"in_world": "<body name='f'><joint name='z' axis='1 0 0'/><geom size='0.1' pos='0.1 0 0'/></body>"}
             base = f"<equality><{kind} name='x' {ends}/></equality>"
-            yield kind, robot(**holes), robot(**holes, after=base)  # the whole element
+            yield kind, robot(**holes), robot(**holes, after=base)  # the whole element is added
             yield kind, robot(**holes, after=base), robot(**holes, after=base.replace("/>", " @/>"))
         case ("actuator", kind):
             ends = {
@@ -253,7 +253,7 @@ def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
 
 @functools.cache
 def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
-    """MuJoCo's model, and all of it that has an effect; or its error."""
+    """Returns MuJoCo's model with all fields that have an effect, or its error."""
     try:
         m = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
@@ -316,7 +316,7 @@ def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
         "actuator_ctrllimited",
     ]:
         effect[field] = getattr(m, field).copy()
-    effect["eq_data"][:, 10] = 0.0  # the torque scale of a soft weld
+    effect["eq_data"][:, 10] = 0.0  # the torque scale of a compliant weld
     effect["actuator_biasprm"][m.actuator_biastype == 0] = 0.0
     effect["actuator_dynprm"][m.actuator_dyntype == 0] = 0.0
     for name in ("tendon_range", "actuator_forcerange", "actuator_ctrlrange"):
@@ -330,7 +330,7 @@ def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
 
 
 def rounded(x: Any) -> Any:
-    """The numbers of a value of JSON with 12 digits."""
+    """Rounds the numbers of a JSON value to 12 digits."""
     if isinstance(x, float):
         return float(f"{x:.12g}")
     if isinstance(x, list):
@@ -340,7 +340,7 @@ def rounded(x: Any) -> Any:
 
 @functools.cache
 def ours(text: str) -> tuple[condyle.Model, dict[str, Any]] | str:
-    """Our model and all that it holds, or the error."""
+    """Returns our model with all its contents, or the error."""
     try:
         model = condyle.Model.from_mjcf_str(text)
     except condyle.Error as error:
@@ -350,7 +350,7 @@ def ours(text: str) -> tuple[condyle.Model, dict[str, Any]] | str:
 
 
 def changed(a: dict[str, Any], b: dict[str, Any]) -> list[str]:
-    """The names of what differs."""
+    """Returns the names of the differing fields."""
 
     def same(x: Any, y: Any) -> bool:
         if isinstance(x, str) or isinstance(y, str) or not np.shape(x) or not np.shape(y) or len(x) != len(y):
@@ -369,7 +369,7 @@ def changed(a: dict[str, Any], b: dict[str, Any]) -> list[str]:
 
 
 def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, dict[str, Any]]) -> list[str]:
-    """The names of the quantities in which our robot is not MuJoCo's."""
+    """Returns the names of the quantities in which our robot differs from MuJoCo's."""
     (m, d), effect = theirs
     model, _ = mine
     if (model.nq, model.nv) != (m.nq, m.nv):
@@ -378,7 +378,7 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
     q = there.position_from(d.qpos)
     v = there.velocity_from(d.qpos, d.qvel)
     data = condyle.Data(model)
-    turn = np.array([there.velocity(q, e) for e in np.eye(model.nv)]).T  # theirs = turn · ours
+    turn = np.array([there.velocity(q, e) for e in np.eye(model.nv)]).T  # MuJoCo's velocity = turn · ours
     wrong = []
 
     def expect(name: str, found: Any, expected: Any) -> None:
@@ -390,7 +390,7 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
     tau = condyle.rnea(model, data, q, v, a)
     expect("bias", there.effort(q, tau), effect["bias"])
     passive = there.effort(q, condyle.passive_torque(model, q, v, 1e-3))
-    passive = passive + model.friction * np.tanh(d.qvel / 1e-3)  # MuJoCo's friction is a constraint
+    passive = passive + model.friction * np.tanh(d.qvel / 1e-3)  # in MuJoCo, friction is a constraint
     expect("passive", passive, effect["passive"])
     expect("gravity", model.gravity, effect["gravity"] if not effect["disabled"][0] & 128 else 0 * effect["gravity"])
     frames = {f.name for f in model.frames}
@@ -409,7 +409,7 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
         ]
     )
     single = np.array([kind > 1 for kind in m.jnt_type for _ in range(1 if kind > 1 else 7 if kind == 0 else 4)])
-    # a tendon over one joint is held by the joint
+    # a tendon over one joint is stored as a property of the joint
     if not ((m.tendon_num == 1) & ((m.tendon_frictionloss > 0) | (m.tendon_limited > 0))).any():
         found = np.vstack([model.limits.lower, model.limits.upper]).T[single]
         if single.any() and not np.allclose(found, ranges[single]):
@@ -419,7 +419,8 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
 
 
 def cases() -> Iterator[tuple[str, str, str]]:
-    """Name, robot without the feature, robot with it; `@` in the latter stands for an attribute that is named `*`."""
+    """Yields name, robot without the feature, and robot with it; `@` in the latter is the placeholder of an
+    attribute, named `*`."""
     for path, attributes in schema():
         if VISUAL & set(path):
             continue
@@ -442,7 +443,7 @@ def cases() -> Iterator[tuple[str, str, str]]:
 
 
 def verdict(base: str, text: str) -> tuple[str, str]:
-    """`silent`, `wrong`, `held`, `warned`, `refused`, `no effect`, or `invalid` if MuJoCo refuses it."""
+    """Returns `silent`, `wrong`, `held`, `warned`, `refused`, `no effect`, or `invalid` if MuJoCo rejects the robot."""
     theirs, before = compiled(text), compiled(base)
     if isinstance(theirs, str):
         return "invalid", theirs.splitlines()[0]
@@ -454,7 +455,7 @@ def verdict(base: str, text: str) -> tuple[str, str]:
         return "refused", mine
     warnings = [str(w) for w in mine[0].warnings]
     known = [str(w) for w in plain[0].warnings]
-    # an element that is left out whole is warned of already, whatever its attributes
+    # an omitted element already gives a warning, whatever its attributes
     said = [w for w in warnings if w not in known or "`x`" in w]
     if not said and (wrong := differences(theirs, mine)):
         return "wrong", f"{wrong}; MuJoCo's changes: {effect}"
@@ -473,7 +474,7 @@ if __name__ == "__main__":
         if fnmatch.fnmatch(name, pattern):
             try:
                 kind, what = verdict(base, text)
-            except Exception as error:  # a case that the comparison itself cannot take
+            except Exception as error:  # a case that the comparison itself cannot handle
                 kind, what = "crash", repr(error)
             counts[kind] = counts.get(kind, 0) + 1
             print(f"{kind:10} {name}: {what}")

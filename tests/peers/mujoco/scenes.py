@@ -1,4 +1,4 @@
-"""The robots, their controllers, and what they are to do in MuJoCo."""
+"""The robots, their controllers, and their tasks in MuJoCo."""
 
 import sys
 from collections import deque
@@ -28,46 +28,46 @@ sys.path.append(str(Path(__file__).parents[3] / "python" / "examples"))
 from gait import Gait
 
 Law = Callable[[float, Array, Array], Array]
-"""Efforts from time, position and velocity."""
+"""Function that returns efforts from time, position and velocity."""
 
 SOLES = ["left_sole_link", "right_sole_link"]
 SOLE = (0.2, 0.12)
 """Sides of TALOS's soles (m)."""
 TRUSTED = (0.19, 0.11)
-"""What the controller takes for them: at the very edges a sole tips."""
+"""Sides of the soles that the controller assumes (m): at the very edges a sole tips."""
 FEET = ["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"]
 BALL = 0.03
 """Radius of ANYmal's feet (m)."""
 FRICTION = 0.7
 PUSH_TIME = 0.1
-"""For which a push lasts (s)."""
+"""Duration of a push (s)."""
 FALLEN = 0.75
-"""A robot has fallen when its trunk is below this part of its first height, or leans by this angle (rad)."""
+"""Limit of a fall: the trunk is below this fraction of its initial height, or leans by this angle (rad)."""
 
 
 def urdf(name: str) -> str:
-    """The text of a robot of example-robot-data."""
+    """Returns the text of a robot of example-robot-data."""
     loader = ROBOTS[name]
     path = Path(loader.path) / loader.urdf_subpath / loader.urdf_filename
     return (Path(getModelPath(str(path))) / path).read_text()
 
 
 class Disturbance(NamedTuple):
-    """What the controller does not know."""
+    """Differences between the world and the controller's model of it."""
 
     noise: float = 0.0
-    """Of each velocity, in parts of itself, normally distributed."""
+    """Noise of each velocity, normally distributed, relative to the velocity."""
     delay: int = 0
-    """Ticks after which a state is seen."""
+    """Delay after which the controller receives a state (ticks)."""
     friction: float = 1.0
-    """What the controller takes for μ, in parts of it."""
+    """Friction coefficient that the controller assumes, as a multiple of μ."""
 
 
 NONE = Disturbance()
 
 
 class Record(NamedTuple):
-    """A run, every so many ticks."""
+    """Record of a run, with one entry per `every` ticks."""
 
     stands: bool
     """Whether the robot has not fallen."""
@@ -76,11 +76,11 @@ class Record(NamedTuple):
     q: Array
     """Positions."""
     com: Array
-    """The centre of mass (m)."""
+    """Centre of mass (m)."""
     loads: Array
-    """The vertical force on each foot (N)."""
+    """Vertical force on each foot (N)."""
     wanted: Array
-    """The centre of mass that is asked for (m)."""
+    """Reference of the centre of mass (m)."""
 
 
 def run(
@@ -92,7 +92,7 @@ def run(
     wanted: Callable[[], Array] | None = None,
     every: int = 10,
 ) -> Record:
-    """Lets a law control a robot that is in its first state."""
+    """Runs a control law on a robot that starts in its current state."""
     rng, data = np.random.default_rng(0), condyle.Data(world.model)
     seen: deque[tuple[Array, Array]] = deque(maxlen=1 + disturbance.delay)
     height, rows = world.state()[0][2] - world.ground, []
@@ -105,7 +105,7 @@ def run(
         if tick % every == 0:
             c = condyle.com(world.model, data, q)
             rows.append((t, q, c, world.loads()[:, 2], wanted() if wanted else c))
-        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z of the trunk's z
+        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z component of the trunk's z axis
         if not (q[2] - world.ground > FALLEN * height and upright > np.cos(FALLEN)):
             stands = False
             break
@@ -113,7 +113,7 @@ def run(
 
 
 def ramp(t: float, begin: float, end: float) -> Array:
-    """From 0 at one time to 1 at another one, smoothly: value, rate, and rate of the rate."""
+    """Returns a smooth transition from 0 at `begin` to 1 at `end`: value, rate, and second derivative."""
     s, w = np.clip((t - begin) / (end - begin), 0.0, 1.0), 1.0 / (end - begin)
     value = s**3 * (10.0 + s * (6.0 * s - 15.0))
     return np.array([value, 30.0 * w * (s * (1.0 - s)) ** 2, 60.0 * w**2 * s * (1.0 - s) * (1.0 - 2.0 * s)])
@@ -144,14 +144,14 @@ class Humanoid:
         for side, sign in (("left", 1.0), ("right", -1.0)):
             for name, angle in (posture | {"arm_*_1": sign * 0.26, "arm_*_2": sign * 0.17}).items():
                 q[model.idx_qs[model.joint(name.replace("*", side) + "_joint")]] = angle
-        q[2] -= self.controller.hold(q).contacts[0].pose[2, 3]  # it stands at height 0
+        q[2] -= self.controller.hold(q).contacts[0].pose[2, 3]  # puts the soles at height 0
         self.q, self.start = q, self.controller.hold(q)
         self.references = self.start.copy()
         self.unsolved = 0
         self.world.set_state(q, np.zeros(model.nv))
 
     def control(self, aim: Callable[[float, References], None] | None = None) -> Law:
-        """The whole-body controller, with references that a function changes as time goes by."""
+        """Returns the whole-body controller; `aim` changes its references over time."""
 
         def law(t: float, q: Array, v: Array) -> Array:
             if aim:
@@ -163,10 +163,11 @@ class Humanoid:
         return law
 
     def hold(self, stiffness: float) -> Law:
-        """PD control of the joints about the posture, with the efforts that carry it: no whole-body control.
+        """Returns PD control of the joints about the posture, with efforts that compensate gravity: no whole-body
+        control.
 
-        stiffness: in parts of the joint's greatest effort for 1 rad; the damping is a tenth of it for 1 rad/s, without
-        delay or limit, as in a motor's own loop: MuJoCo has it in its implicit step.
+        stiffness: as a fraction of the joint's maximum effort per rad. The damping is a tenth of it per rad/s. Neither
+        has a delay or a limit, as in a motor's own control loop: MuJoCo includes them in its implicit step.
         """
         most = np.where(np.isfinite(limit := self.world.model.limits.effort), limit, 0.0)
         tau0 = self.controller.step(self.q, np.zeros(len(most)), self.start).solved().tau
@@ -179,7 +180,7 @@ class Humanoid:
         return law
 
     def run(self, law: Law, seconds: float, push: Sequence[float] | None = None, begin: float = 0.5) -> Record:
-        """push: N s, given evenly over PUSH_TIME."""
+        """Runs a law; `push` (N s) is distributed evenly over PUSH_TIME."""
 
         def force(t: float) -> Sequence[float]:
             pushed = push is not None and begin <= t < begin + PUSH_TIME
@@ -191,7 +192,7 @@ class Humanoid:
         return run(self.world, law, seconds, force, self.disturbance, wanted)
 
     def shift(self, t: float, references: References) -> None:
-        """The weight goes to the left and to the right sole, in 8 s, each time by 6 cm."""
+        """Shifts the weight to the left and to the right sole in 8 s, by 6 cm each."""
         w, (b, db, ddb) = 0.5 * np.pi, ramp(t, 0.0, 1.0)
         s, ds, dds = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
         y, v, a = 0.06 * np.array([b * s, db * s + b * ds, ddb * s + 2.0 * db * ds + b * dds])
@@ -199,7 +200,7 @@ class Humanoid:
         references.com.velocity[1], references.com.acceleration[1] = v, a
 
     def lift(self, t: float, references: References) -> None:
-        """The weight goes to the left sole, the right foot is lifted by 10 cm, and all comes back, in 7 s."""
+        """Shifts the weight to the left sole, lifts the right foot by 10 cm, and returns, in 7 s."""
         start = self.start
         to, back = ramp(t, 0.2, 1.4), ramp(t, 5.2, 6.4)
         aside = start.contacts[0].pose[:2, 3] - start.com.position[:2]
@@ -212,7 +213,7 @@ class Humanoid:
 
 
 class Quadruped:
-    """A quadruped that trots what FDDP has planned."""
+    """Quadruped that trots along a plan by FDDP."""
 
     def __init__(
         self,
@@ -242,12 +243,13 @@ class Quadruped:
         return command.tau
 
     def run(self, seconds: float) -> Record:
-        """The first seconds of the plan."""
+        """Runs the first seconds of the plan."""
         return run(self.world, self.law, seconds, None, self.disturbance, lambda: self.references.com.position.copy())
 
 
 def trot(urdf: str, feet: Sequence[str], knees: Sequence[float], seconds: float) -> Plan:
-    """A trot by FDDP: diagonal pairs step 16 cm ahead by turns, four times a second, with 50 ms on all feet between."""
+    """Plans a trot by FDDP: diagonal pairs of feet alternately step 16 cm ahead, four times a second. Between steps
+    all feet stand for 50 ms."""
     model = condyle.Model.from_urdf_str(urdf, root_joint="free_flyer")
     q = condyle.neutral(model)
     q[7:] = knees
@@ -263,5 +265,5 @@ def trot(urdf: str, feet: Sequence[str], knees: Sequence[float], seconds: float)
 
 @cache
 def anymal() -> Plan:
-    """ANYmal's trot of 20 s."""
+    """Returns ANYmal's trot of 20 s."""
     return trot(urdf("anymal"), FEET, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2, 20.0)

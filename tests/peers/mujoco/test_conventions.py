@@ -1,4 +1,4 @@
-"""`condyle.conventions` beside MuJoCo: one state, in each library's numbers, gives one motion."""
+"""`condyle.conventions` compared with MuJoCo: one state, in each library's convention, gives one motion."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ import condyle
 from condyle import conventions
 
 SAME = 1e-9
-"""Accelerations, efforts and poses of both libraries, to this part of the largest one."""
+"""Tolerance of accelerations, efforts and poses, relative to the largest one."""
 FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
 
 
@@ -22,7 +22,7 @@ def close(found: np.ndarray, expected: np.ndarray) -> None:
 
 @pytest.fixture(params=["quadruped", "talos"])
 def world(request: pytest.FixtureRequest) -> World:
-    """A robot in both libraries, without damping or friction."""
+    """Creates a robot in both libraries, without damping or friction."""
     robots: dict[str, tuple[str, Sequence[str], tuple[float, float] | float]] = {
         "quadruped": (condyle.robots.QUADRUPED, FEET, BALL),
         "talos": (urdf("talos"), SOLES, SOLE),
@@ -34,7 +34,7 @@ def world(request: pytest.FixtureRequest) -> World:
 
 
 def orders(world: World) -> tuple[list[int], list[int]]:
-    """Where our positions and velocities stand in MuJoCo's vectors: joints by their names."""
+    """Returns the indices of our positions and velocities in MuJoCo's vectors, by joint names."""
     positions, velocities = [], []
     for name, nq, nv in list(zip(world.model.names, world.model.nqs, world.model.nvs, strict=True))[1:]:
         joint = world.mj.joint(name)
@@ -94,7 +94,7 @@ def test_external_forces(world: World) -> None:
 
 
 def test_spherical_and_continuous() -> None:
-    """A ball joint's quaternion, and an angle for a cosine and a sine."""
+    """A ball joint's quaternion is converted, and so is an angle to a cosine and a sine."""
     text = """<mujoco><worldbody><body name="a"><joint name="ball" type="ball"/>
         <inertial pos="0.1 0 -0.3" mass="2" diaginertia="0.1 0.2 0.15"/>
         <body name="b" pos="0 0 -0.5"><joint name="hinge" axis="0 1 0"/>

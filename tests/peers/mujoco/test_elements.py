@@ -1,5 +1,5 @@
-"""The table of MJCF's elements against MuJoCo's schema: nothing that MuJoCo knows is unknown, and each attribute that
-may change a robot has a decision."""
+"""The table of MJCF's elements compared with MuJoCo's schema. It contains all of MuJoCo's elements, and states how
+each attribute that may change a robot is treated."""
 
 from pathlib import Path
 
@@ -10,9 +10,9 @@ import condyle
 
 TABLE = Path(__file__).parents[3] / "crates/model/src/io/mjcf/elements.txt"
 
-# What becomes of each attribute of the structure: a model holds it (or refuses a value by name), it is a warning that
-# says what is left out, or it has no effect on kinematics, dynamics and limits. Springs, actuators, tendons,
-# constraints and keyframes are tried one by one by `features.py`.
+# Treatment of each attribute of the structure. A model holds it (or rejects a value by name), a warning says that it is
+# left out, or it has no effect on kinematics, dynamics and limits. `features.py` tests springs, actuators, tendons,
+# constraints and keyframes one by one.
 HELD = {
     "compiler": "alignfree angle assetdir autolimits balanceinertia boundinertia boundmass coordinate eulerseq "
     "fitaabb inertiafromgeom inertiagrouprange meshdir settotalmass strippath",
@@ -59,7 +59,7 @@ NO_EFFECT = {
 
 
 def table() -> dict[str, tuple[set[str], dict[str, str]]]:
-    """Attributes and children of each type; the type of a child whose inside is not looked at is empty."""
+    """Returns attributes and children of each type; the type of a child is empty if its contents are ignored."""
     types = {}
     for line in TABLE.read_text().splitlines():
         name, rest = line.split(":", 1)

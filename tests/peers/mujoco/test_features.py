@@ -1,4 +1,4 @@
-"""One-feature robots, from MuJoCo's own schema: nothing that has an effect is dropped in silence."""
+"""Robots with one feature each, from MuJoCo's own schema: no feature with an effect is ignored silently."""
 
 import collections
 import itertools
@@ -11,7 +11,7 @@ CASES = {path: list(cases) for path, cases in itertools.groupby(features.cases()
 
 @pytest.mark.parametrize("path", CASES)
 def test_features(path: str) -> None:
-    """Each attribute of an element is held as MuJoCo has it, is without effect, or is warned of, or refused."""
+    """Each attribute of an element is held as in MuJoCo, has no effect, gives a warning, or is rejected."""
     verdicts: dict[str, list[str]] = collections.defaultdict(list)
     for name, base, text in CASES[path]:
         kind, what = features.verdict(base, text)

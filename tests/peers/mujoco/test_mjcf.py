@@ -1,4 +1,4 @@
-"""Actuators, springs, tendons, loops and keyframes of random MJCFs beside MuJoCo's compiled models."""
+"""Actuators, springs, tendons, loops and keyframes of random MJCFs compared with MuJoCo's compiled models."""
 
 import json
 from typing import Any
@@ -12,16 +12,16 @@ import condyle
 
 Array = np.ndarray
 SAME = 1e-8
-"""Numbers of both, to this part of each: some follow from M⁻¹."""
+"""Tolerance relative to each number; some follow from M⁻¹."""
 BOTH = (-1.0, 1.0)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
-"""Kinds of joints from here on have one degree of freedom."""
+"""Index from which the kinds of joints have one degree of freedom."""
 HUGE = 1e8
-"""Control beyond all ranges. An effort that is a hundredth of it has no limit."""
+"""Control beyond all ranges. An effort above a hundredth of it has no limit."""
 
 
 class Robot:
-    """A robot as MuJoCo has compiled it, and as we have read it."""
+    """Robot as compiled by MuJoCo, and as read by us."""
 
     def __init__(self, text: str, theirs: mujoco.MjModel) -> None:
         """Reads the text."""
@@ -31,11 +31,11 @@ class Robot:
         self.theirs, self.data, self.text = theirs, mujoco.MjData(theirs), text
 
     def says(self, what: str) -> bool:
-        """Whether a warning has these words."""
+        """Returns whether a warning contains these words."""
         return any(what in warning for warning in self.said)
 
     def position(self) -> Array:
-        """The position of MuJoCo's state in our order: quaternions are x, y, z, w."""
+        """Returns the position of MuJoCo's state in our order: quaternions are x, y, z, w."""
         q, m = self.data.qpos.copy(), self.theirs
         for at, kind in zip(m.jnt_qposadr, m.jnt_type, strict=True):
             if mujoco.mjtJoint(kind) in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
@@ -44,7 +44,7 @@ class Robot:
         return q
 
     def inertia(self, m: mujoco.MjModel) -> Array:
-        """M of a model of MuJoCo at its first position."""
+        """Returns M of a model of MuJoCo at its first position."""
         data, matrix = mujoco.MjData(m), np.zeros((m.nv, m.nv))
         mujoco.mj_forward(m, data)
         mujoco.mj_fullM(m, data, matrix)
@@ -52,7 +52,7 @@ class Robot:
 
 
 def robots() -> list[Robot]:
-    """The first robots that MuJoCo accepts."""
+    """Returns the first robots that MuJoCo accepts."""
     found: list[Robot] = []
     seed = 0
     while len(found) < 150:
@@ -77,13 +77,13 @@ def close(found: Any, expected: Any) -> None:
 
 
 def ends(limits: list[float | None]) -> list[float]:
-    """A range of a file in JSON, where null is infinite."""
+    """Returns a range of a file in JSON, where null is infinite."""
     lower, upper = limits
     return [-np.inf if lower is None else lower, np.inf if upper is None else upper]
 
 
 def pose(X: dict[str, Any]) -> Array:
-    """A pose as a matrix."""
+    """Returns a pose as a matrix."""
     matrix = np.eye(4)
     columns = [[column[k] for k in "xyz"] for column in (X["rotation"][c] for c in "xyz")]
     matrix[:3, :3], matrix[:3, 3] = np.array(columns).T, [X["translation"][k] for k in "xyz"]
@@ -111,7 +111,7 @@ def test_armature_and_friction(read: list[Robot]) -> None:
 
 
 def spring(robot: Robot, q: Array) -> Array:
-    """The effort of all springs."""
+    """Returns the effort of all springs."""
     tau = np.zeros(robot.theirs.nv)
     for s in robot.ours["springs"]:
         body, k, rest = robot.ours["bodies"][s["body"]], s["stiffness"], np.array(s["rest"])
@@ -134,7 +134,7 @@ def spring(robot: Robot, q: Array) -> Array:
 
 
 def test_springs_and_damping(read: list[Robot]) -> None:
-    """`qfrc_spring` and `qfrc_damper`, where no tendon runs over several joints."""
+    """Compares with `qfrc_spring` and `qfrc_damper`, where no tendon runs over several joints."""
     rng, compared = np.random.default_rng(0), 0
     for robot in read:
         m, d = robot.theirs, robot.data
@@ -153,7 +153,7 @@ def test_springs_and_damping(read: list[Robot]) -> None:
 
 
 def test_actuators(read: list[Robot]) -> None:
-    """Laws, gears and ranges of the table; what is not in it is said."""
+    """Compares laws, gears and ranges of the table; a warning names each omitted actuator."""
     compared = 0
     for robot in read:
         m = robot.theirs
@@ -184,7 +184,7 @@ def test_actuators(read: list[Robot]) -> None:
 
 
 def pushed(robot: Robot, k: int, sign: float) -> tuple[float, bool]:
-    """The greatest effort along a degree of freedom in one direction, and whether an actuator acts on it."""
+    """Returns the maximum effort along a degree of freedom in one direction, and whether an actuator acts on it."""
     m, d, driven = mujoco.MjModel.from_xml_string(robot.text), robot.data, False
     mujoco.mj_resetData(m, d)
     mujoco.mj_forward(m, d)
@@ -195,11 +195,11 @@ def pushed(robot: Robot, k: int, sign: float) -> tuple[float, bool]:
         controls = slice(m.actuator_ctrladr[i], m.actuator_ctrladr[i] + m.actuator_ctrlnum[i])
         moment = moments[m.actuator_outadr[i], k]
         if m.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE:
-            m.actuator_gear[i] = 0.0  # no limit of a joint
+            m.actuator_gear[i] = 0.0  # does not limit a joint
             continue
         driven |= moment != 0.0
         if mujoco.mjtGain(m.actuator_gaintype[i]) not in fixed or m.actuator_biasprm[i, 1:3].any():
-            # with length and velocity its force is any that its own range allows: a motor has that range alone
+            # if its force depends on length and velocity, only its own range limits it, as for a motor
             m.actuator_gaintype[i], m.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
             m.actuator_gainprm[i, 0], m.actuator_ctrllimited[controls] = 1.0, 0
         d.ctrl[controls] = sign * np.sign(moment * m.actuator_gainprm[i, 0]) * HUGE
@@ -227,7 +227,7 @@ def test_limits_of_effort(read: list[Robot]) -> None:
 
 
 def test_limits_of_position(read: list[Robot]) -> None:
-    """Tendons over one joint limit it, unless they exclude its own range, which is said."""
+    """Tendons over one joint limit it, unless they exclude its own range, which gives a warning."""
     for robot in read:
         m, at = robot.theirs, 0
         for j in range(m.njnt):

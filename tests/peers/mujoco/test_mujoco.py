@@ -1,4 +1,4 @@
-"""Whole-body control of bodies in MuJoCo, for some seconds: the state that it sees, a stand, a push, a trot."""
+"""Whole-body control of bodies in MuJoCo, for some seconds: the state it receives, a stand, a push, a trot."""
 
 from collections.abc import Sequence
 
@@ -11,18 +11,18 @@ from world import Array, World
 import condyle
 
 SAME = 1e-9
-"""Accelerations of both libraries are the same to this part of the largest one."""
+"""Tolerance of accelerations, relative to the largest one."""
 SWAY = 1e-3
-"""A stand moves the centre of mass less than this (m): the ground is soft, and joints have friction of their own."""
+"""Maximum motion of the centre of mass in a stand (m): the ground is compliant, and joints have friction."""
 RETURNED = 5e-3
-"""Where it is 3 s after a push (m)."""
+"""Maximum distance of the centre of mass 3 s after a push (m)."""
 ASTRAY = 0.05
-"""How far a trot may leave its plan (m)."""
+"""Maximum distance of a trot from its plan (m)."""
 QUADRUPED_FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
 
 
 def somewhere(model: condyle.Model) -> tuple[Array, Array, Array]:
-    """A state in the air, turned, in motion, and efforts of the joints."""
+    """Returns a random state in the air, rotated and moving, and efforts of the joints."""
     rng = np.random.default_rng(0)
     q, v, tau = condyle.random_configuration(model, seed=1), *rng.standard_normal((2, model.nv))
     q[:3] = 1.0, 2.0, 5.0
@@ -36,13 +36,13 @@ def somewhere(model: condyle.Model) -> tuple[Array, Array, Array]:
     ("text", "feet", "size"), [(urdf("talos"), SOLES, SOLE), (condyle.robots.QUADRUPED, QUADRUPED_FEET, BALL)]
 )
 def test_one_robot_in_both(text: str, feet: Sequence[str], size: tuple[float, float] | float) -> None:
-    """The state comes back, and both move the robot alike in the air: (q, v) and τ mean the same."""
+    """The state is restored, and in the air both libraries move the robot alike: (q, v) and τ mean the same."""
     world = World(text, feet, size)
     q, v, tau = somewhere(world.model)
     world.set_state(q, v)
     for found, given in zip(world.state(), (q, v), strict=True):
         np.testing.assert_allclose(found, given, atol=1e-12)
-    world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0  # which Condyle leaves to its user
+    world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0  # Condyle leaves them to its user
     world.data.qfrc_applied[:] = world.generalized(tau)
     mujoco.mj_forward(world.mj, world.data)
     assert world.data.ncon == 0

@@ -1,4 +1,5 @@
-"""`Model.from_mujoco`: models that MuJoCo has compiled, beside our reader of the same files and MuJoCo's numbers."""
+"""`Model.from_mujoco`: models compiled by MuJoCo, compared with our reader of the same files and with MuJoCo's
+numbers."""
 
 import re
 import sys
@@ -17,8 +18,10 @@ from random_mjcf import RandomMjcf
 PACKAGES = ("dm_control", "gymnasium", "robosuite")
 SAME = 1e-11
 MESHES = 1e-8
-"""MuJoCo turns meshes into their principal axes up to some 1e-7 rad."""
-"""Masses, poses and M of both, to this part of the largest one; quaternions of files are rounded twice."""
+"""Tolerances of masses, poses and M, relative to the largest entry; quaternions of files are rounded twice.
+
+`MESHES` is for models with meshes, which MuJoCo rotates into their principal axes up to some 1e-7 rad.
+"""
 
 LOADED = """<mujoco model="loaded">
   <compiler angle="degree" settotalmass="7"/>
@@ -45,7 +48,7 @@ def close(found: np.ndarray, expected: np.ndarray) -> None:
 
 
 def same_robot(ours: condyle.Model, other: condyle.Model, inertia: float = 0.0) -> None:
-    """Two of our models are one robot, up to rounding; inertia: how far inertias may be apart, beside that."""
+    """Checks that two of our models are one robot, up to rounding; inertia: additional tolerance of inertias."""
     for what in ("name", "names", "body_names", "joint_types", "parents", "idx_qs", "idx_vs"):
         assert getattr(ours, what) == getattr(other, what), what
     apart = np.abs(ours.inertial_parameters - other.inertial_parameters)
@@ -82,7 +85,7 @@ def same_robot(ours: condyle.Model, other: condyle.Model, inertia: float = 0.0) 
 
 
 def agrees(ours: condyle.Model, theirs: mujoco.MjModel, seed: int) -> None:
-    """M, bias and the places of bodies are MuJoCo's at a random state."""
+    """Checks that M, bias and the positions of bodies equal MuJoCo's at a random state."""
     rng, there = np.random.default_rng(seed), condyle.conventions.Coordinates(ours, "mujoco")
     q, v = condyle.random_configuration(ours, seed=seed), rng.standard_normal(ours.nv)
     data, scratch = mujoco.MjData(theirs), condyle.Data(ours)
@@ -131,7 +134,7 @@ def test_numbers_that_were_changed_after_compiling() -> None:
 
 
 def test_the_text_compiles_to_the_same_numbers() -> None:
-    """What is written for our reader is MuJoCo's own model once more, so nothing is lost on the way."""
+    """The text written for our reader compiles to the same model in MuJoCo, so nothing is lost."""
     inside = """<body name="b" pos="0 0 1" gravcomp="0.5">
       <joint name="j" axis="0 1 0" ref="10" springref="20" stiffness="1 2 3" damping="0.5 0.1 0.2" range="-10 20"/>
       <joint name="k" type="ball" stiffness="2" actuatorgravcomp="true" range="0 60"/>
@@ -160,7 +163,7 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
         if part not in ("jnt", "dof", "tendon", "key", "wrap", "qpos", "qpos0", "body", "actuator", "site", "eq"):
             continue
         found, expected = getattr(second, field), getattr(first, field)
-        # bounding volumes of geoms, and the mark of a relative pose that the compiler chose
+        # bounding volumes of geoms, and the mark of a relative pose that the compiler chose, are skipped
         if not isinstance(expected, np.ndarray) or "bvh" in field or "geom" in field:
             continue
         if field == "eq_data":
@@ -173,7 +176,7 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
 
 
 def robots_of_packages() -> list[Path]:
-    """The MJCFs of the packages that the comparison of robots reads, where these are installed."""
+    """Returns the installed MJCF files of the packages that the comparison of robots reads."""
     folder = Path(__file__).parents[3] / ".venv" / "robots"
     files = sorted(file for package in PACKAGES for file in (folder / package).rglob("*.xml"))
     return [file for file in files if "<mujoco" in file.read_text(encoding="utf-8", errors="ignore")]
@@ -181,17 +184,17 @@ def robots_of_packages() -> list[Path]:
 
 @pytest.mark.skipif(not robots_of_packages(), reason="no packages of robots in .venv/robots")
 def test_robots_of_packages() -> None:
-    """Each model is MuJoCo's own, and the robot that our reader makes of the file, where it reads it."""
+    """Each model equals MuJoCo's, and the robot that our reader creates from the file, if it can read it."""
     compared = read = 0
     for file in robots_of_packages():
         try:
             theirs = mujoco.MjModel.from_xml_path(str(file))
-        except ValueError:  # parts of models, and files that the package leaves out
+        except ValueError:  # parts of models, and files that the package omits
             continue
         ours = condyle.Model.from_mujoco(theirs)
         try:
             other = condyle.Model.from_mjcf(file)
-        except condyle.Error:  # meshes of formats that we do not read
+        except condyle.Error:  # meshes of unsupported formats
             other = None
         if other is not None:
             same_robot(ours, other, MESHES)
@@ -203,7 +206,7 @@ def test_robots_of_packages() -> None:
 
 
 def test_words_for_what_has_none() -> None:
-    """Names that files do not give are those that our reader gives."""
+    """Elements without a name get the names that our reader gives."""
     text = """<mujoco><worldbody><body><joint/><joint axis="1 0 0"/><geom size="1"/>
       <body name="body3"><joint/><geom size="1"/><body><joint name="body3_joint"/><geom size="1"/></body></body>
     </body></worldbody></mujoco>"""
@@ -223,12 +226,12 @@ def test_losses_that_differ_within_a_joint() -> None:
 
 
 PLAIN = re.sub("</?replicate[^>]*>| settotalmass=.7.", "", LOADED)
-"""The robot without what only an expanded file can be written for."""
+"""The robot without the features that can only be written to an expanded file."""
 
 
 @pytest.mark.parametrize("text", [PLAIN, *(RandomMjcf(k).text for k in range(8))])
 def test_written_numbers(text: str, tmp_path: Path) -> None:
-    """Other inertias, limits and armature in a copy of a file are those of the robot that MuJoCo reads there."""
+    """Changed inertias, limits and armature in a copy of a file equal the robot that MuJoCo reads from it."""
     original, new = tmp_path / "original.xml", tmp_path / "new.xml"
     original.write_text(text, encoding="utf-8")
     model, rng = condyle.Model.from_mjcf(original), np.random.default_rng(1)

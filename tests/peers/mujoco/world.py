@@ -1,7 +1,7 @@
-"""A robot in MuJoCo and in Condyle, made from one URDF, and what leads from the state of one to that of the other.
+"""A robot in MuJoCo and in Condyle, made from one URDF, and conversions between their states.
 
-MuJoCo's free joint has the quaternion's w first; its linear velocity is along the world's axes, its angular one along
-the body's. Condyle (as Pinocchio) has w last, and both velocities along the body's axes.
+MuJoCo stores the quaternion of a free joint with w first. Its linear velocity is along the world's axes, its angular
+velocity along the body's. Condyle (as Pinocchio) stores w last, and both velocities along the body's axes.
 """
 
 import xml.etree.ElementTree as ET
@@ -16,13 +16,14 @@ import condyle
 Array = NDArray[np.float64]
 
 STIFFNESS = (0.005, 1.0)
-"""Time constant (s) and damping ratio of MuJoCo's contacts: some tenths of a millimetre under a humanoid."""
+"""Time constant (s) and damping ratio of MuJoCo's contacts, which yield some tenths of a millimetre under a
+humanoid."""
 THICKNESS = 0.02
-"""Of the box that is a sole (m)."""
+"""Thickness of the box that represents a sole (m)."""
 
 
 def bare(urdf: str) -> ET.Element:
-    """The links and joints of a URDF without shapes, moving freely."""
+    """Returns the links and joints of a URDF without shapes, moving freely."""
     robot = ET.fromstring(urdf)
     for link in robot.iter("link"):
         for shape in link.findall("visual") + link.findall("collision"):
@@ -32,7 +33,7 @@ def bare(urdf: str) -> ET.Element:
     moved = {joint.find("child").attrib["link"] for joint in robot.iter("joint")}
     root = next(link.attrib["name"] for link in robot.iter("link") if link.attrib["name"] not in moved)
     for inertia in robot.iter("inertia"):
-        if float(inertia.attrib["ixx"]) <= abs(float(inertia.attrib["ixy"])):  # ANYmal's base has what no body has
+        if float(inertia.attrib["ixx"]) <= abs(float(inertia.attrib["ixy"])):  # ANYmal's base is physically impossible
             inertia.attrib.update(dict.fromkeys(["ixy", "ixz", "iyz"], "0"))
     ET.SubElement(robot, "link", name="world")
     joint = ET.SubElement(robot, "joint", name="root_joint", type="floating")
@@ -43,7 +44,7 @@ def bare(urdf: str) -> ET.Element:
 
 
 class World:
-    """A robot on level ground in MuJoCo: soles are boxes below their frames, other feet are balls around them."""
+    """Robot on level ground in MuJoCo: soles are boxes below their frames, other feet are balls around them."""
 
     def __init__(
         self,
@@ -53,7 +54,8 @@ class World:
         friction: float = 0.7,
         dt: float = 1e-3,
     ) -> None:
-        """size: of soles, their sides along x and y (m); of balls, their radius. friction: Coulomb's, in MuJoCo."""
+        """size: sides of the soles along x and y (m), or radius of the balls (m). friction: Coulomb friction in
+        MuJoCo."""
         self.model = condyle.Model.from_urdf_str(urdf, root_joint="free_flyer")
         self.feet, self.ground = list(feet), 0.0
         spec = mujoco.MjSpec.from_string(ET.tostring(bare(urdf)).decode())
@@ -73,7 +75,7 @@ class World:
             body = spec.body(self.model.body_names[frame.body])
             body.add_geom(name=foot, contype=1, conaffinity=0, mass=0.0, **shape, **contact)
         if isinstance(size, float):
-            self.ground = -size  # the plan's feet, at height 0, are the middles of balls
+            self.ground = -size  # the plan's feet, at height 0, are the centres of the balls
         plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "pos": [0.0, 0.0, self.ground]}
         spec.worldbody.add_geom(name="ground", contype=0, conaffinity=1, **plane, **contact)
         self.mj = spec.compile()
@@ -88,11 +90,11 @@ class World:
 
     @property
     def dt(self) -> float:
-        """The time of a step (s)."""
+        """Time step (s)."""
         return float(self.mj.opt.timestep)
 
     def state(self) -> tuple[Array, Array]:
-        """(q, v), as Condyle has them."""
+        """Returns (q, v), in Condyle's convention."""
         qpos, qvel, R = self.data.qpos, self.data.qvel, np.zeros(9)
         mujoco.mju_quat2Mat(R, qpos[3:7])
         q, v = np.zeros(self.model.nq), np.zeros(self.model.nv)
@@ -102,7 +104,7 @@ class World:
         return q, v
 
     def set_state(self, q: Array, v: Array) -> None:
-        """Puts the robot into a state that Condyle has."""
+        """Sets a state given in Condyle's convention."""
         mujoco.mj_resetData(self.mj, self.data)
         qpos, qvel, R = self.data.qpos, self.data.qvel, np.zeros(9)
         qpos[:3], qpos[4:7], qpos[3] = q[:3], q[3:6], q[6]
@@ -112,25 +114,26 @@ class World:
         mujoco.mj_forward(self.mj, self.data)
 
     def generalized(self, tau: Array) -> Array:
-        """Efforts of the joints in MuJoCo's order."""
+        """Returns the efforts of the joints in MuJoCo's order."""
         out = np.zeros(self.mj.nv)
         out[self._theirs[1]] = tau[self._ours[1]]
         return out
 
     def step(self, tau: Array, push: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """One step under efforts of the joints, and a force on the trunk, at its centre of mass in the world (N)."""
+        """Makes one step under efforts of the joints, and a force on the trunk, at its centre of mass in the world
+        (N)."""
         self.data.qfrc_applied[:] = self.generalized(tau)
         self.data.xfrc_applied[self.trunk, :3] = push
         mujoco.mj_step(self.mj, self.data)
 
     def loads(self) -> Array:
-        """The force of the ground on each foot in the world, as the last step had it, (feet, 3)."""
+        """Returns the force of the ground on each foot in world coordinates, from the last step, (feet, 3)."""
         out, force = np.zeros((len(self.feet), 3)), np.zeros(6)
         for k in range(self.data.ncon):
             contact = self.data.contact[k]
             mujoco.mj_contactForce(self.mj, self.data, k, force)
             names = [self.mj.geom(geom).name for geom in contact.geom]
-            sign = 1.0 if names[0] == "ground" else -1.0  # the force is on the second of the two
+            sign = 1.0 if names[0] == "ground" else -1.0  # the force acts on the second of the two
             out[self.feet.index(next(name for name in names if name != "ground"))] += (
                 sign * contact.frame.reshape(3, 3).T @ force[:3]
             )

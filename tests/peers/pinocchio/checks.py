@@ -1,4 +1,4 @@
-"""The comparisons, for any pair of models."""
+"""Comparisons for any pair of models."""
 
 import numpy as np
 import pinocchio as pin
@@ -10,18 +10,18 @@ from condyle.simulation import Simulation
 
 METHODS = (None, "aba", "dense", "sparse")
 GRAINS = (1, 4)
-"""Of divide and conquer: as many cuts as there can be, and fewer."""
+"""Grain sizes of divide and conquer: the smallest, with as many cuts as possible, and a larger one."""
 CUTS = 10.0
-"""Its pieces are worse conditioned than the whole robot, so it may be so many times further from Pinocchio."""
+"""Factor on the tolerance of divide and conquer: its pieces are worse conditioned than the whole robot."""
 FRAMES = {
     "local": pin.ReferenceFrame.LOCAL,
     "world": pin.ReferenceFrame.WORLD,
     "local_world_aligned": pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
 }
 STEP = 1e-5
-"""Of central differences."""
+"""Step of central differences."""
 DIFFERENCES = 1e-7
-"""A tenth of what they may be off by: rounding of 1e-16/step, and step² times a third derivative."""
+"""A tenth of the tolerance of central differences: rounding of 1e-16/step, and step² times a third derivative."""
 KINDS = {
     pin.FrameType.BODY: "link",
     pin.FrameType.JOINT: "joint",
@@ -31,14 +31,14 @@ KINDS = {
 
 
 def check_model(pair: Pair) -> None:
-    """Sizes, names, order, placements, inertias, limits, frames."""
+    """Compares sizes, names, order, placements, inertias, limits, frames."""
     check_bodies(pair)
     check_limits(pair)
     check_frames(pair)
 
 
 def check_bodies(pair: Pair) -> None:
-    """Sizes, names, order, placements, inertias, losses."""
+    """Compares sizes, names, order, placements, inertias, losses."""
     ours, theirs = pair.ours, pair.theirs
     assert ours.name == theirs.name
     assert (ours.nq, ours.nv, ours.nbodies) == (theirs.nq, theirs.nv, theirs.njoints)
@@ -63,7 +63,7 @@ def check_bodies(pair: Pair) -> None:
 
 
 def check_limits(pair: Pair) -> None:
-    """Limits are equal, and infinite where Pinocchio has none (or ±1.01 for the numbers of a rotation)."""
+    """Compares limits; they are infinite where Pinocchio has none (or ±1.01 for the numbers of a rotation)."""
     ours, theirs = pair.ours.limits, pair.theirs
     finite = np.zeros(theirs.nq, bool)
     for joint in theirs.joints[1:]:
@@ -78,7 +78,7 @@ def check_limits(pair: Pair) -> None:
 
 
 def check_frames(pair: Pair) -> None:
-    """The same frames but for Pinocchio's `universe`, with the same body and placement."""
+    """Checks that the frames, except Pinocchio's `universe`, have the same body and placement."""
     ours = {(f.name, f.kind): f for f in pair.ours.frames}
     theirs = {(f.name, KINDS[f.type]): f for f in list(pair.theirs.frames)[1:]}
     assert len(theirs) == pair.theirs.nframes - 1
@@ -89,7 +89,8 @@ def check_frames(pair: Pair) -> None:
 
 
 def common_frames(pair: Pair) -> list[tuple[int, int]]:
-    """The numbers of the frames that both have; of a URDF's these are all but Pinocchio's `universe` (check_frames)."""
+    """Returns the indices of the frames that both have; for a URDF, all except Pinocchio's `universe`
+    (check_frames)."""
     theirs = {(f.name, KINDS[f.type]): i for i, f in enumerate(pair.theirs.frames) if i > 0}
     ours = [(f.name, f.kind) for f in pair.ours.frames]
     found = [(i, theirs[key]) for i, key in enumerate(ours) if key in theirs]
@@ -98,7 +99,7 @@ def common_frames(pair: Pair) -> list[tuple[int, int]]:
 
 
 def check_kinematics(state: State) -> None:
-    """Placements of bodies and frames, and the Jacobians of all frames in all three frames of reference."""
+    """Compares placements of bodies and frames, and the Jacobians of all frames in all three frames of reference."""
     pair, ours, q = state.pair, ours_of(state), state.q
     model, data = pair.theirs, pair.their_data
     pin.framesForwardKinematics(model, data, q)
@@ -116,7 +117,7 @@ def check_kinematics(state: State) -> None:
 
 
 def check_motion(state: State) -> None:
-    """Velocities, accelerations and rates of the Jacobians of all frames in all three frames of reference.
+    """Compares velocities, accelerations and rates of the Jacobians of all frames in all three frames of reference.
 
     In LOCAL_WORLD_ALIGNED Pinocchio's rate of the Jacobian belongs to the classical acceleration, as ours does.
     """
@@ -154,7 +155,7 @@ def check_motion(state: State) -> None:
 
 
 def check_centroidal(state: State) -> None:
-    """The centre of mass, momentum, and their maps and rates. What is fixed to the world counts for neither library."""
+    """Compares centre of mass, momentum, and their maps and rates. Neither library counts bodies fixed to the world."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     data = pair.their_data
     theirs(pin.centerOfMass, q, v, a)
@@ -177,15 +178,14 @@ def check_centroidal(state: State) -> None:
 
 
 def expect_fields(pair: Pair, what: str, ours: "tuple[np.ndarray, ...]", theirs: dict[str, np.ndarray]) -> None:
-    """Members of a named tuple by their names."""
+    """Compares members of a named tuple by name."""
     for name, value in theirs.items():
         pair.expect(f"{what}: {name}", getattr(ours, name), value)
 
 
 def check_energy(state: State) -> None:
-    """Energies, and their regressors. Only without armature: of a revolute joint about an axis that is not aligned
-    Pinocchio's kinetic energy leaves it out.
-    """
+    """Compares energies and their regressors, only without armature. Pinocchio's kinetic energy omits the armature
+    of a revolute joint whose axis is not aligned."""
     pair, ours, theirs, q, v = state.pair, ours_of(state), theirs_of(state), state.q, state.v
     assert not pair.theirs.armature.any()
     pair.expect("kinetic_energy", ours(condyle.kinetic_energy, q, v), theirs(pin.computeKineticEnergy, q, v))
@@ -203,7 +203,8 @@ def check_energy(state: State) -> None:
 
 
 def check_equations_of_motion(state: State) -> None:
-    """What stands in the equations of motion: Coriolis matrix, M and h in one call, static efforts, regressor."""
+    """Compares the terms of the equations of motion: Coriolis matrix, M and h in one call, static efforts,
+    regressor."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     if pair.rates:
         C = theirs(pin.computeCoriolisMatrix, q, v)
@@ -222,7 +223,8 @@ def check_equations_of_motion(state: State) -> None:
 
 
 def check_lock(state: State) -> None:
-    """Every third joint locked, unless Pinocchio refuses: it finds no frame where a joint and a link have one name."""
+    """Locks every third joint, unless Pinocchio rejects it: it finds no frame if a joint and a link have the same
+    name."""
     pair, rng = state.pair, np.random.default_rng(0)
     locked = list(range(1, pair.theirs.njoints, 3))
     ours = pair.ours.lock([body for i in locked for body in pair.chains[i]], state.q)
@@ -247,7 +249,7 @@ def check_lock(state: State) -> None:
 
 
 def check_motion_derivatives(state: State) -> None:
-    """How the motion of bodies and frames, momentum and the centre of mass change with position and velocity."""
+    """Compares derivatives of the motion of bodies and frames, of momentum and of the centre of mass."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     if not pair.rates:
         return
@@ -295,13 +297,15 @@ def check_motion_derivatives(state: State) -> None:
     theirs(pin.computeForwardKinematicsDerivatives, q, v, a)
     theirs(pin.centerOfMass, q, v, a)
     dvcom_dq = pin.getCenterOfMassVelocityDerivatives(model, data)
-    if np.isfinite(dvcom_dq).all():  # it divides by the mass of what each joint carries
+    if np.isfinite(dvcom_dq).all():  # Pinocchio divides by the mass that each joint carries
         pair.expect("centroidal_derivatives: dvcom_dq", d.dvcom_dq, dvcom_dq)
 
 
 def trusted_columns(model: pin.Model, reference: str) -> np.ndarray:
-    """Where Pinocchio's ∂a/∂q is right: in the world's axes it contradicts differences of Pinocchio's own accelerations
-    (and ours does not) in the columns of joints of several degrees of freedom, if they sit on a body that moves.
+    """Returns the columns in which Pinocchio's ∂a/∂q is correct.
+
+    In the world's axes it contradicts differences of Pinocchio's own accelerations (ours does not). This affects the
+    columns of joints with several degrees of freedom, if they are on a moving body.
     """
     right = np.ones(model.nv, bool)
     for joint, parent in zip(model.joints, model.parents, strict=True):
@@ -311,9 +315,10 @@ def trusted_columns(model: pin.Model, reference: str) -> np.ndarray:
 
 
 def of_numbers(by_q: np.ndarray, motion: pin.Motion, J: np.ndarray) -> np.ndarray:
-    """The derivative of a motion's six numbers in LOCAL_WORLD_ALIGNED, whose origin moves with q by J's linear part.
+    """Converts ∂/∂q of a motion to the derivative of its six numbers in LOCAL_WORLD_ALIGNED.
 
-    Pinocchio's is that of the motion itself, seen at the origin where it now is.
+    The origin moves with q by J's linear part. Pinocchio's derivative is of the motion itself, at the fixed current
+    origin.
     """
     moved = by_q.copy()
     moved[:3] += np.cross(motion.angular, J[:3], axisb=0).T
@@ -321,7 +326,8 @@ def of_numbers(by_q: np.ndarray, motion: pin.Motion, J: np.ndarray) -> np.ndarra
 
 
 def check_effort_derivatives(state: State) -> None:
-    """The derivatives of static efforts, by inertial parameters and forces; and the Hessian of inverse dynamics."""
+    """Compares derivatives of static efforts, derivatives by inertial parameters and forces, and the Hessian of
+    inverse dynamics."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     if not pair.rates:
         return
@@ -353,8 +359,10 @@ def check_effort_derivatives(state: State) -> None:
 
 
 def check_hessian(state: State) -> None:
-    """The Hessian of λᵀ τ along a direction, against differences of Pinocchio's first derivatives; it has none of the
-    second in Python. Along one direction d the tangent spaces of q ⊕ h d do not matter.
+    """Compares the Hessian of λᵀ τ along a direction with differences of Pinocchio's first derivatives.
+
+    Pinocchio does not offer second derivatives in Python. Along one direction d the tangent spaces of q ⊕ h d do not
+    matter.
     """
     pair, q, v, a, tau = state.pair, state.q, state.v, state.a, state.tau
     d = np.random.default_rng(0).standard_normal(pair.theirs.nv)
@@ -375,7 +383,7 @@ def check_hessian(state: State) -> None:
 
 
 def check_inverse_dynamics(state: State) -> None:
-    """rnea and nonlinear_effects, which both libraries offer for mimic joints too."""
+    """Compares rnea and nonlinear_effects, which both libraries also offer for mimic joints."""
     pair, ours, theirs = state.pair, ours_of(state), theirs_of(state)
     q, v, a = state.q, state.v, state.a
     pair.expect("rnea", ours(condyle.rnea, q, v, a), theirs(pin.rnea, q, v, a))
@@ -385,18 +393,18 @@ def check_inverse_dynamics(state: State) -> None:
 
 
 def check_crba(state: State) -> None:
-    """M, both triangles."""
+    """Compares M, both triangles."""
     state.pair.expect("crba", ours_of(state)(condyle.crba, state.q), theirs_of(state)(pin.crba, state.q))
 
 
 def check_gravity(state: State) -> None:
-    """The efforts of gravity."""
+    """Compares the efforts of gravity."""
     ours, theirs = ours_of(state), theirs_of(state)
     state.pair.expect("gravity", ours(condyle.gravity, state.q), theirs(pin.computeGeneralizedGravity, state.q))
 
 
 def check_rnea_derivatives(state: State) -> None:
-    """∂τ/∂q, ∂τ/∂v, ∂τ/∂a, with and without external forces."""
+    """Compares ∂τ/∂q, ∂τ/∂v, ∂τ/∂a, with and without external forces."""
     if not state.pair.rates:
         return
     for label, ours_extra, theirs_extra in (("", (), ()), (", f_ext", (state.f_ext,), (state.their_forces,))):
@@ -407,10 +415,10 @@ def check_rnea_derivatives(state: State) -> None:
 
 
 def check_forward_dynamics(state: State) -> bool:
-    """q̈, M⁻¹ and the derivatives of q̈, with and without external forces; false if M has no inverse.
+    """Compares q̈, M⁻¹ and the derivatives of q̈, with and without external forces; returns false if M has no inverse.
 
-    A body without mass at the end of a limb makes M singular. Pinocchio's q̈ is then not finite; ours is refused, with
-    the joint's name.
+    A body without mass at the end of a limb makes M singular. Pinocchio's q̈ is then not finite; our functions reject
+    the robot, with the joint's name.
     """
     pair, q, v, tau = state.pair, state.q, state.v, state.tau
     ours, theirs, distance = ours_of(state), theirs_of(state), pair.self_distance
@@ -448,7 +456,7 @@ def check_forward_dynamics(state: State) -> bool:
 
 
 def check_factors(state: State) -> None:
-    """What the factors of M solve, against Pinocchio's factor of its own."""
+    """Compares solutions by the factors of M with solutions by Pinocchio's factor."""
     pair, q, tau, distance = state.pair, state.q, state.tau, state.pair.self_distance
     M = ours_of(state)(condyle.crba, q)
     theirs_of(state)(pin.crba, q)
@@ -464,7 +472,7 @@ def check_factors(state: State) -> None:
 
 
 def check_euler(state: State) -> None:
-    """A step of the semi-implicit Euler method, of Pinocchio's aba and integrate."""
+    """Compares a step of the semi-implicit Euler method with Pinocchio's aba and integrate."""
     pair, q, v, tau, h = state.pair, state.q, state.v, state.tau, 1e-3
     simulation = Simulation(pair.ours, "semi_implicit_euler", h)
     simulation.set_state(q, v)
@@ -476,10 +484,10 @@ def check_euler(state: State) -> None:
 
 
 def check_configuration(state: State) -> None:
-    """Neutral, integrate, difference, and their Jacobians, interpolate, distance, normalize, transport.
+    """Compares neutral, integrate, difference and their Jacobians, interpolate, distance, normalize and transport.
 
-    Pinocchio's dIntegrateTransport multiplies with ∂(q ⊕ v)/∂q: from q to q ⊕ v. Ours goes the other way, and
-    undoes it.
+    Pinocchio's dIntegrateTransport multiplies by ∂(q ⊕ v)/∂q, from q to q ⊕ v. Ours applies the inverse, in the
+    opposite direction.
     """
     pair, q, q1, v = state.pair, state.q, state.q1, state.v
     ours, theirs = pair.ours, pair.theirs
@@ -504,8 +512,10 @@ def check_configuration(state: State) -> None:
 
 
 def with_nearer_quaternions(model: pin.Model, q: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Of the two quaternions of a rotation the one nearer to q's: ours is, and Pinocchio's of a free-flyer that is
-    integrated, but not Pinocchio's of a spherical joint that turns by more than half a turn, nor what it interpolates.
+    """Returns `moved` with the quaternion of each rotation that is nearer to q's, of the two possible ones.
+
+    Ours is the nearer one, and so is Pinocchio's for an integrated free-flyer. Pinocchio's is not for a spherical joint
+    that rotates by more than half a turn, nor for interpolated positions.
     """
     first = {"JointModelSpherical": 0, "JointModelFreeFlyer": 3}
     for joint in model.joints:
@@ -516,5 +526,5 @@ def with_nearer_quaternions(model: pin.Model, q: np.ndarray, moved: np.ndarray) 
 
 
 def poses(placements: "pin.StdVec_SE3") -> np.ndarray:
-    """Poses as homogeneous matrices."""
+    """Returns poses as homogeneous matrices."""
     return np.array([X.homogeneous for X in placements])

@@ -1,4 +1,4 @@
-"""One robot in both libraries, states to compare them at, and what counts as equal."""
+"""One robot in both libraries, states at which they are compared, and the tolerances."""
 
 import inspect
 from collections import defaultdict
@@ -13,11 +13,12 @@ import pinocchio as pin
 import condyle
 
 TOLERANCE = 1e-10
-"""Relative to 1 + max |theirs|: some thousand roundings of double precision, with room for ill-conditioned poses."""
+"""Tolerance relative to 1 + max |theirs|: some thousand roundings of double precision, with a margin for
+ill-conditioned poses."""
 SELF_DISTANCE = 10.0
-"""What contains M⁻¹ may be this many times as far from Pinocchio as Pinocchio is from itself."""
+"""Tolerance of results that contain M⁻¹, as a multiple of Pinocchio's difference from itself."""
 UNLIMITED = 3.0
-"""Where a coordinate has no limits, it is drawn from ± this (rad, m)."""
+"""Range ± of random coordinates without limits (rad, m)."""
 
 ROOT_JOINTS = {
     "free_flyer": pin.JointModelFreeFlyer,
@@ -27,26 +28,26 @@ ROOT_JOINTS = {
 }
 
 BATCH, HERE = 11, 9
-"""How many states a batch has, more than a vector and no multiple of it, and which one of them is compared."""
+"""Number of states of a batch (more than a vector and not a multiple of it), and index of the compared state."""
 
 SELF_STATES = 20
-"""At how many states Pinocchio is compared with itself."""
+"""Number of states at which Pinocchio is compared with itself."""
 
 
 @dataclass
 class Record:
-    """How far one quantity was from Pinocchio's, over all robots and states."""
+    """Largest difference of one quantity from Pinocchio's, over all robots and states."""
 
     share: float = 0.0
-    """The greatest difference as a share of what is allowed there."""
+    """Largest difference as a fraction of the tolerance there."""
     difference: float = 0.0
-    """The same, relative to 1 + max |theirs|."""
+    """That difference relative to 1 + max |theirs|."""
     bound: float = TOLERANCE
-    """What is allowed there."""
+    """Tolerance there."""
     where: str = ""
-    """The robot."""
+    """Name of the robot."""
     robots: set[str] = field(default_factory=set)
-    """All robots that it was compared for."""
+    """Names of all robots for which the quantity was compared."""
 
     def add(self, difference: float, bound: float, robot: str) -> None:
         self.robots.add(robot)
@@ -55,13 +56,13 @@ class Record:
 
 
 records: dict[str, Record] = defaultdict(Record)
-"""For each quantity what was found, for the summary."""
+"""Record of each quantity, for the summary."""
 sizes: dict[str, tuple[str, int, int, int]] = {}
-"""For each robot that was read its root joint, moving bodies, nq and nv, for the summary."""
+"""Root joint, moving bodies, nq and nv of each robot that was read, for the summary."""
 
 
 class Pair:
-    """A robot as Pinocchio and as we have it."""
+    """Robot in Pinocchio and in Condyle."""
 
     def __init__(
         self,
@@ -74,24 +75,26 @@ class Pair:
         self.name, self.theirs, self.ours, self.root_joint = name, theirs, ours, root_joint
         self.their_data, self.data = theirs.createData(), condyle.Data(ours)
         self.chains = chains or [[i] for i in range(ours.nbodies)]
-        """For each of Pinocchio's joints the bodies that its joints carry here: several if it is a composite."""
+        """For each of Pinocchio's joints the corresponding bodies here: several if it is a composite."""
         self.bodies = [chain[-1] for chain in self.chains]
         """For each of Pinocchio's joints the body that it carries here."""
         self.rates = all(len(chain) == 1 for chain in self.chains)
-        """Whether Pinocchio's rates and derivatives hold: it takes a composite joint's axes for fixed in the body."""
+        """Whether Pinocchio's rates and derivatives are correct: it treats a composite joint's axes as fixed in the
+        body."""
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """The columns of our regressors that Pinocchio's have: those of the bodies that its joints carry."""
+        """Returns the columns of our regressors that exist in Pinocchio's: for the bodies that its joints carry."""
         return np.concatenate([np.arange(10 * body - 10, 10 * body) for body in self.bodies[1:]])
 
     def record_size(self) -> None:
-        """Lets the summary count the robot."""
+        """Adds the robot to the summary."""
         ours = self.ours
         sizes[self.name] = (self.root_joint or "none", ours.nbodies - 1, ours.nq, ours.nv)
 
     def with_armature(self, armature: np.ndarray) -> "Pair":
-        """The same robot, with armature for both, except along a free joint's linear coordinates: meanings differ."""
+        """Returns the same robot with armature for both, except a free joint's linear coordinates, whose armature
+        differs in meaning."""
         armature = armature.copy()
         for kind, first in zip(self.ours.joint_types, self.ours.idx_vs, strict=True):
             if kind == "free_flyer":
@@ -101,16 +104,16 @@ class Pair:
         return Pair(self.name, theirs, self.ours.with_armature(armature), self.root_joint, self.chains)
 
     def states(self, count: int, seed: int = 0) -> "list[State]":
-        """Random states: q inside its limits, the rest standard normal."""
+        """Returns random states: q inside its limits, the rest standard normal."""
         return [State(self, seed + i) for i in range(count)]
 
     @cached_property
     def self_distance(self) -> float:
-        """How far Pinocchio's forward dynamics is from itself, relative; not a number if M has no inverse."""
+        """Returns the relative difference of Pinocchio's forward dynamics from itself; NaN if M has no inverse."""
         return float(np.max([state.self_distance() for state in self.states(SELF_STATES, seed=100)]))
 
     def expect(self, what: str, ours: np.ndarray, theirs: np.ndarray, self_distance: float = 0.0) -> None:
-        """Checks that two results are equal; `self_distance` is Pinocchio's from itself, relative."""
+        """Checks that two results are equal; `self_distance` is Pinocchio's relative difference from itself."""
         ours, theirs = np.asarray(ours), np.asarray(theirs)
         assert ours.shape == theirs.shape, f"{what} of {self.name}: shape {ours.shape}, expected {theirs.shape}"
         if not theirs.size:
@@ -123,7 +126,7 @@ class Pair:
 
 
 def from_urdf(name: str, path: str, root_joint: str | None, mimic: bool = False) -> Pair:
-    """A robot as both read it from the same URDF; with `mimic` its size is not recorded."""
+    """Reads a robot from the same URDF with both libraries; with `mimic` its size is not recorded."""
     root = (ROOT_JOINTS[root_joint](),) if root_joint else ()
     theirs = pin.buildModelFromUrdf(path, *root, mimic=mimic)
     pair = Pair(name, theirs, condyle.Model.from_urdf(path, root_joint=root_joint, mimic=mimic), root_joint)
@@ -133,7 +136,7 @@ def from_urdf(name: str, path: str, root_joint: str | None, mimic: bool = False)
 
 
 class State:
-    """A position, velocity, acceleration, efforts and external forces."""
+    """Position, velocity, acceleration, efforts and external forces."""
 
     def __init__(self, pair: Pair, seed: int) -> None:
         model, rng = pair.theirs, np.random.default_rng(seed)
@@ -148,7 +151,7 @@ class State:
         self.f_ext[pair.bodies] = rng.standard_normal((model.njoints, 6))
         self.pair = pair
         self.in_batch = False
-        """Whether our functions are called for many states at once, of which this is one."""
+        """Whether our functions are called for a batch of states that contains this one."""
 
     @cached_property
     def their_forces(self) -> "pin.StdVec_Force":
@@ -158,14 +161,15 @@ class State:
         return forces
 
     def self_distance(self) -> float:
-        """How far Pinocchio's forward dynamics in the world's frame is from that in the bodies' frames, relative."""
+        """Returns the relative difference of Pinocchio's forward dynamics in the world's frame and in the bodies'
+        frames."""
         args = (self.pair.theirs, self.pair.their_data, self.q, self.v, self.tau)
         local, world = pin.aba(*args, pin.Convention.LOCAL).copy(), pin.aba(*args, pin.Convention.WORLD).copy()
         return float(np.abs(local - world).max() / (1.0 + np.abs(world).max()))
 
 
 def ours_of(state: State) -> Callable[..., np.ndarray]:
-    """Our functions, with model and data filled in."""
+    """Returns our functions, with model and data filled in."""
     model, data = state.pair.ours, state.pair.data
     if not state.in_batch:
         return lambda function, *args: function(model, data, *args)
@@ -188,12 +192,13 @@ def ours_of(state: State) -> Callable[..., np.ndarray]:
 
 @cache
 def arguments_of(function: Callable[..., Any]) -> list[str]:
-    """The names of what a function takes beside model and data; to read its signature takes longer than most calls."""
+    """Returns the parameters of a function besides model and data, cached because reading a signature takes longer
+    than most calls."""
     return list(inspect.signature(function).parameters)[2:]
 
 
 def of_state(results: Any) -> Any:
-    """What a batch gives for the state that is compared."""
+    """Returns the results of a batch for the compared state."""
     if not isinstance(results, tuple):
         return results[HERE]
     members = map(of_state, results)
@@ -201,5 +206,5 @@ def of_state(results: Any) -> Any:
 
 
 def theirs_of(state: State) -> Callable[..., np.ndarray]:
-    """Pinocchio's functions, with model and data filled in."""
+    """Returns Pinocchio's functions, with model and data filled in."""
     return lambda function, *args: function(state.pair.theirs, state.pair.their_data, *args)

@@ -1,4 +1,5 @@
-"""Prints, after the tests, how far from Pinocchio each quantity was, and writes it where --validation says."""
+"""Prints the largest difference of each quantity from Pinocchio after the tests, and writes it to the --validation
+file."""
 
 from pathlib import Path
 

@@ -17,25 +17,26 @@ compiler = os.environ.get("CC", "cc").split()[0]
 
 WARNINGS = ["-Wall", "-Wextra", "-Werror"]
 C = [*WARNINGS, "-O0", "-march=native", "-ffp-contract=fast", "-shared", "-fPIC"]
-"""Compiled for the time that compilers take, not for its own; vectors are those of the processor."""
+"""Compiler options for a short compilation, not for fast code; vectors match the processor."""
 RUST = ["--edition=2021", "--crate-type=cdylib", "-Copt-level=0", "-Cdebuginfo=0", "-Ccodegen-units=1"]
 
 
 def missing(language: str) -> str | None:
-    """The compiler that a language needs and that is not there."""
+    """Returns the compiler that a language needs, if it is missing."""
     name = "rustc" if language.startswith("rust") else compiler
     return None if shutil.which(name) else name
 
 
 def lanes(language: str) -> int:
-    """The states that a call computes."""
+    """Returns the number of states that a call computes."""
     return int(language[-1]) if language[-1] in "48" else 1
 
 
 class Library:
     """Functions of a robot in a language, in one shared library.
 
-    `lanes` states go into a call, of numbers that are `real`; what has the same text is compiled once for a folder.
+    A call takes `lanes` states, whose numbers have the type `real`. Sources with the same text are compiled once per
+    folder.
     """
 
     def __init__(
@@ -77,7 +78,7 @@ class Library:
         shutil.rmtree(folder)
 
     def _exports(self) -> str:
-        """A library in Rust that gives the functions of a module the names that they have in C."""
+        """Returns Rust source that exports the functions of a module under the names that they have in C."""
         real = {4: "f32", 8: "f64"}[self.real.itemsize]
         text = f'#![deny(warnings)]\n#![allow(non_snake_case)]\n#[path = "{self.stem}.rs"]\nmod robot;\n'
         for name, (inputs, outputs) in self.functions.items():
@@ -89,10 +90,10 @@ class Library:
         return text
 
     def __call__(self, name: str, states: Sequence[Sequence[np.ndarray]]) -> list[list[np.ndarray]]:
-        """The results of a function for the arguments of as many states as there are lanes."""
+        """Returns the results of a function for the arguments of as many states as there are lanes."""
         inputs, outputs = self.functions[name]
         assert len(states) == self.lanes and all(len(state) == len(inputs) for state in states)
-        # number k of state i at [lanes * k + i]
+        # number k of state i has the index lanes * k + i
         given = [np.ascontiguousarray(np.stack(of, axis=-1), self.real) for of in zip(*states, strict=True)]
         assert [array.size for array in given] == [self.lanes * rows * columns for _, rows, columns in inputs]
         found = [np.full((rows * columns, self.lanes), np.nan, self.real) for _, rows, columns in outputs]

@@ -1,8 +1,8 @@
-"""MJCFs of random robots: hinges, slides, balls, a free body, several joints on a body, bodies without any.
+"""MJCFs of random robots: hinges, slides, balls, a free body, several joints on a body, bodies without joints.
 
-Without what Pinocchio reads otherwise than MuJoCo: of several bodies in the world it takes the first one only, where
-that one has no joint it forgets its pose, a free body's position is counted from its pose, and balls lose their
-damping and friction.
+They exclude what Pinocchio reads differently from MuJoCo. Of several bodies in the world, Pinocchio only takes the
+first one, and if that one has no joint, it ignores its pose. A free body's position is relative to its pose, and balls
+lose their damping and friction.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ KINDS = ("hinge", "hinge", "slide", "ball", "two", "none")
 
 
 class RandomMjcf:
-    """A random robot of some bodies; the first one may be free."""
+    """Random robot of some bodies; the first one may be free."""
 
     def __init__(self, seed: int, bodies: int = 10) -> None:
         self.rng = np.random.default_rng(seed)

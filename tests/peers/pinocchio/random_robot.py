@@ -1,7 +1,7 @@
-"""Random robots made with both libraries' own calls, of every kind of joint that either has.
+"""Random robots made by both libraries' own calls, with every kind of joint of either library.
 
-Pinocchio's universal, spherical ZYX and composite joints are one joint each, if asked for, or several with bodies
-without mass between them, as they are here. q and v are laid out alike.
+Pinocchio's universal, spherical ZYX and composite joints are either one joint each, or several joints with massless
+bodies between them, as in this library. q and v have the same layout.
 """
 
 import numpy as np
@@ -12,13 +12,13 @@ import condyle
 from condyle import BodyId, Inertia, Joint, ModelBuilder
 
 BRANCH = 0.4
-"""How often a body is not on the one before it, but on one of those that carry it."""
+"""Probability that a body is not on the previous one, but on one of that body's ancestors."""
 ONE = ("revolute", "continuous", "prismatic", "helical")
-"""Kinds with an axis, which may be x, y, z or any."""
+"""Kinds of joints with an axis, which may be x, y, z or any."""
 OTHERS = ("spherical", "planar", "translation", "free_flyer")
 COMPOSITES = ("universal", "spherical_zyx", "composite")
 PARTS = ("revolute", "helical", "prismatic", "continuous")
-"""Of the composite joint."""
+"""Kinds of joints in the composite joint."""
 ALIGNED = {
     "revolute": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
     "continuous": (pin.JointModelRUBX, pin.JointModelRUBY, pin.JointModelRUBZ),
@@ -30,7 +30,7 @@ UNALIGNED = {
     "prismatic": pin.JointModelPrismaticUnaligned,
     "helical": pin.JointModelHelicalUnaligned,
 }
-"""Of continuous joints only the URDF parser makes those."""
+"""Continuous joints with a free axis, which only the URDF parser creates."""
 FREE = {
     "spherical": (pin.JointModelSpherical, Joint.spherical),
     "planar": (pin.JointModelPlanar, Joint.planar),
@@ -39,11 +39,12 @@ FREE = {
 }
 
 Part = tuple[pin.JointModel, Joint, pin.SE3]
-"""A joint of both libraries, and where it sits."""
+"""Joint of both libraries, and its placement."""
 
 
 class RandomRobot:
-    """A random robot with joints of these kinds, in any order; bodies are added depth first, as both number them."""
+    """Random robot with joints of these kinds, in any order; bodies are added depth first, as both libraries number
+    them."""
 
     def __init__(self, name: str, seed: int, kinds: tuple[str, ...], composites: bool) -> None:
         self.rng, self.composites = np.random.default_rng(seed), composites
@@ -69,7 +70,7 @@ class RandomRobot:
         return axis / np.linalg.norm(axis)
 
     def part(self, kind: str) -> Part:
-        """A joint with a single axis or without any."""
+        """Returns a joint with a single axis or without an axis."""
         X = pin.SE3.Random()
         if kind in FREE:
             theirs, ours = FREE[kind]
@@ -84,7 +85,7 @@ class RandomRobot:
         return pin.JointModelRevoluteUnaligned(axis), Joint.revolute(axis), X
 
     def parts(self, kind: str) -> list[Part]:
-        """What a joint is made of."""
+        """Returns the parts of a joint."""
         X, here = pin.SE3.Random(), pin.SE3.Identity()
         if kind == "universal":
             a, b = self.axis(), self.axis()
@@ -120,7 +121,7 @@ class RandomRobot:
         return joint, body
 
     def add_one(self, name: str, part: Part, inertia: pin.Inertia, parent: int, on: BodyId) -> tuple[int, BodyId]:
-        """The same of a joint that is one in both libraries, with limits and losses."""
+        """Adds a joint that is a single joint in both libraries, with limits and losses."""
         their, our, X = part
         effort, velocity, friction, damping = self.rng.uniform(0, 1, 4)
         lower, upper = self.rng.uniform(-3, 0), self.rng.uniform(0, 3)
@@ -153,7 +154,7 @@ class RandomRobot:
 
 
 def composite(kind: str, parts: list[Part]) -> pin.JointModel:
-    """Several joints as one of Pinocchio's; the first one's place is that of the whole."""
+    """Combines several joints into one of Pinocchio's; the whole has the placement of the first one."""
     if kind == "universal":
         return pin.JointModelUniversal(*(ours.axis for _, ours, _ in parts))
     if kind == "spherical_zyx":

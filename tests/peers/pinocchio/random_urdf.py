@@ -1,19 +1,19 @@
-"""URDFs of random robots: every kind of joint, odd axes, odd names, links without inertia, fixed joints between."""
+"""URDFs of random robots: every kind of joint, unusual axes and names, links without inertia, fixed joints between."""
 
 import numpy as np
 
 AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 -1", "-1 0 0", "0 0 2", "1e-9 0 1", "0 3 4")
-"""Aligned, against the axis, not normalised, nearly aligned; beside random ones and none at all."""
+"""Axes: aligned, negative, not normalised, nearly aligned. Random axes and missing ones are used, too."""
 NAMES = ("J3", "_0", "j1", "j10", "j2", "J", "hip.left", "hip-left", "Über", "a b")
-"""Their order in bytes is neither that of the alphabet nor of the numbers."""
+"""Names whose order by bytes is neither alphabetical nor numerical."""
 KINDS = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
 ONE = ("revolute", "continuous", "prismatic")
-"""Those with one degree of freedom, which may follow another."""
+"""Kinds of joints with one degree of freedom, which may follow another."""
 
 
 class RandomUrdf:
-    """A random robot of some links; `mimics` lets some joints follow others."""
+    """Random robot of some links; `mimics` lets some joints follow others."""
 
     def __init__(self, seed: int, links: int = 12, mimics: bool = False) -> None:
         self.rng = np.random.default_rng(seed)
@@ -22,7 +22,7 @@ class RandomUrdf:
         names = [f"{self.rng.choice(NAMES)}{suffixes[i]}" for i in range(1, links)]
         kinds = [str(self.rng.choice(KINDS)) for _ in names]
         lines = [f'<robot name="random{seed}">']
-        # a body that moves has mass, or M would have no inverse
+        # a moving body has mass, because otherwise M would have no inverse
         lines += [self._link(i, moves=i == 0 or kinds[i - 1] != "fixed") for i in range(links)]
         self.kinds = dict(zip(names, kinds, strict=True))
         leaders: list[str] = []
@@ -35,7 +35,7 @@ class RandomUrdf:
         self.text = "\n".join([lines[0], *(lines[i] for i in order), "</robot>\n"])
 
     def _leader(self, kind: str, leaders: list[str]) -> str | None:
-        """A joint to follow, for some; what follows a continuous joint turns."""
+        """Returns a leader for some joints; only a rotating joint may follow a continuous joint."""
         turns = kind in ("revolute", "continuous")
         leaders = [name for name in leaders if turns or self.kinds[name] != "continuous"]
         return str(self.rng.choice(leaders)) if kind in ONE and leaders and self.rng.random() < 0.4 else None
@@ -58,7 +58,7 @@ class RandomUrdf:
         axes = (f'<axis xyz="{self._numbers(3, 1.0)}"/>', "", *(f'<axis xyz="{axis}"/>' for axis in AXES))
         axis = axes[self.rng.integers(len(axes))] if kind in ("revolute", "continuous", "prismatic") else ""
         if kind == "planar":
-            axis = '<axis xyz="0 0 1"/>'  # the one plane in which Pinocchio's joint moves
+            axis = '<axis xyz="0 0 1"/>'  # the only plane in which Pinocchio's joint moves
         lower, upper, velocity, effort = self.rng.uniform((-3, 0, 0, 0), (0, 3, 10, 100))
         limited = kind in ("revolute", "prismatic") or (kind == "continuous" and self.rng.random() < 0.5)
         limit = f'<limit lower="{lower}" upper="{upper}" velocity="{velocity}" effort="{effort}"/>' if limited else ""

@@ -1,4 +1,4 @@
-"""Robots put together of robots, against Pinocchio's appendModel."""
+"""Robots assembled from robots, compared with Pinocchio's appendModel."""
 
 import checks
 import numpy as np
@@ -12,11 +12,11 @@ from condyle import Inertia, Joint, ModelBuilder
 
 STATES = 3
 PARTS = [("panda", "ur5"), ("double_pendulum", "panda"), ("kinova", "xarm7")]
-"""Fixed robots, two of which stand on one platform; no joint of one has the name of one of the other."""
+"""Pairs of fixed robots on one platform; their joints have different names."""
 
 
 def together(names: tuple[str, str], seed: int) -> Pair:
-    """Both robots on a platform that slides and turns."""
+    """Returns both robots on a platform that slides and rotates."""
     pin.seed(seed)
     theirs, builder = pin.Model(), ModelBuilder("together")
     theirs.name = "together"

@@ -11,18 +11,18 @@ from test_robots import NO_URDF, ROBOTS, SINGULAR, root_joint, urdf_path
 import condyle
 
 EXACT = 1e-11
-"""Relative to the largest entry: some thousand roundings."""
+"""Tolerance relative to the largest entry: some thousand roundings."""
 INVERSE = 1e-9
-"""The same where pivots divide, whose ratio is up to 1e7 but on icub."""
+"""Tolerance of results with a division by pivots, whose ratio is up to 1e7 for all robots except icub."""
 SEMIDEFINITE = 1e-11
-"""An eigenvalue that is zero, relative to the largest entry."""
+"""Largest eigenvalue that counts as zero, relative to the largest entry."""
 NOT_PHYSICAL = {"icub", "icub_reduced"}
-"""Robots whose inertias no body can have: pivots lose 11 digits."""
+"""Robots with physically impossible inertias: pivots lose 11 digits."""
 
 
 @pytest.fixture(scope="module")
 def book() -> dict[str, Any]:
-    """What the chapter defines."""
+    """Returns the functions that the chapter defines."""
     path = Path(__file__).parents[3] / "docs" / "run.py"
     spec = importlib.util.spec_from_file_location("run", path)
     assert spec is not None and spec.loader is not None
@@ -39,7 +39,7 @@ def test_one_factorisation(book: dict[str, Any], name: str) -> None:
     armature = rng.uniform(0.1, 1.0, model.nv) * (rng.random(model.nv) < 0.5)
     for kind, first in zip(model.joint_types, model.idx_vs, strict=True):
         if kind == "free_flyer":
-            armature[first : first + 3] = armature[first]  # one number along its linear coordinates
+            armature[first : first + 3] = armature[first]  # the same value along its linear coordinates
     found = book["identities"](model.with_armature(armature), condyle.random_configuration(model, seed=0))
     assert len(found) == 6
     for identity, value in found.items():

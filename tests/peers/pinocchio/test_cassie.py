@@ -1,7 +1,8 @@
-"""Cassie, an SDF with closed loops: its spanning tree against one put together in Pinocchio, which reads no SDF here.
+"""Cassie, an SDF with closed loops: its spanning tree compared with one assembled in Pinocchio, which reads no SDF
+here.
 
-The file is read once more, by what SDF 1.6 says: poses of links in the model, of joints in their child; axes in the
-joint's frame, or in the model's with `use_parent_model_frame`.
+The file is read a second time by the rules of SDF 1.6. Poses of links are relative to the model, poses of joints to
+their child. Axes are in the joint's frame, or in the model's with `use_parent_model_frame`.
 """
 
 import os
@@ -41,8 +42,10 @@ def inertia(link: ElementTree.Element) -> pin.Inertia:
 
 
 def tree() -> pin.Model:
-    """The joints breadth first from the pelvis, in the order of the file, without those that close a loop; numbered
-    depth first.
+    """Builds the tree: joints breadth first from the pelvis, in the order of the file, without joints that close a
+    loop.
+
+    They are numbered depth first.
     """
     robot = ElementTree.parse(path()).getroot().find("model")
     links = {link.get("name"): link for link in robot.findall("link")}

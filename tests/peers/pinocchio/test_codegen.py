@@ -1,4 +1,5 @@
-"""Generated code on robots of example-robot-data, against Pinocchio and the library, and as CasADi's `external`."""
+"""Generated code for robots of example-robot-data, compared with Pinocchio and the library, and as CasADi's
+`external`."""
 
 import itertools
 import os
@@ -21,29 +22,30 @@ import condyle
 import condyle.codegen
 
 BOUND = 1e-10
-"""Of what the peer computes in another order, relative to 1 + the largest number; as in comparison.py."""
+"""Tolerance of results that the peer computes in another order, relative to 1 + the largest number; as in
+comparison.py."""
 ROUNDING = 1e-12
-"""Of what the library computes in another order, relative to 1 + the largest number."""
+"""Tolerance of results that the library computes in another order, relative to 1 + the largest number."""
 WORST = 1e10
-"""The condition from which on nothing is compared: a contact that a robot cannot give way to."""
+"""Condition number from which results are not compared: a contact in a direction in which the robot cannot move."""
 MILD = 1e3
-"""The condition of M up to which its inverse amplifies roundings within ROUNDING; beyond, as much as the condition."""
+"""Condition number of M up to which ROUNDING holds; beyond, the tolerance grows with the condition number."""
 APART = 2.0
-"""How often that at the states of vectors but the first: the code and the library may both be off, to different sides.
+"""Factor on the tolerance for all states except the first: the code and the library may have errors of opposite sign.
 
-Both are 4.4e-12 from what extended precision gives for solo12's aba_hessian at the seventh state, and 8.7e-12 from each
-other, where its condition allows 8.2e-12.
+For solo12's aba_hessian at the seventh state, both differ by 4.4e-12 from extended precision, and by 8.7e-12 from each
+other. The condition number there allows 8.2e-12.
 """
 SINGLE = float(np.finfo(np.float32).eps / np.finfo(np.float64).eps)
-"""How much coarser numbers of type float are, and how much more of ROUNDING they take."""
+"""Ratio of the roundings of type float and double, and factor on ROUNDING for floats."""
 WORST_SINGLE = 1e5
-"""The condition from which on results of floats are not compared: no two digits remain."""
+"""Condition number from which results of floats are not compared, because fewer than two digits remain."""
 
 ALL = "CONDYLE_FULL" in os.environ
 """Whether to compile for all robots, which takes a quarter of an hour on two cores."""
 SOME = ["panda", *(["solo12", "anymal"] if ALL else [])]
 FEW = ["double_pendulum_continuous", "ur5", "borinot"]
-"""Those that all languages are compiled for: with a joint on a circle, an arm, and one that flies and has a limb."""
+"""Robots for which all languages are compiled: with a joint on a circle, an arm, and a flying base with a limb."""
 LANGUAGES = ["c-casadi", "c-float", "c-4", "c-8", "rust"]
 CASES = [
     (name, language)
@@ -52,19 +54,20 @@ CASES = [
     if ALL or not (name == "borinot" and language == "c-float")
     if ALL or language != "c-8" or name == FEW[0] or condyle.LEVEL == "avx512"
 ]
-"""Where vectors have four numbers, compilers take a minute for eight lanes of a robot: then one will do.
+"""Pairs of robot and language.
 
-The three kinds of floats are left to the two smaller ones.
+With vectors of four numbers, compilers take a minute for eight lanes of a robot, so only one robot is compiled with
+them. The three kinds of floats are compiled for the two smaller robots.
 """
 BESIDES = {"c-float": ["c-float-4", "c-float-8"], "rust": ["rust-float"]}
-"""Of robots of up to `SMALL` coordinates, the languages that join what others have one by one."""
+"""Additional languages of robots with up to `SMALL` coordinates, compiled together with the language in the key."""
 
 pytestmark = pytest.mark.skipif(shutil.which(compiler) is None, reason="there is no C compiler")
 
 
 @pytest.fixture(scope="module", autouse=True)
 def fast() -> object:
-    """Code is compiled for the time that compilers take, not for its own."""
+    """Sets options for fast compilation instead of fast code."""
     before = condyle.codegen.FLAGS
     condyle.codegen.FLAGS = tuple("-O0" if flag == "-O2" else flag for flag in before)
     yield
@@ -100,18 +103,18 @@ def test_beside_pinocchio(name: str, tmp_path: Path) -> None:
 
 RESTITUTION = 0.3
 SMALL = 9
-"""The coordinates up to which robots are compiled in all languages."""
+"""Maximum number of coordinates of robots that are compiled in all languages."""
 LARGEST = 25
-"""The coordinates up to which the longest functions are compiled: second derivatives and those that need M⁻¹."""
+"""Maximum number of coordinates for the longest functions: second derivatives and functions that need M⁻¹."""
 COMPLETE = {("talos", "c-casadi")}
-"""Larger ones for which all functions are compiled in some language."""
+"""Larger robots for which all functions are compiled in some language."""
 
 Numbers = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""q, v, and what stands for a or τ."""
+"""q, v, and an acceleration or effort."""
 
 
 def beside(pair: Pair, function: str, frame: str, numbers: Numbers) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """The arguments of a function at a state, and what the library computes of them."""
+    """Returns the arguments of a function at a state, and the library's results."""
     model, data = pair.ours, pair.data
     q, v, x = numbers
     told: object
@@ -144,7 +147,8 @@ def beside(pair: Pair, function: str, frame: str, numbers: Numbers) -> tuple[lis
 
 
 def condition(pair: Pair, function: str, frame: str, q: np.ndarray) -> float:
-    """How much the inverses that a function needs may amplify roundings; infinite where there is none."""
+    """Returns the factor by which a function's inverses may amplify roundings; infinite if an inverse does not
+    exist."""
     if not function.startswith(("aba", "minv", "constrained", "impulse")):
         return 1.0
     if pair.name in SINGULAR:
@@ -157,8 +161,8 @@ def condition(pair: Pair, function: str, frame: str, q: np.ndarray) -> float:
 
 
 def chosen(pair: Pair, language: str) -> list[str]:
-    """The functions that are compiled for a robot in a language."""
-    # of impacts only in plain C, or they would take as long as all others together
+    """Returns the functions that are compiled for a robot in a language."""
+    # functions of impacts are compiled only in plain C; otherwise they would take as long as all others together
     plain = language in ("c", "c-casadi")
     long = {"aba_derivatives", "constrained_dynamics_derivatives", "rnea_hessian", "aba_hessian"}
     long |= set() if plain else {"impulse_dynamics_derivatives"}
@@ -167,20 +171,20 @@ def chosen(pair: Pair, language: str) -> list[str]:
 
 
 def frame_of(pair: Pair) -> str:
-    """The frame that most joints move: it is asked for, and a contact holds it."""
+    """Returns the frame that most joints move; functions are evaluated at it, and a contact constrains it."""
     model, q = pair.ours, pair.states(1)[0].q
     moved = [condyle.frame_jacobian(model, pair.data, q, k).any(axis=0).sum() for k in range(len(model.frames))]
     return str(model.frames[int(np.argmax(moved))].name)
 
 
 Call = Callable[[str, Sequence[Sequence[np.ndarray]]], list[list[np.ndarray]]]
-"""The results of a function for the arguments of some states."""
+"""Function that returns the results of a generated function for the arguments of some states."""
 
 
 def compare(pair: Pair, language: str, compiled: Callable[[list[str], dict[str, Any]], Call]) -> Call:
-    """Checks that code is equal to the library but for roundings, which inverses amplify by their condition.
+    """Checks that code is equal to the library up to roundings, which inverses amplify by their condition number.
 
-    compiled: what makes the code, of functions with options. Returns the code.
+    compiled: compiles functions with options. Returns the code.
     """
     single = "float" in language
     rounding, worst = (ROUNDING * SINGLE, WORST_SINGLE) if single else (ROUNDING, WORST)
@@ -208,7 +212,7 @@ def compare(pair: Pair, language: str, compiled: Callable[[list[str], dict[str, 
 
 @pytest.mark.parametrize("name", SOME)
 def test_functions_one_by_one(name: str, tmp_path: Path) -> None:
-    """What `condyle.codegen.compile` makes is what the library computes."""
+    """Functions from `condyle.codegen.compile` give the library's results."""
     pair = load(name)
 
     def call(names: list[str], options: dict[str, Any]) -> Call:
@@ -225,14 +229,14 @@ def test_functions_one_by_one(name: str, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def folder() -> Iterator[Path]:
-    """A folder for libraries, which take a gigabyte for all robots: it is not kept."""
+    """Creates a temporary folder for libraries, which take a gigabyte for all robots."""
     with TemporaryDirectory() as folder:
         yield Path(folder)
 
 
 @pytest.mark.parametrize(("name", "language"), CASES)
 def test_languages(name: str, language: str, folder: Path) -> None:
-    """What each language computes is what the library does, and CasADi gets that."""
+    """The code in each language gives the library's results, and CasADi receives them."""
     if (lacks := missing(language)) is not None:
         pytest.skip(f"there is no {lacks}")
     pair = load(name)
@@ -247,7 +251,7 @@ def test_languages(name: str, language: str, folder: Path) -> None:
 
 
 def external(pair: Pair, code: Library) -> None:
-    """CasADi gets from each function what the code computes, and of its Jacobian what that of the derivatives does."""
+    """Checks that CasADi gets each function's results from the code, and its Jacobian from the derivatives."""
     state = pair.states(1)[0]
     numbers = {"q": state.q, "v": state.v, "restitution": np.array([RESTITUTION]), "lambda": state.v[::-1].copy()}
     for function, (inputs, outputs) in code.functions.items():
@@ -272,7 +276,7 @@ def external(pair: Pair, code: Library) -> None:
 
 
 def library(folder: Path) -> str:
-    """Compiles all C of a folder to robot.so; the name of the robot in it."""
+    """Compiles all C of a folder to robot.so; returns the name of the robot in it."""
     sources = sorted(path.name for path in folder.glob("*.c"))
     flags = ["-O1", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
     subprocess.run([compiler, *flags, *sources, "-o", "robot.so", "-lm"], cwd=folder, check=True)
@@ -280,7 +284,7 @@ def library(folder: Path) -> str:
 
 
 def test_external(tmp_path: Path) -> None:
-    """CasADi finds each function, its arrays by name and shape, and takes what it leaves out for zeros."""
+    """CasADi finds each function, its arrays by name and shape, and uses zeros for omitted arguments."""
     pair = load("panda")
     model, theirs, state = pair.ours, pair.theirs, pair.states(1)[0]
     for file, text in condyle.codegen.source(model, ["rnea", "crba"], "c-casadi").items():
@@ -299,14 +303,14 @@ def test_external(tmp_path: Path) -> None:
     M += np.triu(M, 1).T
     assert crba.size_out(0) == M.shape
     assert np.abs(np.array(crba(state.q)) - M).max() <= BOUND * (1.0 + np.abs(M).max())
-    # inside of an expression
+    # inside an expression
     q = casadi.MX.sym("q", model.nq)
     trace = casadi.Function("trace", [q], [casadi.trace(crba(q))])
     assert abs(float(trace(state.q)) - np.trace(M)) <= BOUND * (1.0 + np.trace(M))
 
 
 def test_jacobians_of_externals(tmp_path: Path) -> None:
-    """CasADi differentiates a function by the derivatives that stand beside it, also inside of an expression."""
+    """CasADi differentiates a function by its generated derivatives, also inside an expression."""
     pair = load("panda")
     model, theirs, state = pair.ours, pair.theirs, pair.states(1)[0]
     names = ["rnea", "aba", "rnea_derivatives", "aba_derivatives"]
@@ -329,7 +333,8 @@ def test_jacobians_of_externals(tmp_path: Path) -> None:
 
 
 def test_jacobians_under_constraints(tmp_path: Path) -> None:
-    """Of accelerations, forces, velocities after an impact and impulses; by the restitution, too."""
+    """Tests Jacobians of accelerations, forces, velocities after an impact and impulses, also with respect to the
+    restitution."""
     pair = load("panda")
     model, frame, state = pair.ours, frame_of(pair), pair.states(1)[0]
     names = [f"{name}{end}" for name in ("constrained_dynamics", "impulse_dynamics") for end in ("", "_derivatives")]
@@ -342,7 +347,7 @@ def test_jacobians_under_constraints(tmp_path: Path) -> None:
         _, d = beside(pair, f"{function}_derivatives", frame, (state.q, state.v, state.a))
         rows = [d[2:5], d[5:8]] if function == "constrained_dynamics" else [d[2:4], d[4:6]]
         expected = np.vstack([np.hstack(blocks) for blocks in rows])
-        # inside of an expression
+        # inside an expression
         x = [casadi.MX.sym(name, size) for name, size in zip(of.name_in(), map(len, arguments), strict=True)]
         sines = casadi.sin(casadi.vertcat(*of.call(x)))
         jacobian = casadi.Function("jacobian", x, [casadi.jacobian(sines, casadi.vertcat(*x))])
@@ -350,7 +355,7 @@ def test_jacobians_under_constraints(tmp_path: Path) -> None:
         chain = np.cos(np.concatenate([y, lambda_]))
         chained = chain[:, None] * expected
         assert np.abs(found[:, : chained.shape[1]] - chained).max() <= bound * (1.0 + np.abs(chained).max()), function
-        # central differences of the library's function, by what it has no derivatives too
+        # central differences of the library's function, also for arguments without derivatives
         step = 1e-6
         for k, by in enumerate(np.cumsum([0, *map(len, arguments[:-1])])):
             for j in range(len(arguments[k])):
@@ -371,7 +376,7 @@ def test_jacobians_under_constraints(tmp_path: Path) -> None:
 
 
 def test_positions_with_quaternions_have_no_jacobian() -> None:
-    """Derivatives along the tangent are none by the numbers of q."""
+    """Derivatives along the tangent are not derivatives with respect to the numbers of q."""
     for robot, expected in [("panda", True), ("anymal", False)]:
         text = "".join(condyle.codegen.source(load(robot).ours, ["rnea", "rnea_derivatives"], "c-casadi").values())
         assert ("jac_" in text) == expected, robot

@@ -1,4 +1,4 @@
-"""Contacts and loops on random robots and on legged ones, against Pinocchio 4.1."""
+"""Contacts and loops on random robots and on legged ones, compared with Pinocchio 4.1."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,13 +18,14 @@ RANDOM = 30
 STATES = 2
 LEGGED = ("anymal", "anymal_kinova", "hyq", "solo12", "go1", "bolt", "talos", "talos_legs", "icub_reduced")
 WORST_CONDITION = 1e4
-"""Of J M⁻¹ Jᵀ: less regular constraints say nothing about the algorithms."""
+"""Maximum condition number of J M⁻¹ Jᵀ: worse conditioned constraints cannot test the algorithms."""
 ROUNDINGS = WORST_CONDITION * np.finfo(float).eps
-"""∂q̈/∂τ is M⁻¹ less what the constraints take, known so well, in both libraries, and loses what M⁻¹ is larger by."""
+"""Accuracy of the terms of ∂q̈/∂τ in both libraries: M⁻¹ minus the constraints' part, with cancellation if M⁻¹ is
+larger."""
 RESTITUTION = 0.3
 STEP = 1e-6
 DIFFERENCES = 1e-5
-"""What central differences with that step leave, relative to 1 + max |theirs|."""
+"""Tolerance of central differences with that step, relative to 1 + max |theirs|."""
 
 
 @dataclass
@@ -40,14 +41,14 @@ class Case:
         return condyle.ConstraintSet(self.state.pair.ours, self.constraints)
 
     def conditions(self) -> float:
-        """The condition number of the inertia that the robot shows to its constraints."""
+        """Returns the condition number of the Delassus matrix."""
         s = self.state
         d = ours_of(s)(condyle.constrained_dynamics_derivatives, self.set(), s.q, s.v, s.tau)
         return float(np.inf if d.redundant else np.linalg.cond(d.inertia))
 
 
 def case(state: State, constraints: list[condyle.ContactConstraint]) -> Case:
-    """Constraints as Pinocchio has them: the target is part of the second placement."""
+    """Returns constraints in Pinocchio's form: the target is part of the second placement."""
     pair = state.pair
     theirs = dict(common_frames(pair))
     models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
@@ -71,7 +72,7 @@ def case(state: State, constraints: list[condyle.ContactConstraint]) -> Case:
 
 
 def random_case(state: State, seed: int, loops: bool) -> Case:
-    """As many constraints as the robot can satisfy in one way, of a dozen random ones."""
+    """Chooses, from a dozen random constraints, as many as the robot can satisfy with unique forces."""
     rng, pair = np.random.default_rng(seed), state.pair
     frames = [i for i, _ in common_frames(pair)]
     chosen: list[condyle.ContactConstraint] = []
@@ -101,14 +102,16 @@ def random_case(state: State, seed: int, loops: bool) -> Case:
 
 
 def whole(c: condyle.ContactConstraint) -> bool:
-    """Whether Pinocchio's ∂/∂q is the derivative of its own q̈ and λ, as differences show: it is not for all loops of
-    points, nor for all rigid constraints along the world's axes.
+    """Returns whether Pinocchio's ∂/∂q is the derivative of its own q̈ and λ, as differences show.
+
+    It is not for all loops of points, nor for all rigid constraints along the world's axes.
     """
     return c.reference == "local" if c.kind == "rigid" else c.other is None
 
 
 def check_dynamics(case: Case) -> None:
-    """q̈ and λ, and their derivatives; where Pinocchio's ∂/∂q is not whole, against differences of its q̈ and λ."""
+    """Compares q̈ and λ and their derivatives; where Pinocchio's ∂/∂q is not whole, with differences of its q̈ and
+    λ."""
     state, pair = case.state, case.state.pair
     model, data, far = pair.theirs, pair.their_data, pair.self_distance
     settings = pin.ProximalSettings(1e-14, 1e-14, 0.0, 1)
@@ -138,7 +141,7 @@ def check_dynamics(case: Case) -> None:
 
 
 def check_impacts(case: Case) -> None:
-    """v⁺ and Λ, and their derivatives: Pinocchio's are those of v⁺ − v."""
+    """Compares v⁺ and Λ and their derivatives; Pinocchio returns the derivatives of v⁺ − v."""
     state, pair = case.state, case.state.pair
     model, data, far = pair.theirs, pair.their_data, pair.self_distance
     args = (model, data, state.q, state.v, case.models, case.datas, RESTITUTION)
@@ -180,7 +183,7 @@ def test_legged_robots(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in LEGGED if name in ROBOTS])
 def test_batches(name: str) -> None:
-    """Constrained dynamics and impacts, and their derivatives, in the lanes of a batch."""
+    """Tests constrained dynamics and impacts, and their derivatives, in the lanes of a batch."""
     (state,) = load(name).states(1, seed=50)
     contacts = random_case(state, 50, False)
     state.in_batch = True

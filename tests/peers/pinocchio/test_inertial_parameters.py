@@ -1,4 +1,4 @@
-"""Inertial parameters of random bodies, against Pinocchio 4.1."""
+"""Inertial parameters of random bodies, compared with Pinocchio 4.1."""
 
 import numpy as np
 import pinocchio as pin
@@ -11,7 +11,7 @@ BODIES = 100
 
 
 def expect(what: str, ours: np.ndarray, theirs: np.ndarray) -> None:
-    """Checks that two results are equal, and records how far they are from each other."""
+    """Checks that two results are equal, and records their difference."""
     ours, theirs = np.asarray(ours), np.asarray(theirs)
     assert ours.shape == theirs.shape
     difference = float(np.abs(ours - theirs).max() / (1 + np.abs(theirs).max()))

@@ -1,4 +1,4 @@
-"""Robots that no URDF can describe, made with both libraries' own calls, against Pinocchio 4.1."""
+"""Robots that URDF cannot describe, made by both libraries' own calls, compared with Pinocchio 4.1."""
 
 import checks
 import numpy as np
@@ -12,10 +12,10 @@ import condyle
 ROBOTS = 20
 STATES = 2
 SINGLE = (*ONE, *ONE, *OTHERS)
-"""Each kind with an axis twice, so that most robots have aligned and other ones."""
+"""Kinds of joints; kinds with an axis occur twice, so that most robots have aligned and other axes."""
 STEP = 1e-6
 DIFFERENCES = 1e-6
-"""What central differences with that step leave, relative to 1 + max |theirs|."""
+"""Tolerance of central differences with that step, relative to 1 + max |theirs|."""
 
 
 def check(pair: Pair, seed: int) -> None:
@@ -47,7 +47,7 @@ def test_single_joints(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_chains_of_joints(seed: int) -> None:
-    """Universal, spherical ZYX and composite joints, in Pinocchio as chains too: every function."""
+    """Compares every function for universal, spherical ZYX and composite joints, which are chains in Pinocchio, too."""
     robot = RandomRobot(f"built robot {100 + seed}", 100 + seed, (*SINGLE, *COMPOSITES), composites=False)
     robot.pair.record_size()
     checks.check_bodies(robot.pair)
@@ -59,7 +59,8 @@ def test_chains_of_joints(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_composite_joints(seed: int) -> None:
-    """The same robots, with one joint of Pinocchio's for each chain: every function but rates and derivatives."""
+    """Compares the same robots with one joint of Pinocchio's for each chain: every function except rates and
+    derivatives."""
     robot = RandomRobot(f"built robot {100 + seed}", 100 + seed, (*SINGLE, *COMPOSITES), composites=True)
     ours, theirs = robot.pair.ours, robot.pair.theirs
     assert (ours.nq, ours.nv) == (theirs.nq, theirs.nv)
@@ -74,8 +75,9 @@ def test_composite_joints(seed: int) -> None:
 
 
 def test_derivatives_through_composite_joints() -> None:
-    """Of τ by q: ours are what differences of Pinocchio's own rnea say. Its own derivatives are not; once they are, the
-    comparisons of composite joints above need make no exception.
+    """Our ∂τ/∂q equals differences of Pinocchio's own rnea, but Pinocchio's derivatives do not.
+
+    Once they do, the comparisons of composite joints above need no exception.
     """
     pair = RandomRobot("built", 0, (*ONE, *COMPOSITES), composites=True).pair
     state = pair.states(1)[0]

@@ -1,8 +1,8 @@
-"""Mimic joints that share a coordinate: rnea, crba and nle as Pinocchio has them, and all else by projection.
+"""Mimic joints that share a coordinate: rnea, crba and nle compared with Pinocchio's, and all others by projection.
 
-A robot whose joints follow others moves as the same robot with free joints does along q_free = G q + offset, so its
-efforts are Gᵀ τ_free, its inertia Gᵀ M_free G, and its derivatives Gᵀ (∂τ_free/∂·) G; Pinocchio computes those of the
-free robot. What forward dynamics returns is put back into these.
+A robot with mimic joints moves as the same robot with free joints along q_free = G q + offset. So its efforts are Gᵀ
+τ_free, its inertia is Gᵀ M_free G, and its derivatives are Gᵀ (∂τ_free/∂·) G; Pinocchio computes them for the free
+robot. Results of forward dynamics are verified by inserting them into these equations.
 """
 
 from pathlib import Path
@@ -21,16 +21,17 @@ STATES = 3
 RANDOM = 20
 ROBOTS = [n for n in test_robots.ROBOTS if n not in test_robots.NO_URDF and "<mimic" in test_robots.text(n)]
 BROKEN = {"alex_psyonic_hands"}
-"""Robots with a joint that follows one that is not there; neither library reads them with mimic=True."""
+"""Robots with a joint that follows a missing one; neither library reads them with mimic=True."""
 REFUSED = {"romeo", "talos_full", "talos_full_box"}
-"""Robots with a joint that follows one of a higher number, which Pinocchio does not read with mimic=True."""
+"""Robots with a joint that follows one with a higher index; Pinocchio does not read them with mimic=True."""
 
 UNREADABLE = ("not in the kinematic tree", "Mimicking and mimicked configuration spaces have different sizes")
-"""Why Pinocchio refuses random robots: a joint follows one of a higher number, or a continuous one and another kind."""
+"""Pinocchio's errors for random robots: a joint follows one with a higher index, or a continuous one and another
+kind."""
 
 
 class Projection:
-    """The robot with mimic joints (ours) as part of the one without (Pinocchio's)."""
+    """Robot with mimic joints (ours) as a projection of the one without (Pinocchio's)."""
 
     def __init__(self, name: str, path: str, root_joint: str | None) -> None:
         self.free = from_urdf(name, path, root_joint)
@@ -44,7 +45,7 @@ class Projection:
                 self.G[free.idx_vs[i] + k, ours.idx_vs[i] + k] = mimic.ratio if mimic else 1.0
 
     def position(self, q: np.ndarray) -> np.ndarray:
-        """The position of the free robot."""
+        """Returns the position of the free robot."""
         free, ours, q_free = self.free.ours, self.ours, np.empty(self.free.ours.nq)
         for i, mimic in enumerate(ours.mimics):
             own = q[ours.idx_qs[i] :][: free.nqs[i]]
@@ -57,7 +58,7 @@ class Projection:
         return q_free
 
     def check(self, seed: int) -> None:
-        """Everything at one random state."""
+        """Compares everything at one random state."""
         rng, pair, G, ours = np.random.default_rng(seed), self.free, self.G, (self.ours, self.data)
         q = condyle.random_configuration(self.ours, seed)
         v, a, tau = rng.standard_normal((3, self.ours.nv))
@@ -87,7 +88,7 @@ class Projection:
         d = condyle.aba_derivatives(*ours, q, v, tau, f_ext)
         pair.expect("mimic: aba of aba_derivatives", d.a, condyle.aba(*ours, q, v, tau, f_ext))
         assert np.array_equal(d.da_dtau, condyle.minv(*ours, q))
-        # M q̈ + h = τ and what follows from it, M ∂q̈/∂· = −∂τ/∂·, M M⁻¹ = 1
+        # M q̈ + h = τ and its consequences: M ∂q̈/∂· = −∂τ/∂·, M M⁻¹ = 1
         dtau_dq, dtau_dv, _ = derivatives(d.a)
         pair.expect("mimic: rnea of aba", rnea(d.a), tau)
         for grain in checks.GRAINS:
@@ -99,7 +100,7 @@ class Projection:
         pair.expect("mimic: M times minv", M @ d.da_dtau, np.eye(self.ours.nv))
 
     def check_terms(self, q: np.ndarray, v: np.ndarray, a: np.ndarray, state: State) -> None:
-        """The Coriolis matrix, the regressor, centre of mass, momentum and energies."""
+        """Compares the Coriolis matrix, the regressor, centre of mass, momentum and energies."""
         pair, G, ours, theirs = self.free, self.G, (self.ours, self.data), (self.free.theirs, self.free.their_data)
         q_free, v_free, a_free = self.position(q), G @ v, G @ a
         C = pin.computeCoriolisMatrix(*theirs, q_free, v_free)
@@ -148,15 +149,17 @@ def test_broken(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(REFUSED))
 def test_refused(name: str) -> None:
-    """Once Pinocchio reads these, they belong to the direct comparison."""
+    """Pinocchio rejects these robots; once it reads them, they belong to the direct comparison."""
     with pytest.raises(ValueError, match="not in the kinematic tree"):
         pin.buildModelFromUrdf(test_robots.urdf_path(name), mimic=True)
 
 
 @pytest.mark.parametrize("seed", range(RANDOM))
 def test_random_robot(seed: int, tmp_path: Path) -> None:
-    """Without a direct comparison of M: with joints of several degrees of freedom below one that follows another,
-    Pinocchio's crba contradicts its own rnea, and ours agrees with the latter.
+    """Compares random robots, but not M directly.
+
+    With joints of several degrees of freedom below a joint that follows another, Pinocchio's crba contradicts its own
+    rnea. Ours agrees with the latter.
     """
     path = tmp_path / "robot.urdf"
     path.write_text(RandomUrdf(1000 + seed, mimics=True).text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Random robots that both read from the same MJCF, against Pinocchio 4.1."""
+"""Random robots that both libraries read from the same MJCF, compared with Pinocchio 4.1."""
 
 from pathlib import Path
 

@@ -1,6 +1,7 @@
-"""Models of Pinocchio as ours and back, of all robots of example-robot-data: the same joints, frames and numbers.
+"""Pinocchio's models converted to ours and back, for all robots of example-robot-data: the same joints, frames and
+numbers.
 
-Named positions of SRDFs, appended robots and joints that follow others are beside Pinocchio's own.
+Named positions of SRDFs, appended robots and joints that follow others are compared with Pinocchio's own.
 """
 
 import os
@@ -27,13 +28,13 @@ MIMICS = [n for n in test_mimic.ROBOTS if n not in test_mimic.BROKEN | test_mimi
 
 
 def close(what: str, ours: np.ndarray, theirs: np.ndarray) -> None:
-    """Equal, as everywhere in these tests."""
+    """Checks equality, with the tolerance of all these tests."""
     bound = TOLERANCE * (1.0 + np.abs(theirs).max(initial=0.0))
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=bound, err_msg=what)
 
 
 def check_same(ours: Model, theirs: pin.Model, bodies: list[int] | None = None, states: int = 2) -> None:
-    """Names, limits, losses, and the numbers of rnea, crba and frames; `bodies` are ours for each of their joints."""
+    """Compares names, limits, losses, rnea, crba and frames; `bodies` are our bodies for each of their joints."""
     pair = Pair(theirs.name, theirs, ours, chains=None if bodies is None else [[body] for body in bodies])
     bodies = bodies or list(range(ours.nbodies))
     assert (ours.name, ours.nq, ours.nv) == (theirs.name, theirs.nq, theirs.nv)
@@ -80,7 +81,7 @@ def test_there_and_back(name: str) -> None:
     check_same(ours, pair.theirs)
     theirs = pair.ours.to_pinocchio()
     check_same(pair.ours, theirs)
-    if not name.startswith("icub"):  # whose axes are 6e-17 from x, y and z
+    if not name.startswith("icub"):  # icub's axes differ by 6e-17 from x, y and z
         assert [j.shortname() for j in theirs.joints] == [j.shortname() for j in pair.theirs.joints]
     kinds = {(f.name, str(f.type)) for f in theirs.frames}
     assert kinds == {(f.name, str(f.type)) for f in pair.theirs.frames}
@@ -98,7 +99,7 @@ def test_every_kind_of_joint(seed: int, composites: bool) -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 def test_random_urdfs(seed: int, tmp_path: Path) -> None:
-    """Continuous joints about any axis, which only Pinocchio's reader makes."""
+    """Tests continuous joints about any axis, which only Pinocchio's reader creates."""
     path = tmp_path / "robot.urdf"
     path.write_text(RandomUrdf(seed).text, encoding="utf-8")
     pair = from_urdf(f"robot {seed}", str(path), "free_flyer")
@@ -169,7 +170,7 @@ def test_append_at_a_frame(name: str, frame: str) -> None:
     close("crba", condyle.crba(ours, data, q), pin.crba(theirs, their_data, q))
     assert np.array_equal(ours.limits.effort, np.where(theirs.upperEffortLimit > 1e30, np.inf, theirs.upperEffortLimit))
     prefixed = on.ours.append(None, arm.ours, prefix="tool_")
-    assert prefixed.names[on.ours.nbodies] == "tool_" + arm.ours.names[1]  # behind what the world has carried
+    assert prefixed.names[on.ours.nbodies] == "tool_" + arm.ours.names[1]  # after the bodies already on the world
     with pytest.raises(condyle.ModelError, match="unknown frame"):
         on.ours.append("no such frame", arm.ours)
 
@@ -201,7 +202,7 @@ def test_by_name(name: str) -> None:
 
 
 def test_by_name_of_robot_descriptions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A package with modules like those of robot_descriptions, which fetches its files from the net."""
+    """Imitates a package with modules as in robot_descriptions, which downloads its files."""
     folder = tmp_path / "robot_descriptions"
     folder.mkdir()
     (tmp_path / "arm7.urdf").write_text(condyle.robots.ARM7, encoding="utf-8")

@@ -1,6 +1,6 @@
-"""The program on all robots of example-robot-data: what `inspect` says against Pinocchio, `check`, `budget`, meshes.
+"""The program on all robots of example-robot-data: `inspect` compared with Pinocchio, `check`, `budget`, meshes.
 
-It is looked for where cargo builds it (`cargo test` does), or where CONDYLE_PROGRAM says.
+It uses the program that cargo builds (as `cargo test` does), or the one that CONDYLE_PROGRAM names.
 """
 
 import base64
@@ -39,7 +39,8 @@ QUADRUPEDS = {
     "go1": ("foot", ["FL", "FR", "RL", "RR"], "{}_thigh_joint", "{}_calf_joint", (0.8, -1.6), False),
     "hyq": ("foot", ["lf", "rf", "lh", "rh"], "{}_hfe_joint", "{}_kfe_joint", (0.7, -1.4), True),
 }
-"""Ends of the feet's names, legs, joints of thigh and shank, their angles, and whether the hind knees bend forwards."""
+"""Suffix of the feet's names, legs, joints of thigh and shank, their angles, and whether the hind knees bend
+forwards."""
 
 
 def phase(kind: str, knots: int, **numbers: object) -> str:
@@ -63,7 +64,7 @@ def plan(task: str, folder: Path) -> dict:
 
 
 def check_motion(name: str, motion: dict, ahead: float) -> None:
-    """It goes where it should, within Pinocchio's limits, and its states are q ⊕ v Δt."""
+    """Checks that the motion reaches its goal, within Pinocchio's limits, and that its states are q ⊕ v Δt."""
     model = pin.buildModelFromUrdf(urdf_path(name), pin.JointModelFreeFlyer())
     q, v, tau = motion["q"], motion["v"], motion["tau"]
     assert abs(q[-1, 0] - q[0, 0] - ahead) < 0.03
@@ -163,7 +164,7 @@ def test_budget_in_contact(name: str) -> None:
 
 
 def on_terminal(*line: str) -> str:
-    """What the program shows on a terminal."""
+    """Returns the program's output on a terminal."""
     leader, follower = os.openpty()
     environment = {**os.environ, "TERM": "xterm-256color"}
     with subprocess.Popen([str(PROGRAM), *line], stdout=follower, stderr=follower, env=environment) as process:
@@ -172,7 +173,7 @@ def on_terminal(*line: str) -> str:
         while True:
             try:
                 part = os.read(leader, 4096)
-            except OSError:  # how Linux says that nobody writes any more
+            except OSError:  # Linux reports by this error that all writers have closed the terminal
                 part = b""
             if not part:
                 break
@@ -194,10 +195,12 @@ def test_colours_and_progress_are_for_terminals(command: str) -> None:
 
 
 MOST_TRIANGLES = 60_000
-"""Of a page, as `condyle plan --help` says."""
+"""Maximum number of triangles on a page, as documented by `condyle plan --help`."""
 MESH_ROUNDING = 0.02
-"""How far the box around a body's meshes may be from that of the files, relative to its largest side: meshes are made
-smaller by edges that collapse, and have 16 bits along a side."""
+"""Maximum difference between the box around a body's meshes and the box of the files, relative to its largest side.
+
+Meshes are simplified by collapsing edges, and have a resolution of 16 bits along a side.
+"""
 
 
 def scene_of(name: str, folder: Path) -> dict:
@@ -212,7 +215,7 @@ def scene_of(name: str, folder: Path) -> dict:
 
 
 def box_of_meshes(scene: dict, shapes: list[dict]) -> np.ndarray | None:
-    """The box around the meshes of a body, in the body's frame: least and largest coordinates."""
+    """Returns the box around the meshes of a body, in the body's frame: smallest and largest coordinates."""
     points = []
     for shape in (shape for shape in shapes if shape["kind"] == "mesh"):
         mesh = scene["meshes"][shape["part"]]
@@ -227,7 +230,7 @@ def box_of_meshes(scene: dict, shapes: list[dict]) -> np.ndarray | None:
 
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name not in {*NO_URDF, *SINGULAR}])
 def test_meshes(name: str, tmp_path: Path) -> None:
-    """All meshes are found, and each body's are where Pinocchio, which reads them by assimp, has them."""
+    """All meshes are found, and each body's meshes are where Pinocchio has them, which reads them by assimp."""
     model = pin.buildModelFromUrdf(urdf_path(name))
     if model.nv == 0:
         pytest.skip("on a fixed root nothing moves")

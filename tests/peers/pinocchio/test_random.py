@@ -1,4 +1,4 @@
-"""Random robots of every kind of joint that a URDF has, on every kind of root joint, against Pinocchio 4.1."""
+"""Random robots with every kind of joint of URDF, on every kind of root joint, compared with Pinocchio 4.1."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""All robots of example-robot-data, from their plain URDF, against Pinocchio 4.1."""
+"""All robots of example-robot-data, from their plain URDF, compared with Pinocchio 4.1."""
 
 import os
 
@@ -11,7 +11,7 @@ from example_robot_data.robots_loader import ROBOTS, getModelPath
 STATES = 3
 NO_URDF = {"cassie": "is an SDF file: see test_cassie.py"}
 SINGULAR = {"bravo7_gripper", "falcon_bravo7_gripper", "bluevolta_bravo7_gripper", "romeo"}
-"""Robots with bodies without mass at the end of a limb: M has no inverse."""
+"""Robots with massless bodies at the end of a limb: M has no inverse."""
 
 
 def urdf_path(name: str) -> str:
@@ -80,7 +80,7 @@ def test_forward_dynamics(pair: Pair) -> None:
 
 
 def test_batches(pair: Pair) -> None:
-    """Every function of a state, in the lanes of a batch."""
+    """Tests every function of a state, in the lanes of a batch."""
     (state,) = pair.states(1, seed=50)
     state.in_batch = True
     checks.check_kinematics(state)

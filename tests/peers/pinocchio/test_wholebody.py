@@ -1,4 +1,4 @@
-"""Whole-body control on pyramids finds the optimum that quadprog finds, of the same programs."""
+"""Whole-body control on pyramids finds the same optimum as quadprog, for the same programs."""
 
 import subprocess
 import sys
@@ -14,14 +14,15 @@ sys.path.insert(0, str(ROOT / "benches" / "peers"))
 from wholebody_programs import Program, read  # noqa: E402
 
 AGREEMENT = 1e-6
-"""Relative to 1 and the size of what is compared: quadprog is exact but for rounding, our tolerance is 1e-9."""
+"""Tolerance relative to 1 and the size of the compared numbers: quadprog is exact up to rounding, our tolerance is
+1e-9."""
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The programs of ticks of robots that stand, walk and trot while they are pushed, with our solutions."""
+    """Writes the programs of ticks of robots that stand, walk and trot while they are pushed, with our solutions."""
     folder = tmp_path_factory.mktemp("programs")
-    # of the workspace, with whose features all that it needs is already compiled
+    # with the workspace's features, all dependencies are already compiled
     command = ["cargo", "bench", "--quiet", "--locked", "--workspace", "--profile", "dev", "--bench", "wholebody_peers"]
     command += ["--", "--ticks", "1600", "--window", "320", "--replays", "0", "--export", str(folder)]
     subprocess.run([*command, "humanoid", "quadruped"], cwd=ROOT, check=True)

@@ -1,4 +1,4 @@
-"""Random inertias, limits and armature in copies of all URDFs of example-robot-data, which Pinocchio reads too."""
+"""Random inertias, limits and armature in copies of all URDFs of example-robot-data, which Pinocchio also reads."""
 
 from pathlib import Path
 
@@ -12,11 +12,11 @@ import condyle
 FOLDER = Path(getModelPath("a1_description"))
 FILES = sorted(file.relative_to(FOLDER).as_posix() for file in FOLDER.rglob("*.urdf"))
 SAME = 1e-11
-"""M and inertias, to this part of the largest entry: inertias go through the frames of merged links."""
+"""Tolerance of M and inertias, relative to the largest entry: inertias pass through the frames of merged links."""
 
 
 def other(inertia: condyle.Inertia, rng: np.random.Generator) -> condyle.Inertia:
-    """Another inertia that a body may have, of about the size of a limb."""
+    """Returns another valid inertia of a body, of about the size of a limb."""
     del inertia
     spread = 0.1 * rng.standard_normal((3, 3))
     moments = spread @ spread.T + 1e-3 * np.eye(3)
@@ -57,5 +57,5 @@ def test_inertias_come_back(name: str, root_joint: str | None, tmp_path: Path) -
         return
     M = pin.crba(theirs, theirs.createData(), q := condyle.random_configuration(changed, seed=1))
     M = np.triu(M) + np.triu(M, 1).T
-    ours = condyle.crba(changed, condyle.Data(changed), q) - np.diag(changed.armature)  # Pinocchio reads no armature
+    ours = condyle.crba(changed, condyle.Data(changed), q) - np.diag(changed.armature)  # Pinocchio ignores armature
     np.testing.assert_allclose(ours, M, rtol=0.0, atol=SAME * (1.0 + np.abs(M).max()))

@@ -1,4 +1,4 @@
-"""The table of all differences from Pinocchio, as Markdown, from what the tests of one run have recorded."""
+"""The table of all differences from Pinocchio, as Markdown, from the records of one test run."""
 
 import platform
 import re
@@ -77,17 +77,17 @@ joint, with mimic joints, armature and external forces (`crates/dynamics/tests/s
 
 
 PUBLIC = re.compile(r"<!-- public robots -->.*<!-- end of public robots -->\n", re.DOTALL)
-"""The section that `tests/peers/robots.py --table` writes."""
+"""Section that `tests/peers/robots.py --table` writes."""
 
 
 def kept(text: str) -> str:
-    """Returns the section on public robots of a file, which is another program's, with a line before it."""
+    """Returns the section on public robots of a file, which another program writes, with an empty line before it."""
     section = PUBLIC.search(text)
     return "\n" + section.group() if section else ""
 
 
 def report() -> str:
-    """The whole file."""
+    """Returns the whole file."""
     head = HEAD.format(
         command=COMMAND,
         ours=condyle.__version__,
@@ -106,7 +106,7 @@ def report() -> str:
 
 
 def derivatives() -> list[str]:
-    """What the Rust tests print about the derivatives by hand."""
+    """Returns the Rust tests' output about hand-written derivatives."""
     modules = ("derivatives", "second_order", "inputs", "motion_derivatives", "constrained_derivatives")
     command = ("cargo", "test", "--locked", "--package", "condyle-dynamics", "--test", "suite", "--", "--nocapture")
     output = subprocess.run((*command, *modules), check=True, stdout=subprocess.PIPE, text=True).stdout
@@ -120,7 +120,7 @@ def derivatives() -> list[str]:
 
 
 def robots() -> list[str]:
-    """All robots of example-robot-data, with what is special about them."""
+    """Returns all robots of example-robot-data, with remarks."""
     lines = [
         "## Robots",
         "",
@@ -137,13 +137,13 @@ def robots() -> list[str]:
 
 
 def degrees(names: list[str]) -> str:
-    """From the least to the greatest number of degrees of freedom."""
+    """Returns the smallest and the largest number of degrees of freedom."""
     nvs = [comparison.sizes[name][3] for name in names] or [0]
     return f"{min(nvs)} to {max(nvs)}"
 
 
 def remarks(name: str) -> list[str]:
-    """What is special about a robot."""
+    """Returns the special properties of a robot."""
     found = []
     if name in test_robots.NO_URDF:
         found.append("an SDF with closed loops: its spanning tree, put together in Pinocchio")

@@ -8,13 +8,13 @@ use condyle_dynamics::{
 use rand::RngExt;
 use rand::rngs::StdRng;
 
-/// Sets whose Λ has a greater condition number say nothing about the algorithm.
+/// Largest condition number of Λ: with a greater one, a set of constraints cannot test the algorithm.
 const WORST_CONDITION: f64 = 1e4;
 
 const KINDS: [ConstraintKind; 4] =
     [ConstraintKind::Point, ConstraintKind::Rigid, ConstraintKind::Line, ConstraintKind::Plane];
 
-/// A contact or loop, of a point, along some axes or of a frame, in either reference, with any gains and targets.
+/// Returns a contact or loop of any kind, in either reference, with any gains and targets.
 pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConstraint {
     let frames = model.frames().len();
     let motion = |rng: &mut StdRng| Motion::new(normal3(rng), normal3(rng));
@@ -36,7 +36,7 @@ pub(crate) fn random_constraint(model: &Model, rng: &mut StdRng) -> ContactConst
     }
 }
 
-/// Some constraints that the robot can satisfy at a state, in one way.
+/// Returns random constraints that the robot can satisfy at a state, with unique forces.
 pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng) -> Vec<ContactConstraint> {
     let mut chosen = Vec::new();
     let mut data = Data::new(model);
@@ -54,7 +54,7 @@ pub(crate) fn random_constraints(model: &Model, state: &State, rng: &mut StdRng)
     chosen
 }
 
-/// Models, each with a state and constraints that it can satisfy in one way.
+/// Returns models, each with a state and constraints that it can satisfy there, with unique forces.
 pub(crate) fn cases(trees: u64) -> Vec<(Model, State, Vec<ContactConstraint>)> {
     let with_constraints = |(seed, model): (usize, Model)| {
         let mut rng = rng(seed as u64);

@@ -1,4 +1,4 @@
-//! Random robots and states, and how the tests compare numbers.
+//! Random robots and states, and functions that compare numbers.
 #![allow(dead_code)] // each test file uses a part of it
 
 pub(crate) mod contacts;
@@ -14,12 +14,12 @@ use rand::rngs::StdRng;
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 
-/// The same numbers in every run.
+/// Returns a generator with the same numbers in every run.
 pub(crate) fn rng(seed: u64) -> StdRng {
     StdRng::seed_from_u64(seed)
 }
 
-/// n numbers, standard normal.
+/// Returns n numbers, standard normal.
 pub(crate) fn normal(rng: &mut StdRng, n: usize) -> Vec<f64> {
     let mut one = || {
         let (u, angle) = (1.0 - rng.random::<f64>(), core::f64::consts::TAU * rng.random::<f64>());
@@ -42,7 +42,7 @@ pub(crate) fn random_pose(rng: &mut StdRng) -> Se3<f64> {
     Se3::new(random_rotation(rng), normal3(rng).scale(0.5))
 }
 
-/// Four mass points.
+/// Returns the inertia of four mass points.
 pub(crate) fn random_inertia(rng: &mut StdRng) -> Inertia<f64> {
     (0..4).fold(Inertia::zero(), |I, _| {
         let mass = 0.2 + rng.random::<f64>();
@@ -50,7 +50,7 @@ pub(crate) fn random_inertia(rng: &mut StdRng) -> Inertia<f64> {
     })
 }
 
-/// The three embedded robots, with a rotor on each joint but the free-flyer's.
+/// Returns the three embedded robots, with a rotor on each joint except the free-flyer.
 pub(crate) fn embedded() -> [Model; 3] {
     [robots::arm7(), robots::quadruped(), robots::humanoid()].map(|model| {
         let first = if model.bodies()[1].joint == Joint::FreeFlyer { 6 } else { 0 };
@@ -60,32 +60,33 @@ pub(crate) fn embedded() -> [Model; 3] {
     })
 }
 
-/// A body of a random tree, and the joint that carries it.
+/// Body of a random tree, and the joint that carries it.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
-    /// 0 is the world.
+    /// Index of the parent; 0 is the world.
     pub(crate) parent: usize,
     pub(crate) joint: Joint,
     pub(crate) placement: Se3<f64>,
     pub(crate) inertia: Inertia<f64>,
     pub(crate) armature: f64,
-    /// Which part's joint it follows, and how.
+    /// Index of the part whose joint this one follows, and the relation.
     pub(crate) mimic: Option<(usize, Mimic)>,
-    /// A frame on the body.
+    /// Frame on the body.
     pub(crate) frame: Se3<f64>,
 }
 
-/// A robot that can be described more than once. Part i (counted from 1) is named `b{i}`, its frame `f{i}`.
+/// Robot that can be described in more than one format. Part i (counted from 1) is named `b{i}`, its frame `f{i}`.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree {
     pub(crate) parts: Vec<Part>,
     pub(crate) gravity: Vec3<f64>,
-    /// Whether its passive efforts have all derivatives: no |v| and no |Δ|.
+    /// Whether its passive efforts have all derivatives: they contain neither |v| nor |Δ|.
     pub(crate) smooth: bool,
 }
 
 impl Tree {
-    /// Every kind of joint, revolute and prismatic ones about aligned and other axes, in random order on random parents.
+    /// Creates a robot with every kind of joint in random order on random parents. Revolute and prismatic joints have
+    /// aligned and other axes.
     pub(crate) fn random(rng: &mut StdRng) -> Self {
         let e = |k: usize, s: f64| Vec3::from(core::array::from_fn(|i| if i == k { s } else { 0.0 }));
         let mut kinds = vec![
@@ -106,7 +107,7 @@ impl Tree {
         kinds.shuffle(rng);
         let mut tree = Self { parts: Vec::new(), gravity: normal3(rng).scale(5.0), smooth: false };
         for joint in kinds {
-            // half of the bodies on the last one, so that some branches are long
+            // half of the bodies are on the previous one, so that some branches are long
             let n = tree.parts.len();
             let parent = if rng.random::<bool>() { n } else { rng.random_range(0..=n) };
             tree.add(rng, parent, joint);
@@ -114,7 +115,8 @@ impl Tree {
         tree
     }
 
-    /// The same, and joints that follow: in the leader's branch, in others, with several followers, turned round.
+    /// Creates the same robot with joints that follow others: in the leader's branch, in other branches, with several
+    /// followers, and with inverted axes.
     pub(crate) fn random_with_mimics(rng: &mut StdRng) -> Self {
         let mut tree = Self::random(rng);
         let n = tree.parts.len();
@@ -130,7 +132,7 @@ impl Tree {
         tree.follow(below, leader, -0.7, 0.3);
         tree.follow(far_below, leader, 1.0, 0.0);
         tree.follow(across, leader, 0.4, -0.2);
-        tree.follow(earlier, between, 1.5, 0.1); // numbered before its leader
+        tree.follow(earlier, between, 1.5, 0.1); // its index is lower than its leader's
         // continuous joints, as leaders and as followers
         let endless = tree.add(rng, below, Joint::Continuous { axis: e });
         let backwards = tree.add(rng, endless, Joint::Revolute { axis: a });
@@ -198,14 +200,14 @@ impl Tree {
     }
 }
 
-/// Damping, with a polynomial or without, and friction of the i-th joint.
+/// Returns damping (with or without a polynomial) and friction of the i-th joint.
 fn losses(i: usize, smooth: bool) -> JointOptions {
     let damping_polynomial = if i.is_multiple_of(2) { [if smooth { 0.0 } else { 0.02 }, 0.03] } else { [0.0; 2] };
     let friction = if i.is_multiple_of(3) { 0.2 } else { 0.0 };
     JointOptions { damping: 0.1 + 0.05 * (i % 3) as f64, damping_polynomial, friction, ..JointOptions::default() }
 }
 
-/// A position at which the spring of a joint rests.
+/// Returns a rest position for the spring of a joint.
 fn rest(joint: Joint) -> &'static [f64] {
     match joint {
         Joint::Continuous { .. } => &[0.6, 0.8],
@@ -217,8 +219,8 @@ fn rest(joint: Joint) -> &'static [f64] {
     }
 }
 
-/// Efforts of armature: a q̈, and for a free joint's linear coordinates a (v̇ + ω × v).
-#[allow(dead_code)] // by some of the tests
+/// Returns the efforts of armature: a q̈, and for a free joint's linear coordinates a (v̇ + ω × v).
+#[allow(dead_code)] // used by some of the tests
 pub(crate) fn armature_torque(model: &Model, v: &[f64], a: &[f64]) -> Vec<f64> {
     let mut tau: Vec<f64> = model.armature().iter().zip(a).map(|(armature, a)| armature * a).collect();
     for body in model.bodies()[1..].iter().filter(|body| body.joint == Joint::FreeFlyer) {
@@ -231,8 +233,8 @@ pub(crate) fn armature_torque(model: &Model, v: &[f64], a: &[f64]) -> Vec<f64> {
     tau
 }
 
-/// A robot that does not move: two bodies that are fixed to the world, and a frame.
-#[allow(dead_code)] // by some of the tests
+/// Creates a robot that does not move: two bodies fixed to the world, and a frame.
+#[allow(dead_code)] // used by some of the tests
 pub(crate) fn fixed() -> Model {
     let rng = &mut rng(0);
     let mut builder = ModelBuilder::new("fixed");
@@ -242,7 +244,8 @@ pub(crate) fn fixed() -> Model {
     builder.build().expect("a robot need not move")
 }
 
-/// The embedded robots, one of them with an apparent mass of its base as well, and random trees without and with mimic joints.
+/// Returns the embedded robots, one of them also with an apparent mass of its base, and random trees with and without
+/// mimic joints.
 pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     let mut models = embedded().to_vec();
     models.push(robots::quadruped().with_armature(&[0.7; 18]).expect("three equal numbers"));
@@ -253,7 +256,7 @@ pub(crate) fn all_models(trees: u64) -> Vec<Model> {
     models
 }
 
-/// n hinges (and slides, one in four), each body on the one that `parent` names; on a free-flyer if `floating`.
+/// Creates n hinges (one in four is a slide), each body on the one with index `parent`; on a free-flyer if `floating`.
 pub(crate) fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) -> Model {
     let rng = &mut rng(n as u64);
     let mut builder = ModelBuilder::new("tree");
@@ -272,7 +275,7 @@ pub(crate) fn tree(n: usize, floating: bool, parent: impl Fn(usize) -> usize) ->
     builder.build().expect("a tree is well-formed")
 }
 
-/// Long chains: one on the world, one on a floating base, and branches upon branches.
+/// Returns long chains: one on the world, one on a floating base, and one with branches on branches.
 pub(crate) fn long_branches() -> [Model; 3] {
     [
         tree(53, false, |i| i - 1),
@@ -286,14 +289,14 @@ pub(crate) fn long_branches() -> [Model; 3] {
     ]
 }
 
-/// A state, and what acts on it.
+/// State of a robot, and the efforts and forces that act on it.
 #[derive(Clone, Debug)]
 pub(crate) struct State {
     pub(crate) q: Vec<f64>,
     pub(crate) v: Vec<f64>,
     pub(crate) a: Vec<f64>,
     pub(crate) tau: Vec<f64>,
-    /// On each body, and one on the world that must not matter.
+    /// Force on each body, and one on the world, which must not matter.
     pub(crate) f_ext: Vec<Force<f64>>,
 }
 
@@ -315,7 +318,7 @@ pub(crate) fn lift_forces<S: Scalar>(f: &[Force<f64>]) -> Vec<Force<S>> {
     f.iter().map(|f| f.lift()).collect()
 }
 
-/// x + ε d.
+/// Returns x + ε d.
 pub(crate) fn dual(x: &[f64], d: &[f64]) -> Vec<Dual64> {
     x.iter().zip(d).map(|(&x, &d)| Dual64::new(x, d)).collect()
 }
@@ -332,14 +335,14 @@ pub(crate) fn unit(n: usize, k: usize) -> Vec<f64> {
     (0..n).map(|i| if i == k { 1.0 } else { 0.0 }).collect()
 }
 
-/// q ⊕ d.
+/// Returns q ⊕ d.
 pub(crate) fn moved<S: Scalar>(model: &Model, q: &[S], d: &[S]) -> Vec<S> {
     let mut out = q.to_vec();
     integrate(model, q, d, &mut out);
     out
 }
 
-/// λ_X_i by the textbook: Rodrigues' formula about the joint's own axis.
+/// Computes λ_X_i as in textbooks: Rodrigues' formula about the joint's own axis.
 pub(crate) fn joint_placement(joint: Joint, q: &[f64]) -> Se3<f64> {
     let turn = |w: Vec3<f64>| lie::exp3(w).to_rotation();
     let z = Vec3::new(0.0, 0.0, 1.0);
@@ -357,7 +360,7 @@ pub(crate) fn joint_placement(joint: Joint, q: &[f64]) -> Se3<f64> {
     Se3::new(rotation, translation)
 }
 
-/// The position of joint i as it would have it if it followed nobody: ratio · q + offset, by way of angles.
+/// Computes the position that joint i would have if it were not a follower: ratio · q + offset, by angles.
 pub(crate) fn own_position(model: &Model, i: usize, q: &[f64]) -> Vec<f64> {
     let body = &model.bodies()[i];
     let Some(Mimic { ratio, offset }) = body.mimic else { return q[body.idx_q..body.idx_q + body.joint.nq()].to_vec() };
@@ -368,12 +371,12 @@ pub(crate) fn own_position(model: &Model, i: usize, q: &[f64]) -> Vec<f64> {
     if body.joint.nq() == 2 { vec![x.cos(), x.sin()] } else { vec![x] }
 }
 
-/// aXb as the twelve numbers.
+/// Returns aXb as its twelve numbers.
 pub(crate) fn flat<S: Scalar>(X: Se3<S>) -> Vec<S> {
     X.rotation.columns().into_iter().chain([X.translation]).flat_map(Vec3::to_array).collect()
 }
 
-/// max |a − b| / (1 + max |b|); NaN anywhere gives infinity.
+/// Returns max |a − b| / (1 + max |b|), or infinity if any number is NaN.
 pub(crate) fn relative(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     let largest = |x: f64, y: f64| if y.is_nan() { f64::INFINITY } else { x.max(y) };
@@ -381,7 +384,7 @@ pub(crate) fn relative(a: &[f64], b: &[f64]) -> f64 {
     difference / (1.0 + b.iter().map(|b| b.abs()).fold(0.0, largest))
 }
 
-/// The largest error so far, with what it is allowed to be.
+/// Largest error so far, and its tolerance.
 pub(crate) struct Worst {
     name: &'static str,
     tolerance: f64,
@@ -393,7 +396,7 @@ impl Worst {
         Self { name, tolerance, error: 0.0 }
     }
 
-    /// Fails if the relative error is too large.
+    /// Fails if the relative error exceeds the tolerance.
     #[track_caller]
     pub(crate) fn see(&mut self, model: &Model, found: &[f64], expected: &[f64]) {
         let error = relative(found, expected);

@@ -1,11 +1,11 @@
-//! Checks of where panics are reported.
+//! Checks of the location that a panic reports.
 
 #[path = "../../../../tests/common/panics.rs"]
 mod shared;
 
 pub(crate) use shared::{Panic, panic_of};
 
-/// Panics unless a call panics with a message that contains `expected`, in a file with this end of its path.
+/// Fails unless `call` panics with a message that contains `expected`, at a file whose path ends with `end`.
 #[track_caller]
 pub(crate) fn assert_panic(end: &str, expected: &str, call: impl FnOnce()) {
     let Panic { file, message, .. } = panic_of(call).unwrap_or_else(|| panic!("expected a panic: {expected}"));

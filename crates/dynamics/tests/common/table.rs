@@ -1,6 +1,7 @@
-//! Every function that a control loop calls, in one table: what holds for all of them is tested over it.
+//! Table of every function that a control loop calls; properties that all functions share are tested with it.
 //!
-//! [`DivideConquer`](condyle_dynamics::DivideConquer) is not among them: rayon allocates when threads meet.
+//! [`DivideConquer`](condyle_dynamics::DivideConquer) is not in the table, because rayon allocates when threads
+//! synchronise.
 
 use super::{State, lift, lift_forces};
 use condyle_dynamics::inertial_parameters::{self, from_log_cholesky, log_cholesky_jacobian};
@@ -20,13 +21,13 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
 
-/// What the functions of the table are called with.
+/// Arguments with which the functions of the table are called.
 #[derive(Clone, Debug)]
 pub(crate) struct Input<S> {
     pub(crate) q: Vec<S>,
     pub(crate) q1: Vec<S>,
     pub(crate) v: Vec<S>,
-    /// An acceleration or an effort.
+    /// Acceleration or effort.
     pub(crate) x: Vec<S>,
     pub(crate) f_ext: Vec<Force<S>>,
 }
@@ -51,7 +52,7 @@ impl<S: Scalar> Input<S> {
     }
 }
 
-/// Where the functions of the table put what they return, and the scratch that is not in a `Data`.
+/// Results of the functions of the table, and scratch that does not belong to a `Data`.
 pub(crate) struct Output<S: Scalar> {
     pub(crate) numbers: Vec<S>,
     q: Vec<S>,
@@ -92,12 +93,12 @@ impl<S: Scalar> Output<S> {
         }
     }
 
-    /// The state after a step of 1 ms, and whether it was taken.
+    /// Appends the state after a step of 1 ms, and whether the step was taken.
     fn step(&mut self, integrator: Integrator, i: &Input<S>) {
         self.simulation.settings.integrator = integrator;
         self.simulation.settings.passive = Some(0.1);
         if self.simulation.set_state(&i.q, &i.v).is_err() {
-            return; // not a number, as a table of hidden order gives it
+            return; // NaN, as the test of hidden order passes it
         }
         let taken = self.simulation.step(&i.x, &i.f_ext).is_done();
         self.numbers.extend_from_slice(self.simulation.q());
@@ -112,7 +113,7 @@ impl<S: Scalar> Output<S> {
     }
 }
 
-/// A contact and a loop, with a round more than is needed; nothing for a robot that cannot move.
+/// Returns a contact and a loop, with one more iteration than needed; no constraints for a robot that cannot move.
 fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     let bodies = model.bodies().len();
     if bodies == 1 {
@@ -127,15 +128,15 @@ fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     set
 }
 
-/// What τ and q̈ depend on beside q, v, and each other.
+/// Returns the inputs on which τ and q̈ depend, besides q, v, and each other.
 fn other_inputs(model: &Model) -> [condyle_dynamics::Input; 6] {
     use condyle_dynamics::Input::*;
     let last = model.bodies().len() - 1;
-    let inertia = if last > 0 { Inertia(last) } else { Gravity }; // the world has none
+    let inertia = if last > 0 { Inertia(last) } else { Gravity }; // the world has no inertia
     [Force(last), inertia, Gravity, Armature, Damping, Friction { smoothing: 0.1 }]
 }
 
-/// The functions that need no `Data`, or bring their own.
+/// Functions that need no `Data`, or create their own.
 const WITHOUT_DATA: [&str; 10] = [
     "integrate",
     "difference",
@@ -153,18 +154,19 @@ pub(crate) fn has_data(name: &str) -> bool {
     !WITHOUT_DATA.iter().any(|f| name.starts_with(f))
 }
 
-/// Newton's iterations of a simulated step: from random states three are enough.
+/// Newton iterations of a simulated step; from random states three are enough.
 const ITERATIONS: usize = 5;
 
-/// Whether a function looks at all lanes at once: a simulation steps in all of them or in none, and Newton's method
-/// iterates until it is at its end in all.
+/// Returns whether a function couples the lanes. A simulation steps in all lanes or in none, and Newton's method
+/// iterates until it has converged in all.
 pub(crate) fn in_step(name: &str) -> bool {
     name.starts_with("simulation")
 }
 
 pub(crate) type Function<S> = fn(&Model, &mut Data<S>, &Input<S>, &mut Output<S>);
 
-/// Name and call of each function that is compiled for every level as a whole. A call allocates only if the function does.
+/// Returns name and call of each function that is compiled as a whole for every SIMD level. A call allocates only if
+/// the function does.
 pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
     [
         ("rnea", |m, d, i, o| o.numbers.extend_from_slice(rnea(m, d, &i.q, &i.v, &i.x, &i.f_ext))),
@@ -204,7 +206,7 @@ pub(crate) fn kernels<S: Scalar>() -> [(&'static str, Function<S>); 16] {
     ]
 }
 
-/// Name and call of each function. A call allocates only if the function does.
+/// Returns name and call of each function. A call allocates only if the function does.
 pub(crate) fn functions<S: Scalar>() -> Vec<(&'static str, Function<S>)> {
     let others: [(&'static str, Function<S>); 42] = [
         ("rnea_derivatives by all other inputs", |m, d, i, o| {

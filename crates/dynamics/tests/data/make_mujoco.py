@@ -1,6 +1,6 @@
-"""Numbers of MuJoCo 4.0.0 for tests/suite/mjcf.rs: `pip install mujoco==4.0.0`, then `python make_mujoco.py`.
+"""Reference numbers of MuJoCo 4.0.0 for tests/suite/mjcf.rs: `pip install mujoco==4.0.0`, then `python make_mujoco.py`.
 
-Quaternions stay w first and a free joint's linear velocity in the world's frame: the test converts.
+Quaternions are stored with w first, and a free joint's linear velocity in the world's frame; the test converts them.
 """
 
 import json
@@ -13,7 +13,7 @@ assert mujoco.__version__ == "4.0.0"
 here = pathlib.Path(__file__).parent
 for name in ["arm", "quadruped"]:
     text = (here / f"{name}.xml").read_text()
-    # the mesh is not there: MuJoCo would want to read it, and it has no mass
+    # the mesh file is missing: MuJoCo would read it, but it has no mass
     lines = [line for line in text.splitlines() if "mesh" not in line]
     assets = {p.name: p.read_bytes() for p in here.glob("*_defaults.xml")}
     model = mujoco.MjModel.from_xml_string("\n".join(lines), assets)
@@ -61,8 +61,8 @@ for name in ["arm", "quadruped"]:
         )
     (here / f"{name}_mujoco.json").write_text(json.dumps(out) + "\n")
 
-# Joints that follow others: positions at which MuJoCo finds the equality constraints met, and what it computes there in
-# the coordinates of those that lead, v = G v_leaders.
+# Joints that follow others: positions at which MuJoCo's equality constraints hold, and MuJoCo's results there, in the
+# leaders' coordinates, v = G v_leaders.
 model = mujoco.MjModel.from_xml_path(str(here / "gripper.xml"))
 data = mujoco.MjData(model)
 rng = np.random.default_rng(1)
@@ -97,8 +97,9 @@ for _ in range(3):
     )
 (here / "gripper_mujoco.json").write_text(json.dumps(out))
 
-# Springs, polynomial damping, gravity compensation and the armature of a free joint, for tests/suite/springs.rs: here in the
-# conventions of this library (quaternions w last, the linear velocity of a free joint in the body's axes).
+# Springs, polynomial damping, gravity compensation and the armature of a free joint, for tests/suite/springs.rs. These
+# numbers follow the conventions of this library (quaternions with w last, the linear velocity of a free joint in the
+# body's axes).
 model = mujoco.MjModel.from_xml_path(str(here / "passive.xml"))
 data = mujoco.MjData(model)
 rng = np.random.default_rng(1)
@@ -110,11 +111,11 @@ for _ in range(4):
     mujoco.mj_forward(model, data)
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
-    T = np.eye(model.nv)  # their velocity = T times ours
+    T = np.eye(model.nv)  # MuJoCo's velocity = T times ours
     T[:3, :3] = data.body("base").xmat.reshape(3, 3)
     v = T.T @ data.qvel
     turned = np.zeros(model.nv)
-    turned[:3] = np.cross(v[3:6], v[:3])  # their acceleration = T (ours + ω × v)
+    turned[:3] = np.cross(v[3:6], v[:3])  # MuJoCo's acceleration = T (ours + ω × v)
     q = data.qpos.copy()
     for joint in ["float", "ball"]:
         at = model.joint(joint).qposadr[0] + (3 if joint == "float" else 0)

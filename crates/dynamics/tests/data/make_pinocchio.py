@@ -21,7 +21,7 @@ out = {
     "states": [],
 }
 for _ in range(6):
-    q = pin.randomConfiguration(model)  # of the continuous joint: all around the circle
+    q = pin.randomConfiguration(model)  # the continuous joint's angle covers the whole circle
     v, a = rng.standard_normal((2, model.nv))
     pin.framesForwardKinematics(model, data, q)
     links = [i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]

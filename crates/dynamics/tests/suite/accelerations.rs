@@ -1,4 +1,4 @@
-//! Velocities, accelerations and rates of Jacobians, against dual numbers in time.
+//! Velocities, accelerations and rates of Jacobians, compared with dual numbers in time.
 
 use crate::common;
 
@@ -12,13 +12,13 @@ use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Products of some ten matrices.
+/// Tolerance of products of some ten matrices.
 const ROUNDING: f64 = 1e-12;
 const TREES: u64 = 10;
 const REFERENCES: [ReferenceFrame; 3] =
     [ReferenceFrame::Local, ReferenceFrame::World, ReferenceFrame::LocalWorldAligned];
 
-/// A body or a frame: what is asked of both.
+/// Body or frame; both have the same functions.
 #[derive(Clone, Copy)]
 enum Place {
     Body(usize),
@@ -62,12 +62,12 @@ impl Place {
     }
 }
 
-/// q ⊕ t v and v + t a, as dual numbers in t.
+/// Returns q ⊕ t v and v + t a, as dual numbers in t.
 fn moving(model: &Model, State { q, v, a, .. }: &State) -> (Vec<Dual64>, Vec<Dual64>) {
     (moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v)), dual(v, a))
 }
 
-/// J v is the velocity, and dJ v + J a its derivative, in each reference frame.
+/// J v is the velocity, and dJ v + J a its time derivative, in each reference frame.
 #[test]
 fn velocities_and_their_rates() {
     let mut first = Worst::new("J v = velocity", ROUNDING);
@@ -80,7 +80,7 @@ fn velocities_and_their_rates() {
         let k = forward_accelerations(model, &mut data, &state.q, &state.v, &state.a);
         let (q_moving, v_moving) = moving(model, &state);
         let k_moving = forward_velocities(model, &mut duals, &q_moving, &v_moving);
-        let mut J = DMatrix::from_element(6, model.nv(), f64::NAN); // nothing need be zeroed
+        let mut J = DMatrix::from_element(6, model.nv(), f64::NAN); // the matrix need not be zeroed
         let mut dJ = J.clone();
         for place in places(model) {
             for r in REFERENCES {
@@ -133,8 +133,8 @@ fn jacobian_rates() {
     }
 }
 
-/// The spatial acceleration is the rate of the spatial velocity, the classical one that of a point's velocity; both turn
-/// with the reference frame.
+/// The spatial acceleration is the rate of the spatial velocity, and the classical one is the rate of a point's
+/// velocity. Both are transformed with the reference frame.
 #[test]
 fn accelerations() {
     let mut spatial = Worst::new("spatial acceleration", ROUNDING);
@@ -155,7 +155,7 @@ fn accelerations() {
                 Place::Frame(i) => k.frame(i),
             };
             let [local, world, aligned] = REFERENCES;
-            let at_origin = Se3::new(pose.rotation, Vec3::zero()); // turns Local to LocalWorldAligned
+            let at_origin = Se3::new(pose.rotation, Vec3::zero()); // rotates Local to LocalWorldAligned
             let a = place.acceleration(&k, local);
             spatial.see(model, &a.to_array(), &rate(local).to_array());
             spatial.see(model, &place.acceleration(&k, world).to_array(), &rate(world).to_array());
@@ -164,7 +164,7 @@ fn accelerations() {
             classical.see(model, &place.classical_acceleration(&k, aligned).to_array(), &p_rate.to_array());
             let turned = at_origin.act_inv(p_rate);
             classical.see(model, &place.classical_acceleration(&k, local).to_array(), &turned.to_array());
-            // in the world's frame, of the body's point at the world's origin
+            // in the world's frame, for the body's point at the world's origin
             let (v, a) = (place.velocity(&k, world), place.acceleration(&k, world));
             let expected = Motion::new(a.linear + v.angular.cross(v.linear), a.angular);
             classical.see(model, &place.classical_acceleration(&k, world).to_array(), &expected.to_array());
@@ -172,7 +172,7 @@ fn accelerations() {
     }
 }
 
-/// The view of the higher order answers the questions of the lower one, with the same bits.
+/// The results of the higher order also provide the functions of the lower order, with the same bits.
 #[test]
 fn one_hierarchy() {
     for model in all_models(2) {
@@ -192,10 +192,10 @@ fn one_hierarchy() {
     }
 }
 
-/// Each argument of each function of kinematics, statics and momentum, one number short.
+/// Each argument of each function of kinematics, statics and momentum is given one number short.
 #[test]
 fn wrong_lengths_name_the_argument() {
-    let model = &robots::quadruped(); // nq 19, nv 18, 14 bodies with the world
+    let model = &robots::quadruped(); // nq 19, nv 18, 14 bodies including the world
     let data = &mut Data::<f64>::new(model);
     let (q, v) = (&neutral(model)[..], &[0.0; 18][..]);
     let (short_q, short_v, short_f) = (&q[1..], &v[1..], &[Force::zero(); 13]);

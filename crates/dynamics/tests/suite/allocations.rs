@@ -1,4 +1,4 @@
-//! Nothing is allocated once a `Data` exists, by any function that a control loop calls.
+//! No function that a control loop calls allocates, once a `Data` exists.
 
 use crate::common::table::{Input, Output, functions};
 use crate::common::{all_models, rng};
@@ -6,7 +6,8 @@ use crate::counting::allocations;
 use condyle_dynamics::{Data, Scalar};
 use num_dual::Dual64;
 
-/// On the three robots, on a tree of every joint type, and on one with joints that follow; from the first call on.
+/// Checks the three robots, a tree of every joint type, and a tree with joints that follow others; from the first call
+/// on.
 fn check<S: Scalar>() {
     for (seed, model) in all_models(1).iter().enumerate() {
         let input = Input::<S>::random(model, &mut rng(seed as u64));

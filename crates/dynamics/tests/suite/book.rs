@@ -10,7 +10,7 @@ use condyle_dynamics::{
 };
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector6};
 
-/// Sums over all bodies, relative to the largest number.
+/// Tolerance of sums over all bodies, relative to the largest number.
 const ROUNDING: f64 = 1e-11;
 /// The same times the condition number of M.
 const INVERTED: f64 = 1e-10;

@@ -1,5 +1,5 @@
-//! Centre of mass, centroidal momentum, energies, and all terms at once: against dual numbers in time and the other
-//! algorithms.
+//! Centre of mass, centroidal momentum, energies, and all terms at once, compared with dual numbers in time and with
+//! the other algorithms.
 
 use crate::common;
 
@@ -12,9 +12,9 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Sums over all bodies, relative to the largest number.
+/// Tolerance of sums over all bodies, relative to the largest number.
 const ROUNDING: f64 = 1e-11;
-/// The same after forward dynamics: times the condition number of M.
+/// Tolerance of the same after forward dynamics: times the condition number of M.
 const INVERTED: f64 = 1e-9;
 const TREES: u64 = 15;
 
@@ -22,7 +22,7 @@ fn vector(x: &[f64]) -> DVector<f64> {
     DVector::from_column_slice(x)
 }
 
-/// q ⊕ t v, as dual numbers in t.
+/// Returns q ⊕ t v, as dual numbers in t.
 fn moving(model: &Model, q: &[f64], v: &[f64]) -> Vec<Dual64> {
     moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v))
 }
@@ -55,7 +55,7 @@ fn centre_of_mass() {
     }
 }
 
-/// hg = Ag v, dAg = dAg/dt, dhg = Ag a + dAg v = dhg/dt; Ig is that of all bodies as one.
+/// hg = Ag v, dAg = dAg/dt, dhg = Ag a + dAg v = dhg/dt; Ig is the inertia of all bodies as one.
 #[test]
 fn momentum() {
     let mut momentum = Worst::new("Ag v = hg", ROUNDING);
@@ -90,14 +90,14 @@ fn momentum() {
     }
 }
 
-/// What changes the momentum of a floating robot are its weight and the external forces: dhg = [m g; 0] + Σ f_ext.
+/// Only weight and external forces change the momentum of a floating robot: dhg = [m g; 0] + Σ f_ext.
 #[test]
 fn newton_and_euler() {
     let mut worst = Worst::new("dhg = [m g; 0] + Σ f_ext", INVERTED);
     let [_, quadruped, humanoid] = embedded();
     for (model, seed) in [quadruped, humanoid].iter().flat_map(|model| (0..20).map(move |seed| (model, seed))) {
         let State { q, v, mut tau, f_ext, .. } = State::random(model, &mut rng(seed));
-        tau[..6].fill(0.0); // nothing holds the base
+        tau[..6].fill(0.0); // the base has no drive
         let mut data = Data::new(model);
         let a = aba(model, &mut data, &q, &v, &tau, &f_ext).to_vec();
         let k = forward_accelerations(model, &mut data, &q, &v, &a);
@@ -135,7 +135,7 @@ fn energies() {
     }
 }
 
-/// All terms are those of the algorithms one by one.
+/// All terms equal the results of the single algorithms.
 #[test]
 fn all_terms() {
     let mut worst = Worst::new("compute_all_terms", ROUNDING);

@@ -1,4 +1,4 @@
-//! Worked examples: robots whose equations of motion stand in textbooks, written out.
+//! Worked examples: robots whose equations of motion are given in textbooks.
 
 use crate::common;
 
@@ -9,12 +9,12 @@ use condyle_dynamics::{
 };
 use core::f64::consts::PI;
 
-/// Some hundreds of operations on numbers of size 10.
+/// Tolerance of some hundreds of operations on numbers of size 10.
 const ROUNDING: f64 = 1e-13;
 const G: f64 = 9.81;
 const Z: Vec3<f64> = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
 
-/// A link of a planar arm: its length, where along it the centre of mass is, mass, inertia about the centre of mass.
+/// Link of a planar arm: length, distance of the centre of mass along it, mass, inertia about the centre of mass.
 #[derive(Clone, Copy)]
 struct Link {
     l: f64,
@@ -33,13 +33,13 @@ fn along_x(x: f64) -> Se3<f64> {
     Se3::new(Mat3::identity(), Vec3::new(x, 0.0, 0.0))
 }
 
-/// Hinges about z, gravity along −y, the whole world turned by R.
+/// Creates an arm with hinges about z and gravity along −y; the whole world is rotated by R.
 fn planar_arm(links: &[Link], R: Mat3<f64>) -> Model {
     let mut builder = ModelBuilder::new("planar arm");
     builder.gravity(R * Vec3::new(0.0, -G, 0.0));
     let (mut parent, mut placement) = (WORLD, Se3::new(R, Vec3::new(0.3, -0.2, 0.1)));
     for (i, link) in links.iter().enumerate() {
-        // what the rotational inertia across the plane is does not matter
+        // the rotational inertia about the other axes does not matter
         let inertia = Inertia::from_com(link.m, Vec3::new(link.c, 0.0, 0.0), Sym3::diagonal(link.I));
         parent = builder.body(&format!("link{i}"), parent, Joint::Revolute { axis: Z }, placement, inertia);
         placement = along_x(link.l);
@@ -47,7 +47,7 @@ fn planar_arm(links: &[Link], R: Mat3<f64>) -> Model {
     builder.build().unwrap()
 }
 
-/// Spong, Hutchinson, Vidyasagar, *Robot Modeling and Control* (2006), section 7.3.2.
+/// Source: Spong, Hutchinson, Vidyasagar, *Robot Modeling and Control* (2006), section 7.3.2.
 #[test]
 fn two_links() {
     let [a, b, _] = LINKS;
@@ -75,8 +75,8 @@ fn two_links() {
     }
 }
 
-/// In absolute angles θ_i = q_1 + … + q_i, with A_ij = I_i δ_ij + Σ_k m_k r_ki r_kj:
-/// T = ½ Σ A_ij cos(θ_i − θ_j) θ̇_i θ̇_j, and what turns link i also turns those before it.
+/// Uses absolute angles θ_i = q_1 + … + q_i, and A_ij = I_i δ_ij + Σ_k m_k r_ki r_kj. Then T = ½ Σ A_ij cos(θ_i − θ_j)
+/// θ̇_i θ̇_j, and a torque at link i also acts on the links before it.
 #[test]
 fn three_links() {
     let arm = |k: usize, i: usize| match k.cmp(&i) {
@@ -119,7 +119,7 @@ fn three_links() {
     }
 }
 
-/// A rod on a hinge across gravity, hanging at θ = 0: (I + m c² + rotor) θ̈ = τ − m g c sin θ.
+/// A rod hangs at θ = 0 on a horizontal hinge: (I + m c² + rotor) θ̈ = τ − m g c sin θ.
 #[test]
 fn pendulum() {
     let (m, c, I, rotor) = (1.7, 0.6, 0.09, 0.05);
@@ -141,10 +141,10 @@ fn pendulum() {
     }
 }
 
-/// Released at 2 rad, a pendulum swings with the period 4 K(sin 1) / ω₀ = 2π / (ω₀ agm(1, cos 1)).
+/// A pendulum released at 2 rad swings with the period 4 K(sin 1) / ω₀ = 2π / (ω₀ agm(1, cos 1)).
 #[test]
 fn period_of_a_pendulum() {
-    /// Runge and Kutta's error with 2000 steps: (0.001)⁴ times a fifth derivative.
+    /// Number of steps, and tolerance: the Runge–Kutta error is (0.001)⁴ times a fifth derivative.
     const STEPS: u32 = 2000;
     const INTEGRATION: f64 = 1e-10;
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -1.0), Sym3::zero());
@@ -170,7 +170,7 @@ fn period_of_a_pendulum() {
     assert!((q - 2.0).abs() < INTEGRATION && v.abs() < INTEGRATION, "after a period: {q} {v}");
 }
 
-/// A cart on rails with a pole, upright at θ = 0: (M + m) ẍ + m l (θ̈ cos θ − θ̇² sin θ) = F, l θ̈ + ẍ cos θ = g sin θ.
+/// A cart on rails has a pole, upright at θ = 0: (M + m) ẍ + m l (θ̈ cos θ − θ̇² sin θ) = F, l θ̈ + ẍ cos θ = g sin θ.
 #[test]
 fn cart_and_pole() {
     let (M, m, l) = (1.5, 0.4, 0.8);
@@ -190,7 +190,7 @@ fn cart_and_pole() {
     }
 }
 
-/// Euler's equations: J ω̇ = n − ω × J ω; the centre of mass falls, whatever the body does.
+/// Euler's equations hold: J ω̇ = n − ω × J ω; the centre of mass falls, whatever the body does.
 #[test]
 fn free_body() {
     let rng = &mut rng(3);
@@ -211,7 +211,8 @@ fn free_body() {
             let tau = [0.0, 0.0, 0.0, n.x, n.y, n.z];
             let free = n - w.cross(J * w);
             let w_dot = Vec3::new(free.x / J.xx, free.y / J.yy, free.z / J.zz);
-            // of the origin: the fall less what turning about the centre of mass adds to it; spatial, so less ω × v
+            // acceleration of the origin: gravity minus the contribution of the rotation about the centre of mass;
+            // spatial, hence − ω × v
             let fall = r.to_rotation().transpose_mul(Vec3::new(0.0, 0.0, -G));
             let v_dot = fall - w_dot.cross(c) - w.cross(w.cross(c)) - w.cross(v);
             let expected: Vec<f64> = v_dot.to_array().into_iter().chain(w_dot.to_array()).collect();
@@ -221,7 +222,7 @@ fn free_body() {
     }
 }
 
-/// A top on its tip: Ī ω̇ = c × m g − ω × Ī ω about the tip.
+/// A top stands on its tip: Ī ω̇ = c × m g − ω × Ī ω about the tip.
 #[test]
 fn top() {
     let rng = &mut rng(4);
@@ -244,7 +245,7 @@ fn top() {
     }
 }
 
-/// A puck and a point: on the ice m (v̇ + ω × v) = f in the body, in the air m ẍ = f + m g.
+/// A puck on the ice satisfies m (v̇ + ω × v) = f in body coordinates, and a point in the air m ẍ = f + m g.
 #[test]
 fn puck_and_point() {
     let rng = &mut rng(5);
@@ -266,7 +267,7 @@ fn puck_and_point() {
     }
 }
 
-/// Two wheels geared by −3 with one motor, and a rack that the first drives: (J₁ + 9 J₂ + r² m) θ̈ = τ.
+/// One motor drives two wheels geared by −3, and a rack on the first wheel: (J₁ + 9 J₂ + r² m) θ̈ = τ.
 #[test]
 fn gears() {
     let (J1, J2, m, r) = (0.2, 0.05, 1.5, 0.1);

@@ -1,4 +1,4 @@
-//! Constrained dynamics and impacts: the constraints hold, with forces of theirs and no others.
+//! Constrained dynamics and impacts: the constraints hold, by constraint forces only.
 
 use crate::common;
 
@@ -13,13 +13,14 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Two exact ways, some thousand roundings each.
+/// Tolerance between two exact methods, some thousand roundings each.
 const EXACT: f64 = 1e-11;
-/// The same after a product with M or its inverse, whose condition is up to 1e4, or Λ's.
+/// Tolerance after a product with M or its inverse, or with Λ, whose condition numbers are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
 const TREES: u64 = 15;
 
-/// What a constraint asks to vanish, from the public kinematics, the velocities' rates by dual numbers in time.
+/// Computes the quantity that a constraint requires to vanish, from the public kinematics; rates of velocities by dual
+/// numbers in time.
 fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64]) -> Vec<f64> {
     let world = ReferenceFrame::World;
     let mut data = Data::<Dual64>::new(model);
@@ -67,7 +68,7 @@ fn wanted(model: &Model, c: &ContactConstraint, q: &[f64], v: &[f64], a: &[f64])
     }
 }
 
-/// The numbers of a force that are those of a constraint's rows.
+/// Returns the entries of a force that belong to a constraint's rows.
 fn in_rows(c: &ContactConstraint, force: Force<f64>) -> Vec<f64> {
     let along = c.axes.transpose_mul(force.linear);
     match c.kind {
@@ -77,7 +78,7 @@ fn in_rows(c: &ContactConstraint, force: Force<f64>) -> Vec<f64> {
     }
 }
 
-/// The effort of a constraint's force, from the public Jacobians.
+/// Computes the effort of a constraint's force, from the public Jacobians.
 fn effort(model: &Model, c: &ContactConstraint, force: Force<f64>, q: &[f64]) -> DVector<f64> {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
@@ -99,7 +100,7 @@ fn effort(model: &Model, c: &ContactConstraint, force: Force<f64>, q: &[f64]) ->
     own - J.tr_mul(&DVector::from_row_slice(&oF.to_array()))
 }
 
-/// Every constraint holds, and M q̈ + h − Jᵀ λ = τ: the two halves of what defines the solution.
+/// Every constraint holds, and M q̈ + h − Jᵀ λ = τ: both equations that define the solution.
 #[test]
 fn constraints_hold_by_forces_of_their_own() {
     let mut held = Worst::new("J q̈ + γ", CONDITIONED);
@@ -127,7 +128,7 @@ fn constraints_hold_by_forces_of_their_own() {
     println!("{rows} rows in all");
 }
 
-/// Of a contact of a point or a frame, the axes of the rows change λ's axes and nothing else.
+/// For a contact of a point or a frame, the axes of the rows only change the axes of λ.
 #[test]
 fn references_turn_forces_only() {
     let mut worst = Worst::new("q̈ in both references", CONDITIONED);
@@ -161,7 +162,7 @@ fn references_turn_forces_only() {
     }
 }
 
-/// Where the robot stands: the humanoid on both soles, its knees bent.
+/// Returns the standing humanoid: on both soles, with bent knees.
 fn standing() -> (Model, State, [usize; 2]) {
     let model = robots::humanoid();
     let mut state = State::random(&model, &mut rng(7));
@@ -172,7 +173,7 @@ fn standing() -> (Model, State, [usize; 2]) {
     (model, state, soles)
 }
 
-/// Rows that depend on others are found and get no force; with μ they share it, the motion being the same.
+/// Redundant rows are detected and get no force. With μ they share the force, and the motion is the same.
 #[test]
 fn redundant_constraints() {
     let (model, s, [left, right]) = standing();
@@ -181,7 +182,7 @@ fn redundant_constraints() {
         ContactConstraint::rigid(left),
         ContactConstraint { reference: ReferenceFrame::LocalWorldAligned, ..ContactConstraint::rigid(right) },
     ];
-    // the ankle's frame is on the same body as the sole
+    // the ankle's frame belongs to the same body as the sole
     let body = model.frames()[left].body;
     let again = (0..model.frames().len()).find(|&f| f != left && model.frames()[f].body == body).unwrap();
     let twice = [once[0], once[1], ContactConstraint::rigid(again)];
@@ -202,7 +203,8 @@ fn redundant_constraints() {
     }
 }
 
-/// The forces found with μ are the smallest ones: those of M⁻¹ and the pseudo-inverse, however many points stand in line.
+/// The forces computed with μ are the smallest ones, as with M⁻¹ and the pseudo-inverse, for any number of points on a
+/// line.
 #[test]
 fn smallest_forces() {
     let mut builder = ModelBuilder::new("box");
@@ -232,7 +234,7 @@ fn smallest_forces() {
     assert!((lambda - smallest).amax() < 1e-6);
 }
 
-/// Constraints that contradict each other give the solution of the first, finite, and say so.
+/// Contradicting constraints give the finite solution of the first one, and are reported.
 #[test]
 fn contradictions() {
     let (model, s, [left, _]) = standing();
@@ -250,7 +252,7 @@ fn contradictions() {
     assert!(common::relative(d.a, &a) < CONDITIONED);
 }
 
-/// Without constraints it is forward dynamics, and nothing happens in an impact.
+/// Without constraints, constrained dynamics equals forward dynamics, and an impact changes nothing.
 #[test]
 fn no_constraint() {
     for (seed, model) in all_models(4).iter().enumerate() {
@@ -266,7 +268,7 @@ fn no_constraint() {
     }
 }
 
-/// T⁺ = T for ε = 1; for ε = 0 the energy lost is that of the velocity lost, ½ Δᵀ M Δ (Carnot's theorem).
+/// For ε = 1, T⁺ = T. For ε = 0, the lost energy is the energy of the lost velocity, ½ Δᵀ M Δ (Carnot's theorem).
 #[test]
 fn energy_of_impacts() {
     let mut worst = Worst::new("energy of impacts", CONDITIONED);
@@ -287,7 +289,7 @@ fn energy_of_impacts() {
     }
 }
 
-/// ContactConstraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0; and the
+/// Constraint forces do no work on motions that the constraints allow: with v in the kernel of J, vᵀ Jᵀ λ = 0. The
 /// acceleration is the allowed one nearest to the free one, so no allowed change brings it nearer (Gauss).
 #[test]
 fn gauss_principle() {
@@ -306,7 +308,7 @@ fn gauss_principle() {
     }
 }
 
-/// Targets in the set count, and can be changed.
+/// Targets in the set are used, and can be changed.
 #[test]
 fn moving_targets() {
     let (model, s, [left, right]) = standing();
@@ -375,7 +377,7 @@ fn another_robots_constraints() {
     constrained_dynamics(&arm, &mut Data::new(&arm), &mut set, &[0.0; 7], &[0.0; 7], &[0.0; 7], &[]);
 }
 
-/// The loops of a model become constraints of its frames; a coupling of joints holds no frame.
+/// The loops of a model become constraints of its frames; a coupling of joints does not constrain a frame.
 #[test]
 fn loops_of_a_model() {
     let mut builder = ModelBuilder::new("loops");

@@ -1,4 +1,4 @@
-//! The derivatives of constrained dynamics and of impacts by hand against dual numbers and against differences.
+//! Hand-written derivatives of constrained dynamics and of impacts, compared with dual numbers and with differences.
 
 use crate::common;
 
@@ -13,16 +13,16 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Two exact ways, some thousand roundings each.
+/// Tolerance between two exact methods, some thousand roundings each.
 const EXACT: f64 = 1e-11;
-/// The same after a product with M or its inverse, whose condition is up to 1e4, or Λ's.
+/// Tolerance after a product with M or its inverse, or with Λ, whose condition numbers are up to 1e4.
 const CONDITIONED: f64 = 1e-9;
-/// Central differences with a step of 1e-5: rounding of 1e-16/step, and step² times a third derivative.
+/// Tolerance and step of central differences: the error is rounding of 1e-16/step, plus step² times a third derivative.
 const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;
 
-/// q̈ and λ, or v⁺ and Λ, as a function of q, v and τ.
+/// Algorithm that computes q̈ and λ, or v⁺ and Λ, as a function of q, v and τ.
 trait Algorithm {
     fn run<S: Scalar>(
         model: &Model,
@@ -48,7 +48,7 @@ impl Algorithm for Dynamics {
     }
 }
 
-/// τ and J q̈ + γ as a function of q, v and q̈, for forces that are no solution.
+/// Inverse dynamics: τ and J q̈ + γ as a function of q, v and q̈, for forces that are not a solution.
 struct Inverse;
 
 impl Algorithm for Inverse {
@@ -86,7 +86,7 @@ impl Algorithm for Impact {
     }
 }
 
-/// The derivatives with respect to q, v and τ by dual numbers.
+/// Computes the derivatives with respect to q, v and τ by dual numbers.
 fn by_duals<A: Algorithm>(
     model: &Model,
     s: &State,
@@ -111,7 +111,7 @@ fn by_duals<A: Algorithm>(
     out
 }
 
-/// The same by central differences.
+/// Computes the same derivatives by central differences.
 fn by_differences<A: Algorithm>(
     model: &Model,
     s: &State,
@@ -168,7 +168,7 @@ fn derivatives_of_constrained_dynamics() {
     }
 }
 
-/// M δq̈ − Jᵀ δλ + r = δτ and J δq̈ + c = 0 hold for the derivatives that dual numbers find.
+/// M δq̈ − Jᵀ δλ + r = δτ and J δq̈ + c = 0 hold for the derivatives computed by dual numbers.
 #[test]
 fn equations_of_constrained_dynamics() {
     let names = ["r, c for q", "r, c for v", "for τ"];
@@ -212,7 +212,7 @@ fn equations_of_constrained_dynamics() {
     }
 }
 
-/// At a motion and forces that are no solution; and the value is that of the equations, M q̈ + h − Jᵀ λ and J q̈ + γ.
+/// At a motion and forces that are not a solution, derivatives are exact. The values are M q̈ + h − Jᵀ λ and J q̈ + γ.
 #[test]
 fn derivatives_of_constrained_inverse_dynamics() {
     let names = ["∂(τ, J q̈ + γ)/∂q", "∂(τ, J q̈ + γ)/∂v", "∂(τ, J q̈ + γ)/∂q̈"];
@@ -268,7 +268,7 @@ fn derivatives_of_impulse_dynamics() {
     }
 }
 
-/// K K⁻¹ = 1, with the blocks of K⁻¹ as they are returned.
+/// K K⁻¹ = 1, with the returned blocks of K⁻¹.
 #[test]
 fn inverse_of_the_whole_matrix() {
     let mut worst = Worst::new("K K⁻¹ − 1", CONDITIONED);
@@ -292,7 +292,7 @@ fn inverse_of_the_whole_matrix() {
     }
 }
 
-/// Rows that depend on others have no force at neighbouring states either, so all derivatives are exact.
+/// Redundant rows have no force at neighbouring states either, so all derivatives are exact.
 #[test]
 fn redundant_constraints() {
     let mut exact = Worst::new("redundant constraints", EXACT);

@@ -9,11 +9,11 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 
-/// Sums over all bodies, relative to the largest number.
+/// Tolerance of sums over all bodies, relative to the largest number.
 const ROUNDING: f64 = 1e-11;
 const TREES: u64 = 20;
 
-/// dM/dt along the tangent vector v.
+/// Computes dM/dt along the tangent vector v.
 fn inertia_rate(model: &Model, q: &[f64], v: &[f64]) -> DMatrix<f64> {
     let q_moving = moved(model, &lift(q), &dual(&vec![0.0; model.nv()], v));
     let rate = eps(crba(model, &mut Data::new(model), &q_moving).as_slice());
@@ -36,8 +36,8 @@ fn forces_and_skewness() {
     }
 }
 
-/// Where the velocities are rates of coordinates, C is made of Christoffel's symbols:
-/// C_ij = ½ Σ_k (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_jk/∂q_i) v_k. This leaves no freedom.
+/// Where the velocities are rates of coordinates, C consists of Christoffel symbols, which determine it uniquely: C_ij
+/// = ½ Σ_k (∂M_ij/∂q_k + ∂M_ik/∂q_j − ∂M_jk/∂q_i) v_k.
 #[test]
 fn christoffel_symbols() {
     let mut worst = Worst::new("C = Christoffel", ROUNDING);
@@ -66,7 +66,7 @@ fn christoffel_symbols() {
     }
 }
 
-/// static_torque is rnea at rest, and without forces gravity.
+/// `static_torque` equals rnea at rest, and gravity if there are no forces.
 #[test]
 fn at_rest() {
     let mut worst = Worst::new("static_torque = rnea(q, 0, 0, f_ext)", ROUNDING);

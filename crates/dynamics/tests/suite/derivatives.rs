@@ -1,4 +1,4 @@
-//! The derivatives by hand against dual numbers and against differences.
+//! Hand-written derivatives, compared with dual numbers and with differences.
 
 use crate::common;
 
@@ -7,17 +7,17 @@ use condyle_dynamics::{Data, Force, Inertia, Model, Scalar, aba, aba_derivatives
 use nalgebra::DMatrix;
 use num_dual::{Dual, Dual64};
 
-/// Two exact ways, some thousand roundings each; forward dynamics times the condition number of M.
+/// Tolerance between two exact methods, some thousand roundings each; forward dynamics times the condition number of M.
 const EXACT: f64 = 1e-11;
-/// The same, times the condition number of M, which grows with the cube of a chain's length: 1e7 for 90 links, of which the
-/// largest entries, to which the error is relative, take most away.
+/// Tolerance times the condition number of M, which grows with the cube of a chain's length: 1e7 for 90 links. The
+/// error is relative to the largest entries, which cancels most of it.
 const LONG: f64 = 1e-9;
-/// Central differences with a step of 1e-5: rounding of 1e-16/step, and step² times a third derivative.
+/// Tolerance and step of central differences: the error is rounding of 1e-16/step, plus step² times a third derivative.
 const DIFFERENCES: f64 = 1e-6;
 const STEP: f64 = 1e-5;
 const TREES: u64 = 15;
 
-/// An algorithm as a function of position, velocity and a third vector (acceleration or effort), with f_ext or without.
+/// Algorithm as a function of position, velocity and a third vector (acceleration or effort), with or without f_ext.
 trait Algorithm {
     fn run<S: Scalar>(&self, model: &Model, data: &mut Data<S>, q: &[S], v: &[S], x: &[S], f: &[Force<S>]) -> Vec<S>;
 }
@@ -38,7 +38,7 @@ impl Algorithm for Aba {
     }
 }
 
-/// The derivatives with respect to q, v and x by dual numbers.
+/// Computes the derivatives with respect to q, v and x by dual numbers.
 fn by_duals(
     algorithm: &impl Algorithm,
     model: &Model,
@@ -61,7 +61,7 @@ fn by_duals(
     out
 }
 
-/// The same by central differences.
+/// Computes the same derivatives by central differences.
 fn by_differences(
     algorithm: &impl Algorithm,
     model: &Model,
@@ -113,7 +113,7 @@ fn inverse_dynamics() {
     }
 }
 
-/// Columns side by side, and M⁻¹ ∂τ without a product.
+/// Computes columns side by side, and M⁻¹ ∂τ without a product.
 #[test]
 fn long_branches() {
     let mut exact = Worst::new("∂τ of long branches", EXACT);
@@ -161,7 +161,8 @@ fn forward_dynamics() {
     }
 }
 
-/// The derivatives by hand run on dual numbers, too: ∂²τ/∂q∂q two ways, by nesting and by deriving the derivative.
+/// The hand-written derivatives also run on dual numbers: ∂²τ/∂q∂q is computed by nesting, and by differentiating the
+/// derivative.
 #[test]
 fn second_derivatives() {
     let mut worst = Worst::new("∂²τ/∂q²", EXACT);
@@ -170,7 +171,7 @@ fn second_derivatives() {
         let State { q, v, a, .. } = State::random(model, &mut rng(seed as u64));
         let (j, k) = (seed % nv, (3 * seed + 1) % nv);
         let still = vec![0.0; nv];
-        // first along j in the inner numbers, then along k from there in the outer ones
+        // first along j in the inner numbers, then from there along k in the outer ones
         let inner = moved(model, &lift(&q), &dual(&still, &unit(nv, j)));
         let mut data = Data::<Dual64>::new(model);
         let derivative = rnea_derivatives(model, &mut data, &inner, &lift(&v), &lift(&a), &[]).dtau_dq;
@@ -184,7 +185,7 @@ fn second_derivatives() {
     }
 }
 
-/// τ is linear in the inertial parameters, so differences by a whole kilogram are exact.
+/// τ is linear in the inertial parameters, so differences with a step of a whole kilogram are exact.
 #[test]
 fn with_respect_to_a_mass() {
     let mut efforts = Worst::new("∂τ/∂m", EXACT);

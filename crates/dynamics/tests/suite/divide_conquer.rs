@@ -1,4 +1,5 @@
-//! Divide and conquer gives the accelerations of the articulated-body algorithm, in O(log n) steps, whatever the threads.
+//! Divide and conquer gives the accelerations of the articulated-body algorithm, in O(log n) steps, on any number of
+//! threads.
 
 use crate::common;
 use crate::counted::{Counted, counted};
@@ -10,9 +11,9 @@ use condyle_dynamics::{
 };
 use num_dual::Dual64;
 
-/// Some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 in the robots and grows with the cube
-/// of a chain's length: 1e8 for 300 links. Of that, aba itself loses as much; the largest accelerations, to which the
-/// error is relative, are those of the light tips and grow alike.
+/// Tolerance of some hundreds of roundings times the condition number of M. It is 1e2 to 1e5 in the robots and grows
+/// with the cube of a chain's length: 1e8 for 300 links. `aba` itself loses as many digits. The error is relative to
+/// the largest accelerations, which belong to the light tips and grow alike.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 
@@ -70,7 +71,7 @@ fn branches_and_floating_bases() {
     }
 }
 
-/// Several robots on the world are one model.
+/// Several robots on the world form one model.
 #[test]
 fn a_forest() {
     let mut worst = Worst::new("divide and conquer on forests", INVERTED);
@@ -79,7 +80,7 @@ fn a_forest() {
     }
 }
 
-/// Bodies without mass, and point masses on their hinge's axis, are no trouble as long as something below them has mass.
+/// Bodies without mass, and point masses on their hinge's axis, are valid as long as a body below them has mass.
 #[test]
 fn bodies_without_mass() {
     let mut worst = Worst::new("divide and conquer with massless bodies", INVERTED);
@@ -104,8 +105,8 @@ fn bodies_without_mass() {
     }
 }
 
-/// A floating palm with four fingers of four hinges, the last three of them parallel, and light tips. The larger a finger's
-/// joint number, the larger its rotor.
+/// Creates a floating palm with four fingers of four hinges each. The last three hinges are parallel, and the tips are
+/// light. The rotors grow with the joint's index along the finger.
 fn hand(rotor: f64) -> Model {
     let inertia = |mass: f64| Inertia::from_com(mass, Vec3::new(0.0, 0.0, 0.02), Sym3::diagonal(1e-4 * mass));
     let at = |y: f64, z: f64| Se3::new(Mat3::identity(), Vec3::new(0.0, y, z));
@@ -126,7 +127,8 @@ fn hand(rotor: f64) -> Model {
     builder.build().expect("a hand is well-formed")
 }
 
-/// Fewer degrees of freedom than six, in a plane, between the handles of a piece: its compliance Y is singular.
+/// Between the handles of a piece there are fewer than six degrees of freedom, in a plane, so its compliance Y is
+/// singular.
 #[test]
 fn fingers() {
     let mut worst = Worst::new("divide and conquer on hands", INVERTED);
@@ -138,7 +140,8 @@ fn fingers() {
     }
 }
 
-/// A chain of n hinges, every third of which follows one of two others, and of which some have no inertia of their own.
+/// Creates a chain of n hinges, of which every third follows one of two others; bodies selected by `massless` have no
+/// inertia.
 fn chain_with_followers(n: usize, massless: impl Fn(usize) -> bool) -> Model {
     let rng = &mut rng(n as u64);
     let mut builder = ModelBuilder::new("chain");
@@ -159,13 +162,13 @@ fn chains_with_followers() {
     let mut worst = Worst::new("divide and conquer on chains with followers", INVERTED);
     for n in [3, 4, 7, 20, 50, 100] {
         check(&mut worst, &chain_with_followers(n, |_| false), n as u64);
-        check(&mut worst, &chain_with_followers(n, |i| i % 3 == 0), n as u64); // what follows is without mass
-        check(&mut worst, &chain_with_followers(n, |i| i < 3), n as u64); // what leads is
+        check(&mut worst, &chain_with_followers(n, |i| i % 3 == 0), n as u64); // the followers have no mass
+        check(&mut worst, &chain_with_followers(n, |i| i < 3), n as u64); // the leaders have no mass
     }
 }
 
-/// Nothing resists joint after joint but through the ties: a follower without mass at each tip, and a wheel that could
-/// turn against the arm without mass that carries it, were it not geared to the other one.
+/// Only the couplings give these joints inertia: a massless follower at each tip, and a wheel on a massless arm. The
+/// wheel could turn against that arm if it were not geared to the leader.
 #[test]
 fn followers_without_inertia() {
     let axis = Vec3::new(0.0, 0.0, 1.0);
@@ -192,7 +195,7 @@ fn followers_without_inertia() {
     }
 }
 
-/// Tangents, by the same source.
+/// Dual numbers give tangents, by the same source.
 #[test]
 fn on_dual_numbers() {
     let mut worst = Worst::new("derivatives by divide and conquer", INVERTED);
@@ -208,7 +211,7 @@ fn on_dual_numbers() {
     }
 }
 
-/// The assembly fixes every sum, so the bits do not depend on who computes it.
+/// The assembly fixes the order of every sum, so the bits do not depend on the threads.
 #[test]
 fn same_bits_for_any_number_of_threads() {
     let pools: Vec<_> = [1, 2, 3]
@@ -233,7 +236,8 @@ fn same_bits_for_any_number_of_threads() {
     }
 }
 
-/// A chain of n bodies has ⌈log₂ n⌉ levels of joins; other trees at most about twice as many (heavy paths, cut by weight).
+/// A chain of n bodies has ⌈log₂ n⌉ levels of joins; other trees have at most about twice as many (heavy paths, cut by
+/// weight).
 #[test]
 fn levels() {
     let log2 = |n: usize| n.next_power_of_two().ilog2() as usize;

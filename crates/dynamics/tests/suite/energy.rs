@@ -1,4 +1,4 @@
-//! The algorithms against Lagrange: everything follows from the energies, and these need nothing but placements.
+//! The algorithms follow from the energies (Lagrange), which need only placements.
 
 use crate::common;
 
@@ -9,12 +9,12 @@ use condyle_dynamics::{
 use nalgebra::DVector;
 use num_dual::{Dual, Dual64, DualNum, HyperDual64};
 
-/// Sums over all bodies, relative to the largest number.
+/// Tolerance of sums over all bodies, relative to the largest number.
 const ROUNDING: f64 = 1e-11;
 const TREES: u64 = 8;
 
-/// The kinetic energy (rotors included) and the potential energy. A body's velocity is how its placement changes along
-/// q ⊕ t v: a dual number around the scalar.
+/// Computes the kinetic energy (rotors included) and the potential energy. A body's velocity is the rate of its
+/// placement along q ⊕ t v, by a dual number around the scalar.
 fn energies<T>(model: &Model, data: &mut Data<Dual<T>>, q: &[T], v: &[T]) -> (T, T)
 where
     T: Scalar<Mask = bool> + DualNum,
@@ -102,7 +102,7 @@ fn power_balance() {
         let (kinetic, potential) = energies(model, &mut duals, &q_moving, &dual(&v, &a));
         let rate = (kinetic + potential).eps;
         worst.see(model, &[power(rnea(model, &mut data, &q, &v, &a, &[]))], &[rate]);
-        // what the external forces do, with the bodies' velocities by dual numbers
+        // power of the external forces, with the bodies' velocities by dual numbers
         let mut dual_data = Data::new(model);
         let placements = forward_kinematics(model, &mut dual_data, &q_moving);
         let mut external = 0.0;

@@ -1,4 +1,4 @@
-//! The sparse and the dense factor of M: what they are, what they solve, where they have zeros.
+//! Sparse and dense factors of M: their product, their solutions, and their zeros.
 
 use crate::common;
 
@@ -9,9 +9,9 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Some hundreds of roundings, relative to the largest entry of M.
+/// Tolerance of some hundreds of roundings, relative to the largest entry of M.
 const RECONSTRUCTED: f64 = 1e-13;
-/// The same times the condition number of M, which is 1e2 to 1e5 in these robots.
+/// Tolerance of the same times the condition number of M, which is 1e2 to 1e5 in these robots.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 
@@ -20,7 +20,7 @@ fn inertia_matrix(model: &Model, seed: u64) -> DMatrix<f64> {
     crba(model, &mut Data::new(model), &q).clone_owned()
 }
 
-/// L and D in the order of the coordinates' places.
+/// Returns L and D, with rows and columns in the order of the factor.
 fn unpack(factor: &Ltdl<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let D = nalgebra::DVector::from_iterator(factor.order().len(), factor.diagonal());
     let mut L = DMatrix::identity(D.len(), D.len());
@@ -32,12 +32,12 @@ fn unpack(factor: &Ltdl<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     (L, DMatrix::from_diagonal(&D))
 }
 
-/// P M Pᵀ: rows and columns in an order.
+/// Returns P M Pᵀ: the rows and columns of M in the given order.
 fn ordered(M: &DMatrix<f64>, order: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(M.nrows(), M.nrows(), |i, j| M[(order[i], order[j])])
 }
 
-/// The factors multiply to M; D is positive.
+/// The product of the factors is M, and D is positive.
 #[test]
 fn reconstructs() {
     let mut sparse = Worst::new("Lᵀ D L = M", RECONSTRUCTED);
@@ -95,7 +95,7 @@ fn solves() {
     }
 }
 
-/// Without shared coordinates, row k has an entry for each degree of freedom between k and the root, and no other.
+/// Without shared coordinates, row k has one entry for each degree of freedom between k and the root, and no others.
 #[test]
 fn zeros_are_those_of_the_tree() {
     for model in all_models(TREES).iter().filter(|m| m.bodies().iter().all(|b| b.mimic.is_none())) {
@@ -122,7 +122,7 @@ fn zeros_are_those_of_the_tree() {
     }
 }
 
-/// How many entries of the lower triangle of L are not zero, of M = Lᵀ D L computed densely.
+/// Computes M = Lᵀ D L densely; returns the number of nonzeros in the lower triangle of L, and L.
 fn dense_nonzeros(mut H: DMatrix<f64>) -> (usize, DMatrix<f64>) {
     let n = H.nrows();
     for k in (0..n).rev() {
@@ -139,8 +139,8 @@ fn dense_nonzeros(mut H: DMatrix<f64>) -> (usize, DMatrix<f64>) {
     (H.lower_triangle().iter().filter(|&&x| x != 0.0).count(), H)
 }
 
-/// With shared coordinates, the rows hold all that is not zero, and the order makes them shorter, in all, than the
-/// coordinates' own order would.
+/// With shared coordinates, the rows contain all nonzeros. The chosen order needs fewer entries in total than the
+/// coordinates' own order.
 #[test]
 fn shared_coordinates_keep_branches_apart() {
     let mut stored = (0, 0);
@@ -166,8 +166,8 @@ fn shared_coordinates_keep_branches_apart() {
     assert!(stored.0 < stored.1);
 }
 
-/// A hand whose fingers all follow one coordinate at the tip of the first: it moves to where the fingers meet, and each
-/// finger's row has that coordinate, its own, and the arm's.
+/// All fingers of a hand follow one coordinate, at the tip of the first finger. That coordinate is ordered where the
+/// fingers meet. Each finger's row contains that coordinate, its own, and the arm's.
 #[test]
 fn fingers_that_follow() {
     let link = Inertia::from_com(0.1, Vec3::new(0.01, 0.02, 0.03), condyle_dynamics::Sym3::diagonal(1e-3));
@@ -222,7 +222,7 @@ fn on_dual_numbers() {
     }
 }
 
-/// A factor is right whatever was in it before.
+/// A factorisation does not depend on the previous content of the factor.
 #[test]
 fn may_be_used_again() {
     for (seed, model) in all_models(4).iter().enumerate() {

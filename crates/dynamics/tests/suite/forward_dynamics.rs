@@ -1,4 +1,4 @@
-//! All ways of forward dynamics are one.
+//! All methods of forward dynamics give the same result.
 
 use crate::common::{self, State, Worst, all_models, lift, lift_forces, rng, tree};
 use crate::counted::{Counted, counted};
@@ -8,7 +8,7 @@ use condyle_dynamics::{aba, crba, forward_dynamics};
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 in these robots.
+/// Tolerance of some hundreds of roundings times the condition number of M, which is 1e2 to 1e5 in these robots.
 const INVERTED: f64 = 1e-10;
 const TREES: u64 = 30;
 const METHODS: [ForwardDynamicsMethod; 3] =
@@ -35,7 +35,7 @@ fn methods_agree() {
     }
 }
 
-/// On dual numbers, and from whatever the scratch holds.
+/// All methods agree on dual numbers, whatever the content of the scratch.
 #[test]
 fn methods_agree_on_dual_numbers() {
     let mut worst = Worst::new("derivatives by every method", INVERTED);
@@ -86,7 +86,8 @@ fn allocates_nothing(f: impl FnOnce()) {
     assert_eq!(allocations(f), 0);
 }
 
-/// Every method, both factors, and divide and conquer (on one thread: what rayon allocates to share work is its own).
+/// Checks every method, both factors, and divide and conquer (on one thread, because rayon itself allocates to share
+/// work).
 #[test]
 fn nothing_is_allocated() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread can be started");

@@ -1,4 +1,4 @@
-//! The armature of free joints: in free space the same as a mass at the origin of the body, in every algorithm.
+//! Armature of free joints: in free space it equals a mass at the origin of the body, in every algorithm.
 
 use crate::common;
 
@@ -12,13 +12,13 @@ use condyle_dynamics::{
     nonlinear_effects, rnea, rnea_derivatives, rnea_hessian, robots,
 };
 
-/// The same sums in another order; with M⁻¹ times its condition.
+/// Tolerances of the same sums in another order; with M⁻¹ times its condition number.
 const ROUNDING: f64 = 1e-11;
 const CONDITIONED: f64 = 1e-8;
-/// The apparent mass (kg).
+/// Apparent mass (kg).
 const MASS: f64 = 2.5;
 
-/// A robot in free space whose base has armature, and one whose base has a mass there.
+/// Returns a robot in free space whose base has armature, and one whose base has an additional mass instead.
 fn pair(robot: &Model) -> [Model; 2] {
     let free = robot.clone().with_gravity(Vec3::zero()).unwrap();
     let nv = robot.nv();
@@ -28,7 +28,7 @@ fn pair(robot: &Model) -> [Model; 2] {
     [free.with_armature(&armature(MASS)).unwrap(), heavier.with_armature(&armature(0.0)).unwrap()]
 }
 
-/// All numbers that algorithms give for a model: first those without M⁻¹, then those with it.
+/// Returns all numbers that algorithms compute for a model: first without M⁻¹, then with it.
 fn numbers(model: &Model, s: &State, frames: [&str; 2]) -> [Vec<f64>; 2] {
     let (State { q, v, a, tau, f_ext }, nv) = (s, model.nv());
     let data = &mut Data::new(model);
@@ -84,7 +84,7 @@ fn numbers(model: &Model, s: &State, frames: [&str; 2]) -> [Vec<f64>; 2] {
     [sums, solved]
 }
 
-/// Body by body, and with the limbs side by side.
+/// Tests single bodies, and branches in parallel lanes.
 #[test]
 fn in_free_space_it_is_a_mass() {
     let mut sums = Worst::new("armature of a base = mass", ROUNDING);
@@ -108,7 +108,7 @@ fn in_free_space_it_is_a_mass() {
     }
 }
 
-/// It has no weight.
+/// Armature has no weight.
 #[test]
 fn it_has_no_weight() {
     let quadruped = robots::quadruped();
@@ -118,7 +118,7 @@ fn it_has_no_weight() {
     assert_eq!(gravity(&heavier, &mut Data::new(&heavier), &q), weight);
 }
 
-/// A free joint on a body that moves: its armature resists the motion relative to that body, along the axes of that body.
+/// A free joint is on a moving body. Its armature resists the motion relative to that body, along that body's axes.
 #[test]
 fn on_a_body_that_moves() {
     let I = Inertia::from_com(1.0, Vec3::new(0.1, 0.2, 0.3), Sym3::diagonal(0.1));
@@ -133,14 +133,14 @@ fn on_a_body_that_moves() {
     let with = rnea(&heavier, &mut Data::new(&heavier), &q, &v, &a, &[]).to_vec();
     let [linear, angular] = [1, 4].map(|k| Vec3::new(v[k], v[k + 1], v[k + 2]));
     let acceleration = Vec3::new(a[1], a[2], a[3]) + angular.cross(linear); // v̇ + ω × v
-    assert!((with[0] - without[0]).abs() < 1e-12); // the table does not feel it
+    assert!((with[0] - without[0]).abs() < 1e-12); // the table does not feel the armature
     for (k, x) in acceleration.to_array().into_iter().enumerate() {
         assert!((with[k + 1] - without[k + 1] - MASS * x).abs() < 1e-12);
         assert!((with[k + 4] - without[k + 4]).abs() < 1e-12);
     }
 }
 
-/// In the axes of the parent a body that turns has one number, whatever makes the model.
+/// Along the axes of the parent, a rotating body has one number for all axes, in models from any source.
 #[test]
 fn three_equal_numbers() {
     let quadruped = robots::quadruped();

@@ -1,4 +1,4 @@
-//! The ground of a simulation against closed forms: landing, standing, sliding, sticking, lift-off, energy.
+//! Ground of a simulation, compared with closed forms: landing, standing, sliding, sticking, lift-off, energy.
 
 use crate::common::{normal3, random_rotation, relative, rng};
 use crate::counting::allocations;
@@ -9,15 +9,15 @@ use condyle_dynamics::{
 };
 
 const G: f64 = 9.81;
-/// The step of all tests (s).
+/// Time step of all tests (s).
 const H: f64 = 1e-3;
-/// Half the length, width and height of the box (m).
+/// Half of the box's length, width and height (m), and its mass (kg).
 const HALF: [f64; 3] = [0.15, 0.1, 0.05];
 const MASS: f64 = 2.0;
-/// The tolerance of the contact solver (1e-9 m/s) over some thousand steps, and rounding.
+/// Tolerance of the contact solver (1e-9 m/s) over some thousand steps, and rounding.
 const SOLVED: f64 = 1e-7;
 
-/// A box that moves freely, with a frame in its centre.
+/// Creates a box that moves freely, with a frame in its centre.
 fn free_box() -> Model {
     let [x, y, z] = HALF.map(|half| 4.0 * half * half * MASS / 12.0);
     let moments = Sym3 { xx: y + z, yy: x + z, zz: x + y, ..Sym3::zero() };
@@ -31,7 +31,7 @@ fn free(name: &str, inertia: Inertia<f64>) -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// All corners of the box; the first four are below.
+/// Returns all corners of the box; the first four are at the bottom.
 fn corners() -> Vec<Vec3<f64>> {
     let [x, y, z] = HALF;
     let around = [(x, y), (x, -y), (-x, -y), (-x, y)];
@@ -55,7 +55,7 @@ fn energy(model: &Model, simulation: &Simulation<f64>) -> f64 {
 
 fn passive(_: &mut Control<'_, f64>) {}
 
-/// A box slides with exactly μ g, along any direction, and stops after v²/(2 μ g) less half a step's way.
+/// A box slides with exactly μ g, along any direction. It stops after v²/(2 μ g) minus half a step's distance.
 #[test]
 fn a_box_slides_to_a_stop() {
     let model = free_box();
@@ -64,7 +64,7 @@ fn a_box_slides_to_a_stop() {
         let (speed, along) = (1.0, Vec3::new(f64::cos(angle), f64::sin(angle), 0.0));
         let v = [speed * along.x, speed * along.y, 0.0, 0.0, 0.0, 0.0];
         let mut simulation = on(&model, ground, &[0.0, 0.0, HALF[2], 0.0, 0.0, 0.0, 1.0], &v);
-        let steps = (speed / (mu * G * H)) as usize; // all of them slide
+        let steps = (speed / (mu * G * H)) as usize; // the box slides in all of them
         for k in 1..=steps {
             assert_eq!(simulation.run(1, passive), Status::Done);
             let found = Vec3::new(simulation.v()[0], simulation.v()[1], 0.0);
@@ -76,14 +76,14 @@ fn a_box_slides_to_a_stop() {
         assert!(simulation.run(500, passive).is_done());
         let way = simulation.q()[0].hypot(simulation.q()[1]);
         let expected = speed * speed / (2.0 * mu * G) - speed * H / 2.0; // the sum of h v⁺ over the steps
-        let rest = mu * G * H * H; // what the last, shorter, step may add
+        let rest = mu * G * H * H; // distance that the last, shorter, step may add
         println!("μ = {mu}: stops after {way:.6} m, expected {expected:.6}");
         assert!((way - expected).abs() < rest, "{way} {expected}");
         assert!(simulation.v().iter().all(|v| v.abs() < SOLVED), "{:?}", simulation.v());
     }
 }
 
-/// Forces of a standing robot are the same in each step and sum up to its weight: nothing drifts or shakes.
+/// The forces of a standing robot are the same in each step and sum up to its weight: it neither drifts nor vibrates.
 #[test]
 fn standing_is_still() {
     let model = free_box();
@@ -93,13 +93,13 @@ fn standing_is_still() {
             .flat_map(|k| corners()[..4].iter().map(move |&c| c * (1.0 - 0.1 * k as f64)).collect::<Vec<_>>())
             .collect(),
     );
-    let sixteen: Vec<_> = sixteen.into_iter().map(|p| Vec3::new(p.x, p.y, -HALF[2])).collect(); // in one plane
+    let sixteen: Vec<_> = sixteen.into_iter().map(|p| Vec3::new(p.x, p.y, -HALF[2])).collect(); // all in one plane
     for (sole, speed) in [(four, 0.0), (sixteen, 0.3)] {
         let points = sole.len();
         let ground = Ground::default().with_sole(0, &sole);
         let v = [speed, 0.0, 0.0, 0.0, 0.0, speed];
         let mut simulation = on(&model, ground, &[0.0, 0.0, HALF[2], 0.0, 0.0, 0.0, 1.0], &v);
-        assert!(simulation.run(500, passive).is_done()); // it comes to rest
+        assert!(simulation.run(500, passive).is_done()); // the box comes to rest
         let (q, mut forces, mut shaken) = (simulation.q().to_vec(), simulation.contacts().to_vec(), 0);
         for _ in 0..5000 {
             assert!(simulation.run(1, passive).is_done());
@@ -140,11 +140,11 @@ fn sticks_or_slides_on_a_slope() {
         println!("{degrees}°: {speed} m/s, expected {expected}");
         assert!((speed - expected).abs() < SOLVED, "{speed} {expected}");
         let turned = Quaternion::new(simulation.q()[3], simulation.q()[4], simulation.q()[5], simulation.q()[6]);
-        assert!((turned.to_rotation().z - normal).norm() < SOLVED); // it lies flat
+        assert!((turned.to_rotation().z - normal).norm() < SOLVED); // the box lies flat
     }
 }
 
-/// A point falls for √(2 H/g), lands without going through, stays, and leaves when it is pulled up by more than its weight.
+/// A point falls for √(2 H/g), lands without penetration, stays, and lifts off when pulled up by more than its weight.
 #[test]
 fn falls_lands_and_lifts_off() {
     let model = free("ball", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.01)));
@@ -171,7 +171,8 @@ fn falls_lands_and_lifts_off() {
     }
 }
 
-/// A point that its joints hold in some directions lands and stands like a free one: on a vertical rail, and on a pendulum.
+/// A point whose joints constrain some directions lands and stands like a free one: on a vertical rail, and on a
+/// pendulum.
 #[test]
 fn joints_may_hold_directions() {
     let z = Vec3::new(0.0, 0.0, 1.0);
@@ -191,10 +192,10 @@ fn joints_may_hold_directions() {
     builder.frame("tip", rod, Se3 { translation: Vec3::new(2.0, 0.0, 0.0), ..Se3::identity() });
     let pendulum = builder.build().unwrap();
     let mut heavy = on(&pendulum, Ground { friction: 0.3, ..Ground::at_frames([0]) }, &[0.0], &[0.0]);
-    assert!(heavy.run(500, |now| now.tau[0] = 3.0).is_done()); // turns down, until the tip touches at 30°
+    assert!(heavy.run(500, |now| now.tau[0] = 3.0).is_done()); // the pendulum turns down, until its tip touches at 30°
     assert!((heavy.q()[0] - f64::asin(0.5)).abs() < 1e-6 && heavy.v()[0].abs() < 1e-9);
     assert!(heavy.contacts()[0].touches);
-    // a rail along the ground: the point can only slide, and nothing pushes it
+    // a rail along the ground: the point can only slide, and no force pushes it
     let mut builder = ModelBuilder::new("cart");
     let cart =
         builder.body("cart", WORLD, Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) }, Se3::identity(), weight);
@@ -205,7 +206,7 @@ fn joints_may_hold_directions() {
     assert_eq!(simulation.v()[0], 1.0);
 }
 
-/// A ball rebounds to e² of its height, and comes to rest instead of shaking.
+/// A ball rebounds to e² of its height, and comes to rest instead of vibrating.
 #[test]
 fn restitution_rebounds() {
     let model = free("ball", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.01)));
@@ -229,10 +230,10 @@ fn restitution_rebounds() {
     }
 }
 
-/// Boxes that tumble over their eight corners: what the contacts do takes energy; all come to rest.
+/// Boxes tumble over their eight corners: contacts only reduce the energy, and all boxes come to rest.
 #[test]
 fn energy_never_grows() {
-    // a cube's spin changes nothing without contacts, but for h² ω² of the velocity that turns with it
+    // without contacts, a cube's spin keeps its energy, except for h² ω² of the velocity that turns with it
     let model = free("cube", Inertia::from_com(MASS, Vec3::zero(), Sym3::diagonal(0.02)));
     let cube: Vec<_> =
         corners().into_iter().map(|c| Vec3::from([c.x / HALF[0], c.y / HALF[1], c.z / HALF[2]]) * 0.1).collect();
@@ -249,7 +250,7 @@ fn energy_never_grows() {
             let (v, now) = (simulation.v(), energy(&model, &simulation));
             let spin = Vec3::new(v[3], v[4], v[5]).norm_squared();
             let turned = H * H * spin * MASS * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
-            // a corner that was carried below the plane by the curvature of its path is taken out again
+            // a corner may enter the plane by the curvature of its path, and is then pushed out again
             let depth = H * H * (spin * 0.2 + G) * MASS * G;
             assert!(now <= before + turned + depth + 1e-9, "cube {seed}: {before} to {now} J");
             before = now;
@@ -266,8 +267,9 @@ fn placed(model: &Model, q: &[f64]) -> Se3<f64> {
     forward_kinematics(model, &mut Data::new(model), q).body(1)
 }
 
-/// Holds a posture: as stiff as the inertia of each joint lets an explicit integrator be, plus the weight of the limbs. What a
-/// joint feels is M_kk where it carries a light limb, and 1/(M⁻¹)_kk where both of its sides are heavy.
+/// Returns a control law that holds a posture. It is as stiff as an explicit integrator allows for the inertia of each
+/// joint, plus the weight of the limbs. A joint's inertia is M_kk where it carries a light limb, and 1/(M⁻¹)_kk where
+/// both of its sides are heavy.
 fn posture(model: &Model, q0: &[f64], heavy: bool) -> impl FnMut(&mut Control<'_, f64>) + use<> {
     let (mut data, q0) = (Data::new(model), q0.to_vec());
     let inertia: Vec<f64> = if heavy {
@@ -299,7 +301,7 @@ fn quadruped() -> (Model, Vec<f64>, Ground) {
     (model, q, Ground::at_frames(feet))
 }
 
-/// A quadruped stands on four feet; a humanoid, all its joints locked, on the eight corners of its soles.
+/// A quadruped stands on four feet; a humanoid with locked joints stands on the eight corners of its soles.
 #[test]
 fn robots_stand() {
     let (model, q, ground) = quadruped();
@@ -326,7 +328,7 @@ fn robots_stand() {
     assert!(relative(simulation.q(), &q) < 1e-6, "{:?} {q:?}", simulation.q());
     assert!((push(&simulation).z / (statue.total_mass() * G) - 1.0).abs() < 1e-6);
 
-    // with all its joints, held by their laws
+    // with all its joints free, held by control laws
     let mut q = neutral(&humanoid);
     let frames = soles.map(|frame| humanoid.frame(&statue.frames()[frame].name).unwrap());
     let ground = frames.into_iter().fold(Ground::default(), |ground, frame| ground.with_sole(frame, &sole));
@@ -341,7 +343,7 @@ fn robots_stand() {
     assert!((lifted - 1.0).abs() < 0.05 && (q[2] - z).abs() < 0.05);
 }
 
-/// Points below the ground at the start are taken out gently: depth does not become speed.
+/// Points that start below the ground are pushed out gently: depth does not become speed.
 #[test]
 fn depth_does_not_become_speed() {
     let model = free_box();
@@ -354,7 +356,8 @@ fn depth_does_not_become_speed() {
     assert!((simulation.q()[2] - HALF[2]).abs() < 1e-6, "{}", simulation.q()[2]);
 }
 
-/// A stored state goes on with the same bits, contacts included; so does one that was set again.
+/// A simulation continues from a stored state with the same bits, contacts included; so does one whose state is set
+/// again.
 #[test]
 fn contacts_are_part_of_the_state() {
     let (model, q, ground) = quadruped();
@@ -377,7 +380,7 @@ fn contacts_are_part_of_the_state() {
     assert_eq!(simulation.state(), end);
 }
 
-/// Nothing is allocated by steps, in the air, on landing and at rest.
+/// Steps do not allocate, in the air, on landing and at rest.
 #[test]
 fn steps_do_not_allocate() {
     let (model, mut q, ground) = quadruped();
@@ -391,7 +394,7 @@ fn steps_do_not_allocate() {
     assert!(simulation.contacts().iter().any(|contact| contact.touches));
 }
 
-/// A solver that may not iterate says so, and by how much; its impulses push only, inside the cones.
+/// A contact solver without iterations reports its failure and its error; its impulses only push, inside the cones.
 #[test]
 fn a_solver_that_is_stopped_says_so() {
     let model = free_box();
@@ -402,7 +405,7 @@ fn a_solver_that_is_stopped_says_so() {
     assert!((error - G * H).abs() < 1e-12, "{error}");
     assert_eq!(simulation.time(), H); // the step was taken
     let run = simulation.run(4, passive);
-    assert!((simulation.time() - 5.0 * H).abs() < 1e-12); // a run goes on, and reports the largest error
+    assert!((simulation.time() - 5.0 * H).abs() < 1e-12); // the run continues, and reports the largest error
     assert!(matches!(run, Status::ContactsNotConverged { error: largest } if largest > error), "{run}");
     assert_eq!(run.and(Status::Done), run);
     assert_eq!(run.and(Status::NotFinite), Status::NotFinite);

@@ -1,4 +1,4 @@
-//! What holds for every function: no hidden order, named panics; and what a model promises.
+//! Properties of every function: no hidden state, and panics that name the argument; and the properties of models.
 
 use crate::common;
 
@@ -14,7 +14,7 @@ use nalgebra::DMatrix;
 use num_dual::Dual64;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// A function gives the same bits whatever ran before it on the same `Data`, not-a-numbers included.
+/// A function gives the same bits whatever ran before on the same `Data`, even with NaN.
 #[test]
 fn no_hidden_order() {
     for (seed, model) in all_models(3).iter().enumerate() {
@@ -40,8 +40,8 @@ fn no_hidden_order() {
     }
 }
 
-/// A robot of fixed joints only has no coordinates; every function gives what is left, which is finite, but for the centre of
-/// mass of what moves: nothing does, and it is documented to be no number.
+/// A robot with only fixed joints has no coordinates, and every function gives its remaining results, which are finite.
+/// The exception is the centre of mass of the moving bodies, which do not exist; it is documented to be NaN.
 #[test]
 fn robots_without_coordinates() {
     const CENTRE_OF_MASS: [&str; 6] = [
@@ -70,16 +70,16 @@ fn robots_without_coordinates() {
     }
 }
 
-/// What a call panics with.
+/// Returns the message with which a call panics.
 fn message(call: impl FnOnce()) -> String {
     let panic = catch_unwind(AssertUnwindSafe(call)).expect_err("the call panics");
     panic.downcast_ref::<String>().cloned().expect("the message has numbers in it")
 }
 
-/// Each argument of each function, one number short or too long.
+/// Each argument of each function is given one number short or too long.
 #[test]
 fn wrong_lengths_name_the_argument() {
-    let model = &robots::quadruped(); // nq 19, nv 18, 14 bodies with the world
+    let model = &robots::quadruped(); // nq 19, nv 18, 14 bodies including the world
     let data = &mut Data::<f64>::new(model);
     let (q, v, f) = (neutral(model), vec![0.0; 18], vec![Force::zero(); 14]);
     let (short_q, short_v, short_f) = (&q[1..], &v[1..], &f[1..]);
@@ -137,7 +137,7 @@ fn wrong_lengths_name_the_argument() {
     expect(bad_armature, message(|| drop(robots::quadruped().with_armature(short_v))));
 }
 
-/// A `Data` of another robot is refused by every function that takes one, before it computes nonsense.
+/// Every function that takes a `Data` rejects the `Data` of another robot, before it computes wrong results.
 #[test]
 fn data_of_another_model() {
     let [arm, quadruped, humanoid] = embedded();
@@ -154,7 +154,7 @@ fn data_of_another_model() {
     }
 }
 
-/// As many bodies, columns and coordinates, in another order: what a `Data` keeps of the tree would not fit.
+/// The same numbers of bodies, columns and coordinates in another order: the tree stored in a `Data` would not fit.
 #[test]
 fn data_of_another_tree() {
     let robot = |parents: [usize; 3]| {
@@ -171,7 +171,7 @@ fn data_of_another_tree() {
     let found = message(|| drop(minv(&fork, &mut Data::new(&chain), &[0.0; 3]).clone()));
     let sizes = "(4, 3, 3) bodies, joint axes and coordinates, found (4, 3, 3)";
     assert_eq!(found, format!("data: made for a model of {sizes} in another tree"));
-    // the same tree with other constants is welcome
+    // the same tree with other constants is accepted
     let heavy = chain.with_inertias(|_, I| I.scale(2.0)).unwrap();
     minv(&heavy, &mut Data::new(&chain), &[0.0; 3]);
     assert_eq!(heavy.total_mass(), 2.0 * chain.total_mass());
@@ -192,7 +192,7 @@ fn models_are_shared_between_threads() {
     });
 }
 
-/// JSON and back: the same robot to the last bit, with limits or without (JSON knows no infinity).
+/// JSON restores the same robot to the last bit, with or without limits (JSON has no infinity).
 #[test]
 fn serde_round_trip() {
     for (seed, model) in all_models(3).iter().enumerate() {
@@ -226,7 +226,7 @@ fn names() {
     assert_eq!(arm.frames()[arm.frame("base").unwrap()].body, 0);
 }
 
-/// Models are shared by threads, and scratch moves between them; all of them are cloned.
+/// Threads share models, and scratch can move between threads; both can be cloned.
 #[test]
 fn types_are_cloned_and_cross_threads() {
     use condyle_dynamics::{Batch, BatchConstraints, ConstraintSet, Data, DivideConquer, Matrices, Model, StateMatrix};

@@ -1,4 +1,4 @@
-//! The algorithms against each other: inverse dynamics, inertia matrix, forward dynamics, inverse inertia matrix.
+//! The algorithms compared with each other: inverse dynamics, inertia matrix, forward dynamics, inverse inertia matrix.
 
 use crate::common;
 
@@ -10,9 +10,9 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 
-/// Some hundreds of operations, relative to the largest effort.
+/// Tolerance of some hundreds of operations, relative to the largest effort.
 const ROUNDING: f64 = 1e-12;
-/// The same times the condition number of M, which is 1e2 to 1e5 in these robots.
+/// Tolerance of the same times the condition number of M, which is 1e2 to 1e5 in these robots.
 const INVERTED: f64 = 1e-10;
 const STATES: usize = 1000;
 const TREES: u64 = 30;
@@ -111,7 +111,8 @@ fn inertia_matrix_is_positive() {
     }
 }
 
-/// Joints that follow are joints of the free robot under a constraint: v_joint = G v, τ = Gᵀ τ_joint, M = Gᵀ M_joint G.
+/// Joints that follow others are joints of the free robot under a constraint: v_joint = G v, τ = Gᵀ τ_joint, M = Gᵀ
+/// M_joint G.
 #[test]
 fn mimics_are_a_projection() {
     let mut efforts = Worst::new("τ = Gᵀ rnea(G q + o, G v, G a)", ROUNDING);
@@ -141,8 +142,8 @@ fn mimics_are_a_projection() {
     }
 }
 
-/// The same robot with its bodies' frames chosen otherwise: any orientation, any origin on the axis of a hinge, any origin
-/// at all on a slide. The coordinates are the same, so efforts, accelerations and M are.
+/// The same robot has other body frames: any orientation, any origin on the axis of a hinge, any origin at all on a
+/// slide. The coordinates are the same, and so are efforts, accelerations and M.
 #[test]
 fn frames_do_not_matter() {
     let mut efforts = Worst::new("rnea in other frames", ROUNDING);
@@ -154,7 +155,7 @@ fn frames_do_not_matter() {
         let rng = &mut rng(seed);
         let tree = if seed % 2 == 0 { Tree::random(rng) } else { Tree::random_with_mimics(rng) };
         let mut other = tree.clone();
-        // oXn: the new frame of each body in the old one
+        // oXn: the placement of the new frame of each body in the old one
         let mut news = vec![Se3::identity()];
         for part in &mut other.parts {
             let axis = part.joint.axis().map(|a| a.scale(1.0 / a.norm_squared().sqrt()));
@@ -207,7 +208,7 @@ fn frames_do_not_matter() {
     }
 }
 
-/// A floating robot and gravity turned and moved together: what is measured from the robot's own frames stays as it is.
+/// A floating robot and gravity are rotated and moved together: results in the robot's own frames do not change.
 #[test]
 fn moved_as_a_whole() {
     let mut slopes = ["∂τ/∂q", "∂τ/∂v", "∂τ/∂a"].map(|name| Worst::new(name, ROUNDING));
@@ -240,7 +241,7 @@ fn moved_as_a_whole() {
     }
 }
 
-/// Bodies are where a product of textbook matrices puts them, in the frames that were given.
+/// The placements of bodies equal a product of textbook matrices, in the given frames.
 #[test]
 fn placements() {
     let mut worst = Worst::new("oX_i = oX_λ X_T X_J", ROUNDING);
@@ -261,7 +262,7 @@ fn placements() {
     }
 }
 
-/// A force on the world moves nothing.
+/// A force on the world has no effect.
 #[test]
 fn force_on_the_world() {
     let [arm, ..] = embedded();

@@ -1,4 +1,4 @@
-//! Which inertias are physical, and the parametrisation in which all are.
+//! Physical validity of inertias, and the parametrisation that only has valid ones.
 
 use crate::common;
 
@@ -11,9 +11,9 @@ use condyle_dynamics::{Inertia, Sym3, Vec3, robots};
 use nalgebra::SMatrix;
 use num_dual::Dual64;
 
-/// A few roundings, relative to the largest number.
+/// Tolerance of a few roundings, relative to the largest number.
 const ROUNDING: f64 = 1e-13;
-/// The same after a factorisation of pseudo-inertias of condition up to 1e5.
+/// Tolerance after a factorisation of pseudo-inertias with a condition number up to 1e5.
 const FACTORED: f64 = 1e-9;
 const CASES: u64 = 300;
 
@@ -25,7 +25,7 @@ fn ten_numbers_there_and_back() {
     }
 }
 
-/// J is Σ m (x, 1)(x, 1)ᵀ of mass points.
+/// J is the sum Σ m (x, 1)(x, 1)ᵀ over mass points.
 #[test]
 fn pseudo_inertia_is_the_second_moment() {
     for seed in 0..CASES {
@@ -40,7 +40,7 @@ fn pseudo_inertia_is_the_second_moment() {
     }
 }
 
-/// The check says what the eigenvalues of J say.
+/// The check agrees with the eigenvalues of J.
 #[test]
 fn physical_is_positive_definite() {
     let mut refused = 0;
@@ -66,7 +66,7 @@ fn what_is_wrong_is_said() {
     assert!(check(Inertia::from_com(f64::NAN, Vec3::zero(), Sym3::diagonal(1.0))).is_err());
     assert!(check(Inertia::from_com(1.0, Vec3::zero(), Sym3::diagonal(f64::NAN))).is_err());
     let rod = Sym3 { xx: 1.0, yy: 1.0, ..Sym3::zero() };
-    assert!(check(Inertia::from_com(1.0, Vec3::zero(), rod)).is_err()); // without volume
+    assert!(check(Inertia::from_com(1.0, Vec3::zero(), rod)).is_err()); // no volume
 }
 
 /// Every body of the embedded robots is physical.
@@ -79,7 +79,7 @@ fn our_robots_are_physical() {
     }
 }
 
-/// θ → π → θ, and π → θ → π.
+/// The maps θ → π → θ and π → θ → π are identities.
 #[test]
 fn log_cholesky_there_and_back() {
     for seed in 0..CASES {
@@ -94,7 +94,7 @@ fn log_cholesky_there_and_back() {
     }
 }
 
-/// J = U Uᵀ with the matrix U of the paper.
+/// J = U Uᵀ, with the matrix U of the paper.
 #[test]
 fn log_cholesky_is_the_factor() {
     for seed in 0..CASES {
@@ -123,7 +123,7 @@ fn log_cholesky_is_the_factor() {
     }
 }
 
-/// ∂π/∂θ is what dual numbers say.
+/// ∂π/∂θ equals the derivative by dual numbers.
 #[test]
 fn log_cholesky_jacobian_is_the_derivative() {
     for seed in 0..CASES {

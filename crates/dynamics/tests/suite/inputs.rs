@@ -1,4 +1,4 @@
-//! The derivatives with respect to forces, inertial parameters, gravity, armature, damping and friction.
+//! Derivatives with respect to forces, inertial parameters, gravity, armature, damping and friction.
 
 use crate::common;
 
@@ -10,16 +10,16 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Two exact ways, some thousand roundings each; forward dynamics times the condition number of M.
+/// Tolerance between two exact methods, some thousand roundings each; forward dynamics times the condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 6;
 const SMOOTHING: f64 = 0.3;
 
-/// The effort and the acceleration along one direction of an input, by dual numbers.
+/// Computes the derivatives of effort and acceleration along one direction of an input, by dual numbers.
 fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [Vec<f64>; 2] {
     let nv = model.nv();
     let mut f_ext: Vec<Force<Dual64>> = lift_forces(&s.f_ext);
-    let mut passive = vec![Dual64::from(0.0); nv]; // the losses of one unit of damping or friction in a joint
+    let mut passive = vec![Dual64::from(0.0); nv]; // losses for one unit of damping or friction in a joint
     let mut seeded: Model<Dual64> = model.with_inertias(|_, I| I.lift()).unwrap();
     let one = |on: bool| Dual64::new(0.0, f64::from(u8::from(on)));
     match input {
@@ -61,8 +61,8 @@ fn by_duals(model: &Model, s: &State, qdd: &[f64], input: Input, k: usize) -> [V
     [eps(&effort), eps(aba(&seeded, &mut data, &q, &v, &tau, &f_ext))]
 }
 
-/// Loss of a coordinate for a unit of damping or friction, by a law of one component. A free joint loses along the axes of its
-/// parent.
+/// Computes the loss of a coordinate for a unit of damping or friction, by a law for one component. A free joint has
+/// losses along its parent's axes.
 fn lost(model: &Model, s: &State, k: usize, law: impl Fn(f64) -> f64) -> Vec<f64> {
     let mut loss = vec![0.0; model.nv()];
     let is_linear = |body: &&Body| body.joint == Joint::FreeFlyer && (body.idx_v..body.idx_v + 3).contains(&k);
@@ -107,7 +107,7 @@ fn every_input() {
     }
 }
 
-/// A force on the world moves nothing.
+/// A force on the world has no effect.
 #[test]
 fn the_world() {
     let quadruped = condyle_dynamics::robots::quadruped();

@@ -1,4 +1,4 @@
-//! Several robots in one model: those that no constraint ties together are computed as if each were alone.
+//! Several robots in one model: robots that no constraint connects are computed as if each were alone.
 
 use crate::common::{Worst, normal, random_pose, rng};
 use condyle_dynamics::{
@@ -9,17 +9,17 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Sums of the same numbers in another order, times the condition numbers of M and of J M⁻¹ Jᵀ.
+/// Tolerance of sums of the same numbers in another order, times the condition numbers of M and of J M⁻¹ Jᵀ.
 const SAME: f64 = 1e-9;
 
-/// A robot, the frames that touch, and whether these are held whole.
+/// Robot, its contact frames, and whether all their six directions are constrained.
 struct Part {
     model: Model,
     feet: &'static [&'static str],
     rigid: bool,
 }
 
-/// An arm that touches, a quadruped, one that falls, a humanoid on two soles, and an arm again.
+/// Returns an arm with a contact, a quadruped, a falling quadruped, a humanoid on two soles, and another arm.
 fn parts() -> Vec<Part> {
     const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
     let part = |model, feet, rigid| Part { model, feet, rigid };
@@ -32,7 +32,7 @@ fn parts() -> Vec<Part> {
     ]
 }
 
-/// All robots side by side, in one model.
+/// Creates a model with all robots side by side.
 fn together(parts: &[Part]) -> Model {
     let (mut builder, mut rng) = (ModelBuilder::new("all"), rng(7));
     for (k, part) in parts.iter().enumerate() {
@@ -41,7 +41,7 @@ fn together(parts: &[Part]) -> Model {
     builder.build().unwrap()
 }
 
-/// The robot's model in the world of the whole one: the same, placed where it stands there.
+/// Creates the model of one robot alone, at its placement in the whole model's world.
 fn alone(k: usize, parts: &[Part]) -> Model {
     let (mut builder, mut rng) = (ModelBuilder::new("one"), rng(7));
     let placement = (0..=k).map(|_| random_pose(&mut rng)).last().unwrap();
@@ -58,7 +58,7 @@ fn contacts(k: usize, part: &Part, model: &Model) -> Vec<ContactConstraint> {
     part.feet.iter().map(contact).collect()
 }
 
-/// Where the coordinates of a robot stand in the whole model: of q, and of v.
+/// Returns the indices of a robot's coordinates in the whole model, for q and for v.
 fn places(one: &Model, whole: &Model) -> [Vec<usize>; 2] {
     let mut all = [Vec::new(), Vec::new()];
     for body in &one.bodies()[1..] {
@@ -73,7 +73,7 @@ fn pick(of: &[f64], at: &[usize]) -> Vec<f64> {
     at.iter().map(|&k| of[k]).collect()
 }
 
-/// The entries of a matrix in some rows and columns; all others in these rows are zero.
+/// Returns the entries of a matrix in some rows and columns; checks that all others in these rows are zero.
 fn block(of: &Matrix<f64>, rows: &[usize], columns: &[usize]) -> Vec<f64> {
     let beside = |column: &usize| !columns.contains(column);
     let zeros = (0..of.ncols()).filter(beside).all(|column| rows.iter().all(|&row| of[(row, column)] == 0.0));
@@ -81,8 +81,8 @@ fn block(of: &Matrix<f64>, rows: &[usize], columns: &[usize]) -> Vec<f64> {
     columns.iter().flat_map(|&column| rows.iter().map(move |&row| of[(row, column)])).collect()
 }
 
-/// Each function on the whole model, and on each robot by itself; with limbs side by side, and body by body. A set that ties
-/// two robots was used on the same `Data` before.
+/// Compares each function on the whole model with the function on each robot alone, with branches in parallel lanes,
+/// and body by body. A constraint set that connects two robots used the same `Data` before.
 #[test]
 fn each_robot_is_as_it_is_alone() {
     let (parts, mut worst) = (parts(), Worst::new("robots alone and together", SAME));
@@ -153,8 +153,8 @@ fn each_robot_is_as_it_is_alone() {
     }
 }
 
-/// Constraints in any order, and robots that are tied together by loops, with damping and several rounds: the order of the
-/// constraints, which decides where islands can be told apart, changes nothing but the order of the rows.
+/// Constraints are in any order, and loops connect robots, with damping and several iterations. The order decides where
+/// islands can be separated, but only changes the order of the rows.
 #[test]
 fn the_order_of_constraints_changes_nothing() {
     let (parts, mut worst) = (parts(), Worst::new("orders of constraints", SAME));
@@ -198,7 +198,7 @@ fn the_order_of_constraints_changes_nothing() {
     }
 }
 
-/// A robot that is not a number leaves the others as they are.
+/// A robot with NaN does not affect the others.
 #[test]
 fn a_robot_that_is_not_a_number_stays_alone() {
     let parts = parts();
@@ -218,7 +218,7 @@ fn a_robot_that_is_not_a_number_stays_alone() {
     }
 }
 
-/// Two arms, of seven coordinates each, and two quadrupeds, of eighteen.
+/// Creates two arms with seven coordinates each, and two quadrupeds with eighteen.
 fn four() -> Model {
     let mut builder = ModelBuilder::new("all");
     for (name, robot) in
@@ -229,7 +229,7 @@ fn four() -> Model {
     builder.build().unwrap()
 }
 
-/// The islands of some contacts, by names of frames, each with another one or none.
+/// Returns the islands of some contacts, given by frame names, each optionally with a second frame.
 fn islands(model: &Model, of: &[(&str, Option<&str>)]) -> Vec<(Range<usize>, Range<usize>)> {
     let frame = |name: &str| model.frame(name).unwrap();
     let contact = |(one, other): &(&str, Option<&str>)| ContactConstraint {
@@ -244,15 +244,15 @@ fn islands(model: &Model, of: &[(&str, Option<&str>)]) -> Vec<(Range<usize>, Ran
 fn trees_and_what_ties_them() {
     let model = &four();
     assert_eq!(islands(model, &[]), [(0..7, 0..0), (7..14, 0..0), (14..32, 0..0), (32..50, 0..0)]);
-    // each by itself, whatever the order of the robots
+    // each robot alone, in any order of the contacts
     let apart = [("cLF_foot", None), ("cRF_foot", None), ("atool", None), ("dLF_foot", None)];
     assert_eq!(islands(model, &apart), [(0..7, 6..9), (7..14, 0..0), (14..32, 0..6), (32..50, 9..12)]);
-    // two that hold each other
+    // two robots connected by a constraint
     assert_eq!(islands(model, &[("atool", Some("btool"))])[0], (0..14, 0..3));
-    // what stands between two that hold each other goes along, and so do rows between those of one
+    // robots between two connected robots join their island, and so do rows between the rows of one robot
     assert_eq!(islands(model, &[("atool", Some("cLF_foot"))]), [(0..32, 0..3), (32..50, 0..0)]);
     let mixed = [("cLF_foot", None), ("dLF_foot", None), ("cRF_foot", None)];
     assert_eq!(islands(model, &mixed), [(0..7, 0..0), (7..14, 0..0), (14..50, 0..9)]);
-    // a foot that holds on to its own trunk
+    // a foot constrained to another foot of the same robot
     assert_eq!(islands(model, &[("cLF_foot", Some("cRF_foot"))])[2], (14..32, 0..3));
 }

@@ -1,4 +1,4 @@
-//! Jacobians of frames and of the configuration space, against dual numbers.
+//! Jacobians of frames and of the configuration space, compared with dual numbers.
 
 use crate::common;
 
@@ -10,11 +10,11 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Products of some ten matrices.
+/// Tolerance of products of some ten matrices.
 const ROUNDING: f64 = 1e-12;
 const TREES: u64 = 10;
 
-/// The velocity of a moving pose, in itself.
+/// Returns a moving pose's value, and its velocity in its own frame.
 fn velocity(X: Se3<Dual64>) -> (Se3<f64>, Motion<f64>) {
     let re = |x: Vec3<Dual64>| Vec3::from(x.to_array().map(|x| x.re));
     let rate = |x: Vec3<Dual64>| Vec3::from(x.to_array().map(|x| x.eps));
@@ -37,7 +37,7 @@ fn frame_jacobians() {
         let q_moving = moved(model, &lift(&q), &dual(&vec![0.0; model.nv()], &v));
         let moving = forward_kinematics(model, &mut duals, &q_moving);
         let placements = forward_kinematics(model, &mut data, &q);
-        let mut J = DMatrix::from_element(6, model.nv(), f64::NAN); // nothing need be zeroed
+        let mut J = DMatrix::from_element(6, model.nv(), f64::NAN); // the matrix need not be zeroed
         for f in 0..model.frames().len() {
             let (oXf, local) = velocity(moving.frame(f));
             let at_origin = Se3::new(oXf.rotation, Vec3::zero());
@@ -49,14 +49,14 @@ fn frame_jacobians() {
                 placements.frame_jacobian(f, reference, &mut J);
                 worst.see(model, &times(&J, &v), &expected.to_array());
                 J.fill(f64::NAN);
-                frame_jacobian(model, &q, f, reference, &mut J); // by the joints on its way alone
+                frame_jacobian(model, &q, f, reference, &mut J); // uses only the joints between the frame and the root
                 worst.see(model, &times(&J, &v), &expected.to_array());
             }
         }
     }
 }
 
-/// Forces f at frames are worth Σ Jᵀ f at the joints.
+/// Forces f at frames are equivalent to the efforts Σ Jᵀ f at the joints.
 #[test]
 fn external_forces() {
     let mut worst = Worst::new("rnea(f_ext) = rnea − Σ Jᵀ f", ROUNDING);
@@ -69,7 +69,7 @@ fn external_forces() {
         let mut J = DMatrix::zeros(6, model.nv());
         let placements = forward_kinematics(model, &mut data, &q);
         for (f, frame) in model.frames().iter().enumerate() {
-            let force = f_ext[frame.body]; // in the frame
+            let force = f_ext[frame.body]; // expressed in the frame
             on_bodies[frame.body] += frame.placement.act(force);
             placements.frame_jacobian(f, ReferenceFrame::Local, &mut J);
             for (tau, x) in expected.iter_mut().zip(times(&J.transpose(), &force.to_array())) {
@@ -80,7 +80,7 @@ fn external_forces() {
     }
 }
 
-/// q ⊕ (q₁ ⊖ q) = q₁ and (q ⊕ v) ⊖ q = v for turns of less than π; q ⊕ 0 = q.
+/// q ⊕ (q₁ ⊖ q) = q₁ and (q ⊕ v) ⊖ q = v for rotations of less than π; q ⊕ 0 = q.
 #[test]
 fn integrate_and_difference() {
     let mut there = Worst::new("q ⊕ (q₁ ⊖ q) = q₁", ROUNDING);
@@ -92,7 +92,7 @@ fn integrate_and_difference() {
             let mut d = vec![0.0; model.nv()];
             difference(model, &q, &q1, &mut d);
             let arrived = moved(model, &q, &d);
-            // a quaternion and its negative are one rotation: compare what moves
+            // a quaternion and its negative are the same rotation, so placements are compared
             let (mut one, mut two) = (Data::new(model), Data::new(model));
             let (one, two) = (forward_kinematics(model, &mut one, &arrived), forward_kinematics(model, &mut two, &q1));
             for i in 0..model.bodies().len() {
@@ -110,7 +110,7 @@ fn integrate_and_difference() {
     }
 }
 
-/// The tangent vector from where a moving position was to where it is.
+/// Returns the rate of a moving position as a tangent vector.
 fn rate(model: &Model, moving: &[Dual64]) -> Vec<f64> {
     let still = lift(&real(moving));
     let mut d = lift::<Dual64>(&vec![0.0; model.nv()]);
@@ -166,7 +166,7 @@ fn jacobians_of_difference() {
     }
 }
 
-/// Within the limits, of unit length where it must be, and the same for the same generator.
+/// Random positions are within the limits, have unit length where required, and are the same for the same generator.
 #[test]
 fn random_configurations() {
     for model in all_models(TREES) {
@@ -177,7 +177,7 @@ fn random_configurations() {
             let (lower, upper) = (bound(model.limits().lower[k], -3.0), bound(model.limits().upper[k], 3.0));
             assert!(lower <= q && q <= upper, "{k}: {q} on\n{model}");
         }
-        // on the manifold: moving by nothing changes nothing but rounding
+        // on the manifold: a zero step changes only rounding
         assert!(relative(&moved(&model, &q, &vec![0.0; model.nv()]), &q) < 1e-15);
     }
 }

@@ -1,5 +1,5 @@
-//! One program for most tests, since each program compiles the generic algorithms again. On their own stand those that
-//! look at the environment or choose the instructions to run on.
+//! Most tests are in one program, since each program compiles the generic algorithms again. Tests that read the
+//! environment or select a SIMD level are separate programs.
 #![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]

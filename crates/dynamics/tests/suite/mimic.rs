@@ -1,4 +1,4 @@
-//! Joints that follow others: as Pinocchio has them, around whole turns, and with rotors of their own.
+//! Joints that follow others: compared with Pinocchio, over full turns, and with their own rotors.
 
 use crate::common;
 
@@ -9,9 +9,9 @@ use condyle_dynamics::{
 };
 use serde_json::Value;
 
-/// Some hundred products, in another order.
+/// Tolerance of some hundred products, in another order.
 const ROUNDING: f64 = 1e-13;
-/// After some hundred turns: as much for each.
+/// Tolerance after some hundred turns, each of which adds as much.
 const TURNS_ROUNDING: f64 = 1e-11;
 
 fn floats(value: &Value) -> Vec<f64> {
@@ -19,7 +19,8 @@ fn floats(value: &Value) -> Vec<f64> {
     all.flat_map(|x| x.as_f64().map_or_else(|| floats(x), |x| vec![x])).collect()
 }
 
-/// Placements, efforts, M and the limits, for every pair of joints that may follow one another there.
+/// Compares placements, efforts, M and limits, for every pair of joint types that Pinocchio supports as leader and
+/// follower.
 #[test]
 fn as_in_pinocchio() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");
@@ -61,7 +62,7 @@ fn body(mass: f64) -> Inertia<f64> {
     Inertia::from_com(mass, Vec3::new(0.1, 0.2, -0.1), Sym3::diagonal(0.05))
 }
 
-/// A leader about an oblique axis, and followers about others.
+/// Creates a leader with an oblique axis, and followers with other axes.
 fn geared(leader: fn(Vec3<f64>) -> Joint, follower: fn(Vec3<f64>) -> Joint, options: &JointOptions) -> Model {
     let mut builder = ModelBuilder::new("gears");
     let axis = Vec3::new(0.3, -0.5, 0.8);
@@ -76,7 +77,8 @@ fn geared(leader: fn(Vec3<f64>) -> Joint, follower: fn(Vec3<f64>) -> Joint, opti
     builder.build().unwrap()
 }
 
-/// A continuous leader moves all as a revolute one does, whichever kind the followers are, also after many turns.
+/// A continuous leader moves all followers as a revolute leader does, for both kinds of followers, also after many
+/// turns.
 #[test]
 fn continuous_is_revolute() {
     type Kind = fn(Vec3<f64>) -> Joint;
@@ -101,14 +103,15 @@ fn continuous_is_revolute() {
     }
 }
 
-/// A rotor on each joint: those of the followers count by the square of their ratio, also in a part of another robot.
+/// Each joint has a rotor. The rotors of followers count with the square of their ratio, also in a part of another
+/// robot.
 #[test]
 fn rotors_of_followers() {
     let revolute = |axis| Joint::Revolute { axis };
     let rotors = JointOptions { armature: 0.1, damping: 0.5, ..JointOptions::default() };
     let model = geared(revolute, revolute, &rotors);
     assert_eq!(model.armature(), [0.1 + 4.0 * 0.1 + 49.0 * 0.1]);
-    assert_eq!(model.damping(), [0.5]); // the leader's alone, as in Pinocchio
+    assert_eq!(model.damping(), [0.5]); // only the leader's damping, as in Pinocchio
     let mut builder = ModelBuilder::new("two");
     builder.append(WORLD, Se3::identity(), &model, "left_");
     builder.append(WORLD, Se3::identity(), &model, "right_");

@@ -1,4 +1,4 @@
-//! From MJCF to a model, against MuJoCo's numbers (data/make_mujoco.py), and whatever else a file can contain.
+//! Models from MJCF, compared with MuJoCo's numbers (data/make_mujoco.py), and other contents of files.
 
 use condyle_dynamics::{
     Data, Error, FrameKind, Joint, MjcfOptions, Model, Vec3, Warning, crba, forward_kinematics, rnea,
@@ -6,7 +6,8 @@ use condyle_dynamics::{
 use serde_json::Value;
 use std::path::PathBuf;
 
-/// Relative; both sides sum some hundred products, MuJoCo through principal axes that it finds by iteration.
+/// Relative tolerance; both sides sum some hundred products, MuJoCo through principal axes that it computes by
+/// iteration.
 const AGREES: f64 = 1e-10;
 
 fn data(file: &str) -> PathBuf {
@@ -37,13 +38,13 @@ fn close(what: &str, ours: &[f64], theirs: &[f64]) {
     assert!(error <= AGREES, "{what}: {error:e}");
 }
 
-/// Position, and rotation by rows.
+/// Returns the position, and the rotation by rows.
 fn flat(X: &condyle_dynamics::Se3<f64>) -> Vec<f64> {
     let (p, R) = (X.translation, X.rotation.transpose());
     [p, R.x, R.y, R.z].iter().flat_map(|v| v.to_array()).collect()
 }
 
-/// Placements, M and nonlinear effects equal MuJoCo's, once its quaternions and free joints are in our conventions.
+/// Compares placements, M and nonlinear effects with MuJoCo's, after conversion of its quaternions and free joints.
 fn against_mujoco(name: &str) {
     let model = Model::from_mjcf(data(&format!("{name}.xml")), &MjcfOptions::default()).unwrap();
     let reference: Value = serde_json::from_str(&text(&format!("{name}_mujoco.json"))).unwrap();
@@ -107,7 +108,7 @@ fn against_mujoco(name: &str) {
         }
         close("M", M.as_slice(), &floats(&state["M"]));
     }
-    // a body's own mass: bodies without joints are merged into their parents, so compare sums
+    // MuJoCo merges bodies without joints into their parents, so compare sums of masses
     let masses: f64 = reference["bodies"].as_object().unwrap().values().filter_map(Value::as_f64).sum();
     if free {
         close("mass", &[model.total_mass()], &[masses]);
@@ -144,7 +145,7 @@ fn gripper_equals_mujoco() {
         }
     }
     let free = Model::from_mjcf(data("gripper.xml"), &MjcfOptions::default()).unwrap();
-    assert_eq!((free.nv(), free.warnings().len()), (5, 3)); // an inactive constraint is none
+    assert_eq!((free.nv(), free.warnings().len()), (5, 3)); // an inactive constraint does not count
 }
 
 #[test]
@@ -172,7 +173,7 @@ fn joints_that_cannot_follow() {
         let held = format!("the joint is left free, and the constraint `joint{number}` holds it");
         assert_eq!(mimic(equality).unwrap(), [format!("<string>:6: <joint>: {why}: {held}")]);
     }
-    assert!(mimic("<joint joint1='a'/>").unwrap().is_empty()); // a constraint beside the tree
+    assert!(mimic("<joint joint1='a'/>").unwrap().is_empty()); // the constraint is separate from the tree
     let said = |equality: &str| mimic(equality).unwrap_err().to_string();
     assert_eq!(said("<joint joint2='b'/>"), "<string>:6: <joint>: has no joint1");
     assert_eq!(said("<joint joint1='c'/>"), "<string>:6: <joint>: joint1: no joint is named `c`");
@@ -235,7 +236,7 @@ fn errors_name_file_line_and_element() {
     assert!(matches!(missing, Error::File { .. }));
 }
 
-/// An error in an included file has that file's name.
+/// An error in an included file reports that file's name.
 #[test]
 fn includes() {
     let folder = std::env::temp_dir().join(format!("condyle-mjcf-{}", std::process::id()));
@@ -263,7 +264,7 @@ fn what_is_left_out_is_said() {
     assert!(matches!(strict, Error::Strict { .. }));
 }
 
-/// A mesh without an <inertial> beside it: refused, or left out where that is asked for.
+/// A mesh without an <inertial> element is rejected, or is left out if an option asks for it.
 #[test]
 fn meshes_weigh_nothing_if_asked() {
     let text = body(&format!("<joint/>{BALL}<geom name='cover' type='mesh' mesh='m'/><geom type='mesh' mass='0'/>"));

@@ -1,4 +1,4 @@
-//! Models in files, as users may edit them: whatever a file says gives a model that works, or an error that says why not.
+//! Models in files, as users may edit them: any file gives a working model, or an error with the reason.
 
 use crate::common;
 
@@ -17,7 +17,7 @@ fn arm() -> Value {
     serde_json::to_value(&embedded()[0]).unwrap()
 }
 
-/// What is said of a file with one thing in another way.
+/// Checks the error of a file in which the value at `pointer` is replaced.
 #[track_caller]
 fn expect(pointer: &str, value: Value, message: &str) {
     let mut file = arm();
@@ -65,7 +65,7 @@ fn mistakes_have_names() {
     assert!(read(&file).unwrap_err().starts_with("unknown field `nodes`"));
 }
 
-/// What was edited is what is computed with.
+/// Edited values are used in computations.
 #[test]
 fn edits_count() {
     let mut file = arm();
@@ -82,7 +82,7 @@ fn edits_count() {
     assert!(matches!(light.warnings().last(), Some(Warning::Singular { joint }) if joint == "joint7"));
 }
 
-/// A place in a file, chosen at random.
+/// Returns a random element of a file.
 fn anywhere<'a>(file: &'a mut Value, rng: &mut StdRng) -> &'a mut Value {
     let inside = match file {
         Value::Array(list) => list.len(),
@@ -101,7 +101,7 @@ fn anywhere<'a>(file: &'a mut Value, rng: &mut StdRng) -> &'a mut Value {
     anywhere(next.expect("it has so many"), rng)
 }
 
-/// Changes something at random: a number, an entry more or less, two things in each other's place.
+/// Makes a random change: changes a number, adds or removes an entry, or swaps two elements.
 fn edit(file: &mut Value, rng: &mut StdRng) {
     let numbers = [json!(0), json!(1), json!(2), json!(-1.0), json!(1e300), json!(u64::MAX), json!(null), json!(0.5)];
     let (change, other) = (rng.random_range(0..4), anywhere(file, rng).clone());
@@ -119,7 +119,7 @@ fn edit(file: &mut Value, rng: &mut StdRng) {
     }
 }
 
-/// How many edited files are read.
+/// Number of edited files that are read.
 const FILES: usize = 3000;
 
 #[test]

@@ -1,4 +1,4 @@
-//! The derivatives of frames' motion, momentum, energies and static efforts: by hand against dual numbers.
+//! Hand-written derivatives of frames' motion, momentum, energies and static efforts, compared with dual numbers.
 
 use crate::common;
 
@@ -11,12 +11,12 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Two exact ways, some hundred roundings each.
+/// Tolerance between two exact methods, some hundred roundings each.
 const EXACT: f64 = 1e-12;
 const TREES: u64 = 5;
 const FRAMES: [ReferenceFrame; 3] = [ReferenceFrame::Local, ReferenceFrame::World, ReferenceFrame::LocalWorldAligned];
 
-/// The derivative of a function of (q, v, a) by the argument `which`.
+/// Computes the derivative of a function of (q, v, a) with respect to the argument `which`.
 fn by_duals(
     model: &Model,
     s: &State,
@@ -34,7 +34,7 @@ fn by_duals(
     DMatrix::from_fn(columns[0].len(), nv, |i, k| columns[k][i])
 }
 
-/// A 6 × nv matrix in which an entry that is not written shows.
+/// Returns a 6 × nv matrix of NaN, in which unwritten entries are visible.
 fn six(model: &Model) -> DMatrix<f64> {
     DMatrix::from_element(6, model.nv(), f64::NAN)
 }

@@ -1,4 +1,4 @@
-//! A panic for a caller's mistake names the mistake, and points into the caller's file.
+//! A panic for a caller's mistake names the mistake, and reports a line of the caller's file.
 
 use crate::common::panics::{Panic, assert_panic, panic_of};
 use crate::common::rng;
@@ -14,16 +14,16 @@ use num_dual::Dual64;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// This file.
+/// End of this file's path.
 const HERE: &str = "tests/suite/panics.rs";
 
-/// The functions without an argument that could have a wrong length.
+/// Functions without an argument that could have a wrong length.
 const WITHOUT_LENGTHS: &[&str] = &["log-Cholesky parameters"];
 
-/// The arguments that rows of the table copy to a matrix of nalgebra's, which panics itself.
+/// Arguments that rows of the table copy to a matrix of nalgebra, which panics itself.
 const COPIED: &[(&str, &str)] = &[("transport", "x")];
 
-/// Every function of the table with each argument too short by one number.
+/// Calls every function of the table with each argument too short by one number.
 fn wrong_lengths<S: Scalar>() {
     for model in [robots::arm7(), robots::quadruped()] {
         let right = Input::<S>::random(&model, &mut rng(1));
@@ -64,7 +64,7 @@ fn wrong_lengths_of_dual_numbers_are_reported_at_the_call() {
     wrong_lengths::<Dual64>();
 }
 
-/// Numbers of bodies and frames that do not exist.
+/// Indices of bodies and frames that do not exist are named in the panic.
 #[test]
 fn missing_bodies_and_frames_are_named() {
     let arm = robots::arm7();
@@ -112,7 +112,7 @@ fn missing_bodies_and_frames_are_named() {
     assert_panic(HERE, "dJ: expected 6 × 7", || moving.frame_jacobian_rate(1, World, small));
 }
 
-/// Whatever else is given to a function.
+/// Other invalid arguments of functions are reported at the call.
 #[test]
 fn other_mistakes_are_reported_at_the_call() {
     let (arm, quadruped) = (robots::arm7(), robots::quadruped());
@@ -167,7 +167,7 @@ fn other_mistakes_are_reported_at_the_call() {
     });
 }
 
-/// Calls of a batch and of its results, each with a wrong argument.
+/// Calls of a batch and of its results, each with a wrong argument, are reported at the call.
 #[test]
 fn mistakes_with_batches_are_reported_at_the_call() {
     let arm = robots::arm7();
@@ -219,7 +219,7 @@ fn mistakes_with_batches_are_reported_at_the_call() {
     assert_panic(HERE, "to: expected 49 numbers", || M.write_rows(&mut [0.0; 48]));
 }
 
-/// A robot whose inertia matrix has no inverse is refused at the call, in a batch too.
+/// A robot whose inertia matrix is singular is reported at the call, in a batch too.
 #[test]
 fn singular_robots_are_reported_at_the_call() {
     use condyle_dynamics::{Inertia, Joint, WORLD};
@@ -235,7 +235,7 @@ fn singular_robots_are_reported_at_the_call() {
     _ = batch.crba(&light, &[0.0; 2]);
 }
 
-/// Where kernels are, whose functions take what their callers have checked.
+/// Folders and files of kernels, whose functions take arguments that their callers have checked.
 const KERNELS: [&str; 4] =
     ["spatial/src/simd/", "linalg/src/outer.rs", "linalg/src/runs.rs", "linalg/src/threads/parts.rs"];
 
@@ -264,7 +264,7 @@ fn functions_that_panic_track_their_callers() {
     assert!(without.is_empty(), "without #[track_caller]:\n{}", without.join("\n"));
 }
 
-/// The Rust files of a folder and of those in it.
+/// Returns the Rust files of a folder and of its subfolders.
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let (folders, files): (Vec<_>, Vec<_>) = entries.partition(|path| path.is_dir());

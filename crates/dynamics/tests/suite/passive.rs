@@ -1,4 +1,5 @@
-//! Passive efforts: damping and friction take power, all have the slopes they say, and no other function adds them.
+//! Passive efforts: damping and friction only take power, all derivatives are exact, and no other function adds these
+//! efforts.
 
 use crate::common;
 
@@ -11,11 +12,11 @@ use condyle_dynamics::{
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// A few roundings.
+/// Tolerance of a few roundings.
 const ROUNDING: f64 = 1e-14;
 const SMOOTHING: f64 = 0.01;
 
-/// A chain with losses at each joint, or without.
+/// Creates a chain with or without losses at each joint.
 fn chain(losses: bool) -> Model {
     let mut builder = ModelBuilder::new("chain");
     let mut parent = WORLD;
@@ -48,7 +49,7 @@ fn takes_power() {
     }
 }
 
-/// Coulomb's law, where the speed is not small; no friction at rest; odd in v.
+/// Friction follows Coulomb's law where the speed is not small; it is zero at rest, and odd in v.
 #[test]
 fn friction_is_smoothed() {
     let model = chain(true);
@@ -60,12 +61,12 @@ fn friction_is_smoothed() {
     assert!(torque(0.0).iter().all(|&x| x == 0.0));
     for (k, &tau) in torque(7.3 * SMOOTHING).iter().enumerate() {
         let expected = -model.damping()[k] * 7.3 * SMOOTHING - model.friction()[k];
-        assert!((tau - expected).abs() <= 1e-6 * model.friction()[k] + ROUNDING); // as the documentation says
+        assert!((tau - expected).abs() <= 1e-6 * model.friction()[k] + ROUNDING); // the documented bound
     }
     assert!(torque(0.3).iter().zip(torque(-0.3)).all(|(a, b)| *a == -b));
 }
 
-/// The derivatives equal those of dual numbers, for every kind of joint with springs, polynomial damping, friction and gravity
+/// The derivatives equal dual numbers, for every kind of joint with springs, polynomial damping, friction and gravity
 /// compensation, and for joints that follow others.
 #[test]
 fn slopes_are_the_derivatives() {
@@ -93,7 +94,7 @@ fn slopes_are_the_derivatives() {
     }
 }
 
-/// A free body with friction slides against it along the axes of the world, whatever way it is turned.
+/// Friction acts on a free body along the axes of the world, for any orientation of the body.
 #[test]
 fn friction_of_a_free_joint() {
     let mut builder = ModelBuilder::new("box");
@@ -102,7 +103,7 @@ fn friction_of_a_free_joint() {
     builder.body_with(("box", "float"), WORLD, Joint::FreeFlyer, Se3::identity(), I, losses);
     let model = builder.build().expect("it is well-formed");
     let mut q = neutral(&model);
-    q[3..].copy_from_slice(&[0.1, -0.5, 0.5, 0.7].map(|x: f64| x)); // of length 1
+    q[3..].copy_from_slice(&[0.1, -0.5, 0.5, 0.7].map(|x: f64| x)); // has length 1
     let R = Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation();
     let along = R.transpose_mul(Vec3::new(1.0, -1.0, 0.0)).to_array();
     let mut tau = [f64::NAN; 6];
@@ -111,7 +112,7 @@ fn friction_of_a_free_joint() {
     assert!((force - Vec3::new(-2.0, 2.0, 0.0)).norm_squared() < 1e-20, "{force:?}");
 }
 
-/// Dynamics is the same with damping and friction as without.
+/// Dynamics does not change with damping and friction, unless they are requested.
 #[test]
 fn acts_only_where_asked_for() {
     let (with, without) = (chain(true), chain(false));
@@ -121,7 +122,7 @@ fn acts_only_where_asked_for() {
     assert_eq!(aba(&with, &mut data, &q, &v, &tau, &[]), aba(&without, &mut other, &q, &v, &tau, &[]));
 }
 
-/// In a simulation that is asked to, friction stops a sliding body where it should, and energy only falls.
+/// In a simulation with friction switched on, a sliding body stops at the expected point, and energy only falls.
 #[test]
 fn simulations_lose_energy() {
     const DT: f64 = 1e-3;
@@ -141,7 +142,7 @@ fn simulations_lose_energy() {
             (simulation.q()[0], simulation.v()[0])
         };
         let (way, speed): (f64, f64) = slide(lossless);
-        assert!((way - 6.0).abs() < 1e-9 && (speed - 3.0).abs() < 1e-9); // not asked for
+        assert!((way - 6.0).abs() < 1e-9 && (speed - 3.0).abs() < 1e-9); // friction is switched off
         let (way, speed): (f64, f64) = slide(lossy);
         assert!((way - 3.0 * 3.0 / (2.0 * 4.0 / 2.0)).abs() < 5e-3); // v²/(2 f/m), after 1.5 s
         assert!(speed.abs() < 1e-3);

@@ -1,4 +1,4 @@
-//! Points of bodies and frames: against frames that are put there, and against derivatives by dual numbers.
+//! Points of bodies and frames, compared with frames at these points, and with derivatives by dual numbers.
 
 use crate::common::{State, all_models, dual, eps, lift, moved, normal3, relative, rng};
 use condyle_dynamics::{
@@ -7,7 +7,7 @@ use condyle_dynamics::{
 };
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Sums over the bodies of a robot, relative to the largest number.
+/// Tolerance of sums over the bodies of a robot, relative to the largest number.
 const ROUNDING: f64 = 1e-12;
 
 fn flat(v: Vec3<f64>) -> [f64; 3] {
@@ -43,7 +43,7 @@ fn points_are_frames_put_there() {
     }
 }
 
-/// J δ is the derivative of the point's place along δ.
+/// J δ is the derivative of the point's position along δ.
 #[test]
 fn jacobians_are_derivatives() {
     for (seed, model) in all_models(4).iter().enumerate() {
@@ -63,7 +63,7 @@ fn jacobians_are_derivatives() {
     }
 }
 
-/// A force of the world at a point accelerates the robot by M⁻¹ Jᵀ f.
+/// A force at a point, in the world's axes, accelerates the robot by M⁻¹ Jᵀ f.
 #[test]
 fn forces_at_points() {
     for (seed, model) in all_models(2).iter().enumerate() {
@@ -87,7 +87,8 @@ fn forces_at_points() {
     }
 }
 
-/// Constraints and contacts can use a frame that was put on a robot, and plans know that it is another robot.
+/// Constraints and contacts can use a frame that was added to a robot; prepared constraint sets detect that it is
+/// another robot.
 #[test]
 fn frames_can_be_added() {
     let arm = robots::arm7();
@@ -106,7 +107,7 @@ fn frames_can_be_added() {
     let motion = condyle_dynamics::forward_accelerations(&with, &mut data, &[0.3; 7], &[0.0; 7], &acceleration);
     let still = motion.frame_classical_acceleration(tip, ReferenceFrame::LocalWorldAligned);
     assert!(still.linear.norm() < 1e-8, "{still:?}");
-    // a plan of the same tree with other frames
+    // a constraint set of the same tree with other frames
     let old = std::panic::catch_unwind(|| {
         let mut set = ConstraintSet::new(&arm, &[ContactConstraint::point(arm.frame("tool").unwrap())]).unwrap();
         let _ = constrained_dynamics(&with, &mut Data::new(&with), &mut set, &[0.3; 7], &[0.0; 7], &[0.0; 7], &[]);
@@ -134,11 +135,11 @@ fn frames_that_cannot_be() {
     assert_eq!(said("tip", "tool".into(), infinite), "frame `tip`: placement is not finite");
     let twice = arm.with_frame("tip", FrameParent::Body(0), here).unwrap().with_frame("tip", "tool", here);
     assert_eq!(twice.unwrap_err().to_string(), "two frames are named `tip`");
-    assert_eq!(said("tool", "tool".into(), here), "two frames are named `tool`"); // the robot's own
+    assert_eq!(said("tool", "tool".into(), here), "two frames are named `tool`"); // the name of the robot's own frame
     assert_eq!(said("", "tool".into(), here), "frame ``: a frame without a name cannot be found");
 }
 
-/// A model is equal to its clone and to itself read back; not to one with another number.
+/// A model equals its clone and itself read back from a file; it does not equal a model with another number.
 #[test]
 fn models_are_compared() {
     for model in all_models(2) {

@@ -10,11 +10,11 @@ use condyle_dynamics::{
 use nalgebra::{DVector, RowDVector};
 use num_dual::Dual64;
 
-/// Sums over all bodies, relative to the largest number.
+/// Tolerance of sums over all bodies, relative to the largest number.
 const ROUNDING: f64 = 1e-12;
 const TREES: u64 = 8;
 
-/// π of all bodies but the world.
+/// Returns π of all bodies except the world.
 fn parameters(model: &Model) -> DVector<f64> {
     DVector::from_iterator(
         10 * (model.bodies().len() - 1),
@@ -81,7 +81,7 @@ fn energies() {
     }
 }
 
-/// The same Y again after other calls on the same data: nothing of it is left over.
+/// Y is the same after other calls on the same data: no results are left over.
 #[test]
 fn nothing_is_left_over() {
     let model = robots::quadruped();

@@ -1,15 +1,15 @@
-//! From SDF to a model: the same robot as a URDF, errors, and whatever else a file can contain.
+//! Models from SDF: the same robot as a URDF, errors, and other contents of files.
 
 use condyle_dynamics::{
     Data, Error, Joint, Model, SdfOptions, UrdfOptions, Vec3, Warning, crba, forward_kinematics, nonlinear_effects,
 };
 
-/// A few products of poses, and sums over seven bodies.
+/// Tolerance of a few products of poses, and sums over seven bodies.
 const ROUNDING: f64 = 1e-12;
 
 const LINKAGE: &str = include_str!("../data/linkage.sdf");
 
-/// The same robot, its poses worked out by hand: each link at its joint.
+/// The same robot as URDF, with poses computed by hand: each link frame is at its joint.
 const URDF: &str = r#"<robot name="linkage">
   <link name="base"><inertial><mass value="4"/><inertia ixx="0.1" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.25"/></inertial></link>
   <link name="crank"><inertial><origin xyz="0.2 0 0" rpy="0 0 0.3"/><mass value="1"/><inertia ixx="0.01" ixy="0.001" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
@@ -62,7 +62,7 @@ fn equals_the_same_robot_as_urdf() {
     }
 }
 
-/// The tree, its limits, where it stands when fixed, and what was left out.
+/// Checks the tree, its limits, its placement when fixed, and the omitted elements.
 #[test]
 fn tree_and_limits() {
     let model = load(LINKAGE, None).unwrap();
@@ -132,7 +132,7 @@ fn errors_name_line_and_element() {
     }
 }
 
-/// A screw by either of its pitches, right-handed: 2 mm for each turn.
+/// A screw is given by either of its pitches, right-handed: 2 mm per turn.
 #[test]
 fn screws() {
     for pitch in ["screw_thread_pitch>0.002</screw_thread_pitch", "thread_pitch>-3141.592653589793</thread_pitch"] {
@@ -151,7 +151,7 @@ fn screws() {
     }
 }
 
-/// An axis follows another one, of a universal joint too: multiplier · (leader − reference) + offset.
+/// An axis follows another one, also of a universal joint: multiplier · (leader − reference) + offset.
 #[test]
 fn axes_that_follow() {
     let mimic = |inside: &str, ratio: &str| {
@@ -186,7 +186,7 @@ fn axes_that_follow() {
     assert!(said.iter().any(|s| s.ends_with(expected)), "{said:?}");
 }
 
-/// A link of 2 kg, its name and pose.
+/// Returns a link of 2 kg with the given name and pose.
 fn link(name: &str, pose: &str) -> String {
     format!(
         "<link name='{name}'><pose>{pose}</pose><inertial><pose>0.1 0 0 0 0 0</pose><mass>2</mass>
@@ -194,7 +194,7 @@ fn link(name: &str, pose: &str) -> String {
     )
 }
 
-/// Compares M, the bias and the place of a frame with Drake's numbers.
+/// Compares M, the bias and the position of a frame with Drake's numbers.
 fn drake(model: &Model, q: &[f64], v: &[f64], (M, h): (&[f64], &[f64]), (frame, at): (&str, [f64; 3])) {
     let mut data = Data::new(model);
     close("M", crba(model, &mut data, q).as_slice(), M);
@@ -203,8 +203,9 @@ fn drake(model: &Model, q: &[f64], v: &[f64], (M, h): (&[f64], &[f64]), (frame, 
     close(frame, &placements.frame(model.frame(frame).unwrap()).translation.to_array(), &at);
 }
 
-/// A model in a model: poses relative to models, frames and links inside, a placement frame, axes in other frames. Numbers of
-/// Drake 1.51: `CalcMassMatrix`, `CalcBiasTerm` − `CalcGravityGeneralizedForces`, with the base welded where it stands.
+/// A model contains a model: poses relative to models, frames and links inside, a placement frame, axes in other
+/// frames. The reference numbers come from Drake 1.51: `CalcMassMatrix`, `CalcBiasTerm` −
+/// `CalcGravityGeneralizedForces`, with the base welded at its pose.
 #[test]
 fn a_model_in_a_model_is_drakes() {
     let (base, arm) = (link("base", ""), link("arm", "0 0 0.4 0 0 0"));
@@ -228,7 +229,8 @@ fn a_model_in_a_model_is_drakes() {
     drake(&model, &[0.3, -0.4], &[0.5, 0.7], (&M, &h), ("inner::tip", tip));
 }
 
-/// A model that is merged: its frame stays, under the placement frame that it brings. Numbers of Drake, as above.
+/// A merged model keeps its frame, under the placement frame that it contains. The reference numbers come from Drake,
+/// as above.
 #[test]
 fn a_merged_model_is_drakes() {
     let folder = std::env::temp_dir().join(format!("condyle_merged_{}", std::process::id()));
@@ -258,7 +260,7 @@ fn a_merged_model_is_drakes() {
     drake(&model, &q, &v, (&M, &h), ("flange", [0.20867700229444647, -0.07692029983644436, -0.005975034974713755]));
 }
 
-/// A joint that is walked from its child keeps its position. Numbers of Drake, as above.
+/// A joint that is traversed from its child keeps its position. The reference numbers come from Drake, as above.
 #[test]
 fn a_reversed_joint_is_drakes() {
     let links =
@@ -286,7 +288,7 @@ fn a_reversed_joint_is_drakes() {
     drake(&model, &[0.3, -0.4, 0.2], &[0.5, 0.7, -0.3], (&M, &h), ("d", d));
 }
 
-/// The inverse of R_y(q₁) R_x(q₂) is R_x(−q₂) R_y(−q₁): a universal joint that is walked from its child.
+/// A universal joint is traversed from its child: the inverse of R_y(q₁) R_x(q₂) is R_x(−q₂) R_y(−q₁).
 #[test]
 fn a_reversed_universal_joint_moves_the_same() {
     let cross = |[parent, child]: [&str; 2], [first, second]: [&str; 2]| {

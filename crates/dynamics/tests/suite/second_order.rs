@@ -1,4 +1,4 @@
-//! The second derivatives by hand against hyper-dual numbers, and against each other.
+//! Hand-written second derivatives, compared with hyper-dual numbers and with each other.
 
 use crate::common;
 
@@ -10,18 +10,18 @@ use condyle_dynamics::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::HyperDual64;
 
-/// Two exact ways, some thousand roundings each; forward dynamics times the condition number of M.
+/// Tolerance between two exact methods, some thousand roundings each; forward dynamics times the condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 5;
 
-/// λᵀ(an algorithm's result) at (q, v, x), x being an acceleration or an effort.
+/// Function that returns λᵀ times an algorithm's result at (q, v, x), where x is an acceleration or an effort.
 type Phi = fn(&Model, &mut Data<HyperDual64>, [&[HyperDual64]; 3], &[Force<HyperDual64>], &[f64]) -> HyperDual64;
 
 fn dot(x: &[HyperDual64], lambda: &[f64]) -> HyperDual64 {
     x.iter().zip(lambda).map(|(&x, &l)| x * l).sum()
 }
 
-/// ∂²φ/∂(argument)∂(argument) by seeding one direction in each of the two dual parts.
+/// Computes ∂²φ/∂(argument)∂(argument) by seeding one direction in each of the two dual parts.
 fn by_hyper_duals(
     phi: Phi,
     model: &Model,
@@ -88,7 +88,7 @@ fn forward_dynamics() {
     }
 }
 
-/// The tensors contracted afterwards, and the other blocks: v with a, and a twice.
+/// The contracted tensors agree, and so do the other blocks: v with a, and a twice.
 #[test]
 fn tensors() {
     let mut worst = Worst::new("Σ λ_i ∂²τ_i", EXACT);
@@ -110,7 +110,7 @@ fn tensors() {
     }
 }
 
-/// A function's own expansion: ψ(x + h) = ψ + ∇ψ h + ½ hᵀ∇²ψ h + O(h³), so the error falls with the cube of the step.
+/// The expansion is ψ(x + h) = ψ + ∇ψ h + ½ hᵀ∇²ψ h + O(h³), so the error falls with the cube of the step.
 #[test]
 fn expansion() {
     const STEPS: [f64; 2] = [2e-3, 1e-3];

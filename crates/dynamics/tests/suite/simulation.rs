@@ -1,4 +1,4 @@
-//! Integrators: their order, and what they conserve.
+//! Integrators: their order, and the quantities that they conserve.
 
 use crate::common::{self, State as Random, Tree, lift, moved, normal, relative, rng};
 use crate::counting::allocations;
@@ -14,16 +14,16 @@ use std::sync::Arc;
 const ALL: [(Integrator, f64); 3] =
     [(Integrator::SemiImplicitEuler, 1.0), (Integrator::RungeKutta4, 4.0), (Integrator::Variational, 2.0)];
 
-/// How far an observed order may be from the method's: the next power of h is still seen at these step lengths.
+/// Tolerance of an observed order: the next power of h still has an effect at these step lengths.
 const ORDER: f64 = 0.15;
-/// Sums over all bodies and some thousand steps, relative to the largest number.
+/// Tolerance of sums over all bodies and some thousand steps, relative to the largest number.
 const ROUNDING: f64 = 1e-10;
 
 fn settings(integrator: Integrator, dt: f64) -> Settings {
     Settings { integrator, dt, ..Settings::default() }
 }
 
-/// Where the robot is after some time without efforts, with how fast it moves.
+/// Returns position and velocity of the robot after some time without efforts.
 fn simulate(model: &Model, settings: Settings, (q, v): (&[f64], &[f64]), time: f64) -> (Vec<f64>, Vec<f64>) {
     let mut simulation = Simulation::new(model, settings);
     simulation.set_state(q, v).unwrap();
@@ -33,14 +33,14 @@ fn simulate(model: &Model, settings: Settings, (q, v): (&[f64], &[f64]), time: f
     (simulation.q().to_vec(), simulation.v().to_vec())
 }
 
-/// The distance between two states.
+/// Returns the distance between two states.
 fn distance(model: &Model, (q, v): (&[f64], &[f64]), (q_other, v_other): (&[f64], &[f64])) -> f64 {
     let mut d = vec![0.0; model.nv()];
     difference(model, q_other, q, &mut d);
     d.iter().map(|d| d * d).chain(v.iter().zip(v_other).map(|(a, b)| (a - b).powi(2))).sum::<f64>().sqrt()
 }
 
-/// Two rods of 1 m and 1 kg, hanging.
+/// Creates two hanging rods of 1 m and 1 kg.
 fn double_pendulum(options: &JointOptions) -> Model {
     let axis = Vec3::new(0.0, 1.0, 0.0);
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3 { zz: 0.001, ..Sym3::diagonal(1.0 / 12.0) });
@@ -52,7 +52,7 @@ fn double_pendulum(options: &JointOptions) -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// A free body in free space, of moments A = A ≠ C.
+/// Creates a free body in free space, with principal moments A = A ≠ C.
 fn top() -> Model {
     let mut builder = ModelBuilder::new("top");
     builder.gravity(Vec3::zero());
@@ -61,12 +61,12 @@ fn top() -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// log₂ of how much smaller the error is with half the step.
+/// Returns log₂ of the factor by which the error falls when the step is halved.
 fn observed_order(coarse: f64, fine: f64) -> f64 {
     (coarse / fine).log2()
 }
 
-/// The error falls by the order of the method from steps of dt to half of them.
+/// Checks that the error falls by the order of the method when the step dt is halved.
 fn check_order(what: &str, order: f64, dt: f64, error: impl Fn(f64) -> f64) {
     let (coarse, fine) = (error(dt), error(dt / 2.0));
     let observed = observed_order(coarse, fine);
@@ -74,7 +74,7 @@ fn check_order(what: &str, order: f64, dt: f64, error: impl Fn(f64) -> f64) {
     assert!((observed - order).abs() < ORDER, "{what}: {observed}");
 }
 
-/// The free symmetric body in closed form: with L = I ω the attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
+/// The free symmetric body has a closed form: with L = I ω, the attitude is exp(t L/A) exp(t ω₃(1 − C/A) e₃).
 #[test]
 fn order_on_a_free_body() {
     let model = top();
@@ -85,7 +85,7 @@ fn order_on_a_free_body() {
     let spin = lie::exp3(Vec3::new(0.0, 0.0, v[5] * (1.0 - C / A) * time));
     let attitude = precession * spin;
     let (R, u) = (attitude.to_rotation(), attitude.vector);
-    let linear = R.transpose_mul(Vec3::new(v[0], v[1], v[2])); // the same velocity, in the body
+    let linear = R.transpose_mul(Vec3::new(v[0], v[1], v[2])); // the same velocity, in body coordinates
     let angular = spin.to_rotation().transpose_mul(Vec3::new(v[3], 0.0, v[5]));
     let expected_q = [v[0] * time, v[1] * time, v[2] * time, u.x, u.y, u.z, attitude.scalar];
     let expected_v: Vec<f64> = linear.to_array().into_iter().chain(angular.to_array()).collect();
@@ -99,7 +99,7 @@ fn order_on_a_free_body() {
     }
 }
 
-/// Every kind of joint, mimic joints, efforts, external forces; damping and friction: against fine steps.
+/// Compares with fine steps, for every kind of joint, mimic joints, efforts, external forces, damping and friction.
 #[test]
 fn order_on_trees() {
     let losses = JointOptions { damping: 0.2, friction: 0.3, armature: 0.1, ..JointOptions::default() };
@@ -134,7 +134,7 @@ fn order_on_trees() {
     }
 }
 
-/// The period of a pendulum of large swing, 4 K(sin(θ₀/2)) √(I/(m g l)), by the arithmetic-geometric mean.
+/// The period of a pendulum of large swing is 4 K(sin(θ₀/2)) √(I/(m g l)), by the arithmetic-geometric mean.
 #[test]
 fn period_of_a_pendulum() {
     let mut builder = ModelBuilder::new("pendulum");
@@ -160,7 +160,7 @@ fn period_of_a_pendulum() {
     }
 }
 
-/// The variational integrator's energy sways and does not drift, over two hundred swings of a chaotic pendulum.
+/// The variational integrator's energy oscillates but does not drift, over two hundred swings of a chaotic pendulum.
 #[test]
 fn energy_does_not_drift() {
     let model = double_pendulum(&JointOptions::default());
@@ -182,7 +182,8 @@ fn energy_does_not_drift() {
     assert!(largest.iter().all(|&x| x < 1.2 * largest[0] && x < 2e-2));
 }
 
-/// A step back undoes a step, to rounding: what moves is turned round, since time runs forwards only.
+/// A step with reversed velocity undoes a step, up to rounding; the velocity is reversed because time only runs
+/// forwards.
 #[test]
 fn variational_steps_are_symmetric() {
     for seed in 0..4 {
@@ -200,7 +201,8 @@ fn variational_steps_are_symmetric() {
     }
 }
 
-/// Newton's method doubles the digits that are right in each iteration, as it does only with the exact slope of its equation.
+/// Newton's method doubles the number of correct digits in each iteration, which requires the exact derivative of its
+/// equation.
 #[test]
 fn variational_steps_converge_quadratically() {
     let trees = (0..8).map(|seed| Tree { smooth: true, ..Tree::random_with_mimics(&mut rng(seed)) }.build());
@@ -222,7 +224,7 @@ fn variational_steps_converge_quadratically() {
     }
 }
 
-/// Neither back nor nowhere.
+/// Time steps that are negative, zero or not finite are rejected.
 #[test]
 fn time_runs_forwards() {
     let arm = robots::arm7();
@@ -233,7 +235,7 @@ fn time_runs_forwards() {
     }
 }
 
-/// The momentum of a robot in the world, about the origin.
+/// Returns the momentum of a robot in the world, about the origin.
 fn momentum(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> [f64; 6] {
     let velocities = forward_velocities(model, data, q, v);
     let of = |i: usize| {
@@ -243,7 +245,7 @@ fn momentum(model: &Model, data: &mut Data<f64>, q: &[f64], v: &[f64]) -> [f64; 
     (1..model.bodies().len()).fold(Force::zero(), |sum, i| sum + of(i)).to_array()
 }
 
-/// Without gravity nothing changes the momentum of a free robot, whatever its joints do.
+/// Without gravity, the momentum of a free robot is constant, whatever its joints do.
 #[test]
 fn momentum_is_conserved() {
     let model = robots::humanoid().with_gravity(Vec3::zero()).unwrap();
@@ -269,7 +271,7 @@ fn momentum_is_conserved() {
     assert!(fine < 1e-6 && observed_order(coarse, fine) > 3.5, "{coarse:.1e} {fine:.1e}");
 }
 
-/// A falling humanoid's centre of mass flies along a parabola, however the rest moves.
+/// A falling humanoid's centre of mass follows a parabola, however its joints move.
 #[test]
 fn centre_of_mass_falls_along_a_parabola() {
     let model = robots::humanoid();
@@ -300,7 +302,7 @@ fn centre_of_mass_falls_along_a_parabola() {
     }
 }
 
-/// A force on a body acts like the efforts that it is worth.
+/// A force on a body acts like the equivalent efforts.
 #[test]
 fn external_forces_act() {
     for (integrator, _) in ALL {
@@ -318,7 +320,7 @@ fn external_forces_act() {
     }
 }
 
-/// A state that is none of the robot's is refused with the joint and the numbers, and the state before stays.
+/// An invalid state is rejected with the joint and the numbers, and the previous state is kept.
 #[test]
 fn invalid_states_are_refused() {
     let quadruped = robots::quadruped();
@@ -342,7 +344,7 @@ fn invalid_states_are_refused() {
     assert_eq!((simulation.q(), simulation.v()), (&q[..], &v[..]));
 }
 
-/// A simulation shares its model, is a value, and goes on from a stored state with the same bits.
+/// A simulation shares its model, can be cloned, and continues from a stored state with the same bits.
 #[test]
 fn simulations_are_values() {
     fn shared<T: Clone + Send + Sync + 'static>(_: &T) {}
@@ -369,7 +371,7 @@ fn simulations_are_values() {
     assert_eq!(said, "Newton's method did not converge in 3 iterations; the step was not taken");
 }
 
-/// A step that fails leaves the state and says why.
+/// A step that fails keeps the state and reports the reason.
 #[test]
 fn failures_are_typed() {
     let model = robots::arm7();
@@ -389,10 +391,10 @@ fn failures_are_typed() {
     }
 }
 
-/// Dual numbers through a step are its derivatives.
+/// Dual numbers passed through a step give its derivatives.
 #[test]
 fn a_step_can_be_differentiated() {
-    const STEP: f64 = 1e-5; // of central differences: rounding and curvature balance
+    const STEP: f64 = 1e-5; // step of central differences, which balances rounding and curvature
     const DIFFERENCES: f64 = 1e-7;
     let mut random = rng(7);
     let model = Tree::random_with_mimics(&mut random).build();
@@ -426,7 +428,7 @@ fn wrong_shape() {
     let _ = Simulation::new(&arm, Settings::default()).step(&[0.0; 6], &[]);
 }
 
-/// Nothing is allocated after construction: by steps and runs, by regressors, by passive torques.
+/// After construction, steps, runs, regressors and passive torques do not allocate.
 #[test]
 fn nothing_is_allocated() {
     for (seed, model) in common::all_models(1).iter().enumerate() {
@@ -452,7 +454,7 @@ fn nothing_is_allocated() {
     }
 }
 
-/// A step to a position that is not finite is not taken, even if the velocity still is finite.
+/// A step to a position that is not finite is not taken, even if the velocity is still finite.
 #[test]
 fn positions_stay_finite() {
     let quadruped = robots::quadruped();

@@ -1,4 +1,4 @@
-//! Single calls in `f32`: the numbers of `f64`, as well as seven digits can have them.
+//! Single calls in `f32` give the numbers of `f64`, to the accuracy that seven digits allow.
 
 use crate::common::{State, Worst, all_models, lift, lift_forces, rng};
 use condyle_dynamics::{
@@ -6,10 +6,10 @@ use condyle_dynamics::{
     rnea_derivatives,
 };
 
-/// 1e3 roundings of the largest number: sums over some twenty bodies, of terms that cancel.
+/// Tolerance: 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
 const ROUNDINGS: f64 = 1e3 * f32::EPSILON as f64;
 
-/// The results of calls at a state whose numbers both precisions have, each with whether it contains M⁻¹.
+/// Returns the results of calls at a state that both precisions represent exactly, each with whether it contains M⁻¹.
 fn results<S: Scalar>(model: &Model, state: &State) -> Vec<(Vec<S>, bool)> {
     let round = |x: &[f64]| lift::<S>(&x.iter().map(|&x| f64::from(x as f32)).collect::<Vec<_>>());
     let (q, v, x) = (round(&state.q), round(&state.v), round(&state.a));

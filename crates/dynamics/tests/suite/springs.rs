@@ -1,4 +1,4 @@
-//! Springs and gravity compensation: their laws, the energies they come from, and MuJoCo's numbers.
+//! Springs and gravity compensation: their laws, their energies, and MuJoCo's numbers.
 
 use crate::common;
 
@@ -13,7 +13,7 @@ use nalgebra::DMatrix;
 
 const SMOOTHING: f64 = 0.01;
 
-/// At the rest of all springs and without weight to carry nothing acts, and the slopes are finite.
+/// At the rest position of all springs, without compensated weight, no effort acts, and the derivatives are finite.
 #[test]
 fn springs_at_rest() {
     let mut builder = ModelBuilder::new("at rest");
@@ -42,13 +42,14 @@ fn springs_at_rest() {
     assert!((dq + DMatrix::identity(nv, nv) * 2.0).amax() < 1e-13);
 }
 
-/// The spring of a joint that follows another one: its own displacement, its effort times the ratio.
+/// The spring of a follower uses the follower's own displacement; its effort is multiplied by the ratio.
 #[test]
 fn springs_of_followers() {
     const AXIS: Vec3<f64> = Vec3 { x: 0.0, y: 0.0, z: 1.0 };
     let I = Inertia::from_com(1.0, Vec3::new(0.1, 0.2, 0.3), Sym3::diagonal(0.1));
     let (endless, hinge) = (Joint::Continuous { axis: AXIS }, Joint::Revolute { axis: AXIS });
-    // (leader, follower, its rest, ratio); what follows a joint without limits is known up to whole turns
+    // (leader, follower, its rest, ratio); the position of a follower of a joint without limits is known up to full
+    // turns
     for (leads, follows, rest, ratio, turns) in [
         (hinge, hinge, vec![0.4], -0.7, false),
         (hinge, Joint::Prismatic { axis: AXIS }, vec![0.4], 1.5, false),
@@ -77,7 +78,8 @@ fn springs_of_followers() {
     }
 }
 
-/// Where all weights are carried the efforts are those that hold the robot still; half of them for half of the weight.
+/// If all weights are compensated, the efforts equal the efforts that hold the robot still; for half of the weights,
+/// half of them.
 #[test]
 fn gravity_that_is_compensated() {
     for seed in 0..10 {
@@ -91,7 +93,7 @@ fn gravity_that_is_compensated() {
                 let names = (name.as_str(), name.as_str());
                 let options = JointOptions::default();
                 ids.push(builder.body_with(names, ids[body.parent], body.joint, body.placement, body.inertia, options));
-                // in two parts, one of them in a frame of its own
+                // in two parts, one of them in its own frame
                 let X = Se3 { translation: Vec3::new(0.3, -0.2, 0.5), ..Se3::identity() };
                 builder.compensate_gravity(ids[i], Se3::identity(), body.inertia, 0.25 * factor);
                 builder.compensate_gravity(ids[i], X, X.act_inv(body.inertia), 0.75 * factor);
@@ -115,7 +117,7 @@ fn gravity_that_is_compensated() {
     }
 }
 
-/// The robot of `passive.xml`, with MuJoCo's laws of springs and damping, and the armature of its free joint.
+/// Creates the robot of `passive.xml`, with MuJoCo's laws of springs and damping, and the armature of its free joint.
 fn like_mujoco() -> Model {
     let mut builder = ModelBuilder::new("passive");
     let full =
@@ -149,7 +151,7 @@ fn like_mujoco() -> Model {
     builder.build().expect("it is well-formed")
 }
 
-/// M, bias and passive efforts equal MuJoCo's, of a robot from a builder and of the file.
+/// M, bias and passive efforts equal MuJoCo's, for a robot from a builder and for the file.
 #[test]
 fn the_numbers_of_mujoco() {
     let text = include_str!("../data/passive_mujoco.json");
@@ -174,8 +176,8 @@ fn the_numbers_of_mujoco() {
     }
 }
 
-/// The energy that springs hold, −∫ τ of each: k₀ r²/2 + k₁ r³/3 + k₂ r⁴/4, with r the displacement of a joint of one degree of
-/// freedom, and the length of the displacement of others.
+/// Computes the energy of springs, −∫ τ of each: k₀ r²/2 + k₁ r³/3 + k₂ r⁴/4. For a joint with one degree of freedom, r
+/// is the displacement; for others, r is the length of the displacement.
 fn spring_energy(model: &Model, q: &[f64]) -> f64 {
     let mut energy = 0.0;
     for spring in model.springs() {
@@ -208,7 +210,7 @@ fn spring_energy(model: &Model, q: &[f64]) -> f64 {
     energy
 }
 
-/// The energy of the weights that are carried.
+/// Computes the energy of the compensated weights.
 fn carried_energy(model: &Model, q: &[f64]) -> f64 {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
@@ -219,7 +221,7 @@ fn carried_energy(model: &Model, q: &[f64]) -> f64 {
     model.gravity_compensation().iter().map(energy).sum()
 }
 
-/// Efforts of springs and of gravity compensation are minus the slope of an energy.
+/// Efforts of springs and of gravity compensation are minus the gradient of an energy.
 #[test]
 fn springs_have_an_energy() {
     let step = 1e-6;
@@ -238,7 +240,8 @@ fn springs_have_an_energy() {
     }
 }
 
-/// With springs and carried weights, but without losses, a simulation keeps the energy: to the order of its integrator.
+/// With springs and compensated weights, but without losses, a simulation conserves energy, to the order of its
+/// integrator.
 #[test]
 fn simulations_keep_the_energy_of_springs() {
     let mut builder = ModelBuilder::new("springs");
@@ -282,6 +285,6 @@ fn simulations_keep_the_energy_of_springs() {
             );
             kinetic = kinetic.max(simulation.v().iter().map(|v| v * v).sum());
         }
-        assert!(kinetic > 10.0 * v.iter().map(|v| v * v).sum::<f64>()); // the springs have moved it
+        assert!(kinetic > 10.0 * v.iter().map(|v| v * v).sum::<f64>()); // the springs have moved the robot
     }
 }

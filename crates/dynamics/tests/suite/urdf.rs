@@ -1,4 +1,4 @@
-//! From a URDF to a model: numbering, fixed joints, conventions, and whatever else a file can contain.
+//! Models from URDF: numbering, fixed joints, conventions, and other contents of files.
 
 use crate::common;
 
@@ -9,7 +9,7 @@ use condyle_dynamics::{
 };
 use rand::RngExt;
 
-/// A few products of poses.
+/// Tolerance of a few products of poses.
 const ROUNDING: f64 = 1e-14;
 
 fn load(text: &str) -> Model {
@@ -28,7 +28,8 @@ fn joint(name: &str, kind: &str, parent: &str, child: &str, inside: &str) -> Str
     )
 }
 
-/// A quaternion says the same as angles, of joints and of inertias; its length is rounded away.
+/// A quaternion gives the same rotation as angles, for joints and for inertias; small errors of its length are
+/// corrected.
 #[test]
 fn quaternions() {
     let robot = |version: &str, turned: &str| {
@@ -49,7 +50,7 @@ fn quaternions() {
     assert_eq!(robot("version='1.0'", r#"rpy="0 0 0""#).nv(), 1);
 }
 
-/// Depth first, siblings by the bytes of their joints' names, whatever the order in the file.
+/// Bodies are numbered depth first, siblings by the bytes of their joints' names, for any order in the file.
 #[test]
 fn numbering() {
     let mut elements = vec![link("base")];
@@ -82,7 +83,7 @@ fn numbering() {
     }
 }
 
-/// Each link sorts its own joints; a fixed joint has its place among them, and its link's joints follow there.
+/// The joints of each link are sorted. A fixed joint is sorted among them, and its link's joints follow there.
 #[test]
 fn numbering_through_fixed_joints() {
     let links: String = ["base", "plate", "a", "b", "c"].map(link).concat();
@@ -97,7 +98,7 @@ fn numbering_through_fixed_joints() {
     assert_eq!(names, ["k", "a", "c"]); // k before m; under m, a before c
 }
 
-/// Two fixed joints in a row, with rotations: masses, centre of mass, inertia and frames.
+/// Two fixed joints in a row, with rotations, are merged: masses, centre of mass, inertia and frames.
 #[test]
 fn fixed_joints_are_merged() {
     let text = r#"<robot name="r"><link name="base"/>
@@ -149,7 +150,7 @@ fn fixed_joints_are_merged() {
     assert!((model.total_mass() - 2.5).abs() < ROUNDING);
 }
 
-/// What is fixed to the world stays in body 0, and its mass counts.
+/// Links fixed to the world belong to body 0, and their mass counts.
 #[test]
 fn root_joints() {
     let fixed = robots::arm7();
@@ -171,7 +172,7 @@ fn root_joints() {
     }
 }
 
-/// Every type of joint of a URDF, with its axis, limits, damping and friction.
+/// Checks every type of joint of a URDF, with its axis, limits, damping and friction.
 #[test]
 fn joint_types() {
     let kinds = ["revolute", "continuous", "prismatic", "floating", "planar", "spherical"];
@@ -202,16 +203,17 @@ fn joint_types() {
     let limits = model.limits();
     assert_eq!((limits.lower[0], limits.upper[3], limits.velocity[0], limits.effort_upper[2]), (-1.0, 1.0, 3.0, 2.0));
     assert!(limits.upper[1].is_infinite() && limits.upper[4..].iter().all(|x| x.is_infinite()));
-    assert_eq!((limits.velocity[1], limits.effort_upper[1]), (3.0, 2.0)); // a continuous joint may have these
-    // what a URDF says of joints without an axis has no unit
+    assert_eq!((limits.velocity[1], limits.effort_upper[1]), (3.0, 2.0)); // allowed for a continuous joint
+    // damping and friction of joints without an axis have no defined unit, and are ignored
     assert_eq!((&model.damping()[..3], &model.friction()[..3]), (&[0.5; 3][..], &[0.25; 3][..]));
     assert!(model.damping()[3..].iter().chain(&model.friction()[3..]).all(|&x| x == 0.0));
     let default =
         load(&format!("<robot name='r'>{}{}{}</robot>", link("x"), link("y"), joint("j", "revolute", "x", "y", "")));
-    assert_eq!(default.bodies()[1].joint, Joint::Revolute { axis: Vec3::new(1.0, 0.0, 0.0) }); // no axis: x
+    assert_eq!(default.bodies()[1].joint, Joint::Revolute { axis: Vec3::new(1.0, 0.0, 0.0) }); // the default axis is x
 }
 
-/// Free unless asked for; then the coordinate is the leader's, wherever it stands in the file.
+/// Mimic joints are free by default. With the option, their coordinate is the leader's, wherever the leader is in the
+/// file.
 #[test]
 fn mimic_joints() {
     let links: String = ["base", "left", "right"].map(link).concat();
@@ -229,7 +231,7 @@ fn mimic_joints() {
     assert_eq!(crba(&model, &mut data, &[0.1])[(0, 0)], 5.0); // 1 + 2²
 }
 
-/// The embedded robots are what their documentation says.
+/// The embedded robots match their documentation.
 #[test]
 fn embedded_robots() {
     let [arm, quadruped, humanoid] = [robots::arm7(), robots::quadruped(), robots::humanoid()];

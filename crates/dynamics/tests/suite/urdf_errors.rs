@@ -1,4 +1,4 @@
-//! What is wrong with a URDF or with what a builder was given: each mistake has its message, with line and element.
+//! Mistakes in a URDF or in calls of a builder: each has its message, with line and element.
 
 use condyle_dynamics::{
     Error, Inertia, Joint, JointOptions, Mimic, Model, ModelBuilder, Se3, Sym3, UrdfOptions, Vec3, WORLD,
@@ -17,7 +17,7 @@ const GOOD: &str = r#"<robot name="r">
   </joint>
 </robot>"#;
 
-/// The robot with one thing replaced.
+/// Returns the robot with one piece of text replaced.
 fn with(what: &str, by: &str) -> String {
     assert_eq!(GOOD.matches(what).count(), 1, "{what}");
     GOOD.replace(what, by)
@@ -66,13 +66,13 @@ fn documents() {
     expect(&nested, "<string>:2: <a>: elements are nested 65538 levels deep, at most 256 are allowed");
 }
 
-/// Macros are in the way: without them there would be a robot, but another one.
+/// Unexpanded macros are an error: ignoring them would give another robot.
 #[test]
 fn xacro() {
     let expand = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
     let open = GOOD.find('>').map(|end| GOOD[..end].to_owned()).unwrap();
     let declared = with(&open, &format!("{open} xmlns:xacro='http://www.ros.org/wiki/xacro'"));
-    assert!(load(&declared, &UrdfOptions::default()).is_ok()); // expanded files often declare it still
+    assert!(load(&declared, &UrdfOptions::default()).is_ok()); // expanded files often still declare the namespace
     let used = declared.replace("</robot>", "<xacro:wheel side='left'/>\n</robot>");
     let error = load(&used, &UrdfOptions::default()).unwrap_err();
     assert!(error.ends_with(&format!(": <xacro:wheel>: belongs to xacro: {expand}")), "{error}");
@@ -185,13 +185,14 @@ fn inertias() {
     expect(&with(mass, r#"<mass value="2e40"/>"#), &format!("<string>:3: link `arm`: {large}"));
 }
 
-/// XML's rules of values, once: a line break or tab in a name is a space, a reference is the character that it stands for.
+/// XML's rules for attribute values apply once: a line break or tab in a name becomes a space, a reference its
+/// character.
 #[test]
 fn names_in_any_spelling() {
     let spaced = GOOD.replace(r#""j""#, "\"a\tj\"").replace(r#""arm""#, "\"an\narm\"");
     let model = load(&spaced, &UrdfOptions::default()).unwrap();
     assert_eq!((model.bodies()[1].joint_name.as_str(), model.bodies()[1].name.as_str()), ("a j", "an arm"));
-    // as a reference, a tab stays one; the link is the same however its name is written
+    // a tab given as a reference is kept; different spellings of a name denote the same link
     let written = GOOD.replace(r#"link="arm""#, r#"link="&#97;r&#x6d;""#).replace(r#""j""#, r#""j&#9;&lt;&quot;é""#);
     let model = load(&written, &UrdfOptions::default()).unwrap();
     assert_eq!((model.bodies()[1].joint_name.as_str(), model.bodies()[1].name.as_str()), ("j\t<\"é", "arm"));
@@ -209,10 +210,10 @@ fn mimics() {
     let nan = "<string>:9: joint `j`: mimic multiplier: `nan` is no finite number";
     expect(&mimic(r#"joint="j" multiplier="nan""#), nan);
     expect(&mimic(""), "<string>:9: joint `j`: mimic has no joint");
-    assert!(load(&mimic(r#"joint="nobody""#), &UrdfOptions::default()).is_ok()); // nobody asked for mimics
+    assert!(load(&mimic(r#"joint="nobody""#), &UrdfOptions::default()).is_ok()); // mimics were not requested
 }
 
-/// A continuous joint leads by whole ratios, and no slide.
+/// A continuous joint may only be followed with integer ratios, and not by a slide.
 #[test]
 fn continuous_leaders() {
     let leader = r#"<link name="wheel"/><joint name="lead" type="continuous"><parent link="base"/><child link="wheel"/></joint></robot>"#;
@@ -233,7 +234,7 @@ fn continuous_leaders() {
     }
 }
 
-/// What is not of interest may be as wrong as it likes.
+/// Faults in ignored elements are ignored.
 #[test]
 fn shapes_and_strangers_are_ignored() {
     let base = r#"<link name="base"/>"#;
@@ -257,7 +258,7 @@ fn shapes_and_strangers_are_ignored() {
     assert_eq!(load(&default, &UrdfOptions::default()).unwrap().to_string(), same);
 }
 
-/// The builder checks what it is given, too.
+/// The builder checks its arguments, too.
 #[test]
 fn builders() {
     let z = Vec3::new(0.0, 0.0, 1.0);

@@ -1,4 +1,4 @@
-//! Many states at once: the same bits as one by one.
+//! Many states at once give the same bits as single states.
 
 use crate::common::panics::{Panic, panic_of};
 use crate::common::table::Input;
@@ -20,17 +20,18 @@ fn states(model: &Model, n: usize, seed: u64) -> States<f64> {
     States::of(&random(model, n, seed))
 }
 
-/// What two ways of rounding leave, relative to the largest entry: some hundred roundings of a matrix of condition 1e3.
+/// Tolerance of two ways of rounding, relative to the largest entry: some hundred roundings of a matrix with condition
+/// number 1e3.
 const ROUNDING: f64 = 1e-11;
 
-/// Matrices that are written by rows have the entries of those of each state, in groups that are full and one that is not.
+/// Matrices written by rows have the entries of each state's matrix, in full groups and in one that is not full.
 #[test]
 fn matrices_by_rows() {
     for model in models(2) {
         let (n, count) = (model.nv(), 19);
         let s = states(&model, count, 5);
         let mut batch = Batch::new(&model, count, 2);
-        // what is symmetric may be written by columns, which then are rows up to rounding
+        // symmetric matrices may be written by columns, which equal rows up to rounding
         let check = |matrices: Matrices<'_, f64>, symmetric: bool| {
             let mut rows = vec![f64::NAN; count * n * n];
             matrices.write_rows(&mut rows);
@@ -53,7 +54,7 @@ fn matrices_by_rows() {
     }
 }
 
-/// What a writer writes is what the batch keeps, by rows; on one thread without allocating.
+/// A writer writes the results that the batch returns, by rows; on one thread without allocating.
 #[test]
 fn written_to_places() {
     const COUNT: usize = 19;
@@ -127,9 +128,9 @@ fn a_place_that_is_missing() {
     );
 }
 
-/// Whatever the number of states, full groups or not, and of threads; and on one thread, once a function has been called,
-/// without allocating. On a processor that a program plays, which `CONDYLE_EMULATED` says, two robots and the first group
-/// that is not full stand for all.
+/// Holds for any number of states and threads, and for full and partial groups. On one thread, it does not allocate
+/// after the first call of a function. On an emulated processor (`CONDYLE_EMULATED`), two robots and the first partial
+/// group represent all.
 #[test]
 fn every_state_is_a_single_call() {
     const MOST: usize = 19;
@@ -175,7 +176,7 @@ fn every_state_is_a_single_call() {
     });
 }
 
-/// In each function.
+/// In each function, a state with NaN does not affect the others.
 #[test]
 fn a_state_that_is_not_a_number_stays_alone() {
     const STATES: usize = 9;
@@ -204,7 +205,7 @@ fn a_state_that_is_not_a_number_stays_alone() {
     });
 }
 
-/// A robot without coordinates has no numbers, in as many states as there are forces or room for.
+/// Results for a robot without coordinates are empty; the number of states is given by the forces or the capacity.
 #[test]
 fn no_coordinates() {
     let model = &fixed();
@@ -224,11 +225,11 @@ fn no_coordinates() {
     });
 }
 
-/// A batch takes memory for what is asked of it: its results, and the scratch of its threads.
+/// A batch only allocates memory for the requested results, and for the scratch of its threads.
 #[test]
 fn memory_by_state() {
     const STATES: [usize; 2] = [1000, 3000];
-    const BESIDE: usize = 48; // for each matrix, where it is and how large, and of all kinds of a group
+    const BESIDE: usize = 48; // bytes for each matrix's address and size, and for the kinds of a group
     let model = &models(0)[2];
     let (nq, nv) = (model.nq(), model.nv());
     let q: Vec<f64> = condyle_dynamics::neutral(model).repeat(STATES[1]);
@@ -285,7 +286,7 @@ fn another_robot() {
     _ = Batch::<f64>::new(&arm, 2, 1).gravity(&quadruped, &condyle_dynamics::neutral(&quadruped));
 }
 
-/// What is expected of the whole robot holds without coordinates too.
+/// The expected results of a whole robot are also correct without coordinates.
 #[test]
 fn every_function_without_coordinates() {
     let model = &fixed();
@@ -302,13 +303,13 @@ fn every_function_without_coordinates() {
                 (row.one)(model, &mut data, &mut set, input, &mut expected);
             }
             (row.many)(model, &mut batch, &mut constraints, &States::of(&inputs), &mut found);
-            let bits = |of: &Found<f64>| of.results.iter().flatten().map(|x| x.to_bits() << 1).collect::<Vec<_>>(); // NaN of either sign
+            let bits = |of: &Found<f64>| of.results.iter().flatten().map(|x| x.to_bits() << 1).collect::<Vec<_>>(); // ignores the sign of NaN
             assert_eq!(bits(&found), bits(&expected), "{}, {level}", row.name);
         }
     });
 }
 
-/// Targets move all states.
+/// A changed target applies to all states.
 #[test]
 fn targets_of_constraints() {
     let _best = best_level();
@@ -359,7 +360,7 @@ fn copies_compute_alone() {
     let (mut one, mut constraints) = (copy.clone(), held(model, &copy));
     let first = one.constrained_dynamics(model, &mut constraints.clone(), &s.q, &s.v, &s.x, &[]).a.to_vec();
     assert_eq!(copy.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a, first);
-    // with forces for the first time, in a copy of a batch that never had some
+    // with forces for the first time, in a copy of a batch that was never called with forces
     let (mut without, rnea) = (Batch::new(model, 11, 1), batch.rnea(model, &s.q, &s.v, &s.x, &s.f_ext).to_vec());
     without.rnea(model, &s.q, &s.v, &s.x, &[]);
     let mut with = without.clone();
@@ -367,13 +368,13 @@ fn copies_compute_alone() {
     assert_eq!((count, with.rnea(model, &s.q, &s.v, &s.x, &s.f_ext)), (0, &rnea[..]));
 }
 
-/// The constraints of the table.
+/// Creates the constraints of the table.
 fn held(model: &Model, batch: &Batch) -> condyle_dynamics::BatchConstraints {
     let (held, proximal) = constraints(model);
     batch.constraints(model, &held, proximal).unwrap()
 }
 
-/// A wrong number of numbers is reported in the file of the caller, by every function.
+/// Every function reports an argument of wrong length in the file of the caller.
 #[test]
 fn wrong_lengths_are_reported_at_the_call() {
     let _best = best_level();

@@ -1,4 +1,4 @@
-//! Derivatives in several directions at a time: those by hand.
+//! Hand-written derivatives in several directions at a time.
 
 use crate::common::table::Input;
 use crate::common::{Worst, rng};
@@ -7,11 +7,11 @@ use condyle_dynamics::{
     Data, Force, LaneJacobian, Matrix, Model, Scalar, StateFunction, aba, aba_derivatives, rnea, rnea_derivatives,
 };
 
-/// Two exact ways, some thousand roundings each; forward dynamics times the condition number of M.
+/// Tolerance between two exact methods, some thousand roundings each; forward dynamics times the condition number of M.
 const EXACT: f64 = 1e-11;
 const TREES: u64 = 5;
 
-/// `rnea` or `aba` of (q, v, x).
+/// Function `rnea` or `aba` of (q, v, x).
 struct Dynamics<'m> {
     model: &'m Model,
     f_ext: &'m [Force<f64>],
@@ -63,7 +63,7 @@ fn of_dynamics() {
     });
 }
 
-/// Chosen columns are those of the whole Jacobian, in whatever order they are asked for; the others stay zero.
+/// Selected columns equal the columns of the whole Jacobian, in any requested order; the others are zero.
 #[test]
 fn along_some_directions() {
     let models = models(TREES);

@@ -1,4 +1,4 @@
-//! Several knots in a vector register: the same bits as single calls, at the same level.
+//! Several knots in a vector register give the same bits as single calls, at the same SIMD level.
 
 use crate::common::table::{Input, Output, kernels};
 use crate::common::{long_branches, rng};
@@ -7,7 +7,7 @@ use condyle_dynamics::level::Level;
 use condyle_dynamics::{Data, Force, Model, Scalar};
 use condyle_spatial::block::{Block, Real, Witness};
 
-/// A vector of numbers as the tests see it.
+/// Vector of numbers, with the operations that the tests need.
 trait Vector: Scalar {
     fn pack(x: &[f64]) -> Self;
     fn unpack(self) -> Vec<f64>;
@@ -24,7 +24,7 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// The promise to use vectors at their level.
+/// Witness that vectors may be used at their SIMD level.
 struct Here;
 
 // SAFETY: `each_level` runs what this processor has.
@@ -64,7 +64,7 @@ fn knots_are_single_calls<S: Vector>(models: &[Model]) {
                 let found: Vec<f64> = found.numbers.iter().map(|x| x.unpack()[k]).collect();
                 assert!(found == expected.numbers, "{name} has other bits in lane {k} of {}, on\n{model}", S::LANES);
             }
-            // a lane that is not a number stays alone
+            // a lane with NaN does not affect the others
             let mut broken = knots.clone();
             broken[1] = broken[1].map(|_| f64::NAN);
             let mut beside = Output::new(model);

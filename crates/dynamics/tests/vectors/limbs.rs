@@ -1,4 +1,5 @@
-//! The limbs of one robot side by side: the numbers of body after body. (At the baseline, both are that.)
+//! Branches (limbs) of one robot in parallel lanes give the numbers of a computation body by body. (At the baseline
+//! level, both are computed body by body.)
 
 use crate::best_level;
 use crate::common::contacts::random_constraints;
@@ -11,11 +12,12 @@ use condyle_dynamics::{
 };
 use nalgebra::DMatrix;
 
-/// Sums in another order, over at most some tens of bodies; what contains M⁻¹ also by its condition.
+/// Tolerances of sums in another order, over at most some tens of bodies; results that contain M⁻¹ also depend on its
+/// condition number.
 const TOLERANCE: f64 = 1e-12;
 const TOLERANCE_ABA: f64 = 1e-8;
 
-/// Robots with three to six limbs of random joints on a random base, some of them with branches.
+/// Creates robots with three to six limbs of random joints on a random base, some of them with branches.
 fn many_limbs(seed: u64, root: Joint) -> Model {
     let mut rng = rng(seed);
     let mut tree = Tree { parts: Vec::new(), gravity: [0.0, 1.0, -9.0].into(), smooth: false };
@@ -47,7 +49,7 @@ fn many_limbs(seed: u64, root: Joint) -> Model {
     tree.build()
 }
 
-/// What is compared: sums, and what contains M⁻¹.
+/// Returns the errors to be compared: of sums, and of results that contain M⁻¹.
 fn sums_and_inverses() -> [Worst; 2] {
     [Worst::new("sums", TOLERANCE), Worst::new("inverses", TOLERANCE_ABA)]
 }
@@ -92,7 +94,7 @@ fn compare(model: &Model, worst: &mut [Worst; 2], seed: u64) {
     }
 }
 
-/// The inputs of which the derivatives are made of what a pass has left.
+/// Returns the inputs whose derivatives use the results of an earlier pass.
 fn inputs(model: &Model) -> impl Iterator<Item = Input> {
     let last = model.bodies().len() - 1;
     [
@@ -149,7 +151,7 @@ fn the_numbers_of_body_after_body() {
     }
 }
 
-/// Compares q̈, λ and J; the residuals are the same to rounding.
+/// Compares q̈, λ and J; the residuals agree up to rounding.
 fn compare_constrained(
     m: &Model,
     constraints: &[ContactConstraint],
@@ -175,7 +177,7 @@ fn compare_constrained(
     }
 }
 
-/// Contacts and loops between all kinds of bodies, the one that carries all others and the world among them.
+/// Constrains all kinds of pairs of bodies, including the base and the world.
 #[test]
 fn constrained_dynamics_of_body_after_body() {
     let _level = best_level();
@@ -187,14 +189,14 @@ fn constrained_dynamics_of_body_after_body() {
         let mut rng = rng(seed as u64);
         let state = State::random(&model, &mut rng);
         let mut constraints = random_constraints(&model, &state, &mut rng);
-        constraints.retain(|c| c.kind.rows() >= 3); // lines and planes have no lanes
+        constraints.retain(|c| c.kind.rows() >= 3); // lines and planes do not support lanes
         for proximal in [Proximal::default(), Proximal { mu: 1e-6, iterations: 3 }] {
             compare_constrained(&model, &constraints, proximal, &mut worst, &state);
         }
     }
 }
 
-/// The humanoid on a sole that is held twice, by rows of which six depend on others, and on its other sole's points.
+/// One sole of the humanoid is constrained twice, so that six rows are redundant, and the other sole by points.
 #[test]
 fn redundant_constraints_of_body_after_body() {
     let _level = best_level();
@@ -210,7 +212,7 @@ fn redundant_constraints_of_body_after_body() {
     compare_constrained(&model, &[], Proximal::default(), &mut worst, &state);
 }
 
-/// Another armature, gravity or inertia is seen by the same `Data`.
+/// The same `Data` works with changed armature, gravity or inertia.
 #[test]
 fn of_the_model_that_is_given() {
     let _level = best_level();
@@ -233,7 +235,7 @@ fn of_the_model_that_is_given() {
     }
 }
 
-/// Scratch that was cloned, before a force was ever given, computes the same way.
+/// Scratch that was cloned before a force was first given computes the same.
 #[test]
 fn with_cloned_data() {
     let _level = best_level();
@@ -250,7 +252,7 @@ fn with_cloned_data() {
     }
 }
 
-/// A number that is not one comes out at the limb that holds it and at the base, and nowhere else.
+/// NaN in one limb only affects the results of that limb and of the base.
 #[test]
 fn what_is_not_a_number_stays_in_its_limb() {
     let _level = best_level();
@@ -275,7 +277,7 @@ fn a_robot_of_loose_bodies() {
     compare(&builder.build().expect("it is well-formed"), &mut worst, 0);
 }
 
-/// Bodies without any body in all lanes, of which the first ones are not those that are computed first.
+/// Some bodies do not exist in all lanes, and the first bodies are not computed first.
 #[test]
 fn fingers_of_all_lengths() {
     let _level = best_level();
@@ -293,8 +295,8 @@ fn fingers_of_all_lengths() {
     }
 }
 
-/// The placements that a call leaves behind are those of its position, whichever way it took; after one that needs none
-/// there are none.
+/// The placements stored by a call belong to its position, for each algorithm. After a call that needs no placements,
+/// none are stored.
 #[test]
 fn calls_leave_their_placements() {
     let _level = best_level();
@@ -331,7 +333,7 @@ fn calls_leave_their_placements() {
     }
 }
 
-/// Placements in the lanes of limbs are refused to a robot whose base sits elsewhere.
+/// Placements stored in lanes are rejected for a robot with another placement of its base.
 #[test]
 fn placements_of_limbs_know_their_robot() {
     let _level = best_level();
@@ -344,7 +346,7 @@ fn placements_of_limbs_know_their_robot() {
     aba(&quadruped, &mut data, &q, &o, &o, &[]);
     assert_panic("tests/vectors/limbs.rs", "another robot than `raised`", || _ = data.placements(&raised));
     assert!(data.placements(&quadruped).is_some());
-    // in the lanes again, and under other inertias
+    // in the lanes again, with other inertias
     aba(&quadruped, &mut data, &q, &o, &o, &[]);
     assert!(data.placements(&quadruped.with_inertias(|_, I| I.scale(2.0)).unwrap()).is_some());
 }

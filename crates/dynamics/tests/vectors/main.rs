@@ -1,4 +1,4 @@
-//! Several states in a vector register, on every level that this processor has, and several limbs of one state.
+//! Several states in a vector register, at every SIMD level that this processor has, and several branches of one state.
 #![allow(non_snake_case)]
 
 #[path = "../common/mod.rs"]
@@ -16,15 +16,17 @@ use condyle_dynamics::Model;
 use condyle_dynamics::level::{Level, pin};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
-/// The level in use is one for all threads: one test goes through all levels, or several use the best.
+/// Lock of the SIMD level, which all threads share: either one test goes through all levels, or several tests use the
+/// best.
 static LEVEL: RwLock<()> = RwLock::new(());
 
-/// All kinds of robots, computed body by body: with the limbs side by side, a single call adds up in another order.
+/// Returns all kinds of robots, computed body by body: with branches in parallel lanes, a single call adds in another
+/// order.
 fn models(trees: u64) -> Vec<Model> {
     common::all_models(trees).into_iter().map(|model| model.with_limbs(false)).collect()
 }
 
-/// Runs a test at each level, and says which could not be run.
+/// Runs a test at each SIMD level, and prints the levels that could not be run.
 fn each_level(test: impl Fn(Level)) {
     let _alone = LEVEL.write().unwrap_or_else(PoisonError::into_inner);
     for level in Level::ALL {
@@ -35,7 +37,7 @@ fn each_level(test: impl Fn(Level)) {
     }
 }
 
-/// The best level is the one in use, as long as what this returns is kept.
+/// Keeps the best SIMD level in use while the returned guard exists.
 fn best_level() -> RwLockReadGuard<'static, ()> {
     let shared = LEVEL.read().unwrap_or_else(PoisonError::into_inner);
     let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).expect("there is the baseline");

@@ -1,4 +1,4 @@
-//! Every function of a batch beside the one for a single state, and what they give in one order.
+//! Table of every function of a batch and the same function for a single state, with their results in one order.
 
 use crate::common::table::Input;
 use condyle_dynamics::{
@@ -15,7 +15,7 @@ use condyle_dynamics::{
 use condyle_spatial::block::Real;
 use nalgebra::DMatrix;
 
-/// The arguments of many states, one after the other.
+/// Arguments of many states, one after the other.
 pub(crate) struct States<T> {
     pub(crate) q: Vec<T>,
     pub(crate) v: Vec<T>,
@@ -31,7 +31,7 @@ impl<T: Copy> States<T> {
     }
 }
 
-/// Results: of each, the numbers of all states.
+/// Results: for each result, the numbers of all states.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Found<T> {
     pub(crate) results: Vec<Vec<T>>,
@@ -39,7 +39,7 @@ pub(crate) struct Found<T> {
 }
 
 impl<T: Copy> Found<T> {
-    /// Numbers of a result: of all states, or of the next one.
+    /// Appends numbers to the next result: of all states, or of one more state.
     fn extend(&mut self, numbers: impl Iterator<Item = T>) {
         if self.results.len() == self.next {
             self.results.push(Vec::new());
@@ -48,18 +48,18 @@ impl<T: Copy> Found<T> {
         self.next += 1;
     }
 
-    /// The first result is what is given next.
+    /// Starts again at the first result.
     pub(crate) fn again(&mut self) {
         self.next = 0;
     }
 
-    /// Room for as many numbers, and none of them.
+    /// Returns empty results with the same capacity.
     pub(crate) fn emptied(&self) -> Self {
         Self { results: self.results.iter().map(|of| Vec::with_capacity(of.len())).collect(), next: 0 }
     }
 }
 
-/// What a function gives, for one state or for many.
+/// Result of a function, for one state or for many.
 trait Put<T> {
     fn put(self, to: &mut Found<T>);
 }
@@ -70,7 +70,7 @@ impl<T: Copy> Put<T> for &[T] {
     }
 }
 
-/// By columns.
+/// Stores the matrix by columns.
 impl<T: Scalar, Storage: Dense<T>> Put<T> for &DenseMatrix<T, Storage> {
     fn put(self, to: &mut Found<T>) {
         to.extend(self.iter().copied());
@@ -98,7 +98,7 @@ macro_rules! arrays {
 }
 arrays!(Vec3, Motion, Force);
 
-/// [m 1, 0; 0, Ī].
+/// Stores [m 1, 0; 0, Ī].
 impl<T: Scalar> Put<T> for Inertia<T> {
     fn put(self, to: &mut Found<T>) {
         let (o, axes) = (T::zero(), self.rotational.full().columns().map(Vec3::to_array));
@@ -114,12 +114,12 @@ fn of_pose<T: Scalar>(X: Se3<T>) -> impl Iterator<Item = T> {
     X.rotation.columns().into_iter().chain([X.translation]).flat_map(Vec3::to_array)
 }
 
-/// Poses of so many states, so many of each.
+/// Stores `each` poses for each of `states` states.
 fn put_poses<T: Real>(poses: Poses<'_, T>, [states, each]: [usize; 2], to: &mut Found<T>) {
     to.extend((0..states).flat_map(|k| (0..each).flat_map(move |i| of_pose(poses.at(k, i)))));
 }
 
-/// The number of states, for a batch that is full if nothing says it.
+/// Returns the number of states; if q is empty, the capacity of the batch.
 fn count<T: Real>(m: &Model, b: &Batch<T>, s: &States<T>) -> usize {
     s.q.len().checked_div(m.nq()).unwrap_or(b.capacity())
 }
@@ -127,7 +127,7 @@ fn count<T: Real>(m: &Model, b: &Batch<T>, s: &States<T>) -> usize {
 type Many<T> = fn(&Model, &mut Batch<T>, &mut BatchConstraints<T>, &States<T>, &mut Found<T>);
 type One<T> = fn(&Model, &mut Data<T>, &mut ConstraintSet<T>, &Input<T>, &mut Found<T>);
 
-/// A function: of all states by a batch, and of one.
+/// Function for all states by a batch, and for one state.
 pub(crate) struct Row<T: Real> {
     pub(crate) name: &'static str,
     pub(crate) many: Many<T>,
@@ -152,8 +152,8 @@ macro_rules! argument {
     };
 }
 
-/// A row for each function, with its arguments and the members of its result: those that are arrays, then those of the
-/// single call that are numbers.
+/// Creates a row for each function, with its arguments and the members of its result: first arrays, then members that
+/// are plain numbers for a single state.
 macro_rules! rows {
     ($($name:ident($($argument:ident),*) $({ $($($member:ident).+),+ $(; $($number:ident),+)? })?;)*) => { vec![$(Row {
         name: stringify!($name),
@@ -175,7 +175,8 @@ macro_rules! rows {
     };
 }
 
-/// A row for each question about the last frame or the last body, in each reference frame; what it fills has names.
+/// Creates a row for each function of the last frame or the last body, in each reference frame; filled matrices have
+/// names.
 macro_rules! questions {
     ($T:ident; $($name:ident($of:ident) after $pass:ident($($argument:ident),*) $(fills [$($member:ident),+])?;)*) => {
         vec![$(Row {
@@ -206,7 +207,7 @@ macro_rules! questions {
     };
 }
 
-/// A row for each sum over the bodies; which of them are single numbers.
+/// Creates a row for each sum over the bodies; sums that are single numbers are marked.
 macro_rules! sums {
     ($($name:ident after $pass:ident($($argument:ident),*) $([$number:ident])?;)*) => { vec![$(Row {
         name: stringify!($name),
@@ -234,7 +235,7 @@ fn last_body(model: &Model) -> usize {
 const SMOOTHING: f64 = 0.1;
 const RESTITUTION: f64 = 0.3;
 
-/// All kinds of inputs of which a robot with these bodies has derivatives.
+/// Returns all kinds of inputs for which a robot with these bodies has derivatives.
 fn inputs(model: &Model) -> impl Iterator<Item = condyle_dynamics::Input> {
     use condyle_dynamics::Input::*;
     let last = last_body(model);
@@ -243,7 +244,7 @@ fn inputs(model: &Model) -> impl Iterator<Item = condyle_dynamics::Input> {
         .chain((last > 0).then_some(Inertia(last)))
 }
 
-/// A contact and a loop, with a round more than is needed; nothing for a robot that cannot move.
+/// Returns a contact and a loop, with one more iteration than needed; no constraints for a robot that cannot move.
 pub(crate) fn constraints(model: &Model) -> (Vec<ContactConstraint>, Proximal) {
     let (bodies, proximal) = (model.bodies().len(), Proximal { mu: 1e-6, iterations: 2 });
     if bodies == 1 {
@@ -256,7 +257,7 @@ pub(crate) fn constraints(model: &Model) -> (Vec<ContactConstraint>, Proximal) {
     (vec![contact, closure], proximal)
 }
 
-/// All functions.
+/// Returns the rows of all functions.
 pub(crate) fn table<T: Real>() -> Vec<Row<T>> {
     dynamics().into_iter().chain(of_frames()).chain(of_bodies()).chain(others()).chain(impulses()).collect()
 }
@@ -326,7 +327,7 @@ fn of_bodies<T: Real>() -> Vec<Row<T>> {
     }
 }
 
-/// Those that take or give something of their own.
+/// Returns the rows of functions with special arguments or results.
 fn others<T: Real>() -> Vec<Row<T>> {
     vec![
         Row {

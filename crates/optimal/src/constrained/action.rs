@@ -8,21 +8,22 @@ use core::fmt;
 use nalgebra::DMatrix;
 use std::any::Any;
 
-/// An action with constraints. To its cost comes, with the multipliers y and the penalty 1/μ that
-/// [`AugmentedLagrangian`](crate::AugmentedLagrangian) chooses,
+/// Action with constraints. The following term is added to its cost, with the multipliers y and the penalty 1/μ chosen
+/// by [`AugmentedLagrangian`](crate::AugmentedLagrangian):
 ///
 /// ```text
 /// (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖²,      z = g(x, u) + μ y,      Π: into the bounds
 /// ```
 ///
-/// whose Hessian is that of Gauss and Newton. A solver that knows nothing of constraints sees a cost for leaving the
-/// bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which computes its dynamics once for both.
+/// The Hessian of the term is the Gauss–Newton approximation. For a solver without constraints, the term is an ordinary
+/// cost for leaving the bounds. For a robot's residuals see [`Limit`](crate::robot::Limit), which computes the dynamics
+/// once for cost and constraints.
 pub struct Constrained {
     action: Box<dyn ActionModel>,
     constraint: Box<dyn PathConstraint>,
     multipliers: Multipliers,
     g: Vec<f64>,
-    /// The slope and the curvature of the cost by g.
+    /// First and second derivatives of the term with respect to g.
     d: Vec<f64>,
     dd: Vec<f64>,
     gx: DMatrix<f64>,
@@ -30,7 +31,7 @@ pub struct Constrained {
 }
 
 impl Constrained {
-    /// `action` under `constraint`, at all knots that it serves.
+    /// Adds `constraint` to `action`, at all knots that the action serves.
     pub fn new(action: Box<dyn ActionModel>, constraint: Box<dyn PathConstraint>) -> Self {
         let (size, ndx, nu) = (constraint.size(), action.ndx(), action.nu());
         let (gx, gu) = (DMatrix::zeros(size, ndx), DMatrix::zeros(size, nu));
@@ -38,27 +39,27 @@ impl Constrained {
         Self { action, constraint, multipliers: Multipliers::new(size), g, d, dd, gx, gu }
     }
 
-    /// The action, if it is a `T`.
+    /// Returns the action, if its type is `T`.
     pub fn action_mut<T: ActionModel>(&mut self) -> Option<&mut T> {
         let action: &mut dyn Any = self.action.as_mut();
         action.downcast_mut()
     }
 
-    /// The constraint, if it is a `T`.
+    /// Returns the constraint, if its type is `T`.
     pub fn constraint_mut<T: PathConstraint>(&mut self) -> Option<&mut T> {
         let constraint: &mut dyn Any = self.constraint.as_mut();
         constraint.downcast_mut()
     }
 
-    /// The term of the cost.
+    /// Computes the term of the cost.
     fn term(&mut self, t: usize, x: &[f64], u: &[f64]) -> f64 {
         self.constraint.calc(t, x, u, &mut self.g);
         let (lower, upper) = self.constraint.bounds(t);
         self.multipliers.value(t, 0, &self.g, lower, upper)
     }
 
-    /// The gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, …, with its slope d and its
-    /// curvature D by g.
+    /// Adds the gradient and the Gauss–Newton Hessian of the term: q += gₓᵀ d,  Q += gₓᵀ D gₓ, …. Here d and D are the
+    /// term's first and second derivatives with respect to g.
     fn add_derivatives(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         self.constraint.calc(t, x, u, &mut self.g);
         if !self.constraint.calc_diff(t, x, u, &mut self.gx, &mut self.gu) {

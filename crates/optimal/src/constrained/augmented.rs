@@ -10,9 +10,9 @@ use crate::time::Instant;
 use nalgebra::DVector;
 use std::time::Duration;
 
-/// The method of multipliers around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and robots with
-/// [`Limit`](crate::robot::Limit)s, with the rules of the bound-constrained Lagrangian method (Conn, Gould, Toint, 1991;
-/// Nocedal and Wright, algorithm 17.4), as ProxDDP has them (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard, Carpentier,
+/// Augmented Lagrangian solver around [`Fddp`], for problems with [`Constrained`](crate::Constrained) actions and
+/// robots with [`Limit`](crate::robot::Limit)s. It follows the bound-constrained Lagrangian method (Conn, Gould, Toint,
+/// 1991; Nocedal and Wright, algorithm 17.4) as ProxDDP does (Jallet, Bambade, Arlaud, El-Kazdadi, Mansard, Carpentier,
 /// 2023).
 ///
 /// ```text
@@ -22,8 +22,9 @@ use std::time::Duration;
 /// until    the constraints and the gradient of the Lagrangian ℓ + yᵀg, along the dynamics, vanish to the tolerances
 /// ```
 ///
-/// Bounds of the actions' controls hold as in [`Fddp`], beside the constraints. A receding horizon goes on from the last
-/// solution, its multipliers and its penalty: [`shift`](Self::shift), then [`resume`](Self::resume).
+/// Bounds on the actions' controls are enforced as in [`Fddp`], in addition to the constraints. For a receding horizon,
+/// call [`shift`](Self::shift) and then [`resume`](Self::resume). The solve then continues from the last solution, its
+/// multipliers and its penalty.
 ///
 /// # Examples
 /// ```
@@ -73,62 +74,64 @@ use std::time::Duration;
 /// ```
 #[derive(Debug, Clone)]
 pub struct AugmentedLagrangian {
-    /// May be changed between solves.
+    /// Settings of the constraints; may be changed between solves.
     pub settings: ConstraintSettings,
-    /// The settings of the inner solves; their tolerances are chosen, and the time budget is that of all of them.
+    /// Settings of the inner solves. The solver chooses their tolerances. Their time budget applies to all inner solves
+    /// together.
     pub inner: Settings,
     pub(super) solver: Fddp,
     pub(super) outcome: Outcome,
-    /// The adjoint state, and its predecessor.
+    /// Adjoint state λ, and scratch for the adjoint state of the previous knot.
     adjoint: [DVector<f64>; 2],
-    /// The durations of the last measurements of the residuals.
+    /// Durations of the last measurements of the residuals.
     measuring: Recent,
     /// Durations of the phases of all inner solves so far.
     timings: Timings,
-    /// Whether the multipliers and the penalty are of no use to the next solve.
+    /// Whether the next solve cannot use the multipliers and the penalty.
     pub(super) lost: bool,
 }
 
-/// Residuals of the stopping tests, besides those of the [`Outcome`].
+/// Residuals of the stopping tests, in addition to the residuals in [`Outcome`].
 struct Residuals {
-    /// The largest violation of what a control can change, gaps included.
+    /// Largest violation that controls can change, gaps included.
     primal: f64,
-    /// The largest violation of x̂₀ itself.
+    /// Largest violation of a constraint on x̂₀ alone.
     fixed: Option<Violation>,
     /// Whether the trajectory minimises the augmented Lagrangian, up to rounding.
     stationary: bool,
 }
 
-/// Largest entry of the gradient of the augmented Lagrangian at a stationary trajectory, as a multiple of the largest
-/// multiplier: four digits of the violation's own gradient, as rounding takes the others at the largest penalty.
+/// Largest gradient entry of the augmented Lagrangian at a stationary trajectory, relative to the largest multiplier.
+/// Chosen because rounding at the largest penalty leaves four digits of the violation's gradient.
 const STATIONARY: f64 = 1e-4;
 
-/// The state of the constraints after a solve, beside its [`Solution`].
+/// State of the constraints after a solve; the trajectory is in the [`Solution`].
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Outcome {
-    /// The cost Σ ℓ without the terms of the constraints.
+    /// Cost Σ ℓ without the terms of the constraints.
     pub cost: f64,
-    /// The largest distance of a constraint from its bounds, or gap of the dynamics.
+    /// Largest distance of a constraint from its bounds, or largest gap of the dynamics, whichever is larger.
     pub primal: f64,
-    /// The row with this distance or gap: the evidence of [`Status::ConstraintsViolated`]; `None` if all constraints hold
-    /// exactly. Of [`Status::Infeasible`] the row that proves it, the one of x̂₀ with the largest violation.
+    /// Row with this distance or gap: the evidence of [`Status::ConstraintsViolated`]. `None` if all constraints hold
+    /// exactly. With [`Status::Infeasible`] it is the row that proves infeasibility: the constraint on x̂₀ with the
+    /// largest violation.
     pub worst: Option<Violation>,
-    /// The largest entry of the gradient of the Lagrangian by the controls, projected on their bounds.
+    /// Largest entry of the gradient of the Lagrangian with respect to the controls, projected on their bounds.
     pub dual: f64,
-    /// The multipliers y of each knot: positive at an upper bound, negative at a lower one, none where there is no
-    /// constraint. Of a robot's knot those of its [`Limit`](crate::robot::Limit)s come first, in their order, then those
-    /// of a [`Constrained`](crate::Constrained) around it.
+    /// Multipliers y of each knot: positive at an upper bound, negative at a lower bound, empty at a knot without
+    /// constraints. At a robot's knot, the multipliers of its [`Limit`](crate::robot::Limit)s come first, in their
+    /// order. The multipliers of a [`Constrained`](crate::Constrained) around the robot's action follow.
     pub multipliers: Vec<Vec<f64>>,
-    /// 1/μ at the end.
+    /// Penalty 1/μ at the end of the solve.
     pub penalty: f64,
-    /// Inner solves.
+    /// Number of inner solves.
     pub solves: usize,
-    /// Iterations of all of them.
+    /// Number of iterations of all inner solves.
     pub iterations: usize,
 }
 
 impl AugmentedLagrangian {
-    /// A solver with the default settings and the workspace for problems with the dimensions of `problem`.
+    /// Creates a solver with the default settings and the workspace for problems with the dimensions of `problem`.
     pub fn new(problem: &Problem) -> Self {
         let adjoint = [(); 2].map(|()| DVector::zeros(problem.ndx()));
         let (settings, inner) = (ConstraintSettings::default(), Settings::default());
@@ -147,24 +150,27 @@ impl AugmentedLagrangian {
 
     /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, and multipliers of zero.
     ///
-    /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances,
-    /// [`Status::ConstraintsViolated`] if the penalty reached its limit, the inner solve found a minimum and the constraints
-    /// do not hold, and [`Status::Infeasible`] if x̂₀ itself violates a constraint of knot 0 that is a function of the state
-    /// alone; the solve goes on under the other constraints. Otherwise it is that of the inner solve that stopped early. The
-    /// cost of the solution contains the terms of the constraints, the outcome's does not. The problem keeps nothing of the
-    /// multipliers.
+    /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances.
+    /// It is [`Status::ConstraintsViolated`] if the penalty reached its limit and the inner solve found a minimum, but
+    /// the constraints do not hold. It is [`Status::Infeasible`] if x̂₀ itself violates a constraint of knot 0 that is
+    /// a function of the state alone; the solve then continues under the other constraints. Otherwise it is the status
+    /// of the inner solve that stopped early.
     ///
-    /// Controls of the warm start that are outside of their bounds are moved into them, whatever
-    /// [`Settings::project_warm_start`] of [`inner`](Self::inner) says. A solve that is lost from its warm start begins once
-    /// more, from x̂₀ held still: see [`ConstraintSettings::restart`].
+    /// The cost of the solution contains the terms of the constraints; the cost of the outcome does not. After the
+    /// solve, the problem does not keep the multipliers.
+    ///
+    /// Controls of the warm start outside their bounds are moved to the bounds, whatever the value of
+    /// [`Settings::project_warm_start`] in [`inner`](Self::inner). A solve that fails from its warm start is repeated
+    /// from x̂₀ held still: see [`ConstraintSettings::restart`].
     ///
     /// # Errors
-    /// [`Error`] as for [`Fddp::solve`], or if a constraint's bounds leave no value.
+    /// [`Error`] as for [`Fddp::solve`], or if no value satisfies the bounds of a constraint.
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
         self.run(problem, Some([xs, us]), &mut Unobserved)
     }
 
-    /// As [`solve`](Self::solve), and shows each iteration of the inner solves to `observer`, who may end the solve.
+    /// Solves as [`solve`](Self::solve) does, and passes each iteration of the inner solves to `observer`, which may
+    /// end the solve.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -178,9 +184,10 @@ impl AugmentedLagrangian {
         self.run(problem, Some([xs, us]), &mut observer)
     }
 
-    /// Solves `problem` from the last solution, its multipliers and its penalty: with a new initial state, new references
-    /// or, after [`shift`](Self::shift), for the next horizon. After a solve that ended as [`Status::NotFinite`], or with
-    /// violated constraints at the largest penalty, the multipliers are zero and the penalty is the first one.
+    /// Solves `problem` from the last solution, its multipliers and its penalty: with a new initial state, new
+    /// references or, after [`shift`](Self::shift), for the next horizon. If the last solve ended as
+    /// [`Status::NotFinite`], or with violated constraints at the largest penalty, the multipliers start at zero and
+    /// the penalty at its first value.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -188,7 +195,8 @@ impl AugmentedLagrangian {
         self.run(problem, None, &mut Unobserved)
     }
 
-    /// As [`resume`](Self::resume), and shows each iteration of the inner solves to `observer`, who may end the solve.
+    /// Solves as [`resume`](Self::resume) does, and passes each iteration of the inner solves to `observer`, which may
+    /// end the solve.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -196,12 +204,12 @@ impl AugmentedLagrangian {
         self.run(problem, None, &mut observer)
     }
 
-    /// Makes the solution and its multipliers a warm start for a problem that was [shifted](Problem::shift) by a knot
-    /// since, as [`Fddp::shift`] does. The new last knot has the multipliers of the one before it, if it has as many
-    /// constraints.
+    /// Turns the solution and its multipliers into a warm start for a problem that has been [shifted](Problem::shift)
+    /// by one knot since, as [`Fddp::shift`] does. The new last knot gets the multipliers of the knot before it, if
+    /// both have the same number of constraints.
     ///
     /// # Errors
-    /// [`Error`] if the numbers of knots, states and controls are not those of the last problem, shifted once.
+    /// [`Error`] if the numbers of knots, states and controls differ from the last problem, shifted once.
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         self.solver.shift(problem)?;
         let horizon = problem.horizon();
@@ -239,7 +247,7 @@ impl AugmentedLagrangian {
         Ok(&self.solver.solution)
     }
 
-    /// Solves once, with a budget that lasts from `begin`; the first attempt makes an iteration whatever the time.
+    /// Makes one attempt, with a budget that starts at `begin`. The first attempt makes an iteration even without time.
     pub(super) fn attempt(
         &mut self,
         problem: &mut Problem,
@@ -260,7 +268,7 @@ impl AugmentedLagrangian {
         }
         let multipliers = std::mem::take(&mut self.outcome.multipliers);
         self.outcome = Outcome { multipliers, penalty, ..Outcome::default() };
-        // the tolerances of one inner solve, which follow μ
+        // tolerances of one inner solve, which follow μ
         let (mut eta, mut omega) = (mu.powf(0.1), mu);
         let mut status = Status::MaxIterations;
         let mut residuals = Residuals { primal: f64::INFINITY, fixed: None, stationary: false };
@@ -278,7 +286,7 @@ impl AugmentedLagrangian {
             self.outcome.solves += 1;
             self.outcome.iterations += result.trace.len();
             let stopped = result.status;
-            // z − Π z at the iterate, and how far it is from a solution
+            // computes z − Π z at the iterate, and the residuals of the stopping tests
             residuals = self.measure(problem);
             if matches!(stopped, Status::TimeLimit | Status::Interrupted | Status::NotFinite) {
                 self.lost = stopped == Status::NotFinite;
@@ -304,7 +312,7 @@ impl AugmentedLagrangian {
                 self.outcome.penalty = 1.0 / mu;
             }
         }
-        // x₀ = x̂₀ cannot be changed: no trajectory satisfies a constraint of it that does not hold
+        // x₀ = x̂₀ cannot be changed: if x̂₀ violates a constraint on x₀ alone, no trajectory satisfies it
         if let Some(proof) = residuals.fixed.filter(|violation| violation.amount > tolerance) {
             self.outcome.worst = Some(proof);
             return Ok(Status::Infeasible);
@@ -312,18 +320,18 @@ impl AugmentedLagrangian {
         Ok(status)
     }
 
-    /// The result of the last solve.
+    /// Returns the result of the last solve.
     pub fn solution(&self) -> &Solution {
         &self.solver.solution
     }
 
-    /// The state of the constraints after the last solve.
+    /// Returns the state of the constraints after the last solve.
     pub fn outcome(&self) -> &Outcome {
         &self.outcome
     }
 
-    /// Cost and residuals at the iterate: λ = q + Aᵀλ⁺,  ∂L/∂u = r + Bᵀλ⁺, whose q and r hold the constraints' terms, which
-    /// are yᵀ∂g of the multipliers that an update would give.
+    /// Computes cost and residuals at the iterate: λ = q + Aᵀλ⁺,  ∂L/∂u = r + Bᵀλ⁺. The vectors q and r contain the
+    /// terms yᵀ∂g of the constraints, with the multipliers y that an update would give.
     fn measure(&mut self, problem: &mut Problem) -> Residuals {
         let Self { settings, solver, outcome, adjoint: [lambda, before], .. } = self;
         let (horizon, begin) = (problem.horizon(), Instant::now());
@@ -342,7 +350,7 @@ impl AugmentedLagrangian {
             _ => measured.worst,
         };
         let primal = larger(*gap, measured.rest);
-        let mut slope_of_free = 0.0; // of controls that are not pressed against a bound
+        let mut slope_of_free = 0.0; // controls that are not pressed against a bound
         lambda.copy_from(&solver.nodes[horizon].q);
         for t in (0..horizon).rev() {
             let node = &solver.nodes[t];
@@ -373,7 +381,7 @@ impl AugmentedLagrangian {
     }
 }
 
-/// The larger of two numbers, or NaN if one is.
+/// Returns the larger of two numbers, or NaN if one of them is NaN.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
 }

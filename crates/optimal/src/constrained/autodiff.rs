@@ -6,20 +6,20 @@ use nalgebra::DMatrix;
 use num_dual::Dual64;
 use std::any::Any;
 
-/// Functions of state and control that must stay within bounds, written for any [`Scalar`], so that
-/// [`AutoDiffConstraint`] makes a [`PathConstraint`] of them. A robot's own residuals share its kinematics: see
+/// Functions of state and control that must stay within bounds, written for any [`Scalar`]. [`AutoDiffConstraint`]
+/// turns them into a [`PathConstraint`]. For a robot's own residuals, which share its kinematics, see
 /// [`OwnConstraint`](crate::robot::OwnConstraint).
 pub trait GenericConstraint: Any + Clone + Send + Sync {
-    /// The number of functions.
+    /// Returns the number of functions.
     fn size(&self) -> usize;
 
-    /// As [`PathConstraint::bounds`].
+    /// Returns the bounds, as [`PathConstraint::bounds`] does.
     fn bounds(&self, t: usize) -> (&[f64], &[f64]);
 
     /// Computes gₜ(x, u) into `g`.
     fn calc<S: Scalar>(&self, t: usize, x: &[S], u: &[S], g: &mut [S]);
 
-    /// Computes x ⊕ δx into `out` (nx): the sum in a vector space. It must be the ⊕ of the action.
+    /// Computes x ⊕ δx into `out` (nx), by default the sum of a vector space. It must be the ⊕ of the action.
     fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
         for ((out, &x), &dx) in out.iter_mut().zip(x).zip(dx) {
             *out = x + dx;
@@ -27,7 +27,8 @@ pub trait GenericConstraint: Any + Clone + Send + Sync {
     }
 }
 
-/// A path constraint whose Jacobian is exact: that of [`GenericConstraint::calc`] by dual numbers, at ndx + nu calls.
+/// Path constraint with an exact Jacobian: [`GenericConstraint::calc`] is differentiated by dual numbers, in ndx + nu
+/// calls.
 ///
 /// ```
 /// use condyle_optimal::{AutoDiffConstraint, GenericConstraint, PathConstraint};
@@ -62,13 +63,13 @@ pub struct AutoDiffConstraint<C> {
 }
 
 impl<C: GenericConstraint> AutoDiffConstraint<C> {
-    /// Makes the path constraint of `constraint`. Its workspace is allocated by the first derivatives.
+    /// Creates the path constraint of `constraint`. The first derivatives allocate its workspace.
     pub fn new(constraint: C) -> Self {
         let [x, moved, dx, u, g] = [(); 5].map(|()| Vec::new());
         Self { constraint, x, moved, dx, u, g }
     }
 
-    /// Returns the constraint that is differentiated, to change it.
+    /// Returns the differentiated constraint, for changes.
     pub fn constraint_mut(&mut self) -> &mut C {
         &mut self.constraint
     }

@@ -1,4 +1,4 @@
-//! Problems with general constraints, by an augmented Lagrangian.
+//! Problems with general constraints, solved by an augmented Lagrangian.
 
 mod action;
 mod augmented;

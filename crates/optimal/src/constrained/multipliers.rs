@@ -1,29 +1,29 @@
-//! The multipliers of all constraints of a problem.
+//! Multipliers of all constraints of a problem.
 
 use super::violation::{Violation, ViolationKind};
 use crate::error::Error;
 use crate::problem::{PENALTY, Problem};
 
-/// The state of all constraints at a trajectory.
+/// State of all constraints at a trajectory.
 #[derive(Debug, Default)]
 pub(crate) struct Measured {
-    /// The largest violation, or none.
+    /// Largest violation; `None` if all constraints hold exactly.
     pub(crate) worst: Option<Violation>,
-    /// The largest violation of a constraint that no control can change: one of x₀ = x̂₀ alone.
+    /// Largest violation of a constraint that no control can change, because it depends on x₀ = x̂₀ alone.
     pub(crate) fixed: Option<Violation>,
-    /// The amount of the largest violation of all other constraints.
+    /// Amount of the largest violation of all other constraints.
     pub(crate) rest: f64,
-    /// The largest of the next multipliers of all other constraints, |z − Π z| / μ.
+    /// Largest absolute value of the next multipliers of all other constraints, |z − Π z| / μ.
     pub(crate) multiplier: f64,
-    /// The sum of the cost's terms.
+    /// Sum of the constraints' terms of the cost.
     pub(crate) terms: f64,
 }
 
 impl Problem {
-    /// Multipliers of zero everywhere, and the penalty 1/μ.
+    /// Sets all multipliers to zero, and the penalty to 1/μ.
     ///
     /// # Errors
-    /// [`Error`] if bounds have a wrong length or leave no value.
+    /// [`Error`] if bounds have a wrong length or no value satisfies them.
     pub(crate) fn start_constraints(&mut self, mu: f64) -> Result<(), Error> {
         let horizon = self.horizon();
         for t in 0..=horizon {
@@ -38,7 +38,7 @@ impl Problem {
         Ok(())
     }
 
-    /// The multipliers of each knot, where it has as many constraints as are given.
+    /// Sets the multipliers of each knot whose number of constraints equals the number of given multipliers.
     pub(crate) fn set_multipliers(&mut self, y: &[Vec<f64>]) {
         for (t, y) in y.iter().enumerate().take(self.horizon() + 1) {
             let mut all = 0;
@@ -56,7 +56,7 @@ impl Problem {
         self.share_multipliers();
     }
 
-    /// Multipliers of zero and the penalty of actions by themselves, everywhere.
+    /// Sets all multipliers to zero, and the penalty to its default value.
     pub(crate) fn forget_multipliers(&mut self) {
         let knots = self.horizon() + 1;
         for t in 0..knots {
@@ -65,14 +65,14 @@ impl Problem {
         self.share_multipliers();
     }
 
-    /// Whether some knot has a constraint.
+    /// Returns whether any knot has a constraint.
     pub(crate) fn has_constraints(&mut self) -> bool {
         let mut any = false;
         (0..=self.horizon()).for_each(|t| self.action_mut(t).constraints(t, &mut |bounded| any |= bounded.count > 0));
         any
     }
 
-    /// The penalty 1/μ.
+    /// Sets the penalty 1/μ.
     pub(crate) fn set_penalty(&mut self, mu: f64) {
         for t in 0..=self.horizon() {
             self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.set_mu(mu));
@@ -80,7 +80,7 @@ impl Problem {
         self.share_multipliers();
     }
 
-    /// y ← (z − Π z) / μ at the trajectory at which derivatives were computed last.
+    /// Updates y ← (z − Π z) / μ at the trajectory at which derivatives were computed last.
     pub(crate) fn update_multipliers(&mut self) {
         for t in 0..=self.horizon() {
             self.action_mut(t).constraints(t, &mut |bounded| bounded.multipliers.update(t));
@@ -88,13 +88,13 @@ impl Problem {
         self.share_multipliers();
     }
 
-    /// Measures the constraints at the trajectory at which derivatives were computed last, of which x₀ is x̂₀ or not. The
-    /// violation of what is not a number is infinite.
+    /// Measures the constraints at the trajectory at which derivatives were computed last. `starts_at_x0` tells whether
+    /// its x₀ is x̂₀. A constraint whose value is NaN has an infinite violation.
     pub(crate) fn measure_constraints(&mut self, starts_at_x0: bool) -> Measured {
         let mut all = Measured::default();
         for t in 0..=self.horizon() {
             let without_controls = self.nu(t) == 0;
-            let mut before = 0; // constraints of the knot that were seen already
+            let mut before = 0; // number of this knot's constraints visited before
             self.action_mut(t).constraints(t, &mut |bounded| {
                 let (excess, next, term) = bounded.multipliers.measured(t, bounded.count);
                 all.terms += term;
@@ -127,7 +127,7 @@ impl Problem {
         all
     }
 
-    /// y of each knot. Allocates at the first call.
+    /// Copies the multipliers y of each knot. Allocates at the first call.
     pub(crate) fn multipliers(&mut self, out: &mut Vec<Vec<f64>>) {
         out.resize(self.horizon() + 1, vec![]);
         for (t, out) in out.iter_mut().enumerate() {

@@ -5,13 +5,14 @@ use crate::problem::differences::FIRST;
 use nalgebra::DMatrix;
 use std::any::Any;
 
-/// Functions of state and control that must stay within bounds: lower ≤ gₜ(x, u) ≤ upper; equalities where both are equal.
+/// Functions of state and control that must stay within bounds: lower ≤ gₜ(x, u) ≤ upper. A function whose bounds are
+/// equal is an equality.
 ///
-/// At a terminal knot u is empty. The rules for [`ActionModel`]s hold here too. An
-/// [`AutoDiffConstraint`](crate::AutoDiffConstraint) needs no Jacobian.
+/// At a terminal knot u is empty. The rules for [`ActionModel`]s apply here too. With an
+/// [`AutoDiffConstraint`](crate::AutoDiffConstraint) no Jacobian needs to be written.
 ///
 /// # Examples
-/// The second number of the state may not exceed 1:
+/// The second entry of the state may not exceed 1:
 /// ```
 /// use condyle_optimal::PathConstraint;
 /// use nalgebra::DMatrix;
@@ -29,30 +30,31 @@ use std::any::Any;
 /// }
 /// ```
 pub trait PathConstraint: Any + Send + Sync {
-    /// The number of functions.
+    /// Returns the number of functions.
     fn size(&self) -> usize;
 
-    /// Their least and their greatest values at knot t, infinite where there is none. They must not change during a solve.
+    /// Returns the smallest and largest allowed values at knot t, infinite where a function is unbounded. They must not
+    /// change during a solve.
     fn bounds(&self, t: usize) -> (&[f64], &[f64]);
 
-    /// gₜ(x, u) into `g`.
+    /// Computes gₜ(x, u) into `g`.
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], g: &mut [f64]);
 
-    /// ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu); says whether it
-    /// did. It does not by default: they are central differences of [`calc`](Self::calc) then, slow, allocating, and
-    /// right to about 1e-9.
+    /// Computes ∂g/∂x into `gx` (size × ndx), in the tangent space of the state, and ∂g/∂u into `gu` (size × nu).
+    /// Returns whether it did so. The default returns false: the solver then takes central differences of
+    /// [`calc`](Self::calc), which are slow, allocate, and are accurate to about 1e-9.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], gx: &mut DMatrix<f64>, gu: &mut DMatrix<f64>) -> bool {
         let _ = (t, x, u, gx, gu);
         false
     }
 
-    /// Returns a copy that computes the same, as [`ActionModel::fork`]; `None` by default.
+    /// Returns a copy that computes the same, as [`ActionModel::fork`] does; `None` by default.
     fn fork(&self) -> Option<Box<dyn PathConstraint>> {
         None
     }
 }
 
-/// ∂g/∂x and ∂g/∂u of a constraint of an action by central differences.
+/// Computes ∂g/∂x and ∂g/∂u of an action's constraint by central differences.
 pub(super) fn calc_diff(
     action: &dyn ActionModel,
     constraint: &mut dyn PathConstraint,

@@ -1,4 +1,4 @@
-//! The second attempt of a solve whose warm start led nowhere.
+//! Second attempt of a solve that failed from its warm start.
 
 use super::augmented::{AugmentedLagrangian, Outcome};
 use crate::ddp::{Observer, Solution, Status};
@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::problem::Problem;
 use crate::time::Instant;
 
-/// The result of an attempt.
+/// Result of an attempt.
 struct Attempt {
     status: Status,
     solution: Solution,
@@ -15,10 +15,12 @@ struct Attempt {
 }
 
 impl AugmentedLagrangian {
-    /// Makes a second attempt after one that is lost, from x̂₀ at all knots and the controls that hold it still, with
-    /// multipliers of zero. Returns the status of the better attempt, whose solution and outcome remain: a converged one,
-    /// else the one with the smaller violation. Does nothing if the first attempt started there, no time is left, or there is
-    /// neither a constraint nor a bound, where the solve is that of [`Fddp`](crate::Fddp).
+    /// Makes a second attempt after a failed one: from x̂₀ at all knots and the controls that hold it still, with
+    /// multipliers of zero. Returns the status of the better attempt, and keeps its solution and outcome. A converged
+    /// attempt is better; otherwise the attempt with the smaller violation is.
+    ///
+    /// Does nothing if the first attempt started there or no time is left. It also does nothing without constraints and
+    /// bounds, where the solve equals [`Fddp`](crate::Fddp)'s.
     pub(super) fn restart(
         &mut self,
         problem: &mut Problem,

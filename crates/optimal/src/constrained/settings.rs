@@ -1,28 +1,29 @@
-//! The settings of the method of multipliers.
+//! Settings of the method of multipliers.
 
 use crate::error::Error;
 
-/// The settings of [`AugmentedLagrangian`](crate::AugmentedLagrangian).
+/// Settings of [`AugmentedLagrangian`](crate::AugmentedLagrangian).
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct ConstraintSettings {
-    /// The distance that a constraint may have from its bounds, and the dynamics from holding.
+    /// Maximum distance of a constraint from its bounds, and maximum gap of the dynamics.
     pub tolerance: f64,
-    /// The largest entry that the gradient of the Lagrangian may have.
+    /// Maximum entry of the gradient of the Lagrangian.
     pub tolerance_dual: f64,
-    /// Inner solves after which a solve stops.
+    /// Maximum number of inner solves.
     pub max_solves: usize,
-    /// 1/μ of the first inner solve.
+    /// Penalty 1/μ of the first inner solve.
     pub penalty_start: f64,
-    /// Largest 1/μ.
+    /// Largest penalty 1/μ.
     pub penalty_max: f64,
-    /// Factor by which 1/μ rises.
+    /// Factor by which the penalty 1/μ rises.
     pub penalty_factor: f64,
-    /// Whether a solve that ends as not finite, or with violated constraints at the largest penalty, begins once more: from
-    /// x̂₀ at all knots, and the controls that hold it still ([`quasi_static`](crate::Problem::quasi_static)). The better
-    /// result counts. A rollout that diverges, or saturated controls, are such warm starts. Allocates. Never done by `resume`,
-    /// nor in a problem without constraints and bounds.
+    /// Whether a failed solve is repeated from x̂₀ at all knots and the controls that hold it still
+    /// ([`quasi_static`](crate::Problem::quasi_static)). A solve has failed if it ends as not finite, or with violated
+    /// constraints at the largest penalty. The better result is kept. Typical causes are warm starts that diverge or
+    /// saturate the controls. The repetition allocates. `resume` never repeats, nor does a problem without constraints
+    /// and bounds.
     pub restart: bool,
 }
 
@@ -41,8 +42,10 @@ impl Default for ConstraintSettings {
 }
 
 impl ConstraintSettings {
+    /// Checks the settings.
+    ///
     /// # Errors
-    /// [`Error::Setting`] for the first field that makes no sense.
+    /// [`Error::Setting`] for the first invalid field.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         for (name, value, good, allowed) in [

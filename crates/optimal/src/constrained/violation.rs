@@ -1,19 +1,19 @@
-//! A constraint that does not hold, as evidence.
+//! Evidence of a constraint that does not hold.
 
 use core::fmt;
 use std::sync::Arc;
 
-/// The kind of a [`Violation`].
+/// Kind of a [`Violation`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ViolationKind {
-    /// A constraint of a knot: a robot's [`Limit`](crate::robot::Limit) or a [`PathConstraint`](crate::PathConstraint).
+    /// Constraint of a knot: a robot's [`Limit`](crate::robot::Limit) or a [`PathConstraint`](crate::PathConstraint).
     Constraint,
-    /// A gap of the dynamics: f₀ = x̂₀ ⊖ x₀ at knot 0, else fₜ = φ(xₜ₋₁, uₜ₋₁) ⊖ xₜ.
+    /// Gap of the dynamics: f₀ = x̂₀ ⊖ x₀ at knot 0, else fₜ = φ(xₜ₋₁, uₜ₋₁) ⊖ xₜ.
     Gap,
 }
 
-/// A row of a constraint, or of the dynamics, that does not hold at the end of a solve.
+/// Row of a constraint or of the dynamics that does not hold at the end of a solve.
 ///
 /// ```
 /// # use condyle_dynamics::robots;
@@ -22,7 +22,7 @@ pub enum ViolationKind {
 /// # use std::sync::Arc;
 /// # let arm = Arc::new(robots::arm7());
 /// # let x0 = vec![0.0; 14];
-/// // the arm begins at rest, where a limit asks its third joint for at least 0.5 rad
+/// // the arm begins at rest, but a limit requires at least 0.5 rad of its third joint
 /// let mut lower = vec![f64::NEG_INFINITY; 14];
 /// lower[2] = 0.5;
 /// let bent = Limit::new("bent", Residual::State { reference: x0.clone() }, lower, vec![f64::INFINITY; 14]);
@@ -42,18 +42,18 @@ pub enum ViolationKind {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Violation {
-    /// The kind of the row.
+    /// Kind of the row.
     pub kind: ViolationKind,
-    /// The knot, 0 … N.
+    /// Index of the knot, 0 … N.
     pub knot: usize,
-    /// The row: the index in [`Outcome::multipliers`](crate::Outcome::multipliers) of the knot, or of a gap the entry of the
-    /// tangent vector.
+    /// Index of the row: for a constraint the index in [`Outcome::multipliers`](crate::Outcome::multipliers) of the
+    /// knot, for a gap the entry of the tangent vector.
     pub row: usize,
-    /// The name of the [`Limit`](crate::robot::Limit), if it is one.
+    /// Name of the [`Limit`](crate::robot::Limit), if the row belongs to one.
     pub name: Option<Arc<str>>,
-    /// The row within the limit of that name, else `row`.
+    /// Index of the row within the named limit; equals `row` without a name.
     pub entry: usize,
-    /// The distance from the bound, or of a gap its size, in the units of the row; infinite if it is not a number.
+    /// Distance from the bound, or size of the gap, in the units of the row; infinite if it is NaN.
     pub amount: f64,
 }
 

@@ -1,24 +1,24 @@
-//! The best iterate of a solve, to go back to at the end when the last one is worse.
-#![allow(non_snake_case)] // K beside k, the names of the literature
+//! Best iterate of a solve, restored at the end if the last iterate is worse.
+#![allow(non_snake_case)] // K besides k: names of the literature
 
 use super::fddp::Fddp;
 use super::progress::{Progress, Value};
 use super::solution::{Solution, Status};
 use crate::problem::Problem;
 
-/// Gaps that differ by less are the same: they are differences of states, which are rounded.
+/// Largest difference of two gaps that count as equal: gaps are differences of states, which are rounded.
 const SAME_GAP: f64 = 1e-12;
-/// Costs that differ by less, beside 1 + their size, are the same: they are sums, which are rounded.
+/// Largest difference of two costs that count as equal, relative to 1 + cost: costs are sums, which are rounded.
 const SAME_COST: f64 = 1e-12;
-/// An iterate that costs so many times as much as the cheapest one of the solve, and 1, has run away, whatever its gaps:
-/// those that close gaps may cost much more than the warm start, but a weight of 1e6 at a distance of ten is still within
-/// it.
+/// Bound on the cost of an iterate: it has diverged if its cost exceeds the lowest of the solve by more than 1e8·(1 +
+/// |lowest|), whatever its gaps. Iterates that close gaps may cost much more than the warm start. A weight of 1e6 at a
+/// distance of ten is still within the bound.
 const RUNAWAY: f64 = 1e8;
 
-/// The best iterate from which a direction could be computed: one within the bounds on controls, then the one with the
-/// smallest gap, and among equals the cheapest.
+/// Best iterate from which a direction could be computed. An iterate within the bounds on controls is better than one
+/// outside. Next, the smaller gap is better, and for equal gaps the lower cost.
 ///
-/// An iterate comes here when a step from it is accepted, by an exchange of buffers; nothing is copied.
+/// When a step is accepted, the old iterate may be stored here by an exchange of buffers; nothing is copied.
 #[derive(Debug, Clone)]
 pub(super) struct Best {
     xs: Vec<f64>,
@@ -26,12 +26,12 @@ pub(super) struct Best {
     /// φₜ(xₜ, uₜ), N·nx.
     next: Vec<f64>,
     value: Option<Value>,
-    /// The lowest cost of an iterate of this solve, that of the warm start included.
+    /// Lowest cost of all iterates of this solve, warm start included.
     lowest: f64,
 }
 
 impl Best {
-    /// Room for an iterate of `problem`.
+    /// Allocates the storage for an iterate of `problem`.
     pub(super) fn new(problem: &Problem) -> Self {
         let shape = problem.shape();
         let horizon = shape.horizon();
@@ -44,18 +44,18 @@ impl Best {
         }
     }
 
-    /// Makes room for a problem of which only the numbers of controls changed.
+    /// Adapts the storage to a problem whose numbers of controls have changed.
     pub(super) fn reshape(&mut self, problem: &Problem) {
         self.us.resize(problem.shape().offsets[problem.horizon()], 0.0);
     }
 
-    /// A solve begins.
+    /// Forgets the iterates of the last solve.
     pub(super) fn start(&mut self) {
         (self.value, self.lowest) = (None, f64::INFINITY);
     }
 
-    /// Exchanges the iterate that a step leaves with the best one, if it is not worse. Returns whether it is the best one
-    /// now.
+    /// Exchanges the iterate that a step leaves with the best one, unless it is worse. Returns whether it is now the
+    /// best.
     pub(super) fn leave(&mut self, solution: &mut Solution, next: &mut Vec<f64>, value: Value) -> bool {
         self.lowest = self.lowest.min(value.cost);
         let good = !self.is_better_than(&value);
@@ -66,7 +66,7 @@ impl Best {
         good
     }
 
-    /// Whether there is an iterate that is better than one of this value.
+    /// Returns whether an iterate is stored that is better than an iterate with the value `other`.
     pub(super) fn is_better_than(&self, other: &Value) -> bool {
         let Some(best) = &self.value else { return false };
         let lowest = self.lowest.min(other.cost);
@@ -80,7 +80,7 @@ impl Best {
         }
     }
 
-    /// Makes the best iterate that of the solution, if there is one. Returns what it is worth.
+    /// Moves the best iterate into the solution, if one is stored, and returns its value.
     pub(super) fn restore(&mut self, solution: &mut Solution, next: &mut Vec<f64>) -> Option<Value> {
         let value = self.value.take()?;
         self.exchange(solution, next);
@@ -95,7 +95,7 @@ impl Best {
 }
 
 impl Fddp {
-    /// Fills what the iterations leave open in the solution, of the last iterate or of a better one.
+    /// Completes the solution at the end of a solve, from the last iterate or a better one.
     pub(super) fn finish(&mut self, problem: &mut Problem, now: &mut Progress, status: Status) {
         let infinite_if_nan = |x: f64| if x.is_nan() { f64::INFINITY } else { x };
         self.solution.gap = infinite_if_nan(self.update_gaps(problem));
@@ -105,7 +105,7 @@ impl Fddp {
         let regularisation = now.regularisation;
         let goes_back = match status {
             Status::Converged => false,
-            Status::NotFinite => true, // there is no direction at the last one
+            Status::NotFinite => true, // no direction exists at the last iterate
             _ => self.best.is_better_than(&last),
         };
         if goes_back && let Some(best) = self.best.restore(&mut self.solution, &mut self.next) {
@@ -125,7 +125,7 @@ impl Fddp {
         solution.regularisation = regularisation;
         solution.status = status;
         if !now.swept {
-            return; // the gains of the solve before, shifted or not
+            return; // keep the gains of the previous solve, shifted or not
         }
         for ((K, k), knot) in solution.K.iter_mut().zip(&mut solution.k).zip(self.sweep.knots()) {
             K.copy_from(&knot.K);

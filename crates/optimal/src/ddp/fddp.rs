@@ -1,5 +1,5 @@
 //! Differential dynamic programming, feasibility-driven or not.
-#![allow(non_snake_case)] // K beside k, the names of the literature
+#![allow(non_snake_case)] // K besides k: names of the literature
 
 use super::best::Best;
 use super::clock::{Clock, Phase};
@@ -16,31 +16,32 @@ use crate::time::Instant;
 use condyle_linalg::max_abs;
 use std::time::Duration;
 
-/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of Crocoddyl
-/// 3.2, so that both make the same iterates. Where controls are bounded ([`bounds`](crate::ActionModel::bounds)), they
-/// are those of its box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022): while there are gaps
-/// the bounds only cut trials off; from then on each knot's step minimises its quadratic model within them.
+/// FDDP (Mastalli et al., ICRA 2020) and DDP (see [`DdpMethod`](crate::DdpMethod)), with the rules and constants of
+/// Crocoddyl 3.2: both produce the same iterates. Bounds on controls ([`bounds`](crate::ActionModel::bounds)) are
+/// handled as in Crocoddyl's box solvers (Tassa, Mansard, Todorov, ICRA 2014; Mastalli et al., RA-L 2022). While gaps
+/// exist, the bounds only clamp the controls of trials. Afterwards, each knot's step minimises its quadratic model
+/// within the bounds.
 ///
-/// The warm start may have gaps f, places where the trajectory does not satisfy the dynamics. One iteration is
+/// The warm start may have gaps f, where the trajectory does not satisfy the dynamics. One iteration is
 ///
 /// ```text
-/// derivatives   at the iterate, if it is a new one
-/// sweep         k, K, Vx, Vxx; while Quu is not positive definite, with a larger regularisation
-/// line search   for α = 1, ½, ¼, …: a rollout that keeps the part 1 − α of each gap; accepted if it lowers the cost
-///               by more than `accept` times the expected α (d₁ + ½ α d₂), or, while there are gaps, raises it by less
+/// derivatives   at the iterate, if it is new
+/// sweep         k, K, Vx, Vxx; repeated with a larger regularisation while Quu is not positive definite
+/// line search   for α = 1, ½, ¼, …: a rollout that keeps 1 − α of each gap; accepted if it lowers the cost
+///               by more than `accept` times the expected α (d₁ + ½ α d₂), or, while gaps exist, raises it by less
 ///               than `accept_ascent` times that
 /// ```
 ///
-/// Iterates count as feasible from the first full step on (α = 1 closes all gaps at once). The feedback is
-/// u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K.
+/// Iterates count as feasible after the first full step (α = 1 closes all gaps at once). The feedback is u = ū + α k +
+/// K (x ⊖ x̄); in Crocoddyl, k and K have the opposite sign.
 ///
-/// The first step length is tried alone; if it fails, the next four are tried side by side and then the others, at most as
-/// many as the actions have [`lanes`](crate::ActionModel::lanes), and the longest good one is taken: the same step that one
-/// by one would find.
+/// The first step length is tried alone. If it fails, the next four are tried side by side, and then the others. The
+/// number tried at once is limited by the [`lanes`](crate::ActionModel::lanes) of the actions. The longest good step is
+/// taken, as in a search of one length after the other.
 ///
-/// The workspace is allocated by [`new`](Self::new); a solve allocates the trace, and workspaces for
-/// [`segments`](Settings::segments), when it begins, and copies of actions for [`threads`](Settings::threads) (not again the
-/// next time), and then nothing, but for what rayon does by itself.
+/// [`new`](Self::new) allocates the workspace. At its beginning, a solve allocates the trace, and workspaces for
+/// [`segments`](Settings::segments). Copies of actions for [`threads`](Settings::threads) are allocated by the first
+/// solve that needs them. Nothing else is allocated, except by rayon itself.
 ///
 /// # Examples
 /// ```
@@ -76,51 +77,52 @@ use std::time::Duration;
 /// ```
 #[derive(Debug, Clone)]
 pub struct Fddp {
-    /// May be changed between solves.
+    /// Settings; may be changed between solves.
     pub settings: Settings,
     pub(crate) nodes: Vec<LqNode>,
     pub(super) sweep: Sweep,
     pub(super) line_search: LineSearch,
-    /// The iterate is in here.
+    /// Solution, whose trajectory is the iterate.
     pub(crate) solution: Solution,
     /// φₜ(xₜ, uₜ) of the iterate, N·nx.
     pub(super) next: Vec<f64>,
-    /// The accelerations and forces of the iterate, N equal parts, for nodes in inverse-dynamics form.
+    /// Accelerations and forces of the iterate, N equal parts, for nodes in inverse-dynamics form.
     pub(super) motions: Vec<f64>,
-    /// Whether they are those of the iterate.
+    /// Whether `motions` belongs to the iterate.
     pub(super) knows_motions: bool,
     costs: Vec<f64>,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁ of the iterate, (N + 1)·ndx.
     pub(super) gaps: Vec<f64>,
-    /// The best iterate, which the solution becomes if the last one is worse.
+    /// Best iterate; it becomes the solution if the last iterate is worse.
     pub(super) best: Best,
     pub(super) clock: Clock,
-    /// Whether knots may come as equations of inverse dynamics.
+    /// Whether knots may be given as equations of inverse dynamics.
     inverse_dynamics: bool,
-    /// Whether there is a trajectory to go on from.
+    /// Whether a trajectory exists from which a solve can resume.
     started: bool,
-    /// Whether the trajectory was given or found since the last [`shift`](Self::shift): a shift without a step in between
-    /// copies its end.
+    /// Whether the trajectory was given or found since the last [`shift`](Self::shift). Without a step in between, a
+    /// shift repeats the last state.
     pub(super) renewed: bool,
 }
 
-/// The rules of a solve that its caller sets, besides the settings.
+/// Rules of a solve that its caller sets, besides the settings.
 #[derive(Clone, Copy)]
 pub(crate) struct Rules {
-    /// Whether the first iteration runs whatever the time.
+    /// Whether the first iteration runs regardless of the time.
     pub(crate) guaranteed: bool,
-    /// Whether a warm start without gaps, of which a control lies on its bound, counts as feasible. Crocoddyl's rule is no:
-    /// the bounds then only cut trials off until the first full step, which is never taken where they press.
+    /// Whether a warm start without gaps counts as feasible if a control lies on its bound. Crocoddyl's value is false:
+    /// the bounds then only clamp trials until the first full step, which is never accepted where the bounds are
+    /// active.
     pub(crate) trusts_start: bool,
-    /// Whether the solve goes on from the last one, and not from a warm start or an earlier part of the same solve.
+    /// Whether the solve continues the last one, instead of a warm start or an earlier part of the same solve.
     pub(crate) resumes: bool,
 }
 
-/// The iterations for which there is room in the trace when a solve begins; with more it grows.
+/// Number of iterations for which the trace is allocated when a solve begins; with more it grows.
 const FORESEEN: usize = 10_000;
 
 impl Fddp {
-    /// A solver with the default settings and the workspace for problems with the dimensions of `problem`.
+    /// Creates a solver with the default settings and the workspace for problems with the dimensions of `problem`.
     pub fn new(problem: &Problem) -> Self {
         let (mut nodes, shape) = (problem.nodes(), problem.shape());
         problem.reserve_inverse_dynamics(&mut nodes);
@@ -147,14 +149,15 @@ impl Fddp {
     /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat.
     ///
     /// # Errors
-    /// [`Error`] if the dimensions of `problem` are not those given to [`new`](Self::new), the warm start has a wrong
-    /// length, is not finite or has a state that is none, or a setting makes no sense. How the solve went is no error: see
-    /// [`Solution::status`].
+    /// [`Error`] if the dimensions of `problem` differ from the problem given to [`new`](Self::new), the warm start has
+    /// a wrong length, is not finite or contains an invalid state, or a setting is invalid. A solve that does not
+    /// converge is not an error: see [`Solution::status`].
     pub fn solve(&mut self, problem: &mut Problem, xs: &[f64], us: &[f64]) -> Result<&Solution, Error> {
         self.run(problem, Some([xs, us]), &mut Unobserved, self.rules(false))
     }
 
-    /// As [`solve`](Self::solve), and shows each iteration as it ends to `observer`, who may end the solve.
+    /// Solves as [`solve`](Self::solve) does, and passes each iteration to `observer` when it ends. The observer may
+    /// end the solve.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -171,9 +174,9 @@ impl Fddp {
     /// Solves `problem` from the trajectory of the last solve: with a new initial state, new references or, after
     /// [`shift`](Self::shift), for the next horizon.
     ///
-    /// A trajectory that is lost is replaced by x̂₀ held still at all knots, if that costs less: one that is not finite, or costs
-    /// more than ten times as much as the last solution, with 1 added to both. After a solve that ran out of time or iterations
-    /// with a refused step, the regularisation begins where it was.
+    /// A lost trajectory is replaced by x̂₀ held still at all knots, if that costs less. A trajectory is lost if it is
+    /// not finite, or costs more than ten times as much as the last solution, with 1 added to both. If the last solve
+    /// ran out of time or iterations with a rejected step, the regularisation starts at its last value.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -181,7 +184,8 @@ impl Fddp {
         self.run(problem, None, &mut Unobserved, self.rules(true))
     }
 
-    /// As [`resume`](Self::resume), and shows each iteration as it ends to `observer`, who may end the solve.
+    /// Solves as [`resume`](Self::resume) does, and passes each iteration to `observer` when it ends. The observer may
+    /// end the solve.
     ///
     /// # Errors
     /// As [`solve`](Self::solve).
@@ -189,12 +193,12 @@ impl Fddp {
         self.run(problem, None, &mut observer, self.rules(true))
     }
 
-    /// Returns the rules of a solve by itself, which are Crocoddyl's.
+    /// Returns the rules of a plain solve, which are Crocoddyl's.
     fn rules(&self, resumes: bool) -> Rules {
         Rules { guaranteed: self.settings.time_budget != Some(Duration::ZERO), trusts_start: false, resumes }
     }
 
-    /// Solves from a warm start or the trajectory of the last solve.
+    /// Solves from a warm start, or from the trajectory of the last solve.
     pub(crate) fn run(
         &mut self,
         problem: &mut Problem,
@@ -219,7 +223,7 @@ impl Fddp {
         self.settings.check()?;
         self.solution.shape().check(problem.shape())?;
         if self.nodes[0].inverse_dynamics.stride == 0 && problem.reserve_inverse_dynamics(&mut self.nodes) {
-            self.sweep = Sweep::new(&self.nodes); // the problem that the solver was made for had no such form
+            self.sweep = Sweep::new(&self.nodes); // the problem given to `new` did not have this form
         }
         let bounded = problem.check_bounds()?;
         self.inverse_dynamics = self.settings.inverse_dynamics_form && !bounded && !self.settings.second_order;
@@ -262,12 +266,12 @@ impl Fddp {
         Ok(&self.solution)
     }
 
-    /// The result of the last solve.
+    /// Returns the result of the last solve.
     pub fn solution(&self) -> &Solution {
         &self.solution
     }
 
-    /// Dynamics and cost of the warm start.
+    /// Computes dynamics and cost of the warm start.
     pub(super) fn calc(&mut self, problem: &mut Problem) {
         let clock = Instant::now();
         let Self { solution: Solution { xs, us, .. }, next, costs, motions, .. } = self;
@@ -279,7 +283,7 @@ impl Fddp {
         self.solution.timings.calc += clock.elapsed();
     }
 
-    /// f₀ = x̂₀ ⊖ x₀,  fₜ₊₁ = φₜ(xₜ, uₜ) ⊖ xₜ₊₁; returns ‖f‖∞.
+    /// Computes f₀ = x̂₀ ⊖ x₀,  fₜ₊₁ = φₜ(xₜ, uₜ) ⊖ xₜ₊₁; returns ‖f‖∞.
     pub(super) fn update_gaps(&mut self, problem: &Problem) -> f64 {
         let (shape, xs) = (self.solution.shape(), &self.solution.xs);
         for t in 0..=shape.horizon() {
@@ -294,7 +298,7 @@ impl Fddp {
         max_abs(&self.gaps)
     }
 
-    /// Returns knot, entry of the tangent space, and size of the largest gap of the last iterate.
+    /// Returns the knot, the entry of the tangent space, and the size of the largest gap of the last iterate.
     pub(crate) fn largest_gap(&self) -> Option<(usize, usize, f64)> {
         let ndx = self.solution.shape().ndx;
         let sizes = self.gaps.iter().map(|gap| if gap.is_nan() { f64::INFINITY } else { gap.abs() });
@@ -302,9 +306,10 @@ impl Fddp {
         (size > 0.0).then_some((i / ndx, i % ndx, size))
     }
 
-    /// The LQ problem at the iterate; the gaps are in it until the first full step, the bounds from then on. On several threads
-    /// the sweep follows the derivatives from knot to knot, if it can: then this returns its outcome.
-    #[inline(never)] // `benches/instructions.py` counts it by its name
+    /// Computes the LQ problem at the iterate. It contains the gaps until the first full step, and the bounds
+    /// afterwards. With several threads, the sweep follows the derivatives from knot to knot if it can, and its outcome
+    /// is returned.
+    #[inline(never)] // `benches/instructions.py` counts this function by name
     pub(super) fn calc_diff(
         &mut self,
         problem: &mut Problem,
@@ -375,12 +380,12 @@ impl Fddp {
         Some(outcome)
     }
 
-    /// Whether the sweep follows the derivatives.
+    /// Returns whether the sweep follows the derivatives.
     pub(super) fn follows(&self) -> bool {
         self.settings.threads > 1 && !self.settings.second_order && self.sweep.is_sequential()
     }
 
-    #[inline(never)] // `benches/instructions.py` counts it by its name
+    #[inline(never)] // `benches/instructions.py` counts this function by name
     pub(super) fn sweep(&mut self, problem: &mut Problem, regularisation: f64) -> Result<(), SweepError> {
         let clock = Instant::now();
         let result = if self.settings.second_order {

@@ -1,4 +1,4 @@
-//! The iterations of a solve, and why they end.
+//! Iterations of a solve, and its reasons to stop.
 
 use super::clock::Phase;
 use super::fddp::Fddp;
@@ -11,7 +11,7 @@ use crate::lq::SweepError;
 use crate::problem::Problem;
 
 impl Fddp {
-    /// Iterates from a start with a largest gap until one of the reasons to stop.
+    /// Iterates from a start with the given largest gap until one of the reasons to stop occurs.
     pub(super) fn iterate(
         &mut self,
         problem: &mut Problem,
@@ -76,7 +76,7 @@ impl Fddp {
             if search.step <= self.settings.regularisation_increase_below {
                 now.regularisation = self.increased(now.regularisation);
             }
-            let stop = (search.d1 + 0.5 * search.d2).abs(); // the expected decrease for α = 1
+            let stop = (search.d1 + 0.5 * search.d2).abs(); // expected decrease for α = 1
             let record = Iteration {
                 iteration,
                 cost: self.solution.cost,

@@ -1,15 +1,15 @@
-//! Observers, who look at a solve while it goes on, and may end it.
+//! Observers, which follow a solve while it runs and may end it.
 
 use super::solution::Iteration;
 use crate::time::Instant;
 use core::ops::ControlFlow;
 use std::time::Duration;
 
-/// An observer of a solve, who may end it: the solution is then the best iterate so far, with
+/// Observer of a solve. If it ends the solve, the solution is the best iterate so far, with
 /// [`Status::Interrupted`](crate::Status::Interrupted).
 ///
-/// A closure of an [`Iteration`] is one that sees each iteration, and if it returns a [`ControlFlow`] may end the solve
-/// after it:
+/// A closure that takes an [`Iteration`] is an observer of each iteration. If it returns a [`ControlFlow`], it may end
+/// the solve after that iteration:
 ///
 /// ```
 /// use condyle_optimal::{Iteration, Observer};
@@ -19,11 +19,13 @@ use std::time::Duration;
 /// observe(|now: &Iteration| if now.cost < 1e-3 { Break(()) } else { Continue(()) });
 /// ```
 pub trait Observer {
-    /// Sees an iteration that has ended, and says whether to go on. A solve that has ended by itself takes no notice.
+    /// Receives an iteration that has ended, and returns whether to continue. The return value is ignored if the solve
+    /// has ended by itself.
     fn iteration(&mut self, now: &Iteration) -> ControlFlow<()>;
 
-    /// Says whether to go on, when nothing has ended: asked between the phases of an iteration (derivatives, sweep, trials),
-    /// at most every 10 ms. This is where a program looks for signals, or at a flag that another thread sets.
+    /// Returns whether to continue, while an iteration is running. It is called between the phases of an iteration
+    /// (derivatives, sweep, trials), at most every 10 ms. A program can check for signals here, or a flag that another
+    /// thread sets.
     fn go_on(&mut self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -35,9 +37,9 @@ impl<R: Verdict, F: FnMut(&Iteration) -> R> Observer for F {
     }
 }
 
-/// The value that a closure that is an [`Observer`] may return: whether to go on, or nothing, which is yes.
+/// Return value of a closure used as an [`Observer`]: a [`ControlFlow`], or nothing, which means to continue.
 pub trait Verdict {
-    /// Whether to go on.
+    /// Returns whether to continue.
     fn verdict(self) -> ControlFlow<()>;
 }
 
@@ -53,7 +55,7 @@ impl Verdict for ControlFlow<()> {
     }
 }
 
-/// The observer of a solve that nobody observes.
+/// Observer of a solve without an observer.
 pub(crate) struct Unobserved;
 
 impl Observer for Unobserved {
@@ -62,27 +64,27 @@ impl Observer for Unobserved {
     }
 }
 
-/// The least time between two questions to an observer.
+/// Minimum time between two calls of [`Observer::go_on`].
 const PERIOD: Duration = Duration::from_millis(10);
 
-/// An observer, and when it was last asked.
+/// Observer, and the time of its last call.
 pub(crate) struct PacedObserver<'a> {
     observer: &'a mut dyn Observer,
     asked: Instant,
 }
 
 impl<'a> PacedObserver<'a> {
-    /// A solve begins.
+    /// Creates the paced observer at the beginning of a solve.
     pub(super) fn new(observer: &'a mut dyn Observer, begin: Instant) -> Self {
         Self { observer, asked: begin }
     }
 
-    /// Shows an iteration.
+    /// Passes an iteration to the observer.
     pub(super) fn iteration(&mut self, now: &Iteration) -> ControlFlow<()> {
         self.observer.iteration(now)
     }
 
-    /// Asks whether to go on, if it is time to.
+    /// Asks the observer whether to continue, if the minimum time has passed.
     pub(super) fn go_on(&mut self, now: Instant) -> ControlFlow<()> {
         if now.duration_since(self.asked) < PERIOD {
             return ControlFlow::Continue(());

@@ -1,23 +1,24 @@
 //! State of a solve between its iterations.
 
-/// State that one iteration leaves to the next.
+/// State that one iteration passes to the next.
 pub(super) struct Progress {
     pub(super) regularisation: f64,
     pub(super) feasible: bool,
     /// Whether the iterate before the last accepted step was feasible.
     pub(super) was_feasible: bool,
     pub(super) tolerance: f64,
-    /// Whether all controls of the iterate are within their bounds: those of a trial are, a warm start need not be.
+    /// Whether all controls of the iterate are within their bounds; controls of trials always are, controls of a warm
+    /// start need not be.
     pub(super) bounded: bool,
-    /// The number of accepted steps.
+    /// Number of accepted steps.
     pub(super) steps: usize,
-    /// Whether there are gains of this solve.
+    /// Whether this solve has computed gains.
     pub(super) swept: bool,
-    /// Whether they are those of the best iterate, which the last step left.
+    /// Whether these gains belong to the best iterate, from which the last step started.
     pub(super) swept_best: bool,
 }
 
-/// Merit of an iterate, and how its feedback was found.
+/// Merit of an iterate, and the data from which its feedback was computed.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Value {
     /// Largest gap.
@@ -26,14 +27,14 @@ pub(super) struct Value {
     pub(super) feasible: bool,
     /// Whether its controls are within their bounds; only a warm start that was not projected can be outside.
     pub(super) bounded: bool,
-    /// The number of accepted steps that led to it.
+    /// Number of accepted steps that led to the iterate.
     pub(super) steps: usize,
-    /// The regularisation of the sweep at it.
+    /// Regularisation of the sweep at the iterate.
     pub(super) regularisation: f64,
 }
 
 impl Progress {
-    /// Returns the value of an iterate with this gap and cost.
+    /// Returns the value of the current iterate, with the given gap and cost.
     pub(super) fn value(&self, gap: f64, cost: f64) -> Value {
         let Self { feasible, bounded, steps, regularisation, .. } = *self;
         Value { gap, cost, feasible, bounded, steps, regularisation }

@@ -1,17 +1,18 @@
-//! The start of a resumed solve: the last trajectory, or x̂₀ held still where that trajectory is lost.
+//! Start of a resumed solve: the last trajectory, or x̂₀ held still if that trajectory is lost.
 
 use super::fddp::Fddp;
 use super::solution::Status;
 use crate::problem::Problem;
 
-/// Factor by which the cost of a start may exceed the cost of the last solution, with 1 added to both. A push of the state or a new
-/// reference rarely raises it more; a horizon whose end runs away does so within a few shifts (measured: 0.3, 1e3, 2e4, 3e7).
+/// Factor by which the cost of a start may exceed the cost of the last solution, with 1 added to both. A push of the
+/// state or a new reference rarely raises the cost more. A horizon whose end diverges exceeds it within a few shifts
+/// (measured: 0.3, 1e3, 2e4, 3e7).
 const LOST: f64 = 10.0;
 
 impl Fddp {
-    /// Replaces the start of a resumed solve by x̂₀ at all knots and the controls that hold it still, if the start is lost and
-    /// this costs less. A start is lost if its cost or a gap is not finite, or if it costs far more than the last solution.
-    /// Returns the largest gap of the start. Allocates only where a start is lost.
+    /// Replaces the start of a resumed solve by x̂₀ at all knots and the controls that hold it still, if the start is
+    /// lost and this costs less. A start is lost if its cost or a gap is not finite, or if it costs far more than the
+    /// last solution. Returns the largest gap of the start. Allocates only if a start is lost.
     pub(super) fn recover(&mut self, problem: &mut Problem, gap: f64, last_cost: f64) -> f64 {
         let cost = self.solution.cost;
         let limit = if last_cost.is_finite() { LOST * (1.0 + last_cost.abs()) } else { f64::INFINITY };
@@ -40,8 +41,9 @@ impl Fddp {
         self.update_gaps(problem)
     }
 
-    /// Returns the regularisation with which a resumed solve begins: where the last solve ran out of time or iterations after
-    /// a step was refused, the one that it had reached. With a smaller one the same step would be refused again.
+    /// Returns the regularisation with which a resumed solve begins. If the last solve ran out of time or iterations
+    /// after a rejected step, it is the regularisation of its end: with a smaller one, the same step would be rejected
+    /// again.
     pub(super) fn resumed_regularisation(&self) -> f64 {
         let start = self.settings.regularisation_start;
         let stopped = matches!(self.solution.status, Status::TimeLimit | Status::MaxIterations | Status::Interrupted);

@@ -5,11 +5,11 @@ use crate::problem::{Actors, Problem, Shape};
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::ops::RangeInclusive;
 
-/// A sum that is rounded once, at the end: near an optimum costs differ in their last digits. (Neumaier, 1974.)
+/// Sum that is rounded only once, at the end: near an optimum costs differ in their last digits. (Neumaier, 1974.)
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Sum {
     sum: f64,
-    /// The part that rounding took.
+    /// Sum of the rounding errors.
     lost: f64,
 }
 
@@ -26,44 +26,44 @@ impl Sum {
     }
 }
 
-/// Trial trajectories, one per step length, that go through the horizon together: at each knot the trials are one
-/// group. Storage is knot after knot and, within a knot, trial after trial.
+/// Trial trajectories, one per step length, that are rolled out together: at each knot the trials form one group. They
+/// are stored knot after knot and, within a knot, trial after trial.
 #[derive(Debug, Clone)]
 pub(crate) struct Trials {
     shape: Shape,
-    /// Trials of the last run; at most `width`.
+    /// Number of trials of the last run; at most `width`.
     count: usize,
     width: usize,
     xs: Vec<f64>,
     us: Vec<f64>,
-    /// φₜ(xₜ, uₜ), N knots. It differs from the next x by what is left of the gap.
+    /// φₜ(xₜ, uₜ), N knots. It differs from the next x by the remaining gap.
     next: Vec<f64>,
-    /// The motion of each knot, in equal parts: see [`ActionModel::motion_size`](crate::ActionModel::motion_size).
+    /// Motion of each knot, in equal parts: see [`ActionModel::motion_size`](crate::ActionModel::motion_size).
     motions: Vec<f64>,
     motion_size: usize,
-    /// Sum of the costs; meaningless where `failed`.
+    /// Sum of the costs of each trial; meaningless if the trial `failed`.
     costs: Vec<Sum>,
-    /// Trials in which something grew beyond bounds.
+    /// Whether each trial has diverged.
     failed: Vec<bool>,
     knot_costs: Vec<f64>,
     knot: Vec<usize>,
     dx: Vec<f64>,
-    /// A place for the next state of a terminal action, which nobody reads.
+    /// Output buffer for the next state of a terminal action, which is never read.
     unread: Vec<f64>,
 }
 
-/// The trajectory that trials start from, and the direction.
+/// Trajectory from which trials start, and the direction.
 #[derive(Clone, Copy)]
 pub(crate) struct Nominal<'a> {
     pub(crate) xs: &'a [f64],
     pub(crate) us: &'a [f64],
-    /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` when there are none.
+    /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, flat; `None` without gaps.
     pub(crate) gaps: Option<&'a [f64]>,
     pub(crate) knots: &'a [LqKnot],
 }
 
 impl Trials {
-    /// Room for `width` trials of `problem`.
+    /// Allocates the storage for `width` trials of `problem`.
     pub(crate) fn new(problem: &Problem, width: usize) -> Self {
         let shape = problem.shape().clone();
         let horizon = shape.horizon();
@@ -85,19 +85,19 @@ impl Trials {
         }
     }
 
-    /// Makes room for a problem of which only the numbers of controls changed.
+    /// Adapts the storage to a problem whose numbers of controls have changed.
     pub(crate) fn reshape(&mut self, problem: &Problem) {
         self.shape.clone_from(problem.shape());
         self.us.resize(self.shape.offsets[self.shape.horizon()] * self.width, 0.0);
     }
 
-    /// Keeps so many numbers of each knot's motion from now on.
+    /// Sets the number of entries of each knot's motion that the next runs keep.
     pub(crate) fn keep_motions(&mut self, size: usize) {
         self.motion_size = size;
         self.motions.resize(self.shape.horizon() * self.width * size, 0.0);
     }
 
-    /// The number of trials that fit.
+    /// Returns the maximum number of trials.
     pub(crate) fn width(&self) -> usize {
         self.width
     }
@@ -106,7 +106,7 @@ impl Trials {
     ///
     /// x₀ = x̂₀ ⊕ (α − 1) f₀,   uₜ = ūₜ + α kₜ + Kₜ (xₜ ⊖ x̄ₜ),   xₜ₊₁ = φₜ(xₜ, uₜ) ⊕ (α − 1) fₜ₊₁
     ///
-    /// with uₜ moved into its bounds; on some knots, which follow those of the last call or begin the horizon.
+    /// with uₜ moved into its bounds. The knots begin the horizon or follow the knots of the last call.
     pub(crate) fn run(
         &mut self,
         actors: &mut Actors<'_>,
@@ -132,7 +132,7 @@ impl Trials {
                 let (x_nominal, u_nominal) = (&nominal.xs[shape.x(t)], &nominal.us[shape.u(t)]);
                 u.copy_from_slice(u_nominal);
                 if failed[i] {
-                    x.copy_from_slice(x_nominal); // a state that the action can be asked for
+                    x.copy_from_slice(x_nominal); // a valid state: the group call evaluates the action there
                     continue;
                 }
                 let action = actors.action(t);
@@ -152,7 +152,7 @@ impl Trials {
                 add_scaled_product(u, 1.0, View::new(gains.K.as_slice(), nu), dx);
                 if let Some((lower, upper)) = action.bounds(t) {
                     for (u, (lower, upper)) in u.iter_mut().zip(lower.iter().zip(upper)) {
-                        *u = if *u < *lower { *lower } else { *u }; // a NaN stays one
+                        *u = if *u < *lower { *lower } else { *u }; // a NaN remains
                         *u = if *u > *upper { *upper } else { *u };
                     }
                 }
@@ -178,12 +178,12 @@ impl Trials {
         }
     }
 
-    /// The cost of trial `i`, or `None` if it left all bounds.
+    /// Returns the cost of trial `i`, or `None` if the trial diverged.
     pub(crate) fn cost(&self, i: usize) -> Option<f64> {
         (!self.failed[i]).then_some(self.costs[i].value())
     }
 
-    /// −Σ bᵀ (x ⊖ x_trial) for trial `i`, over the states x of all knots and vectors b, flat.
+    /// Computes −Σ bᵀ (x ⊖ x_trial) for trial `i`, summed over the states x and the vectors b of all knots, both flat.
     pub(crate) fn distance(&mut self, actors: &Actors<'_>, i: usize, xs: &[f64], b: &[f64]) -> f64 {
         let mut dx = std::mem::take(&mut self.dx);
         let mut sum = 0.0;
@@ -195,12 +195,12 @@ impl Trials {
         sum
     }
 
-    /// The state xₜ of trial `i`.
+    /// Returns the state xₜ of trial `i`.
     fn x(&self, i: usize, t: usize) -> &[f64] {
         &self.xs[(t * self.count + i) * self.shape.nx..][..self.shape.nx]
     }
 
-    /// Copies trial `i` out.
+    /// Copies trial `i` to the arguments.
     pub(crate) fn copy_to(&self, i: usize, xs: &mut [f64], us: &mut [f64], next: &mut [f64], motions: &mut [f64]) {
         for t in 0..=self.shape.horizon() {
             xs[self.shape.x(t)].copy_from_slice(self.x(i, t));

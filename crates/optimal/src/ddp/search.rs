@@ -1,4 +1,5 @@
-//! The line search of differential dynamic programming: what a step should gain, and whether it does.
+//! Line search of differential dynamic programming: the expected improvement of a step, and the test of whether it is
+//! reached.
 
 use super::best::Best;
 use super::clock::{Clock, Phase};
@@ -14,14 +15,16 @@ use condyle_linalg::threads::join;
 use condyle_linalg::{View, add_scaled_product, dot};
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// The number of step lengths that are tried side by side when 1 fails, unless ½ is likely to be good: one of them mostly is,
-/// and they take two to three times as long as one, whose limbs lie side by side.
+/// Number of step lengths that are tried side by side when 1 fails, unless ½ is likely to succeed. One of four usually
+/// succeeds. Four take two to three times as long as one, in which branches of the robot are computed in parallel
+/// lanes.
 const SECOND: usize = 4;
 
-/// So many searches after one that needed a shorter step than 1 may need one too: mostly every second or third does.
+/// Number of searches after a shortened step in which shorter steps are tried concurrently; every second or third needs
+/// one.
 const WARY: usize = 3;
 
-/// The outcome of a line search: of the trial it accepted or else of the last that stayed finite.
+/// Outcome of a line search, for the accepted trial or else the last trial that stayed finite.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Search {
     pub(super) step: f64,
@@ -30,26 +33,26 @@ pub(super) struct Search {
     pub(super) decrease: f64,
     pub(super) expected_decrease: f64,
     pub(super) accepted: bool,
-    /// Why there was no other trial, if the solve must stop.
+    /// Reason why no further trial was made, if the solve must stop.
     pub(super) stopped: Option<Status>,
-    /// The iterate before the accepted step is the best one now.
+    /// Whether the iterate before the accepted step is now the best one.
     pub(super) left_best: bool,
 }
 
-/// An iterate, its feedback, and how to search around it.
+/// Iterate with its feedback, and the data that a search around it needs.
 pub(super) struct Iterate<'a, 'o> {
-    /// The iterate is in here; it becomes the accepted trial.
+    /// Solution that contains the iterate; the accepted trial replaces the iterate.
     pub(super) solution: &'a mut Solution,
     /// φₜ(xₜ, uₜ), N·nx.
     pub(super) next: &'a mut Vec<f64>,
-    /// Its accelerations and forces.
+    /// Accelerations and forces of the iterate.
     pub(super) motions: &'a mut [f64],
-    /// What it is worth, and the best one before it.
+    /// Value of the iterate, and the best iterate before it.
     pub(super) value: Value,
     pub(super) best: &'a mut Best,
     /// f₀ = x̂₀ ⊖ x₀, fₜ₊₁ = φₜ ⊖ xₜ₊₁, (N + 1)·ndx.
     pub(super) gaps: &'a [f64],
-    /// The feedback and value functions.
+    /// Feedback and value functions.
     pub(super) knots: &'a [LqKnot],
     /// Whether the iterate counts as feasible.
     pub(super) feasible: bool,
@@ -58,24 +61,24 @@ pub(super) struct Iterate<'a, 'o> {
     pub(super) watch: &'a mut PacedObserver<'o>,
 }
 
-/// The line search, with its workspace.
+/// Line search, with its workspace.
 #[derive(Debug, Clone)]
 pub(super) struct LineSearch {
     trials: Trials,
-    /// The trial that another thread rolls out while this one tries the first step.
+    /// Trial that another thread rolls out while this thread tries the first step.
     ahead: Option<Trials>,
-    /// How many searches to come try several lengths at once, if they may.
+    /// Number of following searches that try several lengths concurrently, if that is allowed.
     wary: usize,
-    /// The step lengths, 1, ½, ¼, ….
+    /// Step lengths, 1, ½, ¼, ….
     steps: Vec<f64>,
     /// Vxx f, (N + 1)·ndx.
     curved_gaps: Vec<f64>,
-    /// The expected improvement without the part that depends on the trial: dg, dq.
+    /// dg and dq, the expected improvement without the part that depends on the trial.
     expected: [f64; 2],
 }
 
 impl LineSearch {
-    /// The workspace for problems with the dimensions of `problem`.
+    /// Allocates the workspace for problems with the dimensions of `problem`.
     pub(super) fn new(problem: &Problem) -> Self {
         let (horizon, ndx) = (problem.horizon(), problem.ndx());
         Self {
@@ -88,14 +91,14 @@ impl LineSearch {
         }
     }
 
-    /// Makes room for a problem of which only the numbers of controls changed.
+    /// Adapts the storage to a problem whose numbers of controls have changed.
     pub(super) fn reshape(&mut self, problem: &Problem) {
         self.trials.reshape(problem);
         self.ahead.iter_mut().for_each(|ahead| ahead.reshape(problem));
     }
 
-    /// Begins a solve of a problem with `count` step lengths, in which so many numbers of each knot's motion are kept, on so
-    /// many threads.
+    /// Begins a solve with `count` step lengths. `motion_size` is the number of entries kept of each knot's motion,
+    /// `threads` the number of threads.
     pub(super) fn start(&mut self, problem: &Problem, count: usize, motion_size: usize, threads: usize) {
         if threads > 1 && self.ahead.is_none() {
             self.ahead = Some(Trials::new(problem, self.trials.width()));
@@ -107,12 +110,13 @@ impl LineSearch {
         self.steps.extend((0..count).map(|n| 0.5_f64.powi(n as i32))); // α = 2⁻ⁿ
     }
 
-    /// Tries α = 1, ½, ¼, … until a step is accepted, which becomes the iterate. On several threads, if a shorter step than 1
-    /// was needed lately, another one tries the next length beside the first.
+    /// Tries α = 1, ½, ¼, … until a step is accepted, which becomes the iterate. With several threads, if a recent
+    /// search needed a shorter step than 1, another thread tries the next length at the same time as the first.
     ///
-    /// A trial that leaves all bounds keeps the expectation of the trial before it; the first one has that of the line
-    /// search before, `last`, or in DDP, where it does not depend on the trial, that of this one.
-    #[inline(never)] // `benches/instructions.py` counts it by its name
+    /// A trial that diverges keeps the expected improvement of the trial before it. If the first trial diverges, it
+    /// keeps the expected improvement of the previous line search, `last`. In DDP the expected improvement does not
+    /// depend on the trial, so the value of this search is kept.
+    #[inline(never)] // `benches/instructions.py` counts this function by name
     pub(super) fn run(&mut self, problem: &mut Problem, iterate: Iterate<'_, '_>, last: Search) -> Search {
         self.expect(&iterate);
         let Self { trials, ahead, wary, steps, curved_gaps, expected } = self;
@@ -127,14 +131,14 @@ impl LineSearch {
         let some_from = |tried: usize| {
             let most = match tried {
                 0 => 1,
-                1 if last.step >= 0.5 => 1, // ½ will do: the last search took it, or 1
+                1 if last.step >= 0.5 => 1, // ½ is likely to succeed: the last search took ½ or 1
                 1 | 2 => SECOND,
                 _ => count,
             };
             tried..tried + most.min(lanes).min(count - tried)
         };
         let beside = *wary > 0 && settings.threads > 1 && count > 1;
-        let (mut tried, mut ready) = (0, false); // whether the next trials are in `ahead`, but for the terminal knot
+        let (mut tried, mut ready) = (0, false); // `ready`: `ahead` holds the next trials, except their terminal knot
         while tried < count {
             if !ready && let Err(status) = clock.allows(&[Phase::Rollout], watch) {
                 search.stopped = Some(status);
@@ -189,7 +193,7 @@ impl LineSearch {
         search
     }
 
-    /// dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP leaves the gaps f out.
+    /// Computes dg = −Σ Quᵀk − Σ (Vx + Vxx f)ᵀf,   dq = −Σ kᵀQuu k + Σ fᵀVxx f;  DDP omits the gaps f.
     fn expect(&mut self, iterate: &Iterate<'_, '_>) {
         let (mut dg, mut dq) = (0.0, 0.0);
         let gaps = iterate.settings.counts_gaps(iterate.feasible);
@@ -210,21 +214,22 @@ impl LineSearch {
     }
 }
 
-/// The rule by which a trial is accepted, for one iterate.
+/// Rule by which a trial is accepted, for one iterate.
 struct Rule<'a> {
     settings: &'a Settings,
     feasible: bool,
     /// dg and dq.
     expected: [f64; 2],
-    /// Vxx f, while gaps count.
+    /// Vxx f, if gaps count.
     curved_gaps: Option<&'a [f64]>,
-    /// The states and the cost of the iterate.
+    /// States and cost of the iterate.
     xs: &'a [f64],
     cost: f64,
 }
 
 impl Rule<'_> {
-    /// Writes to `search` what trial i, of step length α, promised and does; returns its cost if it is good.
+    /// Writes the expected and the actual decrease of trial i, with step length α, to `search`. Returns its cost if it
+    /// is good.
     ///
     /// ```text
     /// d₁ = dg + dv,   d₂ = dq − 2 dv,   dv = −Σ fᵀVxx (x ⊖ x_trial),   expected decrease α (d₁ + ½ α d₂)
@@ -242,8 +247,8 @@ impl Rule<'_> {
 }
 
 impl Search {
-    /// Whether the step lowers the cost enough; or, while there are gaps, raises it little enough (FDDP), or is expected
-    /// to lower the cost of the rollout that closes them (DDP).
+    /// Returns whether the step lowers the cost enough. While gaps exist, a step is also good if it raises the cost
+    /// little enough (FDDP), or is expected to lower the cost of the rollout that closes the gaps (DDP).
     fn is_good(&self, settings: &Settings, feasible: bool) -> bool {
         let Self { d1, decrease, expected_decrease, .. } = *self;
         let closes_gaps = !feasible && settings.method == DdpMethod::Ddp;

@@ -1,26 +1,26 @@
-//! The settings of the FDDP family.
+//! Settings of the FDDP family.
 
 use crate::error::Error;
 use core::fmt;
 use std::time::Duration;
 
-/// Which search for an optimum a solve is.
+/// Method by which a solve searches for an optimum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum DdpMethod {
-    /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`: every trial is a plain rollout from x̂₀,
-    /// so that the first step accepted closes the gaps of a warm start at once, at whatever cost.
+    /// Differential dynamic programming (Mayne, 1966), Crocoddyl's `SolverDDP`. Every trial is a plain rollout from
+    /// x̂₀, so the first accepted step closes the gaps of a warm start at once, at any cost.
     Ddp,
     /// Feasibility-driven differential dynamic programming (Mastalli et al., ICRA 2020), Crocoddyl's `SolverFDDP`: a
-    /// trial of length α keeps the part 1 − α of each gap.
+    /// trial of length α keeps the fraction 1 − α of each gap.
     #[default]
     Fddp,
 }
 
 impl DdpMethod {
-    /// Returns the name, as files and Python have it: `"ddp"` or `"fddp"`.
+    /// Returns the name used in files and in Python: `"ddp"` or `"fddp"`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ddp => "ddp",
@@ -39,78 +39,82 @@ impl fmt::Display for DdpMethod {
     }
 }
 
-/// The settings of [`Fddp`](crate::Fddp); the defaults are Crocoddyl's.
+/// Settings of [`Fddp`](crate::Fddp); the defaults are Crocoddyl's.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Settings {
-    /// How gaps are closed and which steps are accepted.
+    /// Method, which decides how gaps are closed and which steps are accepted.
     pub method: DdpMethod,
-    /// Whether the curvature of the dynamics counts, Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action gives it: full DDP,
-    /// which converges quadratically. Quu may need more regularisation then. Of a robot's knots those by semi-implicit
-    /// Euler that are without contacts give it, exactly; the others count as linear.
+    /// Whether the curvature of the dynamics is included: Vx·∂²φ in Qxx, Qxu and Quu, at knots whose action computes
+    /// it. This is full DDP, which converges quadratically; Quu may need more regularisation. Among a robot's knots,
+    /// the knots without contacts that use semi-implicit Euler compute it, exactly. All others count as linear.
     pub second_order: bool,
-    /// Whether a robot's knots come to the sweep as the equations of inverse dynamics, with accelerations and contact
-    /// forces as unknowns instead of the controls, where that is possible: without bounds on controls and without
-    /// `second_order`. The same steps and gains, up to rounding, in about half the time.
+    /// Whether the sweep receives a robot's knots as equations of inverse dynamics, with accelerations and contact
+    /// forces as unknowns instead of the controls. This is possible without bounds on controls and without
+    /// `second_order`. Steps and gains are the same, up to rounding, in about half the time.
     pub inverse_dynamics_form: bool,
-    /// Iterations after which a solve stops, at most 1 000 000. With a tolerance of 0 it makes exactly so many.
+    /// Maximum number of iterations, at most 1 000 000. With a tolerance of 0, exactly this number of iterations is
+    /// made.
     pub max_iterations: usize,
-    /// Converged when the iterate was feasible and the expected decrease |d₁ + ½ d₂| of the cost falls below this.
+    /// Tolerance of the expected decrease |d₁ + ½ d₂| of the cost. A solve has converged when the iterate was feasible
+    /// and the expected decrease is below it.
     pub tolerance: f64,
-    /// The tolerance of problems with bounds on controls: the expected decrease does not see the bounds' multipliers.
+    /// Tolerance of problems with bounds on controls: the expected decrease does not include the bounds' multipliers.
     pub tolerance_bounded: f64,
-    /// Whether a warm start outside of the bounds on controls is moved into them, entry by entry, before a solve: what is
-    /// given to [`solve`], and the last trajectory in [`resume`]. Crocoddyl keeps such a start, so its iterates need `false`.
-    /// A solution that violates a bound is never [`Converged`], with either value.
+    /// Whether a warm start outside the bounds on controls is moved into them, entry by entry, before a solve. This
+    /// applies to the warm start given to [`solve`], and to the last trajectory in [`resume`]. Crocoddyl keeps such a
+    /// start, so reproducing its iterates needs `false`. With either value, a solution that violates a bound is never
+    /// [`Converged`].
     ///
     /// [`solve`]: crate::Fddp::solve
     /// [`resume`]: crate::Fddp::resume
     /// [`Converged`]: crate::Status::Converged
     pub project_warm_start: bool,
-    /// The time that a solve may take; `None` for no limit. The first iteration always runs, unless the budget is zero.
-    /// A later phase (derivatives, a sweep, a trial; on several threads derivatives and sweep together) starts only if it
-    /// would end in time. Its duration is predicted as the median of the last five of its kind, of all solves, so that one
-    /// or two delays do not shorten later solves. A solve that takes longer reports
-    /// [`Timings::overrun`](crate::Timings::overrun): the budget is shorter than an iteration, or something delayed it. A
-    /// solve that goes back to a better iterate may take a sweep longer.
+    /// Time limit of a solve; `None` for no limit. The first iteration always runs, unless the budget is zero. A later
+    /// phase (derivatives, a sweep, a trial; with several threads, derivatives and sweep together) starts only if it is
+    /// predicted to end in time. The prediction is the median of the last five durations of that phase, over all
+    /// solves, so one or two delays do not shorten later solves. A solve that takes longer reports
+    /// [`Timings::overrun`](crate::Timings::overrun): the budget is shorter than an iteration, or something delayed it.
+    /// A solve that restores a better iterate may need one more sweep.
     pub time_budget: Option<Duration>,
-    /// The number of segments of the horizon on which a sweep works at the same time: see [`Sweep::set_segments`]. It is
-    /// not the number of threads, which are those of rayon's pool, and any number of them finds the same. At most 1024.
+    /// Number of segments of the horizon that a sweep processes at the same time: see [`Sweep::set_segments`]. It is
+    /// independent of the number of threads, which belong to rayon's pool; any number of threads gives the same result.
+    /// At most 1024.
     ///
     /// [`Sweep::set_segments`]: crate::Sweep::set_segments
     pub segments: usize,
-    /// Threads that share an iteration, of rayon's pool in which a solve is called, else of the global one: derivatives, and
-    /// beside them the sweep, which stays on the calling thread, and the gains; and a second step length where the first is
-    /// often too long. Any number finds the same to the last bit. More than 1 need copies of the actions ([`fork`]), which are
-    /// made when there are none yet, or not of a model as it is now. At most 1024.
+    /// Number of threads that share an iteration, at most 1024. They belong to the rayon pool in which a solve is
+    /// called, otherwise to the global one. They compute derivatives and gains while the calling thread sweeps, and try
+    /// a second step length when the first is often too long. The result is the same to the last bit for any number.
+    /// More than 1 needs copies of the actions ([`fork`]), which are made when they are missing or a model has changed.
     ///
     /// [`fork`]: crate::ActionModel::fork
     pub threads: usize,
     /// Number of step lengths tried, 2⁻ⁿ for n = 0, 1, ….
     pub step_lengths: usize,
-    /// A step is accepted if the cost falls by more than this times the expected decrease.
+    /// Fraction of the expected decrease by which the cost must fall for a step to be accepted.
     pub accept: f64,
-    /// While there are gaps, a step that was expected to raise the cost is accepted if the cost rises by less than
-    /// this times what was expected.
+    /// Factor for steps that are expected to raise the cost, while gaps exist: such a step is accepted if the cost
+    /// rises by less than this times the expected rise.
     pub accept_ascent: f64,
-    /// Any step that was expected to lower the cost is accepted if |d₁| is below this.
+    /// Bound on |d₁| below which any step that is expected to lower the cost is accepted.
     pub flat: f64,
     /// Regularisation of the first iteration.
     pub regularisation_start: f64,
-    /// Least regularisation.
+    /// Smallest regularisation.
     pub regularisation_min: f64,
     /// Largest regularisation; a solve that reaches it stops.
     pub regularisation_max: f64,
     /// Factor by which the regularisation rises and falls.
     pub regularisation_factor: f64,
-    /// The regularisation falls after a step longer than this.
+    /// Step length above which the regularisation falls.
     pub regularisation_decrease_above: f64,
-    /// The regularisation rises after a step of this length or shorter.
+    /// Step length at or below which the regularisation rises.
     pub regularisation_increase_below: f64,
 }
 
-/// The most segments, and the most threads: each has memory of its own.
+/// Maximum number of segments and of threads: each has its own memory.
 const MOST_AT_ONCE: usize = 1024;
 
 /// `MOST_AT_ONCE` in words.
@@ -144,7 +148,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Whether gaps count in what a step should gain.
+    /// Returns whether gaps count in the expected improvement of a step.
     pub(super) fn counts_gaps(&self, feasible: bool) -> bool {
         !feasible && self.method == DdpMethod::Fddp
     }
@@ -152,7 +156,7 @@ impl Settings {
     /// Checks the settings, as each solve does.
     ///
     /// # Errors
-    /// [`Error::Setting`] for the first field that makes no sense.
+    /// [`Error::Setting`] for the first invalid field.
     pub fn check(&self) -> Result<(), Error> {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         let from_zero = |x: f64| x >= 0.0 && x.is_finite();

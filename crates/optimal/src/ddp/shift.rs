@@ -6,17 +6,17 @@ use crate::lq::{LqNode, Sweep};
 use crate::problem::Problem;
 
 impl Fddp {
-    /// Makes the solution a warm start for a problem that was [shifted](Problem::shift) by a knot since: states, controls
-    /// and gains move one knot to the front, and the last control is repeated (it is zero where the number of controls
-    /// changes). Allocates nothing unless numbers of controls differ along the horizon.
+    /// Turns the solution into a warm start for a problem that has been [shifted](Problem::shift) by one knot since.
+    /// States, controls and gains move one knot to the front, and the last control is repeated (it is zero where the
+    /// number of controls changes). Allocates only if the number of controls differs along the horizon.
     ///
-    /// The last state follows from the last control, x_N = φ(x_{N−1}, u_{N−1}), if the trajectory is that of a solve that
-    /// took a step, or of a warm start. At each further shift without such a solve in between the last state is repeated,
-    /// x_N = x_{N−1}, and the next solve closes the gap. Nothing stabilises a rollout by repeated controls, so the end of
-    /// the horizon would diverge exponentially while solves run out of time.
+    /// The last state follows from the last control, x_N = φ(x_{N−1}, u_{N−1}), if the trajectory comes from a warm
+    /// start or from a solve that took a step. At each further shift without such a solve, the last state is repeated,
+    /// x_N = x_{N−1}, and the next solve closes the gap. Nothing stabilises a rollout with repeated controls: without
+    /// this rule, the end of the horizon would diverge exponentially while solves run out of time.
     ///
     /// # Errors
-    /// [`Error`] if the numbers of knots, states and controls are not those of the last problem, shifted once.
+    /// [`Error`] if the numbers of knots, states and controls differ from the last problem, shifted once.
     pub fn shift(&mut self, problem: &mut Problem) -> Result<(), Error> {
         let (old, new) = (self.solution.shape(), problem.shape());
         let (horizon, ndx) = (new.horizon(), new.ndx);
@@ -48,7 +48,7 @@ impl Fddp {
         if !std::mem::take(&mut self.renewed) {
             return Ok(()); // x_N = x_{N−1}
         }
-        // x_N = φ(x_{N−1}, u_{N−1}), if that is a state
+        // x_N = φ(x_{N−1}, u_{N−1}), if it is a valid state
         let new = problem.shape();
         let (x, u, end) = (new.x(horizon - 1), new.u(horizon - 1), new.x(horizon));
         let next = &mut self.next[..end.len()];

@@ -1,5 +1,5 @@
-//! Solutions: the trajectory, its feedback, how the solve ended and what happened on the way.
-#![allow(non_snake_case)] // K beside k, the names of the literature
+//! Solutions: the trajectory, its feedback, the outcome of the solve and a record of its iterations.
+#![allow(non_snake_case)] // K besides k: names of the literature
 
 use crate::problem::{Problem, Shape};
 use core::fmt;
@@ -9,40 +9,43 @@ use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::time::Duration;
 
-/// The outcome of a solve. Whatever it says, the [`Solution`] holds the best iterate found: a converged one; else, of those
-/// from which a step could be computed and of the last one, the one with the smallest gap, and among equals that of least
-/// cost. An iterate within the bounds on controls precedes a warm start outside. An iterate has diverged, and is no candidate,
-/// if its cost exceeds the lowest of the solve by more than 1e8·(1 + |lowest|).
+/// Outcome of a solve. Whatever the status, the [`Solution`] holds the best iterate found. A converged iterate is the
+/// best. Otherwise the candidates are the last iterate and all iterates from which a step could be computed. Among them
+/// the iterate with the smallest gap is the best, and among equal gaps the one with the lowest cost. An iterate within
+/// the bounds on controls precedes a warm start outside. An iterate has diverged, and is not a candidate, if its cost
+/// exceeds the lowest of the solve by more than 1e8·(1 + |lowest|).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Status {
-    /// The iterate has no gaps and the expected decrease of its cost is below the tolerance.
+    /// The iterate has no gaps, and the expected decrease of its cost is below the tolerance.
     Converged,
-    /// The allowed iterations are spent.
+    /// The maximum number of iterations is reached.
     MaxIterations,
-    /// The time allowed is over, or what is left of it is too short to go on.
+    /// The time limit is reached, or the remaining time is too short to continue.
     TimeLimit,
     /// An [`Observer`](crate::Observer) has ended the solve.
     Interrupted,
     /// The regularisation reached its largest value: no descent direction or no acceptable step was found.
     RegularisationLimit,
-    /// The penalty reached its limit and constraints are still violated. This proves nothing: another warm start, or a
-    /// larger penalty, may find a solution. [`Outcome::worst`](crate::Outcome::worst) is the largest violation.
+    /// The penalty reached its limit, and constraints are still violated. This is not a proof of infeasibility: another
+    /// warm start, or a larger penalty, may lead to a solution. [`Outcome::worst`](crate::Outcome::worst) is the
+    /// largest violation.
     ConstraintsViolated,
-    /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof: the initial state x̂₀ itself violates a
-    /// constraint of knot 0 that is known to depend on no control: a built-in residual of the state alone. The solution is that under the other constraints, as far as the
-    /// solve came.
+    /// No solution exists, and [`Outcome::worst`](crate::Outcome::worst) is the proof: the initial state x̂₀ itself
+    /// violates a constraint of knot 0 that no control can change, such as a built-in residual of the state alone. The
+    /// solution satisfies the other constraints, as far as the solve progressed.
     Infeasible,
-    /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so that no direction can be computed. The
-    /// solution is the best iterate before it; if it is the warm start itself, its cost may be infinite. States and controls
-    /// are finite. Another warm start may help, such as x̂₀ held still ([`Problem::quasi_static`](crate::Problem::quasi_static)).
+    /// Cost, dynamics or derivatives of the last iterate are infinite or NaN, so no direction can be computed. The
+    /// solution is the best iterate before it. If that is the warm start itself, its cost may be infinite. States and
+    /// controls are finite. Another warm start may help, such as x̂₀ held still
+    /// ([`Problem::quasi_static`](crate::Problem::quasi_static)).
     NotFinite,
 }
 
 impl Status {
-    /// Returns the name, as files and Python have it: `"converged"`, `"max_iterations"` and so on.
+    /// Returns the name used in files and in Python: `"converged"`, `"max_iterations"` and so on.
     pub fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
@@ -73,58 +76,59 @@ impl fmt::Display for Status {
     }
 }
 
-/// A record of one iteration.
+/// Record of one iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Iteration {
-    /// Its number, from 0.
+    /// Index of the iteration, from 0.
     pub iteration: usize,
     /// Cost of the iterate after the step.
     pub cost: f64,
     /// Largest gap, ‖f‖∞, of the iterate before the step.
     pub gap: f64,
-    /// |d₁ + ½ d₂|, the decrease of the cost expected of the full step; compared with the tolerance.
+    /// |d₁ + ½ d₂|, the expected decrease of the cost by the full step, which is compared with the tolerance.
     pub stop: f64,
-    /// The step length α tried last, which is the accepted one if one was.
+    /// Step length α tried last; if a step was accepted, its length.
     pub step: f64,
     /// Regularisation after the iteration.
     pub regularisation: f64,
-    /// Slope of the expected change: the cost should fall by α (d₁ + ½ α d₂).
+    /// Slope of the expected change: the expected decrease of the cost is α (d₁ + ½ α d₂).
     pub d1: f64,
     /// Curvature of the expected change.
     pub d2: f64,
-    /// The decrease of the cost with the step tried last.
+    /// Actual decrease of the cost by the step tried last.
     pub decrease: f64,
-    /// The decrease that was expected.
+    /// Expected decrease of the cost by the step tried last.
     pub expected_decrease: f64,
     /// Whether the iterate after the step satisfies the dynamics.
     pub feasible: bool,
-    /// Whether a step was accepted; if not, the iterate is as before.
+    /// Whether a step was accepted; otherwise the iterate is unchanged.
     pub accepted: bool,
 }
 
-/// Durations of the phases of a solve: of an [`AugmentedLagrangian`](crate::AugmentedLagrangian) of all inner solves together.
+/// Durations of the phases of a solve. For an [`AugmentedLagrangian`](crate::AugmentedLagrangian) they cover all inner
+/// solves together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Timings {
     /// Dynamics and cost of the warm start.
     pub calc: Duration,
-    /// Derivatives; on several threads, as long as the sweep beside them waited or computed some itself.
+    /// Derivatives. With several threads, the time in which the sweep waited for derivatives or computed some itself.
     pub calc_diff: Duration,
     /// Backward sweeps, repeated ones included.
     pub sweep: Duration,
     /// Trial rollouts of the line searches, accepted or not.
     pub rollout: Duration,
-    /// The whole solve, observer included.
+    /// Whole solve, observer included.
     pub total: Duration,
-    /// The time beyond [`Settings::time_budget`](crate::Settings::time_budget), zero if the solve ended in time: above zero
-    /// where the budget is shorter than the first iteration, or a phase lasted longer than predicted. A budget of zero asks
-    /// for no iteration, and is never overrun.
+    /// Time beyond [`Settings::time_budget`](crate::Settings::time_budget), zero if the solve ended in time. It is
+    /// positive if the budget is shorter than the first iteration, or a phase took longer than predicted. A budget of
+    /// zero requests no iteration, and is never overrun.
     #[cfg_attr(feature = "serde", serde(default))]
     pub overrun: Duration,
 }
 
-/// Adds the phases of another part of the same solve. `total` and `overrun` are set at its end.
+/// Adds the phases of another part of the same solve. `total` and `overrun` are set at the end of the solve.
 impl AddAssign for Timings {
     fn add_assign(&mut self, part: Self) {
         self.calc += part.calc;
@@ -135,7 +139,7 @@ impl AddAssign for Timings {
 }
 
 impl Timings {
-    /// Sets the duration of the whole solve, and its excess over a budget.
+    /// Sets the duration of the whole solve, and the time beyond the budget.
     pub(crate) fn end(&mut self, total: Duration, budget: Option<Duration>) {
         self.total = total;
         let budget = budget.filter(|budget| !budget.is_zero());
@@ -143,39 +147,39 @@ impl Timings {
     }
 }
 
-/// The result of a solve. One that is read from a file is checked: its parts have the lengths of one horizon.
+/// Result of a solve. Reading one from a file checks that the lengths of its parts fit one horizon.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(remote = "Self"))] // the fields; the implementations below check them
+#[cfg_attr(feature = "serde", serde(remote = "Self"))] // serde reads the fields; the implementations below check them
 pub struct Solution {
     /// States x₀ … x_N, flat: (N + 1)·nx.
     pub xs: Vec<f64>,
     /// Controls u₀ … u_{N−1}, flat.
     pub us: Vec<f64>,
-    /// Feedback gains of the last sweep, per knot nu × ndx: uₜ + Kₜ (x ⊖ xₜ) is the control near the trajectory.
+    /// Feedback gains of the last sweep, per knot nu × ndx: near the trajectory the control is uₜ + Kₜ (x ⊖ xₜ).
     #[cfg_attr(feature = "serde", serde(deserialize_with = "crate::read::matrices"))]
     pub K: Vec<DMatrix<f64>>,
-    /// Feed-forward of the last sweep, per knot nu: the full step it asked for.
+    /// Feed-forward terms of the last sweep, per knot nu: the full step of the controls.
     pub k: Vec<DVector<f64>>,
-    /// Cost of the trajectory; infinite if it is not a number.
+    /// Cost of the trajectory; infinite if it is NaN.
     pub cost: f64,
-    /// Largest gap of the trajectory, ‖f‖∞; infinite if it is not a number.
+    /// Largest gap of the trajectory, ‖f‖∞; infinite if it is NaN.
     pub gap: f64,
     /// Whether the trajectory satisfies the dynamics: it is a plain rollout from x̂₀.
     pub feasible: bool,
     /// Regularisation at the end.
     pub regularisation: f64,
-    /// The outcome of the solve.
+    /// Outcome of the solve.
     pub status: Status,
-    /// A record per iteration.
+    /// Record of each iteration.
     pub trace: Vec<Iteration>,
-    /// The times of its phases.
+    /// Durations of the phases.
     pub timings: Timings,
     shape: Shape,
 }
 
 impl Solution {
-    /// Zeros for a problem that is yet to be solved.
+    /// Creates a solution of zeros for a problem that is not yet solved.
     pub(crate) fn new(problem: &Problem) -> Self {
         let shape = problem.shape().clone();
         let horizon = shape.horizon();
@@ -195,7 +199,7 @@ impl Solution {
         }
     }
 
-    /// The state xₜ, t = 0 … N.
+    /// Returns the state xₜ, t = 0 … N.
     ///
     /// # Panics
     /// If t > N.
@@ -206,7 +210,7 @@ impl Solution {
         &self.xs[self.shape.x(t)]
     }
 
-    /// The control uₜ, t = 0 … N − 1.
+    /// Returns the control uₜ, t = 0 … N − 1.
     ///
     /// # Panics
     /// If t ≥ N.
@@ -217,8 +221,8 @@ impl Solution {
         &self.us[self.shape.u(t)]
     }
 
-    /// Drops the first knot, and makes room at the end for one with the shape that `shape` has there: a copy of the last
-    /// state and, where it fits, the last control; the gains there are zero.
+    /// Drops the first knot and appends one at the end, with its dimensions in `shape`. The new knot copies the last
+    /// state and, if its size fits, the last control; its gains are zero.
     pub(crate) fn shift(&mut self, shape: &Shape) {
         let (nx, last, ndx) = (shape.nx, shape.horizon() - 1, shape.ndx);
         self.xs.copy_within(nx.., 0);
@@ -255,7 +259,7 @@ impl Solution {
         }
     }
 
-    /// Whether some control lies on a bound.
+    /// Returns whether a control lies on a bound.
     pub(crate) fn touches_bounds(&self, problem: &Problem) -> bool {
         (0..self.shape.horizon()).any(|t| {
             problem.action(t).bounds(t).is_some_and(|(lower, upper)| {
@@ -265,7 +269,7 @@ impl Solution {
         })
     }
 
-    /// Whether all controls are within their bounds.
+    /// Returns whether all controls are within their bounds.
     pub(crate) fn is_bounded(&self, problem: &Problem) -> bool {
         (0..self.shape.horizon()).all(|t| {
             problem.action(t).bounds(t).is_none_or(|(lower, upper)| {
@@ -275,7 +279,7 @@ impl Solution {
         })
     }
 
-    /// Says which part of a solution from a file has not the length that its horizon asks for.
+    /// Checks that each part of a solution from a file has the length that its horizon requires.
     #[cfg(feature = "serde")]
     fn check(&self) -> Result<(), String> {
         self.shape.check_itself()?;

@@ -1,19 +1,19 @@
-//! Quadratic programs with bounds, by projected Newton steps.
+//! Quadratic programs with bounds, solved by projected Newton steps.
 #![allow(non_snake_case)] // the names of the literature
 
 use condyle_linalg::{SLACK, dot, eliminate, solve_right};
 use nalgebra::DMatrix;
 
-/// Newton steps by Crocoddyl's rule, and as many by the careful one.
+/// Maximum number of Newton steps by Crocoddyl's rule, and then by the careful rule.
 const STEPS: usize = 100;
 
-/// Converged when no entry of the gradient on the free variables is larger.
+/// Largest gradient entry of the free variables at which the iteration has converged.
 const GRADIENT: f64 = 1e-5;
 
-/// A step length is taken if the objective falls by more than this times what its slope says.
+/// Fraction of the decrease predicted by the slope that a step must reach to be accepted.
 const ACCEPT: f64 = 0.1;
 
-/// Step lengths tried, 2⁻ⁿ.
+/// Number of step lengths tried, 2⁻ⁿ.
 const STEP_LENGTHS: i32 = 10;
 
 /// Workspace for
@@ -23,27 +23,27 @@ const STEP_LENGTHS: i32 = 10;
 /// ```
 ///
 /// by the method of Tassa, Mansard, Todorov (ICRA 2014, section III), with the rules and constants of Crocoddyl's box
-/// solvers: a variable is clamped where it lies on a bound that the gradient pushes it against, the others are free and
-/// make a Newton step, cut off at the bounds.
+/// solvers. A variable is clamped if it lies on a bound and the gradient pushes it outwards. The others are free and
+/// make a Newton step, which is clamped at the bounds.
 ///
-/// Crocoddyl's rule for a step counts the slope of the free variables with the wrong sign, so that a step may raise the
-/// objective. It mostly converges all the same, and then to the same last set of clamped variables; where it goes round in
-/// circles (18 of the 600 problems of the test below), the rule of the paper takes over.
+/// In Crocoddyl's rule for a step, the slope of the free variables has the wrong sign, so a step may raise the
+/// objective. It usually converges nevertheless, to the same set of clamped variables. Where it cycles (18 of the 600
+/// problems of the test below), the rule of the paper is used.
 #[derive(Debug, Clone)]
 pub(crate) struct BoxQp {
     pub(crate) x: Vec<f64>,
-    /// Indices of the variables that the last Newton step moved, in order.
+    /// Indices of the variables that the last Newton step moved, in ascending order.
     pub(crate) free: Vec<usize>,
     gradient: Vec<f64>,
     step: Vec<f64>,
     trial: Vec<f64>,
-    /// [H_ff; g_fᵀ] of the free variables, and scratch for its factor.
+    /// [H_ff; g_fᵀ] of the free variables, and scratch for the factor of H_ff.
     H: Vec<f64>,
     upper: Vec<f64>,
 }
 
 impl BoxQp {
-    /// Room for `size` variables.
+    /// Allocates the workspace for `size` variables.
     pub(crate) fn new(size: usize) -> Self {
         Self {
             x: vec![0.0; size],
@@ -56,10 +56,10 @@ impl BoxQp {
         }
     }
 
-    /// Solves from `start`, moved into the bounds; x and `free` are the result.
+    /// Solves from `start`, moved into the bounds. The results are x and `free`.
     ///
     /// # Errors
-    /// The variable and the pivot, if H is not positive definite on the free variables.
+    /// The variable and the pivot, if the block of H of the free variables is not positive definite.
     pub(crate) fn solve(
         &mut self,
         H: &DMatrix<f64>,
@@ -96,7 +96,7 @@ impl BoxQp {
         Ok(())
     }
 
-    /// Δx_f = −H_ff⁻¹ g_f,   Δx = 0 for the clamped.
+    /// Computes Δx_f = −H_ff⁻¹ g_f,   Δx = 0 for the clamped variables.
     fn newton_step(&mut self, H: &DMatrix<f64>) -> Result<(), (usize, f64)> {
         let Self { free, gradient, step, H: work, upper, .. } = self;
         let (count, stride) = (free.len(), free.len() + 1 + SLACK);
@@ -117,7 +117,7 @@ impl BoxQp {
         Ok(())
     }
 
-    /// Takes the longest good step, if there is one, by the rule of the paper if `careful`, else by Crocoddyl's.
+    /// Takes the longest good step, if one exists: by the rule of the paper if `careful`, else by Crocoddyl's rule.
     fn line_search(&mut self, H: &DMatrix<f64>, q: &[f64], lower: &[f64], upper: &[f64], careful: bool) {
         let m = q.len();
         if !careful {
@@ -141,7 +141,7 @@ impl BoxQp {
     }
 }
 
-/// ½ xᵀ H x + qᵀ x.
+/// Returns ½ xᵀ H x + qᵀ x.
 fn objective(H: &DMatrix<f64>, q: &[f64], x: &[f64]) -> f64 {
     let curvature: f64 = H.column_iter().zip(x).map(|(column, xj)| xj * dot(column.as_slice(), x)).sum();
     0.5 * curvature + dot(q, x)

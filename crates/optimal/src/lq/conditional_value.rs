@@ -1,15 +1,15 @@
-//! Conditional value functions: the cost of a segment of a horizon, for every state at its start and whatever comes after
+//! Conditional value functions: the cost of a segment of a horizon, for every state at its start and every cost after
 //! its end.
 //!
-//! Let x be the state at the first knot of a segment and z that after its last one. The least cost of the segment plus
-//! λᵀz, with a multiplier λ as a parameter, is quadratic in both,
+//! Let x be the state at the first knot of a segment and z the state after its last knot. The lowest cost of the
+//! segment plus λᵀz, with a multiplier λ as a parameter, is quadratic in x and λ:
 //!
 //! ```text
 //! V(x, λ) = ½ xᵀPx + pᵀx + λᵀ(Θ x + θ) − ½ λᵀC λ + const
 //! ```
 //!
-//! and with P = 0, p = 0, Θ = 1, θ = 0, C = 0 behind the segment, the elimination of a Riccati step gives it knot by knot, if
-//! λ has rows below H ([`Sweep`](crate::Sweep) has the rest):
+//! The recursion starts after the segment with P = 0, p = 0, Θ = 1, θ = 0, C = 0. The elimination of a Riccati step
+//! then computes it knot by knot, if rows for λ are appended below H (notation as in [`Sweep`](crate::Sweep)):
 //!
 //! ```text
 //! ⎡ H       ⎤      ⎡ L  ·   ⎤      Y = Θ⁺B L⁻ᵀ,   Θ = Θ⁺A − Y Xᵀ
@@ -17,16 +17,17 @@
 //! ⎣ Θ⁺[B A] ⎦      ⎣ Y  Θ   ⎦      C = C⁺ + Y Yᵀ
 //! ```
 //!
-//! The best z is ∂V/∂λ = Θ x + θ − C λ. If what comes after is worth ½ zᵀP₁z + p₁ᵀz, its multiplier is λ = P₁z + p₁; with
-//! both eliminated, P₁ = L Lᵀ and M = 1 + LᵀC L, the value function at the start of the segment has
+//! The optimal z is ∂V/∂λ = Θ x + θ − C λ. If the cost after the segment is ½ zᵀP₁z + p₁ᵀz, its multiplier is λ = P₁z +
+//! p₁. Eliminate both, with P₁ = L Lᵀ and M = 1 + LᵀC L. The value function at the start of the segment then has
 //!
 //! ```text
 //! P₀ = P + (ΘᵀL) M⁻¹ (ΘᵀL)ᵀ,      p₀ = p + Θᵀp₁ + (ΘᵀL) M⁻¹ Lᵀ(θ − C p₁)
 //! ```
 //!
 //! Särkkä and García-Fernández, "Temporal parallelization of dynamic programming and linear quadratic control" (IEEE
-//! TAC, 2023), call V a conditional value function, and have it of x and z; Jallet, Dantec, Arlaud, Mansard, Carpentier,
-//! "Parallel and proximal constrained linear-quadratic methods for real-time nonlinear MPC" (RSS 2024), of x and λ.
+//! TAC, 2023), call V a conditional value function, with x and z as variables. Jallet, Dantec, Arlaud, Mansard,
+//! Carpentier, "Parallel and proximal constrained linear-quadratic methods for real-time nonlinear MPC" (RSS 2024), use
+//! x and λ.
 #![allow(non_snake_case)] // the names of the literature
 
 use super::node::LqNode;
@@ -36,7 +37,7 @@ use condyle_linalg::{
     product_of_upper_lower, product_with_upper, transpose,
 };
 
-/// A value function; P is symmetric and full, with slack rows.
+/// Value function; P is symmetric and full, with padding rows.
 #[derive(Debug, Clone)]
 pub(crate) struct Value {
     pub(crate) P: Vec<f64>,
@@ -44,7 +45,7 @@ pub(crate) struct Value {
 }
 
 impl Value {
-    /// Zeros for n states.
+    /// Creates the value function zero for n states.
     pub(crate) fn zeros(n: usize) -> Self {
         Self { P: vec![0.0; (n + SLACK) * n], p: vec![0.0; n] }
     }
@@ -55,26 +56,26 @@ impl Value {
     }
 }
 
-/// The part of a conditional value function that depends on the multiplier; P and p are in the [`Step`] of the segment.
-/// Matrices have slack rows.
+/// Part of a conditional value function that depends on the multiplier; P and p are in the [`Step`] of the segment.
+/// Matrices have padding rows.
 #[derive(Debug, Clone)]
 pub(crate) struct SegmentValue {
-    /// Θ.
+    /// Matrix Θ.
     Theta: Vec<f64>,
-    /// θ.
+    /// Vector θ.
     theta: Vec<f64>,
-    /// The lower triangle of C.
+    /// Lower triangle of C.
     C: Vec<f64>,
 }
 
 impl SegmentValue {
-    /// Zeros for n states.
+    /// Creates zeros for n states.
     pub(crate) fn zeros(n: usize) -> Self {
         let square = || vec![0.0; (n + SLACK) * n];
         Self { Theta: square(), theta: vec![0.0; n], C: square() }
     }
 
-    /// Finds P, p, Θ, θ and C of a segment from its nodes; says whether all Quu were positive definite.
+    /// Computes P, p, Θ, θ and C of a segment from its nodes; returns whether all Quu were positive definite.
     pub(crate) fn run(&mut self, step: &mut Step, nodes: &[LqNode], regularisation: f64) -> bool {
         let (n, ld) = (self.theta.len(), self.theta.len() + SLACK);
         let work = &mut step.work;
@@ -87,7 +88,7 @@ impl SegmentValue {
         nodes.iter().rev().all(|node| self.step(step, node, regularisation))
     }
 
-    /// The step of one knot; says whether Quu was positive definite.
+    /// Makes the step of one knot; returns whether Quu was positive definite.
     fn step(&mut self, step: &mut Step, node: &LqNode, regularisation: f64) -> bool {
         let (n, m) = (node.ndx(), node.nu());
         let (ldt, last) = (n + SLACK, m + n);
@@ -104,7 +105,7 @@ impl SegmentValue {
         for j in 0..n {
             work.P[j * ldt + j] += regularisation;
         }
-        // Θ, with its columns turned back, and Y
+        // Θ, with its columns rotated back, and Y
         let (below, split) = (&work.H[last + 1..], n - turn);
         copy_matrix(&mut Theta[turn * ldt..], ldt, View::new(&below[m * ld..], ld), [n, split]);
         if turn > 0 {
@@ -120,20 +121,20 @@ impl SegmentValue {
     }
 }
 
-/// The link from the value function at the end of a segment to that at its start, with its scratch. Matrices have slack
-/// rows, and the stride n + 1 + SLACK.
+/// Link from the value function at the end of a segment to the value function at its start, with scratch. Matrices have
+/// padding rows, and the stride n + 1 + SLACK.
 #[derive(Debug, Clone)]
 pub(crate) struct Link {
     /// C, both triangles.
     C: Vec<f64>,
     L: Vec<f64>,
-    /// Lᵀ, with its zeros.
+    /// Lᵀ, including its zeros.
     upper: Vec<f64>,
     /// C L.
     CL: Vec<f64>,
-    /// (C L)ᵀ, and then [Θ, θ − C p₁]ᵀ.
+    /// (C L)ᵀ, and later [Θ, θ − C p₁]ᵀ.
     rows: Vec<f64>,
-    /// [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ]; with the stride 2n + 1 + SLACK.
+    /// [M ·; ΘᵀL −P₀; (θ − C p₁)ᵀL −p₀ᵀ], with the stride 2n + 1 + SLACK.
     H: Vec<f64>,
 }
 
@@ -144,8 +145,9 @@ impl Link {
         Self { C: square(), L: square(), upper: square(), CL: square(), rows: square(), H }
     }
 
-    /// Finds L of P₁ = L Lᵀ, and its transpose; says whether there is one. Where states cost nothing P₁ may be singular, and
-    /// then rounding decides whether a pivot is positive: a second try has a little more on the diagonal.
+    /// Computes L of P₁ = L Lᵀ, and its transpose; returns whether the factorisation exists. If some states cost
+    /// nothing, P₁ may be singular, and rounding decides whether a pivot is positive. A second try therefore adds a
+    /// little to the diagonal.
     fn factorise(&mut self, P: &[f64], n: usize) -> bool {
         let (ld, ldp) = (n + 1 + SLACK, n + SLACK);
         let mut largest = 0.0_f64;
@@ -168,8 +170,8 @@ impl Link {
         false
     }
 
-    /// Finds the value function `start` at the start of a segment with P, p in `step`, from the one at its `end`; says
-    /// whether that one is convex.
+    /// Computes the value function `start` at the start of a segment with P, p in `step`, from the value function at
+    /// its `end`. Returns whether the latter is convex.
     pub(crate) fn run(&mut self, step: &Step, segment: &SegmentValue, end: &Value, start: &mut Value) -> bool {
         let (n, work) = (end.p.len(), &step.work);
         let (ld, ldp, ldh) = (n + 1 + SLACK, n + SLACK, 2 * n + 1 + SLACK);
@@ -195,7 +197,7 @@ impl Link {
         }
         product_with_upper(&mut H[n..], ldh, [n + 1, n], View::new(rows, ld), upper);
 
-        // −P and −(p + Θᵀp₁), from which the elimination subtracts what is to be added to P and p
+        // −P and −(p + Θᵀp₁): the elimination subtracts from them what must be added to P and p
         for j in 0..n {
             let (H, P) = (&mut H[(n + j) * ldh + n..][..n + 1], &work.P[j * ldp..][..n]);
             for i in j..n {

@@ -1,34 +1,34 @@
-//! The gains of knots in inverse-dynamics form, from what the elimination of their unknowns left.
+//! Gains of knots in inverse-dynamics form, from the result of the elimination of their unknowns.
 #![allow(non_snake_case)] // the names of the literature, and Y, U
 
 use super::node::{LqKnot, LqNode};
 use condyle_linalg::{SLACK, View, add_product_vector, copy_matrix, eliminate_rows, transpose};
 
-/// The computation of gains, with its scratch. From [L; X; yᵀ], what is left of the columns of the unknowns w, and the
-/// controls' δu = U (w, δx),
+/// Computation of gains, with its scratch. Its input is [L; X; yᵀ], the eliminated columns of the unknowns w, and the
+/// controls δu = U (w, δx):
 ///
 /// ```text
 /// Y = U_w L⁻ᵀ,     K = U_x − Y Xᵀ,     k = −Y y
 /// ```
 ///
-/// No other knot waits for it: a sweep on several threads leaves it to those that have nothing else to do.
+/// No other knot needs the gains, so a sweep on several threads leaves them to idle threads.
 #[derive(Debug, Clone)]
 pub(crate) struct Gains {
-    /// U over (w, δv, δq), and then [Y K]. With slack rows.
+    /// U over (w, δv, δq), and later [Y K], with padding rows.
     rows: Vec<f64>,
-    /// [L; X; yᵀ] of a knot of which they were put off. With slack rows.
+    /// [L; X; yᵀ] of a knot whose gains were deferred, with padding rows.
     left: Vec<f64>,
-    /// See [`take_gains`].
+    /// Scratch of [`take_gains`].
     y: Vec<f64>,
 }
 
 impl Gains {
-    /// Scratch for knots of n states and at most m controls.
+    /// Allocates the scratch for knots of n states and at most m controls.
     pub(super) fn new(n: usize, m: usize) -> Self {
         Self { rows: vec![0.0; (m + SLACK) * (m + n)], left: Vec::new(), y: vec![0.0; 2 * m + SLACK] }
     }
 
-    /// The same, with room for gains that were put off.
+    /// Allocates the same scratch, with storage for deferred gains.
     pub(super) fn to_finish(n: usize, m: usize) -> Self {
         Self { left: vec![0.0; (m + n + 1 + SLACK) * m], ..Self::new(n, m) }
     }
@@ -42,7 +42,7 @@ impl Gains {
         take_gains(View::new(rows, ld), left.at(all, 0), node, knot, y);
     }
 
-    /// Keeps [L; X; yᵀ] in the knot, for [`finish`](Self::finish).
+    /// Stores [L; X; yᵀ] in the knot, for [`finish`](Self::finish).
     pub(super) fn put_off(left: View<'_>, node: &LqNode, knot: &mut LqKnot) {
         let (n, m) = (node.ndx(), node.nu());
         copy_matrix(knot.Quu.as_mut_slice(), m, left, [m, m]);
@@ -50,7 +50,7 @@ impl Gains {
         copy_matrix(knot.Qu.as_mut_slice(), 1, left.at(m + n, 0), [1, m]);
     }
 
-    /// Writes the gains of those knots of which they were put off.
+    /// Writes the gains of all knots whose gains were deferred.
     pub(crate) fn finish(&mut self, nodes: &[LqNode], knots: &mut [LqKnot]) {
         let mut left = core::mem::take(&mut self.left);
         for (node, knot) in nodes.iter().zip(knots).filter(|(_, knot)| knot.is_put_off) {
@@ -66,8 +66,8 @@ impl Gains {
     }
 }
 
-/// Writes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k, from rows [Y K] over (w, δv, δq) and yᵀ; `scratch` has twice as many
-/// numbers as there are controls, and slack.
+/// Computes K, and k = −Y y,   Quᵀk = −yᵀy = −kᵀQuu k, from rows [Y K] over (w, δv, δq) and yᵀ. The length of `scratch`
+/// is twice the number of controls, plus padding.
 pub(super) fn take_gains(rows: View<'_>, yt: View<'_>, node: &LqNode, knot: &mut LqKnot, scratch: &mut [f64]) {
     let (n, m) = (node.ndx(), node.nu());
     let (nv, K) = (n / 2, knot.K.as_mut_slice());

@@ -1,39 +1,40 @@
-//! The equations of a knot in which accelerations and contact forces take the place of the controls.
+//! Equations of a knot in which accelerations and contact forces replace the controls.
 
 use condyle_linalg::{SLACK, SparseRows};
 
-/// The rows over (w, δv, δq) of a knot; see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the part of
-/// `Q` for δq are those of the node; of its `A`, `B`, `S` and `R` nothing is used.
+/// Rows of a knot over (w, δv, δq); see [`InverseDynamics`](super::forms::InverseDynamics). `r`, `q` and the block of
+/// `Q` for δq are taken from the node; its `A`, `B`, `S` and `R` are not used.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct InverseDynamicsForm {
     /// Whether the solver can use the equations.
     pub(crate) wanted: bool,
-    /// Whether the action wrote the equations, in place of A and B.
+    /// Whether the action wrote the equations, instead of A and B.
     pub(crate) active: bool,
-    /// The motion of the knot (q̈, and the forces of its contacts), as the rollout that led to it found it.
+    /// Motion of the knot (q̈, and the forces of its contacts), as computed by the rollout that led to it.
     pub(crate) motion: Vec<f64>,
-    /// Whether it is that of the point of the derivatives.
+    /// Whether `motion` belongs to the point at which derivatives are computed.
     pub(crate) knows_motion: bool,
-    /// The distance from a row to the next, in all rows.
+    /// Distance between consecutive rows, the same for all rows.
     pub(crate) stride: usize,
-    /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, how many.
+    /// Runs of coordinates that are unknowns: the first coordinate, the first unknown, and the number of both.
     pub(crate) own: Vec<[usize; 3]>,
-    /// The other coordinates.
+    /// Other coordinates, in ascending order.
     pub(crate) dependent: Vec<usize>,
-    /// U: δu = U (w, δv, δq). Its masks are not written: not every form reads them.
+    /// U: δu = U (w, δv, δq). Its masks are not written, because not every form reads them.
     pub(crate) efforts: SparseRows,
-    /// D, a row for each dependent coordinate.
+    /// D, one row for each dependent coordinate.
     pub(crate) steps: SparseRows,
     /// G: the gradients of residuals that depend on more than δq.
     pub(crate) costs: SparseRows,
-    /// a′ and a″, the slope and the curvature of the cost by each of these residuals.
+    /// a′ and a″, first and second derivative of the cost with respect to each of these residuals.
     pub(crate) slopes: Vec<[f64; 2]>,
-    /// The diagonals of Q for δv and of R, one after the other.
+    /// Diagonals of Q for δv and of R, one after the other.
     pub(crate) diagonal: Vec<f64>,
 }
 
 impl InverseDynamicsForm {
-    /// Room for a node of nv coordinates and nu controls with at most so many dependent coordinates and rows of costs.
+    /// Allocates the form for a node of nv coordinates and nu controls, with a maximum number of dependent coordinates
+    /// and of rows of costs.
     pub(crate) fn reserve(&mut self, nv: usize, nu: usize, [dependent, costs]: [usize; 2]) {
         self.stride = nu + 2 * nv + SLACK;
         self.own.reserve(nv);
@@ -45,7 +46,7 @@ impl InverseDynamicsForm {
         }
     }
 
-    /// Takes U and D out, for as long as G is written.
+    /// Takes U and D out while G is being written.
     pub(crate) fn lend(&mut self) -> Self {
         let Self { wanted, active, stride, .. } = *self;
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
@@ -53,7 +54,7 @@ impl InverseDynamicsForm {
         core::mem::replace(self, Self { wanted, active, stride, costs, slopes, diagonal, ..Self::default() })
     }
 
-    /// Puts back what [`lend`](Self::lend) took out.
+    /// Puts back the parts that [`lend`](Self::lend) took out.
     pub(crate) fn take_back(&mut self, lent: Self) {
         let (costs, slopes) = (core::mem::take(&mut self.costs), core::mem::take(&mut self.slopes));
         let diagonal = core::mem::take(&mut self.diagonal);

@@ -1,4 +1,4 @@
-//! The linear-quadratic problem, which is all that a solver sees of a horizon, and the sweep that solves it.
+//! Linear-quadratic problem, which is all that a solver knows of a horizon, and the sweep that solves it.
 
 mod box_qp;
 mod conditional_value;

@@ -1,4 +1,4 @@
-//! The knots of a linear-quadratic problem, and what a sweep finds at them.
+//! Knots of a linear-quadratic problem, and the results of a sweep at them.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …, K, Vxx
 
 use super::inverse_dynamics_form::InverseDynamicsForm;
@@ -7,24 +7,24 @@ use crate::error::assert_length;
 use core::fmt;
 use nalgebra::{DMatrix, DVector};
 
-/// Beyond this a value has diverged and the sweep or the trial is given up.
+/// Absolute value beyond which a number has diverged; the sweep or trial is then abandoned.
 pub(crate) const DIVERGED: f64 = 1e30;
 
-/// One knot of a linear-quadratic problem in the changes δx (ndx), δu (nu):
+/// Knot of a linear-quadratic problem in the changes δx (ndx), δu (nu):
 ///
 /// ```text
 /// minimise   Σₜ ½ δxᵀQδx + δxᵀSδu + ½ δuᵀRδu + qᵀδx + rᵀδu    subject to   δx⁺ = A δx + B δu + f
 /// ```
 ///
-/// and to lower ≤ δu ≤ upper. Q and R are symmetric, with both triangles filled. At the terminal knot (nu = 0) only Q
-/// and q are read.
+/// with lower ≤ δu ≤ upper. Q and R are symmetric, with both triangles filled. At the terminal knot (nu = 0) only Q and
+/// q are read.
 #[derive(Clone, PartialEq)]
 pub struct LqNode {
     /// ∂x⁺/∂x, ndx × ndx.
     pub A: DMatrix<f64>,
     /// ∂x⁺/∂u, ndx × nu.
     pub B: DMatrix<f64>,
-    /// The gap: the predicted next state ⊖ the next state of the trajectory, ndx. Written by the solver.
+    /// Gap: the predicted next state ⊖ the next state of the trajectory, ndx. Written by the solver.
     pub f: DVector<f64>,
     /// ∂²ℓ/∂x², ndx × ndx.
     pub Q: DMatrix<f64>,
@@ -36,17 +36,17 @@ pub struct LqNode {
     pub q: DVector<f64>,
     /// ∂ℓ/∂u, nu.
     pub r: DVector<f64>,
-    /// Least δu, nu; −∞ for none. Written by the solver.
+    /// Lower bound of δu, nu; −∞ for none. Written by the solver.
     pub lower: DVector<f64>,
-    /// Greatest δu, nu; ∞ for none. Written by the solver.
+    /// Upper bound of δu, nu; ∞ for none. Written by the solver.
     pub upper: DVector<f64>,
-    /// The form of A and B, as far as it is known.
+    /// Structure of A and B, as far as it is known.
     pub structure: Structure,
-    /// The equations of inverse dynamics, which stand for A, B, S, R and part of Q where solver and action can use them.
+    /// Equations of inverse dynamics, which replace A, B, S, R and part of Q if solver and action support them.
     pub(crate) inverse_dynamics: InverseDynamicsForm,
 }
 
-/// Shows what a user writes, and not the scratch of the sweep.
+/// Formats the fields that a user writes, without the scratch of the sweep.
 impl fmt::Debug for LqNode {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { A, B, f: gap, Q, S, R, q, r, lower, upper, structure, .. } = self;
@@ -58,13 +58,13 @@ impl fmt::Debug for LqNode {
 }
 
 impl LqNode {
-    /// The most states, and the most controls: a knot has matrices of them.
+    /// Maximum number of states, and of controls: it bounds the size of a knot's matrices.
     pub const MOST_SIZE: usize = 4096;
 
-    /// A knot of zeros with ndx states and nu controls without bounds.
+    /// Creates a knot of zeros with ndx states and nu controls without bounds.
     ///
     /// # Panics
-    /// If a number is above [`MOST_SIZE`](Self::MOST_SIZE).
+    /// If ndx or nu is above [`MOST_SIZE`](Self::MOST_SIZE).
     #[track_caller]
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         let most = Self::MOST_SIZE;
@@ -85,17 +85,17 @@ impl LqNode {
         }
     }
 
-    /// The number of states, ndx.
+    /// Returns the number of states, ndx.
     pub fn ndx(&self) -> usize {
         self.q.len()
     }
 
-    /// The number of controls, nu.
+    /// Returns the number of controls, nu.
     pub fn nu(&self) -> usize {
         self.r.len()
     }
 
-    /// Whether a control has a bound.
+    /// Returns whether a control has a bound.
     pub(crate) fn is_bounded(&self) -> bool {
         self.lower.iter().chain(&self.upper).any(|bound| bound.is_finite())
     }
@@ -127,13 +127,13 @@ fn assert_shape(name: &str, matrix: &DMatrix<f64>, shape: (usize, usize)) {
     assert!(matrix.shape() == shape, "`{name}` has shape {:?}, expected {shape:?}", matrix.shape());
 }
 
-/// The result of a sweep at one knot: the feedback δu = k + K δx, and the value function
-/// V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx + const of the rest of the horizon.
+/// Result of a sweep at one knot: the feedback δu = k + K δx, and the value function V(δx) = ½ δxᵀ Vxx δx + Vxᵀ δx +
+/// const of the rest of the horizon.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LqKnot {
     /// Feedback gain −Quu⁻¹ Qux, nu × ndx; zero for a control at its bound.
     pub K: DMatrix<f64>,
-    /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the δu that is best at δx = 0.
+    /// Feed-forward −Quu⁻¹ Qu, nu; with bounds, the optimal δu at δx = 0.
     pub k: DVector<f64>,
     /// Gradient of the value function at δx = 0, ndx.
     pub Vx: DVector<f64>,
@@ -143,14 +143,15 @@ pub struct LqKnot {
     pub Qu: DVector<f64>,
     /// R + BᵀVxx⁺B with the regularisation on its diagonal; nu × nu, symmetric.
     pub Quu: DMatrix<f64>,
-    /// Quᵀk and kᵀQuu k: what a full step is expected to change of the cost, to first and (twice) to second order.
+    /// Quᵀk and kᵀQuu k: the change of the cost that a full step is expected to make, to first order and (twice) to
+    /// second order.
     pub expected: [f64; 2],
-    /// Whether K, Qu and Quu hold what K and k follow from instead: see [`Gains`](super::gains::Gains).
+    /// Whether K, Qu and Quu store the data from which K and k are computed later: see [`Gains`](super::gains::Gains).
     pub(super) is_put_off: bool,
 }
 
 impl LqKnot {
-    /// A knot of zeros with ndx states and nu controls.
+    /// Creates a knot of zeros with ndx states and nu controls.
     pub(crate) fn zeros(ndx: usize, nu: usize) -> Self {
         Self {
             K: DMatrix::zeros(nu, ndx),
@@ -165,7 +166,7 @@ impl LqKnot {
     }
 }
 
-/// The second derivatives of a function ψ(δx, δu) of one knot; see
+/// Second derivatives of a function ψ(δx, δu) of one knot; see
 /// [`dynamics_hessian`](crate::ActionModel::dynamics_hessian).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hessian {
@@ -178,7 +179,7 @@ pub struct Hessian {
 }
 
 impl Hessian {
-    /// Zeros for ndx states and nu controls.
+    /// Creates zeros for ndx states and nu controls.
     #[track_caller]
     pub fn zeros(ndx: usize, nu: usize) -> Self {
         Self { xx: DMatrix::zeros(ndx, ndx), xu: DMatrix::zeros(ndx, nu), uu: DMatrix::zeros(nu, nu) }

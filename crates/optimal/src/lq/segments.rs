@@ -1,9 +1,8 @@
-//! The backward sweep in several segments of the horizon at the same time.
+//! Backward sweep in several segments of the horizon at the same time.
 //!
-//! To work on S segments at a time, the horizon of N knots is cut into S + 1. A step of a conditional value function
-//! ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as a step of a sweep, so the last segment is
-//! longer than the others by half. The time, counted in steps of a sweep, is
-//!
+//! To process S segments at a time, the horizon of N knots is cut into S + 1. A step of a conditional value function
+//! ([`conditional_value`](super::conditional_value)) takes 1 to 1½ times as long as a step of a sweep. The last segment
+//! is therefore one and a half times as long as the others. The time, counted in steps of a sweep, is
 //! ```text
 //! segment            0      1 … S − 1     S
 //! at the same time          conditional   sweep         1½ N / (S + 1½)
@@ -11,12 +10,13 @@
 //! at the same time   sweep  sweep                       N / (S + 1½)
 //! ```
 //!
-//! The cuts and the operations depend on S and not on the number of threads, which share the segments among them: results
-//! are the same to the last bit for any number.
+//! The cuts and the operations depend on S, not on the number of threads that share the segments. The results are
+//! therefore the same to the last bit for any number of threads.
 //!
-//! A link loses digits where C and the value function are large, which is where controls cost next to nothing. So at the end
-//! the value function with which a segment was swept is compared with the one that the sweep of the next segment found at
-//! the same knot. If they differ by more than rounding, or if anything failed before, the horizon is swept again as one.
+//! A link loses digits if C and the value function are large, which happens where controls cost next to nothing. At the
+//! end, the value function with which a segment was swept is therefore compared with the one that the sweep of the next
+//! segment computed at the same knot. If they differ by more than rounding, or if anything failed before, the horizon
+//! is swept again as one.
 #![allow(non_snake_case)] // the names of the literature
 
 use super::conditional_value::{Link, SegmentValue, Value};
@@ -25,11 +25,11 @@ use super::step::{Sizes, Step, SweepError};
 use condyle_linalg::{SLACK, max_abs, threads};
 use core::ops::Range;
 
-/// The largest difference, relative to the largest entry, between the value function with which a segment was swept and the
-/// one that was found in the next segment: the accuracy of a sweep, and a thousand times what robots show.
+/// Largest accepted difference between the value function with which a segment was swept and the one computed in the
+/// next segment, relative to the largest entry. Chosen as the accuracy of a sweep; robots show a thousandth of it.
 const CONSISTENT: f64 = 1e-9;
 
-/// The segments of a horizon.
+/// Segments of a horizon.
 #[derive(Debug, Clone)]
 pub(crate) struct Segments {
     /// All segments, in the order of the horizon; at least three.
@@ -37,25 +37,25 @@ pub(crate) struct Segments {
     link: Link,
 }
 
-/// A segment, with its workspace.
+/// Segment, with its workspace.
 #[derive(Debug, Clone)]
 struct Segment {
-    /// The knots of the segment.
+    /// Knots of the segment.
     knots: Range<usize>,
     step: Step,
-    /// The conditional value function, together with the P and p of the step.
+    /// Conditional value function, together with the P and p of the step.
     value: SegmentValue,
-    /// The value function at the knot after the segment.
+    /// Value function at the knot after the segment.
     end: Value,
-    /// The outcome of the sweep.
+    /// Outcome of the sweep.
     result: Result<(), SweepError>,
-    /// Whether the conditional value function was found.
+    /// Whether the conditional value function was computed.
     good: bool,
 }
 
 impl Segments {
-    /// The segments for working on `at_once` of them at a time, in a horizon of `horizon` knots of such sizes; `None` if that
-    /// is one, or the horizon too short for two.
+    /// Creates the segments for processing `at_once` of them at a time, in a horizon of `horizon` knots with the sizes
+    /// `sizes`. Returns `None` if `at_once` is one or the horizon too short for two.
     pub(super) fn new(at_once: usize, horizon: usize, sizes: Sizes) -> Option<Self> {
         let at_once = at_once.min(horizon.saturating_sub(2));
         if at_once < 2 {
@@ -73,13 +73,13 @@ impl Segments {
         Some(Self { all: (0..=at_once).map(segment).collect(), link: Link::new(sizes.n) })
     }
 
-    /// Whether a segment may contain a node: not where controls are bounded, since then the value function is not quadratic
-    /// in a multiplier.
+    /// Returns whether a segment may contain a node. It may not if controls are bounded, since the value function is
+    /// then not quadratic in a multiplier.
     fn serve(node: &LqNode) -> bool {
         !node.is_bounded()
     }
 
-    /// The sweep; `None` if it must be done as one.
+    /// Sweeps the horizon; returns `None` if it must be swept as one.
     pub(crate) fn run(
         &mut self,
         nodes: &[LqNode],
@@ -110,7 +110,7 @@ impl Segments {
         self.all.windows(2).all(consistent).then_some(Ok(()))
     }
 
-    /// Finds the value function at the end of each segment but the last; says whether it did.
+    /// Computes the value function at the end of each segment except the last; returns whether this succeeded.
     fn link(&mut self) -> bool {
         let Self { all, link } = self;
         let last = all.len() - 1;
@@ -129,7 +129,7 @@ impl Segments {
 }
 
 impl Value {
-    /// Whether P, p equal Vxx, Vx but for rounding; false for a NaN.
+    /// Returns whether P, p equal Vxx, Vx up to rounding; false for NaN.
     fn is_near(&self, Vxx: &[f64], Vx: &[f64]) -> bool {
         let n = Vx.len();
         let near = |a: &[f64], b: &[f64], scale: f64| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= CONSISTENT * scale);
@@ -139,23 +139,23 @@ impl Value {
     }
 }
 
-/// The pass that a task makes over a segment.
+/// Pass of a task over a segment.
 #[derive(Clone, Copy)]
 enum Pass {
-    /// The sweep of the last segment, and the conditional value function of others.
+    /// Sweep of the last segment, and conditional value function of the others.
     Begin,
-    /// The sweep, from the value function at the end of the segment.
+    /// Sweep, from the value function at the end of the segment.
     Finish,
 }
 
-/// A task that is done for each of some segments.
+/// Task that is done for each of some segments.
 #[derive(Clone, Copy)]
 struct SegmentTask<'a> {
     pass: Pass,
-    /// The nodes of the whole horizon.
+    /// Nodes of the whole horizon.
     nodes: &'a [LqNode],
     regularisation: f64,
-    /// Whether segments are shared among threads.
+    /// Whether threads share the segments.
     parallel: bool,
 }
 
@@ -165,7 +165,7 @@ impl SegmentTask<'_> {
         self.run(segments, &mut knots[segments[0].knots.start..]);
     }
 
-    /// Does the task for consecutive segments; `knots` begin with those of the first one.
+    /// Does the task for consecutive segments; `knots` begin with the knots of the first segment.
     fn run(self, segments: &mut [Segment], knots: &mut [LqKnot]) {
         if let [segment] = segments {
             return self.run_one(segment, knots);

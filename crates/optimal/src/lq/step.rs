@@ -5,41 +5,42 @@ use super::forms::{Controls, Curvature, Driven, Forms, InverseDynamics};
 use super::node::{Hessian, LqKnot, LqNode};
 use super::workspace::Workspace;
 
-/// Why a sweep stopped before the first knot.
+/// Reason why a sweep stopped before the first knot.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SweepError {
-    /// Quu has a pivot that is not positive: the problem is not convex in the control there. More regularisation helps.
+    /// Quu has a pivot that is not positive: the problem is not convex in the control at that knot. More regularisation
+    /// helps.
     #[error("knot {knot}: Quu is not positive definite (pivot {row} is {pivot:e})")]
     NotPositive {
-        /// The knot.
+        /// Index of the knot.
         knot: usize,
-        /// The row of the pivot.
+        /// Row of the pivot.
         row: usize,
-        /// Its value.
+        /// Value of the pivot.
         pivot: f64,
     },
-    /// The value function is infinite, NaN, or beyond 1e30.
+    /// The value function is infinite, NaN, or larger than 1e30.
     #[error("knot {knot}: the value function is not finite")]
     NotFinite {
-        /// The knot.
+        /// Index of the knot.
         knot: usize,
     },
 }
 
-/// The largest numbers of states and controls of some nodes, and what they need for inverse dynamics.
+/// Largest numbers of states and controls of some nodes, and their requirements for inverse dynamics.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
-    /// The number of states.
+    /// Number of states.
     pub(super) n: usize,
-    /// The largest number of controls.
+    /// Largest number of controls.
     pub(super) m: usize,
-    /// See [`InverseDynamics::room`].
+    /// Requirements as returned by [`InverseDynamics::room`].
     inverse_dynamics: [usize; 3],
 }
 
 impl Sizes {
-    /// The sizes of some nodes.
+    /// Returns the sizes of some nodes.
     pub(super) fn of(nodes: &[LqNode]) -> Self {
         Self {
             n: nodes.last().map_or(0, LqNode::ndx),
@@ -48,29 +49,29 @@ impl Sizes {
         }
     }
 
-    /// The most controls of knots in inverse-dynamics form: 0 if there is no such knot.
+    /// Returns the maximum number of controls of knots in inverse-dynamics form: 0 without such knots.
     pub(super) fn solved_controls(self) -> usize {
         if self.inverse_dynamics[0] > 0 { self.m } else { 0 }
     }
 }
 
-/// A step of the recursion, with its workspace.
+/// Step of the recursion, with its workspace.
 #[derive(Debug, Clone)]
 pub(crate) struct Step {
     pub(super) work: Workspace,
     /// Whether Vxx is written to the knots.
     pub(super) keep: bool,
-    /// Whether gains are left to others, where a form allows it: see [`Gains`](super::gains::Gains).
+    /// Whether gains are deferred, if a form supports it: see [`Gains`](super::gains::Gains).
     pub(super) puts_off: bool,
     forms: Forms,
     controls: Controls,
-    /// The curvature of the dynamics, one for each number of controls that nodes with curvature have.
+    /// Curvature of the dynamics, one entry for each number of controls that occurs at nodes with curvature.
     hessians: Vec<Hessian>,
 }
 
 impl Step {
-    /// Room for nodes of such sizes, and in H for `below` more rows. The dynamics may be curved at nodes with one of the
-    /// numbers of controls `curved`.
+    /// Allocates the workspace for nodes of the given sizes, with `below` additional rows in H. The dynamics may be
+    /// curved at nodes whose number of controls is in `curved`.
     pub(super) fn new(sizes: Sizes, below: usize, mut curved: Vec<usize>) -> Self {
         let Sizes { n, m, inverse_dynamics } = sizes;
         curved.sort_unstable();
@@ -85,7 +86,7 @@ impl Step {
         }
     }
 
-    /// Sweeps the end of a horizon, of which the first node is knot `first` and the last the terminal one.
+    /// Sweeps the end of a horizon. The first node is knot `first`, and the last node is the terminal one.
     pub(crate) fn run(
         &mut self,
         first: usize,
@@ -100,7 +101,7 @@ impl Step {
         self.back(first, &nodes[..last], knots, regularisation, curvature)
     }
 
-    /// Makes the steps at `nodes`, of which the first is knot `first`, from P, p of the knot after them.
+    /// Makes the steps at `nodes`, whose first is knot `first`, from P, p of the knot after them.
     pub(crate) fn back(
         &mut self,
         first: usize,
@@ -117,7 +118,7 @@ impl Step {
         Ok(())
     }
 
-    /// Makes one step: P, p of knot t + 1 become those of knot t, and the gains of knot t are written.
+    /// Makes one step: P, p of knot t + 1 become P, p of knot t, and the gains of knot t are written.
     fn step(
         &mut self,
         t: usize,
@@ -143,8 +144,8 @@ impl Step {
         Ok(())
     }
 
-    /// Writes H of a node, and below it Θ times the map to δx⁺. Returns the workspace that holds it, and how the states are
-    /// turned there.
+    /// Writes H of a node, and below it the product of Θ and the map to δx⁺. Returns the workspace that contains it,
+    /// and the rotation of the states there.
     pub(super) fn write_with_rows_below(
         &mut self,
         node: &LqNode,

@@ -1,27 +1,27 @@
-//! The form of a knot's A and B, which a sweep may know beforehand.
+//! Structure of a knot's A and B, which a sweep may exploit.
 #![allow(non_snake_case)] // A, B, T, E
 
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// The most rows of a block: those of a free joint.
+/// Maximum number of rows of a block, needed by a free joint.
 pub(crate) const LARGEST_BLOCK: usize = 6;
 
-/// The form of the A and B of an [`LqNode`](crate::LqNode).
+/// Structure of the A and B of an [`LqNode`](crate::LqNode).
 ///
-/// Nothing is known of them unless the action says what, each time that it differentiates. With x = (q, v), nv numbers each
-/// for a change of q and of v, and the next state by semi-implicit Euler from an acceleration a(x, u),
+/// The structure is unknown unless the action sets it, each time that it differentiates. Let x = (q, v), with nv
+/// numbers each for a change of q and of v. The next state follows by semi-implicit Euler from an acceleration a(x, u):
 ///
 /// ```text
 /// v⁺ = v + a Δt,   q⁺ = q ⊕ v⁺ Δt:      A = ⎡ T 0 ⎤ + ⎡ Δt E ⎤ A_v,   B = ⎡ Δt E ⎤ B_v
 ///                                           ⎣ 0 0 ⎦   ⎣   1  ⎦           ⎣   1  ⎦
 /// ```
 ///
-/// where A_v, B_v are the last nv rows of A and B, and T = ∂(q ⊕ δ)/∂q, E = ∂(q ⊕ δ)/∂δ at δ = v⁺ Δt are the identity but
-/// for a block for each joint whose configurations are no vector space. A sweep that knows this multiplies with A_v and B_v
-/// alone: half the operations.
+/// where A_v, B_v are the last nv rows of A and B. T = ∂(q ⊕ δ)/∂q and E = ∂(q ⊕ δ)/∂δ at δ = v⁺ Δt are the identity,
+/// except for one block per joint whose configurations are not a vector space. A sweep that knows this multiplies only
+/// by A_v and B_v, with half the operations.
 ///
-/// A and B hold all of their entries nevertheless; the form is a promise about them, which is not checked.
+/// A and B must nevertheless contain all of their entries. The structure is a promise about them, which is not checked.
 ///
 /// # Examples
 /// ```
@@ -35,15 +35,15 @@ pub(crate) const LARGEST_BLOCK: usize = 6;
 /// ```
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Structure {
-    /// Δt, if the form is known.
+    /// Δt, if the structure is known.
     dt: Option<f64>,
     blocks: Vec<EulerBlock>,
 }
 
-/// The blocks of T and E of one joint; see [`Structure`].
+/// Blocks of T and E of one joint; see [`Structure`].
 #[derive(Debug, Clone, PartialEq)]
 pub struct EulerBlock {
-    /// The first row and column of the block.
+    /// First row and column of the block.
     pub(crate) start: usize,
     /// ∂(q ⊕ δ)/∂q.
     pub T: DMatrix<f64>,
@@ -52,13 +52,14 @@ pub struct EulerBlock {
 }
 
 impl Structure {
-    /// Sets that nothing is known of A and B. Keeps the memory of blocks.
+    /// Sets the structure to unknown. Keeps the memory of blocks.
     pub fn set_dense(&mut self) {
         self.dt = None;
     }
 
-    /// Sets the form of semi-implicit Euler steps of `dt` seconds, in which T and E are the identity but for a block over each
-    /// range of at most six rows and columns. Returns the blocks, to be written. Allocates them at the first call.
+    /// Sets the structure of semi-implicit Euler steps of `dt` seconds. T and E are the identity, except for a block
+    /// over each range of at most six rows and columns. Returns the blocks, which the caller must write. Allocates them
+    /// at the first call.
     pub fn set_euler(&mut self, dt: f64, ranges: &[Range<usize>]) -> &mut [EulerBlock] {
         self.dt = Some(dt);
         let fits = |(block, range): (&EulerBlock, &Range<usize>)| block.range() == *range;
@@ -72,14 +73,14 @@ impl Structure {
         &mut self.blocks
     }
 
-    /// Δt and the blocks, if the form is that of semi-implicit Euler.
+    /// Returns Δt and the blocks, if the structure is semi-implicit Euler.
     pub(crate) fn euler(&self) -> Option<(f64, &[EulerBlock])> {
         Some((self.dt?, &self.blocks))
     }
 }
 
 impl EulerBlock {
-    /// The rows and columns of the block.
+    /// Returns the rows and columns of the block.
     pub(crate) fn range(&self) -> Range<usize> {
         self.start..self.start + self.T.nrows()
     }

@@ -1,30 +1,30 @@
-//! The workspace of a step of the sweep.
+//! Workspace of a step of the sweep.
 #![allow(non_snake_case)] // the names of the literature: P, F, W, H
 
 use super::node::{DIVERGED, LqKnot, LqNode};
 use condyle_linalg::{SLACK, View, add_scaled_product, copy_matrix, copy_symmetric_turned, copy_with_squares};
 
-/// The value function of the next knot, ½ δxᵀP δx + pᵀδx, and the quadratic form H that a step makes of it. Matrices are
-/// column-major with slack rows; P has the stride n + SLACK, the others that of [`stride`](Self::stride).
+/// Value function of the next knot, ½ δxᵀP δx + pᵀδx, and the quadratic form H that a step computes from it. Matrices
+/// are column-major with padding rows. P has the stride n + SLACK; the others have the stride [`stride`](Self::stride).
 #[derive(Debug, Clone)]
 pub(crate) struct Workspace {
     /// Vxx⁺, symmetric and full.
     pub(crate) P: Vec<f64>,
-    /// Vx⁺, and then Vx⁺ + Vxx⁺ f.
+    /// Vx⁺, and later Vx⁺ + Vxx⁺ f.
     pub(crate) p: Vec<f64>,
     /// [B A]ᵀ, or the same of their last rows, in the order of the columns of H.
     pub(crate) F: Vec<f64>,
-    /// The product of P with [B A], transposed, and others of its kind.
+    /// Product of P with [B A], transposed, and similar products.
     pub(crate) W: Vec<f64>,
-    /// The quadratic form: [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ], its lower triangle, with rows below it that a segment makes use of, or
+    /// Lower triangle of the quadratic form [Hᵤᵤ ·; Hₓᵤ Hₓₓ; gᵤᵀ gₓᵀ]. The rows below it are used by a segment, or hold
     /// the map from the unknowns and δx to the controls.
     pub(crate) H: Vec<f64>,
-    /// The number of rows below the quadratic form.
+    /// Number of rows below the quadratic form.
     below: usize,
 }
 
 impl Workspace {
-    /// Room for knots with n states and at most m controls, and in H for `below` more rows.
+    /// Allocates the workspace for knots with n states and at most m controls, with `below` additional rows in H.
     pub(crate) fn new(n: usize, m: usize, below: usize) -> Self {
         let stride = m + n + 1 + below + SLACK;
         Self {
@@ -37,33 +37,33 @@ impl Workspace {
         }
     }
 
-    /// The stride of F, W and H at a knot with m controls: their m + n + 1 rows, those below, and slack.
+    /// Returns the stride of F, W and H at a knot with m controls: m + n + 1 rows, the rows below, and padding.
     pub(crate) fn stride(&self, m: usize) -> usize {
         m + self.p.len() + 1 + self.below + SLACK
     }
 
-    /// P, p = Q, q of the terminal knot.
+    /// Sets P, p = Q, q of the terminal knot.
     pub(crate) fn start(&mut self, node: &LqNode) {
         let n = node.ndx();
         self.p.copy_from_slice(node.q.as_slice());
         copy_matrix(&mut self.P, n + SLACK, View::new(node.Q.as_slice(), n), [n, n]);
     }
 
-    /// p += P f, the gradient at the predicted state.
+    /// Adds P f to p, which becomes the gradient at the predicted state.
     pub(crate) fn move_by(&mut self, f: &[f64]) {
         if f.iter().any(|f| *f != 0.0) {
             add_scaled_product(&mut self.p, 1.0, View::new(&self.P, f.len() + SLACK), f);
         }
     }
 
-    /// P, p = Vxx, Vx of an H (stride `ld`) whose first `eliminated` columns are eliminated and whose states are turned by
-    /// `turn`.
+    /// Sets P, p = Vxx, Vx from H (stride `ld`), whose first `eliminated` columns are eliminated and whose states are
+    /// rotated by `turn`.
     pub(crate) fn take_value(&mut self, ld: usize, eliminated: usize, turn: usize) {
         let Self { P, p, H, .. } = self;
         let n = p.len();
         let states = &H[eliminated * (ld + 1)..];
         copy_symmetric_turned(P, n + SLACK, View::new(states, ld), n, turn);
-        let (after, before) = p.split_at_mut(turn); // the states in H before and after the turn
+        let (after, before) = p.split_at_mut(turn); // states in H after and before the wrap-around
         let mut at = n;
         for part in [before, after] {
             for p in part {
@@ -73,7 +73,8 @@ impl Workspace {
         }
     }
 
-    /// Adds ϱ 1 to P, and writes p, and P if it is to be kept, to the knot; says whether they are finite and have not diverged.
+    /// Adds ϱ 1 to P. Writes p to the knot, and P if `keep` is set. Returns whether they are finite and have not
+    /// diverged.
     pub(crate) fn finish_value(&mut self, knot: &mut LqKnot, regularisation: f64, keep: bool) -> bool {
         let Self { P, p, .. } = self;
         let (n, stride) = (p.len(), p.len() + SLACK);
@@ -83,6 +84,6 @@ impl Workspace {
         let (Vx, Vxx) = (knot.Vx.as_mut_slice(), if keep { knot.Vxx.as_mut_slice() } else { &mut [] });
         let squares = copy_with_squares(Vxx, n, View::new(P, stride), [n, n]);
         let squares = squares + copy_with_squares(Vx, n, View::new(p, n), [n, 1]);
-        squares < DIVERGED * DIVERGED // false for a NaN
+        squares < DIVERGED * DIVERGED // false for NaN
     }
 }

@@ -1,35 +1,35 @@
-//! The actions of a horizon, in the hands of one thread.
+//! Actions of a horizon, used by one thread.
 
 use super::action::ActionModel;
 
-/// The actions of all knots: a problem's own, or copies of them.
+/// Actions of all knots: a problem's own, or copies of them.
 pub(crate) struct Actors<'a> {
-    /// The initial state x̂₀.
+    /// Initial state x̂₀.
     pub(super) x0: &'a [f64],
-    /// The model of each knot, and the action that stands for each model.
+    /// Model of each knot, and the action that represents each model.
     pub(super) stages: &'a [usize],
     pub(super) places: &'a [[usize; 2]],
     pub(super) actions: Actions<'a>,
 }
 
-/// Whose actions they are.
+/// Source of the actions.
 pub(super) enum Actions<'a> {
-    /// The problem's, with the terminal one.
+    /// Actions of the problem, and its terminal action.
     Own(&'a mut [Box<dyn ActionModel>], &'a mut dyn ActionModel),
-    /// Copies, one of each action; there is none of the terminal one.
+    /// Copies, one of each action except the terminal one.
     Copied(&'a mut [Option<Box<dyn ActionModel>>]),
 }
 
-/// What [`Problem::two`](super::Problem::two) sees to, and those that work with copies.
+/// Message for a violated condition that [`Problem::two`](super::Problem::two) and the users of copies guarantee.
 const COPIED: &str = "copies serve the knots before the terminal one";
 
 impl Actors<'_> {
-    /// The initial state x̂₀.
+    /// Returns the initial state x̂₀.
     pub(crate) fn x0(&self) -> &[f64] {
         self.x0
     }
 
-    /// The action of knot t.
+    /// Returns the action of knot t.
     pub(crate) fn action(&self, t: usize) -> &dyn ActionModel {
         let place = self.stages.get(t).map(|stage| self.places[*stage][0]);
         match (&self.actions, place) {
@@ -39,7 +39,7 @@ impl Actors<'_> {
         }
     }
 
-    /// As [`action`](Self::action), to compute with.
+    /// Returns the action of knot t, for computing.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
         let place = self.stages.get(t).map(|stage| self.places[*stage][0]);
         match (&mut self.actions, place) {

@@ -8,27 +8,27 @@ use condyle_spatial::Scalar;
 use num_dual::HyperDual64;
 use std::any::Any;
 
-/// The dynamics x⁺ = φₜ(x, u) and the cost ℓₜ(x, u) of a knot, written for any [`Scalar`], so that [`AutoDiff`] makes an
-/// action of it. The rules for [`ActionModel`]s hold here too.
+/// Dynamics x⁺ = φₜ(x, u) and cost ℓₜ(x, u) of a knot, written for any [`Scalar`]. [`AutoDiff`] turns them into an
+/// action. The rules for [`ActionModel`]s apply here too.
 pub trait GenericAction: Any + Send + Sync {
-    /// The number of entries of a state x.
+    /// Returns the number of entries of a state x.
     fn nx(&self) -> usize;
 
-    /// The number of entries of a change of state δx; nx unless the state lives on a manifold.
+    /// Returns the number of entries of a change of state δx; nx unless the state lives on a manifold.
     fn ndx(&self) -> usize {
         self.nx()
     }
 
-    /// The number of entries of a control u; zero at a terminal knot.
+    /// Returns the number of entries of a control u; zero at a terminal knot.
     fn nu(&self) -> usize;
 
-    /// As [`ActionModel::bounds`].
+    /// Returns the bounds, as [`ActionModel::bounds`] does.
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         let _ = t;
         None
     }
 
-    /// Returns a copy that computes the same, as [`ActionModel::fork`]; `None` by default.
+    /// Returns a copy that computes the same, as [`ActionModel::fork`] does; `None` by default.
     fn fork(&self) -> Option<Self>
     where
         Self: Sized,
@@ -36,17 +36,17 @@ pub trait GenericAction: Any + Send + Sync {
         None
     }
 
-    /// x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
+    /// Computes x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
     fn calc<S: Scalar>(&mut self, t: usize, x: &[S], u: &[S], next: &mut [S]) -> S;
 
-    /// x ⊕ δx into `out` (nx); the sum in a vector space.
+    /// Computes x ⊕ δx into `out` (nx), by default the sum of a vector space.
     fn integrate<S: Scalar>(&self, x: &[S], dx: &[S], out: &mut [S]) {
         for ((out, &x), &dx) in out.iter_mut().zip(x).zip(dx) {
             *out = x + dx;
         }
     }
 
-    /// x₁ ⊖ x₀ into `out` (ndx); the difference in a vector space.
+    /// Computes x₁ ⊖ x₀ into `out` (ndx), by default the difference of a vector space.
     fn difference<S: Scalar>(&self, x0: &[S], x1: &[S], out: &mut [S]) {
         for ((out, &x0), &x1) in out.iter_mut().zip(x0).zip(x1) {
             *out = x1 - x0;
@@ -54,17 +54,18 @@ pub trait GenericAction: Any + Send + Sync {
     }
 }
 
-/// An action whose derivatives, first and second ones, are exact: those of [`GenericAction::calc`] by num-dual's hyper-dual
+/// Action with exact first and second derivatives: [`GenericAction::calc`] is differentiated by num-dual's hyper-dual
 /// numbers,
 ///
 /// ```text
 /// f(z + ε₁eᵢ + ε₂eⱼ) = f + ε₁ ∂f/∂zᵢ + ε₂ ∂f/∂zⱼ + ε₁ε₂ ∂²f/∂zᵢ∂zⱼ
 /// ```
 ///
-/// with z = (δx, δu) along ⊕. Costs n (n + 1) / 2 calls for n = ndx + nu, each some ten times that of numbers: for knots of
-/// few states, and to begin with. The Hessian of ℓ is the exact one, not Gauss–Newton's; the curvature of the dynamics
-/// ([`second_order`](crate::Settings::second_order)) is exact too. Allocates nothing but what `calc` does. Source: Fike and
-/// Alonso, *The development of hyper-dual numbers for exact second-derivative calculations* (2011).
+/// with z = (δx, δu) along ⊕. The cost is n (n + 1) / 2 calls for n = ndx + nu, each about ten times as slow as a call
+/// with plain numbers. It is meant for knots of few states, and for first versions. The Hessian of ℓ is the exact one,
+/// not the Gauss–Newton approximation. The curvature of the dynamics ([`second_order`](crate::Settings::second_order))
+/// is exact too. Allocates only if `calc` does. Source: Fike and Alonso, *The development of hyper-dual numbers for
+/// exact second-derivative calculations* (2011).
 ///
 /// # Examples
 /// ```
@@ -105,7 +106,7 @@ pub struct AutoDiff<A> {
 }
 
 impl<A: GenericAction> AutoDiff<A> {
-    /// The action of `action`.
+    /// Creates the action of `action`.
     pub fn new(action: A) -> Self {
         let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
         let zeros = |n| vec![HyperDual64::from(0.0); n];
@@ -121,12 +122,12 @@ impl<A: GenericAction> AutoDiff<A> {
         }
     }
 
-    /// The action that is differentiated, to change it.
+    /// Returns the differentiated action, for changes.
     pub fn action_mut(&mut self) -> &mut A {
         &mut self.action
     }
 
-    /// φ(x, u), from which changes are counted.
+    /// Computes φ(x, u), the reference point of all changes.
     #[track_caller]
     fn start(&mut self, t: usize, x: &[f64], u: &[f64]) {
         assert_length("x", x.len(), self.x.len());
@@ -134,13 +135,13 @@ impl<A: GenericAction> AutoDiff<A> {
         let lift = |to: &mut [HyperDual64], from: &[f64]| (0..to.len()).for_each(|k| to[k] = from[k].into());
         lift(&mut self.x, x);
         lift(&mut self.u, u);
-        lift(&mut self.centre, x); // a terminal action leaves it alone
+        lift(&mut self.centre, x); // a terminal action does not write it
         lift(&mut self.next, x);
         self.dx.fill(0.0.into());
         self.action.calc(t, &self.x, &self.u, &mut self.centre);
     }
 
-    /// ℓ and, in `change`, φ ⊖ φ(x, u), with ε₁ on zᵢ and ε₂ on zⱼ.
+    /// Returns ℓ, with ε₁ on zᵢ and ε₂ on zⱼ; `change` receives φ ⊖ φ(x, u).
     fn along(&mut self, t: usize, i: usize, j: usize) -> HyperDual64 {
         let Self { action, x, moved, dx, u, centre, next, change } = self;
         let ndx = dx.len();

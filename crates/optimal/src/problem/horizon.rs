@@ -1,4 +1,4 @@
-//! The optimal control problem over a horizon of knots.
+//! Optimal control problem over a horizon of knots.
 
 use super::action::ActionModel;
 use super::actors::{Actions, Actors};
@@ -10,15 +10,16 @@ use crate::lq::{Gains, LqKnot, LqNode};
 use std::any::Any;
 use std::ops::{ControlFlow, Range};
 
-/// An optimal control problem in discrete time, with N knots and a terminal one:
+/// Optimal control problem in discrete time, with N knots and a terminal knot:
 ///
 /// ```text
 /// minimise   ℓ_N(x_N) + Σₜ ℓₜ(xₜ, uₜ)      subject to   x₀ = x̂₀,   xₜ₊₁ = φₜ(xₜ, uₜ),   t = 0 … N − 1
 /// ```
 ///
-/// It holds action models, and for each knot the index of its model. Consecutive knots with the same model are asked as one
-/// group; so are those of models of a robot that differ in costs, references and weights only, so that an action for each
-/// knot costs no more than one for all. All models share nx and ndx; nu may differ from model to model.
+/// A problem contains action models, and for each knot the index of its model. Consecutive knots with the same model
+/// are evaluated as one group. This includes models of a robot that differ only in costs, references and weights, so
+/// one action per knot costs no more than one action for all knots. All models share nx and ndx; nu may differ from
+/// model to model.
 ///
 /// Trajectories are flat: `xs` is x₀ … x_N one after the other, (N + 1)·nx numbers; `us` is u₀ … u_{N−1}, each with
 /// the nu of its knot.
@@ -59,22 +60,25 @@ pub struct Problem {
     shape: Shape,
     /// Maximal runs of knots with one action: (action, knots).
     runs: Vec<(usize, Range<usize>)>,
-    /// 0, 1, …, N: the knots of a group are a slice of it.
+    /// 0, 1, …, N; the knots of a group are a slice of it.
     knots: Vec<usize>,
-    /// Copies of the models, for threads.
+    /// Copies of the models, for other threads.
     copies: Copies,
-    /// A place for the next state of the terminal action.
+    /// Output buffer for the next state of the terminal action.
     unread: Vec<f64>,
 }
 
 impl Problem {
-    /// A problem from x̂₀ with knot t served by `models[stages[t]]`, t = 0 … N − 1, and the end by `terminal`.
+    /// Creates a problem that starts at x̂₀. Knot t is served by `models[stages[t]]`, t = 0 … N − 1, and the end by
+    /// `terminal`.
     ///
     /// # Errors
-    /// [`Error`] if the horizon or the state is empty, an index has no model, nx or ndx differ, the terminal model has
-    /// controls, a model that has [no next state](ActionModel::is_end) serves a knot, x̂₀ has a wrong length or an entry that
-    /// is not finite or is no state, a state or the controls of a knot have more than 4096 entries, or there are more than
-    /// 2²⁰ knots or 2²⁸ numbers in the matrices \[A B\] of all of them.
+    /// [`Error`] if
+    /// - the horizon or the state is empty, an index has no model, or nx or ndx differ,
+    /// - the terminal model has controls, or a model that has [no next state](ActionModel::is_end) serves a knot,
+    /// - x̂₀ has a wrong length, has an entry that is not finite, or is an invalid state,
+    /// - a state or the controls of a knot have more than 4096 entries, or
+    /// - there are more than 2²⁰ knots, or 2²⁸ numbers in the matrices \[A B\] of all knots.
     pub fn new(
         x0: Vec<f64>,
         models: Vec<Box<dyn ActionModel>>,
@@ -94,7 +98,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// Finds from the stages where the controls lie and which knots make a run.
+    /// Computes the offsets of the controls and the runs of knots from the stages.
     fn arrange(&mut self) {
         let Self { models, stages, shape: Shape { offsets, .. }, runs, copies, .. } = self;
         runs.clear();
@@ -112,15 +116,16 @@ impl Problem {
         }
     }
 
-    /// Moves the horizon on by a knot, as an MPC does after each step: knot t becomes knot t − 1, with the costs and limits
-    /// that a robot's knot has of its own, and the last one is served by the model `last`, with the costs that it has for
-    /// all knots. The models are [told](ActionModel::shift), and told their knots by the new numbers. Allocates nothing.
+    /// Moves the horizon by one knot, as an MPC does after each step. Knot t becomes knot t − 1 and keeps the costs and
+    /// limits that belong to a robot's knot. The new last knot is served by the model `last`, with the costs that this
+    /// model has for all knots. The models are [notified](ActionModel::shift), and are assigned their knots by the new
+    /// indices. Allocates nothing.
     ///
-    /// The solver's trajectory moves along with [`Fddp::shift`](crate::Fddp::shift).
+    /// [`Fddp::shift`](crate::Fddp::shift) moves the solver's trajectory accordingly.
     ///
     /// # Errors
-    /// [`Error::UnknownModel`] if there is no such model, [`Error::NoNextState`] if it is one of the end; the problem then stays
-    /// as it is.
+    /// [`Error::UnknownModel`] if the model does not exist, [`Error::NoNextState`] if it is only made for the end; the
+    /// problem is then unchanged.
     pub fn shift(&mut self, last: usize) -> Result<(), Error> {
         let horizon = self.horizon();
         if last >= self.models.len() {
@@ -137,27 +142,27 @@ impl Problem {
         Ok(())
     }
 
-    /// The index of the model of each knot.
+    /// Returns the index of the model of each knot.
     pub fn stages(&self) -> &[usize] {
         &self.stages
     }
 
-    /// The number of knots before the terminal one, N.
+    /// Returns the number of knots before the terminal one, N.
     pub fn horizon(&self) -> usize {
         self.stages.len()
     }
 
-    /// The number of entries of a state.
+    /// Returns the number of entries of a state.
     pub fn nx(&self) -> usize {
         self.shape.nx
     }
 
-    /// The number of entries of a change of state.
+    /// Returns the number of entries of a change of state.
     pub fn ndx(&self) -> usize {
         self.shape.ndx
     }
 
-    /// The number of controls of knot t; 0 for the terminal one, t = N.
+    /// Returns the number of controls of knot t; 0 for the terminal one, t = N.
     ///
     /// # Panics
     /// If t > N.
@@ -167,7 +172,7 @@ impl Problem {
         self.shape.nu(t)
     }
 
-    /// The place of uₜ in the flat controls.
+    /// Returns the range of uₜ in the flat controls.
     ///
     /// # Panics
     /// If t > N.
@@ -177,7 +182,7 @@ impl Problem {
         self.shape.u(t)
     }
 
-    /// The initial state x̂₀.
+    /// Returns the initial state x̂₀.
     pub fn x0(&self) -> &[f64] {
         &self.x0
     }
@@ -185,7 +190,7 @@ impl Problem {
     /// Sets the initial state, as an MPC does before each solve.
     ///
     /// # Errors
-    /// [`Error`] if its length is not nx, an entry is not finite, or it is no state; the old one then stays.
+    /// [`Error`] if its length is not nx, an entry is not finite, or it is an invalid state; the old one is then kept.
     pub fn set_x0(&mut self, x0: &[f64]) -> Result<(), Error> {
         Error::check("x0", x0, self.nx())?;
         self.terminal.check_state(x0).map_err(|what| Error::State { name: "x0", knot: 0, what })?;
@@ -193,14 +198,14 @@ impl Problem {
         Ok(())
     }
 
-    /// The action model `index`, if there is one and it is a `T`; to change a reference between solves. Its dimensions
-    /// must stay. Where one action stands for several models, what is changed is this model's.
+    /// Returns the action model `index` as a `T`, if it exists and has that type; for changing a reference between
+    /// solves. Its dimensions must not change. If one action represents several models, only this model is changed.
     pub fn model_mut<T: ActionModel>(&mut self, index: usize) -> Option<&mut T> {
         let model: &mut dyn Any = self.chosen(index)?;
         model.downcast_mut()
     }
 
-    /// The action of model `index`, to change what is this model's.
+    /// Returns the action of model `index`, to change this model.
     pub(crate) fn chosen(&mut self, index: usize) -> Option<&mut dyn ActionModel> {
         if index < self.models.len() {
             self.copies.forget(self.models.place(index)[0]);
@@ -208,38 +213,39 @@ impl Problem {
         self.models.chosen(index)
     }
 
-    /// The number of models.
+    /// Returns the number of models.
     pub(crate) fn model_count(&self) -> usize {
         self.models.len()
     }
 
-    /// Copies the problem, with all costs, limits, references and weights as they are now, so that another thread can solve
-    /// it. The robot's [`Model`](condyle_dynamics::Model) and functions of one's own are shared. Allocates.
+    /// Copies the problem, with all current costs, limits, references and weights, so that another thread can solve it.
+    /// The robot's [`Model`](condyle_dynamics::Model) and user-defined functions are shared. Allocates.
     ///
-    /// A problem is not [`Clone`]: an action of a user's own has a copy only where [`fork`](ActionModel::fork) gives one. All
-    /// actions of this crate do, except [`NumDiff`](crate::NumDiff); [`AutoDiff`](crate::AutoDiff) and
-    /// [`Constrained`](crate::Constrained) do if what they are made of does.
+    /// A problem is not [`Clone`]: a user-defined action can be copied only if its [`fork`](ActionModel::fork) returns
+    /// a copy. All actions of this crate can be copied, except [`NumDiff`](crate::NumDiff).
+    /// [`AutoDiff`](crate::AutoDiff) and [`Constrained`](crate::Constrained) can be copied if their parts can.
     ///
     /// # Errors
-    /// [`Error::NoCopy`] for an action without a copy.
+    /// [`Error::NoCopy`] for an action that cannot be copied.
     pub fn try_clone(&self) -> Result<Self, Error> {
         let Self { x0, models, stages, terminal, shape, runs: own_runs, knots, unread, .. } = self;
         let (x0, models, stages, shape) = (x0.clone(), models.try_clone()?, stages.clone(), shape.clone());
         let mut terminal = terminal.fork().ok_or(Error::NoCopy { model: None })?;
         terminal.reserve();
-        let mut runs = Vec::with_capacity(stages.len()); // as many as a shift may need
+        let mut runs = Vec::with_capacity(stages.len()); // capacity that a shift may need
         runs.extend_from_slice(own_runs);
         let (knots, unread, copies) = (knots.clone(), unread.clone(), Copies::default());
         Ok(Self { x0, models, stages, terminal, shape, runs, knots, copies, unread })
     }
 
-    /// The terminal model, if it is a `T`.
+    /// Returns the terminal model as a `T`, if it has that type.
     pub fn terminal_mut<T: ActionModel>(&mut self) -> Option<&mut T> {
         let model: &mut dyn Any = self.terminal.as_mut();
         model.downcast_mut()
     }
 
-    /// The states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates them.
+    /// Returns the states x₀ … x_N that follow from x̂₀ under the controls `us`: a warm start without gaps. Allocates
+    /// them.
     ///
     /// # Errors
     /// [`Error`] if `us` has a wrong length or an entry that is not finite, or a state `xs` becomes infinite.
@@ -247,11 +253,11 @@ impl Problem {
         self.rollout_while(us, || ControlFlow::Continue(()))
     }
 
-    /// As [`rollout`](Self::rollout), with a function that is asked at each knot whether to go on; the states of knots that
-    /// were not reached are zeros.
+    /// Computes as [`rollout`](Self::rollout) does, and calls `go_on` at each knot, which returns whether to continue.
+    /// The states of knots that were not reached are zeros.
     ///
     /// # Errors
-    /// As of [`rollout`](Self::rollout).
+    /// As [`rollout`](Self::rollout).
     #[doc(hidden)]
     pub fn rollout_while(&mut self, us: &[f64], mut go_on: impl FnMut() -> ControlFlow<()>) -> Result<Vec<f64>, Error> {
         Error::check("us", us, self.shape.offsets[self.horizon()])?;
@@ -269,8 +275,8 @@ impl Problem {
         Ok(xs)
     }
 
-    /// The next states φₜ(xₜ, uₜ) into `next` (N·nx) and the costs ℓₜ(xₜ, uₜ) into `costs` (N + 1, the terminal one
-    /// last), for all knots of a trajectory. Allocates nothing.
+    /// Computes the next states φₜ(xₜ, uₜ) into `next` (N·nx) and the costs ℓₜ(xₜ, uₜ) into `costs` (N + 1, the
+    /// terminal one last), for all knots of a trajectory. Allocates nothing.
     ///
     /// # Panics
     /// If a length is wrong.
@@ -279,8 +285,8 @@ impl Problem {
         self.calc_with_motion(xs, us, next, costs, &mut []);
     }
 
-    /// As [`calc`](Self::calc), and the motion of each knot into `motions`, N equal parts that are empty or have
-    /// [`motion_size`](Self::motion_size) numbers.
+    /// Computes as [`calc`](Self::calc) does, and writes the motion of each knot into `motions`: N equal parts, which
+    /// are empty or have [`motion_size`](Self::motion_size) numbers.
     #[track_caller]
     pub(crate) fn calc_with_motion(
         &mut self,
@@ -309,7 +315,8 @@ impl Problem {
         self.terminal.calc_group(&self.knots[horizon..], x, &[], &mut self.unread, &mut costs[horizon..]);
     }
 
-    /// The derivatives at all knots of a trajectory, into `nodes` (N + 1, the terminal one last). Allocates nothing.
+    /// Computes the derivatives at all knots of a trajectory into `nodes` (N + 1, the terminal one last). Allocates
+    /// nothing.
     ///
     /// # Panics
     /// If a length is wrong.
@@ -326,11 +333,10 @@ impl Problem {
         self.terminal.calc_diff_group(&self.knots[horizon..], x, &[], &mut nodes[horizon..]);
     }
 
-    /// [`calc_diff`](Self::calc_diff) on as many threads of the rayon pool in which it is called, else of the global one, as there
-    /// is scratch in `gains`; the same to the last bit. What is done is shown to `sweep` on the calling thread, from the last
-    /// knots to the first: the model and the number of the first of some knots, their nodes and, of `found`, what a sweep finds
-    /// there. The gains that it puts off are then written. Models without a copy ([`fork`](ActionModel::fork)) are asked on the
-    /// calling thread.
+    /// Computes [`calc_diff`](Self::calc_diff) on `gains.len()` threads of the rayon pool in which it is called, or
+    /// else of the global pool; the result is the same to the last bit. From the end of the horizon, each finished
+    /// group (model, first index, nodes, results in `found`) is passed to `sweep` on the calling thread. Deferred gains
+    /// are written afterwards. Models that cannot be [copied](ActionModel::fork) are evaluated on the calling thread.
     ///
     /// # Panics
     /// If a length is wrong.
@@ -353,13 +359,13 @@ impl Problem {
         copies.calc_diff(&mut models.actions, runs, all, nodes, found, gains, sweep);
     }
 
-    /// Gives the copies of models, which threads have, the multipliers of their models.
+    /// Copies the multipliers of models to the copies that other threads use.
     pub(crate) fn share_multipliers(&mut self) {
         self.copies.share_multipliers(&mut self.models.actions, &self.runs);
     }
 
-    /// Checks the lengths, and lets nothing be known of the forms of A and B: the action says if it is. Asks none for the
-    /// equations of inverse dynamics that has none.
+    /// Checks the lengths, and resets the structures of A and B, which the action sets. Requests the equations of
+    /// inverse dynamics only from actions that support them.
     #[track_caller]
     fn begin_derivatives(&self, xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         self.assert_trajectory(xs, us);
@@ -371,11 +377,11 @@ impl Problem {
         }
     }
 
-    /// The controls of all knots that hold their states still, each by itself, as far as that is possible: see
+    /// Computes for each knot by itself the controls that hold its state still, as far as that is possible: see
     /// [`hold`](ActionModel::hold). Allocates.
     ///
     /// # Errors
-    /// [`Error`] if `xs` has not (N + 1)·nx numbers, or one that is not finite.
+    /// [`Error`] if the length of `xs` is not (N + 1)·nx, or an entry is not finite.
     pub fn quasi_static(&mut self, xs: &[f64]) -> Result<Vec<f64>, Error> {
         Error::check("xs", xs, (self.horizon() + 1) * self.nx())?;
         let mut us = Vec::with_capacity(self.shape.offsets[self.horizon()]);
@@ -385,7 +391,7 @@ impl Problem {
         Ok(us)
     }
 
-    /// x₁ ⊖ x₀ of two states into `out` (ndx).
+    /// Computes x₁ ⊖ x₀ of two states into `out` (ndx).
     ///
     /// # Panics
     /// If a length is wrong.
@@ -399,7 +405,8 @@ impl Problem {
         self.terminal.difference(x0, x1, out);
     }
 
-    /// Shows what the dynamics of knot t compute at (x, u) beside the next state: see [`outputs`](ActionModel::outputs).
+    /// Passes the vectors that the dynamics of knot t compute at (x, u), besides the next state, to `show`: see
+    /// [`outputs`](ActionModel::outputs).
     ///
     /// # Panics
     /// If t > N or a length is wrong.
@@ -410,18 +417,18 @@ impl Problem {
         self.action_mut(t).outputs(t, x, u, show);
     }
 
-    /// Nodes of zeros with the dimensions of the knots, the terminal one last.
+    /// Creates nodes of zeros with the dimensions of the knots, the terminal one last.
     pub fn nodes(&self) -> Vec<LqNode> {
         (0..=self.horizon()).map(|t| LqNode::zeros(self.ndx(), self.shape.nu(t))).collect()
     }
 
-    /// The most numbers of its motion that a knot keeps from a rollout for its derivatives.
+    /// Returns the maximum number of entries of a knot's motion that a rollout stores for the derivatives.
     pub(crate) fn motion_size(&self) -> usize {
         self.models.actions.iter().map(|model| model.motion_size()).max().unwrap_or(0)
     }
 
-    /// Makes room in nodes for the equations of inverse dynamics, wherever in the horizon their actions come to serve; says
-    /// whether one has them.
+    /// Allocates memory in nodes for the equations of inverse dynamics, for any order of the actions in the horizon.
+    /// Returns whether an action supports them.
     pub(crate) fn reserve_inverse_dynamics(&self, nodes: &mut [LqNode]) -> bool {
         let sizes = self.models.actions.iter().filter_map(|model| model.inverse_dynamics_form());
         let Some(most) = sizes.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else { return false };
@@ -438,25 +445,25 @@ impl Problem {
         &self.shape
     }
 
-    /// The model of knot t; the terminal one for t = N.
+    /// Returns the model of knot t; the terminal one for t = N.
     pub(crate) fn action(&self, t: usize) -> &dyn ActionModel {
         self.stages.get(t).map_or(&*self.terminal, |&stage| self.models.of(stage))
     }
 
-    /// As [`action`](Self::action), to compute with.
+    /// Returns the model of knot t, for computing.
     pub(crate) fn action_mut(&mut self, t: usize) -> &mut dyn ActionModel {
         self.stages.get(t).map_or(&mut *self.terminal, |&stage| self.models.of_mut(stage))
     }
 
-    /// The actions of all knots.
+    /// Returns the actions of all knots.
     pub(crate) fn actors(&mut self) -> Actors<'_> {
         let Self { x0, models, stages, terminal, .. } = self;
         let (actions, places) = models.parts();
         Actors { x0, stages, places, actions: Actions::Own(actions, &mut **terminal) }
     }
 
-    /// The actions of all knots, and copies of all but the terminal one, which compute the same on another thread; none if
-    /// there is an action without a copy, or none was made yet.
+    /// Returns the actions of all knots, and copies of all but the terminal one, which compute the same on another
+    /// thread. Returns `None` if an action cannot be copied, or no copies exist yet.
     pub(crate) fn two(&mut self) -> Option<[Actors<'_>; 2]> {
         let Self { x0, models, stages, terminal, copies, .. } = self;
         let copies = copies.first().filter(|copies| copies.iter().all(Option::is_some))?;
@@ -465,10 +472,10 @@ impl Problem {
         Some([with(Actions::Own(actions, &mut **terminal)), with(Actions::Copied(copies))])
     }
 
-    /// Whether some knot's controls are bounded.
+    /// Returns whether some knot's controls are bounded.
     ///
     /// # Errors
-    /// [`Error`] if the bounds of a knot have a wrong length or leave no control.
+    /// [`Error`] if the bounds of a knot have a wrong length or no control satisfies them.
     pub(crate) fn check_bounds(&self) -> Result<bool, Error> {
         let mut bounded = false;
         for knot in 0..self.horizon() {
@@ -490,12 +497,12 @@ impl Problem {
         Ok(bounded)
     }
 
-    /// The largest number of lanes that one of the models uses.
+    /// Returns the largest number of lanes that one of the models uses.
     pub(crate) fn lanes(&self) -> usize {
         self.models.actions.iter().map(|action| action.lanes()).max().unwrap_or(1).max(1)
     }
 
-    /// The places of the states and controls of a run of knots in flat trajectories.
+    /// Returns the ranges of the states and controls of a run of knots in flat trajectories.
     fn places(&self, knots: &Range<usize>) -> (Range<usize>, Range<usize>) {
         let Shape { nx, offsets, .. } = &self.shape;
         (knots.start * nx..knots.end * nx, offsets[knots.start]..offsets[knots.end])

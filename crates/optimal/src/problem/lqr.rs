@@ -1,12 +1,13 @@
-//! The linear dynamics and quadratic cost of the textbook, as an action.
+//! Linear dynamics with a quadratic cost, as an action.
 #![allow(non_snake_case)] // the names of the literature
 
 use super::action::ActionModel;
 use crate::lq::LqNode;
 
-/// x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper: of an [`LqNode`], which names them.
+/// Action x⁺ = A x + B u + f,   ℓ = ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu,   lower ≤ u ≤ upper. The names are the fields
+/// of its [`LqNode`].
 ///
-/// Without controls it is a terminal action. Crocoddyl's `ActionModelLQR`.
+/// Without controls it is a terminal action. In Crocoddyl: `ActionModelLQR`.
 ///
 /// ```
 /// use condyle_optimal::{Fddp, LqNode, Lqr, Problem};
@@ -23,7 +24,7 @@ use crate::lq::LqNode;
 pub struct Lqr(LqNode);
 
 impl Lqr {
-    /// The action of a node.
+    /// Creates the action of a node.
     ///
     /// # Panics
     /// If the shapes of the node's matrices do not fit each other.
@@ -45,13 +46,13 @@ impl Lqr {
         Self(node)
     }
 
-    /// The node that it is.
+    /// Returns the node of the action.
     pub fn node(&self) -> &LqNode {
         &self.0
     }
 }
 
-/// y += X z, for a matrix of as many columns as z has numbers.
+/// Computes y += X z; X has as many columns as z has entries.
 fn add_product(y: &mut [f64], X: &[f64], z: &[f64]) {
     for (column, z) in X.chunks_exact(y.len()).zip(z) {
         y.iter_mut().zip(column).for_each(|(y, x)| *y += x * z);
@@ -62,7 +63,7 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// xᵀ X z.
+/// Returns xᵀ X z.
 fn product(x: &[f64], X: &[f64], z: &[f64]) -> f64 {
     X.chunks_exact(x.len().max(1)).zip(z).map(|(column, z)| dot(x, column) * z).sum()
 }

@@ -1,4 +1,4 @@
-//! The optimal control problem: actions, horizons of them, and derivatives of what has none of its own.
+//! Optimal control problem: actions, horizons of actions, and derivatives for actions without their own.
 
 mod action;
 mod actors;

@@ -1,27 +1,28 @@
-//! The actions of a problem: models that differ in costs, references and weights only are one action, so that their knots
-//! are computed in groups.
+//! Actions of a problem. Models that differ only in costs, references and weights are represented by one action, so
+//! that their knots are computed in groups.
 
 use super::action::ActionModel;
 use super::shape::{MOST_ENTRIES, MOST_KNOTS};
 use crate::error::Error;
 
-/// The most numbers in the matrices [A B] of all knots: a solver keeps several as large, 2 GiB each.
+/// Maximum number of entries in the matrices [A B] of all knots: a solver stores several objects of that size, 2 GiB
+/// each.
 const MOST_NUMBERS: usize = 1 << 28;
 
-/// A model is compared with so many actions that came last, so that a horizon whose knots are all unlike is made in a time
-/// that grows with its length alone.
+/// Number of most recent actions with which a model is compared. It is limited so that a horizon whose knots all differ
+/// is created in linear time.
 const COMPARED: usize = 64;
 
-/// The actions of a problem, and which of them stands for each model.
+/// Actions of a problem, and the action that represents each model.
 #[derive(Default)]
 pub(crate) struct Models {
     pub(crate) actions: Vec<Box<dyn ActionModel>>,
-    /// The action that stands for each model, and the model's number there.
+    /// Action that represents each model, and the model's index in that action.
     places: Vec<[usize; 2]>,
 }
 
 impl Models {
-    /// Merges those models that differ in costs, references and weights only, and makes the memory of all.
+    /// Merges the models that differ only in costs, references and weights, and allocates the memory of all.
     pub(crate) fn new(models: Vec<Box<dyn ActionModel>>) -> Self {
         let mut all = Self::default();
         let mut counts: Vec<usize> = Vec::new();
@@ -45,32 +46,32 @@ impl Models {
         all
     }
 
-    /// The actions, and the action that stands for each model.
+    /// Returns the actions, and the action that represents each model.
     pub(crate) fn parts(&mut self) -> (&mut [Box<dyn ActionModel>], &[[usize; 2]]) {
         (&mut self.actions, &self.places)
     }
 
-    /// The number of models.
+    /// Returns the number of models.
     pub(crate) fn len(&self) -> usize {
         self.places.len()
     }
 
-    /// The action that stands for a model, and the model's number there.
+    /// Returns the action that represents a model, and the model's index in that action.
     pub(crate) fn place(&self, model: usize) -> [usize; 2] {
         self.places[model]
     }
 
-    /// The action that stands for a model.
+    /// Returns the action that represents a model.
     pub(crate) fn of(&self, model: usize) -> &dyn ActionModel {
         &*self.actions[self.places[model][0]]
     }
 
-    /// As [`of`](Self::of), to compute with.
+    /// Returns the action that represents a model, for computing.
     pub(crate) fn of_mut(&mut self, model: usize) -> &mut dyn ActionModel {
         &mut *self.actions[self.places[model][0]]
     }
 
-    /// The action that stands for a model; what is changed through it is that model's.
+    /// Returns the action that represents a model; changes made through it only change that model.
     pub(crate) fn chosen(&mut self, model: usize) -> Option<&mut dyn ActionModel> {
         let [action, own] = *self.places.get(model)?;
         let action = &mut *self.actions[action];
@@ -78,10 +79,10 @@ impl Models {
         Some(action)
     }
 
-    /// Copies of all actions, for the same models.
+    /// Copies all actions, for the same models.
     ///
     /// # Errors
-    /// [`Error::NoCopy`] for an action that has none.
+    /// [`Error::NoCopy`] for an action that cannot be copied.
     pub(crate) fn try_clone(&self) -> Result<Self, Error> {
         let model = |k: usize| self.places.iter().position(|place| place[0] == k);
         let mut actions = Vec::with_capacity(self.actions.len());
@@ -94,7 +95,7 @@ impl Models {
     }
 }
 
-/// Refuses models that make no problem together.
+/// Checks that the models fit together in one problem.
 pub(crate) fn check(
     models: &[Box<dyn ActionModel>],
     stages: &[usize],

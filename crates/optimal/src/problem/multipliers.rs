@@ -1,28 +1,29 @@
-//! The multipliers of an action's constraints, and their terms of its cost.
+//! Multipliers of an action's constraints, and the terms that they add to its cost.
 
 use crate::error::Error;
 use std::sync::Arc;
 
-/// The multipliers y of constraints lower ≤ g(x, u) ≤ upper at the knots that an action serves, and the penalty 1/μ. To
-/// the action's cost comes, at each knot,
+/// Multipliers y of constraints lower ≤ g(x, u) ≤ upper at the knots that an action serves, and the penalty 1/μ. At
+/// each knot, the following term is added to the action's cost,
 ///
 /// ```text
 /// ½ Σ (e² / μ − μ y²),      e = z − Π z,      z = g(x, u) + μ y,      Π: into the bounds
 /// ```
 ///
-/// with the slope e / μ by g, and the curvature of Gauss and Newton: 1/μ outside of the bounds and at equalities, else 0.
+/// with the derivative e / μ with respect to g, and the Gauss–Newton curvature: 1/μ outside the bounds and at
+/// equalities, else 0.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Multipliers {
     mu: f64,
-    /// The most constraints that a knot has.
+    /// Maximum number of constraints of a knot.
     size: usize,
-    /// y of each knot. Shape: knots × size, and zero beyond its end. Written by: `start`, `update`.
+    /// Multipliers y of each knot. Shape: knots × size, padded with zeros. Written by: `start`, `update`.
     y: Vec<f64>,
     /// e / μ at each knot's last derivatives, which are better multipliers. Written by: `slopes`.
     next: Vec<f64>,
-    /// g − Π g at each knot's last derivatives, NaN where g is. Shape: knots × size. Written by: `slopes`.
+    /// g − Π g at each knot's last derivatives, NaN where g is NaN. Shape: knots × size. Written by: `slopes`.
     excess: Vec<f64>,
-    /// The cost's term there, of each knot. Written by: `begin`, `slopes`.
+    /// Term of the cost at each knot's last derivatives. Written by: `begin`, `slopes`.
     terms: Vec<f64>,
 }
 
@@ -33,7 +34,7 @@ impl Clone for Multipliers {
         Self { mu, size, y, next, excess, terms }
     }
 
-    /// Allocates nothing for as many knots.
+    /// Copies without allocating if the number of knots is the same.
     fn clone_from(&mut self, other: &Self) {
         (self.mu, self.size) = (other.mu, other.size);
         self.y.clone_from(&other.y);
@@ -43,33 +44,35 @@ impl Clone for Multipliers {
     }
 }
 
-/// The constraints of a knot, and their multipliers.
+/// Constraints of a knot, and their multipliers.
 pub struct Bounded<'a> {
-    /// The number of constraints.
+    /// Number of constraints.
     pub(crate) count: usize,
     pub(crate) lower: &'a [f64],
     pub(crate) upper: &'a [f64],
-    /// The parts of the constraints that are known by name; empty for those of a user.
+    /// Parts of the constraints that have a name; empty for user-defined constraints.
     pub(crate) parts: &'a [Part],
     pub(crate) multipliers: &'a mut Multipliers,
 }
 
-/// Consecutive constraints of a knot that have a name.
+/// Consecutive constraints of a knot that share a name.
 #[derive(Clone, Debug)]
 pub(crate) struct Part {
     pub(crate) name: Arc<str>,
-    /// The first of its rows; the last is before the first of the next part.
+    /// First row of the part; it ends before the first row of the next part.
     pub(crate) first: usize,
-    /// Whether its rows are functions of the state alone.
+    /// Whether the rows are functions of the state alone.
     pub(crate) of_state: bool,
 }
 
-/// A function that is called with the constraints of a knot.
+/// Function that is called with the constraints of a knot.
 pub(crate) type Visit<'a> = dyn FnMut(Bounded<'_>) + 'a;
 
 impl Bounded<'_> {
+    /// Checks the bounds.
+    ///
     /// # Errors
-    /// [`Error`] if the bounds have a wrong length or leave no value.
+    /// [`Error`] if the bounds have a wrong length or no value satisfies them.
     pub(crate) fn check(&self, knot: usize) -> Result<(), Error> {
         for (name, found) in [("lower bounds", self.lower.len()), ("upper bounds", self.upper.len())] {
             if found != self.count {
@@ -85,36 +88,36 @@ impl Bounded<'_> {
     }
 }
 
-/// Whether some finite number is within bounds, which are numbers themselves.
+/// Returns whether some finite number is within the bounds, and neither bound is NaN.
 pub(crate) fn leave_a_value(lower: f64, upper: f64) -> bool {
     lower <= upper && lower < f64::INFINITY && upper > f64::NEG_INFINITY // false for NaN
 }
 
-/// 1/μ unless a solve has chosen another.
+/// Penalty 1/μ unless a solve has chosen another.
 pub(crate) const PENALTY: f64 = 10.0;
 
-/// The distance of z beyond its bounds, with its sign.
+/// Returns the signed distance of z beyond its bounds.
 #[inline(always)]
 fn outside(z: f64, lower: f64, upper: f64) -> f64 {
     match z {
         z if z > upper => z - upper,
         z if z >= lower => 0.0,
-        z => z - lower, // a NaN stays one
+        z => z - lower, // a NaN remains
     }
 }
 
 impl Multipliers {
-    /// Zeros, for at most `size` constraints a knot.
+    /// Creates zeros, for at most `size` constraints per knot.
     pub(crate) fn new(size: usize) -> Self {
         Self { mu: 1.0 / PENALTY, size, y: vec![], next: vec![], excess: vec![], terms: vec![] }
     }
 
-    /// The most constraints that a knot has.
+    /// Returns the maximum number of constraints of a knot.
     pub(crate) fn size(&self) -> usize {
         self.size
     }
 
-    /// Zeros at knot t of so many, and μ. Allocates at the first call.
+    /// Sets y to zero at knot t of `knots` knots, and sets μ. Allocates at the first call.
     pub(crate) fn start(&mut self, t: usize, knots: usize, mu: f64) {
         self.mu = mu;
         for numbers in [&mut self.y, &mut self.next, &mut self.excess] {
@@ -128,24 +131,24 @@ impl Multipliers {
         self.mu = mu;
     }
 
-    /// Sets the first ones of y at knot t, after `start`.
+    /// Sets the first entries of y at knot t, after `start`.
     pub(crate) fn set(&mut self, t: usize, y: &[f64]) {
         self.y[t * self.size..][..y.len()].copy_from_slice(y);
     }
 
-    /// The first `count` of y at knot t.
+    /// Returns the first `count` entries of y at knot t.
     pub(crate) fn of(&self, t: usize, count: usize) -> &[f64] {
         &self.y[t * self.size..][..count]
     }
 
-    /// y ← e / μ at knot t.
+    /// Updates y ← e / μ at knot t.
     pub(crate) fn update(&mut self, t: usize) {
         let knot = t * self.size..(t + 1) * self.size;
         self.y[knot.clone()].copy_from_slice(&self.next[knot]);
     }
 
-    /// g − Π g of the first `count` constraints, their next multipliers, and the cost's term, at the last derivatives of
-    /// knot t.
+    /// Returns g − Π g of the first `count` constraints, their next multipliers, and the term of the cost, at the last
+    /// derivatives of knot t.
     pub(crate) fn measured(&self, t: usize, count: usize) -> (&[f64], &[f64], f64) {
         let first = t * self.size;
         (&self.excess[first..][..count], &self.next[first..][..count], self.terms[t])
@@ -155,7 +158,7 @@ impl Multipliers {
         self.y.get(t * self.size + row).copied().unwrap_or(0.0)
     }
 
-    /// The cost's term for the constraints from `first` on whose values are g.
+    /// Returns the term of the cost for the constraints from `first` on, with the values g.
     pub(crate) fn value(&self, t: usize, first: usize, g: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
         let mut term = 0.0;
         for i in 0..g.len() {
@@ -173,7 +176,7 @@ impl Multipliers {
         }
     }
 
-    /// The slopes and curvatures of [`value`](Self::value), in `d` and `dd`.
+    /// Computes the first and second derivatives of [`value`](Self::value), into `d` and `dd`.
     pub(crate) fn slopes(
         &mut self,
         t: usize,

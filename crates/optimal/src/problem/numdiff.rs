@@ -1,15 +1,15 @@
-//! Derivatives of any action by finite differences: the oracle against which written derivatives are tested.
+//! Derivatives of any action by finite differences: a reference for tests of hand-written derivatives.
 
 use super::action::ActionModel;
 use super::action::differences::{SECOND, at, calc_diff, write_curvature};
 use crate::lq::{Hessian, LqNode};
 
-/// An action whose derivatives, whatever it has of its own, are central differences of [`calc`](ActionModel::calc), taken
-/// with ⊕ and ⊖.
+/// Action whose derivatives are central differences of [`calc`](ActionModel::calc), taken with ⊕ and ⊖. The action's
+/// own derivatives are not used.
 ///
-/// First derivatives are right to about 1e-9, second ones to about 1e-7 (relative to the size of cost and state). The
-/// Hessian is the exact one: an action that gives a Gauss–Newton approximation differs from it where the residuals
-/// curve. Costs 2 (ndx + nu) + 2 (ndx + nu)² calls and allocates: for tests.
+/// First derivatives are accurate to about 1e-9, second derivatives to about 1e-7 (relative to the size of cost and
+/// state). The Hessian is the exact one; a Gauss–Newton approximation differs from it where the residuals are
+/// nonlinear. Meant for tests: it takes 2 (ndx + nu) + 2 (ndx + nu)² calls, and allocates.
 ///
 /// # Examples
 /// ```
@@ -33,7 +33,7 @@ use crate::lq::{Hessian, LqNode};
 /// ```
 #[derive(Debug, Clone)]
 pub struct NumDiff<A>(
-    /// The action that is differentiated.
+    /// Action that is differentiated.
     pub A,
 );
 

@@ -1,21 +1,22 @@
-//! The dimensions of a horizon.
+//! Dimensions of a horizon.
 
 use crate::error::Error;
 use crate::lq::LqNode;
 use core::ops::Range;
 
-/// The most knots of a horizon.
+/// Maximum number of knots of a horizon.
 pub(crate) const MOST_KNOTS: usize = 1 << 20;
-/// The most entries of a state, a change of state, or the controls of a knot: matrices of that size take 128 MiB each.
+/// Maximum number of entries of a state, a change of state, or the controls of a knot: matrices of that size take 128
+/// MiB each.
 pub(crate) const MOST_ENTRIES: usize = LqNode::MOST_SIZE;
 
-/// The dimensions of a horizon: what trajectories and workspaces are allocated by.
+/// Dimensions of a horizon, by which trajectories and workspaces are allocated.
 #[derive(Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Shape {
     pub(crate) nx: usize,
     pub(crate) ndx: usize,
-    /// The place where uₜ starts in the flat controls; N + 1 entries, the last is their length.
+    /// Offset of uₜ in the flat controls; N + 1 entries, the last is the length of the controls.
     pub(crate) offsets: Vec<usize>,
 }
 
@@ -24,7 +25,7 @@ impl Clone for Shape {
         Self { nx: self.nx, ndx: self.ndx, offsets: self.offsets.clone() }
     }
 
-    /// Allocates nothing for a horizon of the same length.
+    /// Copies without allocating if the horizon has the same length.
     fn clone_from(&mut self, other: &Self) {
         (self.nx, self.ndx) = (other.nx, other.ndx);
         self.offsets.clone_from(&other.offsets);
@@ -40,22 +41,22 @@ impl Shape {
         self.offsets.get(t + 1).map_or(0, |end| end - self.offsets[t])
     }
 
-    /// The place of xₜ in a flat trajectory.
+    /// Returns the range of xₜ in a flat trajectory.
     pub(crate) fn x(&self, t: usize) -> Range<usize> {
         t * self.nx..(t + 1) * self.nx
     }
 
-    /// The place of δxₜ in a flat trajectory of changes.
+    /// Returns the range of δxₜ in a flat trajectory of changes.
     pub(crate) fn dx(&self, t: usize) -> Range<usize> {
         t * self.ndx..(t + 1) * self.ndx
     }
 
-    /// The place of uₜ in flat controls; empty at the terminal knot.
+    /// Returns the range of uₜ in flat controls; empty at the terminal knot.
     pub(crate) fn u(&self, t: usize) -> Range<usize> {
         self.offsets[t]..self.offsets[t] + self.nu(t)
     }
 
-    /// Says what is wrong with a shape from a file: it must be that of a problem.
+    /// Checks that a shape from a file is the shape of a problem.
     #[cfg(feature = "serde")]
     pub(crate) fn check_itself(&self) -> Result<(), String> {
         let Self { nx, ndx, offsets } = self;
@@ -73,7 +74,7 @@ impl Shape {
         }
     }
 
-    /// `Ok` if a problem has the dimensions for which a solver was made.
+    /// Returns `Ok` if the dimensions of a problem equal the dimensions for which a solver was created.
     pub(crate) fn check(&self, found: &Self) -> Result<(), Error> {
         if self.horizon() != found.horizon() {
             return Err(Error::Length { name: "stages", expected: self.horizon(), found: found.horizon() });

@@ -1,8 +1,8 @@
-//! The derivatives of a horizon on several threads, each with its own copies of the actions, and the sweep beside them.
+//! Derivatives of a horizon on several threads, each with its own copies of the actions, concurrent with the sweep.
 //!
-//! Groups of knots, as many as a model has lanes, go through three stages, from the end of the horizon to its beginning:
-//! their derivatives, by the thread that comes first; the sweep, by the calling thread, which computes derivatives itself
-//! while those that it needs are not there; and their gains, by a thread that has nothing else to do.
+//! A group has as many knots as its model has lanes. From the end of the horizon to its beginning, each group passes
+//! through three stages. The first free thread computes its derivatives. The calling thread sweeps it; while the
+//! derivatives it needs are missing, it computes derivatives itself. An idle thread computes the group's gains.
 
 use super::action::ActionModel;
 use crate::lq::{Gains, LqKnot, LqNode};
@@ -10,30 +10,30 @@ use condyle_linalg::threads::{Parts, join, pause};
 use core::ops::Range;
 use core::sync::atomic::AtomicU8;
 
-/// The stages of a group.
+/// Stages of a group.
 const DERIVE: u8 = 0;
 const SWEEP: u8 = 1;
 const FINISH: u8 = 2;
 
-/// A thread that so often found nothing to do leaves what is left to the one that sweeps, some milliseconds: so none waits
-/// for ever, whatever else shares the pool.
+/// Number of idle polls (a few ms) after which a helper thread returns and leaves the rest to the sweeping thread. Thus
+/// no thread waits for ever, even if other work occupies the pool.
 const PATIENCE: usize = 4096;
 
 /// Copies of actions for threads, and the groups of knots that these compute.
 #[derive(Default)]
 pub(crate) struct Copies {
-    /// The copy of each model, for each thread beside the first one.
+    /// Copy of each model, for each thread except the first one.
     of: Vec<Vec<Option<Box<dyn ActionModel>>>>,
-    /// The first knot of each group, and the end of the horizon.
+    /// First knot of each group, and the end of the horizon.
     cuts: Vec<usize>,
-    /// The model of each group.
+    /// Model of each group.
     owners: Vec<usize>,
     /// Scratch for [`Parts`].
     states: Vec<AtomicU8>,
 }
 
 impl Copies {
-    /// The copies that the first of the other threads has, as far as they were made.
+    /// Returns the copies of the second thread, as far as they exist.
     pub(super) fn first(&mut self) -> Option<&mut [Option<Box<dyn ActionModel>>]> {
         self.of.first_mut().map(Vec::as_mut_slice)
     }
@@ -45,19 +45,19 @@ impl Copies {
         }
     }
 
-    /// The horizon has moved on by a knot.
+    /// Notifies the copies that the horizon has moved by one knot.
     pub(crate) fn shift(&mut self) {
         self.of.iter_mut().flatten().flatten().for_each(|copy| copy.shift());
     }
 
-    /// Lets a model that an action stands for serve knot t of so many.
+    /// Assigns knot t, of `horizon` knots, to a model that an action represents.
     pub(crate) fn serve(&mut self, action: usize, t: usize, horizon: usize, model: usize) {
         for copy in self.of.iter_mut().filter_map(|copies| copies[action].as_mut()) {
             copy.serve(t, horizon, model);
         }
     }
 
-    /// Makes those that are missing of the models that can be copied, for `threads` threads in all.
+    /// Creates the missing copies of all models that can be copied, for `threads` threads in all.
     fn renew(&mut self, threads: usize, models: &[Box<dyn ActionModel>]) {
         self.of.resize_with(threads - 1, || models.iter().map(|_| None).collect());
         for copies in &mut self.of {
@@ -70,7 +70,7 @@ impl Copies {
         }
     }
 
-    /// Finds the groups of knots: counted from the start of a run, as one thread counts them.
+    /// Computes the groups of knots, counted from the start of a run as on a single thread.
     fn group(&mut self, models: &[Box<dyn ActionModel>], runs: &[(usize, Range<usize>)]) {
         let Self { cuts, owners, .. } = self;
         cuts.clear();
@@ -84,7 +84,7 @@ impl Copies {
         cuts.push(runs.last().map_or(0, |(_, run)| run.end));
     }
 
-    /// Gives copies the multipliers of their models.
+    /// Copies the multipliers of the models to their copies.
     pub(super) fn share_multipliers(&mut self, models: &mut [Box<dyn ActionModel>], runs: &[(usize, Range<usize>)]) {
         for copies in &mut self.of {
             for (model, run) in runs {
@@ -104,9 +104,9 @@ impl Copies {
         }
     }
 
-    /// The derivatives at all knots on as many threads as there is scratch in `gains`. This one shows the groups to `sweep`,
-    /// from the last to the first, each with its model and the number of its first knot; the gains that are put off then are
-    /// written. Models without a copy are asked on this thread alone.
+    /// Computes the derivatives at all knots on as many threads as `gains` has entries. The calling thread passes the
+    /// groups to `sweep`, from the last to the first, each with its model and the index of its first knot. Deferred
+    /// gains are written afterwards. Models that cannot be copied are evaluated on the calling thread only.
     pub(super) fn calc_diff(
         &mut self,
         models: &mut [Box<dyn ActionModel>],
@@ -125,13 +125,13 @@ impl Copies {
         join(
             || {
                 let parts = groups.parts;
-                let mut tried = parts.count(); // this thread has tried to derive those from here on
+                let mut tried = parts.count(); // this thread has tried to derive all groups from this index on
                 for group in (0..parts.count()).rev() {
                     while !parts.work(group, SWEEP, |first, nodes, found| {
                         sweep(&*models[owners[group]], first, nodes, found);
                     }) {
                         if parts.is_abandoned() {
-                            return; // another thread panics, and so will this one
+                            return; // another thread has panicked, and so will this one
                         } else if tried > 0 {
                             tried -= 1;
                             groups.derive(tried, &mut *models[owners[tried]]);
@@ -147,21 +147,21 @@ impl Copies {
     }
 }
 
-/// The knots before the terminal one, as all threads read them.
+/// Knots before the terminal one, as read by all threads.
 #[derive(Clone, Copy)]
 pub(super) struct Knots<'a> {
-    /// Their numbers.
+    /// Indices of the knots.
     pub(super) knots: &'a [usize],
-    /// The states, and the controls.
+    /// States and controls.
     pub(super) xs: &'a [f64],
     pub(super) us: &'a [f64],
-    /// The number of entries of a state.
+    /// Number of entries of a state.
     pub(super) nx: usize,
-    /// The place at which the controls of each knot start.
+    /// Offset of the controls of each knot.
     pub(super) offsets: &'a [usize],
 }
 
-/// The groups of knots, as all threads see them.
+/// Groups of knots, as used by all threads.
 #[derive(Clone, Copy)]
 struct Groups<'a> {
     parts: &'a Parts<'a, LqNode, LqKnot>,
@@ -170,7 +170,7 @@ struct Groups<'a> {
 }
 
 impl Groups<'_> {
-    /// The derivatives at the knots of a group, by its model or a copy of it, unless somebody computes them.
+    /// Computes the derivatives at the knots of a group, by its model or a copy of it, unless another thread does.
     fn derive(self, group: usize, model: &mut dyn ActionModel) {
         let Knots { knots, xs, us, nx, offsets } = self.knots;
         self.parts.work(group, DERIVE, |first, nodes, _| {
@@ -180,12 +180,12 @@ impl Groups<'_> {
         });
     }
 
-    /// Writes the gains of a group that were put off, if it has been swept and nobody does; says whether it did.
+    /// Writes the deferred gains of a group, if it has been swept and no other thread does; returns whether it did so.
     fn finish(self, group: usize, gains: &mut Gains) -> bool {
         self.parts.work(group, FINISH, |_, nodes, found| gains.finish(nodes, found))
     }
 
-    /// Lets each of some threads, by the copies that it has, work on groups until there are none left.
+    /// Distributes the groups over threads, each with its own copies, until no group is left.
     fn spread(self, copies: &mut [Vec<Option<Box<dyn ActionModel>>>], gains: &mut [Gains]) {
         let ([copies], [gains]) = (&mut *copies, &mut *gains) else {
             let half = copies.len() / 2;

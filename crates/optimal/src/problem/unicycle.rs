@@ -1,9 +1,9 @@
-//! A unicycle as an action: the smallest problem whose dynamics curve.
+//! Unicycle as an action: the smallest problem with curved dynamics.
 
 use super::action::ActionModel;
 use crate::lq::{Hessian, LqNode};
 
-/// A unicycle: x = (x, y, θ), u = (v, ω),
+/// Unicycle: x = (x, y, θ), u = (v, ω),
 ///
 /// ```text
 /// x⁺ = x + Δt (v cos θ, v sin θ, ω),      ℓ = ½ (w₁² ‖x‖² + w₂² ‖u‖²)
@@ -24,25 +24,25 @@ use crate::lq::{Hessian, LqNode};
 pub struct Unicycle {
     /// Δt (s).
     pub dt: f64,
-    /// w₁ and w₂.
+    /// Weights w₁ and w₂.
     pub weights: [f64; 2],
     end: bool,
 }
 
 impl Default for Unicycle {
-    /// A step of 0.1 s with the weights 10 and 1.
+    /// Returns a unicycle with a step of 0.1 s and the weights 10 and 1.
     fn default() -> Self {
         Self::new(0.1, [10.0, 1.0])
     }
 }
 
 impl Unicycle {
-    /// A unicycle with the step Δt and the weights w₁ and w₂.
+    /// Creates a unicycle with the step Δt and the weights w₁ and w₂.
     pub fn new(dt: f64, weights: [f64; 2]) -> Self {
         Self { dt, weights, end: false }
     }
 
-    /// The same as an action of the end, without controls.
+    /// Returns the same unicycle as a terminal action, without controls.
     #[must_use]
     pub fn at_the_end(self) -> Self {
         Self { end: true, ..self }

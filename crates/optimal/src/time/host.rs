@@ -1,4 +1,4 @@
-//! A clock that the host gives.
+//! Clock that the host provides.
 
 use core::ops::Add;
 use std::sync::OnceLock;
@@ -6,15 +6,17 @@ use std::time::Duration;
 
 static CLOCK: OnceLock<fn() -> Duration> = OnceLock::new();
 
-/// Gives solves a clock, a time that never goes back: in a browser `performance.now()`. Only the first call counts.
+/// Sets the clock of solves. Its time must never go back; in a browser it is `performance.now()`. Only the first call
+/// has an effect.
 ///
-/// Until then time stands still: all [`Timings`](crate::Timings) are 0, a [`time_budget`](crate::Settings::time_budget) is
-/// never used up, and an [`Observer`](crate::Observer) is asked after iterations only.
+/// Before this call, time stands still: all [`Timings`](crate::Timings) are 0, a
+/// [`time_budget`](crate::Settings::time_budget) is never used up, and an [`Observer`](crate::Observer) is called only
+/// after iterations.
 pub fn set_clock(now: fn() -> Duration) {
     let _ = CLOCK.set(now);
 }
 
-/// A time of the host's clock.
+/// Time of the host's clock.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub(crate) struct Instant(Duration);
 

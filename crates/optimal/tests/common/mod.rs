@@ -1,4 +1,4 @@
-//! Actions without a robot, for the tests.
+//! Actions without a robot, for tests.
 #![allow(dead_code)] // each test file uses some of them
 #![allow(non_snake_case)] // A, B, T, E
 
@@ -11,12 +11,12 @@ pub(crate) fn random() -> StdRng {
     StdRng::seed_from_u64(7)
 }
 
-/// An m×n matrix with entries in (−1, 1).
+/// Returns an m×n matrix with random entries in (−1, 1).
 pub(crate) fn random_matrix(random: &mut impl Rng, m: usize, n: usize) -> DMatrix<f64> {
     DMatrix::from_fn(m, n, |_, _| random.random_range(-1.0..1.0))
 }
 
-/// An LQ knot with random entries and a cost that is strictly convex in (δx, δu).
+/// Returns an LQ knot with random entries and a cost that is strictly convex in (δx, δu).
 pub(crate) fn random_node(random: &mut impl Rng, ndx: usize, nu: usize) -> LqNode {
     let mut node = LqNode::zeros(ndx, nu);
     let root = random_matrix(random, ndx + nu, ndx + nu);
@@ -32,8 +32,8 @@ pub(crate) fn random_node(random: &mut impl Rng, ndx: usize, nu: usize) -> LqNod
     node
 }
 
-/// As [`random_node`], with the A and B of semi-implicit Euler: nv numbers for q and for v, T and E the identity but for
-/// random blocks over `blocks`.
+/// Returns a knot as [`random_node`] does, whose A and B belong to semi-implicit Euler. q and v have nv entries each. T
+/// and E are the identity, except for random blocks over `blocks`.
 pub(crate) fn random_euler_node(random: &mut impl Rng, nv: usize, nu: usize, blocks: &[Range<usize>]) -> LqNode {
     let (mut node, dt) = (random_node(random, 2 * nv, nu), 0.05);
     let (mut T, mut E) = (DMatrix::identity(nv, nv), DMatrix::identity(nv, nv));
@@ -51,7 +51,7 @@ pub(crate) fn random_euler_node(random: &mut impl Rng, nv: usize, nu: usize, blo
     node
 }
 
-/// x⁺ = A x + B u + f with a quadratic cost: an LQ knot as an action.
+/// LQ knot as an action: x⁺ = A x + B u + f with a quadratic cost.
 pub(crate) struct Linear(pub(crate) LqNode);
 
 impl ActionModel for Linear {
@@ -81,7 +81,8 @@ impl ActionModel for Linear {
     }
 }
 
-/// x = (x, y, θ), u = (v, ω): x⁺ = x + Δt (v cos θ, v sin θ, ω), ℓ = ½ (‖10 x‖² + ‖u‖²); at the end without u.
+/// Unicycle with x = (x, y, θ), u = (v, ω): x⁺ = x + Δt (v cos θ, v sin θ, ω), ℓ = ½ (‖10 x‖² + ‖u‖²); without u at the
+/// terminal knot.
 pub(crate) struct Unicycle {
     pub(crate) nu: usize,
     pub(crate) lanes: usize,
@@ -127,7 +128,7 @@ impl ActionModel for Unicycle {
     }
 }
 
-/// An action whose controls are bounded, by the same numbers at every knot.
+/// Action whose controls are bounded, by the same numbers at every knot.
 pub(crate) struct Limited<A> {
     pub(crate) action: A,
     pub(crate) lower: Vec<f64>,
@@ -155,7 +156,7 @@ impl<A: ActionModel> ActionModel for Limited<A> {
     }
 }
 
-/// A horizon of knots that are all the same.
+/// Creates a problem whose knots are all the same.
 fn horizon_of<A: ActionModel>(
     x0: &[f64],
     horizon: usize,
@@ -178,7 +179,7 @@ pub(crate) fn unicycle(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
     limited_unicycle(x0, horizon, lanes, None)
 }
 
-/// A pole on a cart, θ = 0 upright, x = (y, θ, ẏ, θ̇), u = (f): semi-implicit Euler steps of Δt = 0.03 s.
+/// Pole on a cart, θ = 0 upright, x = (y, θ, ẏ, θ̇), u = (f): semi-implicit Euler steps of Δt = 0.03 s.
 ///
 /// ```text
 /// μ = m₁ + m₂ sin²θ
@@ -187,7 +188,7 @@ pub(crate) fn unicycle(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
 /// x⁺ = x + Δt (ẏ + Δt ÿ, θ̇ + Δt θ̈, ÿ, θ̈)
 /// ```
 ///
-/// ℓ = ½ Σ wᵢ² (θ, y, ẏ, θ̇, f)ᵢ², times Δt before the end.
+/// ℓ = ½ Σ wᵢ² (θ, y, ẏ, θ̇, f)ᵢ², times Δt except at the terminal knot.
 pub(crate) struct Cartpole {
     pub(crate) nu: usize,
     pub(crate) lanes: usize,
@@ -201,7 +202,7 @@ const GRAVITY: f64 = 9.81;
 const CARTPOLE_STEP: f64 = 0.03;
 
 impl Cartpole {
-    /// The weights of y, θ, ẏ, θ̇, f in the cost.
+    /// Returns the weights of y, θ, ẏ, θ̇, f in the cost.
     fn cost_weights(&self) -> [f64; 5] {
         let scale = if self.nu == 0 { 1.0 } else { CARTPOLE_STEP };
         let [angle, position, velocity, rate, force] = self.weights.map(|w| scale * w * w);
@@ -270,7 +271,7 @@ impl ActionModel for Cartpole {
     }
 }
 
-/// The start of the swing-up in Crocoddyl's examples.
+/// Start of the swing-up in Crocoddyl's examples.
 #[allow(clippy::approx_constant)] // nearly hanging, not π
 pub(crate) const HANGING: [f64; 4] = [0.0, 3.14, 0.0, 0.0];
 
@@ -278,7 +279,7 @@ pub(crate) fn cartpole(x0: &[f64], horizon: usize, lanes: usize) -> Problem {
     limited_cartpole(x0, horizon, lanes, None)
 }
 
-/// A knot of the swing-up.
+/// Returns a knot of the swing-up.
 pub(crate) fn cartpole_action() -> Cartpole {
     Cartpole { nu: 1, lanes: 1, weights: [1.0, 0.1, 0.1, 0.1, 0.3] }
 }
@@ -289,7 +290,7 @@ pub(crate) fn limited_cartpole(x0: &[f64], horizon: usize, lanes: usize, bounds:
     horizon_of(x0, horizon, running, bounds, terminal)
 }
 
-/// `horizon` + 1 states on the straight line from `first` to `last`, flat.
+/// Returns `horizon` + 1 states on the straight line from `first` to `last`, flat.
 pub(crate) fn straight(first: &[f64], last: &[f64], horizon: usize) -> Vec<f64> {
     let at = |t: usize| {
         let s = t as f64 / horizon as f64;
@@ -298,7 +299,8 @@ pub(crate) fn straight(first: &[f64], last: &[f64], horizon: usize) -> Vec<f64> 
     (0..=horizon).flat_map(at).collect()
 }
 
-/// A unit circle as a manifold state: x = (cos φ, sin φ), nx = 2, ndx = 1; u turns it, ℓ = ½ (φ² + 0.1 u²).
+/// State on a unit circle as a manifold: x = (cos φ, sin φ), nx = 2, ndx = 1. The control u turns it, ℓ = ½ (φ² + 0.1
+/// u²).
 pub(crate) struct Circle {
     pub(crate) nu: usize,
 }

@@ -1,4 +1,4 @@
-//! Costs of a problem by their names, and copies of problems.
+//! Access to the costs of a problem by name, and copies of problems.
 
 use super::*;
 use condyle_dynamics::Se3;
@@ -14,7 +14,7 @@ fn plain(name: &str, residual: Residual) -> Cost {
     Cost::new(name, 1.0, residual, Activation::Quadratic)
 }
 
-/// The second joint's speed is at most 3.
+/// Constraint that the second joint's speed is at most 3.
 #[derive(Clone)]
 struct Slow;
 
@@ -30,7 +30,8 @@ impl GenericConstraint for Slow {
     }
 }
 
-/// An arm with a model of each kind: two that are one action, one under a constraint, one with accelerations as controls.
+/// Creates an arm with a model of each kind: two models represented by one action, one with a constraint, and one with
+/// accelerations as controls.
 fn mixed() -> Problem {
     let arm = Arc::new(robots::arm7());
     let costs = |x: f64| {
@@ -79,7 +80,7 @@ fn a_cost_is_found_by_its_name_whatever_the_dynamics() {
         assert_eq!(place(&problem.cost_at_mut(t, "reach").unwrap()), x);
     }
     assert!(problem.cost_mut(0, "grasp").is_none() && problem.cost_mut(5, "reach").is_none());
-    assert!(problem.cost_at_mut(3, "rest").is_none()); // that knot has costs of its own
+    assert!(problem.cost_at_mut(3, "rest").is_none()); // that knot has its own costs
     let unicycle = condyle_optimal::Unicycle::default();
     let end = Box::new(unicycle.clone().at_the_end());
     let mut other = Problem::new(vec![0.0; 3], vec![Box::new(unicycle)], vec![0; 2], end).unwrap();
@@ -106,7 +107,7 @@ fn a_change_is_that_of_its_knots_alone() {
     assert_eq!(changed(&all), [0, 1, 2, 3, 4, 5, 6, 7]);
     let some = |p: &mut Problem| assert!(p.change_costs("rest", |cost| cost.set_target(&[0.3; 14])).unwrap());
     assert_eq!(changed(&some), [0, 1, 2, 4, 5, 6]);
-    // what was set is what a problem that is made with it has
+    // a problem with a changed target equals a problem created with that target
     let mut problem = mixed();
     problem.cost_mut(0, "reach").unwrap().set_target(Vec3::new(0.2, 0.2, 0.5)).unwrap();
     problem.cost_mut(1, "reach").unwrap().set_target(Vec3::new(0.1, 0.2, 0.5)).unwrap();
@@ -172,7 +173,7 @@ fn what_is_no_target_is_refused_and_changes_nothing() {
     let error = cost.set_activation(Activation::Weighted(vec![1.0; 2])).unwrap_err().to_string();
     assert_eq!(error, "cost `com`: its weighting has 2 numbers, expected 3");
     assert_eq!(*cost.get(), plain("com", Residual::CenterOfMass { target: Vec3::zero() }));
-    // all kinds can be set
+    // targets of all kinds can be set
     let turned = rotation(&mut rng);
     problem.cost_mut(0, "turn").unwrap().set_target(turned).unwrap();
     problem.cost_mut(0, "pose").unwrap().set_target(Se3::new(turned, Vec3::zero())).unwrap();
@@ -182,7 +183,7 @@ fn what_is_no_target_is_refused_and_changes_nothing() {
     assert_eq!(problem.cost_mut(0, "turn").unwrap().target(), Some(Target::Rotation(turned)));
 }
 
-/// An action of a user's own around another one.
+/// User-defined action around another one.
 struct Wrapper(Box<dyn ActionModel>);
 
 impl ActionModel for Wrapper {
@@ -245,7 +246,7 @@ fn a_copy_solves_as_the_original_and_changes_alone() {
     assert_eq!(solve(&mut problem).xs, first.xs);
 }
 
-/// A problem of which all actions have copies.
+/// Creates a problem whose actions can all be copied.
 fn copied(arm: &Arc<Model>) -> Problem {
     let rest = Residual::State { reference: vec![0.1; 14] };
     let costs = vec![
@@ -273,7 +274,7 @@ fn an_action_without_a_copy_is_named() {
     assert_eq!(problem.try_clone().unwrap_err(), Error::NoCopy { model: None });
 }
 
-/// Problems of quadrupeds have copies too, with forces as controls and impacts.
+/// Problems of quadrupeds with forces as controls and impacts can be copied, too.
 #[test]
 fn a_copy_of_a_quadrupeds_problem_has_the_same_derivatives() {
     let (model, mut rng) = (Arc::new(robots::quadruped()), StdRng::seed_from_u64(52));

@@ -1,5 +1,5 @@
-//! A caller's mistake panics at the caller's line, with the argument, the expected and the found number; and what users print
-//! and share.
+//! A caller's mistake panics at the caller's line, with the argument, the expected and the found number. Also tests
+//! what users print and share between threads.
 
 use super::*;
 use condyle_optimal::robot::{OwnResidual, RobotProblem};
@@ -8,14 +8,14 @@ use condyle_optimal::{AugmentedLagrangian, DdpMethod, Hessian, Lqr, Settings, So
 #[path = "../../../../tests/common/panics.rs"]
 mod panics;
 
-/// The message of a panic, which must be at a line of this file.
+/// Returns the message of a panic, which must occur at a line of this file.
 fn said(what: &str, line: u32, call: impl FnOnce()) -> String {
     let panic = panics::panic_of(call).expect(what);
     assert!(panic.file.ends_with("callers.rs") && panic.line == line, "{what}, line {line}: {panic:?}");
     panic.message
 }
 
-/// Checks that an expression panics at its own line with a message.
+/// Checks that an expression panics at its own line with the given message.
 macro_rules! panics {
     ($message:expr, $body:expr) => {
         assert_eq!(said(stringify!($body), line!(), || drop($body)), $message)
@@ -23,7 +23,7 @@ macro_rules! panics {
 }
 
 #[test]
-#[rustfmt::skip] // the line of a panic is that of its check
+#[rustfmt::skip] // the line of a panic must equal the line of its check
 #[allow(clippy::drop_non_drop, dropping_copy_types, clippy::unit_arg)]
 fn a_panic_is_at_the_callers_line() {
     let arm = Arc::new(robots::arm7());
@@ -90,7 +90,7 @@ fn statuses_and_methods_are_printed() {
     assert_eq!(format!("[{:>10}]", Status::Converged), "[ converged]");
     assert_eq!((DdpMethod::Fddp.to_string(), DdpMethod::Ddp.to_string()), ("FDDP".to_owned(), "DDP".to_owned()));
     assert_eq!(Integrator::RungeKutta4.to_string(), "Runge–Kutta 4");
-    // names are those of files
+    // names equal the names in files
     for status in [
         Status::Converged,
         Status::MaxIterations,
@@ -116,7 +116,7 @@ fn statuses_and_methods_are_printed() {
 
 fn shared<T: Send + Sync + 'static>() {}
 
-/// Compiles if problems, solvers and solutions may go to other threads and be looked at by several.
+/// This test compiles only if problems and solvers are `Send` and `Sync`.
 #[test]
 fn problems_and_solvers_are_shared_by_threads() {
     shared::<Problem>();

@@ -9,7 +9,7 @@ use condyle_optimal::robot::{
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 
-/// A problem with every kind of knot, residual and activation, as data.
+/// Creates a problem with every kind of knot, residual and activation, as data.
 fn problem_as_data(rng: &mut StdRng) -> RobotProblem {
     let model = robots::humanoid();
     let nv = model.nv();
@@ -131,7 +131,7 @@ fn what_is_wrong_in_a_file_is_said() {
     let landing = |data: &mut RobotProblem| data.terminal = data.knots[2].clone();
     let mut landed = data.clone();
     landing(&mut landed);
-    assert_eq!(landed.build().map(|problem| problem.horizon()).unwrap(), 7); // an impact may come last
+    assert_eq!(landed.build().map(|problem| problem.horizon()).unwrap(), 7); // an impact may be the last knot
     assert!(built(&|data| data.x0[0] = f64::NAN).contains("`x0[0]` is NaN"));
     assert_eq!(
         built(&|data| data.knots[1].limits_at.get_mut(&1).unwrap()[0].lower.truncate(4)),

@@ -1,4 +1,4 @@
-//! Knots side by side: the bits of single knots.
+//! Knots computed side by side have the same bits as single knots.
 
 use super::{DT, contact_costs, feet, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Vec3, robots};
@@ -9,11 +9,11 @@ use condyle_optimal::{ActionModel, LqNode};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// A group of knots in the lanes of a vector register: the bits of single calls, with knots left over and all.
+/// A group of knots in the lanes of a vector register has the same bits as single calls, also for the knots left over.
 #[test]
 fn knots_side_by_side_are_single_knots() {
     let mut rng = StdRng::seed_from_u64(18);
-    let model = Arc::new(robots::quadruped().with_limbs(false)); // which add up in another order
+    let model = Arc::new(robots::quadruped().with_limbs(false)); // parallel branches add in another order
     let contacts = feet(&model, ReferenceFrame::LocalWorldAligned);
     let costs = contact_costs(&model, &contacts, 12, &mut rng);
     let free = costs.iter().filter(|cost| !["force", "cone"].contains(&cost.name.as_str())).cloned().collect();
@@ -31,7 +31,7 @@ fn knots_side_by_side_are_single_knots() {
     check_group(InverseDynamics::running(model.clone(), DT, given).unwrap(), &model, &mut rng);
 }
 
-/// The same where knots of a group differ in targets, in weights, and in what they look at at all.
+/// The same for knots of a group that differ in targets, in weights, and in their sets of costs.
 #[test]
 fn knots_with_costs_of_their_own_are_single_knots() {
     let mut rng = StdRng::seed_from_u64(19);

@@ -1,4 +1,4 @@
-//! Knots in implicit form give the gains and the steps of those in explicit form.
+//! Knots in implicit form give the same gains and steps as knots in explicit form.
 
 use super::{DT, contact_costs, largest_difference, random, random_state};
 use condyle_dynamics::{ContactConstraint, Model, ReferenceFrame, robots};
@@ -10,14 +10,14 @@ use condyle_optimal::{ActionModel, Fddp, Problem};
 use rand::{SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Eleven knots one after another at random states, where contacts are as badly conditioned as they come; most cases
+/// Tolerance of gains, for eleven consecutive knots at random states with very badly conditioned contacts; most cases
 /// agree to 1e-10.
 const GAINS: f64 = 1e-6;
 
-/// So many knots that eight of them go side by side and some are left over.
+/// Number of knots; eight of them form a group of lanes, and some are left over.
 const KNOTS: usize = 11;
 
-/// What the sweep of the first iteration finds with and without the implicit form, from random states with gaps.
+/// Compares the sweeps of the first iteration with and without the implicit form, from random states with gaps.
 pub(super) fn compare(
     what: &str,
     model: &Arc<Model>,
@@ -59,14 +59,14 @@ pub(super) fn compare(
         }
     }
     println!("{what}: gains differ by at most {worst:.1e}");
-    // on a processor with lanes the two are different computations
+    // on a processor with lanes the two computations differ
     assert!(
         exact < 2 * KNOTS || condyle_dynamics::level::level() == condyle_dynamics::level::Level::Baseline,
         "{what}"
     );
 }
 
-/// The costs of contacts, and a control's, so that Quu is positive definite.
+/// Returns costs of contacts and a cost of the controls; the latter makes Quu positive definite.
 fn costs(model: &Model, contacts: &[Contact], rng: &mut StdRng) -> Vec<Cost> {
     let nu = Actuation::joints(model).nu();
     let (first, last) = (contacts[0].clone(), contacts[contacts.len() - 1].clone());
@@ -110,7 +110,7 @@ fn implicit_knots_have_the_gains_of_explicit_ones() {
     }
 }
 
-/// Legs that are straight have no accelerations that could be left out; bodies take their place.
+/// With straight legs, joint accelerations cannot be eliminated; accelerations of bodies are eliminated instead.
 #[test]
 fn implicit_knots_stand_on_straight_legs() {
     let mut rng = StdRng::seed_from_u64(4);

@@ -1,4 +1,4 @@
-//! Integrators and polynomials of controls: exact derivatives, and orders.
+//! Integrators and polynomial controls: exact derivatives, and orders of convergence.
 
 use super::{DT, ROUNDING, check_derivatives, largest_difference, random, random_state};
 use condyle_dynamics::{Vec3, robots};
@@ -46,7 +46,8 @@ fn derivatives_of_integrators_are_those_of_the_action() {
     }
 }
 
-/// Controls that are the same at all nodes of a polynomial are constant: the step, its cost and its derivatives by them.
+/// Controls that are the same at all nodes of a polynomial are constant: step, cost and the derivatives with respect to
+/// them agree.
 #[test]
 fn equal_controls_of_a_polynomial_are_constant() {
     let mut rng = StdRng::seed_from_u64(23);
@@ -84,7 +85,7 @@ fn equal_controls_of_a_polynomial_are_constant() {
     }
 }
 
-/// A step of Δt against many small ones: halving Δt divides the error by 2^(order + 1).
+/// One step of Δt is compared with many small ones: halving Δt divides the error by 2^(order + 1).
 #[test]
 fn runge_kutta_methods_have_their_order() {
     let mut rng = StdRng::seed_from_u64(15);

@@ -1,4 +1,4 @@
-//! Inverse dynamics in contact: exact derivatives, the same motions and optima as forward dynamics, what is refused.
+//! Inverse dynamics in contact: exact derivatives, the same motions and optima as forward dynamics, and errors.
 
 use super::limits::check_gradient;
 use super::{DT, check_derivatives, contact_costs, feet, largest_difference, random, random_state, rotation};
@@ -14,15 +14,16 @@ use rand::{SeedableRng, rngs::StdRng};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A solve with M, whose condition is up to 1e4, and back.
+/// Tolerance of a solve with M, whose condition number is up to 1e4, followed by the inverse operation.
 const BACK: f64 = 1e-9;
-/// A sum of some dozen products in another order.
+/// Tolerance of a sum of some dozen products in another order.
 const ROUNDING: f64 = 1e-12;
-/// How far the equations of a solution may be from holding (N, m/s²), and forces of some hundred newtons then differ.
+/// Maximum violation of a solution's equations (N, m/s²), and the resulting difference of forces of some hundred
+/// newtons.
 const HELD: f64 = 1e-6;
 const FORCES: f64 = 1e-2;
 
-/// Contacts of every kind: a line, a plane, a point and a whole frame, with gains.
+/// Returns contacts of every kind: a line, a plane, a point and a whole frame, with gains.
 fn all_kinds(model: &Model, reference: ReferenceFrame, rng: &mut StdRng) -> Vec<Contact> {
     let kinds: [fn(usize) -> ContactConstraint; 4] =
         [ContactConstraint::line, ContactConstraint::plane, ContactConstraint::point, ContactConstraint::rigid];
@@ -35,7 +36,7 @@ fn all_kinds(model: &Model, reference: ReferenceFrame, rng: &mut StdRng) -> Vec<
     frames.into_iter().zip(kinds).map(contact).collect()
 }
 
-/// The equations of a knot as costs, so that their derivatives are seen with weights.
+/// Returns the equations of a knot as weighted costs, so that their derivatives are compared.
 fn equations(contacts: &[Contact], driven: bool) -> Vec<Cost> {
     let undriven = driven.then(|| Cost::new("undriven", 1e-3, Residual::UndrivenEffort, Activation::Quadratic));
     let holds = contacts.iter().map(|contact| {
@@ -72,7 +73,7 @@ fn derivatives_are_those_of_the_action() {
     }
 }
 
-/// An arm that is driven everywhere has no effort without a drive; an arm that touches nothing is a free one.
+/// A fully driven arm has no undriven efforts; an arm without contacts equals a free one.
 #[test]
 fn derivatives_of_an_arm_are_those_of_the_action() {
     let mut rng = StdRng::seed_from_u64(42);
@@ -103,7 +104,7 @@ fn outputs(action: &mut dyn ActionModel, x: &[f64], u: &[f64]) -> BTreeMap<Strin
     all
 }
 
-/// The outputs of each knot of a trajectory.
+/// Returns the outputs of each knot of a trajectory.
 fn outputs_of_all(problem: &mut Problem, xs: &[f64], us: &[f64]) -> Vec<BTreeMap<String, Vec<f64>>> {
     let (nx, horizon) = (problem.nx(), problem.horizon());
     let nu = us.len() / horizon;
@@ -117,9 +118,9 @@ fn outputs_of_all(problem: &mut Problem, xs: &[f64], us: &[f64]) -> Vec<BTreeMap
     (0..horizon).map(of).collect()
 }
 
-/// With the accelerations and forces that follow from some controls by forward dynamics, the next state and the costs are
-/// the same, the efforts are those of the controls, and the equations hold: by joints that have drives of their own, and by
-/// drives that mix all coordinates.
+/// Inverse dynamics receives the accelerations and forces that forward dynamics computes from some controls. The next
+/// state and the costs are then the same, the efforts equal the controls, and the equations hold. This is tested for
+/// drives of single joints, and for drives that mix all coordinates.
 #[test]
 fn it_is_forward_dynamics_backwards() {
     let mut rng = StdRng::seed_from_u64(43);
@@ -132,7 +133,7 @@ fn it_is_forward_dynamics_backwards() {
                 true => vec![Cost::new("gravity", 1e-2, Residual::ControlGravity, Activation::Quadratic)],
                 false => contact_costs(&model, &contacts, nu, &mut rng),
             };
-            costs.retain(|cost| cost.name != "effort"); // which looks at the controls
+            costs.retain(|cost| cost.name != "effort"); // it depends on the controls
             let forward =
                 ContactAcceleration::new(model.clone(), drives.clone(), &contacts, 0.0, costs.clone()).unwrap();
             let mut forward = Integrated::new(forward, Integrator::SemiImplicitEuler, DT).unwrap();
@@ -151,14 +152,14 @@ fn it_is_forward_dynamics_backwards() {
             let cost = [forward.calc(0, &x, &u, &mut next), inverse.calc(0, &x, &controls, &mut back)];
             assert!((cost[0] - cost[1]).abs() < BACK * (1.0 + cost[0].abs()), "{cost:?}");
             assert!(largest_difference(&back, &next) < ROUNDING);
-            // and where they do not, that costs
+            // a violated equation adds to the cost
             controls[2] += 1.0; // lifts the trunk
             assert!(inverse.calc(0, &x, &controls, &mut back) > cost[0] + 1.0);
         }
     }
 }
 
-/// The quadruped with bent knees.
+/// Returns the state of the quadruped with bent knees.
 pub(super) fn standing(model: &Model) -> Vec<f64> {
     let mut x = neutral(model);
     (0..4).for_each(|leg| (x[8 + 3 * leg], x[9 + 3 * leg]) = (0.7, -1.4));
@@ -166,7 +167,8 @@ pub(super) fn standing(model: &Model) -> Vec<f64> {
     x
 }
 
-/// The forces of quasi-statics hold the robot: no base force is missing, and its efforts are those of forward dynamics.
+/// Quasi-static forces hold the robot still: no force on the base is missing, and the efforts equal the efforts of
+/// forward dynamics.
 #[test]
 fn forces_hold_the_robot_still() {
     let model = Arc::new(robots::quadruped());
@@ -202,8 +204,8 @@ fn knots_in_lanes_are_single_knots() {
     assert!(largest_difference(&costs, &single) < ROUNDING && largest_difference(&next, &alone) < ROUNDING);
 }
 
-/// A quadruped moves its trunk over its feet, with costs on efforts, forces and accelerations and a cone: by forward
-/// dynamics and FDDP, and by inverse dynamics and the augmented Lagrangian.
+/// A quadruped moves its trunk over its feet, with costs on efforts, forces and accelerations, and a cone. It is solved
+/// by forward dynamics with FDDP, and by inverse dynamics with the augmented Lagrangian.
 #[test]
 fn forward_and_inverse_dynamics_have_one_optimum() {
     let model = Arc::new(robots::quadruped());
@@ -279,7 +281,7 @@ fn forward_and_inverse_dynamics_have_one_optimum() {
     }
 }
 
-/// Contacts that say the same twice are no fault here: forces are shared, and the efforts are the smallest.
+/// Redundant contacts are valid here: they share the forces, and the efforts are the smallest.
 #[test]
 fn contacts_may_be_redundant() {
     let model = Arc::new(robots::humanoid());

@@ -1,4 +1,4 @@
-//! Limits: what they add to a knot's cost, and its exact derivatives.
+//! Limits: the terms that they add to a knot's cost, and exact derivatives.
 
 use super::{DIFFERENCES, DT, contact_costs, feet, largest_difference, random, random_state, rotation};
 use condyle_dynamics::{Model, ReferenceFrame, Se3, Vec3, robots};
@@ -10,14 +10,15 @@ use condyle_optimal::{ActionModel, Error, LqNode};
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// 1/μ, unless a solver of constraints has chosen another.
+/// Default penalty 1/μ, before a constrained solver chooses another.
 const PENALTY: f64 = 10.0;
-/// Of central differences: their error is about its square, and the rounding of the cost divided by it.
+/// Step of central differences: their error is about the square of the step, plus the rounding of the cost divided by
+/// the step.
 const STEP: f64 = 1e-5;
-/// A sum of some dozen squares.
+/// Tolerance of a sum of some dozen squares.
 const ROUNDING: f64 = 1e-12;
 
-/// How many numbers a residual of contact_costs has; `rows` of the contact that it looks at.
+/// Returns the number of entries of a residual of `contact_costs`; `rows` is the number of rows of its contact.
 fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
     match residual {
         Residual::State { .. } => 2 * model.nv(),
@@ -32,7 +33,8 @@ fn size(residual: &Residual, model: &Model, nu: usize, rows: usize) -> usize {
     }
 }
 
-/// Every residual that there is, some of its numbers held to zero, others within bounds, others free.
+/// Returns a limit for each existing residual. Some entries are held at zero, others are within bounds, others are
+/// free.
 fn limits(model: &Model, nu: usize, rng: &mut StdRng) -> Vec<Limit> {
     let contacts = feet(model, ReferenceFrame::LocalWorldAligned);
     let rows = contacts[1].constraint.kind.rows();
@@ -82,7 +84,7 @@ pub(super) fn check_gradient<A: ActionModel>(what: &str, mut action: A, model: &
     }
 }
 
-/// Differentiates an action with each limit that it takes, and with all of them; says how many these are.
+/// Checks the derivatives of an action with each limit that it accepts, and with all of them. Returns their number.
 fn check<A: ActionModel>(
     what: &str,
     model: &Model,
@@ -145,7 +147,7 @@ fn derivatives_of_limits_of_other_steps_are_those_of_the_terms() {
     assert_eq!(check("inverse dynamics", &model, &all, inverse, 1.0, &mut rng), all.len() - 3);
 }
 
-/// The term of controls is known, and no Δt and no stage of a step scales it.
+/// The term of a limit on controls has a closed form; neither Δt nor a stage of the integrator scales it.
 #[test]
 fn a_limit_costs_what_it_should() {
     let mut rng = StdRng::seed_from_u64(33);
@@ -168,14 +170,14 @@ fn a_limit_costs_what_it_should() {
         let mut limited = free.clone().with_limits(limit()).unwrap();
         let term = limited.calc(0, &x, &u, &mut next) - without;
         assert!((term - expected).abs() < ROUNDING * expected, "{method:?}: {term}, expected {expected}");
-        // knot 2 may have limits of its own: none
+        // knot 2 may have its own limits: here an empty list
         limited.set_limits(2, vec![]).unwrap();
         let costs = [1, 2, 3].map(|t| limited.calc(t, &x, &u, &mut next) - without);
         assert_eq!(costs, [term, 0.0, term], "{method:?}");
     }
 }
 
-/// Knots side by side in lanes find what single ones do.
+/// Knots side by side in lanes give the same results as single knots.
 #[test]
 fn limits_in_lanes_are_those_of_single_knots() {
     let mut rng = StdRng::seed_from_u64(34);

@@ -1,4 +1,4 @@
-//! Robots in contact, at impacts, and with other drives: exact derivatives, and what is refused.
+//! Robots in contact, at impacts, and with other drives: exact derivatives, and errors.
 #![allow(non_snake_case)] // the names of the literature
 
 mod access;
@@ -25,18 +25,18 @@ use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// Central differences of a function with values and derivatives of order one are good to about 1e-9 of them; contact
-/// forces are some hundred times larger than their arguments.
+/// Tolerance of central differences. For a function with values and derivatives of order one they are accurate to about
+/// 1e-9; contact forces are some hundred times larger than their arguments.
 const DIFFERENCES: f64 = 1e-6;
-/// Both solves stop where the cost is expected to fall by less than 1e-9.
+/// Tolerance of optima: both solves stop where the expected decrease of the cost is below 1e-9.
 const OPTIMUM: f64 = 1e-7;
-/// A sum of some dozen products in another order.
+/// Tolerance of a sum of some dozen products in another order.
 const ROUNDING: f64 = 1e-13;
-/// Two orders of the same sums, through a factorisation.
+/// Tolerance of two orders of the same sums, through a factorisation.
 const SAME: f64 = 1e-9;
 const DT: f64 = 0.02;
 
-/// Numbers of at least 0, for weights.
+/// Returns numbers ≥ 0, for weights.
 fn magnitudes(n: usize, rng: &mut StdRng) -> Vec<f64> {
     random(n, 1.0, rng).iter().map(|x| x.abs()).collect()
 }
@@ -45,7 +45,7 @@ fn random(n: usize, scale: f64, rng: &mut StdRng) -> Vec<f64> {
     (0..n).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect()
 }
 
-/// A state around neutral, of which no joint is near a singularity of its group.
+/// Returns a random state around neutral; no joint is near a singularity of its group.
 fn random_state(model: &Model, rng: &mut StdRng) -> Vec<f64> {
     let mut q = neutral(model);
     integrate(model, &neutral(model), &random(model.nv(), 0.5, rng), &mut q);
@@ -62,7 +62,7 @@ fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / scale
 }
 
-/// Compares written derivatives with differences at a random state.
+/// Compares hand-written derivatives with differences at a random state.
 fn check_derivatives<A: ActionModel + Clone>(what: &str, mut action: A, model: &Model, effort: f64, rng: &mut StdRng) {
     let (ndx, nu) = (action.ndx(), action.nu());
     let mut oracle = NumDiff(action.clone());
@@ -85,7 +85,7 @@ fn check_derivatives<A: ActionModel + Clone>(what: &str, mut action: A, model: &
     }
 }
 
-/// Two feet of the quadruped as points, or both of the humanoid as a whole.
+/// Returns contacts at two feet of the quadruped as points, or at both feet of the humanoid as whole frames.
 fn feet(model: &Model, reference: ReferenceFrame) -> Vec<Contact> {
     let make: fn(usize) -> ContactConstraint = match model.name() {
         "quadruped" => ContactConstraint::point,
@@ -106,7 +106,7 @@ fn barrier(n: usize) -> Activation {
     Activation::Barrier { lower: vec![-0.1; n], upper: vec![0.2; n] }
 }
 
-/// Every residual of a robot in contact.
+/// Returns a cost for every residual of a robot in contact.
 fn contact_costs(model: &Model, contacts: &[Contact], nu: usize, rng: &mut StdRng) -> Vec<Cost> {
     let (nv, name, rows) = (model.nv(), contacts[1].name.clone(), contacts[1].constraint.kind.rows());
     let foot = || FrameName::from(&*contacts[0].name);
@@ -186,7 +186,7 @@ fn derivatives_in_contact_are_those_of_the_action() {
     }
 }
 
-/// Lines and planes, also two lines on one body.
+/// Tests contacts along lines and planes, also two lines on one body.
 #[test]
 fn derivatives_in_contact_along_axes_are_those_of_the_action() {
     let mut rng = StdRng::seed_from_u64(29);
@@ -206,7 +206,7 @@ fn derivatives_in_contact_along_axes_are_those_of_the_action() {
             let mut costs = contact_costs(&model, &contacts, 12, &mut rng);
             let at_frame =
                 |cost: &Cost| !matches!(cost.residual, Residual::FrameRotation { .. } | Residual::FrameVelocity { .. });
-            costs.retain(at_frame); // contacts[0] is called otherwise than its frame
+            costs.retain(at_frame); // the name of contacts[0] differs from its frame's name
             let what = format!("{:?} {reference:?}", contacts[1].constraint.kind);
             let action = ContactDynamics::running(model.clone(), &contacts, DT, costs.clone()).unwrap();
             check_derivatives(&what, action, &model, 5.0, &mut rng);
@@ -320,7 +320,7 @@ fn residuals_are_what_they_say() {
         let cost = action.calc(0, &x, &[], &mut []);
         assert!(cost < 1e-24, "{cost:e}");
     }
-    // the efforts that hold the robot still leave nothing of `ControlGravity`, whatever touches the ground
+    // with the efforts that hold the robot still, `ControlGravity` is zero, whichever feet touch the ground
     let still = [q, &[0.0; 18]].concat();
     let all = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
     let contacts = all.map(|name| Contact::new(name, ContactConstraint::point(model.frame(name).unwrap())));
@@ -416,7 +416,8 @@ fn what_does_not_fit_is_refused_by_name() {
     assert!(matches!(end, Error::Cost { .. }));
 }
 
-/// Points on a line on one body hold it in five ways of six; with damping they share the forces, and a solve goes on.
+/// Points on a line on one body constrain five of six directions. With damping, they share the forces, and a solve
+/// continues.
 #[test]
 fn a_line_of_contacts_on_one_body_needs_damping() {
     let arm = robots::arm7();
@@ -445,7 +446,8 @@ fn a_line_of_contacts_on_one_body_needs_damping() {
     assert!(solution.xs.iter().all(|x| x.is_finite()));
 }
 
-/// What knots in contact and impacts say of the form of A and B is true: a sweep finds the same without knowing it.
+/// The structure of A and B reported by knots in contact and impacts is correct: a sweep without it gives the same
+/// result.
 #[test]
 fn derivatives_have_the_form_of_euler_steps() {
     let mut rng = StdRng::seed_from_u64(9);

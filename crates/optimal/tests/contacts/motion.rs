@@ -1,4 +1,4 @@
-//! Accelerations, efforts and contact forces of a solution are those of the dynamics, in the frames that they promise.
+//! Accelerations, efforts and contact forces of a solution satisfy the equations of motion, in the documented frames.
 
 use super::*;
 use condyle_dynamics::{
@@ -10,10 +10,10 @@ use condyle_optimal::robot::{
 use condyle_optimal::{Constrained, PathConstraint};
 use nalgebra::DVector;
 
-/// The same equation through a factorisation, of forces of some hundred newtons.
+/// Tolerance of the same equation through a factorisation, with forces of some hundred newtons.
 const BALANCE: f64 = 1e-8;
 
-/// No constraint at all.
+/// Constraint without rows.
 struct Nothing;
 
 impl PathConstraint for Nothing {
@@ -26,13 +26,14 @@ impl PathConstraint for Nothing {
     fn calc(&mut self, _: usize, _: &[f64], _: &[f64], _: &mut [f64]) {}
 }
 
-/// A problem of one knot.
+/// Creates a problem of one knot.
 fn single(knot: Box<dyn ActionModel>, model: &Arc<Model>, x: &[f64]) -> Problem {
     let end = FreeDynamics::terminal(model.clone(), vec![]).unwrap();
     Problem::new(x.to_vec(), vec![knot], vec![0], Box::new(end)).unwrap()
 }
 
-/// Σ Jᵀ f, from the forces along the world's axes at the frames' origins; and checks that the local ones are the same.
+/// Computes Σ Jᵀ f from the forces along the world's axes at the frames' origins; checks that the local forces give the
+/// same.
 fn generalised(model: &Model, q: &[f64], motion: &KnotMotion) -> DVector<f64> {
     let (mut data, mut sum) = (Data::new(model), DVector::zeros(model.nv()));
     for contact in &motion.contacts {
@@ -53,7 +54,7 @@ fn generalised(model: &Model, q: &[f64], motion: &KnotMotion) -> DVector<f64> {
     sum
 }
 
-/// Contacts of all kinds along their own and the world's axes.
+/// Returns contacts of all kinds, along their own and the world's axes.
 fn kinds(model: &Model, rng: &mut StdRng) -> Vec<Contact> {
     let names: [&str; 4] = match model.name() {
         "quadruped" => ["LF_foot", "RF_foot", "LH_foot", "RH_foot"],
@@ -103,7 +104,7 @@ fn motion_of_an_arm_is_that_of_its_dynamics() {
     let motion = single(Box::new(knot), &arm, &x).motion_at(0, &x, &a).unwrap();
     assert_eq!(motion.acceleration, a);
     assert!(largest_difference(&motion.effort, &u) < SAME);
-    // the end, and what is no robot
+    // a terminal knot and an action without a robot have no motion
     assert_eq!(single(Box::new(euler()), &arm, &x).motion_at(1, &x, &[]), None);
     assert_eq!(no_robot().motion_at(0, &[1.0, 2.0, 3.0], &[0.0; 2]), None);
 }
@@ -114,7 +115,7 @@ fn no_robot() -> Problem {
     Problem::new(vec![0.0; 3], vec![Box::new(unicycle)], vec![0; 2], end).unwrap()
 }
 
-/// q̈ = u of one number.
+/// Mass with one coordinate: q̈ = u.
 struct Mass {
     zero: DMatrix<f64>,
 }
@@ -173,7 +174,7 @@ fn forces_of_contacts_balance_the_robot() {
         let needed = DVector::from_row_slice(rnea(&model, &mut data, q, v, &motion.acceleration, &[]));
         let found = DVector::from_row_slice(&tau) + generalised(&model, q, &motion);
         assert!(largest_difference(found.as_slice(), needed.as_slice()) < BALANCE);
-        // with accelerations and forces as controls the same
+        // the same with accelerations and forces as controls
         let knot = ContactInverseDynamics::running(model.clone(), &contacts, DT, vec![]).unwrap();
         let mut inverse = single(Box::new(knot), &model, &x);
         let again = inverse.motion_at(0, &x, &[a, lambda].concat()).unwrap();
@@ -211,7 +212,7 @@ fn impulses_change_velocities() {
     }
 }
 
-/// A trot: each knot of a solution has the feet that stand, and the forces that carry the robot.
+/// In a solution of a trot, each knot has contacts at the standing feet, and their forces carry the robot.
 #[test]
 fn a_solution_of_a_trot_has_forces_at_the_feet_that_stand() {
     let model = Arc::new(robots::quadruped());

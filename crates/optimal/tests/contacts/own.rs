@@ -1,4 +1,4 @@
-//! Residuals of one's own that are written for any scalar: exact Jacobians, as costs, limits and path constraints.
+//! User-defined residuals that are written for any scalar: exact Jacobians, as costs, limits and path constraints.
 
 use super::*;
 use condyle_optimal::robot::{
@@ -7,10 +7,10 @@ use condyle_optimal::robot::{
 use condyle_optimal::{AugmentedLagrangian, Constrained, PathConstraint};
 use condyle_spatial::Scalar;
 
-/// The same formulas in another order.
+/// Tolerance of the same formulas in another order.
 const EXACT: f64 = 1e-11;
 
-/// p − p_ref of a frame.
+/// Residual p − p_ref of a frame.
 struct Place {
     frame: usize,
     target: Vec3<f64>,
@@ -30,7 +30,7 @@ impl GenericResidual for Place {
     }
 }
 
-/// The velocity of a frame, along its own axes.
+/// Velocity of a frame, along its own axes.
 struct Speed(usize);
 
 impl GenericResidual for Speed {
@@ -46,7 +46,7 @@ impl GenericResidual for Speed {
     }
 }
 
-/// The controls.
+/// Controls, as a residual.
 struct Drive(usize);
 
 impl GenericResidual for Drive {
@@ -59,7 +59,7 @@ impl GenericResidual for Drive {
     }
 }
 
-/// One entry that mixes all arguments and the knot: (1 + t) z Σ v + z Σ u.
+/// Residual with one entry that mixes all arguments and the knot: (1 + t) z Σ v + z Σ u.
 struct Mixed(usize);
 
 impl GenericResidual for Mixed {
@@ -79,7 +79,7 @@ fn own(model: &Arc<Model>, function: impl GenericResidual) -> Residual {
     Residual::Own(OwnResidual::autodiff(model.clone(), function))
 }
 
-/// Costs by built-in residuals, and the same by ones of one's own.
+/// Returns costs with built-in residuals, and the same costs with user-defined ones.
 fn both(model: &Arc<Model>, frame: &str, nu: usize) -> [Vec<Cost>; 2] {
     let (number, target) = (model.frame(frame).unwrap(), Vec3::new(0.3, -0.2, 0.7));
     let built_in = [
@@ -160,7 +160,7 @@ fn derivatives_of_an_own_residual_are_those_of_the_action() {
     }
 }
 
-/// An arm that reaches for a point, exactly or as a cost.
+/// Creates the problem of an arm that reaches for a point, exactly or as a cost.
 fn reach(residual: Residual, limit: bool) -> Problem {
     let arm = Arc::new(robots::arm7());
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
@@ -195,7 +195,7 @@ fn an_own_residual_can_be_a_limit_or_a_path_constraint() {
     let built_in = solve(reach(Residual::FrameTranslation { frame: "tool".into(), target }, true), 1);
     let limit = solve(reach(Residual::Own(place()), true), 1);
     assert!(largest_difference(&limit, &built_in) < OPTIMUM);
-    // the same as a constraint around an action that knows nothing of it
+    // the same as a constraint around an action without limits
     let x0 = built_in[..14].to_vec();
     let rest = Cost::new("rest", 1e-1, Residual::State { reference: x0.clone() }, Activation::Quadratic);
     let effort = Cost::new("effort", 1e-3, Residual::Control { reference: vec![0.0; 7] }, Activation::Quadratic);

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes crocoddyl.json beside this file: what each solver does on small problems, iteration by iteration.
+"""Writes crocoddyl.json next to this file: the iterations of each solver on small problems.
 
-    pip install crocoddyl==3.2.1 pin==4.0.0 && python make_crocoddyl.py
+pip install crocoddyl==3.2.1 pin==4.0.0 && python make_crocoddyl.py
 
-Sign of K and k there: u = ubar - alpha k - K dx.
+Crocoddyl's sign of K and k: u = ubar - alpha k - K dx.
 """
 import json, math, pathlib
 import numpy as np
@@ -11,7 +11,7 @@ import crocoddyl
 
 
 class Cartpole(crocoddyl.DifferentialActionModelAbstract):
-    """x = (y, theta, y', theta'), theta = 0 upright; cost 1/2 |w (theta, y, y', theta', f)|^2."""
+    """Cart-pole: x = (y, theta, y', theta'), theta = 0 upright; cost 1/2 |w (theta, y, y', theta', f)|^2."""
 
     m1, m2, l, g = 1.0, 0.1, 0.5, 9.81
 

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Writes ipopt.json beside this file: the optima of constrained problems, by CasADi 3.7.2 with IPOPT.
+"""Writes ipopt.json next to this file: the optima of constrained problems, by CasADi 3.7.2 with IPOPT.
 
-    pip install casadi==3.7.2 && python make_ipopt.py
+pip install casadi==3.7.2 && python make_ipopt.py
 
-The actions are those of ../common: the same dynamics and costs.
+The actions have the same dynamics and costs as in ../common.
 """
 
 import json
@@ -30,7 +30,7 @@ def cartpole(x, u, dt=0.03):
 
 
 def solve(step, nu, x0, horizon, cost, end, constraints, end_constraints, guess):
-    """Multiple shooting; constraints(x, u) and end_constraints(x) give lists of (lower, g, upper)."""
+    """Solves by multiple shooting; constraints(x, u) and end_constraints(x) return lists of (lower, g, upper)."""
     opti = casadi.Opti()
     xs, us = opti.variable(len(x0), horizon + 1), opti.variable(nu, horizon)
     total = end(xs[:, horizon])
@@ -78,13 +78,13 @@ def park_on(start, n, disc, guess):
 
 
 def rotation(axis, angle):
-    """Rodrigues' formula."""
+    """Returns the rotation matrix by Rodrigues' formula."""
     K, E = casadi.skew(axis), casadi.DM.eye(3)
     return E + casadi.sin(angle) * K + (1 - casadi.cos(angle)) * K @ K
 
 
 class Arm:
-    """A chain of revolute joints from a URDF, by Newton and Euler with classical accelerations in the world's axes."""
+    """Chain of revolute joints from a URDF, by Newton–Euler with classical accelerations in the world's axes."""
 
     def __init__(self, path, tip):
         root = xml.etree.ElementTree.parse(path).getroot()
@@ -100,7 +100,7 @@ class Arm:
         return casadi.DM([float(x) for x in text.split()])
 
     def efforts(self, q, v, a):
-        """The efforts of the joints and the place of the tip."""
+        """Returns the efforts of the joints and the position of the tip."""
         R, p = casadi.DM.eye(3), casadi.DM.zeros(3)
         w, dw, dv = casadi.DM.zeros(3), casadi.DM.zeros(3), casadi.DM([0, 0, 9.81])
         bodies, k = [], 0
@@ -138,7 +138,8 @@ class Arm:
 
 
 def reach(q0, horizon, dt, target, effort, speed):
-    """The arm comes to rest with its tool at a point, with bounds on efforts and speeds; forces by inverse dynamics."""
+    """Solves for an arm that comes to rest with its tool at a point, with bounds on efforts and speeds; forces by
+    inverse dynamics."""
     arm, opti = Arm(ARM, "tool"), casadi.Opti()
     qs, vs, us = (opti.variable(7, n) for n in (horizon + 1, horizon + 1, horizon))
     opti.subject_to(qs[:, 0] == q0)
@@ -182,14 +183,14 @@ def main():
     disc = [-0.55, -0.6, 0.2]
 
     def around(side):
-        """A way that passes the disc on one side."""
+        """Returns a path that passes the disc on one side."""
         way = line(start, [0.0, 0.0, 0.0], n)
         return [[x - side * 4 * x * (1 + x) * 0.4, y + side * 4 * y * (1 + y) * 0.4, a] for x, y, a in way]
 
     ways = [park_on(start, n, disc, guess) for guess in (line(start, [0.0, 0.0, 0.0], n), around(1), around(-1))]
     park = min(ways, key=lambda found: found["cost"])
 
-    # a lean is caught on a short track: bounds on the cart and its force, upright at rest at the end
+    # a leaning pole is caught on a short track: bounds on the cart and its force, upright and at rest at the end
     start, n = [0.0, 0.3, 0.0, 0.0], 60
     w, h = [0.01, 1.0, 0.01, 0.01, 0.09], 0.03
     catch = solve(

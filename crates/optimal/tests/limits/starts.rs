@@ -1,4 +1,5 @@
-//! Warm starts outside of the bounds, or far from any solution: what comes out is within the bounds, or says that it is not.
+//! Warm starts outside the bounds, or far from any solution: the result is within the bounds, or reports that it is
+//! not.
 
 use super::{ARM, quadratic};
 use condyle_dynamics::{ContactConstraint as Held, Model, ReferenceFrame, Vec3, neutral, robots};
@@ -7,10 +8,10 @@ use condyle_optimal::{AugmentedLagrangian, Fddp, Problem, Solution, Status, Viol
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::sync::Arc;
 
-/// The efforts of the arm may be so large (N m); its second joint alone needs 29.6 to hold it at first.
+/// Largest effort of the arm (N m); holding the initial posture takes 29.6 at the second joint.
 const WEAK: f64 = 20.0;
 const HORIZON: usize = 15;
-/// The optimum, by IPOPT; to how many digits it is known.
+/// Cost of the optimum, by IPOPT, and its accuracy.
 const IPOPT: f64 = 0.7869;
 const DIGITS: f64 = 2e-4;
 
@@ -18,8 +19,8 @@ fn control() -> Residual {
     Residual::Control { reference: vec![0.0; 7] }
 }
 
-/// An arm that comes to rest with its tool at a point, with bounds on its efforts or limits, or for its own sake; and the
-/// efforts that hold it still.
+/// Creates the problem of an arm that ends at `end`, with its efforts bounded directly or by limits. Also returns the
+/// efforts that hold the arm still.
 fn arm(limits: bool, end: FreeDynamics) -> (Problem, Vec<f64>) {
     let costs =
         vec![quadratic("rest", 0.1, Residual::State { reference: ARM.to_vec() }), quadratic("effort", 1e-3, control())];
@@ -37,7 +38,7 @@ fn point() -> Residual {
     Residual::FrameTranslation { frame: "tool".into(), target: Vec3::new(0.35, 0.2, 0.6) }
 }
 
-/// The end at a point and at rest, exactly.
+/// Returns a terminal action that requires the tool at a point and the arm at rest, exactly.
 fn exact() -> FreeDynamics {
     let infinite = f64::INFINITY;
     let [lower, upper] = [-infinite, infinite].map(|q| [vec![q; 7], vec![0.0; 7]].concat());
@@ -54,7 +55,7 @@ fn most(us: &[f64]) -> f64 {
     us.iter().fold(0.0, |most, u| most.max(u.abs()))
 }
 
-/// Random controls of a size, evenly spread or all of that size.
+/// Returns random controls up to a size, or all of that size.
 fn random(n: usize, size: f64, seed: u64, saturated: bool) -> Vec<f64> {
     let mut random = StdRng::seed_from_u64(seed);
     let mut one = || 2.0 * random.random::<f64>() - 1.0;
@@ -68,7 +69,7 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     for (limits, start) in [(false, still.clone()), (false, clipped(&still, WEAK)), (true, still.clone())] {
         let (mut problem, _) = arm(limits, exact());
         let mut solver = AugmentedLagrangian::new(&problem);
-        solver.inner.project_warm_start = false; // it does so anyway
+        solver.inner.project_warm_start = false; // it is projected nevertheless
         let solution = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &start).unwrap();
         assert!(solution.status == Status::Converged && most(&solution.us) <= WEAK + 1e-6);
         let cost = solver.outcome().cost;
@@ -81,11 +82,11 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     let solution = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &still).unwrap();
     assert!(solution.status == Status::MaxIterations || solution.status == Status::Converged);
     assert!(most(&solution.us) <= WEAK);
-    // Crocoddyl's way: the start is kept, no step from it is accepted, and the status says so
+    // as in Crocoddyl: the start is kept, no step from it is accepted, and the status reports this
     solver.settings.project_warm_start = false;
     let kept = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &still).unwrap();
     assert!(kept.status != Status::Converged && kept.us == still);
-    // from then on the setting holds for what is resumed and shifted, too
+    // from then on the setting also applies to resumed and shifted trajectories
     solver.settings.project_warm_start = true;
     solver.settings.max_iterations = 0;
     assert!(most(&solver.resume(&mut problem).unwrap().us) <= WEAK);
@@ -97,7 +98,7 @@ fn a_start_outside_of_the_bounds_is_moved_into_them() {
     assert!(most(solver.solution().u(HORIZON - 1)) <= WEAK && most(solver.solution().u(0)) > WEAK);
 }
 
-/// Bounds that become narrower between two solves hold for the trajectory that is gone on from.
+/// Bounds that become narrower between two solves also apply to the trajectory that is resumed.
 #[test]
 fn bounds_may_change_between_solves() {
     let (mut problem, still) = arm(false, exact());
@@ -109,8 +110,8 @@ fn bounds_may_change_between_solves() {
     assert!(solution.status == Status::Converged && most(&solution.us) <= 19.0);
 }
 
-/// Asserts what holds of any solution: none that violates a bound or a constraint is converged, and no start makes a problem
-/// infeasible that has a solution.
+/// Asserts two properties of any solution. A solution that violates a bound or a constraint is not converged, and a
+/// feasible problem is never reported as infeasible.
 fn assert_honest(solution: &Solution, primal: f64, bound: f64, case: &str) {
     assert_ne!(solution.status, Status::Infeasible, "{case}");
     assert!(solution.xs.iter().chain(&solution.us).all(|x| x.is_finite()), "{case}");
@@ -119,7 +120,7 @@ fn assert_honest(solution: &Solution, primal: f64, bound: f64, case: &str) {
     }
 }
 
-/// Starts with controls of ±1 to ±200, at the initial state or rolled out, of which many are beyond all bounds or diverge.
+/// Starts have controls of ±1 to ±200, at the initial state or rolled out; many exceed all bounds or diverge.
 #[test]
 fn any_start_leads_somewhere() {
     let (mut solved, mut count) = (0, 0);
@@ -144,7 +145,7 @@ fn any_start_leads_somewhere() {
     assert!(count >= 16 && 4 * solved >= 3 * count, "{solved} of {count}");
 }
 
-/// The same of a quadruped that stands on four feet, and shifts its trunk ahead with bounded efforts.
+/// The same for a quadruped that stands on four feet, and shifts its trunk forwards with bounded efforts.
 #[test]
 fn a_stance_starts_anywhere() {
     let model: Arc<Model> = Arc::new(robots::quadruped());
@@ -185,7 +186,7 @@ fn a_stance_starts_anywhere() {
     assert!(costs.iter().all(|cost| (cost - costs[0]).abs() < 1e-4 * costs[0]), "{costs:?}");
 }
 
-/// FDDP's own answers: a converged one is within the bounds, with projection and without.
+/// If FDDP itself reports convergence, the solution is within the bounds, with projection and without.
 #[test]
 fn fddp_never_converges_outside_of_the_bounds() {
     let reach = vec![quadratic("reach", 100.0, point())];
@@ -201,7 +202,7 @@ fn fddp_never_converges_outside_of_the_bounds() {
                 let case = format!("±{size}, seed {seed}, projected {project}");
                 assert_honest(solution, 0.0, WEAK, &case);
                 assert!(!project || most(&solution.us) <= WEAK, "{case}");
-                // an iterate within the bounds precedes a start outside of them
+                // an iterate within the bounds precedes a start outside them
                 let stepped = solution.trace.iter().any(|iteration| iteration.accepted);
                 if stepped && solution.status != Status::NotFinite {
                     assert!(most(&solution.us) <= WEAK, "{case}: {:?}", solution.status);
@@ -211,7 +212,7 @@ fn fddp_never_converges_outside_of_the_bounds() {
     }
 }
 
-/// A limit that x̂₀ itself violates is a proof; what else is asked for is still done.
+/// A limit that x̂₀ itself violates proves infeasibility; the other constraints are still satisfied.
 #[test]
 fn a_proof_names_the_limit() {
     let mut lower = vec![f64::NEG_INFINITY; 14];
@@ -230,10 +231,10 @@ fn a_proof_names_the_limit() {
     let solution = solver.solve(&mut problem, &ARM.repeat(HORIZON + 1), &still).unwrap();
     assert_eq!(solution.status, Status::Infeasible);
     let worst = solver.outcome().worst.clone().unwrap();
-    // `weak` has 7 rows before those of `bent`
+    // the 7 rows of `weak` precede the rows of `bent`
     assert_eq!((worst.kind, worst.knot, worst.row, worst.entry), (ViolationKind::Constraint, 0, 10, 3));
     assert_eq!((worst.name.as_deref(), worst.amount), (Some("bent"), 0.5));
-    // the tool is where it should be, and no restart was made
+    // the tool reaches its target, and no restart was made
     assert!(solver.outcome().penalty < 1e8);
     let mut placements = condyle_dynamics::Data::new(&robots::arm7());
     let arm = robots::arm7();
@@ -242,14 +243,14 @@ fn a_proof_names_the_limit() {
     assert!((tool.translation - Vec3::new(0.35, 0.2, 0.6)).norm_squared().sqrt() < 1e-5);
 }
 
-/// A gap is evidence too: of a solve without an iteration.
+/// In a solve without iterations, a gap is reported as evidence, too.
 #[test]
 fn a_gap_is_named() {
     let (mut problem, still) = arm(true, exact());
     let mut solver = AugmentedLagrangian::new(&problem);
     solver.inner.time_budget = Some(std::time::Duration::ZERO);
     let mut xs = ARM.repeat(HORIZON + 1);
-    xs[14 * 4 + 9] = 30.0; // the velocity of the third joint at knot 4
+    xs[14 * 4 + 9] = 30.0; // velocity of the third joint at knot 4
     let status = solver.solve(&mut problem, &xs, &clipped(&still, WEAK)).unwrap().status;
     assert_eq!(status, Status::TimeLimit);
     let outcome = solver.outcome();

@@ -1,24 +1,25 @@
-//! Time budgets: what a delay does to a controller, and how the controller recovers.
+//! Time budgets: the effect of a delay on a controller, and its recovery.
 
 use condyle_optimal::{ActionModel, AugmentedLagrangian, Error, Fddp, LqNode, Problem, Solution, Status};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-/// Budget of each solve, and one delay, both long against an iteration of some µs and against what else the machine does.
+/// Budget of each solve and one delay (ms). Both are long compared with an iteration of some µs and with disturbances
+/// by other processes.
 const BUDGET: Duration = Duration::from_millis(400);
 const DELAY: u64 = 900;
-/// A solve of this horizon takes several iterations from a new initial state.
+/// Horizon of the problem: a solve takes several iterations from a new initial state.
 const HORIZON: usize = 30;
-/// The largest |x| that belongs to the closed loop; a rollout that diverges passes it by orders.
+/// Largest |x| that occurs in the closed loop; a diverging rollout exceeds it by orders of magnitude.
 const SANE: f64 = 50.0;
 
-/// An unstable pendulum, θ̈ = 3 sin θ + u, by Euler steps of 0.1: its state triples in 6 knots under a constant control.
-/// Sleeps, and breaks, in its derivatives once it is told to.
+/// Unstable pendulum, θ̈ = 3 sin θ + u, by Euler steps of 0.1: its state triples in 6 knots under a constant control.
+/// On request, its derivatives sleep or become NaN.
 #[derive(Clone)]
 struct Unstable {
     nu: usize,
-    /// Milliseconds for which the next derivatives sleep.
+    /// Duration for which the next derivatives sleep (ms).
     delay: Arc<AtomicU64>,
     /// Whether derivatives are NaN.
     broken: Arc<AtomicU64>,
@@ -56,7 +57,7 @@ impl ActionModel for Unstable {
     }
 }
 
-/// Either solver.
+/// One of the two solvers.
 enum Solver {
     Fddp(Box<Fddp>),
     Constrained(Box<AugmentedLagrangian>),
@@ -101,7 +102,7 @@ impl Solver {
             Self::Constrained(solver) => solver.solution(),
         }
     }
-    /// The iterations of all inner solves.
+    /// Returns the number of iterations of all inner solves.
     fn iterations(&self) -> usize {
         match self {
             Self::Fddp(solver) => solver.solution().trace.len(),
@@ -110,7 +111,7 @@ impl Solver {
     }
 }
 
-/// A controller that has solved once without a budget: plant, problem, solver.
+/// Controller that has solved once without a budget: plant, problem, solver.
 struct Loop {
     plant: Unstable,
     problem: Problem,
@@ -134,13 +135,14 @@ impl Loop {
         })
     }
 
-    /// A period: the plant moves by the plan, the horizon moves on, and the next plan is made.
+    /// Makes one control period: the plant follows the plan, the horizon moves by one knot, and the next plan is
+    /// computed.
     fn step(&mut self) -> Solution {
         let plan = self.solver.solution();
         let u = plan.u(0)[0] + (0..2).map(|i| plan.K[0][(0, i)] * (self.x[i] - plan.x(0)[i])).sum::<f64>();
         let mut next = vec![0.0; 2];
         self.plant.calc(0, &self.x, &[u], &mut next);
-        next[1] += 0.02; // something pushes
+        next[1] += 0.02; // a disturbance
         self.x = next;
         self.solver.shift(&mut self.problem).unwrap();
         self.problem.set_x0(&self.x).unwrap();
@@ -148,12 +150,12 @@ impl Loop {
     }
 }
 
-/// The largest entry of a trajectory.
+/// Returns the largest entry of a trajectory.
 fn size(solution: &Solution) -> f64 {
     solution.xs.iter().chain(&solution.us).fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// One delay makes one solve late, which says so; the solves after it are as before.
+/// One delay makes one solve late, which reports it; the following solves are normal.
 #[test]
 fn a_controller_recovers_from_a_delay() {
     for mut now in Loop::all() {
@@ -174,7 +176,7 @@ fn a_controller_recovers_from_a_delay() {
     }
 }
 
-/// A budget that is always too short still lets each solve make an iteration, which steers.
+/// With a budget that is always too short, each solve still makes one iteration, which controls the plant.
 #[test]
 fn a_budget_below_an_iteration_is_overrun() {
     for mut now in Loop::all() {
@@ -188,8 +190,8 @@ fn a_budget_below_an_iteration_is_overrun() {
     }
 }
 
-/// A budget of zero asks for no iteration. Horizons that only move on end in copies of their last state, so that a solve with
-/// time finds the same as one that begins afresh.
+/// With a budget of zero no iteration is made. Horizons that are only shifted end in copies of their last state. A
+/// solve with time then gives the same result as one that starts from scratch.
 #[test]
 fn horizons_stay_sane_without_iterations() {
     for mut now in Loop::all() {
@@ -201,7 +203,7 @@ fn horizons_stay_sane_without_iterations() {
             now.solver.shift(&mut now.problem).unwrap();
             assert!(size(now.solver.solution()) < SANE);
         }
-        // x_N follows from the last control once, and then is copied
+        // x_N follows from the last control once, and is copied afterwards
         let xs = &now.solver.solution().xs;
         assert_eq!(xs[..2].repeat(HORIZON), xs[2..]);
         now.solver.settings().time_budget = None;
@@ -212,7 +214,7 @@ fn horizons_stay_sane_without_iterations() {
     }
 }
 
-/// Shifts in a row: the first rolls the last control out, the others copy.
+/// With several shifts in a row, the first rolls the last control out, and the others copy.
 #[test]
 fn only_a_new_trajectory_is_rolled_out() {
     for mut now in Loop::all() {
@@ -227,7 +229,7 @@ fn only_a_new_trajectory_is_rolled_out() {
     }
 }
 
-/// Solves that end as not finite leave the horizon sane, too.
+/// Solves that end as not finite do not make the horizon diverge either.
 #[test]
 fn horizons_stay_sane_when_nothing_is_finite() {
     for mut now in Loop::all() {

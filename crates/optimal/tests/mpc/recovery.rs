@@ -1,4 +1,4 @@
-//! Resumed solves whose start is lost, or whose step was refused.
+//! Resumed solves whose start is lost, or whose step was rejected.
 
 use condyle_dynamics::{Vec3, robots};
 use condyle_optimal::robot::{Activation, Cost, FreeDynamics, Residual};
@@ -12,7 +12,8 @@ const HORIZON: usize = 15;
 /// Largest cost of the closed loop. A solve from x̂₀ held still costs less than 2 at each of its states.
 const SANE: f64 = 20.0;
 
-/// An arm that reaches for a point. Its end may have any velocity, so that a repeated last control runs away.
+/// Creates the problem of an arm that reaches for a point. Its end may have any velocity, so a repeated last control
+/// diverges.
 fn reach(bound: f64) -> Problem {
     let arm = Arc::new(robots::arm7());
     let rest = Cost::new("rest", 0.1, Residual::State { reference: REST.to_vec() }, Activation::Quadratic);
@@ -52,7 +53,7 @@ fn a_horizon_whose_end_runs_away_is_replaced() {
     }
 }
 
-/// One iteration a solve, whose steps are refused until the regularisation is large enough.
+/// Each solve makes one iteration, whose steps are rejected until the regularisation is large enough.
 #[test]
 fn short_budgets_make_progress() {
     let mut problem = reach(20.0);

@@ -1,4 +1,4 @@
-//! The elimination of controls, of which some may lie at a bound.
+//! Elimination of controls, some of which may lie at a bound.
 #![allow(non_snake_case)] // the names of the literature: K, Quu
 
 use super::super::box_qp::BoxQp;
@@ -6,27 +6,28 @@ use super::super::node::{LqKnot, LqNode};
 use super::super::workspace::Workspace;
 use condyle_linalg::{SLACK, View, copy_symmetric, dot, eliminate, solve_right, transpose_negated};
 
-/// The elimination of controls, with its scratch.
+/// Elimination of controls, with its scratch.
 #[derive(Debug, Clone)]
 pub(crate) struct Controls {
     qp: BoxQp,
-    /// Lᵀ for the back substitution.
+    /// Lᵀ, for the back substitution.
     upper: Vec<f64>,
-    /// The number of controls that were eliminated last.
+    /// Number of controls eliminated last.
     free: usize,
 }
 
 impl Controls {
-    /// Room for m controls.
+    /// Allocates the scratch for m controls.
     pub(crate) fn new(m: usize) -> Self {
         Self { qp: BoxQp::new(m), upper: vec![0.0; (m + SLACK) * m], free: 0 }
     }
 
-    /// L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y, for the controls that are not at a bound; keeps Qu, Quu
-    /// and, where there are bounds, k. Returns the number of these controls.
+    /// Computes L Lᵀ = Quu,   X = Qxu L⁻ᵀ,   Vxx = Qxx − X Xᵀ,   Vx = Qx − X y, for the controls that are not at a
+    /// bound. Stores Qu and Quu in the knot and, if there are bounds, k in the scratch. Returns the number of these
+    /// controls.
     ///
     /// # Errors
-    /// The control and the pivot that is not positive.
+    /// The control and its pivot, if the pivot is not positive.
     pub(super) fn eliminate(
         &mut self,
         work: &mut Workspace,
@@ -54,7 +55,7 @@ impl Controls {
         Ok(self.free)
     }
 
-    /// [K k]ᵀ = −[X; yᵀ] L⁻¹ from what the elimination left, with the states turned by `turn`.
+    /// Computes [K k]ᵀ = −[X; yᵀ] L⁻¹ from the result of the elimination. The states are rotated by `turn`.
     pub(super) fn recover_gains(&mut self, work: &mut Workspace, node: &LqNode, knot: &mut LqKnot, turn: usize) {
         let (n, m, ld) = (node.ndx(), node.nu(), work.stride(node.nu()));
         let (Self { qp, upper, free }, H, split) = (self, &mut work.H, n - turn);
@@ -90,7 +91,7 @@ impl Controls {
     }
 }
 
-/// Moves the rows and columns of the `free` ones of m controls to the front of H, and what follows up behind them.
+/// Moves the rows and columns of the `free` controls, out of m, to the front of H, followed by the rest of H.
 fn keep_free(H: &mut [f64], stride: usize, m: usize, n: usize, free: &[usize]) {
     let (kept, rows) = (free.len(), m + n + 1);
     for (to, from) in free.iter().copied().chain(m..m + n).enumerate() {

@@ -1,4 +1,4 @@
-//! The quadratic form of a knot of whose A and B nothing is known.
+//! Quadratic form of a knot whose A and B have no known structure.
 #![allow(non_snake_case)] // the names of the literature: A, B, Q, …
 
 use super::super::node::{Hessian, LqNode};
@@ -6,7 +6,7 @@ use super::super::workspace::Workspace;
 use super::{Curvature, Form};
 use condyle_linalg::{SLACK, View, add_product_lower, copy_lower, copy_matrix, product, transpose};
 
-/// The form with full matrices, and with the states in their order.
+/// Form with full matrices, and with the states in their original order.
 #[derive(Debug, Clone)]
 pub(super) struct Dense;
 
@@ -15,7 +15,7 @@ impl Form for Dense {
         0
     }
 
-    /// H = [R + ϱ 1 ·; S Q; rᵀ qᵀ] + W [B A],   W = [P B, P A, P f + p]ᵀ.
+    /// Writes H = [R + ϱ 1 ·; S Q; rᵀ qᵀ] + W [B A],   W = [P B, P A, P f + p]ᵀ.
     fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, curvature: &mut Curvature<'_>) {
         let (n, m) = (node.ndx(), node.nu());
         let (ld, rows) = (work.stride(m), m + n);
@@ -32,7 +32,7 @@ impl Form for Dense {
         add_to_diagonal(H, ld, m, regularisation);
     }
 
-    /// Θ [B A].
+    /// Writes Θ [B A].
     fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
         let (n, m) = (node.ndx(), node.nu());
         let ld = work.stride(m);
@@ -41,11 +41,11 @@ impl Form for Dense {
     }
 }
 
-/// H = [R ·; S Q; rᵀ qᵀ] + [ψuu ·; ψxu ψxx; 0 0], the states turned by `turn`: its lower triangle. ψ is the curvature of the
-/// dynamics.
+/// Writes the lower triangle of H = [R ·; S Q; rᵀ qᵀ] + [ψuu ·; ψxu ψxx; 0 0], with the states rotated by `turn`. ψ is
+/// the curvature of the dynamics.
 pub(super) fn write_cost(work: &mut Workspace, node: &LqNode, turn: usize, curvature: &mut Curvature<'_>) {
     let (n, m) = (node.ndx(), node.nu());
-    let (ld, split) = (work.stride(m), n - turn); // states in H before and after the turn
+    let (ld, split) = (work.stride(m), n - turn); // `split`: number of states in H before the rotation wraps around
     let Workspace { H, p, .. } = work;
     let (R, S, Q) = (View::new(node.R.as_slice(), m), View::new(node.S.as_slice(), n), View::new(node.Q.as_slice(), n));
     copy_lower(H, ld, R, m);
@@ -68,7 +68,7 @@ pub(super) fn write_cost(work: &mut Workspace, node: &LqNode, turn: usize, curva
     }
 }
 
-/// H += [ψuu ·; ψxu ψxx], the states turned by `turn`.
+/// Adds [ψuu ·; ψxu ψxx] to H, with the states rotated by `turn`.
 fn add_hessian(H: &mut [f64], ld: usize, Hessian { xx, xu, uu }: &Hessian, turn: usize) {
     let (n, m) = xu.shape();
     let state = |i: usize| (i + turn) % n;
@@ -87,7 +87,7 @@ fn add_hessian(H: &mut [f64], ld: usize, Hessian { xx, xu, uu }: &Hessian, turn:
     }
 }
 
-/// Quu += ϱ 1.
+/// Adds ϱ 1 to Quu.
 pub(super) fn add_to_diagonal(H: &mut [f64], ld: usize, m: usize, regularisation: f64) {
     for j in 0..m {
         H[j * ld + j] += regularisation;

@@ -1,6 +1,7 @@
-//! Knots as the equations of inverse dynamics, of small robots all of whose coordinates are driven and are numbers: arms.
+//! Knots as equations of inverse dynamics, for small robots with all coordinates driven and in a vector space: arms.
 //!
-//! It is the form of [`inverse_dynamics`](super::inverse_dynamics) where every coordinate is an unknown, y = δv + w, and T = E = 1:
+//! This is the form of [`inverse_dynamics`](super::inverse_dynamics) in which every coordinate is an unknown, y = δv +
+//! w, and T = E = 1:
 //!
 //! ```text
 //!     ⎡ Π ·   ·      ⎤   over (w, δv, δq)
@@ -8,7 +9,7 @@
 //!     ⎣ Nᵀ Nᵀ P₁₁    ⎦
 //! ```
 //!
-//! The rows of U and G, scaled to be squares, are added to H in the tiles of the elimination.
+//! The elimination adds the rows of U and G, scaled so that their squares are added, to H tile by tile.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, U
 
 use super::super::gains::take_gains;
@@ -21,38 +22,38 @@ use condyle_linalg::{
     transpose_block,
 };
 
-/// The most coordinates. More are better off where the zeros of rows are known.
+/// Maximum number of coordinates. For more, the form that skips the zeros of rows is faster.
 const MOST: usize = 16;
-/// The most rows of costs.
+/// Maximum number of rows of costs.
 const MOST_COSTS: usize = 16;
 
-/// The form, with its scratch.
+/// Form of driven robots, with its scratch.
 #[derive(Debug, Clone)]
 pub(in crate::lq) struct Driven {
-    /// The scaled rows of U and G over (w, δv, δq), each with its part of the gradient, and zeros. Shape: `stride` × MOST +
-    /// MOST_COSTS, or none for larger robots.
+    /// Scaled rows of U and G over (w, δv, δq), each with its entry of the gradient, and zeros. Shape:
+    /// `stride` × MOST + MOST_COSTS; empty for larger robots.
     rows: Vec<f64>,
     stride: usize,
-    /// The number of rows.
+    /// Number of rows.
     count: usize,
-    /// See [`take_gains`].
+    /// Scratch of [`take_gains`].
     y: Vec<f64>,
 }
 
 impl Driven {
-    /// Scratch for n states.
+    /// Allocates the scratch for n states.
     pub(super) fn new(n: usize) -> Self {
         let nv = if n <= 2 * MOST { n / 2 } else { 0 };
         let stride = 4 * nv + 1 + 4 * SLACK;
         Self { rows: vec![0.0; stride * (nv + MOST_COSTS)], stride, count: 0, y: vec![0.0; 2 * nv + SLACK] }
     }
 
-    /// The rows that the form has below H.
+    /// Returns the number of rows that the form has below H.
     pub(in crate::lq) fn rows_below(n: usize, m: usize) -> usize {
         if n <= 2 * MOST { m } else { 0 }
     }
 
-    /// Whether the form is that of a node, when R gets so much on its diagonal.
+    /// Returns whether the form applies to a node, if `regularisation` is added to the diagonal of R.
     pub(super) fn takes(node: &LqNode, regularisation: f64) -> bool {
         let (nv, InverseDynamicsForm { own, slopes, diagonal, .. }) = (node.ndx() / 2, &node.inverse_dynamics);
         nv <= MOST
@@ -70,7 +71,7 @@ impl Form for Driven {
         n / 2
     }
 
-    /// H but for the squares, and below it U.
+    /// Writes H without the squares, and U below it.
     fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, _: &mut Curvature<'_>) {
         self.count = node.nu() + node.inverse_dynamics.slopes.len();
         at_narrow_level(Write { rows: &mut self.rows, stride: self.stride, work, node, regularisation });
@@ -80,7 +81,8 @@ impl Form for Driven {
         unreachable!("segments of a horizon take the form for all robots");
     }
 
-    /// With the squares, and with U below H: [L ·; X Hₓₓ − X Xᵀ; yᵀ ·; Y K], as [`Gains`](super::super::gains::Gains) has it.
+    /// Adds the squares and eliminates the unknowns. With U below H, the result is [L ·; X Hₓₓ − X Xᵀ; yᵀ ·; Y K], as
+    /// in [`Gains`](super::super::gains::Gains).
     fn eliminate(
         &self,
         work: &mut Workspace,
@@ -101,7 +103,7 @@ impl Form for Driven {
     }
 }
 
-/// The loops of [`Driven::write`].
+/// Loops of [`Driven::write`].
 struct Write<'a> {
     rows: &'a mut [f64],
     stride: usize,
@@ -119,7 +121,7 @@ impl Vectorized for Write<'_> {
         let (dt, _) = node.structure.euler().expect("the form is that of Euler steps");
         let Workspace { P, p, H, .. } = work;
         let (P, Q) = (View::new(P, n + SLACK), View::new(node.Q.as_slice(), n));
-        let (v, q) = (nv * ld, n * ld); // the columns of δv and δq
+        let (v, q) = (nv * ld, n * ld); // first elements of the columns of δv and δq
 
         // Nᵀ = Δt P₁₁ + P₁₂,   Π = Δt (Nᵀ + P₂₁) + P₂₂,   and Q + P₁₁ for δq
         let places = ([n, v + n], [0, nv, v + nv]);

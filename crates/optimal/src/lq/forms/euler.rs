@@ -1,4 +1,4 @@
-//! The quadratic form of a knot of semi-implicit Euler: blocks that are the identity or Δt are never multiplied.
+//! Quadratic form of a knot of semi-implicit Euler: blocks that are the identity or Δt are never multiplied.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, T, E
 
 use super::super::node::LqNode;
@@ -11,16 +11,16 @@ use condyle_linalg::{
     at_narrow_level, product, transpose,
 };
 
-/// The form of Euler steps with the controls as unknowns, and with the states in the order (v, q).
+/// Form of Euler steps with the controls as unknowns, and with the states in the order (v, q).
 #[derive(Debug, Clone)]
 pub(super) struct Euler {
     steps: Steps,
-    /// Part of NᵀF_q; its stride is that of Nᵀ and Π.
+    /// Part of NᵀF_q; its stride equals the stride of Nᵀ and Π.
     M: Vec<f64>,
 }
 
 impl Euler {
-    /// Room for n states.
+    /// Allocates the scratch for n states.
     pub(super) fn new(n: usize) -> Self {
         Self { steps: Steps::new(n), M: vec![0.0; (n / 2 + SLACK) * (n / 2)] }
     }
@@ -31,7 +31,7 @@ impl Form for Euler {
         n / 2
     }
 
-    /// With [B A] = [G F_v F_q] on velocities:
+    /// Writes H. With [B A] = [G F_v F_q] on velocities:
     ///
     /// ```text
     /// W = (Π [G F_v F_q] + [0 0 N])ᵀ,   last row Δt Eᵀp_q + p_v
@@ -65,7 +65,7 @@ impl Form for Euler {
         add_to_diagonal(&mut work.H, ld, m, regularisation);
     }
 
-    /// Θ B = Ψ G,   Θ A = Ψ [F_q F_v] + [Θ_q T  0],   Ψ = Δt Θ_q E + Θ_v.
+    /// Computes Θ B = Ψ G,   Θ A = Ψ [F_q F_v] + [Θ_q T  0],   Ψ = Δt Θ_q E + Θ_v.
     fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
         let (n, m) = (node.ndx(), node.nu());
         let ld = work.stride(m);
@@ -76,32 +76,32 @@ impl Form for Euler {
     }
 }
 
-/// The value function of the next state as a function of velocities and positions: y is the next velocity. Matrices are
-/// column-major with slack rows and the stride nv + SLACK.
+/// Value function of the next state as a function of velocities and positions; y is the next velocity. Matrices are
+/// column-major with padding rows and the stride nv + SLACK.
 #[derive(Debug, Clone)]
 pub(super) struct Steps {
-    /// Nᵀ, and behind it Π.
+    /// Nᵀ, followed by Π.
     both: Vec<f64>,
     /// Δt Eᵀp_q + p_v.
     pub(super) py: Vec<f64>,
-    /// The columns of P E or P T that are not those of P; their stride is that of P.
+    /// Columns of P E or P T that differ from the columns of P, with the stride of P.
     PB: Vec<f64>,
 }
 
 impl Steps {
-    /// Room for n states.
+    /// Allocates the matrices for n states.
     pub(super) fn new(n: usize) -> Self {
         let matrix = |rows: usize| vec![0.0; (rows + SLACK) * (n / 2)];
         Self { both: matrix(n / 2).repeat(2), py: vec![0.0; n / 2], PB: matrix(n) }
     }
 
-    /// Nᵀ and Π.
+    /// Returns Nᵀ and Π.
     #[inline(always)]
     pub(super) fn N_and_Pi(&self) -> (&[f64], &[f64]) {
         self.both.split_at(self.both.len() / 2)
     }
 
-    /// Writes Π, N and Δt Eᵀp_q + p_v: how the value of the next state depends on its velocity.
+    /// Writes Π, N and Δt Eᵀp_q + p_v, by which the value of the next state depends on its velocity.
     pub(super) fn write(&mut self, work: &Workspace, node: &LqNode) {
         let (dt, blocks) = steps_of(node);
         let n = node.ndx();
@@ -109,7 +109,7 @@ impl Steps {
         at_narrow_level(WriteSteps { steps: self, P: &work.P, p: &work.p, dt, blocks });
     }
 
-    /// H_qq += TᵀP₁₁T,   Qx_q += Tᵀp_q.
+    /// Adds H_qq += TᵀP₁₁T,   Qx_q += Tᵀp_q.
     pub(super) fn add_positions(&mut self, work: &mut Workspace, node: &LqNode) {
         let ((_, blocks), n, m) = (steps_of(node), node.ndx(), node.nu());
         let (nv, ld) = (n / 2, work.stride(m));
@@ -118,7 +118,7 @@ impl Steps {
         at_narrow_level(AddPositions { steps: self, P, p, H: &mut H[(m + nv) * (ld + 1)..], ld, blocks });
     }
 
-    /// Ψ = Δt Θ_q E + Θ_v, in W with the stride of Θ.
+    /// Computes Ψ = Δt Θ_q E + Θ_v into W, with the stride of Θ.
     pub(super) fn write_velocities_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
         let ((dt, blocks), n) = (steps_of(node), node.ndx());
         let (nv, ld) = (n / 2, n + SLACK);
@@ -148,12 +148,12 @@ impl Steps {
     }
 }
 
-/// Δt and the blocks of T and E of a node.
+/// Returns Δt and the blocks of T and E of a node.
 fn steps_of(node: &LqNode) -> (f64, &[EulerBlock]) {
     node.structure.euler().expect("the form is that of Euler steps")
 }
 
-/// The loops of [`Steps::write`].
+/// Loops of [`Steps::write`].
 struct WriteSteps<'a> {
     steps: &'a mut Steps,
     P: &'a [f64],
@@ -168,7 +168,8 @@ impl Vectorized for WriteSteps<'_> {
         let Self { steps: Steps { both, py, PB }, P, p, dt, blocks } = self;
         let (nv, ldp, ldn) = (p.len() / 2, p.len() + SLACK, p.len() / 2 + SLACK);
 
-        // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂;  as if T and E were 1 from the left
+        // Nᵀ = Tᵀ(Δt P₁₁E + P₁₂),   Π = Δt Eᵀ(Δt P₁₁E + P₁₂) + Δt P₂₁E + P₂₂;  T and E as left factors are first taken
+        // as 1
         let by_velocity = |k: usize| View::new(&P[(nv + k) * ldp..], ldp);
         add_in_turn::<V, 1, 1>(both, ldn, ([0], [nv * ldn]), by_velocity(0), View::new(P, ldp), dt, [nv, nv]);
         for block in blocks {
@@ -181,7 +182,7 @@ impl Vectorized for WriteSteps<'_> {
         for ((y, q), v) in py.iter_mut().zip(p_q).zip(p_v) {
             *y = dt * q + v;
         }
-        // and their blocks from the left
+        // then the blocks of T and E as left factors are applied
         for block in blocks {
             let (T, E) = (beyond_identity(&block.T, 1.0), beyond_identity(&block.E, dt));
             for k in 0..nv {
@@ -198,7 +199,7 @@ impl Vectorized for WriteSteps<'_> {
     }
 }
 
-/// The loops of [`Steps::add_positions`]; H from the diagonal of δq on.
+/// Loops of [`Steps::add_positions`]; `H` starts at the diagonal of δq.
 struct AddPositions<'a> {
     steps: &'a Steps,
     P: &'a [f64],
@@ -218,7 +219,7 @@ impl Vectorized for AddPositions<'_> {
             let (PT, H) = (&column(j, blocks, P, PB, ldp)[..whole], &mut H[j * ld..][..whole.max(nv + 1)]);
             let gradient = H[nv];
             for (H, PT) in H.chunks_exact_mut(V::N).zip(PT.chunks_exact(V::N)) {
-                V::load(H).add(V::load(PT)).store(H); // what lies above the diagonal is not read
+                V::load(H).add(V::load(PT)).store(H); // elements above the diagonal are never read
             }
             H[nv] = gradient + p[j];
         }
@@ -238,7 +239,7 @@ impl Vectorized for AddPositions<'_> {
     }
 }
 
-/// The columns of the blocks of P B, in `rows` rows, for a matrix B that is the identity but for blocks.
+/// Computes the columns of the blocks of P B, in `rows` rows, for a matrix B that is the identity except for blocks.
 fn times_blocks(
     PB: &mut [f64],
     P: &[f64],
@@ -254,14 +255,14 @@ fn times_blocks(
     }
 }
 
-/// A column of P B: that of P, unless it is in a block.
+/// Returns a column of P B: a column of P, unless it belongs to a block.
 #[inline(always)]
 fn column<'a>(k: usize, blocks: &[EulerBlock], P: &'a [f64], PB: &'a [f64], ldp: usize) -> &'a [f64] {
     let in_block = blocks.iter().any(|block| block.range().contains(&k));
     &(if in_block { PB } else { P })[k * ldp..]
 }
 
-/// The rows of a block, with zeros up to a whole register.
+/// Returns the rows of a block, padded with zeros to a whole register.
 #[inline(always)]
 fn rows_of(B: &nalgebra::DMatrix<f64>) -> [[f64; 8]; LARGEST_BLOCK] {
     let mut rows = [[0.0; 8]; LARGEST_BLOCK];
@@ -273,7 +274,7 @@ fn rows_of(B: &nalgebra::DMatrix<f64>) -> [[f64; 8]; LARGEST_BLOCK] {
     rows
 }
 
-/// The rows of s (B − 1), for a block B.
+/// Returns the rows of s (B − 1), for a block B.
 #[inline(always)]
 fn beyond_identity(B: &nalgebra::DMatrix<f64>, s: f64) -> [[f64; 8]; LARGEST_BLOCK] {
     let mut rows = rows_of(B);
@@ -286,7 +287,7 @@ fn beyond_identity(B: &nalgebra::DMatrix<f64>, s: f64) -> [[f64; 8]; LARGEST_BLO
     rows
 }
 
-/// Bᵀx from the rows of B: eight numbers.
+/// Computes Bᵀx from the rows of B: eight numbers.
 #[inline(always)]
 fn combine<V: Vector>(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [V; 4] {
     let mut sums = [V::splat(0.0); 4];
@@ -298,7 +299,7 @@ fn combine<V: Vector>(rows: &[[f64; 8]; LARGEST_BLOCK], x: &[f64]) -> [V; 4] {
     sums
 }
 
-/// The first eight numbers of y += those of x.
+/// Adds x to the first eight numbers of y.
 #[inline(always)]
 fn add<V: Vector>(y: &mut [f64], x: [V; 4]) {
     let y = &mut y[..8];

@@ -1,24 +1,25 @@
-//! Knots as the equations of inverse dynamics: accelerations and forces take the place of the controls.
+//! Knots as equations of inverse dynamics: accelerations and forces replace the controls.
 //!
-//! Inverse dynamics is cheap, and sparse where forward dynamics is full. In place of δu take as many unknowns w out of
-//! the changes of accelerations and contact forces, so that all others follow from w and δx by the equations that hold
-//! no control (contacts stay, nothing drives the base). With the step of velocities ŷ = v⁺ = v + Δt a as the unknown,
+//! Inverse dynamics is cheap, and sparse where forward dynamics is full. Unknowns w replace δu: as many entries of the
+//! changes of accelerations and contact forces. They are chosen so that all other entries follow from w and δx by the
+//! equations without controls (contacts stay, the base is not driven). With the velocity after the step, ŷ = v⁺ = v +
+//! Δt a, as the unknown,
 //!
 //! ```text
 //! δu = U (w, δv, δq),     y_c = δv_c + w_k  (a coordinate that is an unknown),     y_d = δv_d + D_d (w, δv, δq)  (one that is not)
 //! δq⁺ = T δq + Δt E y,    δv⁺ = y:        ½ δx⁺ᵀ P δx⁺ = ½ yᵀ Π y + yᵀ N δq + ½ δqᵀ Tᵀ P₁₁ T δq
 //! ```
 //!
-//! with the Π and N of Euler steps ([`Sweep`](crate::Sweep)), so that the quadratic form of the knot is copies of Π and N and
-//! few outer products, U's with the cost of controls, and D's with Z = (Π y + N δq)_d − ½ Π_dd D:
+//! where Π and N are the matrices of Euler steps ([`Sweep`](crate::Sweep)). The quadratic form of the knot is thus
+//! copies of Π and N plus few outer products: U with the cost of controls, and D with Z = (Π y + N δq)_d − ½ Π_dd D:
 //!
 //! ```text
 //! H = [Π and N on w, δv, δq] + Uᵀ (R + ϱ 1) U + DᵀZ + ZᵀD + Gᵀ a″ G
 //! ```
 //!
-//! where the rows G are the gradients of residuals that depend on more than δq. All rows have zeros where the tree of the robot
-//! has none, which are left out in blocks. What follows is the elimination of w. P, p, K = U_x + U_w K_w and k = U_w k_w are
-//! those of the explicit form, since for any δx the map from w to δu is invertible.
+//! The rows of G are the gradients of residuals that depend on more than δq. All rows have zeros where the robot's
+//! kinematic tree implies them; these zeros are skipped in blocks. Then w is eliminated. The results P, p, K = U_x +
+//! U_w K_w and k = U_w k_w equal the explicit form's results, since for any δx the map from w to δu is invertible.
 #![allow(non_snake_case)] // the names of the literature, and N, Π, D, U, Z
 
 use super::super::gains::Gains;
@@ -32,21 +33,21 @@ use condyle_linalg::{
     eliminate, mask,
 };
 
-/// The form, with its scratch.
+/// Inverse-dynamics form, with its scratch.
 #[derive(Debug, Clone)]
 pub(crate) struct InverseDynamics {
     steps: Steps,
-    /// The outer products, of rows over (w, δv, δq).
+    /// Outer products, with rows over (w, δv, δq).
     products: OuterProducts,
-    /// ½ Π_dd. Shape: dependent × dependent, with slack rows.
+    /// ½ Π_dd. Shape: dependent × dependent, with padding rows.
     half: Vec<f64>,
-    /// Columns of dependent coordinates. Shape: n × dependent, with slack rows.
+    /// Columns of dependent coordinates. Shape: n × dependent, with padding rows.
     below: Vec<f64>,
     gains: Gains,
 }
 
 impl InverseDynamics {
-    /// The most that the rows of some nodes need: numbers in rows, products, dependent coordinates.
+    /// Returns the maximum requirements of some nodes: numbers in rows, products, dependent coordinates.
     pub(crate) fn room(nodes: &[LqNode]) -> [usize; 3] {
         let rooms = nodes.iter().map(|LqNode { inverse_dynamics: form, .. }| {
             let [efforts, steps, costs] = [&form.efforts, &form.steps, &form.costs].map(|rows| rows.masks.capacity());
@@ -55,7 +56,8 @@ impl InverseDynamics {
         rooms.fold([0; 3], |a, b| [a[0].max(b[0]), a[1].max(b[1]), a[2].max(b[2])])
     }
 
-    /// Scratch for n states and at most m controls, with such room.
+    /// Allocates the scratch for n states and at most m controls, with the requirements returned by
+    /// [`room`](Self::room).
     pub(super) fn new([numbers, products, dependent]: [usize; 3], n: usize, m: usize) -> Self {
         Self {
             steps: Steps::new(n),
@@ -72,7 +74,7 @@ impl Form for InverseDynamics {
         n / 2
     }
 
-    /// H in the order (w, δv, δq).
+    /// Writes H in the order (w, δv, δq).
     fn write(&mut self, work: &mut Workspace, node: &LqNode, regularisation: f64, _: &mut Curvature<'_>) {
         let (n, m, count) = (node.ndx(), node.nu(), node.inverse_dynamics.dependent.len());
         let (ld, all, size) = (work.stride(m), m + n, node.inverse_dynamics.stride);
@@ -81,7 +83,7 @@ impl Form for InverseDynamics {
         let Self { steps, products, half, .. } = self;
         at_narrow_level(WriteRows { steps, products, half, node, regularisation, H: &mut work.H, ld });
 
-        // The last rows are D and (Π y + N δq)_d, which becomes Z.
+        // The last rows are D and (Π y + N δq)_d; the latter becomes Z.
         let Z = products.count() - count;
         let D = Z - count;
         if count > 0 {
@@ -100,7 +102,7 @@ impl Form for InverseDynamics {
         steps.add_positions(work, node);
     }
 
-    /// Ψ y + Θ_q T δq,   Ψ = Δt Θ_q E + Θ_v.
+    /// Computes Ψ y + Θ_q T δq,   Ψ = Δt Θ_q E + Θ_v.
     fn write_below(&mut self, work: &mut Workspace, node: &LqNode, Theta: &[f64]) {
         let (n, m, InverseDynamicsForm { own, dependent, steps: D, stride, .. }) =
             (node.ndx(), node.nu(), &node.inverse_dynamics);
@@ -148,8 +150,8 @@ impl Form for InverseDynamics {
     }
 }
 
-/// The part of H that is Π and N, and the rows of the outer products: those of Uᵀ (R + ϱ 1) U + Gᵀ a″ G, then D and
-/// (Π y + N δq)_d.
+/// Writes the part of H that consists of Π and N, and the rows of the outer products: first the rows of
+/// Uᵀ (R + ϱ 1) U + Gᵀ a″ G, then D and (Π y + N δq)_d.
 struct WriteRows<'a> {
     steps: &'a Steps,
     products: &'a mut OuterProducts,
@@ -169,7 +171,7 @@ impl Vectorized for WriteRows<'_> {
         let (nv, all, size) = (n / 2, m + n, imp.stride);
         let ldn = nv + SLACK;
 
-        // Π and N on the unknowns and δv; unknowns from `forces` on are forces
+        // Π and N for the unknowns and δv; unknowns with index `forces` or above are forces
         let forces = imp.own.last().map_or(0, |own| own[1] + own[2]);
         for &[c, k, length] in &imp.own {
             for &[cc, kk, rows] in imp.own.iter().filter(|own| own[1] >= k) {
@@ -216,7 +218,7 @@ impl Vectorized for WriteRows<'_> {
         let first = products.add_rows(count);
         let (mut j, zero) = (0, V::splat(0.0));
         while j < count {
-            // the rows of coordinates that follow each other
+            // rows of consecutive coordinates
             let (d, together) = (imp.dependent[j], run(&imp.dependent[j..]));
             let rows = &mut products.rows[(first + j) * size..];
             let (own, others) = (View::new(&Pi[d * ldn..], ldn), View::new(&N[d * ldn..], ldn));
@@ -226,14 +228,14 @@ impl Vectorized for WriteRows<'_> {
             for i in 0..together {
                 let row = &mut rows[i * size..][..size];
                 for zeros in row[forces..].chunks_exact_mut(V::N).take((m - forces).div_ceil(V::N)) {
-                    zero.store(zeros); // and some of what is written next
+                    zero.store(zeros); // may overwrite elements that are written next
                 }
                 row[all] = py[d + i];
                 let mut at = 0;
                 while at < count {
                     let (by, length) = (imp.dependent[at], run(&imp.dependent[at..]));
                     let half = &mut half[(j + i) * (count + SLACK) + at..];
-                    copy_scaled::<V>(half, &Pi[(d + i) * ldn + by..][..length], 0.5); // symmetric
+                    copy_scaled::<V>(half, &Pi[(d + i) * ldn + by..][..length], 0.5); // uses the symmetry
                     at += length;
                 }
             }
@@ -244,7 +246,7 @@ impl Vectorized for WriteRows<'_> {
     }
 }
 
-/// How many numbers, of one or more, follow each other.
+/// Returns how many numbers at the beginning are consecutive, at least one.
 #[inline(always)]
 fn run(numbers: &[usize]) -> usize {
     let mut length = 1;

@@ -4,13 +4,13 @@ use super::ActionModel;
 use crate::lq::LqNode;
 use nalgebra::DMatrix;
 
-/// The step of first differences, about ε^⅓: truncation h² meets rounding ε/h.
+/// Step of first differences, about ε^⅓, which balances truncation h² and rounding ε/h.
 pub(crate) const FIRST: f64 = 6e-6;
 
-/// The step of second differences, about ε^¼: truncation h² meets rounding ε/h².
+/// Step of second differences, about ε^¼, which balances truncation h² and rounding ε/h².
 pub(crate) const SECOND: f64 = 1.2e-4;
 
-/// x⁺ and ℓ at (x ⊕ δx, u + δu) with z = (δx, δu).
+/// Computes x⁺ and ℓ at (x ⊕ δx, u + δu) with z = (δx, δu).
 pub(crate) fn at<A: ActionModel + ?Sized>(
     action: &mut A,
     t: usize,
@@ -26,10 +26,10 @@ pub(crate) fn at<A: ActionModel + ?Sized>(
     action.calc(t, &moved, &u, next)
 }
 
-/// [`calc_diff`](ActionModel::calc_diff) by differences of [`calc`](ActionModel::calc).
+/// Computes [`calc_diff`](ActionModel::calc_diff) by differences of [`calc`](ActionModel::calc).
 pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
     let (nx, ndx, nu) = (action.nx(), action.ndx(), action.nu());
-    // A terminal action leaves `next` alone: start from x, which is a state on any manifold.
+    // A terminal action does not write `next`: start from x, which is a valid state on any manifold.
     let (mut centre, mut plus, mut minus) = (x.to_vec(), x.to_vec(), x.to_vec());
     let (mut up, mut down) = (vec![0.0; ndx], vec![0.0; ndx]);
     let mut z = vec![0.0; ndx + nu];
@@ -70,7 +70,8 @@ pub(crate) fn calc_diff<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[
     }
 }
 
-/// Writes the second derivative by entries i ≥ j of z = (δx, δu) to the blocks by δx twice, by both, and by δu twice.
+/// Writes the second derivative with respect to entries i ≥ j of z = (δx, δu) to the block it belongs to: δx twice,
+/// both, or δu twice.
 pub(crate) fn write_curvature(
     [xx, xu, uu]: [&mut DMatrix<f64>; 3],
     ndx: usize,

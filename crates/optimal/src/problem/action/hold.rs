@@ -1,15 +1,15 @@
-//! Controls that hold a state still, by steps of Newton.
+//! Controls that hold a state still, computed by Newton steps.
 #![allow(non_snake_case)] // B
 
 use super::ActionModel;
 use crate::lq::LqNode;
 use nalgebra::DVector;
 
-/// The most steps, and the change of the state that counts as none.
+/// Maximum number of steps, and largest change of the state that counts as standing still.
 const MOST: usize = 100;
 const STILL: f64 = 1e-9;
 
-/// [`hold`](ActionModel::hold) of any action.
+/// Computes [`hold`](ActionModel::hold) of any action.
 pub(crate) fn newton<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64]) -> Vec<f64> {
     let (ndx, nu) = (action.ndx(), action.nu());
     let (mut u, mut next, mut change) = (vec![0.0; nu], x.to_vec(), DVector::zeros(ndx));
@@ -18,7 +18,7 @@ pub(crate) fn newton<A: ActionModel + ?Sized>(action: &mut A, t: usize, x: &[f64
         action.calc(t, x, &u, &mut next);
         action.difference(x, &next, change.as_mut_slice());
         action.calc_diff(t, x, &u, &mut node);
-        // a decomposition of what is not finite has no end
+        // the decomposition of a matrix that is not finite would not terminate
         if !(node.B.iter().chain(&change).all(|x| x.is_finite())) {
             break;
         }

@@ -1,4 +1,4 @@
-//! One knot's dynamics and cost, asked for many knots at a time.
+//! Dynamics and cost of one knot, evaluated for many knots at a time.
 
 pub(crate) mod differences;
 pub(crate) mod hold;
@@ -8,25 +8,26 @@ use crate::error::assert_length;
 use crate::lq::{Hessian, LqNode};
 use std::any::Any;
 
-/// The dynamics x⁺ = φₜ(x, u) and the cost ℓₜ(x, u) of the knots t that it serves.
+/// Dynamics x⁺ = φₜ(x, u) and cost ℓₜ(x, u) of the knots t that the action serves.
 ///
 /// Only the sizes and [`calc`](Self::calc) must be written; derivatives by hand are faster than the default ones. The
-/// solver calls the methods for a **group**: consecutive knots of the horizon, or the trials of a line search at one knot.
-/// Their defaults loop; an implementation that computes several states at a time in the lanes of a vector register
-/// overrides them and says in [`lanes`](Self::lanes) how many states it likes to be given.
+/// solver calls the methods for a **group**: consecutive knots of the horizon, or the trials of a line search at one
+/// knot. The default group methods loop over the states. An implementation that computes several states at a time in
+/// the lanes of a vector register overrides them, and returns its preferred number of states from
+/// [`lanes`](Self::lanes).
 ///
-/// Each knot of a group comes with its index t in the horizon, so that one model can serve all knots that differ only
-/// in a reference (a foot's path, a tracked posture) and these still make one group.
+/// Each knot of a group is given by its index t in the horizon. One model can therefore serve all knots that differ
+/// only in a reference (a foot's path, a tracked posture), and these knots form one group.
 ///
 /// # The terminal knot
-/// A terminal action has nu = 0 and only a cost. It is called like any other, but what it writes to `next` and `A` is
-/// never read: it may leave them alone.
+/// A terminal action has nu = 0 and only a cost. It is called like any other, but its outputs `next` and `A` are never
+/// read and need not be written.
 ///
 /// # Rules for implementations
-/// - The result depends on the arguments only, not on what was called before.
-/// - All of what a method returns is written, whatever was there; entries that are always zero too.
-/// - Nothing panics on a state far away: let the result be infinite or NaN, and the solver tries a shorter step.
-/// - Nothing is allocated, so that a solve allocates nothing either.
+/// - The result depends on the arguments only, not on earlier calls.
+/// - Each method writes its outputs completely, whatever they contained, including entries that are always zero.
+/// - No method panics on an extreme state: let the result be infinite or NaN, and the solver tries a shorter step.
+/// - No method allocates, so that a solve does not allocate either.
 ///
 /// # Examples
 /// The double integrator x⁺ = x + Δt (v, u) with the cost ½ Δt (‖x‖² + u²):
@@ -60,108 +61,111 @@ use std::any::Any;
 /// assert_eq!(next, [2.0, 2.0, 5.0, 4.5]);
 /// ```
 pub trait ActionModel: Any + Send + Sync {
-    /// The number of entries of a state x.
+    /// Returns the number of entries of a state x.
     fn nx(&self) -> usize;
 
-    /// The number of entries of a change of state δx; nx unless the state lives on a manifold.
+    /// Returns the number of entries of a change of state δx; nx unless the state lives on a manifold.
     fn ndx(&self) -> usize {
         self.nx()
     }
 
-    /// The number of entries of a control u; zero at a terminal knot and at one that only jumps (an impact).
+    /// Returns the number of entries of a control u; zero at a terminal knot and at a knot with only a jump (an
+    /// impact).
     fn nu(&self) -> usize;
 
-    /// Whether there is no next state, so that the action may only serve the end of a horizon. Not by default: one may serve
-    /// both.
+    /// Returns whether the action has no next state, so that it may only serve the end of a horizon. By default false:
+    /// an action may serve both.
     fn is_end(&self) -> bool {
         false
     }
 
-    /// The number of states that a group call computes at the price of one; 1 unless it uses vector lanes.
+    /// Returns the number of states that a group call computes at the cost of one; 1 unless it uses vector lanes.
     ///
-    /// A line search tries so many step lengths side by side.
+    /// A line search tries this number of step lengths side by side.
     fn lanes(&self) -> usize {
         1
     }
 
-    /// The most dependent coordinates and the most rows of costs, for actions that can write their knots as equations of
-    /// inverse dynamics.
+    /// Returns the maximum numbers of dependent coordinates and of rows of costs, if the action can write its knots as
+    /// equations of inverse dynamics.
     #[doc(hidden)]
     fn inverse_dynamics_form(&self) -> Option<[usize; 2]> {
         None
     }
 
-    /// The least and the greatest controls of knot t, nu numbers each, infinite where there is none; `None` if no control
-    /// is bounded. They must not change during a solve.
+    /// Returns the smallest and largest allowed controls of knot t, nu numbers each, infinite for an unbounded control;
+    /// `None` if no control is bounded. They must not change during a solve.
     fn bounds(&self, t: usize) -> Option<(&[f64], &[f64])> {
         let _ = t;
         None
     }
 
-    /// The action that this one wraps, if it adds something to another one: typed access to a robot's costs and forces
-    /// ([`Problem::cost_mut`](crate::Problem::cost_mut), [`Problem::motion`](crate::Problem::motion)) looks through. `None` by
-    /// default.
+    /// Returns the wrapped action, if this action adds something to another one. Typed access to a robot's costs and
+    /// forces ([`Problem::cost_mut`](crate::Problem::cost_mut), [`Problem::motion`](crate::Problem::motion)) looks
+    /// inside it. `None` by default.
     fn inner_mut(&mut self) -> Option<&mut dyn ActionModel> {
         None
     }
 
-    /// Shows the constraints of knot t, which have terms of an augmented Lagrangian in its cost, in their order.
+    /// Passes the constraints of knot t that contribute augmented Lagrangian terms to its cost to `visit`, in their
+    /// order.
     #[doc(hidden)]
     fn constraints(&mut self, t: usize, visit: &mut Visit<'_>) {
         let _ = (t, visit);
     }
 
-    /// Makes the memory in which the action computes, unless it is there: a problem asks for it when it is made.
+    /// Allocates the action's workspace, unless it exists. A problem calls this when it is created.
     #[doc(hidden)]
     fn reserve(&mut self) {}
 
-    /// Takes over the knots of another action that differs in costs, references and weights only, and says whether it did:
-    /// then this action stands for the models of both, its own first, and the other is of no use. So the knots of a problem
-    /// that has an action for each of them are computed in groups.
+    /// Takes over the knots of another action that differs only in costs, references and weights, and returns whether
+    /// it did so. This action then represents the models of both, its own first, and the other one becomes unused. Thus
+    /// the knots of a problem that has one action per knot are computed in groups.
     #[doc(hidden)]
     fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
         let _ = other;
         false
     }
 
-    /// Chooses, of the models that this action stands for, the one that is to be changed.
+    /// Selects, among the models that this action represents, the one that is to be changed.
     #[doc(hidden)]
     fn choose(&mut self, model: usize) {
         let _ = model;
     }
 
-    /// Lets one of the models that this action stands for serve knot t of so many.
+    /// Assigns knot t, of `horizon` knots, to one of the models that this action represents.
     #[doc(hidden)]
     fn serve(&mut self, t: usize, horizon: usize, model: usize) {
         let _ = (t, horizon, model);
     }
 
-    /// x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
+    /// Computes x⁺ = φₜ(x, u) into `next` (nx); returns ℓₜ(x, u).
     fn calc(&mut self, t: usize, x: &[f64], u: &[f64], next: &mut [f64]) -> f64;
 
-    /// The derivatives of both at (x, u), in the tangent space of the state: A = ∂x⁺/∂x, B = ∂x⁺/∂u, q = ∂ℓ/∂x,
-    /// r = ∂ℓ/∂u, and the Hessian of ℓ or its Gauss–Newton approximation, Q, S, R. The gap f is the solver's.
+    /// Computes the derivatives of dynamics and cost at (x, u), in the tangent space of the state: A = ∂x⁺/∂x, B =
+    /// ∂x⁺/∂u, q = ∂ℓ/∂x, r = ∂ℓ/∂u, and the Hessian of ℓ or its Gauss–Newton approximation, Q, S, R. The solver writes
+    /// the gap f.
     ///
-    /// By default central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff)'s: slow, allocating, and
-    /// right to about 1e-9 (1e-7 the Hessian). [`AutoDiff`](crate::AutoDiff) has exact ones of what is written for any
-    /// scalar.
+    /// The default takes central differences of [`calc`](Self::calc), as [`NumDiff`](crate::NumDiff) does: slow,
+    /// allocating, and accurate to about 1e-9 (the Hessian to 1e-7). [`AutoDiff`](crate::AutoDiff) computes exact
+    /// derivatives of functions that are written for any scalar.
     fn calc_diff(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         differences::calc_diff(self, t, x, u, node);
     }
 
-    /// The second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for ndx numbers
-    /// `lambda`; says whether it did. Where it did not, the dynamics count as linear around each iterate
-    /// (Gauss–Newton), as they do everywhere unless [`second_order`](crate::Settings::second_order) is set.
+    /// Computes the second derivatives of ψ(δx, δu) = λᵀ (φₜ(x ⊕ δx, u + δu) ⊖ φₜ(x, u)) at zero into `hessian`, for
+    /// `lambda` of length ndx. Returns whether it did so. If not, the dynamics count as linear around each iterate
+    /// (Gauss–Newton). Without [`second_order`](crate::Settings::second_order), they always count as linear.
     fn dynamics_hessian(&mut self, t: usize, x: &[f64], u: &[f64], lambda: &[f64], hessian: &mut Hessian) -> bool {
         let _ = (t, x, u, lambda, hessian);
         false
     }
 
-    /// [`calc`](Self::calc) for a group: knot `knots[i]` at the i-th state of `xs` and the i-th control of `us`, which
-    /// lie one after the other, as do the states written to `next`.
+    /// Computes [`calc`](Self::calc) for a group: knot `knots[i]` at the i-th state of `xs` and the i-th control of
+    /// `us`. States and controls are stored one after the other, and so are the states written to `next`.
     ///
     /// # Panics
-    /// If the lengths are not knots.len() times nx, nu, nx and 1.
+    /// If the lengths differ from knots.len() times nx, nu, nx and 1.
     #[track_caller]
     fn calc_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], next: &mut [f64], costs: &mut [f64]) {
         let (nx, nu) = (self.nx(), self.nu());
@@ -175,14 +179,15 @@ pub trait ActionModel: Any + Send + Sync {
         }
     }
 
-    /// The number of accelerations and forces that the inverse-dynamics form of a knot starts from, none without that form.
+    /// Returns the number of accelerations and forces from which the inverse-dynamics form of a knot starts; zero
+    /// without that form.
     #[doc(hidden)]
     fn motion_size(&self) -> usize {
         0
     }
 
-    /// As [`calc_group`](Self::calc_group), and writes the accelerations and forces of each knot to the beginning of its part
-    /// of `motions`, which are as many equal parts as knots.
+    /// Computes as [`calc_group`](Self::calc_group) does, and writes the accelerations and forces of each knot to the
+    /// beginning of its part of `motions`. `motions` has as many equal parts as there are knots.
     #[doc(hidden)]
     #[track_caller]
     fn calc_group_with_motion(
@@ -198,10 +203,10 @@ pub trait ActionModel: Any + Send + Sync {
         self.calc_group(knots, xs, us, next, costs);
     }
 
-    /// [`calc_diff`](Self::calc_diff) for a group.
+    /// Computes [`calc_diff`](Self::calc_diff) for a group.
     ///
     /// # Panics
-    /// If the lengths are not knots.len() times nx, nu and 1.
+    /// If the lengths differ from knots.len() times nx, nu and 1.
     #[track_caller]
     fn calc_diff_group(&mut self, knots: &[usize], xs: &[f64], us: &[f64], nodes: &mut [LqNode]) {
         let (nx, nu) = (self.nx(), self.nu());
@@ -213,49 +218,49 @@ pub trait ActionModel: Any + Send + Sync {
         }
     }
 
-    /// Shows by their names the vectors that the dynamics of knot t compute beside the next state. None by default; those of a
-    /// robot are `acceleration`, `effort` of all joints, and `force/` with the name of each contact, in the axes of its rows,
-    /// which at an impact is an impulse.
+    /// Passes to `show`, with their names, the vectors that the dynamics of knot t compute besides the next state; none
+    /// by default. A robot's vectors are `acceleration`, `effort` of all joints, and `force/` followed by the name of
+    /// each contact. A contact's force is expressed in the axes of its rows; at an impact it is an impulse.
     fn outputs(&mut self, t: usize, x: &[f64], u: &[f64], show: &mut dyn FnMut(&str, &[f64])) {
         let _ = (t, x, u, show);
     }
 
-    /// The controls that hold the state x of knot t, where it may stand still: φ(x, u) = x, as near as controls come to it.
-    /// By default steps of Newton, u ← u − B⁺ (φ(x, u) ⊖ x), at most 100, as Crocoddyl's; a robot's come from statics.
-    /// Allocates.
+    /// Returns the controls that hold the state x of knot t still, if the state can stand still: φ(x, u) = x, as nearly
+    /// as controls can reach. By default at most 100 Newton steps, u ← u − B⁺ (φ(x, u) ⊖ x), as in Crocoddyl; a robot's
+    /// controls follow from statics. Allocates.
     fn hold(&mut self, t: usize, x: &[f64]) -> Vec<f64> {
         hold::newton(self, t, x)
     }
 
-    /// The horizon has [moved on](crate::Problem::shift) by a knot: what was said of knot t now holds of knot t − 1.
-    /// Nothing by default. May not allocate.
+    /// Notifies the action that the horizon has [moved](crate::Problem::shift) by one knot: data of knot t now belong
+    /// to knot t − 1. Does nothing by default. Must not allocate.
     fn shift(&mut self) {}
 
-    /// A copy that computes the same, for another thread or another problem; `None`, unless an implementation gives one. An
-    /// action without a copy is differentiated on one thread, whatever [`threads`](crate::Settings::threads) says, and its
-    /// problem has no copy ([`Problem::try_clone`](crate::Problem::try_clone)).
+    /// Returns a copy that computes the same, for another thread or another problem; `None` by default. An action
+    /// without a copy is differentiated on one thread, whatever the setting [`threads`](crate::Settings::threads). A
+    /// problem with such an action cannot be copied ([`Problem::try_clone`](crate::Problem::try_clone)).
     fn fork(&self) -> Option<Box<dyn ActionModel>> {
         None
     }
 
-    /// Says what is wrong with a state that is none: for example the length of a quaternion. All are good by default. A
-    /// problem asks of its initial state, a solver of the states that it is given.
+    /// Checks a state, for example the length of a quaternion. All states are valid by default. A problem checks its
+    /// initial state, a solver the states that it is given.
     ///
     /// # Errors
-    /// The fault, with the numbers.
+    /// The fault of an invalid state, with the numbers.
     fn check_state(&self, x: &[f64]) -> Result<(), String> {
         let _ = x;
         Ok(())
     }
 
-    /// x ⊕ δx into `out` (nx); the sum in a vector space.
+    /// Computes x ⊕ δx into `out` (nx), by default the sum of a vector space.
     fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64]) {
         for ((o, x), dx) in out.iter_mut().zip(x).zip(dx) {
             *o = x + dx;
         }
     }
 
-    /// x₁ ⊖ x₀ into `out` (ndx), the δ with x₀ ⊕ δ = x₁; the difference in a vector space.
+    /// Computes x₁ ⊖ x₀ into `out` (ndx): the δ with x₀ ⊕ δ = x₁, by default the difference of a vector space.
     fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64]) {
         for ((o, x0), x1) in out.iter_mut().zip(x0).zip(x1) {
             *o = x1 - x0;
