@@ -474,7 +474,7 @@ fn what_is_wrong_is_said() {
     let Some(fake) = Fake::new() else { return };
     let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
     let said = |error: Error| error.to_string();
-    assert_eq!(said(fake.driver.device(2).unwrap_err()), "device 2: there are 2");
+    assert_eq!(said(fake.driver.device(2).unwrap_err()), "no CUDA device 2: found 2 device(s)");
     let all = of(&arm, &["crba"]);
     let kernels = device.compile::<f64>(&fake.compiler, "arm7", &all).unwrap();
     let kernel = kernels.kernel("crba").unwrap();
