@@ -1,11 +1,11 @@
-//! From which size on divide and conquer pays, on one thread and on two: `cargo bench --bench divide_conquer`.
+//! Size from which divide and conquer is faster, on one thread and on two: `cargo bench --bench divide_conquer`.
 //!
-//! µs on two cores of a Xeon at 2.6 GHz, smallest of many, `aba` / runs of n/2 on one thread / on two: chain of 100
-//! 8.7 / 11.2 / 10.6; of 200 16.8 / 23.4 / 15.6; of 300 25.9 / 33.0 / 22.8; of 500 45 / 53 / 35 · star of 500 39 / 43 /
-//! 30; of 1000 76 / 92 / 57. Two threads win from some 200 bodies on, by 1.1 to 1.3; one thread never does. Runs of one
-//! body, beside other work on both cores, `aba` / on one thread / on two: chain of 100 10.3 / 81 / 74; of 300 31.9 /
-//! 253 / 272; of 1000 106 / 1015 / 548 · star of 1000 90 / 295 / 352: with all their parallelism they would need more
-//! than eight processors for a chain.
+//! µs on two cores of a Xeon at 2.6 GHz, smallest of many, `aba` / runs of n/2 on one thread / on two: chain of 100 8.7
+//! / 11.2 / 10.6; of 200 16.8 / 23.4 / 15.6; of 300 25.9 / 33.0 / 22.8; of 500 45 / 53 / 35 · star of 500 39 / 43 / 30;
+//! of 1000 76 / 92 / 57. Two threads are faster from about 200 bodies on, by a factor of 1.1 to 1.3; one thread never
+//! is. Runs of one body, with other work on both cores, `aba` / on one thread / on two: chain of 100 10.3 / 81 / 74; of
+//! 300 31.9 / 253 / 272; of 1000 106 / 1015 / 548 · star of 1000 90 / 295 / 352. With full parallelism, a chain would
+//! need more than eight processors to be faster.
 
 use condyle::{
     Data, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, aba, divide_conquer::DivideConquer,
@@ -20,7 +20,7 @@ use std::time::Duration;
 const SIZES: [usize; 5] = [10, 30, 100, 300, 1000];
 const THREADS: [usize; 2] = [1, 2];
 
-/// n hinges, each body on the one that `parent` names.
+/// Builds n hinges; the parent of each body is given by `parent`.
 fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     let mut rng = StdRng::seed_from_u64(7);
     let mut builder = ModelBuilder::new("tree");

@@ -1,12 +1,12 @@
-//! Which way of forward dynamics and of M⁻¹ is fastest, for which size and shape of a tree:
-//! `cargo bench --bench factorisation`. The rule in `ForwardDynamicsMethod::fastest` rests on its figures.
+//! Fastest method of forward dynamics and of M⁻¹, by size and shape of a tree: `cargo bench --bench factorisation`. The
+//! rule in `ForwardDynamicsMethod::fastest` uses these figures.
 //!
 //! µs on a Xeon at 2.6 GHz (AVX-512 machine, default build), smallest of many, forward dynamics by ABA / dense / sparse
 //! and M⁻¹ by `minv`'s recursion / by the sparse factor: arm7 0.72 / 0.97 / 0.96, 0.87 / 0.62 · quadruped 1.47 / 2.42 /
-//! 2.22, 2.35 / 1.75 · humanoid 3.40 / 8.03 / 5.94, 6.44 / 5.53 · chain of 6 0.64 / 0.84 / 0.83, 0.74 / 0.51; of 24 2.45 /
-//! 4.55 / 4.48, 4.05 / 4.10; of 50 5.1 / 15.8 / 14.6, 11.3 / 19.1; of 200 20 / 407 / 418, 114 / 802 · binary tree of 50
-//! 4.8 / 13.4 / 7.4, 8.9 / 5.6; of 200 19 / 368 / 36, 74 / 52 · star of 50 4.6 / 12.7 / 6.1, 8.4 / 4.2; of 200 18 / 365 /
-//! 29, 72 / 33. The factor inverts faster while its rows have at most about 12 entries in the mean.
+//! 2.22, 2.35 / 1.75 · humanoid 3.40 / 8.03 / 5.94, 6.44 / 5.53 · chain of 6 0.64 / 0.84 / 0.83, 0.74 / 0.51; of 24
+//! 2.45 / 4.55 / 4.48, 4.05 / 4.10; of 50 5.1 / 15.8 / 14.6, 11.3 / 19.1; of 200 20 / 407 / 418, 114 / 802 · binary
+//! tree of 50 4.8 / 13.4 / 7.4, 8.9 / 5.6; of 200 19 / 368 / 36, 74 / 52 · star of 50 4.6 / 12.7 / 6.1, 8.4 / 4.2; of
+//! 200 18 / 365 / 29, 72 / 33. The factor inverts faster while its rows have at most about 12 entries on average.
 #![allow(non_snake_case)]
 
 use condyle::{
@@ -25,7 +25,7 @@ use std::time::Duration;
 
 const SIZES: [usize; 6] = [6, 12, 25, 50, 100, 200];
 
-/// n hinges, each body on the one that `parent` names.
+/// Builds n hinges; the parent of each body is given by `parent`.
 fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     let mut rng = StdRng::seed_from_u64(7);
     let mut builder = ModelBuilder::new("tree");

@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
-"""Times generated C beside Pinocchio, compiled for the same processor, and beside our pass on plain f64.
+"""Times generated C, compared with Pinocchio compiled for the same processor, and with our pass on plain f64.
 
     python benches/generated.py [--rounds N] [--cpu K] [ROBOT ...]
 
-Generated code is compiled by CC, else clang, else gcc, and called with 64 states in turn, as is Pinocchio, which
-benches/peers/dynamics.py builds (some ten minutes the first time). Pinocchio's own generated code is what CppADCodeGen
-makes of its recursions (benches/peers/cppadcg.cpp, some ten minutes more), compiled by the same compiler with the same
-options. One program calls it and ours in turn: their ratio is the median over the rounds. A time is the shortest, as
-the rest is what else the machine does. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`:
-limbs one after the other, and side by side; then batches beside vectors of eight states. Needs Linux, Rust, compilers
-of C and C++, and the package condyle.
+Generated code is compiled by CC, else clang, else gcc, and called with 64 states in turn. Pinocchio is called in the
+same way; benches/peers/dynamics.py builds it (about ten minutes the first time). CppADCodeGen makes Pinocchio's own
+generated code from its recursions (benches/peers/cppadcg.cpp, about ten minutes more), compiled by the same compiler
+with the same options. One program calls this code and ours in turn: their ratio is the median over the rounds. A time
+is the shortest, since other work on the machine only lengthens it. `cargo bench -p condyle-codegen --bench generated`
+times our passes: limbs one after the other, and limbs in parallel lanes; then batches, compared with vectors of eight
+states. Needs Linux, Rust, compilers of C and C++, and the package condyle.
 """
 
 import argparse
@@ -30,9 +30,9 @@ import dynamics
 FUNCTIONS = ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives"]
 FLAGS = ["-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno"]
 ROUND_NS = 2e7
-"""How long a round takes, in ns."""
+"""Duration of a round (ns)."""
 RUNS = 3
-"""How often Pinocchio is timed."""
+"""Number of times that Pinocchio is timed."""
 TIMER = """
 #include <dlfcn.h>
 #include <stdio.h>
@@ -87,8 +87,8 @@ def compiler() -> str:
 def measured(
     model: condyle.Model, function: str, states: Path, rounds: int, cpu: int, theirs: Path
 ) -> "dict[str, float | None]":
-    """A function as generated C: ns of a call, operations, KB of the program, s of the compiler; CppADCodeGen's ns if
-    it has that function, and the ratio.
+    """Measures a function as generated C: ns of a call, operations, KB of the program, s of the compiler; also
+    CppADCodeGen's ns, if it has that function, and the ratio.
     """
     stem, files, [(_, inputs, outputs, operations, _)] = condyle._condyle._generate(model, [function], "c")
     width = model.nq + 3 * model.nv
@@ -124,7 +124,7 @@ def measured(
 
 
 def record_theirs(program: Path, model: Path, states: Path) -> Path:
-    """The folder of Pinocchio's generated code for a model: a library for each function."""
+    """Returns the folder of Pinocchio's generated code for a model, with a library for each function."""
     folder = dynamics.PEERS / f"cppadcg-{model.stem}-{Path(compiler()).name}"
     if not (folder / "aba_derivatives.so").exists():
         folder.mkdir(exist_ok=True)

@@ -1,5 +1,5 @@
-//! What a solver asks of the dynamics at each of the 100 knots of a horizon: forward dynamics, their derivatives, and
-//! inverse dynamics. `cargo bench --bench horizon`
+//! Work of a solver at each of the 100 knots of a horizon: forward dynamics, their derivatives, and inverse dynamics.
+//! `cargo bench --bench horizon`
 
 use condyle::{Data, Model, aba, aba_derivatives, random_configuration, rnea, robots};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};

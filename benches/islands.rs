@@ -1,5 +1,6 @@
-//! Several quadrupeds on their feet in one model: what each costs, beside what one costs alone: `cargo bench --bench islands`,
-//! in µs. `islands.py` runs this under callgrind, which sees the functions by their names, and prints instructions.
+//! Cost per robot of several quadrupeds on their feet in one model, compared with a single one: `cargo bench --bench
+//! islands`, in µs. `islands.py` runs this program under callgrind, which sees the functions by name, and prints
+//! instructions.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Se3, WORLD, constrained_dynamics,
@@ -14,10 +15,10 @@ use std::time::{Duration, Instant};
 
 const ROBOTS: [usize; 5] = [1, 2, 4, 8, 16];
 
-/// The time for which each function is measured.
+/// Duration of the measurement of each function.
 const TIME: Duration = Duration::from_millis(500);
 
-/// Some quadrupeds, and their contacts with the ground, one robot after the other.
+/// Several quadrupeds and their contacts with the ground, one robot after the other.
 struct Herd {
     model: Model,
     data: Data<f64>,
@@ -47,7 +48,7 @@ impl Herd {
     }
 }
 
-/// One function for each algorithm, which callgrind sees by its name.
+/// Defines one function for each algorithm, which callgrind sees by its name.
 macro_rules! measured {
     ($($name:ident($h:ident) $call:expr;)*) => {
         mod measured {
@@ -70,7 +71,7 @@ measured! {
     impulse_derivatives(h) impulse_dynamics_derivatives(&h.model, &mut h.data, &mut h.set, &h.q, &h.v, 0.0);
 }
 
-/// The time of a call in µs: the least of many.
+/// Measures the time of a call in µs: the least of many.
 fn time(algorithm: fn(&mut Herd), herd: &mut Herd) -> f64 {
     let (start, mut least) = (Instant::now(), f64::INFINITY);
     while start.elapsed() < TIME {

@@ -22,7 +22,7 @@
 //! also give a status: a quaternion without length 1, a matrix that is not a rotation, a number that is not finite.
 //!
 //! # Conventions
-//! - q, v, τ as in [condyle_dynamics]; the actuated coordinates are all coordinates except the coordinates of free-flyers.
+//! - q, v, τ as in [condyle_dynamics]; free-flyers' coordinates are not actuated, all others are.
 //! - A contact is a point, an edge or a convex polygon in a frame. Its force acts from the environment on the robot.
 //! - Positions, velocities and accelerations of tasks and contacts are along the world's axes. Accelerations are
 //!   classical: the second derivative of the position.

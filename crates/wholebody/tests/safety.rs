@@ -185,7 +185,7 @@ fn joints_stay_within_their_limits() {
 fn limits_give_way_to_contacts() {
     let (model, q) = (robots::quadruped(), stance());
     let mut upper = model.limits().upper.clone();
-    (7..19).for_each(|i| upper[i] = q[i] - 0.2); // all joints are beyond their limits: no motion of the trunk brings all of them back
+    (7..19).for_each(|i| upper[i] = q[i] - 0.2); // all joints are too far: no trunk motion returns all
     let limits = JointLimits { upper: Some(upper), ..JointLimits::default() };
     let settings = Settings { joint_limits: Some(limits), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();

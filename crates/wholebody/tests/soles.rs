@@ -185,7 +185,7 @@ fn a_hand_leans_on_a_wall() {
         ..FrictionContact::point("left_hand", 0.4)
     };
     let contacts = [soles(0.7), vec![wall]].concat();
-    let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // so that the wall's force is as small as possible
+    let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // minimises the wall's force
     // The wall should also carry a part of the weight that exceeds friction.
     let (references, command) = solve(&model, &contacts, &humanoid_tasks(), settings, &q, &v, |r| {
         r.contacts[2].force.linear = Vec3::new(0.0, 0.0, 100.0);

@@ -39,9 +39,9 @@ pub enum Language {
     /// C99 with vectors: eight states in a call, with `float`.
     CFloatEight,
     /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
-    /// `robot_aba_casadi` for `robot_aba`. It includes the Jacobian if `robot_aba_derivatives` is generated too and the robot
-    /// has no quaternions and points on circles. For impacts, this Jacobian also has the columns of the restitution, which
-    /// their derivatives lack.
+    /// `robot_aba_casadi` for `robot_aba`. It includes the Jacobian if `robot_aba_derivatives` is generated too and the
+    /// robot has no quaternions and points on circles. For impacts, this Jacobian also has the columns of the
+    /// restitution, which their derivatives lack.
     CCasadi,
     /// A module of Rust with `f64`, without `std`.
     Rust,
@@ -161,10 +161,10 @@ impl Language {
 impl Function {
     /// Returns the number of threads that can share a state in the function's kernel: 1 for other languages than CUDA.
     ///
-    /// Functions of a robot are split by limbs if one thread would need more values than it has registers. In addition, the
-    /// largest share must shrink by a larger factor than the factor by which the sum of all shares grows.
-    /// [`Settings::shares`](crate::Settings::shares) can set the number. A kernel launched with this number of rows of blocks
-    /// (`blockIdx.y`) computes one share in each row; with one row, each thread computes a whole state.
+    /// Functions of a robot are split by limbs if one thread would need more values than it has registers. In addition,
+    /// the largest share must shrink by a larger factor than the factor by which the sum of all shares grows.
+    /// [`Settings::shares`](crate::Settings::shares) can set the number. A kernel launched with this number of rows of
+    /// blocks (`blockIdx.y`) computes one share in each row; with one row, each thread computes a whole state.
     ///
     /// ```
     /// use condyle_codegen::{Language, Settings, functions};
