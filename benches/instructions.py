@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Counts the instructions of the algorithms at the AVX2 level, and fails if a count has grown by more than 3 %.
+"""Counts the instructions of the algorithms at SIMD level AVX2, and fails if a count has grown by more than 3 %.
 
     python3 benches/instructions.py [--write]
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Sorts the instructions of the algorithms by purpose, at the AVX2 level: arithmetic, moves of vectors, or integers.
+"""Sorts the instructions of the algorithms by purpose, at SIMD level AVX2: arithmetic, moves of vectors, or integers.
 
     python3 benches/mix.py [--lines] [ROBOT ...] [--of NAME ...]
 

@@ -1,8 +1,8 @@
 //! The graph of a recording: each value once, simplified while it is recorded.
 //!
-//! An existing value is found again, even if it is written differently. Operands of sums and products are sorted, signs
-//! are moved from products to the sum that follows, constants are computed at once, and a product with 0 is 0. (An
-//! infinite number or NaN, times 0, is therefore 0 here.)
+//! An existing value is found again, even if it is written differently. Operands of sums and products are sorted, and
+//! signs are moved from products to the sum that follows. Constants are computed at once, and a product with 0 is 0.
+//! (An infinite number or NaN, times 0, is therefore 0 here.)
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;

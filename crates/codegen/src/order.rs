@@ -37,7 +37,7 @@ fn on_demand(steps: &Steps) -> Vec<usize> {
                 continue;
             }
             stack.push((k, true));
-            // what needs most registers comes first: it is on top of the stack
+            // the step that needs most registers comes first: it is on top of the stack
             let mut before: Vec<usize> = steps.all[k].takes().map(|id| maker[id as usize]).collect();
             before.retain(|&j| j != usize::MAX);
             before.sort_by_key(|&j| (weight[j], j));

@@ -1,4 +1,4 @@
-//! Constraints of the program at one state: each block next to its equation. x = (q̈, the forces of the active
+//! Constraints of the program at one state: each block of code has its equation as a comment. x = (q̈, the forces of the active
 //! contacts).
 
 use crate::condense::Known;

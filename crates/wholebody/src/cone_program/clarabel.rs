@@ -244,7 +244,7 @@ fn limit(solver: &mut DefaultSolver<f64>, max_iter: u32, time_limit: f64) {
 pub(crate) struct Clarabel {
     settings: Settings,
     capacity: Size,
-    /// Shapes, in the order of their last use.
+    /// Shapes, in the order of their last use: the most recent one is last.
     shapes: Vec<Shape>,
     rows: Vec<Row>,
     x: Vec<f64>,
