@@ -12,10 +12,10 @@ on one core, in turn; a figure is the least of all rounds, since other work on t
 - attributes of a model: the time of an access;
 - batches of 1000 states, `out` reused: the time per state, the time of a loop of Pinocchio's calls, and the limit for
   a batch. The limit is the time of our library's own batch of the same size, plus 1.3 times the time to write the
-  results once. Filling them with a number measures the latter. Our own batch leaves matrices in the lanes of registers, entry
-  after entry for several states; NumPy needs them by rows, state after state. The last figure is the time to copy one
-  matrix from the cache to all states. For panda it is 1.7 times the filling time. With a copy alone, the matrices of a
-  batch would take 1.03 of the limit, and their transposition takes additional time;
+  results once. Filling them with a number measures the latter. Our own batch leaves matrices in the lanes of registers,
+  entry after entry for several states; NumPy needs them by rows, state after state. The last figure is the time to
+  copy one matrix from the cache to all states. For panda it is 1.7 times the filling time. With a copy alone, the
+  matrices of a batch would take 1.03 of the limit, and their transposition takes additional time;
 - overall: `import`, beyond NumPy's; a solve by FDDP, beyond the time that the solver itself measures.
 """
 

@@ -1,5 +1,5 @@
-//! Steps of a function, made from its graph: products are fused into the sums that use them, sine and cosine of an angle
-//! are computed together, and similar entries of a result are computed in a loop.
+//! Steps of a function, made from its graph: products are fused into the sums that use them, sine and cosine of an
+//! angle are computed together, and similar entries of a result are computed in a loop.
 
 use crate::entries;
 use crate::function::{Function, Operations};

@@ -1,5 +1,6 @@
-//! Constraints of the program at one state: each block of code has its equation as a comment. x = (q̈, the forces of the active
-//! contacts).
+//! Constraints of the program at one state: each block of code has its equation as a comment.
+//!
+//! x = (q̈, forces of active contacts).
 
 use crate::condense::Known;
 use crate::cone_program::{ConeProgram, Size};

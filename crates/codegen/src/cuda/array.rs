@@ -79,8 +79,8 @@ impl<T: Real> DeviceArray<T> {
     /// Uses memory of another library, which is neither copied nor freed.
     ///
     /// # Safety
-    /// `len` numbers of type `T` are stored at this address of the device, in memory that outlives the array. Streams that
-    /// are not ordered with the array's streams neither write to this memory nor read the results that are written here.
+    /// `len` numbers of type `T` are stored at this address of the device, in memory that outlives the array. Streams
+    /// that are not ordered with the array's streams neither write to this memory nor read results written here.
     pub unsafe fn from_raw(device: &Device, address: u64, len: usize) -> Self {
         Self { device: device.clone(), address, len, is_owned: false, number: PhantomData }
     }

@@ -12,4 +12,4 @@
 #define EXPORT
 #endif
 
-/* Arrays are dense, as the 1 after rows and columns states. A missing input is zero; a missing output is written to w. */
+/* Arrays are dense, as the 1 after rows and columns states. A missing input is zero; a missing output goes to w. */
