@@ -13,7 +13,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 
-/// How many states a benchmark goes round, so that no branch learns a single one.
+/// Number of states used in turn, so that branch prediction cannot learn a single one.
 const STATES: usize = 16;
 
 /// A position, a velocity, and an effort.

@@ -1,11 +1,12 @@
-//! How the derivatives by hand grow with the size and shape of a tree, against dual numbers and central differences:
-//! `cargo bench --bench derivatives`.
+//! Growth of the analytic derivatives with the size and shape of a tree, compared with dual numbers and central
+//! differences: `cargo bench --bench derivatives`.
 //!
-//! The throughput is in pairs of a joint and one of those before it or itself, n · depth of them (depth the mean number of
-//! joints on the way to the world): where it stays the same, the cost grows as O(n · depth).
+//! The throughput is in pairs of a joint and one of its ancestors or itself. There are n · depth such pairs, where
+//! depth is the mean number of joints on the path to the world. Constant throughput means that the cost grows as O(n ·
+//! depth).
 //!
-//! By hand at n = 8, 32, 128, on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`: µs (ns a pair), how many times as long
-//! dual numbers take, how many times as long differences:
+//! Analytic derivatives at n = 8, 32, 128, on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`: µs (ns per pair),
+//! factor of time with dual numbers, factor of time with differences:
 //!
 //! | | chain | binary tree | star |
 //! | --- | --- | --- | --- |
@@ -14,8 +15,8 @@
 //! | λᵀ∂²τ | 2.6, 19, 253 (72, 36, 31) 22–271, 15–176 | 2.2, 11, 91 (107, 80, 117) 23–218, 16–193 | 2.3, 8.8, 48 (152, 139, 190) 25–325, 15–243 |
 //! | λᵀ∂²q̈ | 4.3, 52, 1227 (120, 98, 149) 27–233, 19–110 | 4.1, 26, 360 (196, 189, 464) 25–315, 18–143 | 4.0, 20, 259 (264, 323, 1017) 23–233, 17–132 |
 //!
-//! ∂τ and λᵀ∂²τ grow as O(n · depth), until n² zeros have to be written. So does ∂q̈ on chains, where it is solved for; on
-//! other trees it is a product, as what λᵀ∂²q̈ has beside λᵀ∂²τ is everywhere, and grows faster.
+//! ∂τ and λᵀ∂²τ grow as O(n · depth), until n² zeros have to be written. ∂q̈ grows in the same way on chains, where it
+//! is solved for. On other trees it is a product, as is the additional part of λᵀ∂²q̈ on all trees, and grows faster.
 use condyle::{
     Data, Inertia, Joint, Model, ModelBuilder, Scalar, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives,
     derivatives::{LaneJacobian, StateFunction, aba_hessian, rnea_hessian},
@@ -33,7 +34,7 @@ use std::time::Duration;
 
 const SIZES: [usize; 5] = [8, 16, 32, 64, 128];
 
-/// n hinges, each body on the one that `parent` names.
+/// Builds n hinges; the parent of each body is given by `parent`.
 fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     let mut rng = StdRng::seed_from_u64(7);
     let mut builder = ModelBuilder::new("tree");
@@ -48,7 +49,7 @@ fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     builder.build().expect("a tree is well-formed")
 }
 
-/// Pairs of a joint and one of those before it or itself.
+/// Returns the number of pairs of a joint and one of its ancestors or itself.
 fn pairs(model: &Model) -> u64 {
     let mut depth = vec![0; model.bodies().len()];
     for (i, body) in model.bodies().iter().enumerate().skip(1) {
@@ -74,7 +75,7 @@ impl State {
     }
 }
 
-/// Calls `f` at (q ⊕ δ, v + δ, x + δ), with a step in one direction after the other: of q, of v and of x.
+/// Calls `f` at (q ⊕ δ, v + δ, x + δ), with a step in each direction in turn: of q, of v and of x.
 fn along_each<S: Scalar>(
     model: &Model,
     s: &State,
@@ -109,7 +110,8 @@ fn along_each<S: Scalar>(
 
 type Group<'c> = BenchmarkGroup<'c, WallTime>;
 
-/// One way of all derivatives, on numbers of which `steps` is enough for a derivative by one direction.
+/// Measures one method for all derivatives. `steps` are the steps in one direction that give one derivative with this
+/// number type.
 fn by_steps<S: Scalar>(group: &mut Group<'_>, way: &str, n: usize, model: &Model, s: &State, steps: &[S]) {
     let (mut data, nv) = (Data::<S>::new(model), model.nv());
     group.bench_function(BenchmarkId::new(format!("∂τ {way}"), n), |b| {
@@ -120,7 +122,7 @@ fn by_steps<S: Scalar>(group: &mut Group<'_>, way: &str, n: usize, model: &Model
             along_each(model, s, 3 * nv, steps, |q, v, tau| _ = black_box(aba(model, &mut data, q, v, tau, &[])))
         });
     });
-    // of the first derivatives by hand: what ∂²/∂a∂a is known to be need not be computed
+    // from the analytic first derivatives; ∂²/∂a∂a is known and not computed
     group.bench_function(BenchmarkId::new(format!("λᵀ∂²τ {way}"), n), |b| {
         let mut call = |q: &[S], v: &[S], a: &[S]| _ = black_box(rnea_derivatives(model, &mut data, q, v, a, &[]));
         b.iter(|| along_each(model, s, 2 * nv, steps, &mut call));
@@ -147,7 +149,7 @@ fn by_hand(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
     });
 }
 
-/// `rnea` or `aba` of (q, v, x).
+/// The function `rnea` or `aba` of (q, v, x).
 struct Dynamics<'m> {
     model: &'m Model,
     forward: bool,
@@ -165,7 +167,7 @@ impl StateFunction for Dynamics<'_> {
     }
 }
 
-/// As many directions at a time as a vector has lanes.
+/// Measures dual numbers in lanes: each lane of a vector has its own direction.
 fn by_lanes(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
     let x = [&s.q[..], &s.v, &s.x].concat();
     let mut jacobian = LaneJacobian::new(model, x.len(), model.nv());

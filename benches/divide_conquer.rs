@@ -1,4 +1,4 @@
-//! From which size on divide and conquer pays, on one thread and on two: `cargo bench --bench divide_conquer`.
+//! Size from which divide and conquer is faster, on one thread and on two: `cargo bench --bench divide_conquer`.
 //!
 //! `docs/lanes.md` has the table of runs of n/2 bodies. Runs of one body take 8 times as long as ABA on one thread.
 
@@ -15,7 +15,7 @@ use std::time::Duration;
 const SIZES: [usize; 5] = [10, 30, 100, 300, 1000];
 const THREADS: [usize; 2] = [1, 2];
 
-/// n hinges, each body on the one that `parent` names.
+/// Builds n hinges; the parent of each body is given by `parent`.
 fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     let mut rng = StdRng::seed_from_u64(7);
     let mut builder = ModelBuilder::new("tree");

@@ -1,4 +1,4 @@
-//! The rigid-body algorithms, their derivatives, and what the equations of motion are made of, one call on one state:
+//! The rigid-body algorithms, their derivatives, and the terms of the equations of motion, one call on one state:
 //! `cargo bench --bench dynamics`.
 
 use condyle::{
@@ -14,7 +14,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 
-/// How many states a benchmark goes round, so that no branch learns a single one.
+/// Number of states used in turn, so that branch prediction cannot learn a single one.
 const STATES: usize = 16;
 
 /// A position, a velocity, and an acceleration or effort.
@@ -35,7 +35,7 @@ fn states(model: &Model) -> Vec<State> {
         .collect()
 }
 
-/// What `compute_all_terms` gives, from the functions that give one of the terms.
+/// Computes the results of `compute_all_terms` by separate functions.
 fn apart(model: &Model, data: &mut Data<f64>, s: &State) {
     black_box(crba(model, data, &s.q));
     black_box(nonlinear_effects(model, data, &s.q, &s.v));

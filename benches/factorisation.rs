@@ -20,7 +20,7 @@ use std::time::Duration;
 
 const SIZES: [usize; 6] = [6, 12, 25, 50, 100, 200];
 
-/// n hinges, each body on the one that `parent` names.
+/// Builds n hinges; the parent of each body is given by `parent`.
 fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     let mut rng = StdRng::seed_from_u64(7);
     let mut builder = ModelBuilder::new("tree");

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Times generated C beside Pinocchio, compiled for the same processor, and beside our pass on plain f64.
+"""Times generated C, compared with Pinocchio compiled for the same processor, and with our pass on plain f64.
 
     python benches/generated.py [--json] [--rounds N] [--cpu K] [ROBOT ...]
 
@@ -31,9 +31,9 @@ import dynamics
 FUNCTIONS = ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives"]
 FLAGS = ["-O3", "-march=native", "-ffp-contract=fast", "-fno-math-errno"]
 ROUND_NS = 2e7
-"""How long a round takes, in ns."""
+"""Duration of a round (ns)."""
 RUNS = 3
-"""How often Pinocchio is timed."""
+"""Number of times that Pinocchio is timed."""
 TIMER = """
 #include <dlfcn.h>
 #include <stdio.h>
@@ -88,8 +88,8 @@ def compiler() -> str:
 def measured(
     model: condyle.Model, function: str, states: Path, rounds: int, cpu: int, theirs: Path
 ) -> "dict[str, float | None]":
-    """A function as generated C: ns of a call, operations, KB of the program, s of the compiler; CppADCodeGen's ns if
-    it has that function, and the ratio.
+    """Measures a function as generated C: ns of a call, operations, KB of the program, s of the compiler; also
+    CppADCodeGen's ns, if it has that function, and the ratio.
     """
     stem, files, [(_, inputs, outputs, operations, _)] = condyle._condyle._generate(model, [function], "c")
     width = model.nq + 3 * model.nv
@@ -125,7 +125,7 @@ def measured(
 
 
 def record_theirs(program: Path, model: Path, states: Path) -> Path:
-    """The folder of Pinocchio's generated code for a model: a library for each function."""
+    """Returns the folder of Pinocchio's generated code for a model, with a library for each function."""
     folder = dynamics.PEERS / f"cppadcg-{model.stem}-{Path(compiler()).name}"
     if not (folder / "aba_derivatives.so").exists():
         folder.mkdir(exist_ok=True)

@@ -1,5 +1,5 @@
-//! How many instructions an algorithm takes, for `instructions.py`, which runs this under callgrind and knows the functions
-//! by their names. A thousandth more or less can be told there, where times differ by a tenth from run to run.
+//! Instructions of each algorithm, for `instructions.py`, which runs this program under callgrind and finds the
+//! functions by name. Counts resolve a change of a thousandth, while times differ by a tenth from run to run.
 
 use condyle::optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem};
@@ -9,7 +9,7 @@ use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 use std::sync::Arc;
 
-/// So many states, one after the other.
+/// Number of states, used one after the other.
 const STATES: usize = 16;
 
 struct States {
@@ -34,7 +34,7 @@ impl States {
     }
 }
 
-/// One function for each algorithm, which callgrind sees by its name.
+/// Defines one function for each algorithm, which callgrind sees by its name.
 macro_rules! measured {
     ($($name:ident($m:ident, $d:ident, $q:ident, $v:ident, $x:ident) $call:expr;)*) => {
         mod measured {
@@ -68,11 +68,11 @@ measured! {
     aba_derivatives(m, d, q, v, x) condyle::aba_derivatives(m, d, q, v, x, &[]);
 }
 
-/// So many iterations of FDDP, on so many knots.
+/// Number of FDDP iterations, and number of knots.
 const ITERATIONS: usize = 5;
 const KNOTS: usize = 32;
 
-/// A robot bends what can bend while its feet stay, if it has any, and then comes to rest.
+/// Builds a motion in which a robot bends its joints while its feet, if any, stay, and then comes to rest.
 fn motion(robot: &Arc<Model>, feet: &[&str], bent: &[(&str, f64)]) -> (Problem, Vec<f64>, Vec<f64>) {
     let (nv, mut q) = (robot.nv(), neutral(robot));
     for (joint, angle) in bent {
@@ -133,7 +133,7 @@ fn main() {
 
     let (d, b, s) = (&mut Data::new(&m), &mut Batch::new(&m, STATES, 1), &States::random(&m));
     all(&m, d, s);
-    black_box(b.aba_derivatives(&m, &s.q, &s.v, &s.x, &[])); // the first call that gives matrices allocates them
+    black_box(b.aba_derivatives(&m, &s.q, &s.v, &s.x, &[])); // the first call that returns matrices allocates them
     measured::batch_aba(&m, b, s);
     measured::batch_aba_derivatives(&m, b, s);
 }

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Counts what a quadruped on its feet costs beside others in one model: instructions for each robot, at the AVX2 level.
+"""Counts the cost of a quadruped on its feet together with others in one model: instructions for each robot, at the
+AVX2 level.
 
     python3 benches/islands.py
 
-It runs benches/islands.rs under callgrind (of valgrind), and prints a table of thousands of instructions.
+It runs benches/islands.rs under callgrind (of valgrind), and prints a table in thousands of instructions.
 """
 
 import os
@@ -20,7 +21,7 @@ LINE = re.compile(r"^\s*([\d,]+) .*\bislands::measured::(\w+)")
 
 
 def counts(program: Path, robots: int) -> dict[str, int]:
-    """Instructions of one call of each algorithm."""
+    """Counts the instructions of one call of each algorithm."""
     with TemporaryDirectory() as folder:
         profile = Path(folder) / "profile"
         command = ("valgrind", "--quiet", "--tool=callgrind", f"--callgrind-out-file={profile}", program, str(robots))

@@ -16,10 +16,10 @@ use std::time::{Duration, Instant};
 
 const ROBOTS: [usize; 6] = [1, 2, 4, 8, 16, 32];
 
-/// The time for which each function is measured.
+/// Duration of the measurement of each function.
 const TIME: Duration = Duration::from_millis(500);
 
-/// Some quadrupeds, and their contacts with the ground, one robot after the other.
+/// Several quadrupeds and their contacts with the ground, one robot after the other.
 struct Herd {
     model: Model,
     data: Data<f64>,
@@ -49,7 +49,7 @@ impl Herd {
     }
 }
 
-/// One function for each algorithm, which callgrind sees by its name.
+/// Defines one function for each algorithm, which callgrind sees by its name.
 macro_rules! measured {
     ($($name:ident($h:ident) $call:expr;)*) => {
         mod measured {

@@ -1,9 +1,10 @@
-"""Times how long robots take to load: the URDFs of example-robot-data, by this condyle and by another one.
+"""Times the loading of robots: the URDFs of example-robot-data, by this condyle and by another one.
 
-    python benches/loading.py [--beside FOLDER] [--rounds N]
+    python benches/loading.py [OPTION ...]
 
-FOLDER has another `condyle` package, for example of an earlier version. Both load each file in turn, in processes of
-their own; a time is the median over the rounds. Prints a line for each robot and the ratio of the sums.
+The options are `--rounds N` and `--beside FOLDER`: a folder with another `condyle` package, for example an earlier
+version. Both load each file in turn, in separate processes; a time is the median over the rounds. Prints a line for
+each robot, and the ratio of the sums.
 """
 
 import argparse
@@ -31,7 +32,7 @@ for line in sys.stdin:
 
 
 def robots() -> list[Path]:
-    """The URDFs of example-robot-data, wherever the package is installed."""
+    """Returns the URDFs of example-robot-data, from the package's folder."""
     import example_robot_data
 
     folders = (base / "share" / "example-robot-data" / "robots" for base in Path(example_robot_data.__file__).parents)
@@ -40,7 +41,7 @@ def robots() -> list[Path]:
 
 
 def loader(folder: str | None) -> subprocess.Popen[str]:
-    """A process that loads the files whose paths it is given, and answers with the time of each."""
+    """Starts a process that loads the files whose paths it receives, and returns the time of each."""
     environment = os.environ | ({"PYTHONPATH": folder} if folder else {})
     pipe = subprocess.PIPE
     return subprocess.Popen([sys.executable, "-c", LOAD], stdin=pipe, stdout=pipe, text=True, env=environment)

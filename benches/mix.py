@@ -1,18 +1,19 @@
 #!/usr/bin/env python3
-"""What the instructions of the algorithms are for, at the AVX2 level: arithmetic, vectors on their way, or integers.
+"""Sorts the instructions of the algorithms by purpose, at SIMD level AVX2: arithmetic, moves of vectors, or integers.
 
     python3 benches/mix.py [--lines] [ROBOT ...] [--of NAME ...]
 
-It runs the program of instructions.py under callgrind (of valgrind), once for each algorithm, and sorts the
-instructions that are executed by what objdump calls them:
+It runs the program of instructions.py under callgrind (of valgrind), once for each algorithm, and sorts the executed
+instructions by their names in objdump:
 
 - arithmetic: sums, products, quotients and roots;
-- load, store: a vector's way from or to memory; stack: from or to the stack, where registers do not suffice;
+- load, store: moves of vectors from or to memory; stack: from or to the stack, if there are too few registers;
 - move: shuffles, masks, copies between registers;
 - integer: indices, bounds, branches, calls;
 - C library: sines and cosines, and copies that are function calls.
 
---lines builds the program with line tables, which takes a build of its own, and shows the lines that execute most, too.
+--lines builds the program with line tables, which takes a separate build, and also shows the lines with most
+instructions.
 """
 
 import argparse
@@ -35,7 +36,7 @@ OBJECT = re.compile(r"^(c?)ob=(\(\d+\))(?: (.+))?$")
 COST = re.compile(r"^0x([0-9a-f]+) \S+ (\d+)$")
 LINE = re.compile(r"crates/(?!core_arch)(\w+/src/\S+?:\d+)")
 SHOWN = 25
-"""The lines that are shown."""
+"""Number of lines that are shown."""
 
 
 def kind(operation: str, operands: str) -> str:
@@ -49,7 +50,7 @@ def kind(operation: str, operands: str) -> str:
 
 
 def executed(program: Path, robot: str, function: str) -> collections.Counter[int]:
-    """How often each instruction is executed within a function, by its address: at 0 those of libraries."""
+    """Counts the executions of each instruction within a function, by address; libraries have the address 0."""
     cost: collections.Counter[int] = collections.Counter()
     with TemporaryDirectory() as folder:
         profile = Path(folder) / "profile"
@@ -57,7 +58,7 @@ def executed(program: Path, robot: str, function: str) -> collections.Counter[in
         command = ("valgrind", "--quiet", "--tool=callgrind", *options, f"--callgrind-out-file={profile}")
         run(*command, program, robot, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
         names: dict[str, str] = {}
-        ours = inclusive = False  # the line after `calls` has the cost of what is called
+        ours = inclusive = False  # the line after `calls` has the cost of the called function
         for line in profile.read_text(encoding="utf-8").splitlines():
             if found := OBJECT.match(line):
                 called, number, name = found.groups()
@@ -70,7 +71,8 @@ def executed(program: Path, robot: str, function: str) -> collections.Counter[in
 
 
 def lines(program: Path, cost: collections.Counter[int]) -> None:
-    """Prints the lines that execute most: the innermost ones but those of `spatial`, which is everywhere."""
+    """Prints the lines with most executed instructions: the innermost lines outside of `spatial`, which is inlined
+    everywhere."""
     addresses = "\n".join(map(hex, cost))
     table = run("addr2line", "-a", "-i", "-e", program, input=addresses)
     found: collections.Counter[str] = collections.Counter()

@@ -1,19 +1,19 @@
-//! Dense products in registers, beside the peak of the processor: `cargo bench --bench tiles`.
+//! Dense products in registers, compared with the processor's peak: `cargo bench --bench tiles`.
 //!
-//! The peak is that of products and sums that wait for nothing, measured before and after each product, since a machine's
-//! clock and its other guests change. Printed are the best of many short rounds.
+//! The peak is the rate of independent products and sums. It is measured before and after each product, since a
+//! machine's clock and its other guests change. The program prints the best of many short rounds.
 
 use condyle::level::level;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// The sums under way at a time: more than a processor's latency asks for, and fewer than it has registers.
+/// Number of independent sums: more than a processor's latency requires, and fewer than its registers.
 const SUMS: usize = 12;
 const TERMS: usize = 4096;
 const ROUNDS: usize = 400;
 
-/// Sums that do not wait for each other; the number of operations, each of one number.
+/// Independent sums, with the number of operations on single numbers.
 struct Independent<'a> {
     operations: &'a mut usize,
 }
@@ -37,7 +37,8 @@ impl Vectorized for Independent<'_> {
     }
 }
 
-/// The most operations a nanosecond, of some rounds that say how many they make.
+/// Returns the largest rate in operations per nanosecond over some rounds, each of which returns its number of
+/// operations.
 fn fastest(mut round: impl FnMut() -> usize) -> f64 {
     let rate = |()| {
         let start = Instant::now();

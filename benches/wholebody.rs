@@ -1,5 +1,5 @@
-//! A tick of whole-body control, of robots that stand or move while they are pushed: a second of recorded ticks after the
-//! other, as their own last solutions follow each other. `cargo bench --bench wholebody`
+//! A tick of whole-body control, for robots that stand or move under pushes: one second of recorded ticks, each started
+//! from the controller's own last solution. `cargo bench --bench wholebody`
 
 #[path = "../crates/wholebody/tests/common/workload.rs"]
 mod workload;

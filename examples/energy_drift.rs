@@ -1,11 +1,11 @@
-//! How well each integrator keeps the energy of what nothing drives and nothing brakes: a double pendulum that swings
-//! chaotically, and a humanoid that falls and tumbles with loose joints, 10 s each.
+//! Energy error of each integrator without drives and brakes: a double pendulum that swings chaotically, and a humanoid
+//! that falls and tumbles with loose joints, 10 s each.
 //!
-//! Prints a table and draws |E(t) − E(0)|, each point the greatest value in a hundredth of the time.
+//! Prints a table and draws |E(t) − E(0)|; each point is the greatest value in a hundredth of the time.
 //!
-//! The humanoid is hard: its wrists are light, loose and at times near the position in which yaw and roll share an axis,
-//! where joint speeds jump. There the forces of Coriolis that Euler's method takes from the beginning of a step feed it
-//! energy, without bound; and with steps of 2 ms the variational integrator says that its equation has no solution.
+//! The humanoid is difficult: its wrists are light, loose, and sometimes near the position in which yaw and roll share
+//! an axis, where joint speeds jump. There, Euler's method uses the Coriolis forces from the beginning of a step, which
+//! adds energy without bound. With steps of 2 ms, the variational integrator reports that its equation has no solution.
 //!
 //! ```text
 //! cargo run --release --example energy_drift -- energy_drift.svg
@@ -26,7 +26,7 @@ const INTEGRATORS: [(&str, Integrator, &str); 3] = [
     ("variational", Integrator::Variational, "#2e933c"),
 ];
 
-/// A robot, and the state in which it is let go.
+/// A robot and its initial state.
 struct System {
     name: &'static str,
     model: Model,
@@ -34,7 +34,7 @@ struct System {
     v: Vec<f64>,
 }
 
-/// Two rods of 1 m and 1 kg.
+/// Creates a pendulum of two rods of 1 m and 1 kg.
 fn double_pendulum() -> Result<System, Error> {
     let joint = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3 { zz: 0.001, ..Sym3::diagonal(1.0 / 12.0) });
@@ -45,7 +45,7 @@ fn double_pendulum() -> Result<System, Error> {
     Ok(System { name: "double pendulum", model: robot.build()?, q: vec![2.0, 1.0], v: vec![0.0; 2] })
 }
 
-/// Thrown into a tumble, every joint turning with up to 1 rad/s.
+/// Creates a tumbling humanoid, with joint speeds up to 1 rad/s.
 fn humanoid() -> System {
     let model = robots::humanoid();
     let q = neutral(&model);
@@ -53,13 +53,13 @@ fn humanoid() -> System {
     System { name: "falling humanoid", model, q, v }
 }
 
-/// The energy's error over time.
+/// Error of the energy over time.
 struct Drift {
     /// E(0) (J).
     start: f64,
-    /// The greatest kinetic energy (J).
+    /// Greatest kinetic energy (J).
     kinetic: f64,
-    /// The greatest |E(t) − E(0)| in each part of the time (J).
+    /// Greatest |E(t) − E(0)| in each part of the time (J).
     errors: Vec<f64>,
     /// E(10 s) − E(0) (J).
     end: f64,
@@ -94,13 +94,13 @@ fn drift(system: &System, integrator: Integrator, dt: f64) -> Result<Drift, Stat
     Ok(drift)
 }
 
-/// A figure with a panel for each system: |E(t) − E(0)| on a logarithmic axis.
+/// Figure with a panel for each system: |E(t) − E(0)| on a logarithmic axis.
 struct Figure {
     svg: String,
     panels: usize,
 }
 
-const PANEL: (f64, f64) = (400.0, 300.0); // its size, without what stands around it
+const PANEL: (f64, f64) = (400.0, 300.0); // size of a panel, without its labels
 const LEFT: f64 = 70.0;
 const TOP: f64 = 64.0;
 const DECADES: (i32, i32) = (-12, 15); // J

@@ -1,10 +1,10 @@
-//! Model predictive control of an arm at a fixed rate: it follows a moving point while something pushes it.
+//! Model predictive control of an arm at a fixed rate: it follows a moving point under disturbances.
 //!
 //! `cargo run --release --example mpc`
 //!
-//! Every 10 ms: read the state, apply u + K (x ⊖ x̄) of the last plan, move the horizon on by a knot, and improve the plan
-//! by one iteration within 5 ms. Prints how well the tool follows, and how punctual the loop was. A solve that is delayed
-//! ends after its iteration and reports the overrun; the next one has its whole budget again.
+//! Every 10 ms: read the state, apply u + K (x ⊖ x̄) of the last plan, shift the horizon by a knot, and improve the
+//! plan by one iteration within 5 ms. Prints the error of the tool and the timing of the loop. A delayed solve ends
+//! after its iteration and reports the overrun; the next solve has its whole budget again.
 
 use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem, Status};
@@ -17,13 +17,13 @@ const HORIZON: usize = 30;
 const STEPS: usize = 500;
 const BUDGET: Duration = Duration::from_millis(5);
 
-/// Where the tool should be: once around a circle in 2.5 s.
+/// Returns the target of the tool, which runs around a circle in 2.5 s.
 fn target(time: f64) -> Vec3<f64> {
     let (sin, cos) = (time * core::f64::consts::TAU / 2.5).sin_cos();
     Vec3::new(0.45, 0.15 * cos, 0.45 + 0.15 * sin)
 }
 
-/// What leads the tool to where it should be after some steps, with so many controls.
+/// Returns the costs that lead the tool to its target after a number of steps, for this number of controls.
 fn costs(rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
     let follow = Residual::FrameTranslation { frame: "tool".into(), target: target(step as f64 * DT) };
     let effort = Residual::Control { reference: vec![0.0; controls] };
@@ -37,7 +37,7 @@ fn costs(rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arm = Arc::new(robots::arm7());
     let rest = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
-    // One model for all knots, each with a target of its own, which it keeps while it moves to the front.
+    // One model serves all knots. Each knot has its own target, which it keeps while it moves to the front.
     let mut knot = FreeDynamics::running(arm.clone(), DT, vec![])?;
     for t in 0..HORIZON {
         knot.set_costs(t, costs(&rest, t, 7))?;
@@ -74,7 +74,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         x.copy_from_slice(&next);
 
-        // the horizon moves on: its last knot and its end have new targets
+        // shift the horizon: its last knot and its terminal have new targets
         problem.shift(0)?;
         let knots: &mut FreeDynamics = problem.model_mut(0).expect("it serves all knots");
         knots.set_costs(HORIZON - 1, costs(&rest, step + HORIZON, 7))?;

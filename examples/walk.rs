@@ -15,7 +15,7 @@ use support::{Foot, Gait};
 
 const FEET: [&str; 2] = ["left_sole", "right_sole"];
 const SOLE: [f64; 2] = [0.2, 0.1]; // m
-const KNOTS: usize = 20; // of a step
+const KNOTS: usize = 20; // per step
 const DT: f64 = 0.03; // s
 
 fn main() -> Result<(), Box<dyn Error>> {

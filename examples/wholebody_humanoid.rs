@@ -1,6 +1,6 @@
 //! A humanoid stands on two soles, shifts its weight to one of them, lifts the other foot, and sets it down.
 //!
-//! The lifted foot's contact fades: its force is ramped down before it leaves the ground, and up after it is back.
+//! The lifted foot's contact fades: its force ramps down before the foot leaves the ground, and up after it has landed.
 //!
 //! ```text
 //! cargo run --release --example wholebody_humanoid [ROBOT.urdf LEFT_SOLE RIGHT_SOLE]
@@ -19,7 +19,7 @@ const SOLE: [f64; 2] = [0.2, 0.1]; // m
 const DT: f64 = 1e-3; // s
 const LIFT: f64 = 0.1; // m
 
-/// From 0 at one time to 1 at another one, smoothly: value, rate, and rate of the rate.
+/// Rises smoothly from 0 at one time to 1 at another: returns value, first and second derivative.
 fn ramp(t: f64, from: f64, to: f64) -> [f64; 3] {
     let (s, w) = (((t - from) / (to - from)).clamp(0.0, 1.0), 1.0 / (to - from));
     let poly = s * s * s * (10.0 + s * (6.0 * s - 15.0));
@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let settings = Settings { contact_gains: Gains { stiffness: 0.0, damping: 40.0 }, ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks, settings)?;
     let ground = controller.hold(&q)?.contacts[0].pose.translation.z;
-    q[2] -= ground; // it stands at height 0
+    q[2] -= ground; // the robot stands at height 0
     let start = controller.hold(&q)?;
     let aside = start.contacts[0].pose.translation - start.com.position;
 
@@ -61,13 +61,13 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut error = 0.0f64;
     for tick in 0..=5000 {
         let t = f64::from(tick) * DT;
-        // The weight goes to the left foot from 0.2 s to 1.2 s, and back from 3.8 s to 4.8 s.
+        // The weight moves to the left foot from 0.2 s to 1.2 s, and back from 3.8 s to 4.8 s.
         let (to, back) = (ramp(t, 0.2, 1.2), ramp(t, 3.8, 4.8));
         references.com.position = start.com.position + aside.scale(to[0] - back[0]);
         references.com.position.z = start.com.position.z;
         references.com.velocity.y = aside.y * (to[1] - back[1]);
         references.com.acceleration.y = aside.y * (to[2] - back[2]);
-        // The right foot is unloaded from 1.4 s to 1.6 s, is lifted and comes down, and is loaded again after 3.3 s.
+        // The right foot is unloaded from 1.4 s to 1.6 s, is lifted and lands, and is loaded again after 3.3 s.
         let up = PI * ((t - 1.6) / 1.6).clamp(0.0, 1.0);
         references.frames[1].pose.translation.z = start.frames[1].pose.translation.z + LIFT * up.sin().powi(2);
         references.frames[1].velocity.linear.z = LIFT * PI / 1.6 * (2.0 * up).sin();

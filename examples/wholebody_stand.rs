@@ -1,8 +1,8 @@
-//! A quadruped stands on four point feet, is pushed, sways and comes back.
+//! A quadruped stands on four point feet, is pushed, sways and returns.
 //!
-//! Each millisecond one cone program gives the torques: whole-body control with true friction cones. The controller
-//! knows nothing of the push, it sees only the state. The ground holds what touches, as long as it has to push; it knows no
-//! friction, so the example looks at each force and says how close the worst one came to its cone.
+//! Every millisecond, one cone program gives the torques: whole-body control with true friction cones. The controller
+//! does not know the push; it sees only the state. The ground holds a touching foot as long as it pushes. The ground's
+//! friction is unbounded, so the example checks each force and prints the smallest distance to a cone.
 //!
 //! ```text
 //! cargo run --release --example wholebody_stand
@@ -52,7 +52,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         error = controller.optimality(&world.q, &world.v, &references).worst().max(error);
 
         let pushed = (200..600).contains(&tick);
-        f_ext[1].linear = if pushed { PUSH } else { Vec3::zero() }; // along the trunk's axes, which hardly turn
+        f_ext[1].linear = if pushed { PUSH } else { Vec3::zero() }; // along the trunk's axes, which hardly rotate
         let forces = world.step(&tau, &f_ext, DT);
         let used = forces.iter().map(|f| f.x.hypot(f.y) / (FRICTION * f.z)).fold(0.0, f64::max);
         assert!(used < 1.0 && forces.iter().all(|f| f.z > 0.0), "a foot slips or lifts at tick {tick}");

@@ -3,15 +3,15 @@
 
     .venv/pinocchio/bin/python benches/peers/casadi_collocation.py [--rounds N] [--json] [PROBLEM ...]
 
-The problems are those of python/examples, in the same transcription for both, with the same variables, constraints and
-zeros; ours have the dynamics of all points as one function (`states=`), the expressions by `Function.map`. They are
-`swing_up`, `reach` (of our arm), `jump`; and `reach_panda`, `reach_talos` (its pelvis fixed), the reach on robots of
-example-robot-data. Prints, for each, the processor's time of a solve (the least of the rounds), how much of it are the
-problem's functions, the iterations and the cost; and how long the expressions took to build. The expressions run in
-CasADi's own virtual machine, as those of pinocchio.casadi do.
+The problems come from python/examples, in the same transcription for both, with the same variables, constraints and
+zeros. Ours have the dynamics of all points as one function (`states=`), the expressions use `Function.map`. The
+problems are `swing_up`, `reach` (of our arm), `jump`; and `reach_panda`, `reach_talos` (its pelvis fixed), the reach
+on robots of example-robot-data. For each problem it prints the processor time of a solve (the least of the rounds),
+the part of it in the problem's functions, the iterations and the cost; also the time to build the expressions. The
+expressions run in CasADi's own virtual machine, as pinocchio.casadi's expressions do.
 
-What is not in the functions is IPOPT's and its linear solver's, the same for both. Of an arm of two links (`swing_up`)
-it is 0.42 of the expressions' time, below which no solve of ours can come.
+The time outside of the functions belongs to IPOPT and its linear solver, the same for both. For an arm of two links
+(`swing_up`), it is 0.42 of the expressions' time, which is a lower bound for our solves.
 """
 
 import argparse
@@ -63,7 +63,8 @@ def reaches(
 
 
 def reaches_of(name: str, frame: str, locked: list[str]) -> tuple[Transcription, Transcription]:
-    """The reach of a robot with a fixed base, from the middle of its joints' ranges to where some radians lead."""
+    """Builds the reach of a robot with a fixed base, from the middle of its joints' ranges to the pose some radians
+    away."""
     from example_robot_data.robots_loader import ROBOTS, getModelPath
 
     loader = ROBOTS[name]
@@ -110,13 +111,13 @@ PROBLEMS: dict[str, Callable[[], tuple[Transcription, Transcription]]] = {
 
 
 def solve(transcription: Transcription, rounds: int) -> dict[str, float]:
-    """The figures of a problem: seconds of the processor, but for `build_s`."""
+    """Returns the figures of a problem, in seconds of processor time; `build_s` is wall time."""
     begin = time.perf_counter()
     opti, _ = transcription()
     opti.solver("ipopt", {"print_time": False, "record_time": True}, SETTINGS)
     found: dict[str, float] = {}
     for one in range(rounds):
-        solution = opti.solve()  # from the guess each time
+        solution = opti.solve()  # from the same initial guess each time
         stats = solution.stats()
         if one == 0:
             found["build_s"] = time.perf_counter() - begin - stats["t_wall_total"]

@@ -46,7 +46,7 @@ class Expressions:
 
     @staticmethod
     def cross(v: casadi.SX) -> casadi.SX:
-        """v × on motions."""
+        """Returns v × for motions."""
         linear, angular = casadi.skew(v[:3]), casadi.skew(v[3:])
         return casadi.blockcat([[angular, linear], [casadi.SX(3, 3), angular]])
 
@@ -102,7 +102,7 @@ class Expressions:
         return casadi.Function("aba", [self.q, self.v, tau], [a])
 
     def forward_kinematics(self, frame: str) -> casadi.Function:
-        """Position and rotation of a frame."""
+        """Returns position and rotation of a frame."""
         R, p = self.frame(frame)
         return casadi.Function("forward_kinematics", [self.q], [p, R])
 
@@ -113,14 +113,14 @@ class Expressions:
         return R @ placement[:3, :3], p + R @ placement[:3, 3]
 
     def velocities(self) -> list[casadi.SX]:
-        """The velocity of each body, in its own axes."""
+        """Returns the velocity of each body, in its own axes."""
         vs = [casadi.SX.zeros(6)]
         for i in range(1, self.model.nbodies):
             vs.append(self.X[i] @ vs[self.model.parents[i]] + self.S[i] @ self.joint_velocity(self.v, i))
         return vs
 
     def frame_velocity(self, name: str) -> casadi.Function:
-        """The velocity of a frame, in its own axes."""
+        """Returns the velocity of a frame, in its own axes."""
         frame = self.model.frames[self.model.frame(name)]
         placement = np.array(frame.placement)
         R, p = casadi.DM(placement[:3, :3]), casadi.DM(placement[:3, 3])
@@ -129,7 +129,7 @@ class Expressions:
         return casadi.Function("frame_velocity", [self.q, self.v], [casadi.vertcat(linear, R.T @ v[3:])])
 
     def constrained_dynamics(self, points: list[str], kd: float) -> casadi.Function:
-        """Accelerations and forces along the world's axes of points that are held to the ground."""
+        """Returns the accelerations, and the forces along the world's axes of points held to the ground."""
         model, vs, biases = self.model, self.velocities(), [casadi.SX.zeros(6)]
         for i in range(1, model.nbodies):
             vJ = self.S[i] @ self.joint_velocity(self.v, i)

@@ -3,9 +3,10 @@
 
     .venv/pinocchio/bin/python benches/peers/casadi_functions.py [URDF …] [--free-flyer] [--json]
 
-Without robots: the embedded arm and humanoid. Prints, for RNEA and ABA, the time of the function, of its Jacobian by
-all arguments and of the Hessian of λᵀf, in microseconds, medians of alternating rounds on one core, and how many times
-faster ours are. The expressions run in CasADi's own virtual machine, as those of pinocchio.casadi do.
+Without robots: the embedded arm and humanoid. For RNEA and ABA it prints times in microseconds, and the
+speed-up of ours: of the function, of its Jacobian with respect to all arguments, and of the Hessian of λᵀf. Times are
+medians of alternating rounds on one core. The expressions run in CasADi's own virtual machine, as pinocchio.casadi's
+expressions do.
 """
 
 import argparse
@@ -22,16 +23,16 @@ import condyle
 import condyle.casadi
 
 ROUNDS = 21
-SECONDS = 0.02  # of each round
+SECONDS = 0.02  # duration of each round
 
 
 def derived(f: casadi.Function) -> dict[str, casadi.Function]:
-    """The function, its Jacobian, and the blocks of the Hessian of λᵀf, as an optimisation gets them."""
+    """Returns the function, its Jacobian, and the blocks of the Hessian of λᵀf, as an optimisation needs them."""
     return {"value": f, "Jacobian": f.jacobian(), "Hessian": f.reverse(1).jacobian()}
 
 
 def call(f: casadi.Function, x: list[np.ndarray]) -> Callable[[], None]:
-    """A call of a function through its buffers, without Python's conversions; inputs beyond x are ones."""
+    """Returns a call of a function through its buffers, without Python's conversions; inputs beyond x are ones."""
     buffer, trigger = f.buffer()
     given = [*x, *(np.ones(f.nnz_in(k)) for k in range(len(x), f.n_in()))]
     results = [np.zeros(f.nnz_out(k)) for k in range(f.n_out())]
@@ -45,7 +46,7 @@ def call(f: casadi.Function, x: list[np.ndarray]) -> Callable[[], None]:
 
 
 def microseconds(calls: list[Callable[[], None]]) -> list[float]:
-    """The median time of each call, over rounds in which they take turns."""
+    """Returns the median time of each call, over rounds in which the calls take turns."""
     repeats = []
     for one in calls:
         begin, n = time.perf_counter(), 0

@@ -3,10 +3,10 @@
 
     python3 benches/peers/dynamics.py [--json] [--rounds N] [--cpu K] [ROBOT ...]
 
-Pinocchio is compiled for this processor (clang++ -O3 -march=native, or g++), which takes some ten minutes the first
-time; Condyle is a default build. Both run on one core, in turn, round after round: a figure is the median over the
-rounds of each program's median, a ratio the median over the rounds of their quotient. Needs Linux, Rust, Python 3 with
-venv and a C++ compiler; everything else is installed under target/peers.
+Pinocchio is compiled for this processor (clang++ -O3 -march=native, or g++), which takes about ten minutes the first
+time; Condyle is a default build. Both run on one core, in turn, round after round. A figure is the median over the
+rounds of each program's median; a ratio is the median over the rounds of the quotient. Needs Linux, Rust, Python 3
+with venv and a C++ compiler; everything else is installed under target/peers.
 """
 
 import argparse
@@ -31,29 +31,29 @@ ROBOTS = {
     "chain50": (50, []),
     "chain100": (100, []),
 }
-"""The robot of example-robot-data, or the links of a chain, and the joints that are locked."""
+"""Robots: a name in example-robot-data or the number of links of a chain, and the locked joints."""
 BESIDE = {
     "rnea_hessian": "rnea_derivatives",
     "aba_hessian": "aba_derivatives",
     "dtau_dq_by_duals": "rnea_derivatives",
     "dtau_dq_by_differences": "rnea_derivatives",
 }
-"""What Pinocchio's bench does not have, and with which of our own times it is compared."""
+"""Algorithms that Pinocchio's benchmark lacks, and our own time with which each is compared."""
 
 MODES = {"": "one call", "batch": "per state of a batch", "horizon": "a horizon"}
-"""What stands before the name of an algorithm, and how its time was taken."""
+"""Prefixes of the names of algorithms, and the kind of their times."""
 KNOT = ("aba", "aba_derivatives", "rnea")
-"""What a solver asks for at each knot of a horizon."""
+"""Algorithms that a solver calls at each knot of a horizon."""
 
 
 def run(*command: "str | Path", **options: object) -> str:
-    """The output of a command."""
+    """Returns the output of a command."""
     result = subprocess.run([str(c) for c in command], check=True, stdout=subprocess.PIPE, text=True, **options)
     return result.stdout
 
 
 def environment(name: str, *packages: str) -> Path:
-    """A virtual environment with these packages; its interpreter."""
+    """Creates a virtual environment with these packages; returns its interpreter."""
     python = PEERS / name / "bin" / "python"
     if not python.exists():
         run(sys.executable, "-m", "venv", PEERS / name)
@@ -62,7 +62,8 @@ def environment(name: str, *packages: str) -> Path:
 
 
 def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *packages: str) -> Path:
-    """Compiles pinocchio.cpp, or another program of its parts that needs headers of some packages more; its path."""
+    """Compiles pinocchio.cpp, or a similar program in parts that needs headers of additional packages; returns its
+    path."""
     purelib = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
     prefix = Path(run(python, "-c", purelib).strip()) / "cmeel.prefix"
     folders = [prefix / "include", prefix / "include/urdfdom"]
@@ -92,7 +93,7 @@ def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *
 
 
 def build_ours() -> Path:
-    """Builds benches/peers/ours.rs as `cargo bench` does; its path."""
+    """Builds benches/peers/ours.rs as `cargo bench` does; returns its path."""
     command = ("cargo", "build", "--release", "--bench", "peers", "--message-format=json", "--locked")
     for line in run(*command, cwd=ROOT).splitlines():
         message = json.loads(line)
@@ -144,14 +145,14 @@ def times(output: str) -> dict[str, float]:
 
 
 def peer_time(kind: str, name: str, mine: dict[str, float], theirs: dict[str, float]) -> float:
-    """What a time of ours is compared with."""
+    """Returns the time with which a time of ours is compared."""
     if kind == "horizon":
         return int(name) * sum(theirs[algorithm] for algorithm in KNOT)
     return theirs.get(name) or mine[BESIDE[name]]
 
 
 def compare(robot: str, python: Path, theirs: Path, ours: Path, rounds: int, cpu: int) -> list[dict]:
-    """Both programs in turn on one robot."""
+    """Runs both programs in turn on one robot."""
     source, locked = ROBOTS[robot]
     model, urdf, states = (PEERS / f"{robot}.{suffix}" for suffix in ("bin", "urdf", "states"))
     export = run(python, "-c", EXPORT, str(source), "0", ",".join(locked), str(STATES), model, urdf, states)
@@ -182,7 +183,7 @@ def compare(robot: str, python: Path, theirs: Path, ours: Path, rounds: int, cpu
 
 
 def table(rows: list[dict]) -> str:
-    """The ratios, a robot in each column, and a table for each mode."""
+    """Returns the ratios, with a column for each robot and a table for each mode."""
     robots = list(dict.fromkeys(row["robot"] for row in rows))
     tables = []
     for mode in MODES.values():

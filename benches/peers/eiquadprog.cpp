@@ -7,7 +7,7 @@ using Eigen::VectorXd;
 
 static eiquadprog::solvers::EiquadprogFast solver;
 
-// min ½ xᵀ P x + cᵀ x with A x + a = 0 and C x + b ≥ 0, matrices by columns. Returns 0 where it was solved.
+// Solves min ½ xᵀ P x + cᵀ x with A x + a = 0 and C x + b ≥ 0, matrices by columns. Returns 0 on success.
 extern "C" int solve(int n, int equalities, int rows, const double *P, const double *c, const double *A,
                      const double *a, const double *C, const double *b, double *x) {
   static MatrixXd hessian, CE, CI;

@@ -3,14 +3,14 @@
 
     .venv/crocoddyl/bin/python benches/peers/ocp.py [OPTION ...] [NAME ...]
 
-Each problem is built in both libraries from the same JSON: problems of a folder (with the robots in its `robots`), or
-else those that `ocp_problems.py` makes. Compared are the costs of all iterations (to 1e-6 of each), their step lengths
-and regularisations, and the optimum; the stopping value, which loses its digits near the optimum, is only shown. Both
-are timed in turn, round after round, on one core, each right after the same solve not timed, as in a loop of control
-that solves again and again: figures are medians of milliseconds in an iteration, for the whole solve and for its
-phases. With --converted our problem is what `condyle.crocoddyl` makes of Crocoddyl's, and it is timed beside ours as it
-is built from the JSON, in place of Crocoddyl. Needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment, which
-`./test` makes.
+Each problem is built in both libraries from the same JSON: from the problems of a folder (with the robots in its
+`robots`), or from `ocp_problems.py`. The program compares the costs of all iterations (to 1e-6 of each), their step
+lengths and regularisations, and the optimum. The stopping value, which loses its digits near the optimum, is only
+shown. Both solvers are timed in turn, round after round, on one core. Each timed solve follows the same untimed solve,
+as in a control loop that solves repeatedly. Figures are medians of milliseconds per iteration, for the whole solve and
+for its phases. With --converted, `condyle.crocoddyl` converts Crocoddyl's problem; the result is timed against our
+problem built from the JSON, instead of Crocoddyl. Needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment,
+which `./test` makes.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import statistics
 import sys
 from pathlib import Path
 
-os.environ["OMP_NUM_THREADS"] = "1"  # before Crocoddyl is loaded: several threads wait for each other on one core
+os.environ["OMP_NUM_THREADS"] = "1"  # before Crocoddyl is loaded: several threads would wait for each other on one core
 
 import numpy as np
 from ocp_converted import Converted
@@ -31,7 +31,7 @@ from ocp_robots import NotRunError
 from ocp_theirs import Theirs
 
 COST = 1e-6
-"""How near the costs of an iteration must be, relatively: Crocoddyl repeats its own when perturbed by 1e-12."""
+"""Tolerance of the costs of an iteration, relative: Crocoddyl repeats its own costs when perturbed by 1e-12."""
 CHAOTIC = {
     ("arm_kinova_cold", "fddp"): 3,
     ("arm_kinova_cold", "ddp"): 3,
@@ -42,26 +42,26 @@ CHAOTIC = {
     ("talos_taichi", "fddp"): 0,
     ("talos_taichi", "boxfddp"): 0,
 }
-"""Problems and solvers of which Crocoddyl does not repeat its own trace, and how many leading iterations it does."""
+"""Problems and solvers whose trace Crocoddyl does not repeat, and the number of leading iterations that it repeats."""
 CURED = {("quadrotor_box", "boxddp"): 7}
-"""As many leading iterations come before Crocoddyl's quadratic program goes round in circles, which ours does not."""
+"""Number of leading iterations before Crocoddyl's quadratic program cycles, which ours does not."""
 ELSEWHERE = {("arm_talos", "ddp"), ("cartpole_swingup", "ddp"), ("quadrotor_box", "boxddp")}
-"""Of these the optimum that is found depends on which way the trace went."""
+"""Problems and solvers whose optimum depends on the trace."""
 INCOMPARABLE = {("arm_kinova_box", "boxddp")}
-"""Of these Crocoddyl repeats neither an iteration nor the optimum."""
+"""Problems and solvers for which Crocoddyl repeats neither an iteration nor the optimum."""
 OPTIMUM = 1e-6
-"""How near the final costs must be, relatively."""
+"""Tolerance of the final costs, relative."""
 
 
 def load(folder, name):
-    """A problem's JSON and its robot's, None without a robot."""
+    """Returns a problem's JSON and its robot's, None without a robot."""
     spec = json.loads((folder / f"{name}.json").read_text())
     robot = spec["robot"] and json.loads((folder / "robots" / f"{spec['robot']}.json").read_text())
     return spec, robot
 
 
 def agreeing(ours, theirs):
-    """How many leading iterations have the same step and regularisation, and costs within `COST`."""
+    """Returns the number of leading iterations with the same step and regularisation, and costs within `COST`."""
     n = min(len(ours), len(theirs))
     a, b = ours[:n], theirs[:n]
     near = np.abs(a[:, 0] - b[:, 0]) <= COST * np.maximum(np.abs(b[:, 0]), 1e-12)
@@ -70,7 +70,7 @@ def agreeing(ours, theirs):
 
 
 def compare(spec, robot, solver, make=Ours):
-    """Both solves of a problem with one of its solvers, ours as it is made here, and what there is to say of them."""
+    """Solves a problem with one of its solvers in both libraries, ours made by `make`, and returns the comparison."""
     case = (spec["name"], solver)
     if case in INCOMPARABLE:
         raise NotRunError("Crocoddyl does not repeat itself")
@@ -96,7 +96,7 @@ def compare(spec, robot, solver, make=Ours):
 
 
 def time_both(ours, theirs, start, iterations, trials, rounds):
-    """Medians over the rounds of milliseconds in an iteration, of both and of their quotient."""
+    """Returns medians over the rounds of milliseconds per iteration, for both solvers and for their quotient."""
     names = ("total", "derivatives", "sweep", "rollout")
     rows = []
     for _ in range(rounds):
@@ -115,7 +115,7 @@ def time_both(ours, theirs, start, iterations, trials, rounds):
 
 
 def time_converted(converted, built, start, rounds):
-    """Medians over the rounds of milliseconds in a solve, of what was converted and of what was built here."""
+    """Returns medians over the rounds of milliseconds per solve, for the converted problem and ours."""
     rows = []
     for _ in range(rounds):
         row = []
@@ -128,7 +128,7 @@ def time_converted(converted, built, start, rounds):
 
 
 def line(result):
-    """A result as a line of text."""
+    """Returns a result as a line of text."""
     case = f"{result['name']} {result['solver']}"
     if "not_run" in result:
         return f"{case:34} not run: {result['not_run']}"
@@ -141,7 +141,7 @@ def line(result):
 
 
 def run(spec, robot, solver, options):
-    """Compares both solves of a problem, and their times, and prints it; says whether they are the same."""
+    """Compares both solves of a problem and their times, and prints the result; returns whether they are the same."""
     show = json.dumps if options.json else line
     try:
         make = Converted if options.converted else Ours

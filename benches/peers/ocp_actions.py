@@ -1,4 +1,4 @@
-"""Actions of the optimal control problems that a user writes: a unicycle, a pole on a cart, a double pendulum."""
+"""User-defined actions of the optimal control problems: a unicycle, a pole on a cart, a double pendulum."""
 
 import math
 
@@ -9,7 +9,7 @@ from condyle import optimal
 
 
 def unicycle(stage):
-    """x = (x, y, θ), u = (v, ω); the running and the terminal action."""
+    """Returns the running and the terminal action: x = (x, y, θ), u = (v, ω)."""
     dt, wx, wu = stage["dt"], stage["w_x"], stage["w_u"]
 
     def calc(t, x, u):
@@ -41,7 +41,7 @@ class Cartpole:
         self.dt = stage["dt"]
 
     def acceleration(self, x, f):
-        """(ÿ, θ̈), and their derivatives with respect to θ, θ̇ and f."""
+        """Returns (ÿ, θ̈), and their derivatives with respect to θ, θ̇ and f."""
         m1, m2, length, g = self.m1, self.m2, self.l, self.g
         s, c, rate = math.sin(x[1]), math.cos(x[1]), x[3]
         mu, dmu = m1 + m2 * s * s, 2.0 * m2 * s * c
@@ -63,7 +63,7 @@ class Cartpole:
         return a, (dup - a * dmu) / mu, by_rate, np.array([1.0, c / length]) / mu
 
     def rate(self, x, u):
-        """The cost in a second."""
+        """Returns the cost per second."""
         return 0.5 * float(self.weights[: 4 + len(u)] @ np.r_[x, u] ** 2)
 
     def calc(self, t, x, u):
@@ -92,14 +92,14 @@ class Cartpole:
 
 
 class DoublePendulum:
-    """Two links and one motor, with a goal of sines and cosines and a Hessian of its own."""
+    """Two links and one motor, with a goal in sines and cosines and its own Hessian."""
 
     def __init__(self, model, stage):
         self.model, self.data = model, condyle.Data(model)
         self.dt, self.costs = stage["dt"], stage["costs"]
 
     def goal(self, x, w):
-        """Value, gradient and Hessian of ½ Σ w r², r = (sin q, 1 − cos q, v)."""
+        """Returns value, gradient and Hessian of ½ Σ w r², r = (sin q, 1 − cos q, v)."""
         s, c = np.sin(x[:2]), np.cos(x[:2])
         r = np.r_[s, 1.0 - c, x[2:]]
         slope = np.r_[c * (w * r)[:2] + s * (w * r)[2:4], (w * r)[4:]]

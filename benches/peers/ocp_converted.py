@@ -1,4 +1,4 @@
-"""Optimal control problems, from their JSON, as `condyle.crocoddyl` makes them of Crocoddyl's."""
+"""Optimal control problems from their JSON, built by Crocoddyl and converted by `condyle.crocoddyl`."""
 
 from ocp_ours import Ours
 from ocp_theirs import Theirs
@@ -7,7 +7,7 @@ import condyle.crocoddyl
 
 
 class Converted(Ours):
-    """Our solver on what Crocoddyl has built."""
+    """Our solver on a problem that Crocoddyl has built."""
 
     strict = True
 

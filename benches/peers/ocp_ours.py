@@ -20,11 +20,11 @@ def our_activation(activation, residual):
     if kind == "quadratic_barrier":
         return optimal.Activation.barrier(bounds(activation["lb"], -np.inf), bounds(activation["ub"], np.inf))
     assert kind == "cone_barrier", kind
-    return None  # what a cone's residual has unless told otherwise
+    return None  # the default for the residual of a cone
 
 
 def our_cost(cost, model, terminal, contacts):
-    """A `Cost`, or None for one that a terminal knot has not."""
+    """Returns a `Cost`, or None for a cost that a terminal knot does not have."""
     residual, name, weight = cost["residual"], cost["name"], cost["weight"]
     kind, activation = residual["type"], our_activation(cost["activation"], residual)
     if terminal and kind in ("control", "friction_cone", "wrench_cone"):
@@ -53,7 +53,7 @@ def our_residual(residual, model, contacts):
 
 
 def our_contact(contact, gains):
-    """A `ContactConstraint` of a contact's or an impulse's JSON."""
+    """Returns the `ContactConstraint` of a contact's or an impulse's JSON."""
     placement = np.eye(4)
     if "ref" in contact:
         placement[:3, 3] = contact["ref"]["p"]
@@ -65,7 +65,7 @@ def our_contact(contact, gains):
 
 
 def our_action(stage, model, spec, bounded, terminal=False, others=()):
-    """An action; `others` are knots and the stages of those that differ from this one in their costs alone."""
+    """Returns an action; `others` lists other knots and their stages, which differ only in their costs."""
     kind = stage["kind"]
     if kind == "unicycle":
         return unicycle(stage)[terminal]
@@ -100,14 +100,14 @@ def our_action(stage, model, spec, bounded, terminal=False, others=()):
 
 
 class Ours:
-    """A problem of a JSON in Condyle, for what Crocoddyl's solver of some name does."""
+    """A problem from its JSON in Condyle, with settings like Crocoddyl's solver of the given name."""
 
     def __init__(self, spec, robot, solver):
         self.spec = spec
         self.solver = optimal.Fddp(self.made(robot, solver), **self.settings(solver))
 
     def made(self, robot, solver):
-        """The problem itself."""
+        """Returns the problem."""
         spec, bounded = self.spec, solver.startswith("box")
         model = our_robot(robot) if robot else None
         models, stages = self.phases(model, bounded)
@@ -115,7 +115,7 @@ class Ours:
         return optimal.Problem(spec["x0"], models, stages, terminal)
 
     def settings(self, solver):
-        """What our solver is told to do as Crocoddyl's of this name does."""
+        """Returns the settings with which our solver works like Crocoddyl's solver of this name."""
         spec = self.spec
         settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
         settings["project_warm_start"] = False  # Crocoddyl keeps a start outside of the bounds
@@ -126,7 +126,8 @@ class Ours:
         return settings
 
     def phases(self, model, bounded):
-        """An action for all knots with the same dynamics, which may differ in their costs; and which serves a knot."""
+        """Returns an action for all knots with the same dynamics, whose costs may differ, and the index of each knot's
+        action."""
         first, serves = {}, []
         for t, k in enumerate(self.spec["stages"]):
             stage = self.spec["stage_models"][k]

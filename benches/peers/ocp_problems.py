@@ -1,8 +1,8 @@
 """Optimal control problems of our own, as the JSON that `ocp.py` reads: an arm, a rotorcraft and legged robots.
 
-A problem names its robot and has `x0`, `stage_models`, for each knot the index of its stage in `stages`, the index
-`terminal`, a `warm_start` and `solvers`. A stage of kind `euler` has a duration, dynamics and costs, one of kind
-`impulse` the frames that hit the ground and costs. Robots are those of the package example-robot-data.
+A problem names its robot and has `x0`, `stage_models`, `stages` with the index of each knot's stage, the index
+`terminal`, a `warm_start` and `solvers`. A stage of kind `euler` has a duration, dynamics and costs; a stage of kind
+`impulse` has the frames that hit the ground, and costs. The robots come from the package example-robot-data.
 """
 
 import math
@@ -18,7 +18,7 @@ SOLE = [0.1, 0.05]
 
 
 def plain(array):
-    """Nested lists; None where there is no bound."""
+    """Returns nested lists; None for an infinite bound."""
     if np.ndim(array):
         return [plain(x) for x in array]
     return float(array) if abs(array) < 1e300 else None
@@ -29,7 +29,7 @@ def placement(X):
 
 
 def robot_json(name, model):
-    """A robot as `ocp_robots.py` reads it."""
+    """Returns a robot as `ocp_robots.py` reads it."""
 
     def joint(k):
         inertia, kind = model.inertias[k], model.joints[k]
@@ -81,7 +81,7 @@ def weighted(w):
 
 
 def problem(name, robot, actuation, x0, knots, terminal, **more):
-    """A problem's JSON; equal knots share a stage."""
+    """Returns a problem's JSON; equal knots share a stage."""
     stages, order = [], []
     for stage in [*knots, terminal]:
         if stage not in stages:
@@ -109,7 +109,7 @@ def free(dt, costs, **bounds):
 
 
 def reach(name="reach", share=None):
-    """A panda reaches for a pose, with this share of its greatest efforts."""
+    """Returns a problem in which a panda reaches for a pose, with this share of its maximum efforts."""
     model = load("panda").model
     q0, data = model.referenceConfigurations["default"], model.createData()
     pin.framesForwardKinematics(model, data, q0)
@@ -130,7 +130,7 @@ def reach(name="reach", share=None):
 
 
 def hover():
-    """A quadrotor flies to a pose."""
+    """Returns a problem in which a quadrotor flies to a pose."""
     model = load("hector").model
     x0 = np.r_[pin.neutral(model), np.zeros(6)]
     angles = [(0.0, "CCW"), (0.5, "CW"), (1.0, "CCW"), (1.5, "CW")]
@@ -153,7 +153,7 @@ def hover():
 
 
 class Walker:
-    """The knots of a legged robot: feet of 3 rows are points, of 6 soles."""
+    """Knots of a legged robot: feet with 3 rows are points, feet with 6 rows are soles."""
 
     def __init__(self, name, feet, rows, posture):
         self.name, self.feet, self.rows = name, feet, rows
@@ -179,7 +179,7 @@ class Walker:
         return cost(f"{foot} moves", weight, "frame_placement", frame=foot, R=plain(np.eye(3)), p=plain(p))
 
     def stand(self, dt, support, moving=(), com=None):
-        """A knot on some feet, others on their way to a point."""
+        """Returns a knot that stands on some feet, while others move to a point."""
         size = {} if self.rows == 3 else {"box": SOLE}
         kind, inner = ("friction_cone", False) if self.rows == 3 else ("wrench_cone", True)
         costs = [
@@ -200,7 +200,7 @@ class Walker:
         return {"kind": "euler", "dt": dt, "dynamics": dynamics, "costs": costs}
 
     def step(self, dt, swinging, length, height, knots):
-        """The knots of a step, and the impact at its end."""
+        """Returns the knots of a step, and the impact at its end."""
         support = [foot for foot in self.feet if foot not in swinging]
         share = len(swinging) / len(self.feet)
         stages = []
@@ -226,7 +226,7 @@ class Walker:
 
 
 def trot():
-    """An anymal makes two steps of a trot."""
+    """Returns a problem in which an anymal makes two steps of a trot."""
     w = Walker("anymal", ["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"], 3, "standing")
     still = [w.stand(0.02, w.feet)] * 2
     knots = still + w.step(0.02, ["RF_FOOT", "LH_FOOT"], 0.1, 0.1, 10)
@@ -235,7 +235,7 @@ def trot():
 
 
 def walk(name="walk", robot="talos_legs", knots=10):
-    """Talos makes two steps."""
+    """Returns a problem in which Talos makes two steps."""
     w = Walker(robot, ["right_sole_link", "left_sole_link"], 6, "half_sitting")
     still = [w.stand(0.03, w.feet)] * 3
     stages = still + w.step(0.03, ["right_sole_link"], 0.2, 0.1, knots) + still

@@ -15,16 +15,16 @@ FRAMES = {
 
 
 class NotRunError(Exception):
-    """One of the libraries has not what a problem needs, or there is nothing to compare."""
+    """One of the libraries lacks a feature that a problem needs, or nothing can be compared."""
 
 
 def bounds(numbers, infinite):
-    """Numbers, of which None stands for no bound."""
+    """Returns numbers with None replaced by `infinite`."""
     return np.array([infinite if x is None else x for x in numbers], dtype=float)
 
 
 def homogeneous(placement):
-    """A pose as a (4, 4) matrix."""
+    """Returns a pose as a (4, 4) matrix."""
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = placement["R"], placement["p"]
     return X
@@ -32,7 +32,7 @@ def homogeneous(placement):
 
 @dataclass
 class Solve:
-    """What a solver did: a row (cost, step, regularisation, stop) an iteration, and the time of its phases (s)."""
+    """Result of a solve: a row (cost, step, regularisation, stop) per iteration, and the time of its phases (s)."""
 
     rows: np.ndarray
     cost: float
@@ -41,7 +41,7 @@ class Solve:
 
 
 def our_robot(spec):
-    """A `condyle.Model` of a robot's JSON."""
+    """Returns a `condyle.Model` of a robot's JSON."""
     builder = condyle.ModelBuilder(spec["name"])
     builder.gravity(spec["gravity"][:3])
     bodies, names = [condyle.WORLD], set()
@@ -75,7 +75,7 @@ def our_robot(spec):
 
 
 def their_robot(spec):
-    """A `pinocchio.Model` of a robot's JSON."""
+    """Returns a `pinocchio.Model` of a robot's JSON."""
     model = pin.Model()
     model.gravity = pin.Motion(np.array(spec["gravity"], dtype=float))
 
@@ -107,7 +107,7 @@ def their_robot(spec):
 
 
 def actuation_matrix(spec, nv):
-    """S of τ = S u; None where each joint but a free-flyer at the root has a control."""
+    """Returns S of τ = S u; None if each joint except a free-flyer at the root has a control."""
     kind = spec["actuation"]["type"]
     if kind in ("full", "floating_base"):
         return None

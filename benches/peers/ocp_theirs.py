@@ -73,7 +73,7 @@ class TheirDrives(crocoddyl.ActuationModelAbstract):
 
 
 class Theirs:
-    """A problem of a JSON in Crocoddyl, for its solver of some name."""
+    """A problem from its JSON in Crocoddyl, for its solver of the given name."""
 
     def __init__(self, spec, robot, solver):
         self.spec, self.name, self.kept = spec, solver, []
@@ -89,7 +89,7 @@ class Theirs:
         stages = [self.stage(stage) for stage in spec["stage_models"]]
         running = [stages[k] for k in spec["stages"]]
         self.problem = crocoddyl.ShootingProblem(np.array(spec["x0"], float), running, stages[spec["terminal"]])
-        self.problem.nthreads = 1  # those of Eigen's products are OMP_NUM_THREADS'
+        self.problem.nthreads = 1  # OMP_NUM_THREADS sets the threads of Eigen's products
 
     def actuation(self):
         kind = self.spec["actuation"]["type"]
@@ -195,7 +195,7 @@ class Theirs:
         return model
 
     def warm_start(self):
-        """States and controls from which both solvers begin."""
+        """Returns the states and controls from which both solvers begin."""
         x0, kind, problem = np.array(self.spec["x0"], float), self.spec["warm_start"], self.problem
         if kind == "zero":
             xs = [m.state.zero() for m in problem.runningModels] + [problem.terminalModel.state.zero()]
@@ -227,7 +227,8 @@ class Theirs:
         return Solve(np.array(rows), float(solver.cost), np.array(list(solver.xs)), {})
 
     def time(self, xs, us, iterations, trials):
-        """Seconds of a solve, and of its phases at the optimum times how often a solve runs them, called before."""
+        """Returns the seconds of a solve, and of each phase at the optimum times its number of runs in a solve, after
+        a first call."""
         solver = self.solver()
         self.run(solver, xs, us)
         begin = time.perf_counter()

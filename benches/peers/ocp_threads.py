@@ -3,10 +3,11 @@
 
     .venv/crocoddyl/bin/python benches/peers/ocp_threads.py [--json] [--threads 2] [--rounds 15] [NAME ...]
 
-Three ways, in turn, round after round, on the problems of `ocp_problems.py`: one thread; several, with the sweep
-beside the derivatives; and with the sweep in as many segments. Figures are medians over the rounds of milliseconds in
-an iteration and, in brackets, of the quotient with one thread. Segments change the iterates by rounding only; each
-way's own iterations are counted. Needs as many cores as threads.
+It compares three modes in turn, round after round, on the problems of `ocp_problems.py`: one thread; several threads,
+with the sweep concurrent with the derivatives; several threads, with the sweep in the same number of segments. Figures
+are medians over the rounds of milliseconds per iteration and, in brackets, of the quotient with one thread. Segments
+change the iterates by rounding only; the iterations of each mode are counted separately. Needs as many cores as
+threads.
 """
 
 import argparse
@@ -29,7 +30,7 @@ def ways(threads):
 
 
 def solver(spec, robot, settings):
-    """A problem's solver with settings of its own, and where it starts: at rest, held still."""
+    """Returns a problem's solver with its own settings, and its start: at rest, quasi-static."""
     ours = Ours(spec, robot, "fddp")
     problem = ours.made(robot, "fddp")
     ours.solver = optimal.Fddp(problem, **ours.settings("fddp"), **settings)

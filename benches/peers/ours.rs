@@ -1,13 +1,14 @@
-//! What Condyle takes for one call: see `dynamics.py`, which builds and runs this beside Pinocchio.
+//! Times Condyle for one call; `dynamics.py` builds and runs this program, together with Pinocchio's.
 //!
 //! ```text
 //! ours URDF fixed|free_flyer LOCKED,JOINTS STATES [batch]
 //! ```
 //!
-//! STATES has q, v, a, τ of one state after the other as doubles. Prints a line for each algorithm: its name and the median
-//! time of a call in ns; of the derivatives of `rnea` also by dual numbers and by central differences; then, after `batch:`,
-//! the time for each state of a batch of them, and after `horizon:`, that of N knots with `aba`, its derivatives and `rnea`. With
-//! `batch` there are those of batches alone, and the least instead of the median: see `python.py`.
+//! STATES contains q, v, a, τ of one state after the other as doubles. Prints a line for each algorithm: its name and
+//! the median time of a call in ns; the derivatives of `rnea` also by dual numbers and by central differences. Lines
+//! with `batch:` have the time per state of a batch. Lines with `horizon:` have the time of N knots with `aba`, its
+//! derivatives and `rnea`. With the argument `batch`, only batches are timed, and the least time replaces the median:
+//! see `python.py`.
 
 use condyle::{
     Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, crba,
@@ -25,12 +26,12 @@ struct State {
     tau: Vec<f64>,
 }
 
-/// The median over batches of the mean time of a call, in ns.
+/// Returns the median over batches of the mean time of a call (ns).
 fn median(states: &[State], call: impl FnMut(&State)) -> f64 {
     timed(states, 10, call)
 }
 
-/// The mean time of a call in the batch of this rank among 21, the fastest first, in ns.
+/// Returns the mean time of a call (ns) in the batch with this rank among 21, the fastest first.
 fn timed(states: &[State], rank: usize, mut call: impl FnMut(&State)) -> f64 {
     let mut batch = |calls: usize| {
         let start = Instant::now();
@@ -44,7 +45,7 @@ fn timed(states: &[State], rank: usize, mut call: impl FnMut(&State)) -> f64 {
     times[rank]
 }
 
-/// ∂τ/∂q by dual numbers, a column at a time.
+/// Computes ∂τ/∂q by dual numbers, one column at a time.
 fn by_duals(model: &Model, data: &mut Data<Dual64>, s: &State) -> f64 {
     let lift = |x: &[f64]| -> Vec<Dual64> { x.iter().map(|&x| x.into()).collect() };
     let (q0, v, a) = (lift(&s.q), lift(&s.v), lift(&s.a));
@@ -59,7 +60,7 @@ fn by_duals(model: &Model, data: &mut Data<Dual64>, s: &State) -> f64 {
     sum
 }
 
-/// ∂τ/∂q by central differences.
+/// Computes ∂τ/∂q by central differences.
 fn by_differences(model: &Model, data: &mut Data<f64>, s: &State) -> f64 {
     let (mut q, mut step) = (s.q.clone(), vec![0.0; model.nv()]);
     let mut sum = 0.0;
@@ -74,7 +75,7 @@ fn by_differences(model: &Model, data: &mut Data<f64>, s: &State) -> f64 {
     sum
 }
 
-/// Times of calls for one state.
+/// Measures times of calls for one state.
 fn singles(m: &Model, states: &[State]) {
     let (d, duals) = (&mut Data::new(m), &mut Data::<Dual64>::new(m));
     let print = |name: &str, ns: f64| println!("{name} {ns:.2}");

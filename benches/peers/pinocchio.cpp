@@ -1,10 +1,11 @@
-// What Pinocchio takes for one call, compiled for this processor: see dynamics.py, which builds and runs this.
+// Times Pinocchio for one call, compiled for this processor; dynamics.py builds and runs this program.
 //
 //     pinocchio MODEL STATES
 //
-// MODEL is an archive that Pinocchio's Python wrote, STATES has q, v, a, τ of one state after the other as doubles. Prints
-// a line for each algorithm: its name and the median time of a call in ns. Where Pinocchio offers two conventions, the
-// faster one counts. Compiled once for each PART, since one translation unit with everything takes too much memory.
+// MODEL is an archive written by Pinocchio's Python package; STATES contains q, v, a, τ of one state after the other as
+// doubles. Prints a line for each algorithm: its name and the median time of a call in ns. If Pinocchio offers two
+// conventions, the faster one counts. Compiled once for each PART, since a single translation unit takes too much
+// memory.
 #include <pinocchio/multibody.hpp>
 #if PART == 0
 #include <pinocchio/serialization.hpp>
@@ -28,7 +29,7 @@ struct State {
   Eigen::VectorXd q, v, a, tau;
 };
 
-// The median over batches of the mean time of a call, in ns.
+// Returns the median over batches of the mean time of a call (ns).
 template <class Call> double median(const std::vector<State> &states, Call call) {
   using Clock = std::chrono::steady_clock;
   auto batch = [&](long calls) {

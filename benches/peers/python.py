@@ -1,22 +1,22 @@
 #!/usr/bin/env python3
-"""Times the Python package beside Pinocchio's binding, and beside our own library.
+"""Times the Python package, compared with Pinocchio's binding and with our own library.
 
     .venv/pinocchio/bin/python benches/peers/python.py [--rounds N] [--cpu K] [--json] [--no-rust] [ROBOT ...]
 
 Without robots: panda and talos. Needs the packages of tests/peers/pinocchio/requirements.txt and a release build of
-ours (`./test` makes both), and Rust for `--no-rust`'s opposite: it builds benches/peers/ours.rs. Everything runs on
-one core, in turn; a figure is the least of all rounds, since what else a machine does only ever adds. Five tables:
+ours (`./test` makes both). Needs Rust, unless `--no-rust` is given: it builds benches/peers/ours.rs. Everything runs
+on one core, in turn; a figure is the least of all rounds, since other work on the machine only adds time. Five tables:
 
 - single calls: the time of a call, Pinocchio's, and their quotient;
-- Pinocchio's spelling: the time of a call through `condyle.pinocchio`, that of ours, and their quotient;
+- Pinocchio's spelling: the time of a call through `condyle.pinocchio`, of our own call, and their quotient;
 - attributes of a model: the time of an access;
-- batches of 1000 states, `out` reused: the time for each state, that of a loop of Pinocchio's calls, and what a batch
-  may cost: our library's own batch of as many states and 1.3 times what it takes to write the results once, which is
-  to fill them with a number. Our own batch leaves matrices in the lanes of registers, entry after entry for some
-  states; to NumPy they go by rows, state after state. A mere copy of one matrix from the cache to all places, the last
-  figure, takes 1.7 times as long as filling them for panda, by which the matrices of a batch would come to 1.03 of what
-  they may cost, and their transposition comes on top;
-- the whole: `import`, beyond NumPy's; a solve by FDDP, beyond what the solver itself measures.
+- batches of 1000 states, `out` reused: the time per state, the time of a loop of Pinocchio's calls, and the limit for
+  a batch. The limit is the time of our library's own batch of the same size, plus 1.3 times the time to write the
+  results once. Filling them with a number measures the latter. Our own batch leaves matrices in the lanes of registers,
+  entry after entry for several states; NumPy needs them by rows, state after state. The last figure is the time to
+  copy one matrix from the cache to all states. For panda it is 1.7 times the filling time. With a copy alone, the
+  matrices of a batch would take 1.03 of the limit, and their transposition takes additional time;
+- overall: `import`, beyond NumPy's; a solve by FDDP, beyond the time that the solver itself measures.
 """
 
 import argparse
@@ -41,13 +41,13 @@ import condyle.pinocchio as spelling
 from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
 
 STATES = 1000
-SECONDS = 0.002  # of each round of a call: shorter than the slices in which a machine shares its cores
-WRITES = 1.3  # times what writing the results takes
+SECONDS = 0.002  # duration of each round of a call: shorter than the time slices in which a machine shares its cores
+WRITES = 1.3  # factor of the time to write the results
 Call = Callable[[], object]
 
 
 def least(calls: list[Call], rounds: int, seconds: float = SECONDS) -> list[float]:
-    """The least time of each call, in µs, over rounds in which they take turns."""
+    """Returns the least time of each call, in µs, over rounds in which the calls take turns."""
     repeats = []
     for call in calls:
         call()
@@ -84,7 +84,7 @@ class Robot:
         self.v, self.a, self.tau = rng.standard_normal((3, STATES, self.model.nv))
 
     def singles(self) -> dict[str, tuple[Call, Call]]:
-        """Calls for one state, ours and Pinocchio's."""
+        """Returns calls for one state, ours and Pinocchio's."""
         m, d, pm, pd = self.model, self.data, self.theirs, self.their_data
         q, v, a, tau = self.q[0], self.v[0], self.a[0], self.tau[0]
         frame = len(m.frames) - 1
@@ -118,7 +118,7 @@ class Robot:
         }
 
     def spelled(self) -> dict[str, tuple[Call, Call]]:
-        """Calls for one state in Pinocchio's spelling, and ours."""
+        """Returns calls for one state in Pinocchio's spelling, and ours."""
         m, d, sm = self.model, self.data, spelling.Model(self.model)
         sd, q, v, a, tau = sm.createData(), self.q[0], self.v[0], self.a[0], self.tau[0]
         frame = len(m.frames) - 1
@@ -162,7 +162,7 @@ class Robot:
         }
 
     def check(self) -> None:
-        """Both libraries give the same numbers."""
+        """Checks that both libraries give the same numbers."""
         for name, (ours, theirs) in self.singles().items():
             mine, other = ours(), theirs()
             if name == "aba_derivatives":
@@ -176,7 +176,7 @@ class Robot:
         return {name: (lambda name=name: getattr(m, name)) for name in ("frames", "names", "limits", "inertias")}
 
     def batches(self) -> dict[str, tuple[Call, Call, list[np.ndarray]]]:
-        """Calls for all states, loops over Pinocchio's, and the arrays that ours fill."""
+        """Returns calls for all states, loops over Pinocchio's calls, and the arrays that our calls fill."""
         m, d, pm, pd = self.model, self.data, self.theirs, self.their_data
         q, v, a, tau, n = self.q, self.v, self.a, self.tau, self.model.nv
         empty = {k: [np.zeros((STATES, *[n] * axes)) for axes in shapes] for k, shapes in SHAPES.items()}
@@ -206,10 +206,10 @@ class Robot:
         }
 
     def rust(self, program: Path, rounds: int) -> dict[str, float]:
-        """The time for each state of our library's own batches, in µs, without Python.
+        """Returns the time per state of our library's own batches, in µs, without Python.
 
-        Where a program's memory lies decides over some per cent, anew in each process: since Python's is one of them,
-        this is the median of some.
+        The addresses of a program's memory change times by a few per cent, differently in each process. Python's
+        process is one sample, so this is the median of several.
         """
         with tempfile.NamedTemporaryFile(suffix=".states") as file:
             for state in zip(self.q, self.v, self.a, self.tau, strict=True):
@@ -221,11 +221,11 @@ class Robot:
 
 
 SHAPES = {"rnea": [1], "aba": [1], "crba": [2], "rnea_derivatives": [2, 2, 2], "aba_derivatives": [1, 2, 2, 2]}
-"""The axes of length nv of the results for one state."""
+"""Number of axes of length nv of each result for one state."""
 
 
 def import_seconds(rounds: int) -> tuple[float, float]:
-    """The least times of `import numpy` and of `import condyle` with it, in fresh interpreters."""
+    """Returns the least times of `import numpy` and of `import numpy, condyle`, in fresh interpreters."""
     timed = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
     codes = [timed.format(what) for what in ("numpy", "numpy, condyle")]
     found = [[float(subprocess.check_output([sys.executable, "-c", code])) for code in codes] for _ in range(rounds)]
@@ -234,7 +234,7 @@ def import_seconds(rounds: int) -> tuple[float, float]:
 
 
 def solve_seconds(rounds: int) -> tuple[float, float]:
-    """The least times of a solve by FDDP as the solver measures it, and as Python sees it: an arm's reach."""
+    """Returns the least times of a solve by FDDP as measured by the solver and by Python: an arm's reach."""
     arm, knots = condyle.robots.arm7(), 100
     x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
     way = [Cost("state", 1e-2, Residual.state(x0)), Cost("effort", 1e-4, Residual.control(np.zeros(7)))]
@@ -265,7 +265,7 @@ def measure(robot: Robot, program: Path | None, rounds: int) -> list[dict]:
     rust = robot.rust(program, rounds) if program else {}
     for name, (ours, theirs, out) in robot.batches().items():
         write = lambda out=out: [x.fill(1.0) for x in out]  # noqa: E731
-        # one after the other, as our own library is timed: in turns each would begin with what others left in the cache
+        # one after the other, as our own library is timed: in turns, each would begin with others' data in the cache
         ones = [np.ones(x.shape[1:]) for x in out]
         copy = lambda out=out, ones=ones: [np.copyto(x, one) for x, one in zip(out, ones, strict=True)]  # noqa: E731
         mine, other, writing, copying = (least([call], rounds, 0.0)[0] / STATES for call in (ours, theirs, write, copy))

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Times a tick of whole-body control by each of our back ends, and other solvers on the same programs.
+"""Times a tick of whole-body control with each of our back ends, and other solvers on the same programs.
 
     python3 benches/peers/wholebody.py [--json] [--write] [--ticks N] [--window N] [--replays N] [--cpu K] [ROBOT ...]
 
-Robots that stand, walk and trot while they are pushed are recorded (benches/peers/wholebody.rs), and the recordings
-are replayed: each tick counts by the least of its replays, so that other work on the machine does not; the p99 of all
-stands beside it. Ours: a whole tick, from state to torques, on cones and on pyramids, by each back end, and its
-assembly (kinematics, rows and condensing) alone. ProxQP, quadprog, DAQP, eiquadprog (TSID's) and ours: a solve alone,
-on pyramids, of the window's consecutive programs, in both forms, warm-started where they offer it. All run on one
-core, for some minutes after the build. With --write the table goes into crates/wholebody/README.md. Talos and ANYmal
-come from example-robot-data. Needs Linux, Rust, Python 3 with venv and a C++ compiler; everything else is installed
-under target/peers.
+Robots that stand, walk and trot under pushes are recorded (benches/peers/wholebody.rs), and the recordings are
+replayed. The time of a tick is the least of its replays, which excludes other work on the machine; the p99 of all
+replays is shown next to it. For our back ends: a whole tick, from state to torques, with cones and with pyramids, and
+its assembly (kinematics, rows and condensing) alone. For ProxQP, quadprog, DAQP, eiquadprog (TSID's) and our solvers:
+a solve alone, with pyramids, of the window's consecutive programs, in both forms, with warm starts if available. All
+run on one core, for some minutes after the build. With --write, the table is written to crates/wholebody/README.md.
+Talos and ANYmal come from example-robot-data. Needs Linux, Rust, Python 3 with venv and a C++ compiler; everything
+else is installed under target/peers.
 """
 
 import argparse
@@ -32,7 +32,7 @@ DOCUMENT = ROOT / "crates" / "wholebody" / "README.md"
 
 
 def build_ours() -> Path:
-    """Builds benches/peers/wholebody.rs as `cargo bench` does; its path."""
+    """Builds benches/peers/wholebody.rs as `cargo bench` does; returns its path."""
     command = ("cargo", "build", "--release", "--bench", "wholebody_peers", "--message-format=json", "--locked")
     for line in run(*command, cwd=ROOT).splitlines():
         message = json.loads(line)
@@ -42,7 +42,7 @@ def build_ours() -> Path:
 
 
 def build_eiquadprog(prefix: Path) -> Path:
-    """Compiles eiquadprog.cpp against the wheel; its path."""
+    """Compiles eiquadprog.cpp against the wheel; returns its path."""
     library, source = PEERS / "eiquadprog.so", HERE / "eiquadprog.cpp"
     compiler = next(c for c in ("clang++-19", "clang++", "g++") if shutil.which(c))
     flags = ["-std=c++17", "-O3", "-march=native", "-DNDEBUG", "-w", "-shared", "-fPIC"]
@@ -52,7 +52,7 @@ def build_eiquadprog(prefix: Path) -> Path:
 
 
 def table(records: list[dict]) -> str:
-    """A row for each way to solve, a column for each recording."""
+    """Returns a table with a row for each solver and form, and a column for each recording."""
     columns = list(dict.fromkeys((r["robot"], r["workload"]) for r in records))
     lines = [
         "| ms: p50, p99 (max; p99 of all replays) | " + " | ".join(f"{robot}, {what}" for robot, what in columns) + " |"

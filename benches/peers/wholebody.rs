@@ -1,12 +1,12 @@
-//! What a tick of whole-body control takes, over recorded ticks of robots that stand, walk and trot while they are pushed:
-//! see `wholebody.py`, which builds and runs this beside other solvers.
+//! Times of whole-body control ticks, for recorded robots that stand, walk and trot under pushes. `wholebody.py` builds
+//! and runs this program, together with other solvers.
 //!
 //! ```text
 //! cargo bench --bench wholebody_peers -- [--ticks N] [--replays N] [--export FOLDER --window N] [ROBOT[=URDF] …]
 //! ```
 //!
-//! Each recording is replayed by a new controller, whose ticks start from the solutions of their own last ticks; of each tick
-//! the least of all replays counts. Prints a record a line. Run it on one core: `taskset -c 1`.
+//! A new controller replays each recording, with each tick starting from the solution of its previous tick; the time of
+//! a tick is the least of all replays. Prints one record per line. Run it on one core: `taskset -c 1`.
 
 #[path = "../../crates/wholebody/tests/common/workload.rs"]
 mod workload;
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use workload::{Robot, Tick, record};
 
-/// The pyramid of comparisons: four faces within the cone.
+/// Pyramid for comparisons: four faces inside the cone.
 const PYRAMID: Friction = Friction::Pyramid { sides: 4, inscribed: true };
 
 struct Options {
@@ -53,12 +53,13 @@ impl Options {
     }
 }
 
-/// The entry below which such a part of the sorted numbers lies.
+/// Returns the entry of the sorted numbers below which this share of them lies.
 fn quantile(sorted: &[f64], part: f64) -> f64 {
     sorted[(part * (sorted.len() - 1) as f64).round() as usize]
 }
 
-/// The milliseconds of each tick in each replay, of `call` after `prepare` on controllers of their own.
+/// Returns the milliseconds of each tick in each replay: of `call` after `prepare`, with a new controller for each
+/// replay.
 fn replay(
     ticks: &[Tick],
     replays: usize,
@@ -80,7 +81,7 @@ fn replay(
         .collect()
 }
 
-/// p50, p99 and max of the least times, and the p99 of all.
+/// Returns p50, p99 and maximum of the least times, and the p99 of all times.
 fn statistics(times: &[Vec<f64>]) -> serde_json::Value {
     let mut least: Vec<f64> =
         (0..times[0].len()).map(|k| times.iter().map(|t| t[k]).fold(f64::INFINITY, f64::min)).collect();
@@ -106,7 +107,7 @@ fn print(robot: &Robot, motion: &str, what: serde_json::Value, times: &[Vec<f64>
     println!("{record}");
 }
 
-/// Times of each back end on cones and on pyramids, in the form that it takes by itself, and of the assembly of the condensed program alone.
+/// Times each back end with cones and with pyramids, in its own form, and the assembly of the condensed program alone.
 fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     for (friction, friction_name) in [(Friction::Cone, "cone"), (PYRAMID, "pyramid")] {
         let settings = Settings { friction, ..Robot::settings() };
@@ -143,7 +144,7 @@ fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     }
 }
 
-/// Times of our back ends without assembly, on pyramids, beside which those of other solvers stand.
+/// Times our back ends without assembly, with pyramids, for comparison with other solvers.
 fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     for (backend, form, name, form_name) in [
         (Backend::InteriorPoint, Form::Full, "condyle", "full"),
@@ -164,9 +165,9 @@ fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     }
 }
 
-/// Writes the programs of consecutive ticks on pyramids, in both forms, with our optimum: sizes as JSON, a line for each
-/// tick, and the numbers as doubles in the order P, c, A, b, G, l, u (matrices by columns), of the full form and then of the
-/// condensed one, then our solutions of both.
+/// Writes the programs of consecutive ticks with pyramids, in both forms, with our optimum. Sizes are JSON, a line for
+/// each tick. Numbers are doubles in the order P, c, A, b, G, l, u (matrices by columns), of the full form and then of
+/// the condensed one, then our solutions of both.
 fn export(robot: &Robot, motion: &str, ticks: &[Tick], folder: &Path) -> Result<(), Box<dyn Error>> {
     let settings = Settings { friction: PYRAMID, ..Robot::settings() };
     let mut controller = robot.controller(settings);

@@ -1,4 +1,4 @@
-"""The programs that benches/peers/wholebody.rs exports, for solvers of others."""
+"""Programs exported by benches/peers/wholebody.rs, for other solvers."""
 
 import json
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 INFINITY = 1e20
-"""What solvers take for no bound."""
+"""Value that solvers treat as an infinite bound."""
 
 
 @dataclass
 class Program:
-    """min ½ xᵀ P x + cᵀ x with A x = b and lower ≤ G x ≤ upper, in all layouts that solvers ask for."""
+    """min ½ xᵀ P x + cᵀ x with A x = b and lower ≤ G x ≤ upper, in all layouts that the solvers need."""
 
     P: np.ndarray
     c: np.ndarray
@@ -43,7 +43,7 @@ class Program:
 
 
 def read(path: Path) -> list[tuple[dict[str, Program], dict[str, np.ndarray]]]:
-    """The programs of a recording in both forms, and our solutions of them."""
+    """Returns the programs of a recording in both forms, and our solutions of them."""
     numbers, at, ticks = np.fromfile(path.with_suffix(".numbers")), 0, []
 
     def take(*shape: int) -> np.ndarray:

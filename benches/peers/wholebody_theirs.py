@@ -1,9 +1,9 @@
-"""Times other solvers on the programs that benches/peers/wholebody.rs exports; see wholebody.py, which runs this.
+"""Times other solvers on the programs that benches/peers/wholebody.rs exports; wholebody.py runs this program.
 
     python wholebody_theirs.py FOLDER REPLAYS EIQUADPROG_LIBRARY
 
-All solve the same program to the same objective, on pyramids, in full form and condensed, and warm-started where they
-offer it. What is timed is a solve, with the replacement of the numbers, but not their computation.
+All solve the same program to the same objective, with pyramids, in full and in condensed form, with warm starts if
+available. The times include a solve and the replacement of the numbers, but not their computation.
 """
 
 import ctypes
@@ -20,12 +20,12 @@ import quadprog
 from wholebody_programs import Program, read
 
 AGREEMENT = 1e-6
-"""An objective further from ours than this, relative to 1 and its size, is no solution."""
+"""Maximum difference of an objective from ours, relative to 1 and its size, for a valid solution."""
 ACCURACY = 1e-9
-"""The tolerance of those that have one; ours has the same."""
+"""Tolerance of solvers that have one; ours has the same."""
 ITERATIONS = 500, 50
-"""Of ProxQP, outer and inner ones. With its own limits a tick on which it stalls takes seconds; with these it counts as
-unsolved, unless it is near enough."""
+"""Outer and inner iterations of ProxQP. With its own limits, a tick on which it stalls takes seconds; with these
+limits it counts as unsolved, unless it is near enough."""
 Solver = Callable[[Program], np.ndarray]
 
 
@@ -93,7 +93,7 @@ def by_eiquadprog(library: str) -> Callable[[], Solver]:
 
 
 def times(ticks: list, form: str, make: Callable[[], Solver], replays: int) -> tuple[np.ndarray, int]:
-    """The milliseconds of each solve in each replay, and how many ticks were not solved."""
+    """Returns the milliseconds of each solve in each replay, and the number of unsolved ticks."""
     found, unsolved = np.empty((replays, len(ticks))), 0
     for replay in range(replays):
         solver = make()

@@ -1,4 +1,4 @@
-//! Puts the description of the board's memory where the linker looks.
+//! Copies the description of the board's memory to a folder that the linker searches.
 
 use std::{env, fs, path::PathBuf};
 

@@ -1,27 +1,27 @@
-//! A robot on level ground, by constrained dynamics: what touches is held as long as the ground pushes, what comes down is
-//! stopped by an impact. Friction has no bound here: callers look at the forces.
+//! A robot on level ground, by constrained dynamics: a foot that touches is held as long as the ground pushes, and a
+//! foot that lands is stopped by an impact. Friction is unbounded here: callers check the forces.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Force, Model, ReferenceFrame, Vec3, constrained_dynamics,
     constraints::impulse_dynamics, forward_kinematics, integrate,
 };
 
-/// How fast a held foot's drift decays (1/s).
+/// Rate at which a held foot's drift decays (1/s).
 const HOLD: f64 = 50.0;
 
-/// The robot and its feet.
+/// A robot and its feet.
 pub(crate) struct Ground<'m> {
     model: &'m Model,
     data: Data<f64>,
     pub(crate) q: Vec<f64>,
     pub(crate) v: Vec<f64>,
     contacts: Vec<ContactConstraint>,
-    /// Where each foot stands, if it does.
+    /// Position at which each foot stands; `None` if it is in the air.
     standing: Vec<Option<Vec3<f64>>>,
 }
 
 impl<'m> Ground<'m> {
-    /// All feet stand where they are.
+    /// Creates a robot whose feet all stand at their present positions.
     pub(crate) fn new(model: &'m Model, q: &[f64], contacts: Vec<ContactConstraint>) -> Self {
         let mut data = Data::new(model);
         let placements = forward_kinematics(model, &mut data, q);
@@ -38,7 +38,7 @@ impl<'m> Ground<'m> {
         ConstraintSet::new(self.model, &feet.iter().map(constraint).collect::<Vec<_>>()).expect("feet differ")
     }
 
-    /// One step of dt under efforts τ and forces on the bodies. Returns the force on each foot.
+    /// Simulates a step of dt with efforts τ and forces on the bodies. Returns the force on each foot.
     pub(crate) fn step(&mut self, tau: &[f64], f_ext: &[Force<f64>], dt: f64) -> Vec<Vec3<f64>> {
         let mut forces = vec![Vec3::zero(); self.contacts.len()];
         loop {
@@ -66,7 +66,7 @@ impl<'m> Ground<'m> {
         let mut next = self.q.clone();
         integrate(self.model, &self.q, &moved, &mut next); // q⁺ = q ⊕ Δt v⁺
         self.q = next;
-        // what has come down
+        // feet that have landed
         let placements = forward_kinematics(self.model, &mut self.data, &self.q);
         let mut landed = false;
         for (standing, contact) in self.standing.iter_mut().zip(&self.contacts) {

@@ -1,4 +1,4 @@
-//! Walking as an optimal control problem, and a page that shows it: what `trot.rs` and `walk.rs` share.
+//! Walking as an optimal control problem, and a page that shows it: code shared by `trot.rs` and `walk.rs`.
 
 use condyle::optimal::robot::{
     Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, ImpulseDynamics, Residual, WrenchCone,
@@ -8,23 +8,23 @@ use condyle::{ContactConstraint, Data, Model, ReferenceFrame, Se3, Vec3, forward
 use std::sync::Arc;
 
 const FRICTION: f64 = 0.7;
-/// How fast a foot's slip decays (1/s).
+/// Rate at which a foot's slip decays (1/s).
 const HOLD: f64 = 40.0;
 
-/// Costs are some hundreds: less than a millionth of them counts for nothing.
+/// Tolerance of the solver: costs are some hundreds, so it is below a millionth of them.
 const TOLERANCE: f64 = 1e-4;
 
-/// What the feet are.
+/// Shape of the feet.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Foot {
     /// Points.
     Point,
     /// Soles, with their sides along x and y (m).
-    #[allow(dead_code)] // by the quadruped
+    #[allow(dead_code)] // not used by the quadruped
     Sole([f64; 2]),
 }
 
-/// A gait in the making: its knots so far, and where feet and centre of mass are at their end.
+/// A gait under construction: its knots so far, and the positions of feet and centre of mass at their end.
 pub(crate) struct Gait {
     model: Arc<Model>,
     x0: Vec<f64>,
@@ -36,12 +36,12 @@ pub(crate) struct Gait {
     stages: Vec<usize>,
     us: Vec<f64>,
     times: Vec<f64>,
-    /// Whether each foot touches, knot by knot.
+    /// Whether each foot touches, for each knot.
     touches: Vec<bool>,
 }
 
 impl Gait {
-    /// From a posture q, in which the robot stands on its feet, with knots of dt seconds.
+    /// Starts a gait at a posture q in which the robot stands on its feet, with knots of dt seconds.
     pub(crate) fn new(model: Arc<Model>, q: &[f64], foot: Foot, names: &[&str], dt: f64) -> Self {
         let mut data = Data::new(&model);
         let placements = forward_kinematics(&model, &mut data, q);
@@ -49,7 +49,7 @@ impl Gait {
         let mut feet: Vec<_> = frames.map(|frame| (frame, placements.frame(frame).translation)).collect();
         let (mut com, mut x0) = (placements.com(), [q, &vec![0.0; model.nv()]].concat());
         let ground = feet[0].1.z;
-        feet.iter_mut().for_each(|foot| foot.1.z -= ground); // it stands at height 0
+        feet.iter_mut().for_each(|foot| foot.1.z -= ground); // the robot stands at height 0
         (com.z, x0[2]) = (com.z - ground, x0[2] - ground);
         let (models, stages, us) = (Vec::new(), Vec::new(), Vec::new());
         Self { x0, dt, foot, feet, com, models, stages, us, times: vec![0.0], touches: Vec::new(), model }
@@ -67,14 +67,15 @@ impl Gait {
         self.model.frames()[frame].name.clone()
     }
 
-    /// Back to the posture, with weights of the trunk's position and rotation, the joints, and their velocities.
+    /// Returns the cost of the posture, with weights of the trunk's position and rotation, the joints, and their
+    /// velocities.
     fn rest(&self, weights: [f64; 6]) -> Cost {
         let counts = [3, 3, self.model.nv() - 6].repeat(2);
         let w = counts.iter().zip(weights).flat_map(|(&n, w)| vec![w; n]).collect();
         Cost::new("rest", 1e1, Residual::State { reference: self.x0.clone() }, Activation::Weighted(w))
     }
 
-    /// A foot should be at a point, a sole level too.
+    /// Returns the cost of a foot at a point; a sole should also be level.
     fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
         let moved = (&self.model.frames()[frame]).into();
         let residual = match self.foot {
@@ -84,7 +85,7 @@ impl Gait {
         Cost::new(&format!("{} moves", self.name(frame)), weight, residual, Activation::Quadratic)
     }
 
-    /// The costs of a knot on some feet, others on their way.
+    /// Returns the costs of a knot on some feet, while others move.
     fn costs(&self, support: &[usize], moving: &[(usize, Vec3<f64>)], com: Vec3<f64>) -> Vec<Cost> {
         let grip = |&frame: &usize| {
             let (contact, friction) = (self.name(frame), FrictionCone::new(FRICTION));
@@ -107,7 +108,7 @@ impl Gait {
         costs
     }
 
-    /// Some knots on `support`; the k-th has the costs that `costs` gives. One action serves all.
+    /// Adds some knots on `support`; knot k has the costs `costs(k)`. One action serves all knots.
     fn phase(
         &mut self,
         support: &[usize],
@@ -130,13 +131,13 @@ impl Gait {
         Ok(())
     }
 
-    /// Stands on all feet for some knots.
+    /// Stands on all feet for a number of knots.
     pub(crate) fn stand(&mut self, knots: usize) -> Result<(), Error> {
         let feet: Vec<_> = self.feet.iter().map(|foot| foot.0).collect();
         self.phase(&feet, knots, |gait, _| gait.costs(&feet, &[], gait.com))
     }
 
-    /// Swings the feet with these numbers ahead by `length` in an arc of some height, and sets them down.
+    /// Swings the feet with these indices ahead by `length`, in an arc of height `height`, and sets them down.
     pub(crate) fn step(&mut self, swinging: &[usize], length: f64, height: f64, knots: usize) -> Result<(), Error> {
         let swings = |k: &usize| swinging.contains(k);
         let support: Vec<_> = (0..self.feet.len()).filter(|k| !swings(k)).map(|k| self.feet[k].0).collect();
@@ -164,13 +165,13 @@ impl Gait {
         Ok(())
     }
 
-    /// Whether each foot touches from each knot to the next, in the order of their names.
-    #[allow(dead_code)] // by those who do not track it
+    /// Returns whether each foot touches from each knot to the next, in the order of their names.
+    #[allow(dead_code)] // not used without tracking
     pub(crate) fn touches(&self) -> Vec<bool> {
         self.touches.clone()
     }
 
-    /// Solves it, with a line for each iteration; returns the solution and the time of each knot.
+    /// Solves the problem, printing a line for each iteration; returns the solution and the time of each knot.
     pub(crate) fn solve(self) -> Result<(Solution, Vec<f64>), Error> {
         let terminal = vec![self.rest([0.0, 1e3, 1e-1, 1e2, 1e2, 1e2])];
         let end = FreeDynamics::terminal(self.model.clone(), terminal)?;

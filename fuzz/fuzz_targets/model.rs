@@ -1,4 +1,4 @@
-//! Models in files of serde's formats.
+//! Models in JSON.
 #![no_main]
 
 condyle_fuzz::target!(condyle_fuzz::Kind::Model);

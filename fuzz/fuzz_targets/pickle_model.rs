@@ -1,4 +1,4 @@
-//! Models in Python's pickles.
+//! Models from Python pickles.
 #![no_main]
 
 condyle_fuzz::target!(condyle_fuzz::Kind::Pickle);

@@ -1,4 +1,4 @@
-//! Problems in files.
+//! Problems in JSON.
 #![no_main]
 
 condyle_fuzz::target!(condyle_fuzz::Kind::Problem);

@@ -1,7 +1,7 @@
-//! What may come from outside: seeds, mutations, and the property that all of it has.
+//! Hostile input from outside: seeds, mutations, and a property that holds for every input.
 //!
-//! A robot or a problem is refused with an error, or can be used. Nothing panics, nothing hangs, and what can be used gives
-//! numbers.
+//! A robot or a problem is either rejected with an error or usable. Nothing panics, nothing hangs, and usable input
+//! gives finite numbers.
 
 use condyle::optimal::robot::{
     Activation, Contact, ControlBounds, Cost, Dynamics, Integrator, Knot, Limit, Residual, RobotProblem,
@@ -16,22 +16,22 @@ use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
 use std::sync::OnceLock;
 
-/// A way in which a robot or a problem comes from outside.
+/// Format in which a robot or a problem comes from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A URDF.
+    /// A robot as URDF.
     Urdf,
-    /// An MJCF.
+    /// A robot as MJCF.
     Mjcf,
-    /// An SDF.
+    /// A robot as SDF.
     Sdf,
     /// A model in JSON.
     Model,
     /// A problem in JSON.
     Problem,
-    /// A model as pickles have it.
+    /// A model in the format of pickles.
     Pickle,
-    /// An SRDF.
+    /// Named positions as SRDF.
     Srdf,
     /// A mesh as STL.
     Stl,
@@ -53,7 +53,7 @@ macro_rules! mesh {
     };
 }
 
-/// An MJCF that copies parts of its tree, and has meshes with mass.
+/// MJCF that copies parts of its tree, and has meshes with mass.
 const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default class="c"><joint damping="1"/></default></default>
 <asset><mesh name="m" inertia="exact" scale="1 -2 3" vertex="0 0 0 1 0 0 0 2 0 0 0 3" face="0 2 1 0 1 3 0 3 2 1 2 3"/>
 <mesh name="s" builtin="supersphere" params="5 0.5 1.5"/></asset><worldbody><replicate count="3" offset="1 0 0" euler="0 0 30" sep="-">
@@ -62,7 +62,7 @@ const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default clas
 <geom type="box" mesh="s"/></body><attach body="b-1" prefix="x"/></worldbody><actuator><motor joint="j" gear="2"/></actuator></mujoco>"#;
 
 impl Kind {
-    /// The seeds: all good.
+    /// Returns the seeds, which are all valid.
     pub fn seeds(self) -> Vec<Vec<u8>> {
         static SEEDS: [OnceLock<Vec<Vec<u8>>>; 10] = [const { OnceLock::new() }; 10];
         SEEDS[self as usize].get_or_init(|| self.new_seeds()).clone()
@@ -99,17 +99,17 @@ impl Kind {
         texts.into_iter().map(String::into_bytes).collect()
     }
 
-    /// Reads what has come, and uses what could be read. Returns whether it could.
+    /// Reads an input, and uses the result if reading succeeds. Returns whether it succeeded.
     ///
     /// # Panics
-    /// If what could be read cannot be used.
+    /// If an input that was read cannot be used.
     pub fn check(self, input: &[u8]) -> bool {
         let text = match self {
             // as the text of a file, in any encoding
             Self::Urdf | Self::Mjcf | Self::Sdf | Self::Srdf => Model::decoded(input.to_vec()).into(),
             _ => String::from_utf8_lossy(input),
         };
-        // what a user may ask for, by a bit that a mutation changes as well
+        // options of a user, chosen by the input's length, which mutations change too
         let (some, other) = (input.len().is_multiple_of(2), input.len().is_multiple_of(3));
         let root_joint = some.then_some(Joint::FreeFlyer);
         let said = match self {
@@ -150,7 +150,7 @@ impl Kind {
     }
 }
 
-/// Robot with what the format has besides links and joints, and what programs add to it.
+/// Robot with features of the format besides links and joints, and with additions of other programs.
 const URDF: &str = r#"<!------ a robot ------>
 <?xml version="1.0" encoding="windows-1252"?>
 <!DOCTYPE robot [<!ELEMENT robot (link)>]>
@@ -173,7 +173,7 @@ const URDF: &str = r#"<!------ a robot ------>
   <gazebo reference="b"><turnGravityOff>true</turnGravityOff><sensor:camera name="x"/></gazebo>
 </robot>"#;
 
-/// Robots with all that a file of a model can have.
+/// Returns robots with all features that a file of a model can have.
 fn models() -> Vec<Model> {
     let mimic = UrdfOptions { mimic: true, ..UrdfOptions::default() };
     let mimic = Model::from_urdf_str(file!("mimic.urdf"), &mimic).expect("is a good robot");
@@ -181,7 +181,7 @@ fn models() -> Vec<Model> {
     vec![robots::arm7(), robots::quadruped(), mimic, linkage]
 }
 
-/// Problems with all kinds of dynamics, and the terms that a file can have.
+/// Returns problems with all kinds of dynamics, and all terms that a file can have.
 fn problems() -> Vec<RobotProblem> {
     let (arm, quadruped) = (robots::arm7(), robots::quadruped());
     let state = |model: &Model| [neutral(model), vec![0.0; model.nv()]].concat();
@@ -229,8 +229,8 @@ fn problems() -> Vec<RobotProblem> {
     ]
 }
 
-/// Inverse dynamics and the inertia matrix at the neutral position are numbers and, where that matrix has an inverse, forward
-/// dynamics somewhere else (at the neutral position, axes may coincide).
+/// Checks that inverse dynamics and the inertia matrix at the neutral position are finite. If this matrix is
+/// invertible, also checks forward dynamics at another position (at the neutral position, axes may coincide).
 fn use_model(model: &Model) {
     let (mut data, mut q) = (Data::new(model), neutral(model));
     let zeros = vec![0.0; model.nv()];
@@ -244,12 +244,12 @@ fn use_model(model: &Model) {
     }
 }
 
-/// Named positions are numbers, as many as the quadruped has coordinates.
+/// Checks that named positions are finite, with as many numbers as the quadruped has coordinates.
 fn use_positions(all: &[(String, Vec<f64>)]) {
     assert!(all.iter().all(|(_, q)| q.len() == 19 && q.iter().all(|x| x.is_finite())), "{all:?}");
 }
 
-/// A problem that can be built can be rolled out: to numbers, or to an error.
+/// Checks that a problem that can be built can be rolled out: to finite numbers, or to an error.
 fn use_problem(data: &RobotProblem) -> Result<(), String> {
     let mut problem = data.build().map_err(|e| e.to_string())?;
     let us = vec![0.0; (0..problem.horizon()).map(|t| problem.nu(t)).sum()];
@@ -258,7 +258,7 @@ fn use_problem(data: &RobotProblem) -> Result<(), String> {
     Ok(())
 }
 
-/// A mesh in a page: its triangles have corners that there are, in boxes that are finite.
+/// Checks a mesh in a page: drawn triangles have valid vertex indices, and boxes are finite.
 fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
     let mut meshes = Meshes::default();
     let drawn = meshes.add(format, bytes, &|_| Some(mesh!("box.mtl").to_owned()))?;
@@ -275,7 +275,7 @@ fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// Numbers of 16 bits, each with its lower byte first.
+/// Decodes numbers of 16 bits, each with its lower byte first.
 fn from_base64(text: &str) -> Vec<u16> {
     let value = |letter: u8| match letter {
         b'A'..=b'Z' => letter - b'A',
@@ -292,7 +292,7 @@ fn from_base64(text: &str) -> Vec<u16> {
     bytes.collect::<Vec<u8>>().chunks(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect()
 }
 
-/// Two triangles as a binary STL.
+/// Returns two triangles as a binary STL.
 fn binary_stl() -> Vec<u8> {
     let mut bytes = vec![b' '; 80];
     bytes.extend(2_u32.to_le_bytes());
@@ -306,7 +306,7 @@ fn binary_stl() -> Vec<u8> {
     bytes
 }
 
-/// An input with one to four things changed.
+/// Returns an input with one to four changes.
 pub fn mutated(kind: Kind, input: &[u8], seeds: &[Vec<u8>], rng: &mut StdRng) -> Vec<u8> {
     let mut bytes = input.to_vec();
     for _ in 0..rng.random_range(1..5) {
@@ -324,7 +324,7 @@ pub fn mutated(kind: Kind, input: &[u8], seeds: &[Vec<u8>], rng: &mut StdRng) ->
     bytes
 }
 
-/// Numbers that files should not have, or not there.
+/// Numbers that are invalid in files, or invalid at some positions.
 const NUMBERS: &[&str] = &[
     "nan",
     "inf",
@@ -350,7 +350,7 @@ const NUMBERS: &[&str] = &[
     "null",
 ];
 
-/// Words that mean something in one of the formats or in XML.
+/// Words with a meaning in one of the formats or in XML.
 const PIECES: &[&str] = &[
     "<",
     ">",
@@ -404,7 +404,7 @@ fn any<T: Clone>(of: &[T], rng: &mut StdRng) -> T {
     of[rng.random_range(0..of.len())].clone()
 }
 
-/// Bytes flipped, left out, swapped, repeated, or from another input.
+/// Flips, removes, swaps or repeats bytes, or inserts bytes from another input.
 fn mutate_bytes(mut bytes: Vec<u8>, donor: &[u8], rng: &mut StdRng) -> Vec<u8> {
     if bytes.is_empty() {
         return donor.to_vec();
@@ -427,7 +427,7 @@ fn mutate_bytes(mut bytes: Vec<u8>, donor: &[u8], rng: &mut StdRng) -> Vec<u8> {
     bytes
 }
 
-/// Where words stand between signs: ranges of bytes.
+/// Returns the byte ranges of words between signs.
 fn words(text: &str) -> Vec<(usize, usize)> {
     let (mut found, mut begin) = (Vec::new(), None);
     for (i, c) in text.char_indices().chain([(text.len(), ' ')]) {
@@ -448,7 +448,7 @@ fn replaced(text: &str, (from, to): (usize, usize), by: &str) -> String {
     [&text[..from], by, &text[to..]].concat()
 }
 
-/// A piece of a format put somewhere, a word left out or in the place of another one.
+/// Inserts a piece of a format, removes a word, or replaces it by another one.
 fn mutate_tokens(text: &str, rng: &mut StdRng) -> String {
     let words = words(text);
     if words.is_empty() {
@@ -463,7 +463,7 @@ fn mutate_tokens(text: &str, rng: &mut StdRng) -> String {
     }
 }
 
-/// A number, or a name, in place of another one; at times of all its like.
+/// Replaces a number or a name by another one; sometimes all equal ones.
 fn mutate_words(text: &str, rng: &mut StdRng) -> String {
     let words = words(text);
     let is_number = |&(from, to): &(usize, usize)| text[from..to].parse::<f64>().is_ok();
@@ -489,7 +489,7 @@ fn mutate_words(text: &str, rng: &mut StdRng) -> String {
     }
 }
 
-/// Where elements stand, from the sign that opens one to the sign that closes it, as far as they are closed.
+/// Returns the byte ranges of closed elements, from the sign that opens one to the sign that closes it.
 fn elements(text: &str) -> Vec<(usize, usize)> {
     let (mut found, mut open) = (Vec::new(), Vec::new());
     for (from, _) in text.match_indices('<') {
@@ -505,13 +505,13 @@ fn elements(text: &str) -> Vec<(usize, usize)> {
     found
 }
 
-/// An element left out, twice, elsewhere, inside itself, or in the place of another one.
+/// Removes, repeats, moves or replaces an element, or copies it into itself.
 fn mutate_elements(text: &str, rng: &mut StdRng) -> String {
     let elements = elements(text);
     if elements.is_empty() {
         return text.to_owned();
     }
-    // small ones first: the root and the like are copied too often otherwise
+    // small ones are preferred: the root and similar elements would be copied too often
     let pick = |rng: &mut StdRng| {
         let (a, b) = (any(&elements, rng), any(&elements, rng));
         if a.1 - a.0 < b.1 - b.0 { a } else { b }
@@ -535,7 +535,7 @@ fn mutate_elements(text: &str, rng: &mut StdRng) -> String {
     }
 }
 
-/// A value of JSON changed, left out, twice, or in the place of another one.
+/// Changes, removes, repeats or replaces a value of JSON.
 fn mutate_value(bytes: &[u8], rng: &mut StdRng) -> Vec<u8> {
     let Ok(mut file) = serde_json::from_slice::<Value>(bytes) else {
         return mutate_words(&String::from_utf8_lossy(bytes), rng).into();
@@ -576,7 +576,7 @@ fn mutate_value(bytes: &[u8], rng: &mut StdRng) -> Vec<u8> {
     file.to_string().into_bytes()
 }
 
-/// A place in a file, chosen at random.
+/// Returns a random value in a file.
 fn anywhere<'a>(file: &'a mut Value, rng: &mut StdRng) -> &'a mut Value {
     let inside = match file {
         Value::Array(list) => list.len(),

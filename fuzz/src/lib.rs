@@ -1,7 +1,7 @@
-//! Hostile input for cargo-fuzz (`cargo +nightly fuzz run urdf`): one target for each way in which a robot or a problem comes
-//! from outside. The corpora begin with the robots that the repository has; none is copied.
+//! Hostile input for cargo-fuzz (`cargo +nightly fuzz run urdf`): one target for each format in which a robot or a
+//! problem comes from outside. The corpora begin with the robots of the repository; none is copied.
 //!
-//! `tests/hostile.rs` of the workspace runs the same mutations and the same property a fixed number of times.
+//! `tests/hostile.rs` of the workspace runs the same mutations and checks the same property a fixed number of times.
 
 mod hostile;
 
@@ -10,8 +10,8 @@ use hostile::mutated;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-/// The bytes from which some bytes come by mutation, no more than `room`: of the kind's own seeds where there is nothing
-/// yet, and at times by libFuzzer's own mutations.
+/// Mutates the first `size` bytes of `data` and returns the new size, at most `data.len()`. Short inputs are replaced
+/// by a mutated seed of the kind; some calls use libFuzzer's own mutations.
 pub fn mutate(kind: Kind, data: &mut [u8], size: usize, seed: u32) -> usize {
     let (room, mut rng) = (data.len(), StdRng::seed_from_u64(seed.into()));
     if seed.is_multiple_of(4) && size > 64 {
@@ -25,7 +25,7 @@ pub fn mutate(kind: Kind, data: &mut [u8], size: usize, seed: u32) -> usize {
     size
 }
 
-/// A target of libFuzzer for a kind of input.
+/// Defines a libFuzzer target for a kind of input.
 #[macro_export]
 macro_rules! target {
     ($kind:expr) => {

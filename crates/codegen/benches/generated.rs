@@ -1,8 +1,8 @@
-//! Generated C beside the library: operations, size, time to generate and to compile, and a call; then of vectors of eight states
-//! beside a batch, a state.
+//! Compares generated C with the library: operations, size, time to generate and to compile, and time of a call. Also
+//! compares vectors of eight states with a batch, per state.
 //!
-//! `cargo bench -p condyle-codegen --bench generated -- panda.urdf anymal.urdf:free` ; without files the robots that come along.
-//! `CC` names the compiler, `CFLAGS` its flags.
+//! `cargo bench -p condyle-codegen --bench generated -- panda.urdf anymal.urdf:free`; without files, it uses the
+//! embedded robots. `CC` names the compiler, `CFLAGS` its flags.
 
 use condyle_codegen::{Function, Language, Settings, functions};
 use condyle_dynamics::{
@@ -14,10 +14,10 @@ use std::time::Instant;
 
 const NAMES: [&str; 6] = ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives"];
 
-/// The shortest of some measurements is what a call takes: the rest is what else the machine does.
+/// Number of measurements; the shortest is the time of a call, since other work on the machine only lengthens it.
 const MEASUREMENTS: usize = 20;
 
-/// Nanoseconds of a call.
+/// Measures the time of a call (ns).
 fn time(mut call: impl FnMut()) -> f64 {
     let mut calls = 1_u32;
     loop {
@@ -36,7 +36,7 @@ fn time(mut call: impl FnMut()) -> f64 {
     std::iter::repeat_with(one).take(MEASUREMENTS).fold(f64::INFINITY, f64::min)
 }
 
-/// The library's call.
+/// Measures the library's call (ns).
 fn library(model: &Model, name: &str) -> f64 {
     let (data, q, v) = (&mut Data::new(model), neutral(model), vec![0.1; model.nv()]);
     let (q, v) = (std::hint::black_box(q), std::hint::black_box(v));
@@ -62,7 +62,7 @@ fn library(model: &Model, name: &str) -> f64 {
     }
 }
 
-/// A state of a batch on one core, by the library.
+/// Measures one state of a batch on one core, with the library (ns).
 fn batch(model: &Model, name: &str) -> f64 {
     let n = 8 * STATES;
     let (b, q, v) = (&mut Batch::new(model, n, 1), neutral(model).repeat(n), vec![0.1; n * model.nv()]);
@@ -78,10 +78,10 @@ fn batch(model: &Model, name: &str) -> f64 {
     all / n as f64
 }
 
-/// How many times eight states a batch has.
+/// Number of states of a batch, divided by eight.
 const STATES: usize = 8;
 
-/// A program that prints the nanoseconds of a call.
+/// C program that prints the time of a call (ns).
 const TIMER: &str = r#"
 #include <stdio.h>
 #include <time.h>
@@ -100,16 +100,16 @@ int main(void) {
 }
 "#;
 
-/// What compiling a function took.
+/// Costs of a compiled function.
 struct Compiled {
     text_kb: usize,
     seconds: f64,
     object_kb: u64,
-    /// Of a call.
+    /// Time of a call (ns).
     ns: f64,
 }
 
-/// Writes a function's code to a folder, compiles it, and times it on arrays that have each number `lanes` times.
+/// Writes a function's code to a folder, compiles it, and times it on arrays in which each number occurs `lanes` times.
 fn compiled(model: &Model, f: &Function, language: Language, lanes: usize, folder: &Path) -> Compiled {
     let files = language.text("robot", std::slice::from_ref(f));
     for file in &files {

@@ -1,4 +1,4 @@
-//! Derivatives of what is recorded, by dual numbers of expressions.
+//! Derivatives of recorded functions, by dual numbers of expressions.
 
 use crate::expression::Expression;
 use condyle_model::{Model, integrate};
@@ -6,13 +6,14 @@ use condyle_spatial::Scalar;
 use condyle_spatial::lane_dual::LaneDual;
 use nalgebra::DMatrix;
 
-/// A dual number of expressions: a value and its derivative in one direction.
+/// Dual number of expressions: a value and its derivative in one direction.
 pub type DualExpression = LaneDual<Expression>;
 
-/// f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ, recorded: for use inside of [`record`](crate::record).
+/// Records f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ, inside of [`record`](crate::record).
 ///
-/// x: a position of nq numbers, then any others, which move straight, as in [`condyle_dynamics::jacobian`]; f is generic code on
-/// dual numbers. What the directions have in common is computed once.
+/// x: a position of nq numbers, then any other numbers, which form a vector space, as in
+/// [`condyle_dynamics::jacobian`]; f is generic code on dual numbers. Values common to several directions are computed
+/// once.
 ///
 /// ```
 /// use condyle_codegen::{jacobian, record};
@@ -31,7 +32,8 @@ pub type DualExpression = LaneDual<Expression>;
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers, f gives another number of results for another direction, or there is no recording.
+/// If x has fewer than nq numbers, f returns a different number of results for another direction, or no recording is in
+/// progress.
 pub fn jacobian<R>(
     model: &Model<R>,
     x: &[Expression],

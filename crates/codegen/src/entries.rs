@@ -1,18 +1,18 @@
-//! Entries of a result that follow one another and are alike: sums of products with the same common factors, as those of a product of
-//! matrices are. They are computed in a loop, for which compilers use vectors, and which is a fraction of the code.
+//! Adjacent entries of a result with the same structure: sums of products with the same common factors, such as entries
+//! of a product of matrices. They are computed in a loop, which compilers vectorise and which is much shorter code.
 
 use crate::graph::{Id, Node};
 use crate::step::{Entries, Step, Term};
 
-/// The entries that a loop has at least.
+/// Minimum number of entries of a loop.
 const FEWEST: usize = 4;
 
-/// A term of one sum: whether it is subtracted, and its factors, of which a value has one.
+/// Term of one sum: whether it is subtracted, and its factors; a single value has one factor.
 type Of = (bool, [Option<Id>; 2]);
 
-/// Puts loops in the place of steps.
+/// Replaces steps by loops.
 ///
-/// places: the array and the place in it of each result.
+/// places: the array of each result, and its index in the array.
 pub(crate) fn gather(steps: &mut Vec<Step>, results: &[Id], places: &[(usize, usize)]) {
     let mut gatherer = Gatherer::new(steps, results);
     let (mut loops, mut start) = (Vec::new(), 0);
@@ -40,7 +40,7 @@ pub(crate) fn gather(steps: &mut Vec<Step>, results: &[Id], places: &[(usize, us
     steps.extend(replaced.into_iter().flatten());
 }
 
-/// The product that a step computes: whether it is subtracted, and its factors.
+/// Returns the product that a step computes: whether it is subtracted, and its factors.
 fn product(step: &Step) -> Option<Of> {
     match *step {
         Step::MulAdd(_, [a, b, _]) | Step::Plain(_, Node::Mul(a, b)) => Some((false, [Some(a), Some(b)])),
@@ -49,7 +49,7 @@ fn product(step: &Step) -> Option<Of> {
     }
 }
 
-/// The value to which a step adds a product, or from which it subtracts it.
+/// Returns the value to which a step adds a product, or from which it subtracts it.
 fn rest(step: &Step) -> Option<Id> {
     match *step {
         Step::MulAdd(_, [.., c]) | Step::SubMul(_, [.., c]) => Some(c),
@@ -57,17 +57,17 @@ fn rest(step: &Step) -> Option<Id> {
     }
 }
 
-/// What is known of the values while loops are looked for.
+/// State of the values during the search for loops.
 struct Gatherer {
-    /// The step that makes each; `usize::MAX` if none does.
+    /// Index of the step that computes each value; `usize::MAX` for none.
     maker: Vec<usize>,
-    /// The terms of each that is a sum of products, and perhaps one value; the last one first.
+    /// Terms of each value that is a sum of products, with at most one single value; the last term first.
     sums: Vec<Option<Vec<Of>>>,
-    /// Whether nothing is computed from it, and it is no entry of a loop yet.
+    /// Whether no other value uses the value, and it is not yet an entry of a loop.
     is_free: Vec<bool>,
-    /// The value behind each in the work space.
+    /// Value that follows each value in the work space.
     next: Vec<Option<Id>>,
-    /// Whether it is behind another one or has one behind it.
+    /// Whether a value has a neighbour in the work space.
     has_place: Vec<bool>,
 }
 
@@ -94,7 +94,7 @@ impl Gatherer {
         Self { maker, sums, is_free, next: vec![None; n], has_place: vec![false; n] }
     }
 
-    /// As many of the entries from a place on as are alike.
+    /// Returns the longest run of similar entries from index `place` on.
     fn alike(&mut self, entries: &[Id], place: usize) -> Option<Entries> {
         let sum = |of: &Self, id: Id| of.sums[id as usize].clone().filter(|_| of.is_free[id as usize]);
         let first = sum(self, entries[0]).filter(|sum| sum.len() > 1)?;
@@ -134,7 +134,7 @@ impl Gatherer {
         Some(Entries { ids, first: place, terms })
     }
 
-    /// Puts a value behind another one in the work space, if it is not there already; whether it is there.
+    /// Places a value after another one in the work space, if possible; returns whether it is there.
     fn follows(&mut self, last: Id, id: Id) -> bool {
         match self.next[last as usize] {
             Some(next) => next == id,
@@ -148,7 +148,7 @@ impl Gatherer {
     }
 }
 
-/// The one of two factors that is not the other.
+/// Returns the factor that is not the common one.
 fn other([a, b]: [Option<Id>; 2], common: Option<Id>) -> Option<Id> {
     match (a == common, b == common) {
         (true, false) => b,

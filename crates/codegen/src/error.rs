@@ -1,46 +1,46 @@
-//! Why no code was written.
+//! Errors of code generation.
 
-/// Why no code was written.
+/// Error of code generation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// There is no function of that name.
+    /// No function has this name.
     #[error("no function `{name}`; there are {}", crate::FUNCTIONS.join(", "))]
     Function {
-        /// The name that was given.
+        /// The given name.
         name: String,
     },
-    /// A function was named twice: compilers would find two of one name.
+    /// A function was named twice: the code would define it twice.
     #[error("{name}: named twice")]
     Twice {
-        /// The function.
+        /// Name of the function.
         name: String,
     },
-    /// A function that needs frames or constraints was given none.
+    /// A function needs frames or constraints, but none were given.
     #[error("{name}: needs {needs}, of which there are none")]
     Missing {
-        /// The function.
+        /// Name of the function.
         name: &'static str,
-        /// What it needs.
+        /// The missing frames or constraints.
         needs: &'static str,
     },
-    /// M is singular, and the function needs its inverse.
+    /// M is singular, but the function needs its inverse.
     #[error("{name}: the inertia matrix is singular, because of joint `{joint}`")]
     Singular {
-        /// The function.
+        /// Name of the function.
         name: &'static str,
-        /// A joint that moves nothing with inertia.
+        /// A joint that moves no inertia.
         joint: String,
     },
-    /// Something is wrong with the robot, a frame of it or the constraints.
+    /// The robot, one of its frames or the constraints are invalid.
     #[error(transparent)]
     Model(#[from] condyle_model::Error),
     /// A file cannot be written.
     #[error("{file}: {source}")]
     Write {
-        /// Its path.
+        /// Path of the file.
         file: String,
-        /// What the system says.
+        /// The system's error.
         source: std::io::Error,
     },
 }

@@ -1,27 +1,27 @@
-//! A number that remembers how it was computed.
+//! Numbers that record how they are computed.
 
 use crate::graph::{Graph, Id, ONE, ZERO};
 use condyle_spatial::{Constant, Scalar};
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use std::cell::{Cell, RefCell};
 
-/// A number that remembers how it was computed: algorithms that are generic over [`Scalar`] run on it once and leave a graph
-/// of all that they compute, out of which [`record`](crate::record) makes a [`Function`](crate::Function).
+/// A number that records how it is computed. Algorithms that are generic over [`Scalar`] run on it once and leave a
+/// graph of all their operations; [`record`](crate::record) makes a [`Function`](crate::Function) of this graph.
 ///
-/// It is a number in the graph of the recording in which it was made, and means nothing in another one: that is a panic.
-/// Whether two are equal asks whether they are computed in the same way.
+/// An expression belongs to the recording in which it was made; its use in another one panics. Two expressions are
+/// equal if they are computed in the same way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expression {
-    /// The recording; 0 for the constants 0 and 1, which are the same in each.
+    /// Number of the recording; 0 for the constants 0 and 1, which are the same in each recording.
     session: u32,
     id: Id,
 }
 
-/// The outcome of a comparison of two [`Expression`]s.
+/// Result of a comparison of two [`Expression`]s.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mask(Expression);
 
-/// The recording of a thread.
+/// Recording of a thread.
 struct Session {
     number: u32,
     graph: Graph,
@@ -29,11 +29,11 @@ struct Session {
 
 thread_local! {
     static SESSION: RefCell<Option<Session>> = const { RefCell::new(None) };
-    /// How many recordings there have been.
+    /// Number of recordings so far.
     static COUNT: Cell<u32> = const { Cell::new(0) };
 }
 
-/// A recording that is under way; it ends when this is dropped, by a panic too.
+/// Recording in progress; it ends when this is dropped, also by a panic.
 pub(crate) struct Open(());
 
 impl Open {
@@ -48,7 +48,7 @@ impl Open {
         Self(())
     }
 
-    /// The graph of all that was computed.
+    /// Ends the recording and returns the graph of all operations.
     pub(crate) fn finish(self) -> Graph {
         SESSION.with_borrow_mut(Option::take).map_or_else(Graph::new, |session| session.graph)
     }
@@ -60,14 +60,14 @@ impl Drop for Open {
     }
 }
 
-/// The panic of a number outside of its recording, where nothing more is inlined.
+/// Panics for a number outside of its recording; not inlined, to keep callers small.
 #[cold]
 #[inline(never)]
 fn outside() -> ! {
     panic!("an Expression is a number of one recording: use it inside of the closure that was given to `record`");
 }
 
-/// A value out of the graph of the recording.
+/// Computes a value in the graph of the recording.
 #[inline(never)]
 fn graph<const N: usize>(operands: [Expression; N], compute: fn(&mut Graph, [Id; N]) -> Id) -> Expression {
     SESSION.with_borrow_mut(|session| {
@@ -82,7 +82,7 @@ impl Expression {
         Self { session: if id <= ONE { 0 } else { session }, id }
     }
 
-    /// An input, by its place among those of all arguments.
+    /// Records an input, given by its index among the numbers of all arguments.
     pub(crate) fn input(place: u32) -> Self {
         SESSION.with_borrow_mut(|session| {
             let Some(Session { number, graph }) = session else { outside() };
@@ -90,7 +90,7 @@ impl Expression {
         })
     }
 
-    /// Its number in the graph of the recording.
+    /// Returns its index in the graph of the recording.
     pub(crate) fn id(self) -> Id {
         graph([self], |_, [x]| x).id
     }
@@ -133,7 +133,7 @@ impl SubAssign for Expression {
 
 impl Scalar for Expression {
     type Mask = Mask;
-    /// It stands for as many numbers as the code will be called with: there is not one to look at.
+    /// At least 2, since an expression represents the numbers of many calls: it has no single value.
     const LANES: usize = 2;
 
     #[inline(never)]

@@ -1,4 +1,4 @@
-//! A function out of a recording: what it takes, what it gives, and how the one is computed from the other.
+//! Functions from recordings: inputs, outputs, and the steps of the computation.
 
 use crate::expression::{Expression, Open};
 use crate::graph::{Id, Node};
@@ -7,76 +7,76 @@ use condyle_spatial::{Dense, DenseMatrix, Scalar};
 use core::fmt;
 use core::num::NonZero;
 
-/// An argument or a result of a function: some numbers with a name.
+/// Argument or result of a function: some numbers with a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array {
-    /// The name, which is that of the argument in the code.
+    /// Name of the argument in the code.
     pub name: String,
-    /// The number of rows.
+    /// Number of rows.
     pub rows: usize,
-    /// The number of columns; 1 for vectors. Numbers stand column by column.
+    /// Number of columns; 1 for vectors. Numbers are stored column by column.
     pub columns: usize,
-    /// What the numbers are, with units, in a few words.
+    /// Meaning of the numbers, with units, in a few words.
     pub about: String,
 }
 
 impl Array {
-    /// The number of numbers.
+    /// Returns the number of numbers.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.rows * self.columns
     }
 }
 
-/// A function of some arrays of numbers, as the steps by which it is computed: without branches, loops or memory.
+/// Function of some arrays of numbers, as the steps of its computation: without branches, loops or memory.
 ///
-/// [`record`] makes one; [`Language::text`](crate::Language) writes it down.
+/// [`record`] makes a function; [`Language::text`](crate::Language) writes its code.
 #[derive(Clone, Debug)]
 pub struct Function {
-    /// The name.
+    /// Name of the function.
     pub name: String,
-    /// What it computes, in a sentence.
+    /// Description of the result, in a sentence.
     pub about: String,
-    /// What it takes.
+    /// Arguments.
     pub inputs: Vec<Array>,
-    /// What it gives.
+    /// Results.
     pub outputs: Vec<Array>,
-    /// The values that the outputs need, each after those that it is computed from.
+    /// Values that the outputs need, each after the values from which it is computed.
     pub(crate) nodes: Vec<Node>,
-    /// The values of all outputs, one array after the other; of a share those that it has.
+    /// Values of all outputs, one array after the other; in a share, only the share's values.
     pub(crate) results: Vec<Id>,
-    /// The output and the place in it to which each of them goes.
+    /// Output array of each result, and its index in the array.
     pub(crate) places: Vec<(usize, usize)>,
-    /// The limb to which each of them belongs, 0 being the trunk; empty if that is not known. They are shared out by limbs.
+    /// Limb of each result, 0 for the trunk; empty if unknown. Results are shared out by limbs (see `shares.rs`).
     pub(crate) limbs: Vec<usize>,
-    /// The number of shares that was asked for.
+    /// Requested number of shares.
     pub(crate) shares: Option<NonZero<usize>>,
 }
 
-/// What a function computes with, counted.
+/// Numbers of operations of a function.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Operations {
-    /// Sums and differences, those that are fused with a product not counted.
+    /// Sums and differences, except those fused with a product.
     pub sums: usize,
-    /// Products, those that are fused with a sum not counted.
+    /// Products, except those fused with a sum.
     pub products: usize,
-    /// Products with a sum or difference: one instruction where the processor has it.
+    /// Products fused with a sum or difference: one instruction if the processor has it.
     pub fused: usize,
     /// Quotients and square roots.
     pub quotients: usize,
-    /// Angles of which the sine, the cosine or both are computed; angles of points.
+    /// Angles whose sine, cosine or both are computed; angles of points.
     pub angles: usize,
-    /// Signs, magnitudes, comparisons and choices.
+    /// Signs, absolute values, comparisons and selections.
     pub others: usize,
 }
 
 impl Operations {
-    /// All, each counted as one.
+    /// Returns the number of all operations, each counted once.
     pub fn total(self) -> usize {
         self.sums + self.products + self.fused + self.quotients + self.angles + self.others
     }
 
-    /// Additions and multiplications: a fused pair counts as two.
+    /// Returns the number of additions and multiplications: a fused pair counts as two.
     pub fn flops(self) -> usize {
         self.sums + self.products + 2 * self.fused + self.quotients
     }
@@ -93,7 +93,7 @@ impl fmt::Display for Operations {
     }
 }
 
-/// The arguments and results of a function that is being recorded.
+/// Arguments and results of a function during its recording.
 #[derive(Debug)]
 pub struct Recorder {
     inputs: Vec<Array>,
@@ -103,10 +103,10 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// An argument of the function: `len` numbers.
+    /// Adds an argument to the function: `len` numbers.
     ///
     /// # Panics
-    /// If the name is no identifier (ASCII letters, digits and `_`), or taken.
+    /// If the name is not an identifier (ASCII letters, digits and `_`), or is already used.
     pub fn input(&mut self, name: &str, len: usize, about: &str) -> Vec<Expression> {
         self.check(name);
         let first = self.places;
@@ -115,18 +115,18 @@ impl Recorder {
         (first..self.places).map(Expression::input).collect()
     }
 
-    /// A result of the function: a vector.
+    /// Adds a result to the function: a vector.
     ///
     /// # Panics
-    /// If the name is no identifier (ASCII letters, digits and `_`), or taken.
+    /// If the name is not an identifier (ASCII letters, digits and `_`), or is already used.
     pub fn output(&mut self, name: &str, values: &[Expression], about: &str) {
         self.result(name, (values.len(), 1), values, about);
     }
 
-    /// A result of the function: a matrix. Its numbers stand column by column.
+    /// Adds a result to the function: a matrix. Its numbers are stored column by column.
     ///
     /// # Panics
-    /// If the name is no identifier (ASCII letters, digits and `_`), or taken.
+    /// If the name is not an identifier (ASCII letters, digits and `_`), or is already used.
     pub fn matrix(&mut self, name: &str, values: &DenseMatrix<Expression, impl Dense<Expression>>, about: &str) {
         self.result(name, values.shape(), values.as_slice(), about);
     }
@@ -144,7 +144,7 @@ impl Recorder {
     }
 }
 
-/// Panics unless a name can be one in every language.
+/// Panics unless a name is valid in every language.
 fn check_identifier(name: &str) {
     assert!(is_identifier(name), "name: `{name}` is not made of ASCII letters, digits and `_`, a letter first");
 }
@@ -153,10 +153,12 @@ pub(crate) fn is_identifier(name: &str) -> bool {
     name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
 }
 
-/// The function that a closure computes: it runs once, on [`Expression`]s, and what its outputs need is kept.
+/// Records the function that a closure computes: the closure runs once, on [`Expression`]s, and the values that its
+/// outputs need are kept.
 ///
-/// The closure may call whatever is generic over [`Scalar`]: algorithms of this library, a user's own cost, and dual numbers of
-/// expressions ([`jacobian`](crate::jacobian)). It must not depend on the values of its inputs but by [`Scalar::select`].
+/// The closure may call any code that is generic over [`Scalar`]: algorithms of this library, a user's own cost, and
+/// dual numbers of expressions ([`jacobian`](crate::jacobian)). It may depend on the values of its inputs only by
+/// [`Scalar::select`].
 ///
 /// ```
 /// use condyle_codegen::{Language, record};
@@ -174,7 +176,7 @@ pub(crate) fn is_identifier(name: &str) -> bool {
 /// ```
 ///
 /// # Panics
-/// If a name is no identifier, or a recording is under way on this thread.
+/// If a name is not an identifier, or a recording is in progress on this thread.
 pub fn record(name: &str, about: &str, f: impl FnOnce(&mut Recorder)) -> Function {
     check_identifier(name);
     let open = Open::new();
@@ -198,7 +200,7 @@ pub fn record(name: &str, about: &str, f: impl FnOnce(&mut Recorder)) -> Functio
     }
 }
 
-/// Of each value whether some results need it.
+/// Returns for each value whether some results need it.
 pub(crate) fn is_needed(all: &[Node], results: impl Iterator<Item = Id>) -> Vec<bool> {
     let mut is_needed = vec![false; all.len()];
     results.for_each(|id| is_needed[id as usize] = true);
@@ -210,7 +212,7 @@ pub(crate) fn is_needed(all: &[Node], results: impl Iterator<Item = Id>) -> Vec<
     is_needed
 }
 
-/// The values that some results need, in the order in which they were recorded, and the results among them.
+/// Returns the values that some results need, in recording order, and the results as indices among them.
 pub(crate) fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
     let is_needed = is_needed(all, results.iter().copied());
     let (mut nodes, mut new) = (Vec::new(), vec![Id::MAX; all.len()]);
@@ -224,10 +226,10 @@ pub(crate) fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
 }
 
 impl Function {
-    /// The results for some arguments, computed step by step: slowly, without a compiler.
+    /// Computes the results for some arguments, step by step: slowly, without a compiler.
     ///
     /// # Panics
-    /// If there are not as many arguments, or one has not as many numbers, as `inputs` says.
+    /// If the number of arguments, or the length of one, differs from `inputs`.
     pub fn evaluate(&self, inputs: &[&[f64]]) -> Vec<Vec<f64>> {
         assert!(inputs.len() == self.inputs.len(), "inputs: expected {}, found {}", self.inputs.len(), inputs.len());
         for (array, given) in self.inputs.iter().zip(inputs) {
@@ -269,7 +271,7 @@ impl Function {
     }
 }
 
-/// The array and the place in it of each number of all of some arrays.
+/// Returns the array of each number of some arrays, and its index in the array.
 pub(crate) fn places(arrays: &[Array]) -> Vec<(usize, usize)> {
     arrays.iter().enumerate().flat_map(|(k, array)| (0..array.len()).map(move |i| (k, i))).collect()
 }

@@ -1,4 +1,4 @@
-//! Files of code for a robot.
+//! Files of generated code for a robot.
 
 use crate::error::Error;
 use crate::identifiers::identifier;
@@ -7,12 +7,12 @@ use crate::text::Language;
 use condyle_model::Model;
 use std::path::{Path, PathBuf};
 
-/// Writes functions of a robot into files of a folder, which is made if it is not there; for programs and build scripts.
+/// Writes functions of a robot into files of a folder, which is created if needed; for programs and build scripts.
 ///
-/// The files and the functions in them have the robot's name, as an identifier, and that of the language
-/// ([`Language::stem`]): `panda.h` and `panda.c` with `panda_aba` and so on, `panda_float_x8.h` and `panda_float_x8.c` with
-/// `panda_float_x8_aba`, or `panda.rs` with `aba`. Returns the paths of the files. The same robot gives the same text, and a file that has it already is
-/// not written again.
+/// The names of files and functions consist of the robot's name, as an identifier, and the language's suffix
+/// ([`Language::stem`]). Examples: `panda.h` and `panda.c` with `panda_aba` and so on, `panda_float_x8.h` and
+/// `panda_float_x8.c` with `panda_float_x8_aba`, or `panda.rs` with `aba`. Returns the paths of the files. The same
+/// robot gives the same text, and an unchanged file is not written again.
 ///
 /// ```no_run
 /// use condyle_codegen::{Language, Settings, generate};
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 /// ```
 ///
 /// # Errors
-/// Those of [`functions`], and [`Error::Write`].
+/// The errors of [`functions`], and [`Error::Write`].
 pub fn generate(
     model: &Model,
     names: &[&str],

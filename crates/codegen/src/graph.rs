@@ -1,33 +1,33 @@
-//! The graph of what a recording has computed: each value once, simplified as it is recorded.
+//! The graph of a recording: each value once, simplified while it is recorded.
 //!
-//! A value that exists already is found again, however it was written: operands of sums and products are in order, signs are
-//! taken out of products and go into the sum that follows, constants are computed at once, and what is multiplied by 0 is 0.
-//! (So an infinite number or none at all, times 0, is 0 here.)
+//! An existing value is found again, even if it is written differently. Operands of sums and products are sorted, and
+//! signs are moved from products to the sum that follows. Constants are computed at once, and a product with 0 is 0.
+//! (An infinite number or NaN, times 0, is therefore 0 here.)
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-/// A value by its number: how manieth it was recorded.
+/// Index of a value, in recording order.
 pub(crate) type Id = u32;
 
-/// 0, which every graph begins with; as a mask, what never holds.
+/// 0, the first value of every graph; as a mask, false.
 pub(crate) const ZERO: Id = 0;
-/// 1, which comes next; as a mask, what always holds.
+/// 1, the second value of every graph; as a mask, true.
 pub(crate) const ONE: Id = 1;
 
-/// How a value is computed.
+/// Computation of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Node {
     /// A constant, by its bits.
     Constant(u64),
-    /// An input, by its place among those of all arguments.
+    /// An input, by its index among the numbers of all arguments.
     Input(u32),
     Add(Id, Id),
     Sub(Id, Id),
     Mul(Id, Id),
     Div(Id, Id),
     Neg(Id),
-    /// −a as a value of its own: its sign is not taken out.
+    /// −a as a separate value: its sign is not moved.
     Minus(Id),
     Sqrt(Id),
     Sin(Id),
@@ -39,7 +39,7 @@ pub(crate) enum Node {
     Less(Id, Id),
     And(Id, Id),
     Or(Id, Id),
-    /// The second where the mask holds, else the third.
+    /// The second operand where the mask holds, otherwise the third.
     Select(Id, Id, Id),
 }
 
@@ -48,7 +48,7 @@ impl Node {
         Self::Constant(x.to_bits())
     }
 
-    /// What it is computed from.
+    /// Returns the values from which it is computed.
     pub(crate) fn operands(self) -> impl DoubleEndedIterator<Item = Id> {
         let (n, all) = match self {
             Self::Constant(_) | Self::Input(_) => (0, [0; 3]),
@@ -62,7 +62,7 @@ impl Node {
         all.into_iter().take(n)
     }
 
-    /// The same of other operands.
+    /// Returns the same computation with other operands.
     pub(crate) fn renamed(self, to: impl Fn(Id) -> Id) -> Self {
         match self {
             Self::Constant(_) | Self::Input(_) => self,
@@ -84,13 +84,13 @@ impl Node {
         }
     }
 
-    /// Whether it is a mask.
+    /// Returns whether it is a mask.
     pub(crate) fn is_mask(self) -> bool {
         matches!(self, Self::Less(..) | Self::And(..) | Self::Or(..))
     }
 }
 
-/// All values of a recording.
+/// Values of a recording.
 #[derive(Debug)]
 pub(crate) struct Graph {
     pub nodes: Vec<Node>,
@@ -105,7 +105,7 @@ impl Graph {
         graph
     }
 
-    /// The value that is computed in this way.
+    /// Returns the value with this computation, which is added if it is new.
     fn find(&mut self, node: Node) -> Id {
         match self.known.entry(node) {
             Entry::Occupied(found) => *found.get(),
@@ -117,7 +117,7 @@ impl Graph {
         }
     }
 
-    /// The value that is computed in this way, simplified.
+    /// Returns the value with this computation, simplified.
     pub(crate) fn simplified(&mut self, node: Node) -> Id {
         match node {
             Node::Constant(_) | Node::Input(_) => self.find(node),
@@ -150,7 +150,7 @@ impl Graph {
         self.find(Node::Input(place))
     }
 
-    /// The number, if it is a constant.
+    /// Returns the number, if the value is a constant.
     fn value(&self, a: Id) -> Option<f64> {
         match self.nodes[a as usize] {
             Node::Constant(bits) => Some(f64::from_bits(bits)),
@@ -158,7 +158,7 @@ impl Graph {
         }
     }
 
-    /// What a value is the negative of, if it is a negative.
+    /// Returns x, if the value is −x.
     fn negated(&self, a: Id) -> Option<Id> {
         match self.nodes[a as usize] {
             Node::Neg(x) => Some(x),
@@ -166,7 +166,7 @@ impl Graph {
         }
     }
 
-    /// A value without its sign, and whether it had one.
+    /// Returns a value without its sign, and whether it had a minus sign.
     fn unsigned(&mut self, a: Id) -> (Id, bool) {
         match (self.negated(a), self.value(a)) {
             (Some(x), _) => (x, true),
@@ -187,7 +187,7 @@ impl Graph {
         }
     }
 
-    /// A value whose sign is not taken out where it is multiplied.
+    /// Returns a value whose sign stays where it is in products.
     pub(crate) fn kept(&mut self, a: Id) -> Id {
         self.negated(a).map_or(a, |x| self.find(Node::Minus(x)))
     }
@@ -216,7 +216,7 @@ impl Graph {
         }
     }
 
-    /// a + (b − a) = b.
+    /// Simplifies a + (b − a) to b.
     fn rest_of_sum(&self, a: Id, difference: Id) -> Option<Id> {
         match self.nodes[difference as usize] {
             Node::Sub(b, c) if c == a => Some(b),
@@ -224,7 +224,7 @@ impl Graph {
         }
     }
 
-    /// a − (a − b) = b, (a + b) − a = b.
+    /// Simplifies a − (a − b) and (b + a) − a to b.
     fn rest_of_difference(&self, a: Id, b: Id) -> Option<Id> {
         match (self.nodes[a as usize], self.nodes[b as usize]) {
             (_, Node::Sub(c, rest)) if c == a => Some(rest),
@@ -275,7 +275,7 @@ impl Graph {
         self.signed(product, minus_a != minus_b)
     }
 
-    /// (x / b) b = x and (1 / b) x b = x.
+    /// Simplifies (x / b) b and (1 / b) x b to x.
     fn dividend(&self, a: Id, b: Id) -> Option<Id> {
         let inverse = Node::Div(ONE, b);
         match self.nodes[a as usize] {
@@ -286,7 +286,7 @@ impl Graph {
         }
     }
 
-    /// The constant x, which has the number c, times another value.
+    /// Returns a times the constant x, whose index is c.
     fn scale(&mut self, x: f64, c: Id, a: Id) -> Id {
         if c == ONE {
             return a;

@@ -1,4 +1,5 @@
-//! Robots as straight-line code: the library's algorithms, run once on numbers that remember how they were computed.
+//! Generated straight-line code for robots: the library's algorithms, recorded once on numbers that store how they are
+//! computed.
 //!
 //! ```
 //! use condyle_codegen::{Language, Settings, functions};
@@ -11,10 +12,11 @@
 //! # Ok::<(), condyle_codegen::Error>(())
 //! ```
 //!
-//! [`record`] runs any closure that is generic over the scalar on [`Expression`]s, which leave a graph: constants folded, what is
-//! 0 left out, each value computed once. [`functions`] does it with the algorithms of a robot, [`Language`] writes the graph as
-//! C, Rust or CUDA, and [`generate`] puts that into files. What does not depend on the robot's position is not computed at run
-//! time, and the code has neither branches nor memory of its own, nor loops but of a few entries of a result that are alike.
+//! [`record`] runs any closure that is generic over the scalar on [`Expression`]s. They leave a graph in which
+//! constants are folded, zeros are removed, and each value is computed once. [`functions`] does this with the
+//! algorithms of a robot, [`Language`] writes the graph as C, Rust or CUDA, and [`generate`] writes files. Values that
+//! do not depend on the robot's position are not computed at run time. The code has neither branches nor memory of its
+//! own, and its only loops compute entries of a result with the same structure.
 #![allow(non_snake_case)]
 
 #[cfg(feature = "cuda")]

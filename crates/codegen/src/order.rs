@@ -1,14 +1,14 @@
-//! The order of a function's steps: such that few values are under way at a time.
+//! Order of a function's steps, such that few values are needed at the same time.
 
 use crate::graph::Id;
 use crate::step::Step;
 use crate::steps::Steps;
 use std::collections::BTreeSet;
 
-/// The registers that a processor has, of which an order should need no more.
+/// Number of a processor's registers, which an order should not exceed.
 const REGISTERS: usize = 16;
 
-/// The best order found: that of the recording, or each value right before it is first needed.
+/// Applies the better of two orders: the order of the recording, or each value immediately before its first use.
 pub(crate) fn order(steps: &mut Steps) {
     let late = on_demand(steps);
     let recorded: Vec<usize> = (0..steps.all.len()).collect();
@@ -16,7 +16,7 @@ pub(crate) fn order(steps: &mut Steps) {
     steps.all = best.into_iter().map(|k| steps.all[k].clone()).collect();
 }
 
-/// The order in which each step is taken when it is first asked for, for one result after the other.
+/// Returns the order in which each step is taken when it is first needed, for one result after the other.
 fn on_demand(steps: &Steps) -> Vec<usize> {
     let mut order = Vec::with_capacity(steps.all.len());
     let mut taken = vec![false; steps.all.len()];
@@ -37,7 +37,7 @@ fn on_demand(steps: &Steps) -> Vec<usize> {
                 continue;
             }
             stack.push((k, true));
-            // what needs most registers first: it is on top of the stack
+            // the step that needs most registers comes first: it is on top of the stack
             let mut before: Vec<usize> = steps.all[k].takes().map(|id| maker[id as usize]).collect();
             before.retain(|&j| j != usize::MAX);
             before.sort_by_key(|&j| (weight[j], j));
@@ -47,8 +47,8 @@ fn on_demand(steps: &Steps) -> Vec<usize> {
     order
 }
 
-/// The registers that a step needs with all before it, if nothing were shared (Sethi and Ullman, *The generation of optimal
-/// code for arithmetic expressions*, 1970).
+/// Returns the number of registers that each step needs, with all steps before it, if no values were shared (Sethi and
+/// Ullman, *The generation of optimal code for arithmetic expressions*, 1970).
 fn weights(steps: &Steps, maker: &[usize]) -> Vec<u32> {
     let mut weight: Vec<u32> = Vec::with_capacity(steps.all.len());
     for step in &steps.all {
@@ -60,13 +60,13 @@ fn weights(steps: &Steps, maker: &[usize]) -> Vec<u32> {
     weight
 }
 
-/// How often a value goes to or comes from memory, if it is always the one needed last that leaves the registers (Belady,
-/// *A study of replacement algorithms for a virtual-storage computer*, 1966).
+/// Returns the number of transfers between registers and memory, if the value needed last is always the one moved to
+/// memory (Belady, *A study of replacement algorithms for a virtual-storage computer*, 1966).
 fn transfers(steps: &Steps, order: &[usize]) -> usize {
     let never = order.len();
     let mut uses: Vec<Vec<usize>> = vec![Vec::new(); steps.values];
     for (time, &k) in order.iter().enumerate().rev() {
-        steps.all[k].takes().for_each(|id| uses[id as usize].push(time)); // the next one last
+        steps.all[k].takes().for_each(|id| uses[id as usize].push(time)); // the next one is last in the list
     }
     let mut is_free = vec![true; steps.values]; // inputs and constants are in memory anyway
     steps.all.iter().flat_map(Step::makes).for_each(|id| is_free[id as usize] = false);

@@ -1,4 +1,4 @@
-//! A function as a program: its steps in order, in parts of bounded size, with the places of what one part leaves to others.
+//! A function as a program: its ordered steps in parts of bounded size, with storage for values shared between parts.
 
 use crate::function::Function;
 use crate::graph::Id;
@@ -8,37 +8,37 @@ use crate::steps::Steps;
 use core::iter::successors;
 use core::ops::Range;
 
-/// The steps that a part may have: compilers take more than twice as long for twice as many.
+/// Maximum number of steps of a part: the time of compilers more than doubles with twice the number of steps.
 const LONGEST: usize = 2000;
-/// The steps that a part has at least, but for the last one.
+/// Minimum number of steps of a part, except the last part.
 const SHORTEST: usize = 1000;
 
-/// Where a part finds a value.
+/// Storage of a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Place {
-    /// It is an input or a constant.
+    /// An input or a constant.
     Given,
-    /// A variable of the part that computes it, and of no other.
+    /// A variable of the only part that computes and uses it.
     Local,
-    /// In the work space, and in the part that computes it a variable too.
+    /// A number in the work space; in the part that computes it, also a variable.
     Work(usize),
 }
 
-/// A function's steps in order, in parts.
+/// Ordered steps of a function, in parts.
 #[derive(Debug)]
 pub(crate) struct Program<'f> {
     pub function: &'f Function,
     pub steps: Steps<'f>,
-    /// The steps of each part.
+    /// Steps of each part.
     pub parts: Vec<Range<usize>>,
-    /// The part that computes each value; `usize::MAX` if none does.
+    /// Index of the part that computes each value; `usize::MAX` for none.
     pub part_of: Vec<usize>,
     pub places: Vec<Place>,
     /// Whether a step takes each value.
     pub taken: Vec<bool>,
-    /// The most values that are under way at a time.
+    /// Maximum number of values that are needed at the same time.
     pub most_alive: usize,
-    /// The numbers in the work space: the sines of all angles that are known at once, their cosines, then the rest.
+    /// Size of the work space: the sines of all early angles, their cosines, then other numbers.
     pub work: usize,
 }
 
@@ -59,13 +59,13 @@ impl<'f> Program<'f> {
         Self { function, steps, parts, part_of, places, taken, most_alive, work }
     }
 
-    /// The angles that are known at once.
+    /// Returns the angles that are computed before all steps.
     pub(crate) fn angles(&self) -> &[Angle] {
         &self.steps.angles
     }
 }
 
-/// Where values are used for the last time: the step, or behind the last one for nothing but a result.
+/// Returns the step that uses each value last; `steps.all.len()` if only a result uses it.
 fn last_uses(steps: &Steps) -> Vec<usize> {
     let mut last = vec![0; steps.values];
     for (k, step) in steps.all.iter().enumerate() {
@@ -74,7 +74,8 @@ fn last_uses(steps: &Steps) -> Vec<usize> {
     last
 }
 
-/// How many values come from before each step and are needed by it or after it; last, behind the last step.
+/// Returns the number of values that come from before each step and are used by it or later; the last entry is for the
+/// end.
 fn alive(steps: &Steps) -> Vec<usize> {
     let n = steps.all.len();
     let last = last_uses(steps);
@@ -95,7 +96,8 @@ fn alive(steps: &Steps) -> Vec<usize> {
     change.into_iter().map(next).collect()
 }
 
-/// The parts: each ends where, within its bounds, the fewest values go on, which is where a limb ends.
+/// Cuts the steps into parts: each ends, within its bounds, where the fewest values are still needed, for example at
+/// the end of a limb.
 fn cut(alive: &[usize]) -> Vec<Range<usize>> {
     let n = alive.len() - 1;
     let (mut parts, mut first) = (Vec::new(), 0);
@@ -108,7 +110,7 @@ fn cut(alive: &[usize]) -> Vec<Range<usize>> {
     parts
 }
 
-/// The values from which loops compute entries, each behind the one of the entry before.
+/// Returns the values from which loops compute entries, each after the value of the previous entry.
 fn side_by_side(steps: &Steps) -> Vec<Id> {
     let (mut next, mut is_first) = (vec![None; steps.values], vec![true; steps.values]);
     let mut all = Vec::new();
@@ -131,7 +133,7 @@ fn side_by_side(steps: &Steps) -> Vec<Id> {
     placed
 }
 
-/// The places of all values, and the size of the work space.
+/// Returns the storage of all values, and the size of the work space.
 fn place(steps: &Steps, parts: &[Range<usize>], part_of: &[usize]) -> (Vec<Place>, usize) {
     let mut places = vec![Place::Given; steps.values];
     let n = steps.angles.len();

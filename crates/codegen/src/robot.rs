@@ -1,4 +1,4 @@
-//! The functions of a robot: the library's algorithms, recorded.
+//! Functions of a robot: the library's algorithms, recorded.
 
 use crate::error::Error;
 use crate::expression::Expression;
@@ -17,7 +17,7 @@ use condyle_spatial::{Force, Inertia, Matrix, Scalar};
 use core::num::NonZero;
 use nalgebra::DMatrix;
 
-/// The functions that [`functions`] knows.
+/// Names of the functions that [`functions`] can record.
 pub const FUNCTIONS: [&str; 16] = [
     "rnea",
     "aba",
@@ -37,7 +37,7 @@ pub const FUNCTIONS: [&str; 16] = [
     "impulse_dynamics_derivatives",
 ];
 
-/// Those that need M⁻¹.
+/// Names of the functions that need M⁻¹.
 const INVERTING: [&str; 8] = [
     "aba",
     "minv",
@@ -49,29 +49,31 @@ const INVERTING: [&str; 8] = [
     "impulse_dynamics_derivatives",
 ];
 
-/// What functions of a robot are made with.
+/// Settings of a robot's functions.
 #[derive(Clone, Debug, Default)]
 pub struct Settings {
-    /// The frames of `frames`, by name.
+    /// Frames of the function `frames`, by name.
     pub frames: Vec<String>,
-    /// The constraints of `constrained_dynamics` and `impulse_dynamics`, and of their derivatives.
+    /// Constraints of `constrained_dynamics` and `impulse_dynamics`, and of their derivatives.
     pub constraints: Vec<ContactConstraint>,
-    /// Whether dynamics and its derivatives take external forces on the bodies: `f_ext`, six numbers for each body but the
-    /// world.
+    /// Whether dynamics and its derivatives have external forces on the bodies as an argument: `f_ext`, six numbers for
+    /// each body except the world.
     pub external_forces: bool,
-    /// Whether the inertial parameters of the bodies are an argument instead of constants: `inertia`, ten numbers for each body but
-    /// the world, as in [`inertial_parameters`](condyle_model::inertial_parameters).
+    /// Whether the inertial parameters of the bodies are an argument instead of constants: `inertia`, ten numbers for
+    /// each body except the world, as in [`inertial_parameters`](condyle_model::inertial_parameters).
     pub inertia_is_input: bool,
     /// Whether the armature of the coordinates is an argument instead of constants: `armature`.
     pub armature_is_input: bool,
-    /// Whether the acceleration of free fall is an argument instead of a constant: `gravity_vector`, three numbers.
+    /// Whether the gravitational acceleration is an argument instead of a constant: `gravity_vector`, three numbers.
     pub gravity_is_input: bool,
-    /// Among how many threads kernels of CUDA share out every state, at most one for each limb and one for the trunk. By default they
-    /// can do so where it pays ([`Function::shares`]), and do so as long as there are few states. Other languages do not.
+    /// Number of threads that share every state in CUDA kernels, at most one for each limb and one for the trunk. By
+    /// default, kernels can split states where it is worthwhile ([`Function::shares`]), and do so for few states. Other
+    /// languages ignore this setting.
     pub shares: Option<NonZero<usize>>,
 }
 
-/// Functions of a robot, by the names in [`FUNCTIONS`], with the arguments and results that the library's have.
+/// Records functions of a robot, by the names in [`FUNCTIONS`], with the arguments and results of the library's
+/// functions.
 ///
 /// ```
 /// use condyle_codegen::{Settings, functions};
@@ -83,12 +85,12 @@ pub struct Settings {
 /// ```
 ///
 /// # Errors
-/// [`Error::Function`] for an unknown name, [`Error::Twice`] for one that is there twice, [`Error::Missing`] if there are no
-/// frames or constraints for a function that needs some, [`Error::Singular`] if M is singular and a function needs its
-/// inverse, [`Error::Model`] for frames and constraints that the robot has not.
+/// [`Error::Function`] for an unknown name; [`Error::Twice`] for a name that occurs twice. [`Error::Missing`] if a
+/// function needs frames or constraints and none are given; [`Error::Singular`] if M is singular and a function needs
+/// its inverse. [`Error::Model`] for frames and constraints that the robot does not have.
 ///
 /// # Panics
-/// If a recording is under way on this thread.
+/// If a recording is in progress on this thread.
 pub fn functions(model: &Model, names: &[&str], settings: &Settings) -> Result<Vec<Function>, Error> {
     if let Some((_, name)) = names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
         return Err(Error::Twice { name: (*name).to_owned() });
@@ -117,7 +119,8 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
             match name {
                 _ if is_constrained => return robot.constrained(r, name),
                 "frames" => robot.frames(r, &frames),
-                // of second derivatives of accelerations M⁻¹ amplifies what another frame rounds beyond what they are checked to
+                // in second derivatives of accelerations, M⁻¹ amplifies the rounding of another frame beyond the
+                // tolerance of the tests
                 "centroidal" | "aba_hessian" => robot.unconstrained(r, name),
                 _ => {
                     robot.in_frame_of_first_body()?;
@@ -131,7 +134,7 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
     Ok(Function { limbs: limbs_of_results(model, &function), shares: settings.shares, ..function })
 }
 
-/// What a function computes, of which robot.
+/// Returns the description of a function, with the robot's name.
 fn about(name: &str, model: &Model) -> String {
     let what = match name {
         "rnea" => "Inverse dynamics, tau = M(q) a + h(q, v)",
@@ -159,7 +162,8 @@ fn about(name: &str, model: &Model) -> String {
     format!("{what}. Of the robot `{}`, nq = {nq}, nv = {nv}.", model.name().replace("*/", "* /").replace('\n', " "))
 }
 
-/// The second derivatives of a weighted sum, of which those twice by the last argument are 0.
+/// Adds the second derivatives of a weighted sum as results; the second derivatives with respect to the last argument
+/// are 0.
 fn hessian(r: &mut Recorder, [qq, vq, vv, xq]: [&Matrix<Expression>; 4], last: &str) {
     r.matrix("dqdq", qq, "derivative by q twice, symmetric");
     r.matrix("dvdq", vq, "derivative by v (rows) and q (columns)");
@@ -167,7 +171,7 @@ fn hessian(r: &mut Recorder, [qq, vq, vv, xq]: [&Matrix<Expression>; 4], last: &
     r.matrix(&format!("d{last}dq"), xq, &format!("derivative by {last} (rows) and q (columns)"));
 }
 
-/// A robot whose constants are expressions, and what all functions of it take.
+/// A robot whose constants are expressions, and the inputs that all its functions have.
 struct Robot<'s> {
     model: Model<Expression>,
     data: Data<Expression>,
@@ -199,10 +203,11 @@ impl<'s> Robot<'s> {
         Ok(Self { data: Data::new(&model), model, settings, q })
     }
 
-    /// Takes the frame in which the first body would be at rest in its neutral position for the world's: what the joints feel is
-    /// the same there, under a gravity that is turned with it, and the position of the first joint falls out of all else.
+    /// Replaces the world's frame by the frame in which the first body would be at rest in its neutral position. The
+    /// joints' dynamics are the same there, with gravity rotated accordingly, and the position of the first joint
+    /// cancels from all other results.
     ///
-    /// Where the world carries several bodies, or the first joint leads another one, it stays as it is.
+    /// If the world carries several bodies, or another joint follows the first one, nothing changes.
     fn in_frame_of_first_body(&mut self) -> Result<(), Error> {
         let Self { model, data, q, .. } = self;
         let [_, first, others @ ..] = model.nodes() else { return Ok(()) };
@@ -226,7 +231,7 @@ impl<'s> Robot<'s> {
         self.input(r, "v", "velocity")
     }
 
-    /// The external forces, where they are arguments.
+    /// Returns the external forces, if they are arguments.
     fn forces(&self, r: &mut Recorder) -> Vec<Force<Expression>> {
         if !self.settings.external_forces {
             return Vec::new();
@@ -237,7 +242,7 @@ impl<'s> Robot<'s> {
         core::iter::once(Force::zero()).chain(given).collect()
     }
 
-    /// All that needs neither frames nor constraints.
+    /// Records a function that needs neither frames nor constraints.
     fn unconstrained(&mut self, r: &mut Recorder, name: &str) {
         match name {
             "crba" => return r.matrix("M", &crba(&self.model, &self.q), "inertia matrix"),

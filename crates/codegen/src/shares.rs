@@ -1,26 +1,28 @@
-//! Shares of a function: several threads compute one state, each some of the results, where one thread would need more registers
-//! than it has.
+//! Shares of a function: several threads compute one state, each a part of the results, if one thread would need more
+//! registers than it has.
 //!
-//! Results are shared out by limbs. A limb is a subtree without forks that hangs on a body with several children, or on the world;
-//! what bears limbs is the trunk. To a limb belong the columns of its coordinates in matrices and their entries in vectors; all
-//! else is the trunk's. A value that stands in several places, as in a symmetric matrix, is computed once and belongs to the limb
-//! of the first of them, but to the trunk only if all are the trunk's.
+//! Results are shared out by limbs. A limb is a subtree without forks that is attached to a body with several children,
+//! or to the world; the bodies that carry limbs are the trunk. A limb owns the columns of its coordinates in matrices
+//! and their entries in vectors; the trunk owns the rest. A value that is stored at several indices, as in a symmetric
+//! matrix, is computed once. It belongs to the limb of the first such index, and to the trunk only if the trunk owns
+//! all of them.
 //!
-//! A share is the function without the results of the others, and without what only they need: a function like any other. So
-//! threads do not wait for each other, nor have memory in common; what several shares need, as the way along the trunk, each
-//! computes for itself. How much that is decides what a split is worth. With few states a GPU is not full, and a call takes as
-//! long as the largest share; with many states, as long as all shares together:
+//! A share is the function without the results of the other shares, and without the values that only those need: a
+//! function like any other. Threads therefore neither wait for each other nor share memory; values that several shares
+//! need, such as those along the trunk, are computed by each of them. The size of this common part determines the value
+//! of a split. With few states, the GPU is not full, and a call takes as long as the largest share. With many states,
+//! it takes as long as all shares together:
 //!
 //! ```text
 //! gain = whole / largest share        loss = sum of shares / whole        worth = gain / loss        in operations
 //! ```
 //!
-//! One begins with a share for each limb and merges, again and again, those two after which the worth is greatest; of all that one
-//! has had on this way, the whole function at its end, what is worth most is taken. That is the whole for efforts and accelerations,
-//! where the trunk needs what all limbs do; of derivatives there is a share for most limbs.
+//! The search begins with a share for each limb, and repeatedly merges the two shares that give the greatest worth. The
+//! best of all these splits is used; the last one is the whole function. For efforts and accelerations the whole
+//! function is best, since the trunk needs the values of all limbs; for derivatives, most limbs have their own share.
 //!
-//! As the loss is real, a kernel has the whole function beside its shares, and how it is launched decides: states are shared out
-//! as long as all threads are on the device at a time.
+//! Because of the loss, a kernel contains the whole function besides its shares, and each launch selects one of them.
+//! States are shared out while all threads fit on the device at the same time.
 
 use crate::function::{Function, is_needed, needed};
 use crate::graph::{Id, Node};
@@ -29,10 +31,11 @@ use condyle_model::Model;
 use core::cmp::Reverse;
 use std::collections::{BTreeSet, HashMap};
 
-/// The registers of a thread that can be used for values, of 32 bits each.
+/// Number of a thread's registers that can hold values, of 32 bits each.
 const REGISTERS: usize = 255;
 
-/// The limb of each result of a robot's function, as far as it is a column or an entry for a coordinate; else 0, the trunk.
+/// Returns the limb of each result of a robot's function, if it is a column or an entry of a coordinate; otherwise 0,
+/// the trunk.
 pub(crate) fn limbs_of_results(model: &Model, function: &Function) -> Vec<usize> {
     let of_coordinate = limbs(model);
     let own = |&(array, place): &(usize, usize)| {
@@ -57,7 +60,7 @@ pub(crate) fn limbs_of_results(model: &Model, function: &Function) -> Vec<usize>
     of_result
 }
 
-/// The limb of each coordinate of a robot; 0 is the trunk.
+/// Returns the limb of each coordinate of a robot; 0 is the trunk.
 fn limbs(model: &Model) -> Vec<usize> {
     let nodes = model.nodes();
     let mut children = vec![0; nodes.len()];
@@ -71,7 +74,7 @@ fn limbs(model: &Model) -> Vec<usize> {
     for (i, node) in nodes.iter().enumerate().skip(1).filter(|&(i, _)| !bears_limbs[i]) {
         of_body[i] = of_body[node.parent];
         if of_body[i] == 0 {
-            count += 1; // one begins here
+            count += 1; // a limb begins here
             of_body[i] = count;
         }
         of_coordinate[node.idx_v..][..node.joint.nv()].fill(of_body[i]);
@@ -79,11 +82,11 @@ fn limbs(model: &Model) -> Vec<usize> {
     of_coordinate
 }
 
-/// Some limbs, and what their results need.
+/// Some limbs, and the operations that their results need.
 #[derive(Clone)]
 struct Share {
     limbs: Vec<usize>,
-    /// Of each value whether it is an operation of this share.
+    /// Whether each value is an operation of this share.
     operations: Vec<bool>,
     count: usize,
 }
@@ -107,17 +110,17 @@ impl Share {
     }
 }
 
-/// Whether a value takes an operation: signs do not.
+/// Returns whether a value takes an operation; signs do not.
 fn is_operation(node: Node) -> bool {
     !matches!(node, Node::Constant(_) | Node::Input(_) | Node::Neg(_) | Node::Minus(_))
 }
 
-/// The largest share times the sum of all: the least is best.
+/// Returns the largest share times the sum of all shares: the smallest cost is best.
 fn cost(counts: impl Iterator<Item = usize> + Clone) -> u128 {
     counts.clone().max().unwrap_or(0) as u128 * counts.sum::<usize>() as u128
 }
 
-/// The two shares after whose union the cost is least, and that cost.
+/// Returns the two shares whose union gives the smallest cost, and this cost.
 fn best_pair(shares: &[Share]) -> Option<(u128, [usize; 2])> {
     let pairs = (0..shares.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
     let costs = pairs.map(|[a, b]| {
@@ -127,7 +130,8 @@ fn best_pair(shares: &[Share]) -> Option<(u128, [usize; 2])> {
     costs.min()
 }
 
-/// The shares of a function on numbers of some registers each, the largest one first; none where it is not split.
+/// Returns the shares of a function, the largest first; empty if it is not split. Each number takes
+/// `registers_of_number` registers.
 pub(crate) fn split(program: &Program, registers_of_number: usize) -> Vec<Function> {
     let function = program.function;
     let spills = registers_of_number * program.most_alive > REGISTERS;
@@ -153,7 +157,7 @@ pub(crate) fn split(program: &Program, registers_of_number: usize) -> Vec<Functi
 }
 
 impl Function {
-    /// The function without the results of other limbs.
+    /// Returns the function without the results of other limbs.
     fn share(&self, k: usize, limbs: &[usize]) -> Self {
         let kept = || (0..self.results.len()).filter(|&k| limbs.contains(&self.limbs[k]));
         let results: Vec<Id> = kept().map(|k| self.results[k]).collect();

@@ -1,8 +1,8 @@
-//! A step of a function: what a line of code computes.
+//! Steps of a function, each computed by one line of code.
 
 use crate::graph::{Id, Node};
 
-/// A step.
+/// Step of a function.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Step {
     /// A value as the graph computes it.
@@ -15,12 +15,12 @@ pub(crate) enum Step {
     SubMul(Id, [Id; 3]),
     /// The sine and the cosine of an angle.
     SinCos(Angle),
-    /// A loop.
+    /// A loop that computes several entries.
     Entries(Entries),
 }
 
 impl Step {
-    /// The values that it computes.
+    /// Returns the values that it computes.
     pub(crate) fn makes(&self) -> impl Iterator<Item = Id> {
         let (few, many) = match *self {
             Self::Plain(id, _) | Self::MulAdd(id, _) | Self::MulSub(id, _) | Self::SubMul(id, _) => {
@@ -32,7 +32,7 @@ impl Step {
         few.into_iter().flatten().chain(many.iter().copied())
     }
 
-    /// The values from which it computes them.
+    /// Returns the values that it uses.
     pub(crate) fn takes(&self) -> impl Iterator<Item = Id> {
         let (few, many) = match *self {
             Self::Plain(_, node) => {
@@ -47,7 +47,7 @@ impl Step {
     }
 }
 
-/// An angle, with its sine and its cosine where they are needed.
+/// An angle, with its sine and its cosine if they are needed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Angle {
     pub angle: Id,
@@ -58,21 +58,21 @@ pub(crate) struct Angle {
 /// Sums Σ ± eachₖ common for each k.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entries {
-    /// The sums, from which nothing is computed.
+    /// The sums, which no other value uses.
     pub ids: Vec<Id>,
-    /// The place of the first one among all results; the others follow.
+    /// Index of the first sum among all results; the other sums follow.
     pub first: usize,
-    /// The first one is added.
+    /// Terms; the first one is added, not subtracted.
     pub terms: Vec<Term>,
 }
 
-/// A term of each sum.
+/// Term of each sum.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Term {
-    /// Whether it is subtracted.
+    /// Whether the term is subtracted.
     pub minus: bool,
-    /// The value in each sum. These values follow one another in the work space.
+    /// The term's value in each sum. These values are adjacent in the work space.
     pub each: Vec<Id>,
-    /// What it is multiplied by in all sums. The first term may be values alone.
+    /// Factor of the term in all sums. The first term may have none.
     pub common: Option<Id>,
 }

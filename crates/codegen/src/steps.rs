@@ -1,5 +1,5 @@
-//! The steps of a function: its graph with products fused into the sums that they go into, both parts of an angle computed
-//! together, and entries of a result that are alike in a loop.
+//! Steps of a function, made from its graph: products are fused into the sums that use them, sine and cosine of an
+//! angle are computed together, and similar entries of a result are computed in a loop.
 
 use crate::entries;
 use crate::function::{Function, Operations};
@@ -8,23 +8,24 @@ use crate::step::{Angle, Step};
 use crate::sums::Sums;
 use std::collections::HashMap;
 
-/// All steps of a function, each after those from which it takes values.
+/// Steps of a function, each after the steps whose values it uses.
 #[derive(Debug)]
 pub(crate) struct Steps<'f> {
     pub nodes: &'f [Node],
-    /// The number of values.
+    /// Number of values.
     pub values: usize,
     pub all: Vec<Step>,
-    /// The angles that are known at once: those of the joints. Their sines and cosines are computed in a loop before all else.
+    /// Early angles, such as joint angles: their sines and cosines are computed in a loop before all other steps.
     pub angles: Vec<Angle>,
-    /// The values of all outputs.
+    /// Values of all outputs.
     pub results: &'f [Id],
 }
 
-/// The operations that an angle may take to be known at once.
+/// Maximum number of operations of an early angle.
 const AT_ONCE: usize = 4;
 
-/// How many operations it takes to compute a value from inputs and constants, if they are sums and products, and few.
+/// Returns the number of operations that compute a value from inputs and constants; `None` if it exceeds the maximum,
+/// or includes other operations than sums and products.
 fn operations_from_inputs(nodes: &[Node], id: Id) -> Option<usize> {
     let node = nodes[id as usize];
     match node {
@@ -44,7 +45,7 @@ fn operations_from_inputs(nodes: &[Node], id: Id) -> Option<usize> {
 }
 
 impl<'f> Steps<'f> {
-    /// The steps of a function, in the order in which they were recorded.
+    /// Returns the steps of a function, in recording order.
     pub(crate) fn new(function: &'f Function) -> Self {
         let nodes = &function.nodes[..];
         let mut all = Sums::new(nodes, &function.results).steps();
@@ -56,7 +57,7 @@ impl<'f> Steps<'f> {
                 *half = Some(id as Id);
             }
         }
-        // both halves of an angle where the first one stands
+        // sine and cosine are computed where the first of them is recorded
         all.retain_mut(|step| match *step {
             Step::Plain(_, Node::Sin(angle) | Node::Cos(angle)) => match halves.remove(&angle) {
                 Some(both) => {
@@ -81,7 +82,7 @@ impl<'f> Steps<'f> {
         steps
     }
 
-    /// Drops the steps to angles that are known at once.
+    /// Removes steps whose values are not used, such as the steps to early angles.
     fn drop_unused(&mut self) {
         let mut used = vec![false; self.values];
         self.results.iter().for_each(|&id| used[id as usize] = true);
@@ -96,7 +97,7 @@ impl<'f> Steps<'f> {
         self.all.retain(|_| kept.next() == Some(true));
     }
 
-    /// What there is to compute.
+    /// Returns the numbers of operations.
     pub(crate) fn operations(&self) -> Operations {
         let mut n = Operations { angles: self.angles.len(), ..Operations::default() };
         for step in &self.all {
@@ -118,7 +119,7 @@ impl<'f> Steps<'f> {
 }
 
 impl Function {
-    /// What it computes with.
+    /// Returns the numbers of operations.
     ///
     /// ```
     /// use condyle_codegen::record;

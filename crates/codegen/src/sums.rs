@@ -1,20 +1,22 @@
-//! Sums of products: in how many steps a sum of any length is computed, and which products go into it.
+//! Sums of products: the steps that compute a sum of any length, and the products that are fused into it.
 //!
-//! A sum that only another sum needs is part of it, so that a sum is a list of terms, each a value or a product of two. As products
-//! are fused with the sum behind them, a sum that begins with a value takes a step for each other term, wherever brackets stood;
-//! x − (a b + c d) is two steps. Terms are added in the order in which they were recorded, as soon as they are there.
+//! A sum that only another sum needs becomes part of it. A sum is therefore a list of terms, each a value or a product
+//! of two values. Since products are fused with the sum that follows, a sum that begins with a value takes one step for
+//! each other term, with any brackets; x − (a b + c d) takes two steps. Terms are added in recording order, as soon as
+//! they are available.
 
 use crate::graph::{Graph, Id, Node};
 use crate::step::Step;
 
-/// A term: a value, and whether it is subtracted.
+/// Term of a sum: a value, and whether it is subtracted.
 #[derive(Clone, Copy, Debug)]
 struct Term {
     id: Id,
     minus: bool,
 }
 
-/// The same values with all constants of a sum in one; what is no longer needed is among them.
+/// Returns the same values, with the constants of each sum combined into one; they include values that are no longer
+/// needed.
 pub(crate) fn with_constants_gathered(nodes: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
     let sums = Sums::new(nodes, results);
     let mut graph = Graph::new();
@@ -42,14 +44,14 @@ pub(crate) fn with_constants_gathered(nodes: &[Node], results: &[Id]) -> (Vec<No
     (graph.nodes, results.iter().map(|&id| new[id as usize]).collect())
 }
 
-/// The sums among the values of a function.
+/// Sums among the values of a function.
 pub(crate) struct Sums<'f> {
     nodes: &'f [Node],
-    /// How often each value is needed.
+    /// Number of uses of each value.
     uses: Vec<u32>,
-    /// How often each value is needed by sums.
+    /// Number of uses of each value by sums.
     by_sums: Vec<u32>,
-    /// The products that have a step of their own.
+    /// Whether each product has its own step.
     has_step: Vec<bool>,
 }
 
@@ -67,18 +69,18 @@ impl<'f> Sums<'f> {
         Self { nodes, uses, by_sums, has_step }
     }
 
-    /// Whether a value is part of the one sum that needs it.
+    /// Returns whether a value is part of the one sum that needs it.
     fn is_part(&self, id: Id) -> bool {
         let id = id as usize;
         is_sum(self.nodes[id]) && self.uses[id] == 1 && self.by_sums[id] == 1
     }
 
-    /// Whether a value is a product that goes into sums and nowhere else.
+    /// Returns whether a value is a product that is only used in sums.
     fn is_fused(&self, id: Id) -> bool {
         matches!(self.nodes[id as usize], Node::Mul(..)) && !self.has_step[id as usize]
     }
 
-    /// All steps, with the places among the recorded values at which they can be taken.
+    /// Returns all steps, ordered by the recorded value at which they can be taken.
     pub(crate) fn steps(mut self) -> Vec<Step> {
         let mut of_sums = Vec::new();
         for (k, &node) in self.nodes.iter().enumerate() {
@@ -101,7 +103,7 @@ impl<'f> Sums<'f> {
         steps.into_iter().map(|(_, step)| step).collect()
     }
 
-    /// The terms of a sum, and the sums that are parts of it.
+    /// Returns the terms of a sum, and the sums that are parts of it.
     fn terms(&self, root: Id) -> (Vec<Term>, Vec<Id>) {
         let (mut terms, mut parts) = (Vec::new(), Vec::new());
         let mut stack = vec![Term { id: root, minus: false }];
@@ -123,10 +125,10 @@ impl<'f> Sums<'f> {
         (terms, parts)
     }
 
-    /// The steps of a sum. What it has added up so far goes by the names of its parts.
+    /// Adds the steps of a sum. Partial sums get the ids of its parts.
     fn sum(&mut self, root: Id, steps: &mut Vec<(Id, Step)>) {
         let (mut terms, parts) = self.terms(root);
-        // a value first, else a product that goes nowhere else, else any
+        // a value first; otherwise a product that is used only here; otherwise any product
         let is_single = |term: &Term| self.uses[term.id as usize] == 1;
         let first = terms.iter().position(|term| !self.is_fused(term.id));
         let first = first.or_else(|| terms.iter().position(is_single)).unwrap_or(0);
@@ -135,7 +137,7 @@ impl<'f> Sums<'f> {
         let mut place = sum;
         let mut names = parts.into_iter().chain([root]);
         for Term { id, minus } in terms {
-            let Some(name) = names.next() else { break }; // there is one for each term but the first
+            let Some(name) = names.next() else { break }; // one for each term except the first
             place = place.max(id);
             let step = match self.nodes[id as usize] {
                 Node::Mul(a, b) if self.is_fused(id) => match (is_negative, minus) {

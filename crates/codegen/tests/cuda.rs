@@ -1,4 +1,4 @@
-//! Kernels called through a driver without a GPU (`tests/cuda_driver`), against the library that they were recorded from.
+//! Kernels called through a driver without a GPU (`tests/cuda_driver`), compared with the library's functions.
 #![allow(non_snake_case, unsafe_code)]
 
 mod common;
@@ -22,13 +22,13 @@ use std::process::Command;
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use trees::Tree;
 
-/// Sums in another order, amplified by M⁻¹; relative to the largest number.
+/// Tolerance for sums in another order, amplified by M⁻¹; relative to the largest number.
 const ROUNDING: f64 = 1e-11;
 
-/// How much further from `f64` a kernel on `f32` may be than the library on `f32` with the same states.
+/// Maximum error of an `f32` kernel relative to `f64`, as a multiple of the library's `f32` error with the same states.
 const FURTHER: f64 = 4.0;
 
-/// The driver, the compiler, and what the driver says that a real one would not.
+/// The fake driver and compiler, with access to the fake driver's records.
 struct Fake {
     driver: Driver,
     compiler: Compiler,
@@ -37,7 +37,7 @@ struct Fake {
 }
 
 impl Fake {
-    /// The libraries, built once and for one test at a time; `None` where there are no compilers.
+    /// Loads the libraries, which are built once, for one test at a time; `None` without compilers.
     fn new() -> Option<Self> {
         static FILES: OnceLock<Option<[PathBuf; 2]>> = OnceLock::new();
         static ALONE: Mutex<()> = Mutex::new(());
@@ -57,42 +57,42 @@ impl Fake {
         Some(Self {
             driver: Driver::open(driver).unwrap(),
             compiler: Compiler::open(nvrtc).unwrap(),
-            // SAFETY: it is ours.
+            // SAFETY: it is a library of this test.
             library: unsafe { Library::new(driver) }.unwrap(),
             _alone: alone,
         })
     }
 
-    /// How much memory, and how many streams, events, modules and contexts have been made and not been destroyed.
+    /// Returns the numbers of live memory blocks, streams, events, modules and contexts.
     fn live(&self) -> [c_long; 5] {
-        // SAFETY: this is its type.
+        // SAFETY: this is the function's type.
         let live = unsafe { self.library.get::<unsafe extern "C" fn(c_int) -> c_long>(b"fake_live\0") }.unwrap();
         // SAFETY: there are five kinds.
         core::array::from_fn(|kind| unsafe { live(kind as c_int) })
     }
 
     fn complaint(&self) -> String {
-        // SAFETY: this is its type, and it returns a string.
+        // SAFETY: this is the function's type, and it returns a string.
         unsafe {
             let complaint = self.library.get::<unsafe extern "C" fn() -> *const c_char>(b"fake_complaint\0").unwrap();
             CStr::from_ptr(complaint()).to_string_lossy().into_owned()
         }
     }
 
-    /// Lets the next call of a function fail.
+    /// Makes the next call of a function fail.
     fn fail(&self, function: &str, status: c_int) {
         let name = CString::new(function).unwrap();
-        // SAFETY: this is its type.
+        // SAFETY: this is the function's type.
         unsafe {
             let fail = self.library.get::<unsafe extern "C" fn(*const c_char, c_int)>(b"fake_fail\0").unwrap();
             fail(name.as_ptr(), status);
         }
     }
 
-    /// The blocks, threads of a block and rows of blocks of the last launch, and how many there have been.
+    /// Returns the blocks, threads of a block and rows of blocks of the last launch, and the number of launches.
     fn launches(&self) -> ([c_uint; 3], c_long) {
         let mut last = [0; 3];
-        // SAFETY: this is its type.
+        // SAFETY: this is the function's type.
         unsafe {
             let launches = self.library.get::<unsafe extern "C" fn(*mut c_uint) -> c_long>(b"fake_launches\0").unwrap();
             let count = launches(last.as_mut_ptr());
@@ -100,14 +100,14 @@ impl Fake {
         }
     }
 
-    /// Everything is gone, and nothing was wrong.
+    /// Checks that everything was freed and that no error occurred.
     fn end(self) {
         assert_eq!(self.complaint(), "");
         assert_eq!(self.live(), [0; 5]);
     }
 }
 
-/// What the library computes.
+/// Returns the library's results.
 fn library<S: Scalar>(model: &Model, name: &str, [q, v, x]: &[Vec<S>; 3]) -> Vec<Vec<S>> {
     let data = &mut Data::new(model);
     match name {
@@ -128,7 +128,7 @@ fn library<S: Scalar>(model: &Model, name: &str, [q, v, x]: &[Vec<S>; 3]) -> Vec
     }
 }
 
-/// The arrays of all states as kernels want them: all states' first numbers first.
+/// Returns the arrays of all states in the kernels' layout: the first numbers of all states first.
 fn side_by_side<T: Copy>(states: &[Vec<Vec<T>>]) -> Vec<Vec<T>> {
     let of = |a: usize, k: usize| states.iter().map(move |state| state[a][k]);
     (0..states[0].len()).map(|a| (0..states[0][a].len()).flat_map(|k| of(a, k)).collect()).collect()
@@ -150,7 +150,7 @@ impl Number for f32 {
     }
 }
 
-/// Calls a kernel for some numbers of states and compares each number.
+/// Calls a kernel for these numbers of states, and compares each result.
 fn check<T: Number>(device: &Device, kernels: &Kernels<T>, model: &Model, name: &str, counts: &[usize]) {
     let (stream, kernel) = (device.stream().unwrap(), kernels.kernel(name).unwrap());
     for &n in counts {
@@ -211,7 +211,7 @@ fn kernels_compute_what_the_library_computes() {
     fake.end();
 }
 
-/// Functions whose kernels have a number of shares, if there are limbs for as many.
+/// Returns functions whose kernels have this number of shares, if there are enough limbs.
 fn in_shares(model: &Model, names: &[&str], shares: usize) -> Vec<Function> {
     functions(model, names, &Settings { shares: NonZero::new(shares), ..Settings::default() }).unwrap()
 }
@@ -221,7 +221,7 @@ fn limbs_are_computed_by_threads_of_their_own() {
     let Some(fake) = Fake::new() else { return };
     let device = fake.driver.device(0).unwrap();
     let names = ["rnea", "crba", "minv", "rnea_derivatives"];
-    // four legs; two legs, two arms and a head, and their trunks
+    // four legs with a trunk; two legs, two arms and a head with a trunk
     for (model, number) in [(robots::quadruped(), 2), (robots::quadruped(), 5), (robots::humanoid(), 4)] {
         let all = in_shares(&model, &names, number);
         let double = device.compile::<f64>(&fake.compiler, "robot", &all).unwrap();
@@ -247,7 +247,7 @@ fn states_are_shared_out_while_they_are_few() {
     let kernels = device.compile::<f64>(&fake.compiler, "quadruped", &of(&quadruped, &["rnea_derivatives"])).unwrap();
     let shares = kernels.kernel("rnea_derivatives").unwrap().shares();
     assert_eq!(shares, of(&quadruped, &["rnea_derivatives"])[0].shares(Language::Cuda));
-    // eight blocks of 256 threads are on the device at a time
+    // the device runs eight blocks of 256 threads at a time
     let most = 2048 / shares;
     for (n, rows) in [(1, shares), (most, shares), (most + 1, 1), (3000, 1)] {
         check(&device, &kernels, &quadruped, "rnea_derivatives", &[n]);
@@ -263,7 +263,7 @@ fn shares_are_as_many_as_pay() {
         let function = &of(model, &[name])[0];
         [Language::Cuda, Language::CudaFloat, Language::C, Language::Rust].map(|language| function.shares(language))
     };
-    // an arm has one limb; the trunk's efforts and all accelerations need what every limb does
+    // an arm has one limb; the trunk's efforts and all accelerations need the values of every limb
     assert_eq!(shares(&robots::arm7(), "aba_derivatives"), [1; 4]);
     for model in [robots::quadruped(), robots::humanoid()] {
         for name in ["rnea", "aba", "gravity", "nonlinear_effects"] {
@@ -274,13 +274,13 @@ fn shares_are_as_many_as_pay() {
             assert!(double > 2 && single > 2 && others == [1; 2], "{name}: {double}, {single}, {others:?}");
         }
     }
-    // two arms in the world have nothing in common
+    // two arms on the world have nothing in common
     let arm = robots::arm7();
     let two = &of(&arm.append(0, Se3::identity(), &arm, "other_").unwrap(), &["aba_derivatives"])[0];
     let text = Language::Cuda.text("robot", core::slice::from_ref(two)).remove(0).text;
     let all = two.operations().total();
     assert!(text.contains(&format!("// Shares: 2, of {0}, {0} operations; all results together take {all}.", all / 2)));
-    // what is asked for is had, as far as there are limbs
+    // the requested number of shares is used, up to the number of limbs
     let asked = |model: &Model, name: &str, number| in_shares(model, &[name], number)[0].shares(Language::CudaFloat);
     assert_eq!([1, 2, 3, 9].map(|number| asked(&robots::quadruped(), "rnea", number)), [1, 2, 3, 5]);
     assert_eq!([1, 2, 9].map(|number| asked(&robots::arm7(), "aba_derivatives", number)), [1; 3]);
@@ -302,12 +302,12 @@ fn a_split_kernel_says_how_it_is_launched() {
     assert_eq!(split, text(3), "the same functions give the same text");
     let whole = text(1);
     assert!(!whole.contains("hare") && !whole.contains("blockIdx.y"));
-    // as long as nothing is asked for, how it is launched decides
+    // without a requested number, the launch decides
     let as_pays = Language::CudaFloat.text("robot", &of(&quadruped, &["rnea_derivatives"])).remove(0).text;
     assert!(as_pays.contains("if (gridDim.y == 1) return robot_float_rnea_derivatives_whole(n, i, q, v, a, "));
 }
 
-/// A launch that has fewer rows of blocks than there are shares computes all of them too.
+/// A launch with fewer rows of blocks than shares computes all shares, too.
 #[test]
 fn shares_without_a_row_of_their_own_are_not_left_out() {
     let Some(fake) = Fake::new() else { return };
@@ -316,7 +316,7 @@ fn shares_without_a_row_of_their_own_are_not_left_out() {
     let image = String::from_utf8(fake.compiler.ptx::<f64>("robot", &all, (7, 0)).unwrap()).unwrap();
     let path = image.split_whitespace().nth(4).unwrap(); // after FAKE, PTX and 70
     type Thread = unsafe extern "C" fn(*mut *mut c_void, *const c_uint, *const c_uint, c_uint, c_uint);
-    // SAFETY: it was made here.
+    // SAFETY: the library was built by this test.
     let library = unsafe { Library::new(path) }.unwrap();
     let q = random_configuration(&quadruped, &mut StdRng::seed_from_u64(1));
     let expected = crba(&quadruped, &mut Data::new(&quadruped), &q).as_slice().to_vec();
@@ -325,7 +325,7 @@ fn shares_without_a_row_of_their_own_are_not_left_out() {
         let (mut from, mut to) = (q.as_ptr(), M.as_mut_ptr());
         let mut parameters = [(&raw mut n).cast(), (&raw mut from).cast(), (&raw mut to).cast()];
         for row in 0..rows {
-            // SAFETY: this is its type, and the arrays have as many numbers as it reads and writes.
+            // SAFETY: this is the function's type, and the arrays have the length that it reads and writes.
             unsafe {
                 let thread = library.get::<Thread>(b"fake_thread_robot_crba\0").unwrap();
                 thread(parameters.as_mut_ptr(), [1, rows].as_ptr(), [0, row].as_ptr(), 0, 1);
@@ -338,7 +338,7 @@ fn shares_without_a_row_of_their_own_are_not_left_out() {
     fake.end();
 }
 
-/// Trees with every kind of joint, and joints that follow others.
+/// Tests trees with every kind of joint, and joints that follow others.
 #[test]
 fn trees_of_any_form_are_shared_out() {
     let Some(fake) = Fake::new() else { return };
@@ -369,12 +369,12 @@ fn blocks_keep_every_multiprocessor_busy() {
     let Some(fake) = Fake::new() else { return };
     let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
     let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["rnea"])).unwrap();
-    // four multiprocessors, and at most 256 threads in a block
+    // four multiprocessors; at most 256 threads in a block
     for (n, [blocks, threads]) in [(1, [1, 32]), (100, [4, 32]), (129, [3, 64]), (1024, [4, 256]), (3000, [12, 256])] {
         check(&device, &kernels, &arm, "rnea", &[n]);
         assert_eq!(fake.launches().0, [blocks, threads, 1], "{n} states");
     }
-    // rows of blocks fill them too
+    // rows of blocks also fill the multiprocessors
     let quadruped = robots::quadruped();
     let split = device.compile::<f64>(&fake.compiler, "quadruped", &in_shares(&quadruped, &["rnea"], 4)).unwrap();
     for (n, [blocks, threads]) in [(1, [1, 32]), (30, [1, 32]), (100, [1, 128]), (129, [1, 160]), (3000, [12, 256])] {
@@ -408,7 +408,7 @@ fn streams_are_ordered_by_what_is_said() {
     let expected = crba(&arm, &mut Data::new(&arm), &[0.3; 7]).as_slice().to_vec();
     let found = M.to_vec(&second).unwrap();
     assert!(found.iter().zip(&expected).all(|(x, y)| (x - y).abs() < ROUNDING));
-    // what is dropped while a kernel waits for its turn is there until it has run
+    // objects dropped while a kernel waits stay alive until it has run
     let mut again = DeviceArray::new(&device, 49).unwrap();
     kernel.call(&second, 1, &[&q], &mut [&mut again]).unwrap();
     drop(q);
@@ -426,7 +426,7 @@ fn memory_and_streams_of_others_are_used_where_they_are() {
     let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["gravity"])).unwrap();
     let theirs = device.stream().unwrap();
     let (q, mut g) = (DeviceArray::from_slice(&theirs, &[0.3; 14]).unwrap(), DeviceArray::new(&device, 14).unwrap());
-    // SAFETY: they are there until the end of the test.
+    // SAFETY: both arrays and the stream live until the end of the test.
     let (stream, [from, mut to]) = unsafe {
         let array = |a: &DeviceArray<f64>| DeviceArray::from_raw(&device, a.as_raw(), a.len());
         (Stream::from_raw(&device, theirs.as_raw()), [array(&q), array(&g)])
@@ -452,10 +452,10 @@ fn a_newer_device_gets_ptx_and_so_does_a_machine_without_a_compiler() {
     let kernels = new.compile::<f64>(&fake.compiler, "arm7", &all).unwrap();
     check(&new, &kernels, &arm, "aba", &[33]);
     let ptx = fake.compiler.ptx::<f32>("arm7", &all, (7, 0)).unwrap();
-    // SAFETY: this was made of them.
+    // SAFETY: the image was compiled from these functions.
     let loaded = unsafe { old.load::<f32>("arm7", &all, &ptx) }.unwrap();
     check(&old, &loaded, &arm, "aba", &[33]);
-    // what is elsewhere is refused
+    // objects of another device are rejected
     let (stream, other) = (new.default_stream(), old.default_stream());
     let on = |device| DeviceArray::<f64>::new(device, 7).unwrap();
     let [q, v, tau, mut a] = [&new, &new, &old, &new].map(on);
@@ -474,7 +474,7 @@ fn what_is_wrong_is_said() {
     let Some(fake) = Fake::new() else { return };
     let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
     let said = |error: Error| error.to_string();
-    assert_eq!(said(fake.driver.device(2).unwrap_err()), "device 2: there are 2");
+    assert_eq!(said(fake.driver.device(2).unwrap_err()), "no CUDA device 2: found 2 device(s)");
     let all = of(&arm, &["crba"]);
     let kernels = device.compile::<f64>(&fake.compiler, "arm7", &all).unwrap();
     let kernel = kernels.kernel("crba").unwrap();
@@ -497,7 +497,7 @@ fn what_is_wrong_is_said() {
 
     let failed = fake.compiler.ptx::<f64>("arm7", &all, (1, 0)).unwrap_err();
     assert!(said(failed).starts_with("arm7: not compiled for compute_10: status 5: "));
-    // SAFETY: the driver without a GPU reads no further than to the zero.
+    // SAFETY: the driver without a GPU reads only up to the zero.
     let failed = said(unsafe { device.load::<f64>("arm7", &all, b"no code") }.unwrap_err());
     assert_eq!(
         failed,
@@ -518,7 +518,7 @@ fn without_a_driver_that_is_said() {
     assert!(said.ends_with("; the environment variable CONDYLE_CUDA_LIBRARY may name its file"), "{said}");
     let said = Compiler::open(missing).unwrap_err().to_string();
     assert!(said.starts_with("NVIDIA's run-time compiler: cannot be loaded: no-such-file.so: "), "{said}");
-    // a library that is another one
+    // another library is not a driver
     if let Some(fake) = Fake::new() {
         let other = folder("cuda_other").join("libother.so");
         let source = other.with_extension("c");
@@ -548,7 +548,7 @@ fn several_threads_may_call_at_a_time() {
     fake.end();
 }
 
-/// NVIDIA's own compiler where it is installed; it needs no GPU.
+/// Compiles with NVIDIA's own compiler, if it is installed; it needs no GPU.
 #[test]
 fn nvidias_compiler_takes_the_code() {
     let Ok(compiler) = Compiler::new() else {

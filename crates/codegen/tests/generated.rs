@@ -1,4 +1,4 @@
-//! Generated code against the library that it was recorded from.
+//! Generated code, compared with the library's functions.
 #![allow(non_snake_case)]
 
 mod common;
@@ -21,16 +21,16 @@ use rand::{RngExt, SeedableRng};
 use std::process::Command;
 use trees::Tree;
 
-/// Sums in another order: what is recorded is not what lanes compute.
+/// Tolerance for sums in another order: recorded code and the library's lanes differ in rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// How much of the velocity an impact gives back.
+/// Restitution of impacts.
 const RESTITUTION: f64 = 0.3;
 
-/// As above, where M⁻¹ or Λ stands in between: it amplifies roundings by its condition.
+/// Tolerance for results that use M⁻¹ or Λ, whose condition amplifies rounding.
 const THROUGH_INVERSE: f64 = 1e-11;
 
-/// The same times the condition of M of trees whose bodies are as they come.
+/// Returns the tolerance for random trees, whose M may have a large condition.
 fn bound_of_trees(name: &str) -> f64 {
     if bound(name) == ROUNDING { ROUNDING } else { 1e-9 }
 }
@@ -48,7 +48,7 @@ fn all_robots() -> [(&'static str, Model, Settings); 3] {
     [("arm", arm, a), ("quadruped", quadruped, q), ("humanoid", humanoid, h)]
 }
 
-/// q, v, numbers for a or τ, and for λ.
+/// Returns q, v, numbers for a or τ, and numbers for λ.
 fn state(model: &Model, rng: &mut StdRng) -> [Vec<f64>; 4] {
     let mut numbers = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
     let [v, x, lambda] = [(); 3].map(|()| numbers(model.nv()));
@@ -60,7 +60,7 @@ fn matrix(m: &DenseMatrix<f64, impl Dense<f64>>) -> Vec<f64> {
     m.as_slice().to_vec()
 }
 
-/// What the library computes.
+/// Returns the library's results.
 fn expected(
     model: &Model,
     settings: &Settings,
@@ -140,7 +140,7 @@ fn bound(name: &str) -> f64 {
     if through_inverse { THROUGH_INVERSE } else { ROUNDING }
 }
 
-/// The arguments of a function at a state.
+/// Returns the arguments of a function at a state.
 fn arguments(function: &Function, state: &[Vec<f64>; 4]) -> Vec<Vec<f64>> {
     match function.name.starts_with("impulse_dynamics") {
         true => vec![state[0].clone(), state[1].clone(), vec![RESTITUTION]],
@@ -148,12 +148,12 @@ fn arguments(function: &Function, state: &[Vec<f64>; 4]) -> Vec<Vec<f64>> {
     }
 }
 
-/// Whether compilers may be kept busy for some minutes, as `./test full` does.
+/// Returns whether the test may run compilers for several minutes, as `./test full` does.
 fn is_full() -> bool {
     std::env::var_os("CONDYLE_FULL").is_some()
 }
 
-/// The functions that compilers are given for a robot: those of which the code is not long, or nearly all.
+/// Returns the functions to be compiled for a robot: functions with short code, or nearly all functions.
 fn for_compilers(robot: &str) -> Vec<&'static str> {
     let short = ["rnea", "aba", "crba", "gravity", "nonlinear_effects", "frames", "centroidal"];
     match robot {
@@ -165,7 +165,7 @@ fn for_compilers(robot: &str) -> Vec<&'static str> {
     }
 }
 
-/// Compares what `compute` makes of functions at some states with the library.
+/// Compares the results of `compute` for functions at some states with the library.
 fn check(
     what: &str,
     names: impl Fn(&str) -> Vec<&'static str>,
@@ -197,7 +197,7 @@ fn what_is_recorded_is_what_the_library_computes() {
     );
 }
 
-/// Trees with every kind of joint, and joints that follow others.
+/// Tests trees with every kind of joint, and joints that follow others.
 #[test]
 fn random_robots() {
     for seed in 0..4 {
@@ -249,7 +249,7 @@ fn c_computes_what_the_library_does() {
     check("C", for_compilers, |robot, all, inputs| {
         let program = programs.entry(robot.to_owned()).or_insert_with(|| {
             let flags = ["-O0", "-fsanitize=undefined", "-fno-sanitize-recover"];
-            // the checks are in every line: of long code they take minutes
+            // the sanitiser checks every line: for long code this takes minutes
             let flags = if robot == "humanoid" { &flags[..1] } else { &flags };
             Program::c(&folder(&format!("c_{robot}")), all, Language::C, flags)
         });
@@ -262,7 +262,7 @@ fn rust_computes_what_the_library_does() {
     if !is_there("rustc") {
         return;
     }
-    // rustc takes ten times as long as the compilers of C
+    // rustc takes ten times as long as C compilers
     let short = |robot: &str| -> Vec<&'static str> {
         let all = for_compilers(robot);
         all.into_iter().filter(|name| !name.contains("hessian") && (robot == "arm" || !name.contains("_d"))).collect()
@@ -274,7 +274,7 @@ fn rust_computes_what_the_library_does() {
     });
 }
 
-/// Vectors of four and eight states give each state what it gets alone.
+/// Vectors of four and eight states give each state the same results as a single call.
 #[test]
 fn vectors_compute_what_the_library_does() {
     if !is_there("cc") {
@@ -321,7 +321,7 @@ fn vectors_compute_what_the_library_does() {
     }
 }
 
-/// What single precision rounds, of numbers that condition amplifies.
+/// Tolerance of single precision, for numbers whose rounding is amplified by the condition.
 const SINGLE: f64 = 2e-3;
 
 #[test]
@@ -348,7 +348,7 @@ fn floats_are_near() {
     }
 }
 
-/// Files of all languages of one robot lie in one folder, and a program has the functions of all that are C.
+/// Files of all languages for one robot fit in one folder, and one program can contain all functions in C.
 #[test]
 fn languages_share_a_folder_and_a_program() {
     let arm = robots::arm7();
@@ -382,7 +382,7 @@ fn languages_share_a_folder_and_a_program() {
     assert_eq!(said, format!("{second:.3}\n").repeat(6));
 }
 
-/// What cannot move has functions without a number: compilers have nothing to say about them.
+/// A robot without joints has functions without numbers: compilers report nothing.
 #[test]
 fn robots_without_joints() {
     let stone = ModelBuilder::new("stone").build().unwrap();
@@ -402,7 +402,7 @@ fn robots_without_joints() {
     }
 }
 
-/// Two functions of one name would be one too many for a compiler.
+/// A function that is named twice is rejected, since compilers would reject it.
 #[test]
 fn functions_are_named_once() {
     let error = functions(&robots::arm7(), &["aba", "rnea", "aba"], &Settings::default()).unwrap_err();
@@ -410,7 +410,7 @@ fn functions_are_named_once() {
     assert_eq!(error.to_string(), "aba: named twice");
 }
 
-/// A user's own function: a cost with choices, angles and roots, and its Jacobian by dual numbers.
+/// Computes a user's own function: a cost with selections, angles and roots, whose Jacobian comes from dual numbers.
 fn own<S: Scalar>(q: &[S], tool: Vec3<S>) -> Vec<S> {
     let reach = (tool.x * tool.x + tool.y * tool.y).sqrt();
     let is_low = tool.z.lt(S::splat(0.4));
@@ -420,7 +420,7 @@ fn own<S: Scalar>(q: &[S], tool: Vec3<S>) -> Vec<S> {
     vec![penalty * penalty + both, tool.y.atan2(tool.x), q[1].abs() * S::splat(3.0)]
 }
 
-/// A product of a matrix and vectors, the sums of which are loops, one whose sums begin with a value, and a copy of an entry.
+/// Records a product of a matrix and vectors, computed in loops; sums that begin with a value; and a copy of an entry.
 #[test]
 fn entries_that_are_alike_are_computed_in_loops() {
     let function = record("alike", "Products with a matrix of squares.", |r| {

@@ -1,6 +1,6 @@
-//! Names that code can have: the module is compiled into this program, without the rest of the library once more.
+//! Valid identifiers. The module is compiled into this program, without the rest of the library.
 
-#[allow(dead_code, unreachable_pub)] // the crate uses all of it, and exports a part
+#[allow(dead_code, unreachable_pub)] // the crate uses all of the module, and exports a part
 #[path = "../src/identifiers.rs"]
 mod identifiers;
 

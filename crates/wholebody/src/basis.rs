@@ -1,35 +1,35 @@
-//! The split of unknowns by equalities: x_B = p − T z; and rows of coefficients over z.
+//! Splits the unknowns by equalities, x_B = p − T z, and maps rows of coefficients to z.
 
 use crate::cone_program::ConeProgram;
 use crate::numbers::Reader;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, add_product_vector, at_level, max_abs, product_without_slack};
 use nalgebra::DMatrix;
 
-/// Pivots smaller than this part of the row's largest entry in the beginning say that a row depends on others.
+/// Smallest pivot, relative to the row's largest entry at the start; a row without a larger one depends on other rows.
 const DEPENDENT: f64 = 1e-8;
 
-/// A pivot of the last tick serves again if it is at least this part of the row's largest entry.
+/// Smallest pivot of the last tick that is used again, relative to the row's largest entry.
 const KEEP: f64 = 0.05;
 
-/// Where an unknown is.
+/// Index of an unknown among the basic unknowns or among the others.
 #[derive(Clone, Copy)]
 enum Place {
     Basic(usize),
     Other(usize),
 }
 
-/// Basic and other unknowns, and the map from z to x.
+/// Basic unknowns, other unknowns (z), and the map from z to x.
 pub(crate) struct Basis {
-    /// The basic unknowns.
+    /// Basic unknowns, as indices in x.
     pub basic: Vec<usize>,
-    /// The unknowns in z.
+    /// Other unknowns (z), as indices in x.
     pub others: Vec<usize>,
     places: Vec<Place>,
-    /// T, other × basic, with slack rows.
+    /// T, other × basic, with padding rows.
     T: DMatrix<f64>,
     /// p.
     pub p: Vec<f64>,
-    /// Scratch: the basic columns of some rows. Shape: rows × basic, with slack.
+    /// Scratch: the basic columns of some rows. Shape: rows × basic, with padding.
     basic_part: DMatrix<f64>,
 }
 
@@ -45,12 +45,12 @@ impl Basis {
         }
     }
 
-    /// The coefficients of z in a basic unknown, with the opposite sign.
+    /// Returns the coefficients of z in a basic unknown, with the opposite sign.
     pub(crate) fn column(&self, i: usize) -> &[f64] {
         &self.T.as_slice()[i * self.T.nrows()..][..self.others.len()]
     }
 
-    /// (G_N − G_B T)ᵀ and G_B p, for the first rows, which are columns of `from`; `particular` has slack.
+    /// Computes (G_N − G_B T)ᵀ and G_B p for the first rows, which are columns of `from`; `particular` has padding.
     pub(crate) fn map_dense_rows(
         &mut self,
         from: &DMatrix<f64>,
@@ -78,7 +78,7 @@ impl Basis {
         }
     }
 
-    /// The row that has a 1 for one unknown, as row r of `to`, a column for each; what it is at z = 0.
+    /// Writes the row that has a 1 for one unknown as column r of `to`, and returns its value at z = 0.
     pub(crate) fn map_single_row(&self, unknown: usize, to: &mut DMatrix<f64>, r: usize) -> f64 {
         let (n, ldt) = (self.others.len(), to.nrows());
         let to = &mut to.as_mut_slice()[r * ldt..][..n];
@@ -97,7 +97,7 @@ impl Basis {
         }
     }
 
-    /// A row of which most entries are 0; what it is at z = 0.
+    /// Maps a row with few non-zero entries to z, writes it as column r of `to`, and returns its value at z = 0.
     pub(crate) fn map_row(&self, from: &DMatrix<f64>, r: usize, to: &mut DMatrix<f64>) -> f64 {
         let ldt = to.nrows();
         let row = &from.as_slice()[r * from.nrows()..][..self.places.len()];
@@ -118,7 +118,7 @@ impl Basis {
         particular
     }
 
-    /// x of z.
+    /// Computes x from z.
     pub(crate) fn expand(&self, z: &[f64], x: &mut [f64]) {
         for (&j, &z) in self.others.iter().zip(z) {
             x[j] = z;
@@ -129,12 +129,12 @@ impl Basis {
     }
 }
 
-/// The elimination, with room for the largest program.
+/// The elimination, with memory for the largest program.
 pub(crate) struct Elimination {
-    /// Scratch: Aᵀ while it is being eliminated. Shape: unknowns × equalities, with slack rows.
+    /// Scratch: Aᵀ while it is being eliminated. Shape: unknowns × equalities, with padding rows.
     W: DMatrix<f64>,
     right: Vec<f64>,
-    /// Equality and unknown of each pivot in their order. Those of the last call are tried first.
+    /// Equality and unknown of each pivot, in elimination order. The pivots of the last call are tried first.
     pivots: Vec<(usize, usize)>,
     /// (equalities, unknowns) of the last call.
     shape: (usize, usize),
@@ -152,7 +152,7 @@ impl Elimination {
         }
     }
 
-    /// Splits the unknowns by A x = b; as in the call before where that serves.
+    /// Splits the unknowns by A x = b, with the pivots of the last call where they serve.
     pub(crate) fn split(&mut self, program: &ConeProgram, basis: &mut Basis) {
         let (n, equalities) = (program.size.unknowns, program.size.equalities);
         if self.shape != (equalities, n) || !self.eliminate(program, true) {
@@ -171,7 +171,7 @@ impl Elimination {
         }
     }
 
-    /// Writes which unknowns the pivots make basic.
+    /// Writes which unknowns are basic according to the pivots.
     fn place(&self, basis: &mut Basis) {
         basis.basic.clear();
         basis.basic.extend(self.pivots.iter().map(|pivot| pivot.1));
@@ -181,14 +181,14 @@ impl Elimination {
         basis.basic.iter().enumerate().for_each(|(i, &j)| basis.places[j] = Place::Basic(i));
     }
 
-    /// Writes the pivots of the last call, which are tried first.
+    /// Writes the pivots of the last call, which the next call tries first.
     pub(crate) fn write(&self, out: &mut Vec<f64>) {
         let (rows, unknowns) = self.shape;
         out.extend([rows, unknowns, self.pivots.len()].map(|x| x as f64));
         out.extend(self.pivots.iter().flat_map(|&(row, unknown)| [row as f64, unknown as f64]));
     }
 
-    /// Reads the pivots of an elimination of the same capacity; `None` if they are none.
+    /// Reads the pivots of an elimination with the same capacity; `None` if they are invalid.
     pub(crate) fn read(&mut self, basis: &mut Basis, from: &mut Reader<'_>) -> Option<()> {
         let (most, unknowns) = (self.used.len(), basis.places.len());
         self.shape = (from.index(most + 1)?, from.index(unknowns + 1)?);
@@ -205,7 +205,8 @@ impl Elimination {
         Some(())
     }
 
-    /// Gauss–Jordan elimination; with the pivots of the last call, unless one of them has become too small.
+    /// Runs Gauss–Jordan elimination. With `again` it uses the pivots of the last call, and fails if one has become too
+    /// small.
     fn eliminate(&mut self, program: &ConeProgram, again: bool) -> bool {
         let Self { W, right, used, pivots, .. } = self;
         let (n, m, stride) = (program.size.unknowns, program.size.equalities, W.nrows());
@@ -250,13 +251,13 @@ impl Elimination {
             used[row] = true;
             at_level(Pivot { W: &mut W[..m * stride], right, stride, row, j });
         }
-        // A row that seemed to depend on others may do so no longer.
+        // A row that depended on others in the last call may be independent now.
         !again || (0..m).all(|r| used[r] || max_abs(&W[r * stride..][..n]) <= DEPENDENT)
     }
 }
 
-/// One step of the elimination: row `row` is divided by its coefficient of unknown j and taken off the other rows, so that it
-/// alone has j.
+/// One step of the elimination: divides row `row` by its coefficient of unknown j and subtracts it from the other rows,
+/// so that it alone contains j.
 struct Pivot<'a> {
     W: &'a mut [f64],
     right: &'a mut [f64],

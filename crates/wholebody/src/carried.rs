@@ -1,8 +1,8 @@
-//! The numbers that a controller carries from one tick to the next: for clones, and for files.
+//! Numbers that a controller carries from one tick to the next: for clones and for files.
 //!
-//! All else follows from the description (model, contacts, tasks, settings) and from the arguments of a step. A controller that
-//! is made of the same description and given these numbers continues with the same bits, with [`Backend::InteriorPoint`]. With
-//! clarabel, whose solvers are built again, it continues with the same solution up to its tolerance.
+//! All other numbers follow from the description (model, contacts, tasks, settings) and from the arguments of a step.
+//! With [`Backend::InteriorPoint`], a controller made from the same description and given these numbers continues with
+//! the same bits. Clarabel's solvers are built again: it continues with the same solution up to its tolerance.
 //!
 //! [`Backend::InteriorPoint`]: crate::Backend::InteriorPoint
 
@@ -15,16 +15,16 @@ use crate::numbers::{Reader, flag};
 use crate::safety::Safety;
 use condyle_spatial::{Force, Vec3};
 
-/// Names of arguments and of references in a [`Status`], by which it is written as numbers.
+/// Names of arguments and references in a [`Status`]; a name is written as its index in this list.
 const NAMES: [&str; 8] = ["q", "v", "com", "frames", "posture", "momentum", "contacts", "posture.q"];
 
-/// Sources of a command, in the order of their numbers.
+/// Sources of a command; a source is written as its index in this list.
 const SOURCES: [CommandSource; 3] =
     [CommandSource::Solution, CommandSource::LastSolution, CommandSource::GravityCompensation];
 
 impl Clone for WholeBodyController {
-    /// A controller with memory of its own that continues as this one does: with the same bits, or with
-    /// clarabel (whose solvers are built again) with the same solution up to its tolerance.
+    /// Returns a controller with its own memory that continues as this one does, with the same bits. Clarabel's solvers
+    /// are built again: it continues with the same solution up to its tolerance.
     fn clone(&self) -> Self {
         let contacts: Vec<_> = self.equations.contacts.iter().map(|contact| contact.description.clone()).collect();
         let tasks: Vec<_> = self.objective.tasks.iter().map(|task| task.task.clone()).collect();
@@ -36,7 +36,7 @@ impl Clone for WholeBodyController {
 }
 
 impl WholeBodyController {
-    /// The numbers that it carries from one tick to the next.
+    /// Returns the numbers that the controller carries from one tick to the next.
     #[doc(hidden)]
     pub fn carried(&self) -> Vec<f64> {
         let mut numbers = Vec::new();
@@ -47,7 +47,7 @@ impl WholeBodyController {
         numbers
     }
 
-    /// Takes the numbers that a controller of the same description carried; `false` if they are none.
+    /// Restores the numbers carried by a controller of the same description; returns whether they were valid.
     #[doc(hidden)]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let mut from = Reader::new(numbers);

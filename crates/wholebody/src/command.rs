@@ -8,7 +8,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum CommandSource {
-    /// The program's solution; or, where the solver did not finish, an iterate that holds all constraints.
+    /// The program's solution; or an iterate that satisfies all constraints, if the solver did not finish.
     Solution,
     /// The last solution, at most [`Settings::hold_ticks`](crate::Settings::hold_ticks) old.
     LastSolution,
@@ -26,9 +26,9 @@ impl fmt::Display for CommandSource {
     }
 }
 
-/// Command of a tick. Its numbers are finite, and `tau` is within the limits, whatever the status says.
+/// Command of a tick. Its numbers are finite, and `tau` is within the limits, for every status.
 ///
-/// Constraints hold to the solver's tolerance: with the default, a force may leave its cone by some 1e-7 N.
+/// Constraints hold to the solver's tolerance: with the default, a force may leave its cone by about 1e-7 N.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Command {
     /// Status of the step.
@@ -37,20 +37,22 @@ pub struct Command {
     pub source: CommandSource,
     /// τ, the efforts of the motors: nv numbers (N m, N), 0 at a free-flyer.
     pub tau: Vec<f64>,
-    /// q̈, the acceleration that follows if the contacts hold: nv numbers (rad/s², m/s²). Of a safe command, the last one's.
+    /// q̈, the acceleration that results if the contacts hold: nv numbers (rad/s², m/s²). In a safe command: the last
+    /// solution's.
     pub a: Vec<f64>,
-    /// Force of the environment on the robot at each contact, about the frame's origin along the world's axes (N, N m). Of a
-    /// safe command, the last one's.
+    /// Force of the environment on the robot at each contact, about the frame's origin, along the world's axes (N, N
+    /// m). In a safe command: the last solution's.
     pub forces: Vec<Force<f64>>,
-    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²). Of a safe command, the last one's.
+    /// c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²). In a safe command: the last solution's.
     pub com_acceleration: Vec3<f64>,
-    /// Violation of the worst constraint (N, N m, m/s²). Of a safe command, the last one's.
+    /// Violation of the worst constraint (N, N m, m/s²). In a safe command: the last solution's.
     pub violation: f64,
     /// Iterations of the solver.
     pub iterations: u32,
-    /// Whether the solver fell short of [`Settings::tolerance`](crate::Settings::tolerance) and met only its reduced one.
+    /// Whether the solver missed [`Settings::tolerance`](crate::Settings::tolerance) and met only its reduced
+    /// tolerance.
     pub reduced_accuracy: bool,
-    /// Whether the limits of joints had to give way to dynamics, contacts and torques.
+    /// Whether joint limits were relaxed in favour of dynamics, contacts and torques.
     pub limits_relaxed: bool,
 }
 

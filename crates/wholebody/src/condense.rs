@@ -1,8 +1,8 @@
 //! Eliminates equalities from a program, so that fewer unknowns remain.
 //!
-//! Gauss–Jordan elimination with complete pivoting splits x into basic unknowns, one for each independent equality, and the
-//! others, z: x_B = p − T z. Equalities that depend on others (redundant contacts, say) have no pivot and are left out.
-//! What is then minimised over z, with n_B = number of basic unknowns:
+//! Gauss–Jordan elimination with complete pivoting splits x into basic unknowns, one for each independent equality, and
+//! the others, z: x_B = p − T z. Equalities that depend on others (for example redundant contacts) have no pivot and
+//! are left out. The program over z, with n_B = number of basic unknowns:
 //!
 //! ```text
 //! ½ ‖(R_N − R_B T) z − (b − R_B p)‖² + …     l − G_B p ≤ (G_N − G_B T) z ≤ u − G_B p     h + F_B p + (F_N − F_B T) z ∈ Q
@@ -17,35 +17,35 @@ use crate::memory::Places;
 use condyle_linalg::{SLACK, View, add_product_lower, add_scaled_product};
 use nalgebra::DMatrix;
 
-/// What is known of a program. The rows of G stand in this order: first those with few zeros, then those that bound one
-/// unknown, then the others.
+/// Known structure of a program. The rows of G come in three groups: rows with few zeros, rows that bound one unknown,
+/// other rows.
 #[derive(Clone, Copy)]
 pub(crate) struct Known<'a> {
-    /// How many rows have few zeros.
+    /// Number of rows with few zeros.
     pub dense: usize,
-    /// The unknown of each row that bounds one.
+    /// Unknown of each row that bounds a single unknown.
     pub single: &'a [usize],
-    /// Which unknowns and constraints they are.
+    /// Indices of the unknowns and constraints in use.
     pub places: &'a Places,
 }
 
-/// The elimination of one priority's equalities, with room for the largest program.
+/// The elimination of one priority's equalities, with memory for the largest program.
 pub(crate) struct Condenser {
     pub elimination: Elimination,
     pub basis: Basis,
-    /// Scratch: rows of the objective. Shape: other × rows, with slack.
+    /// Scratch: rows of the objective. Shape: other × rows, with padding.
     rows: DMatrix<f64>,
     right_side: Vec<f64>,
-    /// Scratch: P, with slack rows.
+    /// Scratch: P, with padding rows.
     P: DMatrix<f64>,
-    /// Scratch: what rows are at z = 0.
+    /// Scratch: values of the rows at z = 0.
     particular: Vec<f64>,
     /// Scratch: z.
     z: Vec<f64>,
 }
 
 impl Condenser {
-    /// For programs of at most such a size, and objectives of at most so many rows.
+    /// Allocates memory for programs up to this size and objectives up to this number of rows.
     pub(crate) fn new(capacity: Size, objective: usize) -> Self {
         let Size { unknowns, equalities, rows, .. } = capacity;
         let tall = unknowns + SLACK;
@@ -61,7 +61,7 @@ impl Condenser {
         }
     }
 
-    /// The program over z of one over x with an objective over x.
+    /// Writes the program over z that is equivalent to a program over x with an objective over x.
     pub(crate) fn condense(
         &mut self,
         full: &ConeProgram,
@@ -96,7 +96,7 @@ impl Condenser {
         self.objective(objective, out);
     }
 
-    /// z of x.
+    /// Returns z, the entries of x that are not basic.
     pub(crate) fn reduce(&mut self, x: &[f64]) -> &[f64] {
         let z = &mut self.z[..self.basis.others.len()];
         for (z, &j) in z.iter_mut().zip(&self.basis.others) {
@@ -105,7 +105,7 @@ impl Condenser {
         z
     }
 
-    /// P and c of the least squares over z.
+    /// Computes P and c of the least squares over z.
     fn objective(&mut self, from: &LeastSquares, out: &mut ConeProgram) {
         let Self { basis, rows, right_side, P, particular, .. } = self;
         let (n, tall) = (basis.others.len(), rows.nrows());

@@ -1,20 +1,20 @@
-//! Where a robot may touch its environment, and which forces act there.
+//! Contacts of a robot with its environment, and the forces that act there.
 
 use crate::error::Error;
 use condyle_spatial::{Mat3, Vec3};
 
-/// The direction in which the environment pushes; of any length but 0.
+/// Direction in which the environment pushes; of any length except 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Normal {
-    /// Along the world's axes: the ground stays as it is when the foot turns. For points.
+    /// Along the world's axes: the direction stays the same when the foot turns. For points.
     World(Vec3<f64>),
-    /// Along the frame's axes: it turns with the frame.
+    /// Along the frame's axes: the direction turns with the frame.
     Frame(Vec3<f64>),
 }
 
 impl Normal {
-    /// The direction, along the axes in which it is given.
+    /// Returns the direction, along the axes in which it is given.
     pub fn direction(self) -> Vec3<f64> {
         let (Self::World(n) | Self::Frame(n)) = self;
         n
@@ -31,24 +31,24 @@ pub enum SurfaceForces {
     Wrench,
 }
 
-/// Shape that touches.
+/// Shape of the contact.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Shape {
-    /// The frame's origin: it is held, the frame may turn about it.
+    /// The frame's origin: the origin is held, and the frame may turn about it.
     Point,
     /// An edge (two corners: the frame may turn about it) or a convex polygon (three or more: the frame is held).
     Surface {
-        /// In the frame, in their order around the polygon, in one plane across the normal (m).
+        /// Corners in the frame (m), in order around the polygon, in one plane perpendicular to the normal.
         corners: Vec<Vec3<f64>>,
-        /// By which unknowns.
+        /// Unknowns that describe the force.
         forces: SurfaceForces,
     },
 }
 
-/// A contact with friction: what touches is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+/// A contact with friction: its point or surface is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
 ///
-/// Whether it touches at a tick, and how strongly, is said by [`ContactTarget::activation`](crate::ContactTarget).
+/// [`ContactTarget::activation`](crate::ContactTarget) sets whether it touches at a tick, and how strongly.
 ///
 /// ```
 /// use condyle_wholebody::{FrictionContact, Normal};
@@ -58,46 +58,47 @@ pub enum Shape {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct FrictionContact {
-    /// The name of a frame.
+    /// Name of the contact's frame.
     pub frame: String,
-    /// What touches.
+    /// Shape of the contact.
     pub shape: Shape,
     /// The direction in which the environment pushes.
     pub normal: Normal,
-    /// μ, Coulomb's coefficient; above 0.
+    /// μ, Coulomb's friction coefficient; above 0.
     pub friction: f64,
-    /// γ (m): the moment about the normal of a [wrench](SurfaceForces::Wrench) is at most γ f_n. `None` for ⅔ μ r, what a
-    /// disc of radius r turns with under an even pressure, r being that of the greatest disc about the corners' mean within
-    /// the polygon; for ½ μ l on an edge of length 2 l.
+    /// γ (m): |yaw moment| of a [wrench](SurfaceForces::Wrench) ≤ γ f_n. `None`: ⅔ μ r, with r the radius of the
+    /// largest circle about the corners' mean inside the polygon (exact for a uniformly loaded disc); ½ μ l for an edge
+    /// of length 2 l.
     pub yaw_friction: Option<f64>,
-    /// Least normal force of the whole contact (N); at least 0.
+    /// Minimum normal force of the whole contact (N); at least 0.
     pub min_force: f64,
-    /// Greatest normal force of the whole contact (N); may be infinite.
+    /// Maximum normal force of the whole contact (N); may be infinite.
     pub max_force: f64,
 }
 
 impl FrictionContact {
-    /// A point on level ground.
+    /// Creates a point contact on level ground.
     pub fn point(frame: &str, friction: f64) -> Self {
         let normal = Normal::World(Vec3::new(0.0, 0.0, 1.0));
         let (frame, shape) = (frame.to_owned(), Shape::Point);
         Self { frame, shape, normal, friction, yaw_friction: None, min_force: 0.0, max_force: f64::INFINITY }
     }
 
-    /// A convex polygon (or an edge) of corners in the frame, whose normal is the frame's z, by its wrench.
+    /// Creates a contact of a convex polygon (or an edge) with these corners in the frame. The normal is the frame's z,
+    /// and the force is described by its wrench.
     pub fn surface(frame: &str, friction: f64, corners: &[Vec3<f64>]) -> Self {
         let shape = Shape::Surface { corners: corners.to_vec(), forces: SurfaceForces::Wrench };
         Self { shape, normal: Normal::Frame(Vec3::new(0.0, 0.0, 1.0)), ..Self::point(frame, friction) }
     }
 
-    /// A rectangle about the frame's origin with sides along the frame's x and y (m).
+    /// Creates a rectangle about the frame's origin, with sides along the frame's x and y (m).
     pub fn sole(frame: &str, friction: f64, [length, width]: [f64; 2]) -> Self {
         let (x, y) = (0.5 * length, 0.5 * width);
         let corners = [[x, y], [-x, y], [-x, -y], [x, -y]].map(|[x, y]| Vec3::new(x, y, 0.0));
         Self::surface(frame, friction, &corners)
     }
 
-    /// The same contact with a force at each corner.
+    /// Returns the same contact with a force at each corner.
     #[must_use]
     pub fn by_corners(mut self) -> Self {
         if let Shape::Surface { forces, .. } = &mut self.shape {
@@ -169,7 +170,8 @@ impl FrictionContact {
         };
         let turns: Vec<f64> = (0..flat.len()).map(turn).collect();
         let edge = flat.len() == 2;
-        // Each turn to the left; all together one round, which a star's would exceed: the centre lies left of each edge.
+        // Each turn is to the left, and all turns make one round (a star makes more): the centre then lies left of each
+        // edge.
         let left = turns.iter().all(|&t| t > 0.0);
         if !edge && !left {
             if !turns.iter().all(|&t| t < 0.0) {
@@ -193,35 +195,36 @@ impl FrictionContact {
     }
 }
 
-/// What is fixed of a contact.
+/// Constant geometry of a contact.
 #[derive(Clone, Debug)]
 pub(crate) struct Geometry {
-    /// The corners' mean, in the frame.
+    /// Mean of the corners, in the frame.
     pub centre: Vec3<f64>,
-    /// (t₁, t₂, n), right-handed; in the frame, or in the world if the normal is.
+    /// (t₁, t₂, n), right-handed; in the world if the normal is given there, otherwise in the frame.
     pub axes: Mat3<f64>,
-    /// Corners along t₁ and t₂ from the centre, counterclockwise about n; none for a point.
+    /// Corners along t₁ and t₂ from the centre, counterclockwise about n; empty for a point.
     pub corners: Vec<[f64; 2]>,
     pub by_corners: bool,
-    /// Which of the motion's six numbers are held; the wrench has the same.
+    /// Components of the six-dimensional motion that are held; the wrench has the same components.
     pub motion: &'static [usize],
     /// γ.
     pub yaw: f64,
 }
 
 impl Geometry {
-    /// How many unknowns the force has.
+    /// Returns the number of unknowns of the force.
     pub(crate) fn unknowns(&self) -> usize {
         if self.by_corners { 3 * self.corners.len() } else { self.motion.len() }
     }
 
-    /// How many friction cones there are; that of number k is on unknowns 3 k to 3 k + 2: t₁, t₂, n.
+    /// Returns the number of friction cones; cone k acts on unknowns 3 k to 3 k + 2: t₁, t₂, n.
     pub(crate) fn cones(&self) -> usize {
         if self.by_corners { self.corners.len() } else { 1 }
     }
 
-    /// What the square of unknown j is weighted by beside that of a force: a moment counts as the forces at the corners that
-    /// make it, 1 / r² with the root mean square r of the corners' distances from its axis.
+    /// Returns the weight of the square of unknown j, relative to a force's weight. A moment has the weight 1 / r²,
+    /// with r the root mean square of the corners' distances from its axis: it counts as the corner forces that cause
+    /// it.
     pub(crate) fn weight(&self, j: usize) -> f64 {
         let (row, count) = (self.motion[j % self.motion.len()], self.corners.len() as f64);
         let mean = |square: &dyn Fn(&[f64; 2]) -> f64| self.corners.iter().map(square).sum::<f64>() / count;
@@ -234,7 +237,7 @@ impl Geometry {
         }
     }
 
-    /// The half-planes (a, b, c) with a x + b y + c ≥ 0 in which the centre of pressure of a wrench lies.
+    /// Returns the half-planes (a, b, c), a x + b y + c ≥ 0, in which the centre of pressure of a wrench lies.
     pub(crate) fn edges(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let count = if self.by_corners { 0 } else { self.corners.len() };
         (0..count).map(move |k| {
@@ -243,7 +246,7 @@ impl Geometry {
         })
     }
 
-    /// Row r of the wrench that unknown j makes, in the contact's axes at the centre.
+    /// Returns row r of the wrench caused by a unit of unknown j, along the contact's axes and about the centre.
     pub(crate) fn wrench(&self, r: usize, j: usize) -> f64 {
         if !self.by_corners {
             return f64::from(u8::from(self.motion[j] == r));
@@ -260,7 +263,8 @@ impl Geometry {
     }
 }
 
-/// (a, b, c): a x + b y + c is the distance of (x, y) from the line through two corners, above 0 on its left.
+/// Returns (a, b, c): a x + b y + c is the signed distance of (x, y) from the line through two corners, positive on its
+/// left.
 fn inside(from: [f64; 2], to: [f64; 2]) -> [f64; 3] {
     let (x, y) = (to[0] - from[0], to[1] - from[1]);
     let length = x.hypot(y);
@@ -268,9 +272,9 @@ fn inside(from: [f64; 2], to: [f64; 2]) -> [f64; 3] {
     [a, b, -(a * from[0] + b * from[1])]
 }
 
-/// Unit vectors (t₁, t₂, n), right-handed, for a unit vector n.
+/// Returns unit vectors (t₁, t₂, n), right-handed, for a unit vector n.
 fn axes(n: Vec3<f64>) -> Mat3<f64> {
-    // across n and the axis that lies farthest from it
+    // perpendicular to n and to x or y, whichever is farther from n
     let (x, y) = (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0));
     let t = if n.x.abs() < n.y.abs() { n.cross(x) } else { y.cross(n) };
     let t1 = t.scale(1.0 / norm(t));

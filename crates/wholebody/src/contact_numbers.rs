@@ -1,4 +1,4 @@
-//! The numbers of a contact at one state: Jacobian, held acceleration, and the rows and cones of its force.
+//! Numbers of a contact at one state: Jacobian, held acceleration, and the rows and cones of its force.
 
 use crate::cone_program::{ConeProgram, Size};
 use crate::contact::{FrictionContact, Geometry, Normal, norm};
@@ -9,35 +9,35 @@ use crate::settings::{Friction, Settings};
 use condyle_dynamics::{Force, Mat3, Motion, Quaternion, Vec3, lie};
 use nalgebra::DMatrix;
 
-/// A contact, all of whose rows are along its axes (t₁, t₂, n) at its centre.
+/// A contact whose rows are along its axes (t₁, t₂, n) at its centre.
 pub(crate) struct ContactNumbers {
     pub description: FrictionContact,
     pub geometry: Geometry,
-    /// Which of the kinematics' frames it is.
+    /// Index of its frame among the frames of the kinematics.
     pub frame: usize,
-    /// Whether it touches.
+    /// Whether the contact touches.
     pub active: bool,
-    /// The place of its force's first unknown in x, if it is active.
+    /// Index in x of the force's first unknown, if the contact is active.
     pub column: usize,
-    /// How far it touches, up to 1.
+    /// Activation, at most 1.
     activation: f64,
-    /// Where its numbers begin in a program in which all contacts touch.
+    /// Offsets of its unknowns and constraints in a program in which all contacts touch.
     first: Size,
-    /// The axes in the world.
+    /// Axes, in the world.
     axes: Mat3<f64>,
-    /// From the frame's origin to the centre, in the world.
+    /// Vector from the frame's origin to the centre, in the world.
     arm: Vec3<f64>,
-    /// Jᵀ, nv × the number of rows held.
+    /// Jᵀ, nv × number of held rows.
     pub Jt: DMatrix<f64>,
-    /// J q̈ = this: a* − J̇ v.
+    /// a* − J̇ v, the value of J q̈.
     pub held: [f64; 6],
-    /// The reference of the force's unknowns.
+    /// Reference of each of the force's unknowns.
     pub reference: Vec<f64>,
-    /// The weights of the force's unknowns, in parts of the settings' force weight.
+    /// Weight of each of the force's unknowns, relative to the settings' force weight.
     pub weights: Vec<f64>,
-    /// The reference of the wrench.
+    /// Reference of the wrench.
     pub wrench: [f64; 6],
-    /// Least and greatest normal force.
+    /// Minimum and maximum normal force.
     bounds: [f64; 2],
 }
 
@@ -62,7 +62,7 @@ impl ContactNumbers {
         }
     }
 
-    /// Takes the next places of a program in which all contacts touch.
+    /// Reserves the next indices of a program in which all contacts touch.
     pub(crate) fn add_to(&mut self, all: &mut Size, friction: Friction) {
         self.first = *all;
         all.unknowns += self.geometry.unknowns();
@@ -71,7 +71,7 @@ impl ContactNumbers {
         all.cone_rows += if friction == Friction::Cone { 3 * self.geometry.cones() } else { 0 };
     }
 
-    /// Adds the places of its unknowns and constraints in use, in their order in the program.
+    /// Adds the indices of its unknowns and constraints in use, in their order in the program.
     pub(crate) fn add_places(&self, places: &mut Places, friction: Friction) {
         let Size { unknowns, equalities, rows, cone_rows } = self.first;
         let end = rows + self.max_rows(friction);
@@ -84,25 +84,25 @@ impl ContactNumbers {
         }
     }
 
-    /// Whether the first of its rows bounds the normal force.
+    /// Returns whether the first of its rows bounds the normal force.
     fn has_bounds(&self) -> bool {
         let [least, most] = self.bounds;
         least > 0.0 || most < f64::INFINITY
     }
 
-    /// How many rows of G the force may have.
+    /// Returns the maximum number of rows of G for the force.
     fn max_rows(&self, friction: Friction) -> usize {
         let edges = self.geometry.edges().count();
         let sides = if let Friction::Pyramid { sides, .. } = friction { sides } else { 0 };
         1 + edges + 2 * usize::from(edges > 0) + sides * self.geometry.cones()
     }
 
-    /// From the frame's origin to the centre, in the world.
+    /// Returns the vector from the frame's origin to the centre, in the world.
     pub(crate) fn centre_arm(&self, frame: &FrameMotion) -> Vec3<f64> {
         frame.pose.rotation * self.geometry.centre
     }
 
-    /// All numbers of an active contact, whose frame is at `frame`.
+    /// Computes all numbers of an active contact whose frame is at `frame`.
     pub(crate) fn update(&mut self, frame: &FrameMotion, target: &ContactTarget, settings: &Settings, weight: f64) {
         let R = frame.pose.rotation;
         let (centre, axes, motion) = (self.geometry.centre, self.geometry.axes, self.geometry.motion);
@@ -115,13 +115,13 @@ impl ContactNumbers {
         for &j in &frame.support {
             let s = &frame.J.as_slice()[6 * j..6 * j + 6];
             let (linear, angular) = (Vec3::new(s[0], s[1], s[2]), Vec3::new(s[3], s[4], s[5]));
-            let at = linear + angular.cross(self.arm); // of the centre
+            let at = linear + angular.cross(self.arm); // velocity of the centre
             let along = [t1.dot(at), t2.dot(at), n.dot(at), t1.dot(angular), t2.dot(angular), n.dot(angular)];
             for (r, &row) in motion.iter().enumerate() {
                 self.Jt[(j, r)] = along[row];
             }
         }
-        // a* = k (X_ref ⊖ X) − d v of the centre, no longer than the greatest correction
+        // a* = k (X_ref ⊖ X) − d v of the centre, limited to the maximum correction
         let gains = settings.contact_gains;
         let (v, w) = (frame.velocity.linear, frame.velocity.angular);
         let turn: Mat3<f64> = target.pose.rotation * R.transpose();
@@ -145,7 +145,7 @@ impl ContactNumbers {
         for (held, &row) in self.held.iter_mut().zip(motion) {
             *held = along[row];
         }
-        // references of the force, whose wrench is about the frame's origin
+        // references of the force; the target's wrench is about the frame's origin
         let Force { linear, angular } = target.force;
         self.wrench = self.along(linear, angular - self.arm.cross(linear));
         let (wrench, share) = (self.wrench, 1.0 / self.geometry.cones() as f64);
@@ -156,7 +156,7 @@ impl ContactNumbers {
         self.bounds = [min_force, max_force];
         self.activation = target.activation.min(1.0);
         if target.activation < 1.0 {
-            // f_n ≤ α times the greatest force there is, or the robot's weight
+            // f_n ≤ α times the maximum force, or times the robot's weight if the maximum is infinite
             let most = if max_force.is_finite() { max_force } else { weight };
             self.bounds = [min_force, most].map(|bound| bound * target.activation);
         }
@@ -167,7 +167,7 @@ impl ContactNumbers {
         [a.x, a.y, a.z, b.x, b.y, b.z]
     }
 
-    /// −Jᵀ f: subtracts what the force adds to the effort of each coordinate, from the columns of Eᵀ.
+    /// Subtracts Jᵀ f, the force's part of each coordinate's effort, from the columns of Eᵀ.
     pub(crate) fn add_effort(&self, support: &[usize], Et: &mut DMatrix<f64>) {
         let (rows, stride, nv) = (self.geometry.motion, Et.nrows(), self.Jt.nrows());
         let (J, Et) = (self.Jt.as_slice(), Et.as_mut_slice());
@@ -184,7 +184,7 @@ impl ContactNumbers {
         }
     }
 
-    /// J q̈ = a* − J̇ v.
+    /// Adds the equalities J q̈ = a* − J̇ v.
     pub(crate) fn add_equalities(&self, program: &mut ConeProgram) {
         let (n, nv) = (program.size.unknowns, self.Jt.nrows());
         for (r, J) in self.Jt.as_slice().chunks_exact(nv).enumerate() {
@@ -197,14 +197,15 @@ impl ContactNumbers {
         }
     }
 
-    /// Bounds of the force, its friction cones or pyramids, the centre of pressure, the moment about the normal.
+    /// Adds bounds of the force, friction cones or pyramids, and bounds of the centre of pressure and of the yaw
+    /// moment.
     pub(crate) fn add_force_rows(&self, program: &mut ConeProgram, friction: Friction) {
         let Geometry { by_corners, yaw, motion, .. } = self.geometry;
         let mu = self.description.friction;
         let cones = self.geometry.cones();
         if self.has_bounds() {
             let [least, most] = self.bounds;
-            let lower = if least > 0.0 { least } else { f64::NEG_INFINITY }; // the cones say f_n ≥ 0
+            let lower = if least > 0.0 { least } else { f64::NEG_INFINITY }; // the cones imply f_n ≥ 0
             let row = add_row(program, lower, most);
             for k in 0..cones {
                 program.Gt[(self.column + 3 * k + 2, row)] = 1.0;
@@ -255,7 +256,7 @@ impl ContactNumbers {
         }
     }
 
-    /// The wrench of the force in x about the frame's origin, along the world's axes.
+    /// Returns the wrench of the force in x about the frame's origin, along the world's axes.
     pub(crate) fn read(&self, x: &[f64]) -> Force<f64> {
         if !self.active {
             return Force::zero();
@@ -267,7 +268,7 @@ impl ContactNumbers {
     }
 }
 
-/// A row of zeros more.
+/// Adds a row of zeros and returns its index.
 fn add_row(program: &mut ConeProgram, lower: f64, upper: f64) -> usize {
     let (row, n) = (program.size.rows, program.size.unknowns);
     program.row_mut(row)[..n].fill(0.0);

@@ -1,4 +1,4 @@
-//! The controller: fixes memory once, fills in the numbers at each tick, solves, and looks at what it gives out.
+//! The controller: allocates memory once; at each tick it computes the numbers, solves, and checks its output.
 
 use crate::command::{Command, CommandSource};
 use crate::cone_program::Status as Stopped;
@@ -20,10 +20,10 @@ use condyle_dynamics::{Force, Model, Motion, Vec3, neutral};
 use condyle_linalg::check;
 use std::fmt;
 
-/// A solution may violate its constraints by this part of 1 and the robot's weight (N, N m, m/s²); more is an error.
+/// Maximum violation of constraints by a solution, relative to 1 + the robot's weight (N, N m, m/s²); more is an error.
 const FEASIBLE: f64 = 1e-6;
 
-/// The weight with which joints that cannot be kept within their limits are pulled back.
+/// Weight of the task that pulls back joints which cannot be kept within their limits.
 const PULL: f64 = 1e3;
 
 /// A whole-body controller: one cone program for each tick and priority, stated in the [crate's documentation](crate).
@@ -56,15 +56,15 @@ pub struct WholeBodyController {
 }
 
 impl WholeBodyController {
-    /// Checks everything and fixes memory. Contacts may be none: a robot in free fall.
+    /// Checks everything and allocates memory. The list of contacts may be empty: a robot in free fall.
     ///
     /// # Errors
-    /// [`Error`] for an unknown frame, a contact that names a frame twice, and for any number outside of its range.
+    /// [`Error`] for an unknown frame, for a frame named by two contacts, and for any number outside of its range.
     pub fn new(model: &Model, contacts: &[FrictionContact], tasks: &[Task], settings: Settings) -> Result<Self, Error> {
         tasks.iter().try_for_each(|task| task.check(model.nv()))?;
         settings.check(model)?;
         settings.check_effort(model)?;
-        // each frame once: those of contacts, of tasks, and of their axes
+        // each frame once: frames of contacts, of tasks, and of tasks' axes
         let mut frames: Vec<usize> = Vec::new();
         let mut place = |name: &str| -> Result<usize, Error> {
             let frame = model.frame(name)?;
@@ -125,8 +125,8 @@ impl WholeBodyController {
         Ok(Self { settings, equations, objective, levels, safety, command, planned })
     }
 
-    /// The references that keep the position q at rest: all tasks where they are, each contact held where it is and
-    /// touching, the weight shared by the contacts in equal parts.
+    /// Returns references that keep the position q at rest: all tasks at their present values, each contact touching
+    /// and held at its present pose, the weight shared equally by the contacts.
     ///
     /// q: nq numbers.
     ///
@@ -158,8 +158,8 @@ impl WholeBodyController {
         })
     }
 
-    /// The references of a plan at a time: joints, and where they bring centre of mass, momentum and frames; contacts by
-    /// their activation, held where the plan has them, with shares of the force that the plan's c̈ takes.
+    /// Writes the references of a plan at a time. Joints follow the plan; centre of mass, momentum and frames follow
+    /// from the joints. Contacts have the plan's activation, pose, and shares of the force that the plan's c̈ requires.
     ///
     /// # Panics
     /// If the references were made for another controller, or the plan for a robot of other bodies and joints.
@@ -208,9 +208,10 @@ impl WholeBodyController {
         }
     }
 
-    /// Efforts, acceleration and contact forces at the state (q, v). There always is a command: without a solution it is a
-    /// safe one, and its status says why. A number that is not finite is [`Status::NotFinite`]; a quaternion, a pair (cos, sin)
-    /// or a reference's rotation that is none is [`Status::InvalidState`]. The safe command is then made of the last valid state.
+    /// Computes efforts, acceleration and contact forces at the state (q, v). There always is a command: without a
+    /// solution it is a safe one, and its status tells the cause. A number that is not finite gives
+    /// [`Status::NotFinite`]. A quaternion or a pair (cos, sin) without length 1, or an invalid rotation of a
+    /// reference, gives [`Status::InvalidState`]. The safe command is then made from the last valid state.
     ///
     /// q: nq numbers; v: nv. The command stays readable as [`command`](Self::command). Allocates nothing with
     /// [`Backend::InteriorPoint`](crate::Backend); clarabel allocates once, and more for a new set of contacts.
@@ -271,7 +272,7 @@ impl WholeBodyController {
         objective.update(q, v, kinematics, contacts, references, settings, actuated, n);
     }
 
-    /// Fills in the command; `Err` if there is nothing that holds all constraints.
+    /// Computes the command; `Err` if no iterate satisfies all constraints.
     fn solve(&mut self, q: &[f64], v: &[f64], references: &References) -> Result<Status, Status> {
         self.update(q, v, references);
         let Self { equations, objective, levels, safety, command, .. } = self;
@@ -293,7 +294,7 @@ impl WholeBodyController {
         command.iterations = outcome.iterations;
         command.reduced_accuracy = outcome.reduced;
         let status = outcome.stopped.map_or(Status::Solved, Status::from);
-        // An iterate that holds all constraints, or what a former priority found, is as good as any.
+        // An iterate that satisfies all constraints, or the result of an earlier priority, may serve as the solution.
         let may_serve = done > 0 || matches!(status, Status::IterationLimit | Status::TimeLimit);
         let x = &levels.x[..n];
         let violation = equations.violation(x);
@@ -316,7 +317,7 @@ impl WholeBodyController {
         Ok(status)
     }
 
-    /// The last command; before the first step zeros.
+    /// Returns the last command; it is zero before the first step.
     pub fn command(&self) -> &Command {
         &self.command
     }

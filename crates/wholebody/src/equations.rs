@@ -1,4 +1,6 @@
-//! The program's constraints at one state: each block beside its equation. x = (q̈, the forces of the active contacts).
+//! Constraints of the program at one state: each block of code has its equation as a comment.
+//!
+//! x = (q̈, forces of active contacts).
 
 use crate::condense::Known;
 use crate::cone_program::{ConeProgram, Size};
@@ -12,34 +14,34 @@ use crate::settings::Settings;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::DMatrix;
 
-/// Below this activation a contact is off: what it could carry would be lost in the solver's tolerance.
+/// Activation below which a contact is off: the force it could carry would be lost in the solver's tolerance.
 const LEAST_ACTIVATION: f64 = 1e-6;
 
-/// All that the constraints are computed from, and in.
+/// Quantities that determine the constraints, and memory for the constraints.
 pub(crate) struct Equations {
     pub kinematics: Kinematics,
     pub contacts: Vec<ContactNumbers>,
-    /// Coordinates of free-flyers, on which no motor acts.
+    /// Coordinates of free-flyers, which have no motor.
     pub free: Vec<usize>,
     /// The other coordinates.
     pub actuated: Vec<usize>,
-    /// Coordinates with a limited motor, and the limit.
+    /// Coordinates with a limited motor, and their limits.
     pub limited: Vec<(usize, [f64; 2])>,
     pub bounds: AccelerationBounds,
-    /// The coordinates of its bounds.
+    /// Coordinates of the bounds.
     bounded: Vec<usize>,
-    /// Eᵀ of τ = E x + h with E = [M, −Jᵀ]: a column for each coordinate.
+    /// Eᵀ with τ = E x + h and E = [M, −Jᵀ]: a column for each coordinate.
     pub Et: DMatrix<f64>,
-    /// Constraints of the whole program; P and c are the solver's affair.
+    /// Constraints of the whole program; the solver fills in P and c.
     pub program: ConeProgram,
-    /// Which unknowns and constraints the program has.
+    /// Indices of the unknowns and constraints in the program.
     places: Places,
     /// ‖g‖ times the mass (N).
     pub weight: f64,
 }
 
 impl Equations {
-    /// With room for some more equalities.
+    /// Allocates memory, with space for `held` more equalities.
     pub(crate) fn new(
         kinematics: Kinematics,
         mut contacts: Vec<ContactNumbers>,
@@ -70,7 +72,7 @@ impl Equations {
         &self.kinematics.model
     }
 
-    /// The program, and what is known of it.
+    /// Returns the program and its known structure.
     pub(crate) fn program(&mut self) -> (&mut ConeProgram, Known<'_>) {
         (&mut self.program, Known { dense: self.limited.len(), single: &self.bounded, places: &self.places })
     }
@@ -138,14 +140,14 @@ impl Equations {
         }
     }
 
-    /// τ = E x + h of the actuated coordinates.
+    /// Computes τ = E x + h for the actuated coordinates.
     pub(crate) fn effort(&self, x: &[f64], tau: &mut [f64]) {
         for &i in &self.actuated {
             tau[i] = self.kinematics.h[i] + dot(&self.Et.as_slice()[i * self.Et.nrows()..], x);
         }
     }
 
-    /// Takes the joints' limits out of the rows; joints that should be led back become tasks of such a weight.
+    /// Removes the joints' limits from the rows. Joints that should be led back become tasks with this weight.
     pub(crate) fn relax(&mut self, objective: &mut LeastSquares, weight: f64) {
         for (k, &(i, lower, upper)) in self.bounds.bounds.iter().enumerate() {
             let row = self.limited.len() + k;
@@ -156,7 +158,7 @@ impl Equations {
         }
     }
 
-    /// By how much x violates the worst of its rows and cones, and of the equalities, in their units.
+    /// Returns the largest violation by x of rows, cones and equalities, in their units.
     pub(crate) fn violation(&self, x: &[f64]) -> f64 {
         let p = &self.program;
         let stride = p.At.nrows();

@@ -1,10 +1,10 @@
-//! Errors of a controller's description, and the ends of a step.
+//! Errors of a controller's description, and results of a step.
 
 use crate::cone_program;
 use condyle_dynamics::ROTATION_ROUNDING;
 use core::fmt;
 
-/// Error in the description of a controller or of a plan, or in a state that is given to one.
+/// Error in the description of a controller or a plan, or in a state given to one.
 ///
 /// ```
 /// use condyle_wholebody::{FrictionContact, Settings, Task, WholeBodyController};
@@ -25,7 +25,7 @@ pub enum Error {
         /// The frame.
         frame: String,
     },
-    /// A task sets the force of a frame that is no contact.
+    /// A task sets the force of a frame that is not a contact.
     #[error("task `{frame}`: there is no contact of this frame")]
     NoSuchContact {
         /// The frame.
@@ -65,7 +65,7 @@ pub enum Error {
         /// The range.
         allowed: &'static str,
     },
-    /// The effort limit of an actuated coordinate leaves nothing to control it with.
+    /// The effort limit of an actuated coordinate is not positive, so that it cannot be controlled.
     #[error("joint `{joint}`: {origin} is {value}, but it must be above 0")]
     Effort {
         /// The joint's name.
@@ -83,19 +83,19 @@ pub enum Error {
         /// The fault, with the joint and the numbers.
         error: condyle_dynamics::Error,
     },
-    /// A vector has another length than the model needs.
+    /// A vector does not have the length that the model requires.
     #[error("`{name}`: expected {expected} numbers, found {found}")]
     Length {
         /// The field.
         name: &'static str,
-        /// What the model needs.
+        /// The required length.
         expected: usize,
         /// The length given.
         found: usize,
     },
 }
 
-/// How a step ended.
+/// Result of a step.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Status {
@@ -105,8 +105,8 @@ pub enum Status {
     /// The command is the program's solution.
     #[error("solved")]
     Solved,
-    /// Dynamics, held contacts, friction cones, force bounds and torque limits exclude each other: the solver holds a
-    /// certificate of it.
+    /// Dynamics, held contacts, friction cones, force bounds and torque limits contradict each other: the solver has a
+    /// certificate of infeasibility.
     #[error("dynamics, contacts, friction cones and limits exclude each other")]
     Infeasible,
     /// [`Settings::max_iterations`](crate::Settings::max_iterations) were not enough.
@@ -115,7 +115,7 @@ pub enum Status {
     /// [`Settings::time_limit`](crate::Settings::time_limit) was not enough.
     #[error("not solved within the allowed time")]
     TimeLimit,
-    /// A factorisation failed, the iterates made no more progress, or the solution does not hold what it should.
+    /// A factorisation failed, the iterates stopped making progress, or the solution violates its constraints.
     #[error("the solver stopped for numerical reasons")]
     NumericalError,
     /// A number of the state or of the references is infinite or NaN. Nothing was solved.
@@ -123,7 +123,7 @@ pub enum Status {
     NotFinite {
         /// `q`, `v`, or the field of [`References`](crate::References).
         name: &'static str,
-        /// Its position in the flattened argument.
+        /// Index in the flattened argument.
         index: usize,
         /// The number.
         value: f64,
@@ -134,7 +134,7 @@ pub enum Status {
     InvalidState(InvalidRotation),
 }
 
-/// Rotation that is invalid, and its numbers.
+/// Invalid rotation and its numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum InvalidRotation {
@@ -151,7 +151,7 @@ pub enum InvalidRotation {
         /// Length of the quaternion or of the pair.
         length: f64,
     },
-    /// The rotation matrix of a reference's pose is no rotation, up to 1e-2.
+    /// The rotation matrix of a reference's pose is not a rotation, up to 1e-2.
     Pose {
         /// `frames` or `contacts` of the references.
         name: &'static str,
@@ -163,7 +163,7 @@ pub enum InvalidRotation {
 }
 
 impl InvalidRotation {
-    /// The fault with its numbers, without the joint or the frame.
+    /// Returns the fault with its numbers, without the joint or the frame.
     pub(crate) fn fault(&self) -> String {
         match *self {
             Self::Joint { name, first, end, length, .. } => {
@@ -191,7 +191,7 @@ impl From<cone_program::Status> for Status {
             cone_program::Status::Infeasible => Self::Infeasible,
             cone_program::Status::IterationLimit => Self::IterationLimit,
             cone_program::Status::TimeLimit => Self::TimeLimit,
-            // The objective is bounded below, and what goes into the numbers was checked: both are numerical failures.
+            // The objective is bounded below, and the input numbers were checked: both are numerical failures.
             cone_program::Status::Unbounded
             | cone_program::Status::NotFinite { .. }
             | cone_program::Status::NumericalError => Self::NumericalError,
@@ -199,7 +199,7 @@ impl From<cone_program::Status> for Status {
     }
 }
 
-/// `Ok` if every number of an argument is finite.
+/// Returns `Ok` if every number of an argument is finite.
 pub(crate) fn finite(name: &'static str, mut numbers: impl Iterator<Item = f64>) -> Result<(), Status> {
     let mut index = 0;
     match numbers.find(|x| {

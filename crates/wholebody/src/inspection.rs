@@ -1,32 +1,32 @@
-//! The program of a tick as it stands before a solver, and what the solver said: for tests and for comparisons.
+//! The program of a tick as the solver receives it, and the solver's result: for tests and comparisons.
 
 use crate::cone_program::{ConeProgram, Size};
 use crate::controller::WholeBodyController;
 use crate::references::References;
 use nalgebra::{DMatrix, DVector};
 
-/// The numbers of a program: min ½ xᵀ P x + cᵀ x with A x = b, l ≤ G x ≤ u and h + F x in a product of second-order cones.
+/// Numbers of a program: min ½ xᵀ P x + cᵀ x with A x = b, l ≤ G x ≤ u and h + F x in a product of second-order cones.
 #[derive(Clone, Debug)]
 pub struct Program {
-    /// Symmetric.
+    /// P, the quadratic cost; symmetric.
     pub P: DMatrix<f64>,
-    /// The linear cost.
+    /// c, the linear cost.
     pub c: DVector<f64>,
-    /// Equalities.
+    /// A, the coefficients of the equalities.
     pub A: DMatrix<f64>,
-    /// Their right side.
+    /// b, the right side of the equalities.
     pub b: DVector<f64>,
-    /// Rows.
+    /// G, the coefficients of the rows.
     pub G: DMatrix<f64>,
-    /// Their lower bounds.
+    /// l, the lower bounds of the rows.
     pub lower: DVector<f64>,
-    /// Their upper bounds.
+    /// u, the upper bounds of the rows.
     pub upper: DVector<f64>,
-    /// Rows of cones.
+    /// F, the coefficients of the cones' rows.
     pub F: DMatrix<f64>,
-    /// Their constants.
+    /// h, the constants of the cones' rows.
     pub h: DVector<f64>,
-    /// The dimensions of the cones.
+    /// Dimensions of the cones.
     pub cones: Vec<usize>,
 }
 
@@ -49,24 +49,24 @@ impl Program {
         }
     }
 
-    /// ½ xᵀ P x + cᵀ x.
+    /// Returns ½ xᵀ P x + cᵀ x.
     pub fn objective(&self, x: &DVector<f64>) -> f64 {
         0.5 * x.dot(&(&self.P * x)) + self.c.dot(x)
     }
 }
 
-/// What the solver of the first priority found.
+/// Solution of the first priority's solver.
 #[derive(Clone, Debug)]
 pub struct Optimum {
-    /// The accelerations and the forces of the contacts that touch.
+    /// Accelerations and forces of the contacts that touch.
     pub x: DVector<f64>,
-    /// The unknowns that the solver had: those of x that were not eliminated, or more.
+    /// Unknowns of the solver: the unknowns of x that were not eliminated, or additional ones.
     pub z: DVector<f64>,
-    /// The multipliers of the equalities that were not eliminated.
+    /// Multipliers of the equalities that were not eliminated.
     pub equalities: DVector<f64>,
-    /// The multipliers of the rows: positive at a lower bound.
+    /// Multipliers of the rows: positive at a lower bound.
     pub rows: DVector<f64>,
-    /// The multipliers of the cones' rows.
+    /// Multipliers of the cones' rows.
     pub cones: DVector<f64>,
 }
 
@@ -87,7 +87,7 @@ impl WholeBodyController {
         self.levels.solve_assembled(self.equations.program().1);
     }
 
-    /// The program of the first priority as it stands before anything is eliminated.
+    /// Computes the program of the first priority before any elimination.
     #[doc(hidden)]
     #[track_caller]
     pub fn program(&mut self, q: &[f64], v: &[f64], references: &References) -> Program {
@@ -97,7 +97,7 @@ impl WholeBodyController {
         Program::new(&self.equations.program)
     }
 
-    /// The program of the first priority as its solver sees it.
+    /// Computes the program of the first priority as its solver receives it.
     #[doc(hidden)]
     #[track_caller]
     pub fn reduced_program(&mut self, q: &[f64], v: &[f64], references: &References) -> Program {
@@ -105,7 +105,7 @@ impl WholeBodyController {
         Program::new(self.levels.program())
     }
 
-    /// The optimum that the last step's solver of the first priority found.
+    /// Returns the optimum found by the first priority's solver in the last step.
     #[doc(hidden)]
     pub fn optimum(&self) -> Optimum {
         let solver = self.levels.first_solver();

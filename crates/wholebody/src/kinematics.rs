@@ -1,12 +1,12 @@
-//! What a tick needs to know of the robot's motion: one shared pass of `compute_all_terms`, and the frames asked for.
+//! Kinematics and dynamics of a tick: one pass of `compute_all_terms`, and the requested frames.
 
 use condyle_dynamics::{Data, Force, Model, Motion, ReferenceFrame, Se3, Vec3, compute_all_terms};
 use nalgebra::DMatrix;
 
-/// Position, velocity and J̇ v of a frame's origin and rotation, along the world's axes, with the Jacobian J.
+/// Pose, velocity, J̇ v and Jacobian J of a frame's origin and rotation, along the world's axes.
 #[derive(Clone, Debug)]
 pub(crate) struct FrameMotion {
-    /// Its number in the model.
+    /// Index of the frame in the model.
     pub frame: usize,
     /// oXf.
     pub pose: Se3<f64>,
@@ -14,9 +14,9 @@ pub(crate) struct FrameMotion {
     pub velocity: Motion<f64>,
     /// (p̈, ω̇) at q̈ = 0: J̇ v.
     pub drift: Motion<f64>,
-    /// 6 × nv.
+    /// J, 6 × nv.
     pub J: DMatrix<f64>,
-    /// The coordinates that move the frame: columns of J that are not 0.
+    /// Coordinates that move the frame: columns of J that may be non-zero.
     pub support: Vec<usize>,
 }
 
@@ -34,20 +34,20 @@ pub(crate) struct Kinematics {
     pub com_velocity: Vec3<f64>,
     /// c̈ at q̈ = 0.
     pub com_drift: Vec3<f64>,
-    /// The momentum about the centre of mass.
+    /// Momentum about the centre of mass.
     pub momentum: Force<f64>,
-    /// Its rate at q̈ = 0.
+    /// Rate of the momentum at q̈ = 0.
     pub momentum_drift: Force<f64>,
-    /// The centroidal momentum matrix, 6 × nv: rows 0 to 2 are m times the Jacobian of c.
+    /// Centroidal momentum matrix, 6 × nv: rows 0 to 2 are m times the Jacobian of c.
     pub Ag: DMatrix<f64>,
-    /// Mass of all that moves (kg).
+    /// Mass of all moving bodies (kg).
     pub mass: f64,
-    /// One for each number in the list of [`new`](Self::new), each frame once.
+    /// Motion of each frame listed in [`new`](Self::new), in the same order; each frame occurs once.
     pub frames: Vec<FrameMotion>,
 }
 
 impl Kinematics {
-    /// For these frames, by their numbers.
+    /// Creates the kinematics for frames with these indices.
     pub(crate) fn new(model: &Model, frames: &[usize]) -> Self {
         let nv = model.nv();
         let motion = |&frame: &usize| FrameMotion {
@@ -74,7 +74,7 @@ impl Kinematics {
         }
     }
 
-    /// Computes all of it at (q, v).
+    /// Computes all quantities at (q, v).
     pub(crate) fn update(&mut self, q: &[f64], v: &[f64]) {
         let terms = compute_all_terms(&self.model, &mut self.data, q, v);
         self.M.copy_from(terms.M);
@@ -100,7 +100,7 @@ impl Kinematics {
     }
 }
 
-/// The coordinates that move a body.
+/// Returns the coordinates that move a body.
 fn support(model: &Model, mut body: usize) -> Vec<usize> {
     let mut moves = Vec::new();
     while body != 0 {

@@ -3,22 +3,22 @@
 use crate::cone_program::ConeProgram;
 use nalgebra::DMatrix;
 
-/// The rows of one priority. It has room for all tasks and unknowns.
+/// Rows of one priority, with memory for all tasks and unknowns.
 #[derive(Clone, Debug)]
 pub(crate) struct LeastSquares {
-    /// Rᵀ: a column for each row, √w times the task's.
+    /// Rᵀ: a column for each row, multiplied by √w of its task.
     pub Rt: DMatrix<f64>,
-    /// b, √w times the task's.
+    /// b, multiplied by √w of the task.
     pub b: Vec<f64>,
-    /// How many rows there are.
+    /// Number of rows.
     pub count: usize,
     /// d.
     pub diagonal: Vec<f64>,
     /// c.
     pub linear: Vec<f64>,
-    /// Unknowns of which d is a task, not regularisation only.
+    /// Unknowns whose d contains a task, not only regularisation.
     pub single: Vec<usize>,
-    /// How many unknowns there are.
+    /// Number of unknowns.
     unknowns: usize,
 }
 
@@ -35,7 +35,7 @@ impl LeastSquares {
         }
     }
 
-    /// No rows, for so many unknowns.
+    /// Removes all rows and sets the number of unknowns.
     pub(crate) fn clear(&mut self, unknowns: usize) {
         self.count = 0;
         self.unknowns = unknowns;
@@ -44,7 +44,7 @@ impl LeastSquares {
         self.single.clear();
     }
 
-    /// ½ w (r x − b)² more: the row r of zeros, to be filled.
+    /// Adds ½ w (r x − b)²; `fill` writes r into a row of zeros.
     pub(crate) fn add_row(&mut self, weight: f64, b: f64, fill: impl FnOnce(&mut [f64])) {
         let root = weight.sqrt();
         let stride = self.Rt.nrows();
@@ -58,13 +58,13 @@ impl LeastSquares {
         self.count += 1;
     }
 
-    /// ½ w (x_i − a)² more.
+    /// Adds ½ w (x_i − a)², up to a constant.
     pub(crate) fn add_single(&mut self, i: usize, weight: f64, a: f64) {
         self.diagonal[i] += weight;
         self.linear[i] -= weight * a;
     }
 
-    /// P and c of a program in the same unknowns.
+    /// Writes P and c of a program in the same unknowns.
     pub(crate) fn write(&self, program: &mut ConeProgram) {
         let n = self.unknowns;
         for j in 0..n {
@@ -84,7 +84,7 @@ impl LeastSquares {
     }
 }
 
-/// xᵀ y for the numbers of the shorter y, in eight sums side by side.
+/// Returns xᵀ y over the length of y, which is the shorter one; with eight partial sums.
 pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let x = &x[..y.len()];
     let ((xs, x), (ys, y)) = (x.as_chunks::<8>(), y.as_chunks::<8>());

@@ -1,7 +1,7 @@
-//! Solves the program, priority by priority: what the tasks of one attain is held by the next.
+//! Solves the program priority by priority: later priorities keep the results of earlier ones.
 //!
-//! Of min ½ ‖R x − b‖² over a convex set all minimisers have the same R x; the equality R x = R x* therefore describes them
-//! all. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014), section 2.
+//! All minimisers of ½ ‖R x − b‖² over a convex set have the same R x. The equality R x = R x* therefore describes all
+//! of them. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014), section 2.
 
 use crate::basis::Elimination;
 use crate::condense::{Condenser, Known};
@@ -18,37 +18,39 @@ use crate::numbers::Reader;
 use crate::settings::{Backend, Form, Settings};
 use condyle_linalg::max_abs;
 
-/// What former priorities hold may leave no inside of rows and cones, which interior points need: by so much (relative to
-/// 1 and the bound; N) they are widened for the next ones.
+/// Amount by which bounds and cones are widened for later priorities (relative to 1 + the bound; N). Equalities of
+/// earlier priorities may leave rows and cones without an interior, which interior-point methods need.
 const WIDENED: f64 = 1e-7;
 
-/// A row whose coefficients all have become smaller than this part of what they were is decided by what is held.
+/// Relative size of a row's coefficients, compared with the original ones, below which the held equalities decide the
+/// row.
 const DECIDED: f64 = 1e-9;
 
-/// Program that the solver of a priority gets.
+/// Program that a priority's solver receives.
 pub(crate) enum Given {
     /// A program without equalities.
     Condensed(Box<Condenser>, ConeProgram),
-    /// A sparse one.
+    /// A sparse program.
     #[cfg(feature = "clarabel")]
     Lifted(Lifted),
-    /// The program itself.
+    /// The original program.
     Full(ConeProgram),
 }
 
-/// The solvers, and the solution.
+/// Solvers of all priorities, and the solution.
 pub(crate) struct Levels {
     solvers: Vec<Box<dyn Solver + Send + Sync>>,
     pub given: Vec<Given>,
-    /// The last solution of each.
+    /// Last solution of each solver.
     pub memories: Vec<Memory>,
     warm: bool,
-    /// The last solution.
+    /// Last solution.
     pub x: Vec<f64>,
 }
 
 impl Levels {
-    /// For programs of at most such a size, of which so many rows have few zeros, and objectives of so many rows.
+    /// Allocates memory for programs up to this size, with `dense` rows that have few zeros and objectives with these
+    /// numbers of rows.
     pub(crate) fn new(
         capacity: Size,
         #[cfg_attr(not(feature = "clarabel"), expect(unused_variables))] dense: usize,
@@ -57,7 +59,7 @@ impl Levels {
     ) -> Self {
         let Settings { tolerance, max_iterations, time_limit, form, .. } = *settings;
         let given = |(level, &objective): (usize, &usize)| match (form, settings.backend) {
-            // What former priorities hold may depend on contacts and base: only an elimination sees that.
+            // Held results may depend on contacts and base; only an elimination handles dependent equalities.
             _ if level > 0 => Given::condensed(capacity, objective),
             (Form::Condensed, _) => Given::condensed(capacity, objective),
             #[cfg(feature = "clarabel")]
@@ -79,8 +81,8 @@ impl Levels {
         Self { solvers, given, memories, warm: settings.warm_start, x: vec![0.0; capacity.unknowns] }
     }
 
-    /// Minimises one objective after the other under a program; x is the best that was found, and finite. How many were
-    /// minimised.
+    /// Minimises one objective after the other subject to a program, and returns the number of objectives minimised. x
+    /// is the best solution found, and finite.
     pub(crate) fn solve(
         &mut self,
         program: &mut ConeProgram,
@@ -108,17 +110,17 @@ impl Levels {
         (all, done)
     }
 
-    /// Writes what the first solver gets.
+    /// Writes the first solver's program.
     pub(crate) fn assemble(&mut self, program: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         self.given[0].write(program, known, objective);
     }
 
-    /// What the first solver got last.
+    /// Returns the first solver's last program.
     pub(crate) fn program(&self) -> &ConeProgram {
         self.given[0].program()
     }
 
-    /// Solves what was assembled.
+    /// Solves the assembled program.
     pub(crate) fn solve_assembled(&mut self, known: Known<'_>) {
         self.solve_given(known, 0);
     }
@@ -136,7 +138,7 @@ impl Levels {
         self.solve_given(known, level)
     }
 
-    /// Solves what a solver was given, from the last solution.
+    /// Solves a solver's program, starting from the last solution.
     fn solve_given(&mut self, known: Known<'_>, level: usize) -> Outcome {
         let Self { solvers, given, memories, x, warm } = self;
         let (solver, given, memory) = (&mut solvers[level], &mut given[level], &mut memories[level]);
@@ -180,18 +182,18 @@ impl Given {
         }
     }
 
-    /// The elimination whose pivots are tried first at the next tick.
+    /// Returns the elimination, whose pivots are tried first at the next tick.
     pub(crate) fn elimination(&self) -> Option<&Elimination> {
         if let Given::Condensed(condenser, _) = self { Some(&condenser.elimination) } else { None }
     }
 
-    /// Reads these pivots; `None` if they are none.
+    /// Reads the elimination's pivots; `None` if they are invalid.
     pub(crate) fn read_elimination(&mut self, from: &mut Reader<'_>) -> Option<()> {
         let Given::Condensed(condenser, _) = self else { return Some(()) };
         condenser.elimination.read(&mut condenser.basis, from)
     }
 
-    /// Writes what the solver gets.
+    /// Writes the solver's program.
     fn write(&mut self, from: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         match self {
             Given::Condensed(condenser, program) => condenser.condense(from, known, objective, program),
@@ -204,7 +206,7 @@ impl Given {
         }
     }
 
-    /// Tells the solver to start from x.
+    /// Sets x and the multipliers as the solver's start.
     fn start_from(&mut self, x: &[f64], multipliers: Multipliers<'_>, solver: &mut dyn Solver) {
         match self {
             Given::Condensed(condenser, _) => {
@@ -216,7 +218,7 @@ impl Given {
         }
     }
 
-    /// x of what the solver found.
+    /// Computes x from the solver's solution.
     fn read(&self, found: &[f64], x: &mut [f64]) {
         match self {
             Given::Condensed(condenser, _) => condenser.basis.expand(found, x),
@@ -226,7 +228,7 @@ impl Given {
         }
     }
 
-    /// Widens bounds and cones of what was condensed, and takes out rows that are decided.
+    /// Widens bounds and cones of a condensed program, and removes rows that the held equalities decide.
     fn widen(&mut self, full: &ConeProgram) {
         let Given::Condensed(_, program) = self else { return };
         let Size { unknowns, rows, .. } = program.size;
@@ -249,7 +251,7 @@ impl Given {
     }
 }
 
-/// R x = R x* as equalities more.
+/// Adds R x = R x* to the equalities.
 fn hold(program: &mut ConeProgram, objective: &LeastSquares, x: &[f64]) {
     let n = x.len();
     let mut add = |fill: &dyn Fn(&mut [f64])| {

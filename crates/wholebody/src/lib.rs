@@ -1,4 +1,4 @@
-//! Whole-body control: which joint efforts make a robot in contact do what it is told.
+//! Whole-body control: computes the joint efforts with which a robot in contact carries out its tasks.
 //!
 //! At each tick one cone program is solved, with true friction cones instead of pyramids:
 //!
@@ -16,22 +16,22 @@
 //! ```
 //!
 //! The efforts τ are eliminated: their limits are rows in x. [`Task`]s move the centre of mass, frames, joints, angular
-//! momentum and forces, with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v), by weights or in a strict order of priorities;
-//! [`References`] say where to, tick by tick, and which contacts touch. A step always gives a [`Command`] that is finite and
-//! within the torque limits; its [`Status`] says whether it is the solution. An invalid state or reference (a quaternion that does
-//! not have length 1, a matrix that is no rotation, a number that is not finite) is a status too.
+//! momentum and forces, with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v). Tasks have weights or strict priorities.
+//! [`References`] set the targets of each tick, and which contacts touch. A step always gives a [`Command`] that is
+//! finite and within the torque limits; its [`Status`] tells whether it is the solution. Invalid states and references
+//! also give a status: a quaternion without length 1, a matrix that is not a rotation, a number that is not finite.
 //!
 //! # Conventions
-//! - q, v, τ as in [condyle_dynamics]; the actuated coordinates are all but those of free-flyers.
-//! - A contact is a point, an edge or a convex polygon in a frame. Its force is what the environment does to the robot.
-//! - Positions, velocities and accelerations of tasks and contacts are along the world's axes, accelerations classical:
-//!   the second derivative of the position.
-//! - Memory is fixed by [`WholeBodyController::new`].
-//! - A wrong description is an [`Error`] of `new`; a wrong length panics.
+//! - q, v, τ as in [condyle_dynamics]; free-flyers' coordinates are not actuated, all others are.
+//! - A contact is a point, an edge or a convex polygon in a frame. Its force acts from the environment on the robot.
+//! - Positions, velocities and accelerations of tasks and contacts are along the world's axes. Accelerations are
+//!   classical: the second derivative of the position.
+//! - [`WholeBodyController::new`] allocates the memory.
+//! - An invalid description is an [`Error`] of `new`; a wrong length panics.
 //!
 //! # Features
-//! On by default: `loaders` (files of robots, and embedded ones) and `threads` (those of rayon). Off by default: `clarabel`, a second
-//! solver for comparison, with its dependencies: `Backend::Clarabel` exists with it.
+//! On by default: `loaders` (files of robots, and embedded robots) and `threads` (uses rayon). Off by default:
+//! `clarabel` adds `Backend::Clarabel`, a second solver for comparison, with its dependencies.
 //!
 //! Sources: Sentis and Khatib (2005), operational tasks under contact; Herzog et al. (2016), inverse dynamics as a
 //! program in (q̈, f); Lobo et al. (1998), friction as a second-order cone; Baumgarte (1972), drift; Caron, Pham and

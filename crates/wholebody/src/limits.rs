@@ -1,15 +1,15 @@
-//! The accelerations that keep joints within their limits of position and velocity.
+//! Accelerations that keep joints within their limits of position and velocity.
 
 use crate::settings::JointLimits;
 use condyle_dynamics::{Joint, Model};
 
-/// The least width of an interval of accelerations (rad/s²): so narrow a one still has an inside.
+/// Minimum width of an interval of accelerations (rad/s²): an interval of this width still has an interior.
 const WIDTH: f64 = 1e-3;
 
 /// A joint with a limit.
 struct Limited {
     coordinate: usize,
-    /// Its place in q; none if its position has no limit.
+    /// Index of its position in q; `None` if the position has no limit.
     position: Option<usize>,
     lower: f64,
     upper: f64,
@@ -52,7 +52,7 @@ impl AccelerationBounds {
         Self { look_ahead: settings.look_ahead, most: settings.max_acceleration, joints, bounds }
     }
 
-    /// The bounds at (q, v).
+    /// Computes the bounds at (q, v).
     pub(crate) fn update(&mut self, q: &[f64], v: &[f64]) {
         let (T, most) = (self.look_ahead, self.most);
         for (joint, bound) in self.joints.iter().zip(&mut self.bounds) {
@@ -62,7 +62,7 @@ impl AccelerationBounds {
             if let Some(i) = joint.position {
                 let bound = |limit: f64| (limit - q[i]) / (T * T) - 2.0 * v / T;
                 let (l, u) = (bound(joint.lower).min(most), bound(joint.upper).max(-most));
-                // The position's bounds come first: the velocity's give way.
+                // The bounds of the position have priority over the bounds of the velocity.
                 (lower, upper) = (lower.max(l).min(u), upper.min(u).max(l));
                 if l > u {
                     (lower, upper) = (0.5 * (l + u), 0.5 * (l + u));

@@ -1,15 +1,15 @@
-//! The last solution, from which the next one starts also where contacts have come or gone.
+//! The last solution, from which the next solve starts, even if contacts have changed.
 //!
-//! Every unknown and every constraint keeps its place in a numbering in which all contacts touch. Forces are kept in parts of
-//! their contact's activation, so that one whose limit is ramped stays at it; those of a contact that begins are where they
-//! were when it ended.
+//! Every unknown and every constraint keeps its index in a numbering in which all contacts touch. Forces are stored
+//! divided by their contact's activation, so that a force at a ramped limit stays at the limit. The forces of a contact
+//! that begins start from their values when the contact ended.
 
 use crate::cone_program::{Multipliers, Size};
 
-/// The place of each unknown and constraint in use, where all contacts touch.
+/// Index of each unknown and constraint in use, in a numbering in which all contacts touch.
 pub(crate) struct Places {
     pub unknowns: Vec<usize>,
-    /// What each unknown is in proportion to: 1, or the activation of the contact whose force it is.
+    /// Scale of each unknown: 1, or the activation of the contact for a force.
     pub units: Vec<f64>,
     pub equalities: Vec<usize>,
     pub rows: Vec<usize>,
@@ -35,9 +35,9 @@ impl Places {
     }
 }
 
-/// A solution with room for all contacts, and the numbers of it that a program asks for.
+/// A solution with memory for all contacts, and the part of it that a program needs.
 pub(crate) struct Memory {
-    /// Whether there is a solution.
+    /// Whether a solution is stored.
     pub known: bool,
     pub all: Point,
     asked: Point,
@@ -80,7 +80,7 @@ impl Memory {
         self.known = false;
     }
 
-    /// Keeps a solution. Equalities that a solver did not see have no multipliers.
+    /// Stores a solution. Equalities that a solver did not receive have no multipliers.
     pub(crate) fn keep(&mut self, places: &Places, x: &[f64], multipliers: Multipliers<'_>) {
         let Point { x: all_x, equalities, rows, cones } = &mut self.all;
         for (all, places, values) in [
@@ -97,7 +97,7 @@ impl Memory {
         self.known = true;
     }
 
-    /// x and the multipliers of a program, if there is a solution.
+    /// Returns x and the multipliers for a program, if a solution is stored.
     pub(crate) fn recall(&mut self, places: &Places) -> Option<(&[f64], Multipliers<'_>)> {
         let Self { known, all, asked } = self;
         let gather = |to: &mut [f64], places: &[usize], all: &[f64]| {

@@ -1,6 +1,6 @@
-//! Numbers that are read back from a list, one by one, with checks.
+//! Numbers that are read from a list, one by one, with checks.
 
-/// Takes numbers from the front of a slice; `None` if there are too few, or one is invalid.
+/// Reader of numbers from the front of a slice; `None` if too few numbers are left, or one is invalid.
 pub(crate) struct Reader<'a>(&'a [f64]);
 
 impl<'a> Reader<'a> {
@@ -8,12 +8,12 @@ impl<'a> Reader<'a> {
         Self(numbers)
     }
 
-    /// Whether all numbers were taken.
+    /// Returns whether all numbers were read.
     pub(crate) fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// A number that may be infinite or NaN.
+    /// Reads a number that may be infinite or NaN.
     pub(crate) fn any(&mut self) -> Option<f64> {
         let (&first, rest) = self.0.split_first()?;
         self.0 = rest;
@@ -24,7 +24,7 @@ impl<'a> Reader<'a> {
         self.any().filter(|x| x.is_finite())
     }
 
-    /// An integer below a limit.
+    /// Reads an integer below a limit.
     pub(crate) fn index(&mut self, limit: usize) -> Option<usize> {
         let x = self.number()?;
         (x >= 0.0 && x < limit as f64 && x.fract() == 0.0).then_some(x as usize)
@@ -44,7 +44,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// A flag as a number.
+/// Returns a flag as the number 0 or 1.
 pub(crate) fn flag(x: bool) -> f64 {
     f64::from(u8::from(x))
 }

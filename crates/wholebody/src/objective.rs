@@ -1,4 +1,4 @@
-//! The tasks at one state: J q̈ = a* − J̇ v, row by row.
+//! Tasks at one state: J q̈ = a* − J̇ v, row by row.
 
 use crate::contact_numbers::ContactNumbers;
 use crate::kinematics::{FrameMotion, Kinematics};
@@ -8,21 +8,21 @@ use crate::settings::Settings;
 use crate::task::{Axes, Gains, Task, TaskKind};
 use condyle_dynamics::{Mat3, Quaternion, Vec3, difference, lie};
 
-/// A task whose names are found.
+/// A task whose names are resolved to indices.
 pub(crate) struct ResolvedTask {
     pub task: Task,
-    /// Which of the kinematics' frames it moves.
+    /// Index of the frame that it moves, among the frames of the kinematics.
     pub frame: Option<usize>,
-    /// Which of the references' frames it aims at.
+    /// Index of its target among the frames of the references.
     pub target: usize,
-    /// Which of the kinematics' frames has its axes.
+    /// Index of the frame that gives its axes, among the frames of the kinematics.
     pub axes: Option<usize>,
-    /// Which contact's force it sets.
+    /// Index of the contact whose force it sets.
     pub contact: Option<usize>,
 }
 
 impl ResolvedTask {
-    /// How many rows it may have.
+    /// Returns the maximum number of rows.
     pub(crate) fn max_rows(&self) -> usize {
         match self.task.kind {
             TaskKind::Posture => 0,
@@ -31,7 +31,7 @@ impl ResolvedTask {
         }
     }
 
-    /// Adds its rows, one for each axis that the mask lets through.
+    /// Adds its rows, one for each axis selected by the mask.
     fn add(&self, k: &Kinematics, contacts: &[ContactNumbers], references: &References, out: &mut LeastSquares) {
         let Gains { stiffness, damping } = self.task.gains;
         let axes = self.axes.map_or(Mat3::identity(), |frame| k.frames[frame].pose.rotation);
@@ -83,7 +83,7 @@ impl ResolvedTask {
         }
     }
 
-    /// Rows of the centroidal momentum matrix, from one on, along some axes.
+    /// Adds rows `from` to `from` + 2 of the centroidal momentum matrix, along some axes.
     fn add_map(&self, k: &Kinematics, axes: Mat3<f64>, from: usize, scale: f64, b: Vec3<f64>, out: &mut LeastSquares) {
         for (e, _) in axes.columns().into_iter().zip(self.task.mask).filter(|(_, counts)| *counts) {
             let s = e.scale(scale);
@@ -127,7 +127,7 @@ impl ResolvedTask {
         self.add_jacobian(frame, axes, mask, 3, a - frame.drift.angular, out);
     }
 
-    /// Rows of a frame's Jacobian, from one on, along some axes.
+    /// Adds rows `from` to `from` + 2 of a frame's Jacobian, along some axes.
     fn add_jacobian(
         &self,
         frame: &FrameMotion,
@@ -150,12 +150,12 @@ impl ResolvedTask {
     }
 }
 
-/// All tasks, by their priorities.
+/// All tasks, grouped by priority.
 pub(crate) struct Objective {
     pub tasks: Vec<ResolvedTask>,
     /// q_ref ⊖ q, nv numbers.
     pub error: Vec<f64>,
-    /// One for each priority.
+    /// Objective of each priority.
     pub levels: Vec<LeastSquares>,
 }
 
@@ -221,7 +221,7 @@ impl Objective {
 }
 
 impl ResolvedTask {
-    /// Which frame's axes a task wants: its own, or another one.
+    /// Returns the name of the frame that gives a task's axes: its own frame, or another one.
     pub(crate) fn axes_name(task: &Task) -> Option<&str> {
         match &task.axes {
             Axes::World => None,

@@ -1,27 +1,27 @@
-//! The conditions of Karush, Kuhn and Tucker for a step's program, as it stands before anything is eliminated or scaled.
+//! The Karush–Kuhn–Tucker conditions of a step's program, before any elimination or scaling.
 
 use crate::controller::WholeBodyController;
 use crate::inspection::{Optimum, Program};
 use crate::references::References;
 use nalgebra::{DVector, DVectorView};
 
-/// How far a step is from the optimum of its program of the first priority: errors of the conditions of Karush, Kuhn and Tucker.
-/// At the default [`tolerance`](crate::Settings::tolerance) the first three are below 1e-7 and the last below 1e-5: the solver's
-/// own is of numbers that are scaled to size one, where here forces of 1000 N stand beside accelerations of 1 m/s².
+/// Errors of the Karush–Kuhn–Tucker conditions of a step's program of the first priority. At the default
+/// [`tolerance`](crate::Settings::tolerance) the first three are below 1e-7 and the last is below 1e-5. The solver's
+/// tolerance applies to numbers scaled to size one; here forces of 1000 N are compared with accelerations of 1 m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optimality {
-    /// The gradient P x + c − Aᵀ y − Gᵀ z − Fᵀ w, relative to the largest of its terms.
+    /// Gradient P x + c − Aᵀ y − Gᵀ z − Fᵀ w, relative to the largest of its terms.
     pub stationarity: f64,
-    /// What the worst equality, bound or cone is violated by, relative to its row and the unknowns.
+    /// Violation of the worst equality, bound or cone, relative to its row and the unknowns.
     pub primal: f64,
-    /// How far the multipliers are outside of their cones, relative to themselves.
+    /// Distance of the multipliers from their cones, relative to the multipliers.
     pub dual: f64,
-    /// The sum of the products of slacks and multipliers, relative to 1 and the terms of the objective.
+    /// Sum of the products of slack variables and multipliers, relative to 1 and the terms of the objective.
     pub complementarity: f64,
 }
 
 impl Optimality {
-    /// The largest of the errors.
+    /// Returns the largest of the errors.
     pub fn worst(&self) -> f64 {
         let Self { stationarity, primal, dual, complementarity } = *self;
         [stationarity, primal, dual, complementarity].into_iter().fold(0.0, f64::max)
@@ -29,9 +29,9 @@ impl Optimality {
 }
 
 impl WholeBodyController {
-    /// The errors of the conditions of optimality at the last step, which was at this state and for these references. For tests
-    /// and demonstrations: it assembles the program anew, and allocates. After a safe command, which is no optimum, they mean
-    /// nothing, nor do those of a clone before its first step.
+    /// Computes the errors of the optimality conditions at the last step, which was at this state and for these
+    /// references. For tests and demonstrations: it assembles the program again, and allocates. The errors have no
+    /// meaning after a safe command, which is not an optimum, nor for a clone before its first step.
     ///
     /// # Panics
     /// If `q`, `v` or a list of the references has the wrong length.
@@ -63,7 +63,7 @@ fn errors(program: &Program, optimum: &Optimum) -> Optimality {
     let terms = [P * x, c.clone(), -G.transpose() * z, -F.transpose() * w];
     let gradient = terms.iter().sum::<DVector<f64>>();
     let size = 1.0 + terms.iter().map(DVector::amax).fold(0.0, f64::max);
-    let Q = A.transpose().qr().q(); // what of the gradient is not in the range of Aᵀ
+    let Q = A.transpose().qr().q(); // the part of the gradient outside of the range of Aᵀ remains
     let stationarity = (&gradient - &Q * Q.tr_mul(&gradient)).amax() / size;
 
     let norm = |M: &nalgebra::DMatrix<f64>, i: usize| M.row(i).norm() * (1.0 + x.norm());
@@ -75,7 +75,7 @@ fn errors(program: &Program, optimum: &Optimum) -> Optimality {
     for i in 0..g.len() {
         let (below, above) = (g[i] - lower[i], upper[i] - g[i]);
         primal = primal.max(f64::max(-below, -above) / norm(G, i));
-        // z⁺ belongs to the lower bound and z⁻ to the upper one, where there is one
+        // z⁺ belongs to the lower bound and z⁻ to the upper bound, if it exists
         for (z, slack) in [(z[i].max(0.0), below), ((-z[i]).max(0.0), above)] {
             if z > 0.0 {
                 gap += z * slack;

@@ -1,13 +1,14 @@
-//! A planned motion, from plain arrays, as references over time.
+//! A planned motion, given as plain arrays; it serves as references over time.
 
 use crate::error::Error;
 use condyle_dynamics::{Joint, Model, difference, interpolate};
 use condyle_linalg::check;
 
-/// A planned motion: states at some times, efforts and gains between them, and which contacts touch when.
+/// A planned motion: states at given times, efforts and gains between them, and the times at which contacts touch.
 ///
-/// [`WholeBodyController::track`](crate::WholeBodyController::track) makes references of it. Between knots q runs along the
-/// joints' own groups, v and a = Δv / Δt are interpolated. Knots may share a time: then the velocity jumps there (an impact).
+/// [`WholeBodyController::track`](crate::WholeBodyController::track) makes references from it. Between knots, q is
+/// interpolated along the joints' own groups, and v and a = Δv / Δt are interpolated. Two knots may have the same time:
+/// the velocity then jumps there (an impact).
 ///
 /// ```
 /// use condyle_dynamics::{neutral, robots};
@@ -25,14 +26,14 @@ pub struct Plan {
     model: Model,
     contacts: usize,
     data: PlanData,
-    /// What is left of v between free-flyers.
+    /// Number of actuated coordinates (nv without free-flyers).
     controls: usize,
 }
 
-/// The numbers of a [`Plan`] with N + 1 knots.
+/// Numbers of a [`Plan`] with N + 1 knots.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlanData {
-    /// N + 1 times, none smaller than the one before (s).
+    /// N + 1 times in ascending order; equal times are allowed (s).
     pub times: Vec<f64>,
     /// States (q, v) of the knots, flat: (N + 1)·(nq + nv).
     pub states: Vec<f64>,
@@ -42,11 +43,11 @@ pub struct PlanData {
     pub gains: Vec<f64>,
     /// Whether each contact touches from each knot to the next, flat: N·contacts.
     pub touches: Vec<bool>,
-    /// The time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s); at least 0.
+    /// Time over which a contact is loaded after it begins to touch, and unloaded before it ends (s); at least 0.
     pub fade: f64,
 }
 
-/// A state of a plan.
+/// State of a plan.
 #[derive(Clone, Debug)]
 pub(crate) struct PlannedState {
     pub q: Vec<f64>,
@@ -55,10 +56,10 @@ pub(crate) struct PlannedState {
 }
 
 impl Plan {
-    /// For a robot with this number of contacts.
+    /// Creates a plan for a robot with this number of contacts.
     ///
     /// # Errors
-    /// [`Error`] for arrays of the wrong length, for numbers that are not finite, for times that run backwards, and for states
+    /// [`Error`] for arrays of the wrong length, numbers that are not finite, and times that decrease. Also for states
     /// whose quaternions or pairs (cos, sin) do not have length 1: [`Error::Knot`] names the knot and the joint.
     pub fn new(model: &Model, contacts: usize, data: PlanData) -> Result<Self, Error> {
         let (nx, nv) = (model.nq() + model.nv(), model.nv());
@@ -96,17 +97,18 @@ impl Plan {
         Ok(Self { model: model.clone(), contacts, data, controls })
     }
 
-    /// The arrays that it was made of.
+    /// Returns the arrays from which the plan was made.
     pub fn data(&self) -> &PlanData {
         &self.data
     }
 
-    /// The time of the first knot, and of the last.
+    /// Returns the times of the first and the last knot.
     pub fn span(&self) -> [f64; 2] {
         [self.data.times[0], self.data.times[self.data.times.len() - 1]]
     }
 
-    /// The knot before a time (the last one of those that share it), with a knot after it, and how far it is to that one.
+    /// Returns the last knot at or before a time that has a successor, and the time's fraction of the interval between
+    /// them.
     fn step(&self, t: f64) -> (usize, f64) {
         let times = &self.data.times;
         let after = times.partition_point(|&x| x <= t).clamp(1, times.len() - 1);
@@ -114,7 +116,8 @@ impl Plan {
         (after - 1, if to > from { ((t - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 })
     }
 
-    /// Panics unless the plan was made for this robot, or one of the same bodies and joints, with as many contacts.
+    /// Panics unless the plan was made for this robot or one with the same bodies and joints, and for this number of
+    /// contacts.
     #[track_caller]
     pub(crate) fn check(&self, model: &Model, contacts: usize) {
         let same = self.model.tree_hash() == model.tree_hash();
@@ -122,7 +125,7 @@ impl Plan {
         assert!(self.contacts == contacts, "plan: expected {contacts} contacts, found {}", self.contacts);
     }
 
-    /// q, v and a at a time; before the first and after the last knot at rest in it.
+    /// Computes q, v and a at a time; before the first and after the last knot the robot rests there.
     pub(crate) fn read(&self, t: f64, out: &mut PlannedState, tangent: &mut [f64]) {
         let (nq, nx) = (self.model.nq(), self.model.nq() + self.model.nv());
         let (k, s) = self.step(t);
@@ -138,10 +141,11 @@ impl Plan {
         }
     }
 
-    /// The activation of a contact at a time: 0 where it does not touch, ramped where it begins and ends to, else 1.
+    /// Returns the activation of a contact at a time: 0 while it does not touch, a ramp near the beginning and end of
+    /// contact, and 1 otherwise.
     ///
     /// # Panics
-    /// If there is no such contact.
+    /// If the contact's index is out of range.
     #[track_caller]
     pub fn activation(&self, contact: usize, t: f64) -> f64 {
         assert!(contact < self.contacts, "contact: expected one of {}, found {contact}", self.contacts);
@@ -157,11 +161,12 @@ impl Plan {
         ramp(begin.map_or(f64::INFINITY, |k| t - times[k + 1])).min(ramp(end.map_or(f64::INFINITY, |k| times[k] - t)))
     }
 
-    /// The plan's own control at a state: u = ū + K (x ⊖ x̄), as efforts of all coordinates (nv numbers), 0 at a free-flyer.
+    /// Computes the plan's own control at a state, u = ū + K (x ⊖ x̄), as efforts of all coordinates (nv numbers), 0 at
+    /// a free-flyer.
     ///
     /// # Errors
-    /// [`Error::Model`] for a state that is not finite or whose quaternions or pairs (cos, sin) do not have length 1; `tau` is
-    /// left as it was.
+    /// [`Error::Model`] for a state that is not finite, or whose quaternions or pairs (cos, sin) do not have length 1;
+    /// `tau` is then unchanged.
     ///
     /// # Panics
     /// If an argument has the wrong length, or the plan has no controls.

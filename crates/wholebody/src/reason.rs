@@ -5,7 +5,7 @@ use crate::controller::WholeBodyController;
 use crate::error::{InvalidRotation, Status};
 
 impl WholeBodyController {
-    /// The status of the last command in words, with the name of the joint or of the frame that is invalid.
+    /// Returns the status of the last command in words, with the name of the invalid joint or frame.
     ///
     /// ```
     /// # use condyle_dynamics::{neutral, robots};

@@ -1,23 +1,24 @@
-//! The command where there is no solution: the last one for some ticks, then gravity compensation with damping.
+//! Safe command for ticks without a solution: the last solution for some ticks, then gravity compensation with damping.
 
 use crate::contact_numbers::ContactNumbers;
 use crate::kinematics::Kinematics;
 use condyle_dynamics::{Data, gravity};
 use nalgebra::{Matrix6, Vector6};
 
-/// What the safe command is made of.
+/// Quantities from which the safe command is computed.
 pub(crate) struct Safety {
     data: Data<f64>,
-    /// The torques of the last solution; 0 before the first.
+    /// Torques of the last solution; 0 before the first.
     pub tau: Vec<f64>,
-    /// How many ticks ago it was, if there was one.
+    /// Number of ticks since the last solution; `None` before the first.
     pub age: Option<u32>,
-    /// The last valid state.
+    /// Last valid position.
     pub q: Vec<f64>,
+    /// Last valid velocity.
     pub v: Vec<f64>,
-    /// Whether that is the current one.
+    /// Whether the last valid state is the current state.
     pub current: bool,
-    /// Least and greatest effort of each coordinate.
+    /// Minimum and maximum effort of each coordinate.
     effort: [Vec<f64>; 2],
     damping: f64,
     hold_ticks: u32,
@@ -45,7 +46,7 @@ impl Safety {
         }
     }
 
-    /// Takes the state of a tick, if it is valid.
+    /// Stores the state of a tick, if it is valid.
     pub(crate) fn see(&mut self, state: Option<(&[f64], &[f64])>) {
         self.current = state.is_some();
         if let Some((q, v)) = state {
@@ -54,13 +55,13 @@ impl Safety {
         }
     }
 
-    /// The torques of a tick that was solved.
+    /// Stores the torques of a solved tick.
     pub(crate) fn keep(&mut self, tau: &[f64]) {
         self.tau.copy_from_slice(tau);
         self.age = Some(0);
     }
 
-    /// Clips torques to the limits of effort.
+    /// Clips torques to the effort limits.
     pub(crate) fn clip(&self, tau: &mut [f64]) {
         let [least, greatest] = &self.effort;
         for ((tau, &least), &greatest) in tau.iter_mut().zip(least).zip(greatest) {
@@ -68,7 +69,7 @@ impl Safety {
         }
     }
 
-    /// Writes the torques of a tick that was not solved. Whether they are the last solution's.
+    /// Writes the torques of a tick without a solution. Returns whether they are the torques of the last solution.
     pub(crate) fn command(
         &mut self,
         kinematics: &mut Kinematics,
@@ -96,7 +97,7 @@ impl Safety {
         false
     }
 
-    /// τ = g − Jᵀ f, with the smallest forces of the active contacts that carry the base: S (g − Jᵀ f) = 0.
+    /// Computes τ = g − Jᵀ f, with the smallest forces of the active contacts that carry the base: S (g − Jᵀ f) = 0.
     fn gravity_compensation(
         &mut self,
         kinematics: &mut Kinematics,

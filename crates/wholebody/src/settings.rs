@@ -1,4 +1,4 @@
-//! The settings of a controller.
+//! Settings of a controller.
 
 use crate::error::Error;
 use crate::task::Gains;
@@ -11,11 +11,11 @@ use std::fmt;
 pub enum Friction {
     /// ‖f_t‖ ≤ μ f_n, a second-order cone.
     Cone,
-    /// A pyramid, for comparison.
+    /// A pyramid instead of the cone, for comparison.
     Pyramid {
-        /// How many faces; at least 3.
+        /// Number of faces; at least 3.
         sides: usize,
-        /// Whether it lies within the cone (and touches it with its edges), or around it (with its faces).
+        /// Whether the pyramid lies inside the cone (its edges touch the cone) or around it (its faces touch the cone).
         inscribed: bool,
     },
 }
@@ -24,7 +24,7 @@ pub enum Friction {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Backend {
-    /// clarabel, the reference. It exists with the feature `clarabel`, which is off by default.
+    /// Clarabel, the reference solver. Needs the feature `clarabel`, which is off by default.
     #[cfg(feature = "clarabel")]
     Clarabel,
     /// Our own dense interior point method, warm-started from the last tick.
@@ -45,36 +45,37 @@ impl fmt::Display for Backend {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Form {
-    /// The rows of the base and of the contacts are eliminated first.
+    /// The equalities of the base and of the contacts are eliminated first.
     Condensed,
-    /// All of (q̈, f), with equalities, for comparison: it takes longer. For clarabel there are more unknowns, for limited torques
-    /// and for what tasks miss, so that its matrices have more zeros. Priorities after the first are condensed all the same.
+    /// All of (q̈, f), with equalities, for comparison: slower. Clarabel gets additional unknowns, for limited torques
+    /// and for residuals of tasks, so that its matrices have more zeros. Priorities after the first are always
+    /// condensed.
     Full,
 }
 
-/// How joints are kept within their limits.
+/// Limits of the joints' position and velocity, as bounds on their acceleration.
 ///
 /// ```text
 /// (v_min − v) / T ≤ q̈ ≤ (v_max − v) / T                        velocity
 /// (q_min − q) / T² − 2 v / T ≤ q̈ ≤ (q_max − q) / T² − 2 v / T    position: the distance d obeys d̈ ≥ −(2 / T) ḋ − d / T²
 /// ```
 ///
-/// each bound no further than a_max from 0 on the other's side: a joint that is beyond its limit, or too fast towards it,
-/// is led back with at most a_max. Where they exclude each other, the position's bound holds. A limit is approached no
-/// faster than a critically damped spring of time constant T would, and not passed (an exponential control barrier
-/// function: Nguyen and Sreenath, 2016). Where dynamics, contacts and torques leave no acceleration within these bounds,
-/// they become tasks of great weight at that tick.
+/// A lower bound is at most a_max, and an upper bound is at least −a_max. A joint beyond its limit, or too fast towards
+/// it, is therefore led back with at most a_max. If bounds of position and velocity contradict each other, the
+/// position's bound holds. A joint approaches its limit no faster than a critically damped spring with time constant T,
+/// and does not pass it (an exponential control barrier function: Nguyen and Sreenath, 2016). If dynamics, contacts and
+/// torques allow no acceleration within these bounds, the bounds become tasks of large weight at that tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimits {
-    /// T (s), the time to look ahead; some ticks at least.
+    /// T (s), the look-ahead time; at least several ticks.
     pub look_ahead: f64,
     /// a_max (rad/s², m/s²).
     pub max_acceleration: f64,
-    /// Least position, nq numbers; `None` for the model's.
+    /// Minimum position, nq numbers; `None` for the model's.
     pub lower: Option<Vec<f64>>,
-    /// Greatest position, nq numbers; `None` for the model's.
+    /// Maximum position, nq numbers; `None` for the model's.
     pub upper: Option<Vec<f64>>,
-    /// Greatest speed, nv numbers; `None` for the model's.
+    /// Maximum speed, nv numbers; `None` for the model's.
     pub velocity: Option<Vec<f64>>,
 }
 
@@ -84,7 +85,7 @@ impl Default for JointLimits {
     }
 }
 
-/// The settings of [`WholeBodyController`](crate::WholeBodyController).
+/// Settings of [`WholeBodyController`](crate::WholeBodyController).
 ///
 /// ```
 /// use condyle_wholebody::{Gains, Settings};
@@ -95,37 +96,37 @@ impl Default for JointLimits {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Weight of ½ ‖q̈‖², which decides what the tasks leave open; above 0.
+    /// Weight of ½ ‖q̈‖², which decides the motion that the tasks leave open; above 0.
     pub acceleration_weight: f64,
-    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which spreads the forces; above 0. A moment of a sole's wrench counts as the forces
-    /// at the corners that make it, so that pressure stays away from the edges.
+    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which distributes the forces; above 0. A moment of a sole's wrench counts as
+    /// the corner forces that cause it, so that the pressure stays away from the edges.
     pub force_weight: f64,
-    /// Baumgarte's: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0.
+    /// Baumgarte gains: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0.
     pub contact_gains: Gains,
-    /// The greatest such acceleration (m/s², rad/s²): a foot that lands fast is stopped over some ticks.
+    /// Maximum acceleration from `contact_gains` (m/s², rad/s²): a foot that lands fast is stopped over several ticks.
     pub max_correction: f64,
-    /// Cones or pyramids.
+    /// Friction cones or pyramids.
     pub friction: Friction,
-    /// Greatest effort of each coordinate, nv numbers (N m, N), infinite where there is none; `None` for the model's. Above 0
+    /// Maximum effort of each coordinate, nv numbers (N m, N), infinite for no limit; `None` for the model's. Above 0
     /// for each actuated coordinate.
     pub effort: Option<Vec<f64>>,
-    /// Limits of the joints' position and velocity; `None` for none.
+    /// Limits of the joints' position and velocity; `None` for no limits.
     pub joint_limits: Option<JointLimits>,
-    /// For how many ticks after the last solution its torques serve as the safe command.
+    /// Number of ticks after the last solution for which its torques serve as the safe command.
     pub hold_ticks: u32,
-    /// Damping of the safe command that follows: −D v, D in this part of the greatest effort for 1 rad/s (s/rad).
+    /// Damping of the safe command that follows: −D v, with D = this factor (s/rad) times the maximum effort.
     pub damping: f64,
-    /// Which solver.
+    /// Solver of the programs.
     pub backend: Backend,
-    /// In which unknowns.
+    /// Unknowns of the program.
     pub form: Form,
-    /// Whether the solver begins at the last tick's solution, if it can.
+    /// Whether the solver starts from the last tick's solution, if possible.
     pub warm_start: bool,
     /// Tolerance of the solver, absolute and relative, on feasibility and duality gap.
     pub tolerance: f64,
     /// Iterations after which a step fails.
     pub max_iterations: u32,
-    /// Seconds after which a step fails; may be infinite. What depends on it depends on the machine's load.
+    /// Seconds after which a step fails; may be infinite. With a finite limit, results depend on the machine's load.
     pub time_limit: f64,
 }
 
@@ -180,7 +181,7 @@ impl Settings {
         }
         let (nq, nv) = (model.nq(), model.nv());
         for (name, numbers, expected, least) in [
-            ("effort", &self.effort, nv, None), // its numbers: `check_effort`
+            ("effort", &self.effort, nv, None), // `check_effort` checks its numbers
             ("joint_limits.lower", &limits.lower, nq, Some(f64::NEG_INFINITY)),
             ("joint_limits.upper", &limits.upper, nq, Some(f64::NEG_INFINITY)),
             ("joint_limits.velocity", &limits.velocity, nv, Some(0.0)),
@@ -197,7 +198,7 @@ impl Settings {
         Ok(())
     }
 
-    /// Refuses efforts of actuated coordinates that are not above 0, by the joint's name.
+    /// Rejects efforts of actuated coordinates that are not above 0; the error names the joint.
     pub(crate) fn check_effort(&self, model: &Model) -> Result<(), Error> {
         let [least, greatest] = self.effort(model);
         let origin = match self.effort {

@@ -1,8 +1,8 @@
-//! What a controller is to do: tasks, given once.
+//! Tasks of a controller, given once.
 
 use crate::error::Error;
 
-/// The gains of a task: the desired acceleration is a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
+/// Gains of a task: the desired acceleration is a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gains {
     /// k (1/s²).
@@ -12,7 +12,7 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// The gains of a critically damped error of this stiffness (1/s²): d = 2 √k.
+    /// Returns the gains for a critically damped error with this stiffness (1/s²): d = 2 √k.
     ///
     /// ```
     /// assert_eq!(condyle_wholebody::Gains::critical(100.0).damping, 20.0);
@@ -22,31 +22,31 @@ impl Gains {
     }
 }
 
-/// The quantity that a task controls, and how many numbers it has.
+/// Quantity controlled by a task, and its number of components.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum TaskKind {
-    /// The centre of mass, c̈: 3 numbers.
+    /// Centre of mass, c̈: 3 numbers.
     Com,
-    /// A frame's origin and rotation, (p̈, ω̇): 6 numbers, linear first.
+    /// Origin and rotation of a frame, (p̈, ω̇): 6 numbers, linear first.
     Pose(String),
-    /// A frame's origin, p̈: 3 numbers.
+    /// Origin of a frame, p̈: 3 numbers.
     Position(String),
-    /// A frame's rotation, ω̇: 3 numbers.
+    /// Rotation of a frame, ω̇: 3 numbers.
     Orientation(String),
-    /// The velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6 numbers, linear first.
+    /// Velocity of a frame's origin and rotation, at any pose (only the gain d acts): 6 numbers, linear first.
     Velocity(String),
-    /// The actuated joints, q̈.
+    /// Actuated joints, q̈.
     Posture,
-    /// The rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers.
+    /// Rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers.
     AngularMomentum,
-    /// The force of the contact of this frame: 6 numbers, force and moment at the contact's centre along its axes (t₁, t₂,
-    /// n), of which a point has 3. No gain acts; nor does the task while the contact is off.
+    /// Force of the contact of this frame: 6 numbers, force and moment at the contact's centre along its axes (t₁, t₂,
+    /// n); the first 3 for a point. Gains have no effect, and the task is off while the contact is off.
     ContactForce(String),
 }
 
 impl TaskKind {
-    /// The name of the frame that it moves.
+    /// Returns the name of the frame that the task moves.
     pub(crate) fn frame(&self) -> Option<&str> {
         match self {
             Self::Pose(f) | Self::Position(f) | Self::Orientation(f) | Self::Velocity(f) => Some(f),
@@ -54,7 +54,7 @@ impl TaskKind {
         }
     }
 
-    /// What errors call it.
+    /// Returns the name that errors use.
     pub(crate) fn name(&self) -> &str {
         match self {
             Self::Com => "com",
@@ -65,23 +65,23 @@ impl TaskKind {
     }
 }
 
-/// Axes along which the numbers of a task are, from which its mask picks.
+/// Axes of a task's numbers, from which its mask selects.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Axes {
-    /// The world's.
+    /// The world's axes.
     World,
-    /// The frame's own; for tasks that move no frame, the world's.
+    /// The frame's own axes; for tasks that move no frame, the world's axes.
     Local,
-    /// Those of another frame, by its name: a foot along the trunk's axes, say.
+    /// The axes of another frame, by name: for example, a foot along the trunk's axes.
     Frame(String),
 }
 
-/// A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖². What it aims at is in the
+/// A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖². Its target is in the
 /// [`References`](crate::References).
 ///
-/// Tasks of priority 0 come first; those of priority 1 decide only what they leave open, and so on (lexicographic). Within
-/// a priority the weights decide, and only their ratios matter.
+/// Tasks of priority 0 come first. Tasks of priority 1 decide only the motion that priority 0 leaves open, and so on
+/// (lexicographic). Within a priority the weights decide, and only their ratios matter.
 ///
 /// ```
 /// use condyle_wholebody::{Axes, Gains, Task};
@@ -95,15 +95,15 @@ pub enum Axes {
 pub struct Task {
     /// The quantity.
     pub kind: TaskKind,
-    /// w; at least 0, and 0 where the task has no say.
+    /// w; at least 0. A task with weight 0 has no effect.
     pub weight: f64,
-    /// From errors of position and velocity to acceleration.
+    /// Gains from errors of position and velocity to acceleration.
     pub gains: Gains,
-    /// Which of its numbers count; of tasks with 3 numbers the first 3 entries are read. For the posture, see `joints`.
+    /// Selects the numbers that count; tasks with 3 numbers use the first 3 entries. For the posture, use `joints`.
     pub mask: [bool; 6],
-    /// Along whose axes.
+    /// Axes of the numbers.
     pub axes: Axes,
-    /// 0 for the first; at most 2.
+    /// Priority: 0 is the highest, at most 2.
     pub priority: usize,
     /// Factors of the posture's weight, one for each coordinate (nv numbers); empty for all 1.
     pub joints: Vec<f64>,
@@ -115,35 +115,35 @@ impl Task {
         Self { kind, weight, gains, mask: [true; 6], axes: Axes::World, priority: 0, joints: Vec::new() }
     }
 
-    /// The centre of mass: weight 10, critically damped at k = 100/s², as are all.
+    /// Creates a task for the centre of mass: weight 10, critically damped at k = 100/s², as all tasks are.
     pub fn com() -> Self {
         Self::new(TaskKind::Com, 10.0)
     }
-    /// A frame's pose, weight 10.
+    /// Creates a task for a frame's pose, weight 10.
     pub fn pose(frame: &str) -> Self {
         Self::new(TaskKind::Pose(frame.to_owned()), 10.0)
     }
-    /// A frame's origin, weight 10.
+    /// Creates a task for a frame's origin, weight 10.
     pub fn position(frame: &str) -> Self {
         Self::new(TaskKind::Position(frame.to_owned()), 10.0)
     }
-    /// A frame's rotation, weight 10.
+    /// Creates a task for a frame's rotation, weight 10.
     pub fn orientation(frame: &str) -> Self {
         Self::new(TaskKind::Orientation(frame.to_owned()), 10.0)
     }
-    /// A frame's velocity, weight 10.
+    /// Creates a task for a frame's velocity, weight 10.
     pub fn velocity(frame: &str) -> Self {
         Self::new(TaskKind::Velocity(frame.to_owned()), 10.0)
     }
-    /// The joints, weight 0.1.
+    /// Creates a task for the joints, weight 0.1.
     pub fn posture() -> Self {
         Self::new(TaskKind::Posture, 0.1)
     }
-    /// The angular momentum, weight 0.1 s²/kg² m⁴.
+    /// Creates a task for the angular momentum, weight 0.1 s²/kg² m⁴.
     pub fn angular_momentum() -> Self {
         Self::new(TaskKind::AngularMomentum, 0.1)
     }
-    /// The force of a contact, by its frame, weight 1e-3/N².
+    /// Creates a task for the force of a contact, given by its frame, weight 1e-3/N².
     pub fn contact_force(frame: &str) -> Self {
         Self::new(TaskKind::ContactForce(frame.to_owned()), 1e-3)
     }

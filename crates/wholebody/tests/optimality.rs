@@ -1,4 +1,4 @@
-//! Every command satisfies dynamics, contacts and cones, and is the best of its kind.
+//! Every command satisfies dynamics, contacts and cones, and is optimal.
 #![allow(non_snake_case)]
 
 mod common;
@@ -16,7 +16,7 @@ fn standing_still() {
     let references = controller.hold(&q).unwrap();
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
-    // All tasks agree with rest; only the equal shares of the weight do not, with a weight of 1e-7.
+    // All tasks agree with rest, except the equal shares of the weight, which have a weight of 1e-7.
     assert!(max_abs(command.a.iter().copied()) < 1e-2, "{:?}", command.a);
     for (contact, &f) in contacts.iter().zip(&command.forces) {
         assert!(margin(contact, f) > 10.0, "{f:?}");
@@ -54,7 +54,7 @@ fn a_humanoid_on_two_points() {
     }
 }
 
-/// Only the task of the centre of mass: it is met, so q̈ is a minimiser whatever the solver says.
+/// A single task for the centre of mass is met exactly, so q̈ is a minimiser regardless of the solver's report.
 #[test]
 fn a_feasible_task_is_met() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -67,14 +67,14 @@ fn a_feasible_task_is_met() {
     assert!(norm(c - references.com.acceleration) < 1e-5, "{c:?}");
 }
 
-/// Ice: the push that is asked for needs more friction than there is, so the forces stand on their cones.
+/// On ice, the requested push needs more friction than is available, so the forces lie on their cones.
 #[test]
 fn little_friction_tilts_forces_to_the_cone() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let contacts = feet(0.1);
     let mut controller = controller(&model, &contacts);
     let mut references = controller.hold(&q).unwrap();
-    references.com.acceleration.x = 3.0; // of which 0.1 · 9.81 can be had
+    references.com.acceleration.x = 3.0; // 0.1 · 9.81 is feasible
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
     for (contact, &f) in contacts.iter().zip(&command.forces) {
@@ -86,7 +86,7 @@ fn little_friction_tilts_forces_to_the_cone() {
     assert!((c.x - 0.1 * (c.z + 9.81)).abs() < 0.02, "{c:?}");
 }
 
-/// A cone, not a pyramid: the greatest friction force is the same in every direction.
+/// Friction is a cone, not a pyramid: the greatest friction force is the same in every direction.
 #[test]
 fn friction_has_no_preferred_direction() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -108,7 +108,7 @@ fn torque_limits_bind() {
     let contacts = feet(0.7);
     let free = controller(&model, &contacts).step(&q, &v, &{ controller(&model, &contacts).hold(&q).unwrap() }).clone();
     let strongest = max_abs(free.tau.iter().copied());
-    let limit = 0.5 * strongest; // more than internal forces can make up for
+    let limit = 0.5 * strongest; // internal forces cannot compensate
     let settings = Settings { effort: Some(vec![limit; 18]), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks(), settings).unwrap();
     let references = controller.hold(&q).unwrap();
@@ -133,7 +133,7 @@ fn force_bounds_bind() {
     assert!(command.forces[0].linear.z < 50.0 + EQUALITY && command.forces[3].linear.z > 95.0 - EQUALITY);
 }
 
-/// The same robot on tilted ground, and the same robot in a tilted world: one answer.
+/// The same robot on tilted ground and in a tilted world gives the same result.
 #[test]
 fn a_slope_is_a_tilted_world() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -145,7 +145,7 @@ fn a_slope_is_a_tilted_world() {
     let mut level = controller(&leaning, &contacts);
     let references = level.hold(&q).unwrap();
     let expected = level.step(&q, &v, &references).solved().unwrap().clone();
-    // Gravity is straight; base and normals are turned by −slope about y.
+    // Gravity is vertical; base and normals are rotated by −slope about y.
     let mut turned = q.clone();
     let (s, c) = (-slope / 2.0).sin_cos();
     let (x, z) = (q[0], q[2]);
@@ -195,11 +195,11 @@ fn what_cannot_be_is_infeasible() {
     let contacts: Vec<_> = feet(0.7).into_iter().map(|c| FrictionContact { min_force: 1000.0, ..c }).collect();
     let mut controller = controller(&model, &contacts);
     let references = controller.hold(&q).unwrap();
-    assert_eq!(controller.step(&q, &v, &references).status, Status::Infeasible); // knees of 80 N m
+    assert_eq!(controller.step(&q, &v, &references).status, Status::Infeasible); // knees with 80 N m
 }
 
-/// With no inequality active the command solves a linear system, built here from other parts: columns of M and of
-/// Jacobians are differences of RNEA and of accelerations along a path.
+/// With no active inequality, the command solves a linear system. The test builds the system from other functions:
+/// columns of M and of Jacobians are differences of RNEA and of accelerations along a path.
 #[test]
 fn inside_all_cones_the_kkt_system_is_solved() {
     let (model, contacts) = (robots::quadruped(), feet(2.0));
@@ -242,7 +242,7 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     let placements = forward_kinematics(&model, &mut data, &q);
     placements.frame_jacobian(model.frame("trunk").unwrap(), ReferenceFrame::LocalWorldAligned, &mut Jw);
     let (Jw, v) = (Jw.rows(3, 3).into_owned(), DVector::from_vec(v));
-    let damping = 20.0; // of all tasks; there are no errors of position
+    let damping = 20.0; // for all tasks; errors of position are zero
     let com = DVector::from_column_slice(&references.com.acceleration.to_array())
         - DVector::from_column_slice(&com_bias)
         - damping * &Jc * &v;
@@ -264,8 +264,8 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     let right = DVector::from_iterator(n + rows, c.iter().map(|c| -c).chain(b.iter().copied()));
     let x = K.lu().solve(&right).unwrap();
     let found = command.a.iter().copied().chain(command.forces.iter().flat_map(|f| f.linear.to_array()));
-    // A duality gap of 1e-9 bounds what only w_f = 1e-5 decides by √(1e-9 / 1e-5) = 1e-2 N; the last Newton step of an
-    // interior-point method squares that.
+    // A duality gap of 1e-9 bounds the error of forces, which only w_f = 1e-5 decides, by √(1e-9 / 1e-5) = 1e-2 N. The
+    // last Newton step of an interior-point method squares this error.
     let error = max_abs(found.zip(&x).map(|(found, x)| found - x));
     assert!(error < 1e-4, "{error:.1e}");
 }

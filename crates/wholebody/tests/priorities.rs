@@ -1,4 +1,4 @@
-//! What a priority attains, the next ones do not touch.
+//! Results of a priority are not changed by later priorities.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,11 +7,11 @@ use common::*;
 use condyle_dynamics::{Vec3, robots};
 use condyle_wholebody::{Axes, Backend, Form, Gains, Settings, Task, TaskKind, WholeBodyController};
 
-/// Of q̈, relative to 1 and its largest number: a little more than the root of the tolerance, 1e-11, where only regularisation
-/// decides.
+/// Tolerance of q̈, relative to 1 and its largest number: slightly above the root of the solver's tolerance of 1e-11,
+/// where only regularisation decides.
 const AGREEMENT: f64 = 1e-5;
 
-/// The trunk's height and the centre of mass cannot both have their will; the order decides, not the weights.
+/// The targets of the trunk's height and of the centre of mass conflict; the order decides, not the weights.
 #[test]
 fn order_beats_weight() {
     let model = robots::quadruped();
@@ -38,7 +38,7 @@ fn order_beats_weight() {
     assert!(missed(1, 0, 10.0) > 1.0);
 }
 
-/// The first priority at the edge of what friction allows: the next one has no room, and is solved all the same.
+/// A first priority at the limit of friction leaves no freedom to the next priority, which is solved nevertheless.
 #[test]
 fn a_first_priority_at_its_limit() {
     let model = robots::humanoid();
@@ -64,7 +64,7 @@ fn references_without_frames(references: &condyle_wholebody::References) -> cond
     condyle_wholebody::References { frames: Vec::new(), ..references.clone() }
 }
 
-/// Three priorities in each form and by each back end: one command.
+/// Solves three priorities in each form and with each back end: the commands agree.
 #[test]
 fn forms_agree_on_priorities() {
     let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
@@ -106,7 +106,7 @@ fn forms_agree_on_priorities() {
     }
 }
 
-/// Along the hand's own axes, and only one of them.
+/// Tests one axis of the hand, along its own axes and other axes.
 #[test]
 fn masks_and_axes() {
     let model = robots::humanoid();
@@ -136,7 +136,7 @@ fn masks_and_axes() {
     }
 }
 
-/// Angular momentum, velocities and forces are tasks like others.
+/// Angular momentum, velocities and forces can be tasks.
 #[test]
 fn momentum_velocity_and_force() {
     let model = robots::humanoid();
@@ -161,7 +161,7 @@ fn momentum_velocity_and_force() {
     let hand = condyle_wholebody::FrictionContact::point("left_hand", 1.0);
     let (a, _) = accelerations(&model, &[hand], &q, &v, &command.a);
     assert!(norm(a[0] - Vec3::new(0.0, 1.0, 0.0)) < 0.1, "{:?}", a[0]);
-    // dL/dt is the moment of all forces about the centre of mass
+    // dL/dt is the moment of all forces about the centre of mass.
     let com = controller.hold(&q).unwrap().com.position;
     let command = controller.step(&q, &v, &references);
     let mut rate = Vec3::zero();

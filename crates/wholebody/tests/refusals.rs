@@ -1,4 +1,4 @@
-//! Faults are named: descriptions by `Error`, states and failed solves by `Status`, lengths by a panic.
+//! Faults are named: in descriptions by `Error`, in states and failed solves by `Status`, in lengths by a panic.
 
 mod common;
 #[path = "../../../tests/common/panics.rs"]
@@ -93,12 +93,13 @@ fn lengths() {
     let _ = controller.step(&stance(), &[0.0; 18], &references);
 }
 
-/// An effort of 0 leaves nothing to control a joint with: the model's is refused by the joint's name, and replaced by a setting.
+/// A joint with an effort limit of 0 cannot be controlled: the error names the joint, and a setting can replace the
+/// limit.
 #[test]
 fn efforts_are_above_0() {
     let model = robots::quadruped();
     let mut limits = model.limits().clone();
-    limits.effort_upper[7] = 0.0; // of LF_HFE
+    limits.effort_upper[7] = 0.0; // limit of LF_HFE
     let powerless = model.clone().with_limits(limits).unwrap();
     let new = |model, settings| WholeBodyController::new(model, &feet(0.7), &tasks(), settings).map(drop);
     let error = new(&powerless, Settings::default()).unwrap_err().to_string();
@@ -121,7 +122,7 @@ fn efforts_are_above_0() {
     }
 }
 
-/// The place of a panic is the caller's.
+/// Panics report the caller's location.
 #[test]
 fn panics_point_at_the_caller() {
     let model = robots::quadruped();
@@ -164,7 +165,7 @@ fn a_controller_is_shared_between_threads() {
     is_usual::<Status>();
 }
 
-/// A command is no solution before the first step.
+/// Before the first step, the command is not a solution.
 #[test]
 fn nothing_is_solved_before_the_first_step() {
     let model = robots::quadruped();

@@ -1,4 +1,4 @@
-//! Joints that are all beyond a limit, which the feet do not let them back to: whatever the state, there is a solution.
+//! States with all joints beyond a limit, where the held feet prevent their return: each state has a solution.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,13 +7,13 @@ use common::*;
 use condyle_dynamics::{Model, robots};
 use condyle_wholebody::{Backend, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController};
 
-/// Of an acceleration, relative to the greatest: objectives that agree to 1e-9 leave to accelerations about the root of it,
-/// times what the weights of limits and forces are apart.
+/// Tolerance of accelerations, relative to the greatest. Objectives that agree to 1e-9 leave an error of about its root
+/// in accelerations, times the ratio of the weights of limits and forces.
 const APART: f64 = 5e-3;
 const STATES: u64 = 96;
 
-/// The commands of both back ends in many states: at rest in the stance, near it, and thrown about; a little beyond the
-/// limits, and far.
+/// Compares the commands of both back ends in many states: at rest in the stance, near it, and far from it with high
+/// velocities; a little and far beyond the limits.
 fn both_solve(model: &Model, contacts: &[FrictionContact], tasks: &[Task], stance: &[f64]) {
     let mut relaxed = 0;
     for seed in 0..STATES {

@@ -1,4 +1,4 @@
-//! Whatever happens there is a command: finite, within the torque limits, its status said.
+//! Every step gives a command: finite, within the torque limits, and with a status.
 #![allow(non_snake_case)]
 
 #[path = "safety/clones.rs"]
@@ -13,7 +13,7 @@ use condyle_wholebody::{
     Backend, Command, CommandSource, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController,
 };
 
-/// Finite, and within the limits to the last bit.
+/// Checks that a command is finite, and within the limits to the last bit.
 fn is_safe(command: &Command, effort: &[f64]) {
     let numbers = command.tau.iter().chain(&command.a).copied();
     let forces = command.forces.iter().flat_map(|f| f.to_array());
@@ -41,7 +41,7 @@ fn the_last_solution_then_gravity_compensation() {
             assert_eq!((command.source, &command.tau), (CommandSource::LastSolution, &good.tau));
         } else {
             assert_eq!(command.source, CommandSource::GravityCompensation);
-            // On four feet it stands: the same torques, but for what the solver spreads otherwise.
+            // Four feet carry the robot: the torques are the same, except for internal forces.
             let apart = max_abs(command.tau.iter().zip(&good.tau).map(|(a, b)| a - b));
             assert!(apart < 2.0, "{apart} N m");
         }
@@ -72,7 +72,7 @@ fn a_state_that_is_not_finite() {
     }
 }
 
-/// What no torque can do, and solvers that stop early: for any state whatever.
+/// Impossible requirements, and solvers that stop early, in random states.
 #[test]
 fn nothing_breaks_the_limits() {
     let model = robots::humanoid();
@@ -93,7 +93,7 @@ fn nothing_breaks_the_limits() {
     }
 }
 
-/// No time at all is too little for each back end, which says so.
+/// Each back end reports that a time limit of almost zero is too short.
 #[test]
 fn too_slow_is_a_status() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -110,7 +110,7 @@ fn too_slow_is_a_status() {
     }
 }
 
-/// In the air the compensation is gravity's torques.
+/// In the air, the compensation consists of gravity's torques.
 #[test]
 fn compensation_without_contacts() {
     let model = robots::quadruped();
@@ -124,7 +124,7 @@ fn compensation_without_contacts() {
     assert_eq!((&command.tau[..6], &command.tau[6..]), (&zero[..], &g[6..]));
 }
 
-/// States beyond the limits are led back, others kept within them: simulated in free fall, thrown about by the posture.
+/// Joints beyond the limits are led back, and others stay within them, in a simulated free fall with moving targets.
 #[test]
 fn joints_stay_within_their_limits() {
     let model = robots::quadruped();
@@ -160,7 +160,7 @@ fn joints_stay_within_their_limits() {
             integrate(&model, &q, &step, &mut next);
             q = next;
             assert!(beyond || v[6..].iter().all(|v| v.abs() < 5.0 + 1e-6));
-            // a fifth of the distance after the first 0.5 s, and never outside if it was inside
+            // at most a fifth of the distance after the first 0.5 s, and never outside if it started inside
             for i in 7..19 {
                 let out = (q[i] - upper[i]).max(lower[i] - q[i]);
                 assert!(
@@ -180,12 +180,12 @@ fn joints_stay_within_their_limits() {
     }
 }
 
-/// A stance in which a limit asks for what the held feet do not allow.
+/// A limit contradicts the held feet in this stance.
 #[test]
 fn limits_give_way_to_contacts() {
     let (model, q) = (robots::quadruped(), stance());
     let mut upper = model.limits().upper.clone();
-    (7..19).for_each(|i| upper[i] = q[i] - 0.2); // all joints are beyond: no motion of the trunk brings them all back
+    (7..19).for_each(|i| upper[i] = q[i] - 0.2); // all joints are too far: no trunk motion returns all
     let limits = JointLimits { upper: Some(upper), ..JointLimits::default() };
     let settings = Settings { joint_limits: Some(limits), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();

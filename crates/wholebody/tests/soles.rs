@@ -1,4 +1,4 @@
-//! Soles, edges and pyramids; the two forms of the program give one command.
+//! Soles, edges and pyramids; both forms of the program give the same command.
 #![allow(non_snake_case)]
 
 mod common;
@@ -10,7 +10,7 @@ use condyle_wholebody::{
     WholeBodyController,
 };
 
-/// Of q̈, relative to 1 and its largest number: what two solvers of tolerance 1e-10 agree to.
+/// Tolerance of q̈, relative to 1 and its largest number: the agreement of two solvers with tolerance 1e-10.
 const AGREEMENT: f64 = 1e-6;
 
 fn solve(
@@ -45,7 +45,7 @@ fn a_humanoid_stands_on_soles() {
     }
 }
 
-/// Pushed so hard to the side that the centre of pressure stands at the edge of a sole, or friction at its cone.
+/// A strong push to the side brings the centre of pressure to the edge of a sole, or friction to its cone.
 #[test]
 fn the_centre_of_pressure_stays_within() {
     let model = robots::humanoid();
@@ -60,8 +60,9 @@ fn the_centre_of_pressure_stays_within() {
     }
 }
 
-/// Forces are spread alike whether a wrench or the corners' forces describe them: of four corners, a quarter of the force
-/// each costs a quarter of the whole. Half of the way aside, pressure has left both soles' middles but is far from edges.
+/// A wrench and corner forces give the same distribution of forces: four corners with a quarter of the force each cost
+/// a quarter of the whole. Halfway to the side, the pressure has left the middles of both soles but is far from their
+/// edges.
 #[test]
 fn pressure_keeps_away_from_the_edges() {
     let model = robots::humanoid();
@@ -77,14 +78,14 @@ fn pressure_keeps_away_from_the_edges() {
     let weight = 9.81 * model.total_mass();
     for (one, other) in wrench.forces.iter().zip(&corners.forces) {
         assert!(max_abs((*one - *other).to_array()) < 1e-5 * weight, "{one:?} and {other:?}");
-        let aside = one.angular.x / one.linear.z; // y of the centre of pressure, of a sole 10 cm wide
+        let aside = one.angular.x / one.linear.z; // y of the centre of pressure, in a sole 10 cm wide
         assert!(aside.abs() > 1e-3 && aside.abs() < 0.025, "{aside}");
     }
     let [left, right] = [0, 1].map(|k| wrench.forces[k].linear.z);
     assert!((left - right).abs() > 0.05 * weight, "{left} and {right}");
 }
 
-/// Condensed or not, by clarabel or by our solver; with a weight of forces that decides them within the tolerance.
+/// Condensed and full programs agree, with clarabel and with our solver; the weight of forces exceeds the tolerance.
 #[test]
 fn all_ways_agree() {
     let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
@@ -118,7 +119,7 @@ fn all_ways_agree() {
     }
 }
 
-/// The objective of a task, which a larger set of forces can only lower: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
+/// A larger set of forces cannot raise the objective of a task: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
 #[test]
 fn the_cone_lies_between_the_pyramids() {
     let model = robots::quadruped();
@@ -127,7 +128,7 @@ fn the_cone_lies_between_the_pyramids() {
         let settings = Settings { friction, ..Settings::default() };
         let tasks = [Task::com(), Task::orientation("trunk")];
         let command = solve(&model, &feet(0.2), &tasks, settings, &q, &v, |r| r.com.acceleration = push).1;
-        // what the objective consists of, but for the regularisation
+        // the objective, without the regularisation
         (command.com_acceleration - push).norm_squared()
     };
     let cone = missed(Friction::Cone);
@@ -141,7 +142,7 @@ fn the_cone_lies_between_the_pyramids() {
     }
 }
 
-/// A foot that rolls over its toe's edge, and hands against a wall that turns with them.
+/// A foot rolls over the edge of its toe, and hands push against a wall whose normal turns with them.
 #[test]
 fn edges_and_walls() {
     let model = robots::humanoid();
@@ -165,14 +166,15 @@ fn edges_and_walls() {
         let R = orientation(&model, &q, "left_sole");
         let about = f.angular - (R * p).cross(f.linear);
         assert!(about.dot(R * Vec3::new(0.0, 1.0, 0.0)).abs() < EQUALITY);
-        // The wall only pushes, along a normal that turns with the hand, and not too hard.
+        // The wall only pushes, along a normal that turns with the hand, with a limited force.
         let R = orientation(&model, &q, "left_hand");
         let f_n = command.forces[2].linear.dot(R * Vec3::new(-1.0, 0.0, 0.0));
         assert!((-EQUALITY..30.0 + EQUALITY).contains(&f_n), "{f_n}");
     }
 }
 
-/// A hand leans on a wall beside the robot, whose normal is the world's: it pushes, and friction is across that normal.
+/// A hand leans on a wall next to the robot, with a normal in the world: the wall pushes, with friction perpendicular
+/// to the normal.
 #[test]
 fn a_hand_leans_on_a_wall() {
     let model = robots::humanoid();
@@ -183,8 +185,8 @@ fn a_hand_leans_on_a_wall() {
         ..FrictionContact::point("left_hand", 0.4)
     };
     let contacts = [soles(0.7), vec![wall]].concat();
-    let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // so that the wall gives no more than it must
-    // It should carry a part of the weight as well, more than friction allows.
+    let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // minimises the wall's force
+    // The wall should also carry a part of the weight that exceeds friction.
     let (references, command) = solve(&model, &contacts, &humanoid_tasks(), settings, &q, &v, |r| {
         r.contacts[2].force.linear = Vec3::new(0.0, 0.0, 100.0);
     });
@@ -194,7 +196,7 @@ fn a_hand_leans_on_a_wall() {
     assert!(f.z > 0.0 && (f.x.hypot(f.z) / (-0.4 * f.y) - 1.0).abs() < 1e-3, "at the edge of its cone: {f:?}");
 }
 
-/// Any convex polygon, whichever way round its corners are listed.
+/// Any convex polygon, with corners listed in either direction.
 #[test]
 fn soles_of_many_corners() {
     let model = robots::humanoid();
@@ -222,7 +224,7 @@ fn soles_of_many_corners() {
     }
 }
 
-/// On one foot, whose moment about the normal is bounded, the robot turns no faster than that bound allows.
+/// On one foot with a bounded yaw moment, the robot turns as fast as this bound allows.
 #[test]
 fn the_yaw_moment_binds() {
     let model = robots::humanoid();
@@ -239,13 +241,13 @@ fn the_yaw_moment_binds() {
         });
         check(&model, &contacts, &q, &v, &references, &command);
         let f = command.forces[0];
-        f.angular.z / f.linear.z // soles are level, and their frames are in their middles
+        f.angular.z / f.linear.z // soles are level, with frames in their middles
     };
     let (less, more) = (moment(0.003), moment(0.006));
     assert!((less - 0.003).abs() < 1e-6 && (more - 0.006).abs() < 1e-6, "{less} {more}");
 }
 
-/// Four points on one foot: twelve rows of which six are independent.
+/// Four points on one foot give twelve rows, six of which are independent.
 #[test]
 fn redundant_contacts_are_no_obstacle() {
     let mut builder = condyle_dynamics::ModelBuilder::new("hopper");

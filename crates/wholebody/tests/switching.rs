@@ -1,4 +1,4 @@
-//! Contacts come and go from tick to tick.
+//! Contacts that appear and disappear from tick to tick.
 #![allow(non_snake_case)]
 
 mod common;
@@ -9,11 +9,11 @@ use common::*;
 use condyle_dynamics::{Force, Model, integrate, robots};
 use condyle_wholebody::{FrictionContact, Gains, Settings, Task, WholeBodyController};
 
-/// Any set of feet, in any order, each as a controller made for it would have it.
+/// Any set of feet, in any order, gives the same command as a controller made for this set.
 #[test]
 fn every_set_of_contacts() {
     let (model, contacts) = (robots::quadruped(), feet(0.7));
-    // The forces' small weight needs more than the default for torques to be compared.
+    // The small weight of forces needs a tighter tolerance than the default, so that torques can be compared.
     let make = |contacts: &[FrictionContact]| {
         let settings = Settings { tolerance: 1e-13, force_weight: 1e-5, ..Settings::default() };
         WholeBodyController::new(&model, contacts, &tasks(), settings).unwrap()
@@ -54,14 +54,14 @@ fn free_fall_is_a_tick_like_others() {
     }
 }
 
-/// The weight goes to the left foot; the right one is unloaded in 0.2 s, hangs, and is loaded again: no torque jumps.
+/// The weight moves to the left foot; the right foot is unloaded in 0.2 s, hangs, and is loaded again: no torque jumps.
 #[test]
 fn fading_contacts_do_not_jerk() {
     let model = robots::humanoid();
     let contacts = soles(0.7);
-    // What the contact held, the foot's task holds: where it stands, and with more weight than the posture.
+    // A task holds the foot where the contact held it, with more weight than the posture.
     let tasks = [humanoid_tasks(), vec![Task { weight: 1e3, ..Task::pose("right_sole") }]].concat();
-    // beyond the default tolerance, so that the gap is small beside 1 where the objective is
+    // tighter than the default tolerance, so that the gap is small compared with 1, which is larger than the objective
     let settings = Settings { contact_gains: Gains::critical(100.0), tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks, settings).unwrap();
     let (mut q, mut v) = (squat(&model), vec![0.0; 38]);
@@ -89,7 +89,7 @@ fn fading_contacts_do_not_jerk() {
         assert!(command.forces[1].linear.z < EQUALITY + if (1000..=1200).contains(&tick) { 0.0 } else { 1e3 });
         if let Some(before) = &before {
             let jump = max_abs(command.tau.iter().zip(before).map(|(a, b)| a - b));
-            largest = largest.max(if tick > 650 { jump } else { 0.0 }); // the reference's c̈ jumps at 600
+            largest = largest.max(if tick > 650 { jump } else { 0.0 }); // the reference's c̈ jumps at tick 600
         }
         before = Some(command.tau.clone());
         let a = command.a.clone();
@@ -98,8 +98,9 @@ fn fading_contacts_do_not_jerk() {
         }
         advance(&model, &mut q, &mut v, &a, dt);
     }
-    // A tick of the ramp is 4 N on the feet's distance of 0.4 m. In the last one, the friction that these 4 N allowed (2.7 N, of
-    // what accelerates the centre of mass) goes as well, to the other foot, on the hips' height of 0.9 m.
+    // A tick of the ramp changes the force by 4 N, with a lever of 0.4 m between the feet. In the last tick, the
+    // friction that these 4 N allow (2.7 N, which accelerate the centre of mass) moves to the other foot too, with a
+    // lever of 0.9 m, the height of the hips.
     assert!(largest < 4.0, "a torque jumps by {largest:.3} N m in a tick");
 }
 

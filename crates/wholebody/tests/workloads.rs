@@ -1,4 +1,4 @@
-//! Commands of recorded stands, walks and trots under pushes: each is the optimum, and back ends agree on it.
+//! Commands of recorded stands, walks and trots under pushes: each is the optimum, and the back ends agree.
 #![allow(non_snake_case)]
 
 mod common;
@@ -12,16 +12,17 @@ use condyle_wholebody::{Backend, Command, Form, Friction, Settings, Status};
 use optimality::{OPTIMALITY, check_optimality};
 use workload::{Robot, Tick, record};
 
-/// So many ticks are recorded: a biped's first step, and the first one of the other foot; nine steps of a quadruped.
+/// Number of recorded ticks: the first step of each foot of a biped, or nine steps of a quadruped.
 const TICKS: usize = 2000;
-/// Every so many of them are looked at.
+/// Interval between checked ticks.
 const EACH: usize = 8;
 
-/// How far solutions of tolerances 1e-14 and 1e-13 are apart, in objective and q̈, relative to 1 and their size. An error of the
-/// objective, relative to some hundreds, is one of its root in q̈, times four where only the posture's weight of 0.1 decides.
+/// Tolerance between solutions with tolerances 1e-14 and 1e-13, in objective and q̈, relative to 1 and their size. An
+/// error of the objective, relative to some hundreds, causes an error of its root in q̈; times four where only the
+/// posture's weight of 0.1 decides.
 const AGREEMENT: f64 = 1e-6;
 
-/// The workloads, each with its robot.
+/// Calls a function for each workload, with its robot.
 fn all(mut look: impl FnMut(&Robot, &str, &[Tick])) {
     for name in ["quadruped", "humanoid"] {
         let robot = Robot::new(name, None).unwrap();
@@ -32,8 +33,8 @@ fn all(mut look: impl FnMut(&Robot, &str, &[Tick])) {
     }
 }
 
-/// Karush, Kuhn and Tucker's conditions of the program as it is assembled, before anything is eliminated or scaled; and what
-/// holds of forces and torques by formulas that the controller does not share: τ = RNEA, Σ f = m (c̈ − g), cones, centres of
+/// Checks the Karush–Kuhn–Tucker conditions of the assembled program, before any elimination or scaling. Also checks
+/// forces and torques by formulas that the controller does not use: τ = RNEA, Σ f = m (c̈ − g), cones, centres of
 /// pressure.
 #[test]
 fn every_command_is_optimal() {
@@ -50,7 +51,8 @@ fn every_command_is_optimal() {
     });
 }
 
-/// Our interior point on what is condensed, from the last solution; clarabel on the whole program, from nothing.
+/// Compares two solvers: ours, with the condensed program and warm starts; clarabel, with the full program and cold
+/// starts.
 #[test]
 fn back_ends_agree_on_every_command() {
     all(|robot, what, ticks| {
@@ -66,7 +68,7 @@ fn back_ends_agree_on_every_command() {
             let expected = theirs.step(q, v, references).solved().unwrap().clone();
             compared += 1;
             if expected.reduced_accuracy || reduced_accuracy || status != Status::Solved {
-                reduced += 1; // one of them stopped short of what the comparison asks for
+                reduced += 1; // one of the solvers missed the accuracy that the comparison needs
                 continue;
             }
             let expected = expected.a;
@@ -81,7 +83,7 @@ fn back_ends_agree_on_every_command() {
     });
 }
 
-/// What a larger set of forces can only lower: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
+/// A larger set of forces cannot raise the optimum: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
 #[test]
 fn optima_on_cones_lie_between_those_on_pyramids() {
     let mut differ = 0;
@@ -103,8 +105,8 @@ fn optima_on_cones_lie_between_those_on_pyramids() {
     assert!(differ > 0, "friction never mattered");
 }
 
-/// Of a trot, in which contacts fade in and out twice in half a second, 1 tick in 100 takes more than a few iterations; from
-/// nothing a tick takes some ten.
+/// In a trot, contacts fade in and out twice in half a second. Still, only 1 tick in 100 takes more than a few
+/// iterations; a cold start takes about ten.
 #[test]
 fn contacts_that_come_and_go_need_no_new_start() {
     let robot = Robot::new("quadruped", None).unwrap();

@@ -1,13 +1,13 @@
-//! Memory without an operating system: a fixed array, of which each allocation takes the next bytes. None comes back.
+//! Memory without an operating system: a fixed array from which each allocation takes the next bytes. Nothing is freed.
 
 use core::alloc::{GlobalAlloc, Layout};
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicUsize, Ordering};
 
-/// The size of the array (bytes).
+/// Size of the array (bytes).
 const SIZE: usize = 1 << 20;
 
-/// The array, and how much of it is in use.
+/// The array, the number of bytes in use, and the number of allocations.
 #[repr(align(16))]
 pub(crate) struct Arena {
     memory: UnsafeCell<[u8; SIZE]>,
@@ -15,27 +15,27 @@ pub(crate) struct Arena {
     count: AtomicUsize,
 }
 
-// SAFETY: each byte is given away once, by an atomic counter.
+// SAFETY: each byte is handed out once, by an atomic counter.
 unsafe impl Sync for Arena {}
 
 impl Arena {
-    /// An array of which nothing is in use.
+    /// Creates an array with no bytes in use.
     pub(crate) const fn new() -> Self {
         Self { memory: UnsafeCell::new([0; SIZE]), end: AtomicUsize::new(0), count: AtomicUsize::new(0) }
     }
 
-    /// The number of bytes in use.
+    /// Returns the number of bytes in use.
     pub(crate) fn bytes(&self) -> usize {
         self.end.load(Ordering::Relaxed)
     }
 
-    /// The number of allocations so far.
+    /// Returns the number of allocations so far.
     pub(crate) fn allocations(&self) -> usize {
         self.count.load(Ordering::Relaxed)
     }
 }
 
-// SAFETY: pieces do not overlap, are within the array, and are aligned as asked.
+// SAFETY: allocations do not overlap, are within the array, and have the requested alignment.
 unsafe impl GlobalAlloc for Arena {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let start = |end: usize| end.next_multiple_of(layout.align());
@@ -43,7 +43,7 @@ unsafe impl GlobalAlloc for Arena {
             |end: usize| start(end).checked_add(layout.size()).filter(|&end| end <= SIZE && layout.align() <= 16);
         self.count.fetch_add(1, Ordering::Relaxed);
         match self.end.fetch_update(Ordering::Relaxed, Ordering::Relaxed, fits) {
-            // SAFETY: it is within the array.
+            // SAFETY: the address is within the array.
             Ok(before) => unsafe { self.memory.get().cast::<u8>().add(start(before)) },
             Err(_) => core::ptr::null_mut(),
         }

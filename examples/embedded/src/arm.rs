@@ -1,22 +1,22 @@
-//! An arm of six joints, described in code: no file is read where there are none.
+//! An arm of six joints, described in code, since the board has no files.
 
 use condyle_dynamics::{Inertia, Joint, JointOptions, Mat3, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD};
 
-/// The number of joints.
+/// Number of joints.
 pub(crate) const JOINTS: usize = 6;
 
-/// A joint and the link that it carries.
+/// A joint and the link that it moves.
 struct Link {
     name: &'static str,
-    /// The axis, in the link's frame.
+    /// Axis, in the link's frame.
     axis: [f64; 3],
-    /// The joint in the frame of the link before (m).
+    /// Joint in the frame of the previous link (m).
     at: [f64; 3],
     /// Mass (kg), centre of mass (m), moments of inertia about it (kg m²).
     mass: f64,
     com: [f64; 3],
     moments: [f64; 3],
-    /// The rotor's inertia as seen at the joint (kg m²).
+    /// Inertia of the rotor, as seen at the joint (kg m²).
     rotor: f64,
 }
 
@@ -80,7 +80,7 @@ const LINKS: [Link; JOINTS] = [
     },
 ];
 
-/// The arm.
+/// Returns the arm.
 pub(crate) fn model() -> Model {
     let mut builder = ModelBuilder::new("arm");
     let mut parent = WORLD;

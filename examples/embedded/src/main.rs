@@ -1,5 +1,5 @@
-//! Inverse and forward dynamics of an arm of six joints, without an operating system: memory is a fixed array, and nothing is
-//! taken from it after construction.
+//! Inverse and forward dynamics of an arm of six joints, without an operating system: memory is a fixed array, and
+//! nothing is allocated after construction.
 //!
 //! ```text
 //! rustup target add thumbv7em-none-eabihf
@@ -18,7 +18,7 @@ use cortex_m_semihosting::{debug, hprintln};
 #[global_allocator]
 static ARENA: arena::Arena = arena::Arena::new();
 
-/// Where the board starts. Words go to the debugger, which qemu plays too.
+/// Entry point of the board. Text goes to the debugger, which qemu emulates too.
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let empty = (ARENA.bytes(), ARENA.allocations());

@@ -1,4 +1,4 @@
-//! The dynamics of one arm, without `std` and without a dependency.
+//! Dynamics of one arm, without `std` and without dependencies.
 #![no_std]
 
 mod arm7 {

@@ -7,9 +7,9 @@ use crate::text::Language;
 use core::fmt;
 use core::marker::PhantomData;
 
-/// A number that kernels compute with: `f64` or `f32`.
+/// Number type of kernels: `f64` or `f32`.
 pub trait Real: Copy + Default + sealed::Sealed + 'static {
-    /// The language of kernels on such numbers.
+    /// Language of kernels with this number type.
     const LANGUAGE: Language;
 }
 
@@ -27,9 +27,9 @@ mod sealed {
     impl Sealed for f32 {}
 }
 
-/// Numbers in a device's memory: number k of state i of n stands at `[k * n + i]`.
+/// Numbers in a device's memory: number k of state i of n is stored at index `[k * n + i]`.
 ///
-/// The memory is given back when this is dropped, after what all streams do with it.
+/// The memory is freed when the array is dropped, after all streams have finished with it.
 pub struct DeviceArray<T: Real> {
     pub(super) device: Device,
     pub(super) address: Address,
@@ -53,10 +53,10 @@ impl<T: Real> Drop for DeviceArray<T> {
 }
 
 impl<T: Real> DeviceArray<T> {
-    /// Memory for some numbers, which are whatever stood there before.
+    /// Allocates memory for some numbers; their values are undefined.
     ///
     /// # Errors
-    /// [`Error::Call`], as where there is too little memory.
+    /// [`Error::Call`], for example if there is too little memory.
     pub fn new(device: &Device, len: usize) -> Result<Self, Error> {
         let mut address = 0;
         if len > 0 {
@@ -66,7 +66,7 @@ impl<T: Real> DeviceArray<T> {
         Ok(Self { device: device.clone(), address, len, is_owned: len > 0, number: PhantomData })
     }
 
-    /// A copy of some numbers.
+    /// Copies some numbers into a new array.
     ///
     /// # Errors
     /// [`Error::Call`].
@@ -76,30 +76,30 @@ impl<T: Real> DeviceArray<T> {
         Ok(array)
     }
 
-    /// Memory of another library's, which is not copied, and not given back.
+    /// Uses memory of another library, which is neither copied nor freed.
     ///
     /// # Safety
-    /// `len` numbers of type `T` stand at this address of the device, which is there longer than this; and what uses it on streams that
-    /// are not ordered with those that this is given to does not write to it, nor read what is written here.
+    /// `len` numbers of type `T` are stored at this address of the device, in memory that outlives the array. Streams
+    /// that are not ordered with the array's streams neither write to this memory nor read results written here.
     pub unsafe fn from_raw(device: &Device, address: u64, len: usize) -> Self {
         Self { device: device.clone(), address, len, is_owned: false, number: PhantomData }
     }
 
-    /// The address in the device's memory, for other libraries.
+    /// Returns the address in the device's memory, for other libraries.
     pub fn as_raw(&self) -> u64 {
         self.address
     }
 
-    /// How many numbers there are.
+    /// Returns the number of numbers.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Copies numbers to the device, after what is in the stream, and waits for it.
+    /// Copies numbers to the device, after earlier work of the stream, and waits for the copy.
     ///
     /// # Errors
-    /// [`Error::Length`] if there are not as many; [`Error::OtherDevice`]; [`Error::Call`].
+    /// [`Error::Length`] for a wrong number of numbers; [`Error::OtherDevice`]; [`Error::Call`].
     pub fn write(&mut self, stream: &Stream, numbers: &[T]) -> Result<(), Error> {
         self.check(stream, "numbers", numbers.len())?;
         if self.len == 0 {
@@ -111,10 +111,11 @@ impl<T: Real> DeviceArray<T> {
         call!(driver, cuStreamSynchronize(stream.handle))
     }
 
-    /// Copies the numbers from the device, after what is in the stream, and waits for it.
+    /// Copies the numbers from the device, after earlier work of the stream, and waits for the copy.
     ///
     /// # Errors
-    /// [`Error::Length`] if there are not as many; [`Error::OtherDevice`]; [`Error::Call`], also what a kernel before did wrong.
+    /// [`Error::Length`] for a wrong number of numbers; [`Error::OtherDevice`]; [`Error::Call`], also for failures of
+    /// earlier kernels.
     pub fn read(&self, stream: &Stream, numbers: &mut [T]) -> Result<(), Error> {
         self.check(stream, "numbers", numbers.len())?;
         if self.len == 0 {
@@ -126,10 +127,10 @@ impl<T: Real> DeviceArray<T> {
         call!(driver, cuStreamSynchronize(stream.handle)).and(copied)
     }
 
-    /// The numbers, copied from the device: [`read`](Self::read) into a new vector.
+    /// Copies the numbers from the device into a new vector, as [`read`](Self::read) does.
     ///
     /// # Errors
-    /// Those of [`read`](Self::read).
+    /// The errors of [`read`](Self::read).
     pub fn to_vec(&self, stream: &Stream) -> Result<Vec<T>, Error> {
         let mut numbers = vec![T::default(); self.len];
         self.read(stream, &mut numbers)?;
@@ -144,7 +145,7 @@ impl<T: Real> DeviceArray<T> {
     }
 }
 
-/// That something is on the device where it is used.
+/// Checks that an array or a stream is on the device where it is used.
 pub(super) fn on_device(name: &str, expected: &Device, found: &Device) -> Result<(), Error> {
     if expected == found {
         return Ok(());

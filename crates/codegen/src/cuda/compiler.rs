@@ -36,7 +36,7 @@ const LIBRARY: Named = Named {
     },
 };
 
-/// NVIDIA's run-time compiler, which has been loaded. It needs neither a GPU nor a driver.
+/// NVIDIA's run-time compiler, loaded. It needs neither a GPU nor a driver.
 pub struct Compiler {
     table: CompilerTable,
 }
@@ -47,28 +47,28 @@ impl fmt::Debug for Compiler {
     }
 }
 
-/// A program that is being compiled.
+/// Program that is being compiled.
 struct Open<'a>(&'a CompilerTable, Program);
 
 impl Drop for Open<'_> {
     fn drop(&mut self) {
-        // SAFETY: it was made and is destroyed once.
+        // SAFETY: the program was created, and is destroyed once.
         unsafe { (self.0.nvrtcDestroyProgram)(&raw mut self.1) };
     }
 }
 
 impl Open<'_> {
-    /// What two functions say: how many bytes there are, and the bytes.
+    /// Returns the bytes written by `get`; `size` returns their number.
     ///
     /// # Safety
-    /// The second one writes as many bytes as the first one says.
+    /// `get` writes the number of bytes that `size` returns.
     unsafe fn bytes(
         &self,
         size: unsafe extern "system" fn(Program, *mut usize) -> c_int,
         get: unsafe extern "system" fn(Program, *mut c_char) -> c_int,
     ) -> Vec<u8> {
         let mut count = 0;
-        // SAFETY: the caller's.
+        // SAFETY: promised by the caller.
         unsafe {
             if size(self.1, &raw mut count) != 0 {
                 return Vec::new();
@@ -80,37 +80,40 @@ impl Open<'_> {
 }
 
 impl Compiler {
-    /// The compiler from where the system finds it, or from the file that the environment variable `CONDYLE_NVRTC_LIBRARY` names.
+    /// Loads the compiler from the system's search path, or from the file named by the environment variable
+    /// `CONDYLE_NVRTC_LIBRARY`.
     ///
     /// # Errors
-    /// [`Error::Library`] if there is none.
+    /// [`Error::Library`] if it cannot be loaded.
     pub fn new() -> Result<Self, Error> {
         Ok(Self { table: CompilerTable::load(&LIBRARY, None)? })
     }
 
-    /// The compiler from a file, as `libnvrtc.so.12`.
+    /// Loads the compiler from a file, such as `libnvrtc.so.12`.
     ///
     /// # Errors
-    /// [`Error::Library`] if it is none.
+    /// [`Error::Library`] if it cannot be loaded.
     pub fn open(library: &Path) -> Result<Self, Error> {
         Ok(Self { table: CompilerTable::load(&LIBRARY, Some(library))? })
     }
 
-    /// The kernels of some functions as PTX, which runs on all devices from this compute capability on: (7, 0), for example.
+    /// Compiles the kernels of some functions to PTX, which runs on all devices with at least this compute capability;
+    /// for example (7, 0).
     ///
-    /// It is for [`Device::load`](crate::cuda::Device::load), on a machine that has no compiler.
+    /// The result is for [`Device::load`](crate::cuda::Device::load), on a machine without the compiler.
     ///
     /// # Errors
-    /// [`Error::Compile`] with what the compiler says.
+    /// [`Error::Compile`] with the compiler's log.
     ///
     /// # Panics
-    /// If `name` is no identifier (ASCII letters, digits and `_`).
+    /// If `name` is not an identifier (ASCII letters, digits and `_`).
     pub fn ptx<T: Real>(&self, name: &str, functions: &[Function], capability: (u32, u32)) -> Result<Vec<u8>, Error> {
         let architecture = format!("compute_{}{}", capability.0, capability.1);
         self.compile(name, &text::<T>(name, functions), &architecture)
     }
 
-    /// The machine code for devices of this compute capability, or PTX for the newest ones before that are known.
+    /// Compiles to machine code for devices of this compute capability, or to PTX for the newest known earlier
+    /// capability.
     pub(super) fn image<T: Real>(
         &self,
         name: &str,
@@ -121,18 +124,18 @@ impl Compiler {
         let known = self.architectures();
         let architecture = match known.iter().filter(|&&a| a <= wanted).max() {
             Some(&a) if a != wanted => format!("compute_{a}"),
-            _ => format!("sm_{wanted}"), // where that is unknown, the compiler says so
+            _ => format!("sm_{wanted}"), // the compiler reports an unknown one
         };
         self.compile(name, &text::<T>(name, functions), &architecture)
     }
 
-    /// The compute capabilities that the compiler knows, ten times the first number and the second one.
+    /// Returns the compute capabilities that the compiler knows, as 10 · major + minor.
     fn architectures(&self) -> Vec<c_int> {
         let mut count = 0;
-        // SAFETY: it writes a number.
+        // SAFETY: the function writes a number.
         unsafe { (self.table.nvrtcGetNumSupportedArchs)(&raw mut count) };
         let mut all = vec![0; usize::try_from(count).unwrap_or(0)];
-        // SAFETY: it writes as many numbers as it said before.
+        // SAFETY: the function writes the number of entries that it returned before.
         unsafe { (self.table.nvrtcGetSupportedArchs)(all.as_mut_ptr()) };
         all
     }
@@ -141,7 +144,7 @@ impl Compiler {
         let failed = |log: String| Error::Compile { name: name.to_owned(), architecture: architecture.to_owned(), log };
         let file = CString::new(format!("{name}.cu")).expect("an identifier has no zeros");
         let mut open = Open(&self.table, null_mut());
-        // SAFETY: strings end with 0; there are no headers.
+        // SAFETY: the strings end with 0; there are no headers.
         let status = unsafe {
             (self.table.nvrtcCreateProgram)(&raw mut open.1, text.as_ptr(), file.as_ptr(), 0, null(), null())
         };
@@ -153,13 +156,13 @@ impl Compiler {
         let status = unsafe { (self.table.nvrtcCompileProgram)(open.1, 1, [option.as_ptr()].as_ptr()) };
         let table = &self.table;
         if status != 0 {
-            // SAFETY: they belong together.
+            // SAFETY: the two functions belong together.
             let log = unsafe { open.bytes(table.nvrtcGetProgramLogSize, table.nvrtcGetProgramLog) };
             let log = String::from_utf8_lossy(&log);
             return Err(failed(format!("status {status}: {}", log.trim_end_matches('\0').trim())));
         }
         let image = if architecture.starts_with("sm_") {
-            // SAFETY: they belong together.
+            // SAFETY: the two functions belong together.
             unsafe { open.bytes(table.nvrtcGetCUBINSize, table.nvrtcGetCUBIN) }
         } else {
             // SAFETY: as above.
@@ -169,7 +172,7 @@ impl Compiler {
     }
 }
 
-/// The functions in CUDA.
+/// Returns the functions as CUDA code.
 fn text<T: Real>(name: &str, functions: &[Function]) -> CString {
     let mut files = T::LANGUAGE.text(name, functions);
     CString::new(files.remove(0).text).expect("code has no zeros")

@@ -7,20 +7,20 @@ use core::fmt;
 use core::ptr::null_mut;
 use std::sync::Arc;
 
-/// Attributes of a device, by their numbers in CUDA's header.
+/// Attributes of a device, with their numbers in CUDA's header.
 const MULTIPROCESSORS: c_int = 16;
 const CAPABILITY_MAJOR: c_int = 75;
 const CAPABILITY_MINOR: c_int = 76;
 
-/// A stream that does not wait for the legacy default stream.
+/// Flag of a stream that does not wait for the legacy default stream.
 const NON_BLOCKING: u32 = 1;
 
-/// An event without a time.
+/// Flag of an event without timing.
 const DISABLE_TIMING: u32 = 2;
 
-/// A GPU, with its primary context, which is held as long as this or something of it is there.
+/// A GPU with its primary context, which is retained while this handle or an object of the device exists.
 ///
-/// Clones are the same device. It may be used by several threads at a time.
+/// Clones are the same device. Several threads may use it at a time.
 #[derive(Clone)]
 pub struct Device(pub(super) Arc<Inner>);
 
@@ -33,7 +33,7 @@ pub(super) struct Inner {
     capability: (u32, u32),
 }
 
-// SAFETY: a context may be made the current one by any thread, also by several at a time.
+// SAFETY: any thread may make a context current, and several threads may do so at a time.
 unsafe impl Send for Inner {}
 // SAFETY: as above.
 unsafe impl Sync for Inner {}
@@ -44,7 +44,7 @@ impl Drop for Inner {
     }
 }
 
-/// A device's context is the thread's current one as long as this is there.
+/// Guard that makes a device's context current on the thread while it exists.
 pub(super) struct Current<'a>(&'a Inner);
 
 impl Drop for Current<'_> {
@@ -61,10 +61,10 @@ impl Inner {
 }
 
 impl Driver {
-    /// The device of that number.
+    /// Returns the device with this ordinal.
     ///
     /// # Errors
-    /// [`Error::Device`] if there are not so many; [`Error::Call`].
+    /// [`Error::Device`] if it does not exist; [`Error::Call`].
     pub fn device(&self, ordinal: usize) -> Result<Device, Error> {
         Device::open(self.clone(), ordinal)
     }
@@ -77,17 +77,17 @@ impl fmt::Debug for Device {
 }
 
 impl PartialEq for Device {
-    /// Whether both are the same GPU.
+    /// Returns whether both are the same GPU.
     fn eq(&self, other: &Self) -> bool {
         self.0.context == other.0.context
     }
 }
 
 impl Device {
-    /// The device of that number, by the driver that [`Driver::new`] finds.
+    /// Returns the device with this ordinal, using the driver found by [`Driver::new`].
     ///
     /// # Errors
-    /// Those of [`Driver::new`] and [`Driver::device`].
+    /// The errors of [`Driver::new`] and [`Driver::device`].
     pub fn new(ordinal: usize) -> Result<Self, Error> {
         Driver::new()?.device(ordinal)
     }
@@ -110,17 +110,17 @@ impl Device {
         Ok(Self(Arc::new(Inner { driver, ordinal, device, context, multiprocessors, capability })))
     }
 
-    /// The number by which it was asked for.
+    /// Returns the ordinal with which the device was requested.
     pub fn ordinal(&self) -> usize {
         self.0.ordinal
     }
 
-    /// The compute capability: (9, 0) of Hopper.
+    /// Returns the compute capability: (9, 0) for Hopper.
     pub fn capability(&self) -> (u32, u32) {
         self.0.capability
     }
 
-    /// The name that its maker gave it.
+    /// Returns the product name.
     ///
     /// # Errors
     /// [`Error::Call`].
@@ -131,7 +131,7 @@ impl Device {
         Ok(unsafe { CStr::from_ptr(name.as_ptr()) }.to_string_lossy().into_owned())
     }
 
-    /// A new stream, which is ordered with no other one but by [`Stream::wait_for`].
+    /// Creates a stream, which is ordered with other streams only by [`Stream::wait_for`].
     ///
     /// # Errors
     /// [`Error::Call`].
@@ -141,22 +141,23 @@ impl Device {
         Ok(Stream { device: self.clone(), handle, is_owned: true })
     }
 
-    /// The legacy default stream, with which all streams of other libraries are ordered that were not made as non-blocking ones.
+    /// Returns the legacy default stream. It is ordered with all streams of other libraries that were not created as
+    /// non-blocking.
     pub fn default_stream(&self) -> Stream {
         Stream { device: self.clone(), handle: null_mut(), is_owned: false }
     }
 }
 
-/// An order of work: what goes to the same stream is done one after the other.
+/// A queue of work: items in the same stream run one after the other.
 ///
-/// Copies and calls name the stream on which they are done. It may be used by several threads at a time.
+/// Copies and calls name the stream on which they run. Several threads may use it at a time.
 pub struct Stream {
     pub(super) device: Device,
     pub(super) handle: Handle,
     is_owned: bool,
 }
 
-// SAFETY: work may be put into a stream by any thread, also by several at a time.
+// SAFETY: any thread may add work to a stream, and several threads may do so at a time.
 unsafe impl Send for Stream {}
 // SAFETY: as above.
 unsafe impl Sync for Stream {}
@@ -170,26 +171,26 @@ impl fmt::Debug for Stream {
 impl Drop for Stream {
     fn drop(&mut self) {
         if let (true, Ok(_current)) = (self.is_owned, self.device.0.current()) {
-            let _ = call!(self.device.0.driver, cuStreamDestroy_v2(self.handle)); // what is under way goes on
+            let _ = call!(self.device.0.driver, cuStreamDestroy_v2(self.handle)); // work in progress continues
         }
     }
 }
 
 impl Stream {
-    /// A stream of another library's: its `CUstream` or `cudaStream_t`. It is not destroyed.
+    /// Uses a stream of another library: its `CUstream` or `cudaStream_t`. It is not destroyed.
     ///
     /// # Safety
-    /// It is one of the device's primary context, and is there longer than this.
+    /// The stream belongs to the device's primary context and outlives this object.
     pub unsafe fn from_raw(device: &Device, handle: u64) -> Self {
         Self { device: device.clone(), handle: handle as Handle, is_owned: false }
     }
 
-    /// The `CUstream`, for other libraries.
+    /// Returns the `CUstream`, for other libraries.
     pub fn as_raw(&self) -> u64 {
         self.handle as u64
     }
 
-    /// Lets what goes into this stream from now on wait for what is in the other one already.
+    /// Makes all later work of this stream wait for all work already in the other stream.
     ///
     /// # Errors
     /// [`Error::Call`].
@@ -203,14 +204,14 @@ impl Stream {
         };
         let _current = self.device.0.current()?;
         let waits = made.and_then(|()| call!(driver, cuStreamWaitEvent(self.handle, event, 0)));
-        call!(driver, cuEventDestroy_v2(event))?; // when it has happened
+        call!(driver, cuEventDestroy_v2(event))?; // the driver destroys it after it has occurred
         waits
     }
 
-    /// Waits until all that has been put into the stream is done.
+    /// Waits until all work in the stream is done.
     ///
     /// # Errors
-    /// [`Error::Call`], also what a kernel before did wrong.
+    /// [`Error::Call`], also for failures of earlier kernels.
     pub fn synchronize(&self) -> Result<(), Error> {
         let _current = self.device.0.current()?;
         call!(self.device.0.driver, cuStreamSynchronize(self.handle))

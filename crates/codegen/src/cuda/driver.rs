@@ -1,4 +1,4 @@
-//! The driver's library.
+//! The library of NVIDIA's driver.
 
 use super::error::Error;
 use super::library::{Named, library_functions};
@@ -7,10 +7,10 @@ use core::fmt;
 use std::path::Path;
 use std::sync::Arc;
 
-/// What CUDA made: a context, a stream, an event, a module or a kernel.
+/// Handle of a CUDA object: a context, a stream, an event, a module or a kernel.
 pub(super) type Handle = *mut c_void;
 
-/// An address in the device's memory.
+/// Address in the device's memory.
 pub(super) type Address = u64;
 
 library_functions! { DriverTable:
@@ -45,11 +45,12 @@ library_functions! { DriverTable:
     cuLaunchKernel(Handle, c_uint, c_uint, c_uint, c_uint, c_uint, c_uint, c_uint, Handle, *const *mut c_void, *const *mut c_void);
 }
 
-/// Calls a function of the driver's: `Ok(())`, or its name with CUDA's words. The arguments are the caller's to vouch for.
+/// Calls a function of the driver; returns `Ok(())`, or its name with CUDA's message. The caller guarantees that the
+/// arguments are valid.
 macro_rules! call {
     ($driver:expr, $function:ident($($argument:expr),* $(,)?)) => {{
         let driver: &$crate::cuda::Driver = &$driver;
-        // SAFETY: handles are alive as long as what owns them; pointers to results and their sizes are said where they are made.
+        // SAFETY: handles live as long as their owners; callers pass valid pointers to results, and their sizes.
         let status = unsafe { (driver.table.$function)($($argument),*) };
         driver.check(stringify!($function), status)
     }};
@@ -62,7 +63,7 @@ const LIBRARY: Named = Named {
     files: if cfg!(windows) { &["nvcuda.dll"] } else { &["libcuda.so.1", "libcuda.so"] },
 };
 
-/// NVIDIA's driver, which has been loaded.
+/// NVIDIA's driver, loaded.
 #[derive(Clone)]
 pub struct Driver {
     pub(super) table: Arc<DriverTable>,
@@ -75,7 +76,8 @@ impl fmt::Debug for Driver {
 }
 
 impl Driver {
-    /// The driver from where the system finds it, or from the file that the environment variable `CONDYLE_CUDA_LIBRARY` names.
+    /// Loads the driver from the system's search path, or from the file named by the environment variable
+    /// `CONDYLE_CUDA_LIBRARY`.
     ///
     /// ```
     /// use condyle_codegen::cuda::{Driver, Error};
@@ -88,15 +90,15 @@ impl Driver {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Library`] if there is none; [`Error::Call`] if it cannot be used, as where there is no device.
+    /// [`Error::Library`] if it cannot be loaded; [`Error::Call`] if it cannot be used, for example without a device.
     pub fn new() -> Result<Self, Error> {
         Self::load(None)
     }
 
-    /// The driver from a file.
+    /// Loads the driver from a file.
     ///
     /// # Errors
-    /// Those of [`new`](Self::new).
+    /// The errors of [`new`](Self::new).
     pub fn open(library: &Path) -> Result<Self, Error> {
         Self::load(Some(library))
     }
@@ -107,7 +109,7 @@ impl Driver {
         Ok(driver)
     }
 
-    /// The number of devices.
+    /// Returns the number of devices.
     ///
     /// # Errors
     /// [`Error::Call`].
@@ -117,7 +119,7 @@ impl Driver {
         Ok(usize::try_from(count).unwrap_or(0))
     }
 
-    /// What a function returned, as a result.
+    /// Converts a function's status to a result.
     pub(super) fn check(&self, function: &'static str, status: c_int) -> Result<(), Error> {
         if status == 0 {
             return Ok(());
@@ -125,7 +127,7 @@ impl Driver {
         Err(Error::Call { function, status, text: self.text(status) })
     }
 
-    /// A status by its name and in CUDA's words.
+    /// Returns a status's name and CUDA's message.
     fn text(&self, status: c_int) -> String {
         let say = |function: unsafe extern "system" fn(c_int, *mut *const c_char) -> c_int| {
             let mut text = core::ptr::null();

@@ -1,105 +1,105 @@
-//! Why nothing was computed on a GPU.
+//! Errors of computations on a GPU.
 
-/// Why nothing was computed on a GPU.
+/// Error of a computation on a GPU.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A library of NVIDIA's is not there, or is none.
+    /// A library of NVIDIA is missing or invalid.
     #[error("{library}: cannot be loaded: {reason}; the environment variable {variable} may name its file")]
     Library {
-        /// Which one.
+        /// Name of the library.
         library: &'static str,
-        /// What the system says of each file that was tried.
+        /// The system's message for each file that was tried.
         reason: String,
-        /// The environment variable that names another file.
+        /// Environment variable that may name another file.
         variable: &'static str,
     },
-    /// There is no such device.
-    #[error("device {ordinal}: there are {count}")]
+    /// The device does not exist.
+    #[error("no CUDA device {ordinal}: found {count} device(s)")]
     Device {
-        /// The number that was asked for.
+        /// The requested ordinal.
         ordinal: usize,
-        /// How many there are.
+        /// Number of devices.
         count: usize,
     },
-    /// A function of CUDA's failed.
+    /// A function of CUDA failed.
     #[error("{function}: {text} (status {status})")]
     Call {
-        /// The function.
+        /// Name of the function.
         function: &'static str,
-        /// What it returned.
+        /// The returned status.
         status: i32,
-        /// Its name and CUDA's words for it.
+        /// Name of the status, and CUDA's message.
         text: String,
     },
-    /// The compiler refused the code.
+    /// The compiler rejected the code.
     #[error("{name}: not compiled for {architecture}: {log}")]
     Compile {
-        /// The name of the code.
+        /// Name of the code.
         name: String,
-        /// For which devices.
+        /// Target architecture.
         architecture: String,
-        /// What the compiler says.
+        /// The compiler's log.
         log: String,
     },
-    /// The driver refused what was compiled.
+    /// The driver rejected the compiled code.
     #[error("{name}: not loaded: {text}: {log}")]
     Load {
-        /// The name of the code.
+        /// Name of the code.
         name: String,
-        /// CUDA's words for it.
+        /// CUDA's message.
         text: String,
-        /// What the driver's assembler says.
+        /// Log of the driver's assembler.
         log: String,
     },
-    /// There is no kernel of that name.
+    /// No kernel has this name.
     #[error("no kernel `{name}`; there are {}", known.join(", "))]
     Kernel {
-        /// The name that was given.
+        /// The given name.
         name: String,
-        /// Those that there are.
+        /// Names of the existing kernels.
         known: Vec<String>,
     },
     /// There are too few or too many arrays.
     #[error("{kernel}: expected {expected} {arrays}, found {found}")]
     Arrays {
-        /// The kernel.
+        /// Name of the kernel.
         kernel: String,
         /// `inputs` or `outputs`.
         arrays: &'static str,
-        /// How many it has.
+        /// Number that it has.
         expected: usize,
-        /// How many were given.
+        /// Number that was given.
         found: usize,
     },
-    /// An array has not the length that it should have.
+    /// An array does not have the required length.
     #[error("{array}: expected {expected} numbers, found {found}")]
     Length {
-        /// Its name.
+        /// Name of the array.
         array: String,
-        /// How many numbers it should have.
+        /// Required length.
         expected: usize,
-        /// How many it has.
+        /// Length of the array.
         found: usize,
     },
-    /// There are more states than a kernel can count.
+    /// The number of states exceeds the kernel's limit.
     #[error("{kernel}: expected at most {most} states, found {found}")]
     States {
-        /// The kernel.
+        /// Name of the kernel.
         kernel: String,
-        /// How many there may be: the places in the largest array are numbers of 32 bits.
+        /// Maximum number of states: indices in the largest array have 32 bits.
         most: usize,
-        /// How many there are.
+        /// Number of states.
         found: usize,
     },
     /// An array or a stream belongs to another device.
     #[error("{name}: expected one of device {expected}, found one of device {found}")]
     OtherDevice {
-        /// The array's name, or `stream`.
+        /// Name of the array, or `stream`.
         name: String,
-        /// The device of the kernel.
+        /// Ordinal of the kernel's device.
         expected: usize,
-        /// The device where it is.
+        /// Ordinal of the array's or stream's device.
         found: usize,
     },
 }

@@ -1,4 +1,4 @@
-//! Kernels, and how they are called.
+//! Kernels and their calls.
 
 use super::array::{DeviceArray, Real, on_device};
 use super::compiler::Compiler;
@@ -13,23 +13,23 @@ use core::ptr::{null, null_mut};
 use std::ffi::CString;
 use std::sync::Arc;
 
-/// The threads of a warp: fewer in a block would leave some idle.
+/// Number of threads in a warp: a smaller block would leave some of them idle.
 const WARP: usize = 32;
 
-/// Attributes of a kernel, and options of the driver's assembler, by their numbers in CUDA's header.
+/// Attributes of a kernel, and options of the driver's assembler, with their numbers in CUDA's header.
 const LOCAL_BYTES: c_int = 3;
 const REGISTERS: c_int = 4;
 const ERROR_LOG: c_int = 5;
 const ERROR_LOG_BYTES: c_int = 6;
 const LOG: usize = 16 * 1024;
 
-/// What has been compiled and loaded; it stays until all of its kernels are gone.
+/// Compiled and loaded code; it stays loaded until all of its kernels are dropped.
 struct Module {
     device: Device,
     handle: Handle,
 }
 
-// SAFETY: modules and their kernels may be used by any thread, also by several at a time.
+// SAFETY: any thread may use modules and their kernels, and several threads may do so at a time.
 unsafe impl Send for Module {}
 // SAFETY: as above.
 unsafe impl Sync for Module {}
@@ -37,22 +37,23 @@ unsafe impl Sync for Module {}
 impl Drop for Module {
     fn drop(&mut self) {
         if let Ok(_current) = self.device.0.current() {
-            let _ = call!(self.device.0.driver, cuCtxSynchronize()); // a kernel of it may be running
+            let _ = call!(self.device.0.driver, cuCtxSynchronize()); // one of its kernels may be running
             let _ = call!(self.device.0.driver, cuModuleUnload(self.handle));
         }
     }
 }
 
 impl Device {
-    /// The kernels of some functions, compiled for this device, on numbers of type `T`.
+    /// Compiles the kernels of some functions for this device, with numbers of type `T`.
     ///
-    /// Where the compiler does not know the device yet, it makes PTX for the newest one that it knows, which the driver goes on with.
+    /// If the compiler does not know the device, it makes PTX for the newest device that it knows; the driver compiles
+    /// this PTX.
     ///
     /// # Errors
-    /// [`Error::Compile`] with what the compiler says; [`Error::Load`]; [`Error::Call`].
+    /// [`Error::Compile`] with the compiler's log; [`Error::Load`]; [`Error::Call`].
     ///
     /// # Panics
-    /// If `name` is no identifier (ASCII letters, digits and `_`).
+    /// If `name` is not an identifier (ASCII letters, digits and `_`).
     pub fn compile<T: Real>(
         &self,
         compiler: &Compiler,
@@ -63,20 +64,20 @@ impl Device {
         Kernels::load(self, name, functions, &image)
     }
 
-    /// The kernels of some functions from what a compiler has made of them, PTX or CUBIN: NVRTC is not needed.
+    /// Loads the kernels of some functions from PTX or CUBIN made earlier by a compiler; NVRTC is not needed.
     ///
     /// # Safety
-    /// `image` is what [`Compiler::ptx`] (or another compiler) made of the same functions, under the same name and for the same `T`,
-    /// and whole.
+    /// `image` is the complete output of [`Compiler::ptx`] (or another compiler) for the same functions, the same name
+    /// and the same `T`.
     ///
     /// # Errors
-    /// [`Error::Load`] with what the driver says, as where the image is for newer devices; [`Error::Call`].
+    /// [`Error::Load`] with the driver's message, for example if the image is for newer devices; [`Error::Call`].
     pub unsafe fn load<T: Real>(&self, name: &str, functions: &[Function], image: &[u8]) -> Result<Kernels<T>, Error> {
         Kernels::load(self, name, functions, image)
     }
 }
 
-/// The kernels of some functions, ready to be called.
+/// Kernels of some functions, ready to be called.
 #[derive(Debug)]
 pub struct Kernels<T: Real> {
     kernels: Vec<Kernel<T>>,
@@ -85,7 +86,7 @@ pub struct Kernels<T: Real> {
 impl<T: Real> Kernels<T> {
     pub(super) fn load(device: &Device, name: &str, functions: &[Function], image: &[u8]) -> Result<Self, Error> {
         let (driver, _current) = (&device.0.driver, device.0.current()?);
-        let image = [image, &[0]].concat(); // PTX must end with it
+        let image = [image, &[0]].concat(); // PTX must end with 0
         let mut log = vec![0_u8; LOG];
         let values: [*mut c_void; 2] = [log.as_mut_ptr().cast(), LOG as *mut c_void];
         let (options, mut handle) = ([ERROR_LOG, ERROR_LOG_BYTES], null_mut());
@@ -105,10 +106,10 @@ impl<T: Real> Kernels<T> {
         Ok(Self { kernels })
     }
 
-    /// The kernel of the function of that name.
+    /// Returns the kernel of the function with this name.
     ///
     /// # Errors
-    /// [`Error::Kernel`] if there is none.
+    /// [`Error::Kernel`] if no kernel has this name.
     pub fn kernel(&self, name: &str) -> Result<&Kernel<T>, Error> {
         let known = || self.kernels.iter().map(|k| k.name.clone()).collect();
         let found = self.kernels.iter().find(|kernel| kernel.name == name);
@@ -116,25 +117,25 @@ impl<T: Real> Kernels<T> {
     }
 }
 
-/// A function of a robot on a GPU: a thread computes one state, or a share of one.
+/// Function of a robot on a GPU: a thread computes one state, or a share of one.
 pub struct Kernel<T: Real> {
     name: String,
     inputs: Vec<Array>,
     outputs: Vec<Array>,
     module: Arc<Module>,
     handle: Handle,
-    /// The threads that can compute a state, in as many rows of blocks.
+    /// Number of threads that can share a state, each in its own row of blocks.
     shares: usize,
-    /// The states up to which they do.
+    /// Largest number of states for which each state is split among `shares` threads.
     most_shared: usize,
-    /// As many threads in a block as keep the most warps on a multiprocessor.
+    /// Number of threads in a block that keeps the most warps on a multiprocessor.
     threads: usize,
     registers: usize,
     local_bytes: usize,
     number: PhantomData<T>,
 }
 
-// SAFETY: as for the module.
+// SAFETY: the same as for the module.
 unsafe impl<T: Real> Send for Kernel<T> {}
 // SAFETY: as above.
 unsafe impl<T: Real> Sync for Kernel<T> {}
@@ -177,41 +178,41 @@ impl<T: Real> Kernel<T> {
         })
     }
 
-    /// The arrays that it reads.
+    /// Returns the input arrays.
     pub fn inputs(&self) -> &[Array] {
         &self.inputs
     }
 
-    /// The arrays that it fills.
+    /// Returns the output arrays.
     pub fn outputs(&self) -> &[Array] {
         &self.outputs
     }
 
-    /// The threads that compute a state, each some of the results, where there are few states: [`Function::shares`].
+    /// Returns the number of threads that share a state when there are few states: [`Function::shares`].
     pub fn shares(&self) -> usize {
         self.shares
     }
 
-    /// The registers of a thread.
+    /// Returns the number of registers per thread.
     pub fn registers(&self) -> usize {
         self.registers
     }
 
-    /// The memory of a thread, in bytes, for what does not fit into registers.
+    /// Returns the local memory of a thread (bytes), for values that do not fit into registers.
     pub fn local_bytes(&self) -> usize {
         self.local_bytes
     }
 
-    /// The most states that a call takes: the places in the largest array are numbers of 32 bits.
+    /// Returns the maximum number of states in a call: indices in the largest array have 32 bits.
     pub fn most_states(&self) -> usize {
         let largest = self.inputs.iter().chain(&self.outputs).map(Array::len).max().unwrap_or(1);
         i32::MAX as usize / largest.max(1)
     }
 
-    /// Computes n states, on a stream: returns at once, and what is put into the stream afterwards finds the results.
+    /// Computes n states on a stream. Returns at once; later work in the stream finds the results.
     ///
-    /// Number k of state i of an array stands at `[k * n + i]`; numbers of matrices are counted column by column. All numbers of all
-    /// outputs are filled.
+    /// Number k of state i of an array is stored at index `[k * n + i]`; matrices are stored column by column. The call
+    /// writes all numbers of all outputs.
     ///
     /// # Errors
     /// [`Error::Arrays`], [`Error::Length`], [`Error::States`] and [`Error::OtherDevice`] for wrong arguments; [`Error::Call`] if
@@ -248,7 +249,8 @@ impl<T: Real> Kernel<T> {
         )
     }
 
-    /// The threads of a block, of n in all: fewer than the best for many where these would leave multiprocessors idle.
+    /// Returns the number of threads of a block, for n threads in all. It is below the optimum for large n if larger
+    /// blocks would leave multiprocessors idle.
     fn threads_for(&self, n: usize) -> usize {
         let share = n.div_ceil(self.module.device.0.multiprocessors).next_multiple_of(WARP);
         share.min(self.threads)

@@ -1,4 +1,4 @@
-//! Libraries that are loaded while the program runs.
+//! Libraries that are loaded at run time.
 
 use super::error::Error;
 use core::error::Error as _;
@@ -6,7 +6,7 @@ use libloading::Library;
 use std::ffi::OsString;
 use std::path::Path;
 
-/// A library: how it is called, and where it may be.
+/// Name of a library, and its possible files.
 pub(super) struct Named {
     pub(super) library: &'static str,
     pub(super) variable: &'static str,
@@ -14,7 +14,8 @@ pub(super) struct Named {
 }
 
 impl Named {
-    /// The library in the file that was given, else in that which the environment variable names, else where the system finds it.
+    /// Loads the library from the given file, else from the file named by the environment variable, else from the
+    /// system's search path.
     pub(super) fn load(&self, file: Option<&Path>) -> Result<Library, Error> {
         let given = file.map(|file| file.as_os_str().to_owned()).or_else(|| std::env::var_os(self.variable));
         let files = match given {
@@ -23,7 +24,7 @@ impl Named {
         };
         let mut reasons = Vec::new();
         for file in files {
-            // SAFETY: what it runs when it is loaded is NVIDIA's, or of whom the caller trusts.
+            // SAFETY: the library's initialisation code is NVIDIA's, or from a source that the caller trusts.
             match unsafe { Library::new(&file) } {
                 Ok(library) => return Ok(library),
                 Err(error) => reasons.push(said(&error)),
@@ -37,12 +38,12 @@ impl Named {
     }
 }
 
-/// What the system says.
+/// Returns the system's message.
 pub(super) fn said(error: &libloading::Error) -> String {
     error.source().map_or_else(|| error.to_string(), ToString::to_string)
 }
 
-/// Defines a struct with a library's functions, and how they are found there by their names.
+/// Defines a struct of a library's functions, and its constructor, which finds them by name.
 ///
 /// The library stays loaded until the process ends.
 macro_rules! library_functions {
@@ -57,7 +58,7 @@ macro_rules! library_functions {
                 let library = named.load(file)?;
                 let table = Self {
                     $($function: {
-                        // SAFETY: this is the function's type in NVIDIA's header.
+                        // SAFETY: the type is the function's type in NVIDIA's header.
                         let found = unsafe { library.get(concat!(stringify!($function), "\0").as_bytes()) };
                         *found.map_err(|error| named.failed($crate::cuda::library::said(&error)))?
                     },)*

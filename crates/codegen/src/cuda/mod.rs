@@ -1,4 +1,4 @@
-//! Generated kernels on a GPU: compiled while the program runs, and called with arrays of the device.
+//! Generated kernels on a GPU: compiled at run time, and called with arrays on the device.
 //!
 //! ```no_run
 //! use condyle_codegen::cuda::{Compiler, Device, DeviceArray};
@@ -18,13 +18,13 @@
 //! # Ok::<(), condyle_codegen::cuda::Error>(())
 //! ```
 //!
-//! Nothing of CUDA is needed when the program is built: the driver's library is loaded by [`Driver::new`], that of NVIDIA's run-time
-//! compiler (NVRTC) by [`Compiler::new`], each from where the system finds it or from the file that the environment variables
-//! `CONDYLE_CUDA_LIBRARY` and `CONDYLE_NVRTC_LIBRARY` name. Where there is no NVRTC, [`Device::load`] takes what [`Compiler::ptx`] made
-//! elsewhere; that needs no GPU.
+//! Building the program needs nothing of CUDA: [`Driver::new`] loads the driver's library, and [`Compiler::new`] loads
+//! NVIDIA's run-time compiler (NVRTC). Both use the system's search path, or the files named by the environment
+//! variables `CONDYLE_CUDA_LIBRARY` and `CONDYLE_NVRTC_LIBRARY`. Without NVRTC, [`Device::load`] takes PTX that
+//! [`Compiler::ptx`] made elsewhere; making PTX needs no GPU.
 //!
-//! All is done in the device's primary context, which other libraries of the process use too. Arrays and streams of theirs are
-//! taken as they are: [`DeviceArray::from_raw`], [`Stream::from_raw`].
+//! All work uses the device's primary context, which other libraries of the process use too. Arrays and streams of
+//! other libraries can be used: [`DeviceArray::from_raw`], [`Stream::from_raw`].
 #![allow(unsafe_code)] // two libraries in C
 
 mod array;

@@ -1,10 +1,10 @@
 //! Forward dynamics by the articulated-body algorithm, in the bodies' own frames.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, line by line, with the classical acceleration of
-//! each origin in place of the spatial one, as in RNEA: no linear velocity is needed. It is the form for code that is
-//! recorded for one robot: what a joint carries turns about one axis at a time, and the constant turns and zeros of
-//! placements and inertias fold, while in the world's frame (`aba.rs` of `dynamics`) every number depends on every joint before.
-//! Generated code is tested against `aba.rs`.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, line by line. As in RNEA, the classical
+//! acceleration of each origin replaces the spatial acceleration, so no linear velocity is needed. This form is for
+//! code that is recorded for one robot: a joint rotates the quantities of its body about one axis, and constants and
+//! zeros of placements and inertias fold. In the world's frame (`aba.rs` of `dynamics`), every number depends on every
+//! joint before. Generated code is tested against `aba.rs`.
 
 use super::joint_placement::{Carried, JointPlacement};
 use condyle_model::joint::kinematics::JointSinCos;
@@ -12,7 +12,7 @@ use condyle_model::joint::{ClassicalMotion, Joint, JointMotion};
 use condyle_model::layout::Layout;
 use condyle_spatial::{Act, ArticulatedInertia, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 
-/// The whole algorithm. Its memory is its own: of numbers that are recorded each takes some anyway.
+/// Runs the whole algorithm. It allocates its memory, since recorded numbers take memory anyway.
 pub(super) fn pass<L: Layout>(l: &L, q: &[L::S], qd: &[L::S], tau: &[L::S], f_ext: &[Force<L::S>], qdd: &mut [L::S]) {
     let n = l.bodies().end;
     let mut angles = JointSinCos::new(n);
@@ -23,14 +23,14 @@ pub(super) fn pass<L: Layout>(l: &L, q: &[L::S], qd: &[L::S], tau: &[L::S], f_ex
     let (mut w, mut K) = (vec![Vec3::zero(); n], vec![Mat3::zero(); n]); // ω, ω× ω×
     let (mut c, mut a) = (vec![Motion::zero(); n], vec![Motion::zero(); n]);
     let (mut IA, mut pA) = (vec![ArticulatedInertia::zero(); n], vec![Force::zero(); n]);
-    let mut U = vec![Vec::new(); n]; // U, D⁻¹, u of each column, the last one first
+    let mut U = vec![Vec::new(); n]; // U, D⁻¹, u of each column, in reverse order
     for i in l.bodies() {
         let (X_T, X_J) = (l.placement(i), JointPlacement::of(l, i, q, angles.sin[i], angles.cos[i])); // λXi = X_T X_J
         let turn_inv = |x| X_J.turn_inv(X_T.rotation.transpose_mul(x));
         let a_p = l.parent(&K, i) * X_T.act(X_J.translation()); // K_λ p
         let carried = ClassicalMotion { w: turn_inv(l.parent(&w, i)), dw: Vec3::zero(), a: turn_inv(a_p) };
         let m = Joint::motion(l, i, qd).added_to(still, carried); // ω = Rᵀ ω_λ + ω_J
-        c[i] = Motion::new(m.a, m.dw); // c_i, what is there without q̈
+        c[i] = Motion::new(m.a, m.dw); // c_i, the acceleration without q̈
         let Inertia { mass_com, rotational, .. } = l.inertia(i);
         let Ki = ClassicalMotion { dw: Vec3::zero(), ..m }.centripetal();
         pA[i] = Force::new(Ki * mass_com, m.w.cross(rotational * m.w)); // p_i: K h, ω × I ω

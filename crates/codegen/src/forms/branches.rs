@@ -1,26 +1,26 @@
-//! Solutions and the inverse by the factor of a tree, in fewest operations: for numbers that are recorded.
+//! Products with the inverse, and the inverse, from the factor of a tree, with few operations: for recorded numbers.
 //!
-//! Where no number of b stands on the way from place k to an ancestor, all that x_k knows of b comes through that ancestor:
+//! If all entries of b on the path from k to an ancestor are zero, x_k depends on b only through that ancestor:
 //!
 //! ```text
 //! x_k = −Σ L_ke x_e = Σ G_ke x_e     with G_ke = −L_ke − Σ L_kf G_fe
 //! ```
 //!
-//! where e goes over the ancestor and what is before it, and f over the places between. Rows of G are as short as the
-//! branches' common way to the root, and serve all b whose numbers stand in other branches. Those of one branch make sums
-//! that are alike, for which compilers can use vectors.
+//! where e runs over the ancestor and the indices before it, and f over the indices between. Rows of G are as short as
+//! the branches' common path to the root, and serve all b whose non-zero entries are in other branches. Rows of one
+//! branch give sums with the same structure, which compilers can vectorise.
 
 use condyle_linalg::elimination_tree::NONE;
 use condyle_linalg::{Ltdl, check};
 use condyle_spatial::{Dense, DenseMatrix, Scalar};
 use std::collections::BTreeMap;
 
-/// The rows of G, by the place k and the number of places before it that they go over.
+/// Rows of G, by the index k and the number of indices before k that they cover.
 pub struct Branches<'f, S> {
     factor: &'f Ltdl<S>,
-    /// The places before each on the way from the root.
+    /// Indices before each index, on the path from the root.
     before: Vec<Vec<usize>>,
-    /// How many of them are before the branch of each, which begins behind the last place with several ones behind it.
+    /// Number of these indices before the index's branch; a branch begins after the last index with several children.
     before_branch: Vec<usize>,
     /// −D⁻¹.
     minus_inverse_diagonal: Vec<S>,
@@ -28,7 +28,7 @@ pub struct Branches<'f, S> {
 }
 
 impl<'f, S: Scalar> Branches<'f, S> {
-    /// Those of a factor.
+    /// Creates the rows for a factor.
     pub fn new(factor: &'f Ltdl<S>) -> Self {
         let parents = &factor.tree().parent;
         let (mut before, mut before_branch): (Vec<Vec<usize>>, Vec<usize>) = (Vec::new(), Vec::new());
@@ -49,7 +49,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         Self { factor, before, before_branch, minus_inverse_diagonal, rows: BTreeMap::new() }
     }
 
-    /// G_ke for the first m places e before k.
+    /// Returns G_ke for the first m indices e before k.
     fn row(&mut self, k: usize, m: usize) -> Vec<S> {
         if let Some(row) = self.rows.get(&(k, m)) {
             return row.clone();
@@ -67,16 +67,16 @@ impl<'f, S: Scalar> Branches<'f, S> {
         row
     }
 
-    /// A number + Σ G_ke x_e over the first m places before k, x being given by place.
+    /// Returns a number + Σ G_ke x_e over the first m indices before k, with x given by index.
     fn through(&mut self, k: usize, m: usize, start: S, x: impl Fn(usize) -> S) -> S {
         let G = self.row(k, m);
         (0..m).fold(start, |sum, p| sum + G[p] * x(self.before[k][p]))
     }
 
-    /// x = −M⁻¹ b in place of b. Numbers that are zero are left out.
+    /// Replaces b by x = −M⁻¹ b. Zeros are skipped.
     ///
     /// # Panics
-    /// If `b` has not nv numbers.
+    /// If `b` does not have nv numbers.
     pub fn minus_solve(&mut self, b: &mut [S]) {
         let (factor, n) = (self.factor, self.before.len());
         check("b", b.len(), n);
@@ -91,7 +91,8 @@ impl<'f, S: Scalar> Branches<'f, S> {
         let (mut x, mut own) = (vec![S::zero(); n], vec![S::zero(); n]);
         for k in 0..n {
             let (way, L) = (&self.before[k][..], factor.row_from_root(k));
-            // L x = −D⁻¹ y: what the own branch brings, then what comes through the places before it
+            // L x = −D⁻¹ y: first the contribution of the own branch, then the contribution through the indices before
+            // it
             let m = if is_given[k] {
                 let m = self.before_branch[k];
                 let start = y[k] * self.minus_inverse_diagonal[k];
@@ -107,7 +108,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         }
     }
 
-    /// X = M⁻¹, as [`Ltdl::inverse`]: X_kj of two branches comes through the places before both.
+    /// Computes X = M⁻¹, as [`Ltdl::inverse`] does: X_kj of two branches is computed through the indices before both.
     ///
     /// # Panics
     /// If `X` is not nv × nv.
@@ -120,7 +121,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
             for j in 0..k {
                 let ways = self.before[k].iter().zip(self.before[j].iter().chain([&j]));
                 let common = ways.take_while(|(a, b)| a == b).count();
-                // of a place on the way from the root, all that are before k
+                // if j is on the path from the root to k: all indices before k
                 let m =
                     if self.before[k].get(common.wrapping_sub(1)) == Some(&j) { self.before[k].len() } else { common };
                 let x = self.through(k, m, S::zero(), |e| X[at(e, j)]).kept();

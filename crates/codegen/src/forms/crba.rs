@@ -1,8 +1,9 @@
 //! The joint-space inertia matrix by the composite-rigid-body algorithm, in the bodies' own frames.
 //!
-//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2, line by line. It is the form for code that is
-//! recorded for one robot: constant turns and zeros of placements and inertias fold, and S_eᵀ F is a number of F, while in the
-//! world's frame of `crba.rs` every number depends on every joint before. Generated code is tested against `crba.rs`.
+//! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2, line by line. This form is for code that
+//! is recorded for one robot: constants and zeros of placements and inertias fold, and S_eᵀ F is a component of F. In
+//! the world's frame of `crba.rs`, every number depends on every joint before. Generated code is tested against
+//! `crba.rs`.
 
 use super::joint_placement::{Carried, JointPlacement};
 use condyle_model::joint::Joint;
@@ -10,7 +11,7 @@ use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::Columns;
 use condyle_spatial::{Act, Inertia, Se3};
 
-/// The whole algorithm. Its memory is its own: of numbers that are recorded each takes some anyway.
+/// Runs the whole algorithm. It allocates its memory, since recorded numbers take memory anyway.
 pub(super) fn pass<L: Columns>(l: &L, q: &[L::S], M: &mut [L::Number]) {
     let n = l.bodies().end;
     let mut angles = JointSinCos::new(n);
@@ -31,7 +32,7 @@ pub(super) fn pass<L: Columns>(l: &L, q: &[L::S], M: &mut [L::Number]) {
             let mut F = IC[i] * l.joint(i).column(&identity, k); // F = Iᶜ S
             let mut j = i;
             while j != 0 {
-                // M_ej = S_eᵀ F for every column e from the root to its own
+                // M_ej = S_eᵀ F for every column e from the root to column j
                 let (first, own) = (l.support(j).len() - l.joint(j).nv(), if j == i { k } else { l.joint(j).nv() });
                 for e in 0..own {
                     let x = l.joint(j).column(&identity, e).dot(F);

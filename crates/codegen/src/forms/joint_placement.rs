@@ -1,17 +1,17 @@
-//! The pose into which a joint moves its body, and how it acts on what the body carries.
+//! The pose of a joint, and its action on quantities of its body.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::Layout;
 use condyle_spatial::{Act, ArticulatedInertia, Force, Inertia, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
-/// X_J(q), the body's frame in the joint's, in the form that costs least to compute with.
+/// X_J(q), the body's frame in the joint's frame, in the cheapest form.
 #[derive(Clone, Copy, Debug)]
 pub enum JointPlacement<S> {
     /// A rotation about z.
     AboutZ {
-        /// Of the angle.
+        /// Sine of the angle.
         sin: S,
-        /// Of the angle.
+        /// Cosine of the angle.
         cos: S,
     },
     /// Any pose.
@@ -19,7 +19,7 @@ pub enum JointPlacement<S> {
 }
 
 impl<S: Scalar> JointPlacement<S> {
-    /// That of joint i of a pass, whose sine and cosine are known: λXi = X_T X_J.
+    /// Returns the placement of joint i, with λXi = X_T X_J, from the sine and cosine of its angle.
     pub(crate) fn of<L: Layout<S = S>>(l: &L, i: usize, q: &[S], sin: S, cos: S) -> Self {
         if l.joint(i).turns_about_z() {
             return Self::AboutZ { sin, cos };
@@ -27,7 +27,7 @@ impl<S: Scalar> JointPlacement<S> {
         Self::General(Joint::placement_on(l, i, Se3::identity(), q, sin, cos))
     }
 
-    /// The body's origin in the joint's frame.
+    /// Returns the body's origin in the joint's frame.
     pub fn translation(&self) -> Vec3<S> {
         match self {
             Self::AboutZ { .. } => Vec3::zero(),
@@ -35,7 +35,7 @@ impl<S: Scalar> JointPlacement<S> {
         }
     }
 
-    /// Rᵀ x: a vector of the joint's frame in the body's.
+    /// Returns Rᵀ x: transforms a vector from the joint's frame to the body's frame.
     pub fn turn_inv(&self, x: Vec3<S>) -> Vec3<S> {
         match *self {
             Self::AboutZ { sin, cos } => about_z(-sin, cos, x),
@@ -43,7 +43,7 @@ impl<S: Scalar> JointPlacement<S> {
         }
     }
 
-    /// X⁻¹ m: a motion of the joint's frame in the body's.
+    /// Returns X⁻¹ m: transforms a motion from the joint's frame to the body's frame.
     pub fn act_inv(&self, m: Motion<S>) -> Motion<S> {
         match *self {
             Self::AboutZ { sin, cos } => Motion::new(about_z(-sin, cos, m.linear), about_z(-sin, cos, m.angular)),
@@ -52,18 +52,18 @@ impl<S: Scalar> JointPlacement<S> {
     }
 }
 
-/// R x.
+/// Returns R x.
 fn about_z<S: Scalar>(sin: S, cos: S, x: Vec3<S>) -> Vec3<S> {
     Vec3::new(x.x.mul_add(cos, -(x.y * sin)), x.x.mul_add(sin, x.y * cos), x.z)
 }
 
-/// R A Rᵀ, of which the upper left part is
+/// Returns R A Rᵀ, with the upper left part
 ///
 /// ```text
 /// a' = a − s g,   d' = d + s g,   b' = c g − e,   e' = c g − b     with g = s (a − d) + c (b + e)
 /// ```
 ///
-/// for the rows (a, b) and (e, d): half of the products that two products of matrices take.
+/// for the rows (a, b) and (e, d): half the products of two products of matrices.
 fn matrix_about_z<S: Scalar>(sin: S, cos: S, A: Mat3<S>) -> Mat3<S> {
     let (a, b, e, d) = (A.x.x, A.y.x, A.x.y, A.y.y);
     let g = (a - d).mul_add(sin, (b + e) * cos);
@@ -75,16 +75,16 @@ fn matrix_about_z<S: Scalar>(sin: S, cos: S, A: Mat3<S>) -> Mat3<S> {
     }
 }
 
-/// The same of a symmetric matrix.
+/// Returns R A Rᵀ for a symmetric matrix.
 fn symmetric_about_z<S: Scalar>(sin: S, cos: S, A: Sym3<S>) -> Sym3<S> {
     let g = (A.xx - A.yy).mul_add(sin, (A.xy + A.xy) * cos);
     let z = about_z(sin, cos, Vec3::new(A.xz, A.yz, A.zz));
     Sym3 { xx: A.xx - g * sin, xy: g.mul_add(cos, -A.xy), yy: g.mul_add(sin, A.yy), xz: z.x, yz: z.y, zz: A.zz }
 }
 
-/// What a joint carries, which its parent's side sees in the joint's frame.
+/// Quantity of a body that a joint transforms to its parent's side, into the joint's frame.
 pub trait Carried<S>: Sized {
-    /// X x.
+    /// Returns X x.
     fn carried_by(self, X: &JointPlacement<S>) -> Self;
 }
 

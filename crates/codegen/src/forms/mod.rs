@@ -1,8 +1,9 @@
-//! Algorithms in the forms that have fewest operations when they are recorded for one robot.
+//! Algorithms in the forms with the fewest operations when recorded for one robot.
 //!
-//! Code that is written for one robot has neither loops nor operations with zeros. So ABA and CRBA run in the bodies' frames,
-//! where constants fold, M and its factor serve accelerations and their derivatives where it is sparse, and M⁻¹ comes by the
-//! branches of the factor. These take the place of the library's functions of the same names, in functions of one's own too.
+//! Code for one robot has neither loops nor operations with zeros. ABA and CRBA therefore run in the bodies' frames,
+//! where constants fold. Where M is sparse, M and its factor serve accelerations and their derivatives. M⁻¹ is computed
+//! by the branches of the factor. These functions replace the library's functions of the same names, also in user
+//! functions.
 
 mod aba;
 pub(crate) mod branches;
@@ -20,10 +21,10 @@ use condyle_model::layout::Single;
 use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 use nalgebra::{DMatrix, DVectorView};
 
-/// q̈ and its derivatives, as of [`condyle_dynamics::AbaDerivatives`].
+/// q̈ and its derivatives, as in [`condyle_dynamics::AbaDerivatives`].
 #[derive(Clone, Debug)]
 pub struct ForwardDerivatives<S> {
-    /// q̈ itself, nv numbers.
+    /// q̈, nv numbers.
     pub a: Vec<S>,
     /// ∂q̈/∂q in the tangent space, nv × nv.
     pub da_dq: DMatrix<S>,
@@ -33,10 +34,10 @@ pub struct ForwardDerivatives<S> {
     pub da_dtau: DMatrix<S>,
 }
 
-/// [`condyle_dynamics::crba`]: M, nv × nv.
+/// Computes M, nv × nv, as [`condyle_dynamics::crba`] does.
 ///
 /// # Panics
-/// If `q` has not nq numbers.
+/// If `q` does not have nq numbers.
 pub fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S]) -> DMatrix<S> {
     check("q", q.len(), model.nq());
     let mut M = zeros(model);
@@ -44,10 +45,10 @@ pub fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S]) -> DMatrix<S> 
     M
 }
 
-/// [`condyle_dynamics::aba`]: q̈, nv numbers.
+/// Computes q̈, nv numbers, as [`condyle_dynamics::aba`] does.
 ///
 /// # Panics
-/// As it does.
+/// As [`condyle_dynamics::aba`] does.
 pub fn aba<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -76,10 +77,10 @@ pub fn aba<S: Scalar, R: Constant<S>>(
     a
 }
 
-/// [`condyle_dynamics::minv`]: M⁻¹, nv × nv.
+/// Computes M⁻¹, nv × nv, as [`condyle_dynamics::minv`] does.
 ///
 /// # Panics
-/// As it does.
+/// As [`condyle_dynamics::minv`] does.
 pub fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> DMatrix<S> {
     match Inverse::of(model, || crba(model, q)) {
         Some(inverse) => inverse.Minv,
@@ -87,11 +88,12 @@ pub fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: 
     }
 }
 
-/// [`condyle_dynamics::aba_derivatives`]. M and its factor serve the acceleration too, which takes fewer operations than
-/// articulated bodies, and ∂q̈ where the factor has fewer entries than M⁻¹.
+/// Computes q̈ and its derivatives, as [`condyle_dynamics::aba_derivatives`] does. M and its factor serve the
+/// acceleration too, which takes fewer operations than articulated bodies. They also serve ∂q̈ where the factor has
+/// fewer entries than M⁻¹.
 ///
 /// # Panics
-/// As it does.
+/// As [`condyle_dynamics::aba_derivatives`] does.
 pub fn aba_derivatives<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -123,15 +125,16 @@ pub fn aba_derivatives<S: Scalar, R: Constant<S>>(
     ForwardDerivatives { a, da_dq, da_dv, da_dtau: inverse.Minv }
 }
 
-/// The bodies that float without armature on their linear coordinates, and the first coordinate of each: all ∂q̈ by its first
-/// six positions and its first three velocities are known ([`condyle_dynamics::aba_derivatives`]).
+/// Returns the floating bodies without armature on their linear coordinates, with the first coordinate of each. The
+/// derivatives ∂q̈ with respect to its first six positions and its first three velocities are known
+/// ([`condyle_dynamics::aba_derivatives`]).
 fn floating<S: Scalar, R: Constant<S>>(model: &Model<R>) -> Vec<(usize, usize)> {
     let is_free =
         |&(_, first): &(usize, usize)| model.armature()[first..first + 3].iter().all(|&x| x.lift() == S::zero());
     model.floating().map(|i| (i, model.nodes()[i].idx_v)).filter(is_free).collect()
 }
 
-/// τ − h + Σ Jᵢᵀ f_ext,i.
+/// Computes τ − h + Σ Jᵢᵀ f_ext,i.
 fn free_effort<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -148,14 +151,14 @@ fn zeros<S: Scalar, R>(model: &Model<R>) -> DMatrix<S> {
     DMatrix::from_element(model.nv(), model.nv(), S::zero())
 }
 
-/// M⁻¹, and the factor of M unless it came without one.
+/// M⁻¹, and the factor of M, unless M⁻¹ was computed without it.
 struct Inverse<S> {
     factor: Option<Ltdl<S>>,
     Minv: DMatrix<S>,
 }
 
 impl<S: Scalar> Inverse<S> {
-    /// That of M, unless the model's comes without M.
+    /// Computes the inverse of M; `None` if M⁻¹ of this model is computed without M.
     fn of<R>(model: &Model<R>, M: impl FnOnce() -> DMatrix<S>) -> Option<Self> {
         model.check_regular();
         let (mut factor, mut Minv) = (Ltdl::new(model), zeros(model));
@@ -171,7 +174,7 @@ impl<S: Scalar> Inverse<S> {
         Some(Self { factor: Some(factor), Minv })
     }
 
-    /// x = M⁻¹ b in place of b.
+    /// Replaces b by x = M⁻¹ b.
     fn solve(&self, b: &mut [S]) {
         match &self.factor {
             Some(factor) => factor.solve(b),
@@ -184,8 +187,8 @@ impl<S: Scalar> Inverse<S> {
         }
     }
 
-    /// −M⁻¹ B but for columns that are known, which stay zero; by the factor where it has so few entries that twice as many products
-    /// and sums are fewer than nv².
+    /// Computes −M⁻¹ B, except for known columns, which stay zero. It uses the factor if the products and sums with its
+    /// entries, twice their number, are fewer than nv².
     fn minus_products<R>(&self, model: &Model<R>, B: [(&Matrix<S>, Vec<usize>); 2]) -> [DMatrix<S>; 2] {
         let n = model.nv();
         let mut all = B.map(|(B, known)| {

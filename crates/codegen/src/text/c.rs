@@ -1,24 +1,24 @@
-//! C99.
+//! Code in C99.
 
 use super::{Dialect, SourceFile, Writer, description, digits, heading, prefixed};
 use crate::function::Array;
 use crate::program::Program;
 use core::fmt::Write;
 
-/// Sines and cosines without branches but for angles that are out of range: the same sums and products as in the library
-/// (`condyle_spatial::Scalar::sin_cos`), which compilers turn into vector instructions.
+/// Sines and cosines, without branches except for angles out of range. They use the library's sums and products
+/// (`condyle_spatial::Scalar::sin_cos`), which compilers vectorise.
 const SIN_COS: &str = include_str!("sin_cos.c");
 
-/// The types and functions of vectors: GCC's, which clang has too.
+/// Types and functions of vectors: GCC's extensions, which clang has too.
 const VECTORS: &str = include_str!("vectors.c");
 
-/// C on `double` or `float`.
+/// Dialect C, with `double` or `float`.
 pub(crate) struct C {
-    /// What numbers are.
+    /// Type of numbers.
     pub real: &'static str,
-    /// How many states a call computes, side by side in vectors.
+    /// Number of states that a call computes, in vectors.
     pub lanes: usize,
-    /// The name of all files, with which functions begin.
+    /// Name of all files, and prefix of the functions.
     pub name: String,
 }
 
@@ -31,7 +31,7 @@ impl C {
         self.real == "float"
     }
 
-    /// A function of `math.h` for the type of numbers.
+    /// Returns the name of a function of `math.h` for the type of numbers.
     fn function(&self, name: &str) -> String {
         format!("{name}{}", if self.is_float() { "f" } else { "" })
     }
@@ -111,7 +111,7 @@ impl Dialect for C {
     }
 }
 
-/// The parameters of a function: what it reads, the work space, what it writes.
+/// Returns the parameters of a function: inputs, the work space, outputs.
 fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> String {
     let reads = reads.iter().map(|a| format!("const {real} *restrict {}", a.name));
     let work = work.then(|| format!("{real} *restrict w"));
@@ -120,14 +120,14 @@ fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> St
     if all.is_empty() { "void".to_owned() } else { all.join(", ") }
 }
 
-/// How a function begins: `void name(…)`.
+/// Returns the signature of a function: `void name(…)`.
 pub(crate) fn signature(real: &str, name: &str, program: &Program) -> String {
     let (reads, writes): (Vec<&Array>, Vec<&Array>) =
         (program.function.inputs.iter().collect(), program.function.outputs.iter().collect());
     format!("void {name}_{}({})", program.function.name, parameters(real, &reads, false, &writes))
 }
 
-/// The header and the source, of functions that compute as many states as there are lanes.
+/// Returns the header and the source of functions that compute `lanes` states.
 pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, lanes: usize) -> Vec<SourceFile> {
     let guard = format!("{}_H", name.to_uppercase());
     let mut lines = heading(name, programs);
@@ -166,7 +166,7 @@ pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, lanes:
     vec![SourceFile { name: format!("{name}.h"), text: header }, SourceFile { name: format!("{name}.c"), text: source }]
 }
 
-/// The sines and cosines of a file.
+/// Returns the code of sines and cosines for a file.
 fn sin_cos(name: &str, real: &str) -> String {
     let section = |from: &str| {
         let (_, rest) = SIN_COS.split_once(&format!("/* {from} */\n")).unwrap_or_default();
@@ -175,7 +175,7 @@ fn sin_cos(name: &str, real: &str) -> String {
     section(real).replace("NAME", name)
 }
 
-/// The vectors of a file.
+/// Returns the code of vectors for a file.
 fn vectors(name: &str, real: &str, lanes: usize) -> String {
     let is_float = real == "float";
     let (size, suffix) = if is_float { (4, "f") } else { (8, "") };
@@ -196,13 +196,13 @@ fn vectors(name: &str, real: &str, lanes: usize) -> String {
     text
 }
 
-/// A comment of some lines.
+/// Returns a comment of some lines.
 pub(crate) fn comment(lines: &[String]) -> String {
     let body = prefixed(" * ", lines);
     format!("/*\n{body} */\n")
 }
 
-/// A function with its parts.
+/// Returns the code of a function with its parts.
 fn function(writer: &Writer<C>, name: &str) -> String {
     let program = writer.program;
     let (real, function) = (writer.dialect.real, &program.function.name);

@@ -12,4 +12,4 @@
 #define EXPORT
 #endif
 
-/* Arrays are dense, which the 1 behind rows and columns says. One that CasADi leaves out is of zeros, or goes to w. */
+/* Arrays are dense, as the 1 after rows and columns states. A missing input is zero; a missing output goes to w. */

@@ -1,4 +1,4 @@
-//! C for CasADi's `external`.
+//! C code for CasADi's `external`.
 
 use super::c::comment;
 use super::{SourceFile, description, heading};
@@ -6,10 +6,10 @@ use crate::function::{Array, Function};
 use crate::program::Program;
 use core::fmt::Write;
 
-/// The types and marks of the interface, as CasADi's own generated code has them.
+/// Types and macros of the interface, as in CasADi's own generated code.
 const HEAD: &str = include_str!("casadi.c");
 
-/// The file with a function of CasADi's interface for each function.
+/// Returns the file that implements CasADi's interface for each function.
 pub(crate) fn file(name: &str, programs: &[Program]) -> SourceFile {
     let mut lines = heading(name, programs);
     lines.extend([
@@ -35,17 +35,18 @@ pub(crate) fn file(name: &str, programs: &[Program]) -> SourceFile {
     SourceFile { name: format!("{name}_casadi.c"), text }
 }
 
-/// An array that CasADi asks for.
+/// Array that CasADi requests.
 enum Output {
-    /// A result of the function that is called.
+    /// A result of the called function.
     Result(Array),
-    /// The derivative of a result y by the restitution e of an impact. y is affine in e, and what it is at e = -1, where nothing
-    /// happens, is known: v_after is v there, and impulses are 0. So dy/de = (y - y(-1)) / (1 + e).
+    /// The derivative of a result y with respect to the restitution e of an impact. y is affine in e, and its value at
+    /// e = -1, where nothing happens, is known: v_after is v there, and impulses are 0. So dy/de = (y - y(-1)) / (1 +
+    /// e).
     ByRestitution(Array),
 }
 
 impl Output {
-    /// Its rows and columns.
+    /// Returns the numbers of rows and columns.
     fn shape(&self) -> (usize, usize) {
         match self {
             Self::Result(array) => (array.rows, array.columns),
@@ -54,14 +55,15 @@ impl Output {
     }
 }
 
-/// What a result is called where it is differentiated: `v_after` is what becomes of `v`, and goes by its name.
+/// Returns the name of a result in its derivatives: `v_after` is the new value of `v`, and uses its name.
 fn differentiated(y: &Array) -> &str {
     y.name.strip_suffix("_after").unwrap_or(&y.name)
 }
 
-/// The function that computes a function's derivatives, if it is there, and they are by the numbers of each argument (not so of
-/// positions with quaternions): `dy_dx` of `f_derivatives` for each output y (or `y_after`) and input x of `f`, as CasADi names
-/// and orders them. Those by the restitution of an impact need no result.
+/// Returns the function that computes a function's derivatives, if it exists and differentiates with respect to the
+/// numbers of each argument (not for positions with quaternions). Results are `dy_dx` of `f_derivatives` for each
+/// output y (or `y_after`) and input x of `f`, in CasADi's names and order. Derivatives with respect to the restitution
+/// of an impact need no result.
 fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Function, Vec<(String, Output)>)> {
     let name = format!("{}_derivatives", function.name);
     let derivatives = programs.iter().map(|program| program.function).find(|f| f.name == name)?;
@@ -79,7 +81,8 @@ fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Fu
     (derivatives.inputs == function.inputs).then_some((derivatives, blocks))
 }
 
-/// All that CasADi asks of one function, with such names of arrays; computed by a function that takes the first inputs.
+/// Returns CasADi's interface of one function with these names of arrays. It calls a function that takes the first
+/// inputs.
 fn interface(
     name: &str,
     inputs: &[(String, Array)],
@@ -126,7 +129,7 @@ fn interface(
         let names: Vec<String> = arrays.iter().map(|(name, _)| format!("\"{name}\"")).collect();
         let shapes: Vec<String> = arrays.iter().map(|(_, (rows, cols))| format!("{{{rows}, {cols}, 1}}")).collect();
         let n = arrays.len();
-        // an array of size 0 is no C: there is one more than is asked for
+        // an array of size 0 is invalid in C, so it has one additional entry
         let _ = write!(
             text,
             "EXPORT const char *{name}_name_{which}(casadi_int i) {{\n    \

@@ -1,4 +1,4 @@
-//! CUDA: a thread for each state or for each of its shares, the numbers of one kind side by side in memory.
+//! CUDA code: a thread for each state or for each of its shares; the same number of all states is contiguous in memory.
 
 use super::{Dialect, SourceFile, Writer, description, heading, interface, prefixed};
 use crate::function::{Array, Function};
@@ -7,7 +7,7 @@ use crate::shares::split;
 use crate::text::c::C;
 use core::fmt::Write;
 
-/// C with arrays of all states.
+/// Dialect C with arrays of all states.
 struct Cuda(C);
 
 impl Dialect for Cuda {
@@ -44,7 +44,7 @@ impl Dialect for Cuda {
     }
 }
 
-/// The parameters behind the number of states.
+/// Returns the parameters after the number of states.
 fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> String {
     let reads = reads.iter().map(|a| format!(", const {real} *__restrict__ {}", a.name));
     let work = work.then(|| format!(", {real} *__restrict__ w"));
@@ -52,7 +52,7 @@ fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> St
     reads.chain(work).chain(writes).collect()
 }
 
-/// The file.
+/// Returns the file of kernels.
 pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, registers: usize) -> Vec<SourceFile> {
     let shares: Vec<Vec<Function>> = programs.iter().map(|program| split(program, registers)).collect();
     let mut lines = heading(name, programs);
@@ -77,7 +77,7 @@ pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, regist
     vec![SourceFile { name: format!("{name}.cu"), text }]
 }
 
-/// A kernel with its parts, or with functions of its shares.
+/// Returns a kernel with its parts, or with functions of its shares.
 fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
     let (real, function) = (whole.dialect.0.real, whole.program.function);
     let (inputs, outputs): (Vec<&Array>, Vec<&Array>) =
@@ -103,7 +103,7 @@ fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
             let call = device_function(&mut text, whole, &format!("{symbol}_whole"));
             body.push(format!("if (gridDim.y == 1) return {call}"));
         }
-        // shares that no row of blocks is there for are taken by those that are there
+        // shares without their own row of blocks are computed by the existing rows
         let count = shares.len();
         body.push(format!("for (int share = blockIdx.y; share < {count}; share += gridDim.y) switch (share) {{"));
         for (k, share) in shares.iter().enumerate() {
@@ -123,7 +123,8 @@ fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
     text
 }
 
-/// The parts of a program as functions, and the lines that call them, or compute all if there is one part.
+/// Returns the parts of a program as functions, and the lines that call them; with one part, lines that compute
+/// everything.
 fn computation(writer: &Writer<Cuda>, name: &str) -> (String, Vec<String>) {
     let program = writer.program;
     let (real, function) = (writer.dialect.0.real, program.function);

@@ -1,4 +1,4 @@
-//! Programs as text: what all languages have in common.
+//! Programs as text: code common to all languages.
 
 mod c;
 mod casadi;
@@ -12,49 +12,50 @@ use crate::shares::split;
 use crate::step::{Angle, Entries, Step, Term};
 use core::fmt::Write;
 
-/// A file of code.
+/// File of code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceFile {
-    /// Its name, without a folder.
+    /// File name, without a folder.
     pub name: String,
-    /// What is in it.
+    /// Content of the file.
     pub text: String,
 }
 
-/// A language in which functions are written down.
+/// Language of generated code.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Language {
-    /// C99 on numbers of type `double`: a header and a source, which need nothing but `math.h`.
+    /// C99 with `double`: a header and a source, which need only `math.h`.
     #[default]
     C,
-    /// C99 on numbers of type `float`.
+    /// C99 with `float`.
     CFloat,
-    /// C99 with vectors of GCC and clang: four states in a call, on numbers of type `double`.
+    /// C99 with vectors of GCC and clang: four states in a call, with `double`.
     CFour,
-    /// The same with eight states.
+    /// C99 with vectors: eight states in a call, with `double`.
     CEight,
-    /// The same with four states, on numbers of type `float`.
+    /// C99 with vectors: four states in a call, with `float`.
     CFloatFour,
-    /// The same with eight states, on numbers of type `float`.
+    /// C99 with vectors: eight states in a call, with `float`.
     CFloatEight,
     /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
-    /// `robot_aba_casadi` for `robot_aba`, with its Jacobian where `robot_aba_derivatives` is there too and the robot has no
-    /// quaternions and points on circles; of impacts that has what their derivatives lack, columns by the restitution.
+    /// `robot_aba_casadi` for `robot_aba`. It includes the Jacobian if `robot_aba_derivatives` is generated too and the
+    /// robot has no quaternions and points on circles. For impacts, this Jacobian also has the columns of the
+    /// restitution, which their derivatives lack.
     CCasadi,
-    /// A module of Rust on `f64` that needs no `std`.
+    /// A module of Rust with `f64`, without `std`.
     Rust,
-    /// A module of Rust on `f32` that needs no `std`.
+    /// A module of Rust with `f32`, without `std`.
     RustFloat,
-    /// CUDA on numbers of type `double`: a thread for each state, or for each of its shares ([`Function::shares`]), the numbers of one
-    /// kind side by side.
+    /// CUDA with `double`: a thread for each state, or for each of its shares ([`Function::shares`]); the same number
+    /// of all states is contiguous.
     Cuda,
-    /// CUDA on numbers of type `float`.
+    /// CUDA with `float`.
     CudaFloat,
 }
 
 impl Language {
-    /// The languages by the names that [`named`](Self::named) knows.
+    /// Names of the languages, for [`named`](Self::named).
     pub const NAMES: [&str; 11] = [
         "c",
         "c-float",
@@ -69,7 +70,7 @@ impl Language {
         "cuda-float",
     ];
 
-    /// The language of that name.
+    /// Returns the language with this name.
     pub fn named(name: &str) -> Option<Self> {
         let all = [
             Self::C,
@@ -87,7 +88,7 @@ impl Language {
         Self::NAMES.iter().position(|&known| known == name).map(|k| all[k])
     }
 
-    /// The registers of a GPU's thread that a number takes.
+    /// Returns the number of registers that a number takes in a GPU's thread.
     pub(crate) fn registers_of_number(self) -> Option<usize> {
         match self {
             Self::Cuda => Some(2),
@@ -96,7 +97,7 @@ impl Language {
         }
     }
 
-    /// The files in which some functions are written down. The same functions give the same text.
+    /// Returns the files of code of some functions. The same functions give the same text.
     ///
     /// ```
     /// use condyle_codegen::{Language, record};
@@ -110,7 +111,7 @@ impl Language {
     /// ```
     ///
     /// # Panics
-    /// If `name` is no identifier (ASCII letters, digits and `_`).
+    /// If `name` is not an identifier (ASCII letters, digits and `_`).
     pub fn text(self, name: &str, functions: &[Function]) -> Vec<SourceFile> {
         assert!(crate::function::is_identifier(name), "name: `{name}` is not made of ASCII letters, digits and `_`");
         let programs: Vec<Program> = functions.iter().map(Program::new).collect();
@@ -135,8 +136,9 @@ impl Language {
         }
     }
 
-    /// The name of the files, with which functions in C and CUDA begin: that of the robot, then `_float` and `_x4` or `_x8`, so
-    /// that files of several languages lie in one folder, and their functions in one program.
+    /// Returns the name of the files, which is the prefix of functions in C and CUDA: the robot's name, then `_float`
+    /// and `_x4` or `_x8`. Files of several languages can therefore be in one folder, and their functions in one
+    /// program.
     ///
     /// ```
     /// use condyle_codegen::Language;
@@ -157,12 +159,12 @@ impl Language {
 }
 
 impl Function {
-    /// The number of threads among which its kernel can share out a state, in a language: 1 but in CUDA.
+    /// Returns the number of threads that can share a state in the function's kernel: 1 for other languages than CUDA.
     ///
-    /// Functions of a robot are split by limbs where one thread would have to keep more values than it has registers, and the largest
-    /// share is smaller by more than the sum of all is greater; or as [`Settings::shares`](crate::Settings::shares) says. A
-    /// kernel that is launched with so many rows of blocks (`blockIdx.y`) computes a share in each; with one row, a whole state in each
-    /// thread.
+    /// Functions of a robot are split by limbs if one thread would need more values than it has registers. In addition,
+    /// the largest share must shrink by a larger factor than the factor by which the sum of all shares grows.
+    /// [`Settings::shares`](crate::Settings::shares) can set the number. A kernel launched with this number of rows of
+    /// blocks (`blockIdx.y`) computes one share in each row; with one row, each thread computes a whole state.
     ///
     /// ```
     /// use condyle_codegen::{Language, Settings, functions};
@@ -178,35 +180,35 @@ impl Function {
     }
 }
 
-/// How a language says things.
+/// Syntax of a language.
 pub(crate) trait Dialect {
-    /// A constant.
+    /// Returns a constant.
     fn number(&self, x: f64) -> String;
-    /// A number of an array.
+    /// Returns a number of an array.
     fn element(&self, array: &str, index: &str) -> String {
         format!("{array}[{index}]")
     }
-    /// A number of the work space.
+    /// Returns a number of the work space.
     fn work(&self, slot: &str) -> String {
         format!("w[{slot}]")
     }
-    /// A loop of one line over k = 0, 1, …, n − 1, where k goes by some name.
+    /// Returns a loop of one line over k = 0, 1, …, n − 1, with this name for k.
     fn repeat(&self, k: &str, n: usize, line: &str) -> String {
         format!("for (int {k} = 0; {k} < {n}; {k}++) {line}")
     }
-    /// A value where no operation makes one for each state of a constant.
+    /// Returns a value for each state of a vector, if it is a constant that no operation extends to a vector.
     fn whole(&self, value: String) -> String {
         value
     }
-    /// A line that keeps a compiler from moving what reads and writes memory across it.
+    /// Returns a line across which compilers do not move memory accesses.
     fn fence(&self) -> Option<&'static str> {
         None
     }
-    /// A new variable, a mask or a number.
+    /// Returns the definition of a new variable, a mask or a number.
     fn variable(&self, name: &str, expression: &str, is_mask: bool) -> String;
-    /// New variables for the sine and the cosine of an angle.
+    /// Returns the definition of variables for the sine and the cosine of an angle.
     fn sin_cos(&self, sin: &str, cos: &str, angle: &str) -> String;
-    /// a b + c, with signs before the product and before c.
+    /// Returns a b + c, with signs of the product and of c.
     fn mul_add(&self, minus_product: bool, a: &str, b: &str, minus: bool, c: &str) -> String {
         match (minus_product, minus) {
             (false, false) => format!("{a} * {b} + {c}"),
@@ -214,30 +216,30 @@ pub(crate) trait Dialect {
             _ => format!("{c} - {a} * {b}"),
         }
     }
-    /// A choice.
+    /// Returns a selection by a mask.
     fn select(&self, mask: &str, a: &str, b: &str) -> String;
-    /// A function of one number: sqrt, abs.
+    /// Returns a call of a function of one number: sqrt, abs.
     fn call(&self, function: &str, a: &str) -> String;
-    /// The angle of a point.
+    /// Returns the angle of a point.
     fn atan2(&self, y: &str, x: &str) -> String;
-    /// A mask as a number of the work space.
+    /// Returns a mask as a number of the work space.
     fn mask_to_work(&self, mask: &str) -> String;
-    /// A mask out of the work space.
+    /// Returns a mask from a number of the work space.
     fn mask_from_work(&self, number: &str) -> String;
-    /// 0 or 1 as a mask.
+    /// Returns 0 or 1 as a mask.
     fn truth(&self, holds: bool) -> &'static str;
 }
 
-/// The steps from one fence to the next. LLVM's scheduler moves loads so far ahead of what they are for that what is in registers
-/// has to leave them: behind fences, vectors of talos' derivatives take 0.72 of the time, and as much for 20 as for 200 steps.
+/// Number of steps between two fences. LLVM's scheduler moves loads far ahead of their uses, which spills registers.
+/// With fences, vectors of Talos's derivatives take 0.72 of the time; the gain is the same for 20 to 200 steps.
 const FENCED: usize = 50;
 
-/// Writes the parts of a program.
+/// Writer of a program's parts.
 pub(crate) struct Writer<'p, D> {
     pub program: &'p Program<'p>,
     pub dialect: D,
     inputs: Vec<(usize, usize)>,
-    /// The results that are each value.
+    /// Indices of the results equal to each value.
     goes_to: Vec<Vec<usize>>,
     outputs: &'p [(usize, usize)],
 }
@@ -250,7 +252,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         Self { program, dialect, inputs: places(&function.inputs), goes_to, outputs: &function.places }
     }
 
-    /// A value as part p sees it.
+    /// Returns the expression of a value in part p.
     fn value(&self, p: usize, id: Id, is_mask: bool) -> String {
         match self.program.steps.nodes[id as usize] {
             Node::Constant(bits) if is_mask => self.dialect.truth(f64::from_bits(bits) != 0.0).to_owned(),
@@ -269,13 +271,13 @@ impl<'p, D: Dialect> Writer<'p, D> {
         }
     }
 
-    /// How a value is computed, in part p.
+    /// Returns the expression that computes a value in part p.
     fn expression(&self, p: usize, node: Node) -> String {
         let d = &self.dialect;
         let number = |id| self.value(p, id, false);
         let mask = |id| self.value(p, id, true);
         match node {
-            Node::Constant(_) | Node::Input(_) | Node::Sin(_) | Node::Cos(_) => String::new(), // no step of its own
+            Node::Constant(_) | Node::Input(_) | Node::Sin(_) | Node::Cos(_) => String::new(), // these have no step
             Node::Add(a, b) => format!("{} + {}", number(a), number(b)),
             Node::Sub(a, b) => format!("{} - {}", number(a), number(b)),
             Node::Mul(a, b) => format!("{} * {}", number(a), number(b)),
@@ -291,7 +293,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         }
     }
 
-    /// The lines of part p.
+    /// Returns the lines of part p.
     pub(crate) fn lines(&self, p: usize) -> Vec<String> {
         let mut lines = Vec::new();
         for (k, step) in self.program.steps.all[self.program.parts[p].clone()].iter().enumerate() {
@@ -319,7 +321,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
                     continue;
                 }
             };
-            // a value that is a result and nothing else needs no variable
+            // a value that is only a result needs no variable
             let used_later = self.program.places[id as usize] != Place::Local || self.is_taken(id);
             if let ([only], false) = (&self.goes_to[id as usize][..], used_later) {
                 lines.push(format!("{} = {text};", self.output(*only)));
@@ -331,12 +333,12 @@ impl<'p, D: Dialect> Writer<'p, D> {
         lines
     }
 
-    /// Whether a step takes a value.
+    /// Returns whether a step uses a value.
     fn is_taken(&self, id: Id) -> bool {
         self.program.taken[id as usize]
     }
 
-    /// The lines that write a value to the work space and to results.
+    /// Adds the lines that write a value to the work space and to results.
     fn hand_on(&self, lines: &mut Vec<String>, id: Id, is_mask: bool) {
         if let Place::Work(slot) = self.program.places[id as usize] {
             let name = format!("t{id}");
@@ -348,13 +350,13 @@ impl<'p, D: Dialect> Writer<'p, D> {
         }
     }
 
-    /// A number among all outputs.
+    /// Returns the expression of a number among all outputs.
     fn output(&self, k: usize) -> String {
         let (array, index) = self.outputs[k];
         self.dialect.element(&self.program.function.outputs[array].name, &index.to_string())
     }
 
-    /// The loop that computes some entries, and the lines that write them elsewhere too.
+    /// Returns the loop that computes some entries, and the lines that write them to other results too.
     fn entries(&self, p: usize, entries: &Entries) -> Vec<String> {
         let k = self.counter();
         let n = entries.ids.len();
@@ -389,7 +391,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         lines
     }
 
-    /// A name that no array has.
+    /// Returns a name that no array has.
     fn counter(&self) -> String {
         let arrays = || self.program.function.inputs.iter().chain(&self.program.function.outputs);
         let mut name = "k".to_owned();
@@ -399,7 +401,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         name
     }
 
-    /// The lines that write results which no part computes: constants, inputs, sines and cosines of inputs.
+    /// Returns the lines that write results which no part computes: constants, inputs, sines and cosines of inputs.
     pub(crate) fn given_results(&self) -> Vec<String> {
         let part_of = &self.program.part_of;
         let given =
@@ -408,7 +410,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         given.map(|(k, &id)| format!("{} = {};", self.output(k), value(id))).collect()
     }
 
-    /// The arrays that a function does not touch: inputs that nothing is computed from, and results without numbers.
+    /// Returns the arrays that a function does not use: inputs without effect, and results without numbers.
     pub(crate) fn unused_arrays(&self) -> Vec<&'p str> {
         let inputs = &self.program.function.inputs;
         let mut unused = vec![true; inputs.len()];
@@ -422,7 +424,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         unread.chain(empty).map(|array| &*array.name).collect()
     }
 
-    /// An angle that is known at once, as one expression.
+    /// Returns an early angle as one expression.
     pub(crate) fn angle(&self, id: Id) -> String {
         let inside = |id| self.angle(id);
         match self.program.steps.nodes[id as usize] {
@@ -434,7 +436,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         }
     }
 
-    /// The arrays that part p reads and writes.
+    /// Returns the arrays that part p reads and writes.
     pub(crate) fn arrays(&self, p: usize) -> (Vec<&'p Array>, Vec<&'p Array>) {
         let steps = &self.program.steps.all[self.program.parts[p].clone()];
         let function = self.program.function;
@@ -456,7 +458,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
     }
 }
 
-/// What a function takes and gives, line by line, and what that takes.
+/// Returns the description of a function, line by line: arguments, results and costs.
 pub(crate) fn description(program: &Program) -> Vec<String> {
     let mut lines = interface(program.function);
     lines.push(format!("Operations: {}.", program.steps.operations()));
@@ -466,7 +468,7 @@ pub(crate) fn description(program: &Program) -> Vec<String> {
     lines
 }
 
-/// What a function takes and gives, line by line.
+/// Returns the description of a function's arguments and results, line by line.
 pub(crate) fn interface(function: &Function) -> Vec<String> {
     let mut lines = vec![function.about.clone(), String::new()];
     for array in function.inputs.iter().chain(&function.outputs) {
@@ -480,7 +482,7 @@ pub(crate) fn interface(function: &Function) -> Vec<String> {
     lines
 }
 
-/// What every file says at its head.
+/// Returns the heading of every file.
 pub(crate) fn heading(name: &str, programs: &[Program]) -> Vec<String> {
     let functions: Vec<&str> = programs.iter().map(|p| &*p.function.name).collect();
     vec![
@@ -495,7 +497,7 @@ pub(crate) fn heading(name: &str, programs: &[Program]) -> Vec<String> {
     ]
 }
 
-/// Lines, each behind some text, and without spaces at the end.
+/// Returns lines with a prefix, without spaces at their ends.
 pub(crate) fn prefixed(prefix: &str, lines: &[String]) -> String {
     let mut text = String::new();
     for line in lines {
@@ -504,7 +506,7 @@ pub(crate) fn prefixed(prefix: &str, lines: &[String]) -> String {
     text
 }
 
-/// The digits of a number, so that it is read back as it is.
+/// Returns the digits of a number, which give the same number when read.
 pub(crate) fn digits(x: f64) -> String {
     format!("{x:?}")
 }

@@ -1,6 +1,7 @@
 /* double */
-/* The sines of n angles in their place, and their cosines. x = n pi/2 + r with |r| <= pi/4, n pi/2 subtracted in three parts
- * (Cody and Waite), then a polynomial for each of the two with the coefficients of Moshier's Cephes library. */
+/* Replaces n angles by their sines, and computes their cosines. x = n pi/2 + r with |r| <= pi/4; n pi/2 is subtracted
+ * in three parts (Cody and Waite). Sine and cosine of r are polynomials with the coefficients of Moshier's Cephes
+ * library. */
 static inline void NAME_sin_cos(int n, double *restrict sine, double *restrict cosine) {
     int far = 0;
     for (int k = 0; k < n; k++) {
@@ -46,8 +47,9 @@ static inline void NAME_sin_cos(int n, double *restrict sine, double *restrict c
 
 /* end */
 /* float */
-/* The sines of n angles in their place, and their cosines. x = n pi/2 + r with |r| <= pi/4, n pi/2 subtracted in three parts
- * (Cody and Waite), then a polynomial for each of the two with the coefficients of Moshier's Cephes library. */
+/* Replaces n angles by their sines, and computes their cosines. x = n pi/2 + r with |r| <= pi/4; n pi/2 is subtracted
+ * in three parts (Cody and Waite). Sine and cosine of r are polynomials with the coefficients of Moshier's Cephes
+ * library. */
 static inline void NAME_sin_cos(int n, float *restrict sine, float *restrict cosine) {
     int far = 0;
     for (int k = 0; k < n; k++) {

@@ -1,4 +1,4 @@
-/* WIDTH numbers side by side, one of each state; WHOLE is for constants where vectors are asked for. */
+/* Vectors of WIDTH numbers, one of each state; WHOLE extends a constant to a vector. */
 typedef REAL NAME_real __attribute__((vector_size(BYTES)));
 typedef REAL NAME_memory __attribute__((vector_size(BYTES), aligned(SIZE), may_alias));
 typedef INTEGER NAME_mask __attribute__((vector_size(BYTES)));

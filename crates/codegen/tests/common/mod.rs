@@ -1,4 +1,4 @@
-//! Code that is compiled by a compiler of the system and run.
+//! Generated code, compiled by a compiler of the system and run.
 #![allow(dead_code)]
 
 use condyle_codegen::{Function, Language};
@@ -6,7 +6,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A folder of a test's own, empty.
+/// Creates an empty folder for a test.
 pub(crate) fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("codegen_{test}"));
     let _ = std::fs::remove_dir_all(&folder);
@@ -14,7 +14,7 @@ pub(crate) fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Whether there is such a compiler; if not, that is said.
+/// Returns whether the compiler exists; if not, prints a note.
 pub(crate) fn is_there(compiler: &str) -> bool {
     let found = Command::new(compiler).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
     if !found {
@@ -23,14 +23,14 @@ pub(crate) fn is_there(compiler: &str) -> bool {
     found
 }
 
-/// Runs a compiler, which must say nothing.
+/// Runs a compiler, which must print nothing.
 pub(crate) fn compile(command: &mut Command) {
     let output = command.output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success() && said.is_empty(), "{command:?}\n{said}");
 }
 
-/// A program in C that reads the arguments of one function after the other and writes its results.
+/// Returns a C program that reads the arguments of each function and writes its results.
 fn main_in_c(name: &str, functions: &[Function], real: &str, lanes: usize) -> String {
     let mut text = format!("#include \"{name}.h\"\n#include <stdio.h>\nint main(void) {{\n");
     for function in functions {
@@ -52,7 +52,7 @@ fn main_in_c(name: &str, functions: &[Function], real: &str, lanes: usize) -> St
     text + "    return 0;\n}\n"
 }
 
-/// The same in Rust.
+/// Returns the same program in Rust.
 fn main_in_rust(functions: &[Function], real: &str) -> String {
     let mut text = "#![allow(non_snake_case)]\nuse std::io::{Read, Write};\nfn main() {\n    let (mut from, mut to) = (std::io::stdin(), std::io::stdout());\n".to_owned();
     for function in functions {
@@ -77,7 +77,7 @@ fn main_in_rust(functions: &[Function], real: &str) -> String {
     text + "}\n"
 }
 
-/// A program that has been compiled and computes some functions, of one state or of some side by side.
+/// Compiled program that computes some functions, for one state or for several states in vectors.
 pub(crate) struct Program {
     path: PathBuf,
     functions: Vec<Function>,
@@ -86,7 +86,7 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// Code in C by `cc`, without a warning.
+    /// Compiles C code with `cc`, without warnings.
     pub(crate) fn c(folder: &Path, functions: &[Function], language: Language, flags: &[&str]) -> Self {
         let (is_float, lanes) = match language {
             Language::C => (false, 1),
@@ -112,8 +112,8 @@ impl Program {
         Self { path: folder.join("main"), functions: functions.to_vec(), is_float, lanes }
     }
 
-    /// Compiles Rust by `rustc` as a library without `std`, without a warning. Also checks it as a private module of which
-    /// nothing is used, with lints that are off by default.
+    /// Compiles Rust with `rustc` as a library without `std`, without warnings. Also checks it as an unused private
+    /// module, with lints that are off by default.
     pub(crate) fn rust(folder: &Path, functions: &[Function], is_float: bool) -> Self {
         let (language, real) = if is_float { (Language::RustFloat, "f32") } else { (Language::Rust, "f64") };
         for file in language.text("robot", functions) {
@@ -137,7 +137,7 @@ impl Program {
         Self { path: folder.join("main"), functions: functions.to_vec(), is_float, lanes: 1 }
     }
 
-    /// The results of all functions for their arguments.
+    /// Returns the results of all functions for their arguments.
     pub(crate) fn run(&self, inputs: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
         let mut child = Command::new(&self.path)
             .stdin(Stdio::piped())

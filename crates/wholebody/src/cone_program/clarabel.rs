@@ -1,12 +1,13 @@
-//! clarabel as a back end: the reference.
+//! Clarabel as a back end: the reference solver.
 //!
-//! It wants A x + s = b with s in a product of cones, in sparse matrices whose pattern stays. For each shape of a program
-//! (sizes, and which bounds are finite or equal) a solver is built once and kept, so that contact sets that come back cost an
-//! update of numbers. Its pattern holds all entries that were not zero so far: where one becomes so, as when a robot leaves a
-//! symmetric posture, the solver is built again. Clarabel allocates once in each solve; a new shape or pattern allocates more.
+//! Clarabel requires A x + s = b with s in a product of cones, in sparse matrices with a fixed pattern. For each shape
+//! of a program (sizes, and which bounds are finite or equal), a solver is built once and kept: a contact set that
+//! returns only needs an update of numbers. The pattern holds all entries that have been non-zero so far. When another
+//! entry becomes non-zero, as when a robot leaves a symmetric posture, the solver is built again. Clarabel allocates
+//! once in each solve; a new shape or pattern allocates more.
 //!
-//! Most limits of a robot are far away in most ticks. A row of G is left out until a solution came close to it; one that
-//! violates it is solved for again, with it. So the solution is that of all rows.
+//! In most ticks a robot is far from most of its limits. A row of G is left out until a solution comes close to it; if
+//! the solution violates the row, the program is solved again with the row. The solution therefore satisfies all rows.
 
 use super::{ConeProgram, Multipliers, Outcome, Settings, Size, Solver, Start, Status};
 use ::clarabel::algebra::CscMatrix;
@@ -14,19 +15,19 @@ use ::clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus,
 use condyle_linalg::dot;
 use std::time::Instant;
 
-/// What is added to diagonals before a factor is refined: clarabel's own 1e-8 asks for a refinement of each solve.
+/// Regularisation added to diagonals before a factor is refined; clarabel's own 1e-8 requires refinement in each solve.
 const REGULARISATION: f64 = 1e-11;
 
-/// Shapes that are kept; the one not used for the longest time makes room.
+/// Maximum number of stored shapes; the one not used for the longest time is removed.
 const KEPT: usize = 16;
 
-/// A row is close where the rest to a bound is less than this part of the width between its bounds (or of the one bound).
+/// Distance to a bound below which a row is close, relative to the width between its bounds (or to its only bound).
 const CLOSE: f64 = 0.1;
 
-/// So many solutions in a row must be away from a row of G for it to be left out again: its return builds a solver.
+/// Consecutive solutions that must be away from a row of G before it is left out again; its return builds a solver.
 const PATIENCE: u32 = 1000;
 
-/// So many solves have all rows after one without some of them failed.
+/// Number of solves with all rows after a solve with some rows left out has failed.
 const RETRIES: u32 = 10;
 
 /// A row of clarabel's A x + s = b.
@@ -63,7 +64,7 @@ impl Row {
         }
     }
 
-    /// Whether solutions were close to it of late, or it is no limit that they could be away from.
+    /// Returns whether solutions were close to the row recently. Equalities, fixed rows and cones always matter.
     fn matters(self, away: &[u32]) -> bool {
         match self {
             Row::Lower(i) | Row::Upper(i) => away[i] < PATIENCE,
@@ -71,7 +72,7 @@ impl Row {
         }
     }
 
-    /// How many of its coefficients are not zero.
+    /// Returns the number of non-zero coefficients.
     fn count(self, program: &ConeProgram) -> usize {
         let (matrix, i) = match self {
             Row::Equality(i) => (&program.At, i),
@@ -86,7 +87,7 @@ fn nonzeros(x: &[f64]) -> usize {
     x.iter().map(|&x| usize::from(x != 0.0)).sum()
 }
 
-/// Writes clarabel's rows of a program: those of the zero cone, of the orthant, of the second-order cones.
+/// Lists clarabel's rows of a program: zero cone, orthant, second-order cones.
 fn list_rows(program: &ConeProgram, rows: &mut Vec<Row>) {
     let Size { equalities, rows: m, cone_rows, .. } = program.size;
     let (lower, upper) = (&program.lower[..m], &program.upper[..m]);
@@ -110,9 +111,9 @@ struct Shape {
     cones: Vec<usize>,
     /// All rows.
     all: Vec<Row>,
-    /// How many solutions in a row were away from each row of G.
+    /// Number of consecutive solutions away from each row of G.
     away: Vec<u32>,
-    /// The rows that the solver has.
+    /// Rows in the solver.
     rows: Vec<Row>,
     /// Entries of P's upper triangle and of A, column by column.
     entries: [Vec<(usize, usize)>; 2],
@@ -123,7 +124,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// For the rows that matter, with the entries of a program that are not zero, and some more.
+    /// Builds a solver for the rows that matter, with the program's non-zero entries and some additional entries.
     fn new(
         program: &ConeProgram,
         all: Vec<Row>,
@@ -159,16 +160,16 @@ impl Shape {
             tol_feas: tolerance,
             tol_gap_abs: tolerance,
             tol_gap_rel: tolerance,
-            // Refined as far as asked for: clarabel's own 1e-13 costs a sixth of the time.
+            // Refinement as accurate as the tolerance: clarabel's own 1e-13 costs a sixth of the time.
             iterative_refinement_reltol: tolerance,
             iterative_refinement_abstol: tolerance,
             static_regularization_constant: REGULARISATION,
-            // Numbers can be replaced only where neither presolve nor the removal of zeros changed the pattern.
+            // Numbers can be replaced only if neither presolve nor the removal of zeros has changed the pattern.
             presolve_enable: false,
             input_sparse_dropzeros: false,
             ..DefaultSettings::default()
         };
-        // The solver takes the scales of rows and columns from these numbers and keeps them.
+        // The solver computes the scales of rows and columns from these numbers and keeps them.
         let solver =
             DefaultSolver::new(&csc(n, 0), &program.c[..n], &csc(rows.len(), 1), &right_side, &cones, settings)
                 .expect("shapes and cones agree by construction");
@@ -176,7 +177,7 @@ impl Shape {
         Self { size, cones, all, away, rows, entries, values, linear, right_side, solver }
     }
 
-    /// Notes which rows of G a solution is close to; whether it violates one that the solver has not.
+    /// Notes which rows of G a solution is close to; returns whether it violates a row that the solver lacks.
     fn compare(&mut self, program: &ConeProgram, x: &[f64]) -> bool {
         let mut violated = false;
         for (i, away) in self.away.iter_mut().enumerate() {
@@ -189,12 +190,12 @@ impl Shape {
         violated
     }
 
-    /// Whether the solver has the rows that matter.
+    /// Returns whether the solver has the rows that matter.
     fn is_complete(&self) -> bool {
         self.all.iter().filter(|row| row.matters(&self.away)).eq(&self.rows)
     }
 
-    /// Whether all entries of a program that are not zero are in the pattern, whose numbers are taken then.
+    /// Returns whether the pattern contains all non-zero entries of a program; if it does, replaces the numbers.
     fn update(&mut self, program: &ConeProgram) -> bool {
         for (k, &(i, j)) in self.entries[0].iter().enumerate() {
             self.values[0][k] = program.P[(j, i)];
@@ -230,7 +231,7 @@ fn gather(program: &ConeProgram, rows: &[Row], entries: &[Vec<(usize, usize)>; 2
     ]
 }
 
-/// Sets the limits of a solver, which allocates where they are others.
+/// Sets the limits of a solver; allocates if they change.
 fn limit(solver: &mut DefaultSolver<f64>, max_iter: u32, time_limit: f64) {
     let given = solver.settings();
     if (given.max_iter, given.time_limit) != (max_iter, time_limit) {
@@ -243,7 +244,7 @@ fn limit(solver: &mut DefaultSolver<f64>, max_iter: u32, time_limit: f64) {
 pub(crate) struct Clarabel {
     settings: Settings,
     capacity: Size,
-    /// The last one used stands last.
+    /// Shapes, in the order of their last use: the most recent one is last.
     shapes: Vec<Shape>,
     rows: Vec<Row>,
     x: Vec<f64>,
@@ -254,7 +255,7 @@ pub(crate) struct Clarabel {
 }
 
 impl Clarabel {
-    /// A solver of programs with such a capacity.
+    /// Creates a solver of programs with this capacity.
     pub(crate) fn new(capacity: Size, settings: Settings) -> Self {
         let Size { unknowns, equalities, rows, cone_rows } = capacity;
         Self {
@@ -270,7 +271,7 @@ impl Clarabel {
         }
     }
 
-    /// Makes the solver of the program's shape the last of the list, with the program's numbers.
+    /// Moves the solver of the program's shape to the end of the list, and gives it the program's numbers.
     fn prepare(&mut self, program: &ConeProgram) {
         list_rows(program, &mut self.rows);
         let found = self
@@ -295,13 +296,13 @@ impl Clarabel {
         self.shapes.push(Shape::new(program, self.rows.clone(), away, more, &self.settings));
     }
 
-    /// Solves with the rows that solutions were not away from, in what former rounds left of iterations and time.
+    /// Solves with the rows that solutions were close to, within the iterations and time left by earlier rounds.
     fn solve_with_rows(&mut self, program: &ConeProgram, iterations: u32, started: Instant) -> Outcome {
         self.prepare(program);
         let Settings { max_iterations, time_limit, .. } = self.settings;
         let Self { shapes, x, y, z, w, .. } = self;
         let Shape { solver, rows, all, .. } = shapes.last_mut().expect("just prepared");
-        // Where rows are left out, half of the iterations are kept for the case that this was wrong.
+        // If rows are left out, half of the iterations are reserved for a solve with all rows.
         let share = |most: u32| if rows.len() < all.len() { most.div_ceil(2) } else { most };
         let elapsed = if iterations == 0 { 0.0 } else { started.elapsed().as_secs_f64() };
         limit(solver, share(max_iterations - iterations), time_limit - elapsed);
@@ -349,7 +350,7 @@ impl Solver for Clarabel {
             let complete = shape.rows.len() == shape.all.len();
             let failed = outcome.stopped.is_some() || outcome.reduced;
             let done = match outcome.stopped {
-                Some(Status::Infeasible | Status::TimeLimit) => true, // so it would be with all rows
+                Some(Status::Infeasible | Status::TimeLimit) => true, // all rows would give the same result
                 _ if failed => complete,
                 _ => !shape.compare(program, &self.x[..program.size.unknowns]),
             };

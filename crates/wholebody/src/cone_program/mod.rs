@@ -1,4 +1,4 @@
-//! A convex program with second-order cones, dense, its memory fixed when it is made; it knows no robot.
+//! A dense convex program with second-order cones and fixed memory, independent of robots.
 //!
 //! ```text
 //! minimise     ½ xᵀ P x + cᵀ x
@@ -7,8 +7,8 @@
 //!              hₖ + Fₖ x ∈ Qₖ          second-order cones: ‖(s₂, s₃, …)‖ ≤ s₁
 //! ```
 //!
-//! Multipliers stand with the constraints' gradients: P x + c = Aᵀ y + Gᵀ z + Fᵀ w, where z is positive at a lower bound and
-//! negative at an upper one, and wₖ ∈ Qₖ.
+//! Multipliers multiply the constraints' gradients: P x + c = Aᵀ y + Gᵀ z + Fᵀ w. Here z is positive at a lower bound
+//! and negative at an upper bound, and wₖ ∈ Qₖ.
 
 #[cfg(feature = "clarabel")]
 mod clarabel;
@@ -22,14 +22,14 @@ pub(crate) use self::clarabel::Clarabel;
 pub(crate) use interior_point::InteriorPoint;
 pub(crate) use program::{ConeProgram, Size};
 
-/// When a solver stops.
+/// Conditions under which a solver stops.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// Bound of the residuals and of the duality gap, relative to the terms that they are the difference of.
+    /// Maximum residuals and duality gap, relative to the terms that they are differences of.
     pub tolerance: f64,
-    /// Iterations, of cold and warm start together.
+    /// Maximum number of iterations, cold and warm start together.
     pub max_iterations: u32,
-    /// Seconds; may be infinite.
+    /// Maximum time (s); may be infinite.
     pub time_limit: f64,
 }
 
@@ -39,22 +39,22 @@ impl Default for Settings {
     }
 }
 
-/// Where a solver begins.
+/// Start of a solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Start {
     /// From the data alone.
     Cold,
-    /// From the last solution, if there is one of this size, and the solver can.
+    /// From the last solution, if it has this size and the solver supports it.
     Warm,
 }
 
-/// Why there is no minimiser.
+/// Cause of a missing minimiser.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum Status {
-    /// A combination of the constraints has no solution.
+    /// The constraints contradict each other.
     #[error("the constraints exclude each other")]
     Infeasible,
-    /// The objective has no lower bound on what the constraints allow.
+    /// The objective is unbounded below on the feasible set.
     #[error("the objective is unbounded below")]
     Unbounded,
     /// [`Settings::max_iterations`] were not enough.
@@ -63,7 +63,7 @@ pub(crate) enum Status {
     /// [`Settings::time_limit`] was not enough.
     #[error("not solved within the allowed time")]
     TimeLimit,
-    /// The steps became too short, or a factor does not exist.
+    /// The steps became too short, or a factorisation failed.
     #[error("the solver stopped for numerical reasons")]
     NumericalError,
     /// A number of the program is NaN, or infinite where it may not be. Nothing was solved.
@@ -71,25 +71,25 @@ pub(crate) enum Status {
     NotFinite {
         /// The field of [`ConeProgram`].
         name: &'static str,
-        /// Its position in that field, column by column.
+        /// Index in that field, column by column.
         index: usize,
     },
 }
 
-/// What a solve found.
+/// Result of a solve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outcome {
-    /// Iterations, of all attempts together.
+    /// Number of iterations, all attempts together.
     pub iterations: u32,
-    /// Whether the solution was reached from the last one.
+    /// Whether the solution was reached from the last solution.
     pub warm: bool,
     /// Whether only reduced tolerances are met.
     pub reduced: bool,
-    /// Why x is not the minimiser; it is the last iterate then, and finite, or zero where nothing was solved.
+    /// Cause, if x is not the minimiser. x is then the last iterate and finite, or zero if nothing was solved.
     pub stopped: Option<Status>,
 }
 
-/// The multipliers of the last solve, with the signs of the [module](self).
+/// Multipliers of the last solve, with the signs of the [module](self).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Multipliers<'s> {
     /// y, of A x = b.
@@ -100,20 +100,20 @@ pub(crate) struct Multipliers<'s> {
     pub cones: &'s [f64],
 }
 
-/// A solver of programs whose sizes fit a capacity.
+/// A solver of programs with sizes up to a capacity.
 pub(crate) trait Solver {
-    /// Sets where the next warm start begins, for a program of this size. A solver that always starts cold ignores it.
+    /// Sets the start of the next warm solve, for a program of this size. A solver that always starts cold ignores it.
     fn start_from(&mut self, _x: &[f64], _multipliers: Multipliers<'_>) {}
 
-    /// Minimises.
+    /// Minimises the program's objective.
     ///
     /// # Panics
     /// If the program's capacity is not the solver's.
     fn solve(&mut self, program: &ConeProgram, start: Start) -> Outcome;
 
-    /// x of the last solve: `size.unknowns` numbers.
+    /// Returns x of the last solve: `size.unknowns` numbers.
     fn x(&self) -> &[f64];
 
-    /// The multipliers of the last solve.
+    /// Returns the multipliers of the last solve.
     fn multipliers(&self) -> Multipliers<'_>;
 }

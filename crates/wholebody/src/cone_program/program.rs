@@ -1,28 +1,28 @@
-//! The numbers of a program.
+//! Numbers of a program.
 
 use super::Status;
 use nalgebra::DMatrix;
 
-/// How many unknowns and constraints there are, or may be at most.
+/// Numbers of unknowns and constraints, in use or at most.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Size {
-    /// Numbers of x.
+    /// Length of x.
     pub unknowns: usize,
-    /// Rows of A.
+    /// Number of rows of A.
     pub equalities: usize,
-    /// Rows of G.
+    /// Number of rows of G.
     pub rows: usize,
-    /// Rows of F, of all cones together.
+    /// Number of rows of F, all cones together.
     pub cone_rows: usize,
 }
 
-/// The numbers of a program. Matrices and vectors have the sizes of the capacity; a solver reads their leading parts of the
-/// size in use.
+/// Numbers of a program. Matrices and vectors have the dimensions of the capacity; a solver reads the leading parts
+/// with the size in use.
 #[derive(Clone, Debug)]
 pub(crate) struct ConeProgram {
-    /// The size in use, at most the capacity in each number.
+    /// Size in use, at most the capacity in each number.
     pub size: Size,
-    /// P: n × n, positive semidefinite, of which the lower triangle is read.
+    /// P: n × n, positive semidefinite; only the lower triangle is read.
     pub P: DMatrix<f64>,
     /// c: n.
     pub c: Vec<f64>,
@@ -32,21 +32,21 @@ pub(crate) struct ConeProgram {
     pub b: Vec<f64>,
     /// Gᵀ: a column for each row of G.
     pub Gt: DMatrix<f64>,
-    /// l; −∞ where there is none.
+    /// l; −∞ for a missing bound.
     pub lower: Vec<f64>,
-    /// u; ∞ where there is none.
+    /// u; ∞ for a missing bound.
     pub upper: Vec<f64>,
     /// Fᵀ: a column for each row of F, cone after cone.
     pub Ft: DMatrix<f64>,
     /// h.
     pub h: Vec<f64>,
-    /// The dimension of each cone in use, at least 2 (or 1, which is s₁ ≥ 0); their sum is `size.cone_rows`.
+    /// Dimension of each cone in use, at least 2 (or 1, which is s₁ ≥ 0); their sum is `size.cone_rows`.
     pub cones: Vec<usize>,
 }
 
 impl ConeProgram {
-    /// A program of zeros and infinite bounds with the size of its capacity, but without cones; there may be as many as
-    /// `cone_rows`.
+    /// Creates a program of zeros and infinite bounds with the size of its capacity, but without cones; later it may
+    /// have up to `cone_rows` rows of cones.
     pub(crate) fn new(capacity: Size) -> Self {
         let Size { unknowns, equalities, rows, cone_rows } = capacity;
         Self {
@@ -64,18 +64,18 @@ impl ConeProgram {
         }
     }
 
-    /// The greatest size that fits.
+    /// Returns the maximum size.
     pub(crate) fn capacity(&self) -> Size {
         Size { unknowns: self.c.len(), equalities: self.b.len(), rows: self.lower.len(), cone_rows: self.h.len() }
     }
 
-    /// The coefficients of an equality: a number for each unknown of the capacity.
+    /// Returns the coefficients of an equality: a number for each unknown of the capacity.
     pub(crate) fn equality_mut(&mut self, i: usize) -> &mut [f64] {
         let most = self.c.len();
         &mut self.At.as_mut_slice()[i * most..][..most]
     }
 
-    /// The constraints of a program of the same capacity.
+    /// Copies the constraints of a program of the same capacity.
     pub(crate) fn copy_constraints(&mut self, from: &Self) {
         self.size = from.size;
         self.cones.clear();
@@ -93,30 +93,30 @@ impl ConeProgram {
         }
     }
 
-    /// The coefficients of a row: a number for each unknown of the capacity.
+    /// Returns the coefficients of a row: a number for each unknown of the capacity.
     pub(crate) fn row(&self, i: usize) -> &[f64] {
         &self.Gt.as_slice()[i * self.c.len()..][..self.c.len()]
     }
 
-    /// The same, to be written.
+    /// Returns the coefficients of a row, for writing.
     pub(crate) fn row_mut(&mut self, i: usize) -> &mut [f64] {
         let most = self.c.len();
         &mut self.Gt.as_mut_slice()[i * most..][..most]
     }
 
-    /// The coefficients of a row of a cone.
+    /// Returns the coefficients of a row of a cone, for writing.
     pub(crate) fn cone_row_mut(&mut self, i: usize) -> &mut [f64] {
         let most = self.c.len();
         &mut self.Ft.as_mut_slice()[i * most..][..most]
     }
 
-    /// That what a solver would read is finite but for bounds, and that the size in use fits.
+    /// Checks that all numbers read by a solver are finite (bounds may be infinite), and that the size in use fits.
     ///
     /// # Errors
     /// [`Status::NotFinite`].
     ///
     /// # Panics
-    /// If the size in use exceeds the capacity, or the cones have not `size.cone_rows` rows.
+    /// If the size in use exceeds the capacity, or the cones do not have `size.cone_rows` rows.
     pub(crate) fn check(&self) -> Result<(), Status> {
         let (Size { unknowns: n, equalities, rows, cone_rows }, most) = (self.size, self.capacity());
         assert!(n <= most.unknowns && equalities <= most.equalities, "size: more than the capacity");
@@ -145,7 +145,7 @@ impl ConeProgram {
         Ok(())
     }
 
-    /// ½ xᵀ P x + cᵀ x.
+    /// Returns ½ xᵀ P x + cᵀ x.
     #[cfg(test)]
     pub(crate) fn objective(&self, x: &[f64]) -> f64 {
         let mut sum = 0.0;
@@ -157,9 +157,9 @@ impl ConeProgram {
     }
 }
 
-/// That the numbers of a column are finite, from one on; `first` is the position of the column.
+/// Checks that the numbers of a column are finite, from index `from` on; `first` is the column's offset in the matrix.
 fn finite(name: &'static str, column: &[f64], from: usize, first: usize) -> Result<(), Status> {
-    // 0 · x is 0 for each finite x, and NaN for all others; in eight sums, which do not wait for each other.
+    // 0 · x is 0 for each finite x, and NaN for all others; summed in eight independent sums.
     let (eights, rest) = column[from..].as_chunks::<8>();
     let mut sums = [0.0; 8];
     for x in eights {

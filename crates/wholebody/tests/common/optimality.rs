@@ -1,16 +1,16 @@
-//! The conditions of optimality of a step.
+//! Optimality conditions of a step.
 #![allow(dead_code, unreachable_pub)] // each test file uses its part
 
 use condyle_wholebody::{Optimality, References, WholeBodyController};
 
-/// Of the conditions of optimality, as [`Optimality`] says.
+/// Tolerance of the optimality conditions, as described at [`Optimality`].
 pub const OPTIMALITY: f64 = 1e-7;
 const GAP: f64 = 1e-6;
 
-/// Looks at what the last step of a controller found: its program's first priority.
+/// Checks the result of a controller's last step, for its program's first priority.
 ///
 /// # Panics
-/// If it is not the optimum, with a text that says where.
+/// If it is not the optimum; the message contains `place`.
 pub fn check_optimality(
     controller: &mut WholeBodyController,
     q: &[f64],

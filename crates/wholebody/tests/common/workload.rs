@@ -1,8 +1,8 @@
-//! Recorded ticks of robots that stand, walk and trot while they are pushed: what back ends are timed on and compared by.
+//! Recorded ticks of robots that stand, walk and trot while they are pushed, for timing and comparing back ends.
 //!
-//! The loop is closed with our own constrained dynamics: feet that the references have on the ground are held there, also
-//! where the ground would have to pull. The controller sees velocities with noise, and nothing of the pushes. The same
-//! arguments give the same recording, on processors with the same vector instructions.
+//! The loop is closed with Condyle's own constrained dynamics. Feet that touch according to the references are held on
+//! the ground, even if the ground would have to pull. The controller sees velocities with noise, and does not know the
+//! pushes. The same arguments give the same recording on processors with the same vector instructions.
 #![allow(dead_code, unreachable_pub)] // each program uses its part
 
 use condyle_dynamics::{
@@ -13,51 +13,51 @@ use condyle_wholebody::{FrictionContact, Gains, References, Settings, Task, Whol
 use rand::{RngExt, SeedableRng, rngs::StdRng};
 use std::f64::consts::PI;
 
-/// Seconds from tick to tick.
+/// Time step (s).
 const DT: f64 = 1e-3;
 /// Coefficient of friction.
 const FRICTION: f64 = 0.6;
 /// Length and width of a sole (m).
 const SOLE: [f64; 2] = [0.2, 0.1];
-/// Noise of velocities, at most (m/s, rad/s).
+/// Maximum noise of velocities (m/s, rad/s).
 const NOISE: f64 = 5e-3;
-/// How fast the velocity of a held foot decays (1/s).
+/// Rate at which the velocity of a held foot decays (1/s).
 const HOLD: f64 = 50.0;
-/// A push begins at each multiple of the first and lasts for the second (s).
+/// Interval between the beginnings of pushes, and their duration (s).
 const PUSHES: [f64; 2] = [0.5, 0.1];
 
-/// A step of a biped: the weight goes to a foot, the other one is unloaded, swings and is loaded (s).
+/// Durations of a biped's step (s): the weight moves to one foot; the other foot is unloaded, swings and is loaded.
 const SHIFT: f64 = 1.2;
 const FADE: f64 = 0.1;
 const SWING: f64 = 0.5;
-/// Its length and height (m).
+/// Length and height of a biped's step (m).
 const STEP: [f64; 2] = [0.1, 0.05];
-/// The same of a trot, half a period of which is two fades and a swing, and its speed (m/s).
+/// Durations (s), height (m) and speed (m/s) of a trot; half a period is two fades and a swing.
 const TROT_FADE: f64 = 0.03;
 const TROT_SWING: f64 = 0.2;
 const TROT_HEIGHT: f64 = 0.05;
 const TROT_SPEED: f64 = 0.25;
-/// How much further a foot is set for each m/s of the trunk that is not wanted (s): about √(h / g), half a metre high.
+/// Additional reach of a foot per unwanted speed of the trunk (s): about √(h / g), with h of half a metre.
 const CAPTURE: f64 = 0.2;
 
-/// A robot on its feet.
+/// A robot standing on its feet.
 pub struct Robot {
     pub name: String,
     pub model: Model,
-    /// On level ground at height 0.
+    /// Initial position, on level ground at height 0.
     pub q: Vec<f64>,
     pub contacts: Vec<FrictionContact>,
     pub tasks: Vec<Task>,
-    /// What pushes it, as a part of its weight.
+    /// Force of a push, relative to the weight.
     push: f64,
 }
 
-/// What is known of a robot by its name.
+/// Constants of a robot, by name.
 struct Description {
     name: &'static str,
     trunk: &'static str,
     feet: &'static [&'static str],
-    /// Joints whose names contain the text bend by so much.
+    /// Joints whose names contain the text, and their angles.
     bent: &'static [(&'static str, f64)],
 }
 
@@ -100,7 +100,7 @@ const ROBOTS: [Description; 4] = [
 ];
 
 impl Robot {
-    /// An embedded robot, or a known one from its URDF.
+    /// Loads an embedded robot, or a known one from its URDF.
     pub fn new(name: &str, urdf: Option<&str>) -> Result<Self, Box<dyn std::error::Error>> {
         let known = ROBOTS.iter().find(|robot| robot.name == name).ok_or_else(|| format!("no robot `{name}`"))?;
         let options = UrdfOptions { root_joint: Some(Joint::FreeFlyer), ..UrdfOptions::default() };
@@ -138,10 +138,10 @@ impl Robot {
         Ok(robot)
     }
 
-    /// The settings with which it was recorded.
+    /// Returns the settings of the recording.
     pub fn settings() -> Settings {
         let contact_gains = Gains { stiffness: 0.0, damping: 40.0 };
-        // so that how the feet share the load is decided well above rounding
+        // makes the distribution of the load among the feet exceed rounding errors
         Settings { contact_gains, force_weight: 1e-5, ..Settings::default() }
     }
 
@@ -153,13 +153,13 @@ impl Robot {
         self.contacts.len() == 2
     }
 
-    /// The name of what it does when it moves.
+    /// Returns the name of its gait.
     pub fn gait(&self) -> &'static str {
         if self.is_biped() { "walk" } else { "trot" }
     }
 }
 
-/// What a controller is given at a tick.
+/// Input of a controller at a tick.
 #[derive(Clone)]
 pub struct Tick {
     pub q: Vec<f64>,
@@ -167,7 +167,7 @@ pub struct Tick {
     pub references: References,
 }
 
-/// From 0 at s = 0 to 1 at s = 1, smoothly: value, slope and curvature.
+/// Rises smoothly from 0 at s = 0 to 1 at s = 1: returns value, slope and curvature.
 fn smooth(s: f64) -> [f64; 3] {
     let s = s.clamp(0.0, 1.0);
     let rest = s * (1.0 - s);
@@ -206,22 +206,22 @@ impl World<'_> {
     }
 }
 
-/// The references of a gait.
+/// References of a gait.
 struct Gait<'r> {
     robot: &'r Robot,
     start: References,
-    /// Where each foot is held, or swings from.
+    /// Position at which each foot is held, or from which it swings.
     feet: Vec<Vec3<f64>>,
-    /// Where the centre of mass is at the beginning of a step.
+    /// Position of the centre of mass at the beginning of a step.
     from: Vec3<f64>,
     step: usize,
 }
 
 impl Gait<'_> {
-    /// The frames of the feet among the references' frames.
+    /// Index of the first foot among the frames of the references.
     const FEET: usize = 1;
 
-    /// The references at a time, of a robot whose centre of mass moves like this.
+    /// Writes the references at a time, for a robot with this position and velocity of the centre of mass.
     fn write(&mut self, t: f64, com: [Vec3<f64>; 2], references: &mut References) {
         if self.robot.is_biped() { self.walk(t, references) } else { self.trot(t, com, references) }
     }
@@ -239,7 +239,7 @@ impl Gait<'_> {
         frame.acceleration.linear.z += height * 2.0 * (PI / duration).powi(2) * (cos * cos - sin * sin);
     }
 
-    /// Quasi-static steps: the left foot carries first.
+    /// Writes quasi-static steps: the left foot carries first.
     fn walk(&mut self, t: f64, references: &mut References) {
         let duration = SHIFT + FADE + SWING + FADE;
         let step = (t / duration) as usize;
@@ -263,7 +263,7 @@ impl Gait<'_> {
         references.contacts[swings].activation = activation(t - SHIFT, FADE, SWING);
     }
 
-    /// Diagonal feet, by turns.
+    /// Writes steps of diagonal pairs of feet, alternately.
     fn trot(&mut self, t: f64, [com, velocity]: [Vec3<f64>; 2], references: &mut References) {
         let duration = 2.0 * TROT_FADE + TROT_SWING;
         let step = (t / duration) as usize;
@@ -290,16 +290,16 @@ impl Gait<'_> {
     }
 }
 
-/// 1, then down to 0 within `fade`, 0 during the swing, and up to 1 within `fade`.
+/// Returns 1, falling to 0 within `fade`, 0 during the swing, and rising to 1 within `fade`.
 fn activation(t: f64, fade: f64, swing: f64) -> f64 {
     let (down, up) = (1.0 - t / fade, (t - fade - swing) / fade);
     down.max(up).clamp(0.0, 1.0)
 }
 
-/// Ticks of a robot that is pushed while it stands, or moves.
+/// Records ticks of a robot that is pushed while it stands or moves.
 ///
 /// # Panics
-/// If it falls.
+/// If the robot falls.
 pub fn record(robot: &Robot, moves: bool, ticks: usize) -> Vec<Tick> {
     let (model, nv) = (&robot.model, robot.model.nv());
     let mut controller = robot.controller(Robot::settings());
@@ -340,7 +340,7 @@ pub fn record(robot: &Robot, moves: bool, ticks: usize) -> Vec<Tick> {
         } else if tick % each == each / 2 + lasts {
             push = Vec3::zero();
         }
-        f_ext[1].linear = push; // along the trunk's axes, which hardly turn
+        f_ext[1].linear = push; // along the trunk's axes, which hardly rotate
         let v: Vec<f64> = world.v.iter().map(|v| v + NOISE * (2.0 * rng.random::<f64>() - 1.0)).collect();
         let command = controller.step(&world.q, &v, &references);
         let (tau, height) = (command.tau.clone(), world.q[2] / robot.q[2]);

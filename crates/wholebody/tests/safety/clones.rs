@@ -1,10 +1,11 @@
-//! A clone continues as the original does.
+//! Clones continue as the original does.
 
 use crate::common::*;
 use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Command, Form, Settings, Task, WholeBodyController};
 
-/// Ticks near the stance: contacts that come and go, a state and references that are invalid, a second priority.
+/// Steps near the stance: contacts appear and disappear, a state and references are invalid, and tasks have two
+/// priorities.
 fn tick(controller: &mut WholeBodyController, k: u64) -> Command {
     let model = robots::quadruped();
     let (q, v) = state(&model, k / 4, 0.05, 0.2);
@@ -23,7 +24,7 @@ fn described(settings: Settings) -> WholeBodyController {
     WholeBodyController::new(&robots::quadruped(), &feet(0.7), &tasks, settings).unwrap()
 }
 
-/// With our solver to the bit, wherever it is cloned, warm starts included.
+/// With our solver, clones continue with the same bits from any tick, with and without warm starts.
 #[test]
 fn a_clone_has_the_same_bits() {
     for (warm_start, form) in [(true, Form::Condensed), (false, Form::Condensed), (true, Form::Full)] {
@@ -40,17 +41,17 @@ fn a_clone_has_the_same_bits() {
             }
             tick(&mut controller, k);
         }
-        // the clones of before have not changed it: a controller that was never cloned is where it is
+        // earlier clones have not changed the controller: one that was never cloned gives the same command
         let mut alone = described(Settings { warm_start, form, ..Settings::default() });
         let last = (0..24).map(|k| tick(&mut alone, k)).last().unwrap();
         assert_eq!(format!("{last:?}"), format!("{:?}", controller.command()));
     }
 }
 
-/// With clarabel, whose solvers are built again, up to its tolerance.
+/// With clarabel, whose solvers are built again, clones agree up to its tolerance.
 #[test]
 fn a_clone_with_clarabel_has_the_same_solution() {
-    // weights and a tolerance that decide forces and efforts
+    // weights and a tolerance that determine forces and efforts
     let (backend, tolerance) = (Backend::Clarabel, 1e-11);
     let settings = Settings { backend, tolerance, force_weight: 1e-5, ..Settings::default() };
     let mut controller = WholeBodyController::new(&robots::quadruped(), &feet(0.7), &tasks(), settings).unwrap();
@@ -63,7 +64,7 @@ fn a_clone_with_clarabel_has_the_same_solution() {
     }
 }
 
-/// Numbers of another controller, too few, too many, or broken, are refused.
+/// Numbers of another controller, too few, too many, or invalid numbers are rejected.
 #[test]
 fn numbers_of_another_controller_are_refused() {
     let mut controller = described(Settings::default());

@@ -1,11 +1,11 @@
-//! One side of the rows: s = ±(G x − bound) ≥ 0 with its multiplier z ≥ 0, element by element in whole vectors.
+//! One side of the rows: s = ±(G x − bound) ≥ 0 with its multiplier z ≥ 0; vectorised, element by element.
 
 use condyle_linalg::{Vector, Vectorized};
 
-/// The lower or the upper bounds. Where a row has none, s = z = 1 and all changes are 0.
+/// The lower or the upper bounds. A row without this bound has s = z = 1, and all its changes are 0.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Side {
-    /// 1 for lower bounds, −1 for upper ones.
+    /// 1 for lower bounds, −1 for upper bounds.
     pub sign: f64,
     pub s: Vec<f64>,
     pub z: Vec<f64>,
@@ -21,7 +21,7 @@ pub(super) struct Side {
 }
 
 impl Side {
-    /// Forgets the last direction, which may not be finite.
+    /// Clears the last direction, which may not be finite.
     pub(super) fn clear(&mut self) {
         self.ds.fill(0.0);
         self.dz.fill(0.0);
@@ -34,7 +34,7 @@ impl Side {
     }
 }
 
-/// r = ±(G x − bound) − s, d = z / s; adds ±z to `multipliers`, sᵀ z to `gap`, ±bᵀ z to `support`.
+/// Computes r = ±(G x − bound) − s and d = z / s; adds ±z to `multipliers`, sᵀ z to `gap`, ±bᵀ z to `support`.
 pub(super) struct Residuals<'a> {
     pub side: &'a mut Side,
     pub has: &'a [f64],
@@ -76,7 +76,7 @@ impl Vectorized for Residuals<'_> {
     }
 }
 
-/// Adds ±t to `target`, t = ξ / s − d r, with ξ = σμ − s z − ds dz, of which the last part only if `second_order`.
+/// Adds ±t to `target`, with t = ξ / s − d r and ξ = σμ − s z − ds dz; the last term only with `second_order`.
 pub(super) struct Target<'a> {
     pub side: &'a Side,
     pub has: &'a [f64],
@@ -99,7 +99,7 @@ impl Vectorized for Target<'_> {
     }
 }
 
-/// ds = ±G dx + r, dz = (ξ − z ds) / s with ξ as in [`Target`]; the greatest of −ds/s and −dz/z.
+/// Computes ds = ±G dx + r, dz = (ξ − z ds) / s with ξ as in [`Target`], and the greatest of −ds/s and −dz/z.
 pub(super) struct Direction<'a> {
     pub side: &'a mut Side,
     pub has: &'a [f64],

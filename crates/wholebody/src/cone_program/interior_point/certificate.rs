@@ -1,19 +1,20 @@
-//! Proofs that there is no solution.
+//! Certificates that no solution exists.
 
 use super::cone::margin;
 use super::scaled::Scaled;
 use crate::cone_program::Status;
 use condyle_linalg::{dot, max_abs};
 
-/// What should be zero in a certificate, relative to what should not; and what it may be where iterates get no better.
+/// Tolerance of a certificate: terms that should be zero, relative to the other terms. The reduced tolerance applies if
+/// iterates stop improving.
 const TOLERANCE: f64 = 1e-9;
 pub(super) const REDUCED_TOLERANCE: f64 = 1e-5;
-/// An x shorter than this is not taken for a direction without end; unknowns are in units in which they are of size one.
+/// Minimum length of an x that may be an unbounded direction; unknowns are in units in which their size is about one.
 const FAR: f64 = 1e3;
-/// The fall of the objective along a direction of length one is at least this.
+/// Minimum fall of the objective along a direction of length one.
 const FALL: f64 = 1e-6;
 
-/// An iterate, and what it gives rise to.
+/// An iterate and the quantities derived from it.
 pub(super) struct Candidate<'a> {
     pub data: &'a Scaled,
     pub x: &'a [f64],
@@ -28,14 +29,14 @@ pub(super) struct Candidate<'a> {
 }
 
 impl Candidate<'_> {
-    /// How far the iterate is from proving that no x satisfies the constraints: each that does has
-    /// (Kᵀ z + E y)ᵀ x ≥ `support`, so a `force` of zero and a positive support exclude it.
+    /// Returns the distance of the iterate from a proof that no x satisfies the constraints. Every feasible x has (Kᵀ z
+    /// + E y)ᵀ x ≥ `support`, so a `force` of zero with a positive `support` is such a proof.
     pub(super) fn exclusion(&self) -> f64 {
         let size = max_abs(&self.x[..self.data.n]);
         if self.support > 0.0 { self.force * (1.0 + size) / self.support } else { f64::INFINITY }
     }
 
-    /// What the iterate proves.
+    /// Returns the status that the iterate proves, if any.
     pub(super) fn verdict(&self) -> Option<Status> {
         if self.exclusion() <= TOLERANCE {
             return Some(Status::Infeasible);
@@ -44,8 +45,8 @@ impl Candidate<'_> {
         (size > FAR && self.linear < -FALL * size && self.is_ray(size)).then_some(Status::Unbounded)
     }
 
-    /// Whether x is a direction along which the objective falls without end: P x = 0, E x = 0, and G x and F x in what
-    /// bounds and cones allow without end.
+    /// Returns whether the objective falls without bound along x: P x = 0, E x = 0, and G x and F x stay within bounds
+    /// and cones at any length.
     fn is_ray(&self, size: f64) -> bool {
         let Self { data, x, Kx, Px, linear, .. } = *self;
         let (n, m) = (data.n, data.rows());

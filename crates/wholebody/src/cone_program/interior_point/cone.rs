@@ -11,20 +11,20 @@
 //! Sources: Nesterov and Todd (1997); Vandenberghe, *The CVXOPT linear and quadratic cone program solvers* (2010), sections
 //! 4 and 5; Domahidi, Chu and Boyd (2013), section III.
 
-/// x₀ − ‖x₁‖: not negative in the cone.
+/// Returns x₀ − ‖x₁‖, which is not negative in the cone.
 #[inline(always)]
 pub(super) fn margin(x: &[f64]) -> f64 {
     x[0] - tail(x, x).sqrt()
 }
 
-/// xᵀ J x, without the cancellation.
+/// Returns xᵀ J x, without cancellation.
 #[inline(always)]
 pub(super) fn determinant(x: &[f64]) -> f64 {
     let radius = tail(x, x).sqrt();
     (x[0] - radius) * (x[0] + radius)
 }
 
-/// x₁ᵀ y₁.
+/// Returns x₁ᵀ y₁.
 #[inline(always)]
 pub(super) fn tail(x: &[f64], y: &[f64]) -> f64 {
     let mut sum = 0.0;
@@ -34,7 +34,7 @@ pub(super) fn tail(x: &[f64], y: &[f64]) -> f64 {
     sum
 }
 
-/// η, and w with λ written; None if s or z is not in the interior.
+/// Returns η, and writes w and λ; `None` if s or z is not in the interior.
 #[inline(always)]
 pub(super) fn scaling(s: &[f64], z: &[f64], w: &mut [f64], lambda: &mut [f64]) -> Option<f64> {
     let (ds, dz) = (determinant(s), determinant(z));
@@ -48,14 +48,14 @@ pub(super) fn scaling(s: &[f64], z: &[f64], w: &mut [f64], lambda: &mut [f64]) -
     for i in 1..s.len() {
         w[i] = half * (s[i] * rs - z[i] * rz);
     }
-    // w has determinant 1; its head from its tail keeps that to the last digit.
+    // w has determinant 1; its first entry, computed from the others, satisfies this to the last digit.
     w[0] = (1.0 + tail(w, w)).sqrt();
     let eta = (ds / dz).sqrt().sqrt();
     apply(eta, w, z, lambda);
     Some(eta)
 }
 
-/// y = W x.
+/// Computes y = W x.
 #[inline(always)]
 pub(super) fn apply(eta: f64, w: &[f64], x: &[f64], y: &mut [f64]) {
     let inner = tail(w, x);
@@ -66,7 +66,7 @@ pub(super) fn apply(eta: f64, w: &[f64], x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// y = W⁻¹ x.
+/// Computes y = W⁻¹ x.
 #[inline(always)]
 pub(super) fn apply_inverse(eta: f64, w: &[f64], x: &[f64], y: &mut [f64]) {
     let (inner, r) = (tail(w, x), eta.recip());
@@ -77,7 +77,7 @@ pub(super) fn apply_inverse(eta: f64, w: &[f64], x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// x ∘ y = (xᵀ y, x₀ y₁ + y₀ x₁).
+/// Computes x ∘ y = (xᵀ y, x₀ y₁ + y₀ x₁).
 #[inline(always)]
 pub(super) fn product(x: &[f64], y: &[f64], out: &mut [f64]) {
     out[0] = x[0] * y[0] + tail(x, y);
@@ -86,7 +86,7 @@ pub(super) fn product(x: &[f64], y: &[f64], out: &mut [f64]) {
     }
 }
 
-/// The y with λ ∘ y = x.
+/// Computes the y with λ ∘ y = x.
 #[inline(always)]
 pub(super) fn divide(lambda: &[f64], x: &[f64], y: &mut [f64]) {
     y[0] = (lambda[0] * x[0] - tail(lambda, x)) / determinant(lambda);
@@ -96,9 +96,9 @@ pub(super) fn divide(lambda: &[f64], x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// 1 / α for the greatest α with λ + α d ∈ Q; not positive where there is none.
+/// Returns 1 / α for the greatest α with λ + α d ∈ Q; not positive if α is unbounded.
 ///
-/// With λ̄ = λ / √(λᵀ J λ): ρ₀ = λ̄ᵀ J d, ρ₁ = d₁ − (ρ₀ + d₀) / (1 + λ̄₀) λ̄₁; it is (‖ρ₁‖ − ρ₀) / √(λᵀ J λ).
+/// With λ̄ = λ / √(λᵀ J λ), ρ₀ = λ̄ᵀ J d and ρ₁ = d₁ − (ρ₀ + d₀) / (1 + λ̄₀) λ̄₁, it is (‖ρ₁‖ − ρ₀) / √(λᵀ J λ).
 #[inline(always)]
 pub(super) fn inverse_step(lambda: &[f64], d: &[f64]) -> f64 {
     let r = determinant(lambda).sqrt().recip();
@@ -112,7 +112,7 @@ pub(super) fn inverse_step(lambda: &[f64], d: &[f64]) -> f64 {
     r * (sum.sqrt() - rho)
 }
 
-/// s and z with s ∘ z = μ e and s − z = v: s = (v + √(v² + 4 μ e)) / 2, z = s − v, in the cone's algebra.
+/// Computes s and z with s ∘ z = μ e and s − z = v: s = (v + √(v² + 4 μ e)) / 2, z = s − v, in the cone's algebra.
 ///
 /// v has the eigenvalues v₀ ± ‖v₁‖. Source: Fukushima, Luo and Tseng (2002), smoothing of complementarity.
 #[inline(always)]
@@ -128,7 +128,7 @@ pub(super) fn split(v: &[f64], mu: f64, s: &mut [f64], z: &mut [f64]) {
     }
 }
 
-/// s and z with s z = μ and s − z = v.
+/// Returns s and z with s z = μ and s − z = v.
 #[inline(always)]
 pub(super) fn split_number(v: f64, mu: f64) -> [f64; 2] {
     let greater = 0.5 * (v.abs() + (v * v + 4.0 * mu).sqrt());

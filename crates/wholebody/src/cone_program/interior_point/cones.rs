@@ -1,9 +1,9 @@
-//! The cones of a program together: slacks, multipliers, their scalings and directions, row after row.
+//! All cones of a program: slack variables, multipliers, scalings and directions, row after row.
 
 use super::cone::{apply_inverse, divide, inverse_step, product, scaling};
 use super::scaled::{Cone, Scaled};
 
-/// The expression with `dim` a constant where it is that of a friction cone, so that its loops have no end to ask for.
+/// Evaluates the expression with a constant `dim` for a friction cone, so that the compiler can unroll its loops.
 macro_rules! by_dimension {
     ($value:expr, $dim:ident => $expression:expr) => {
         match $value {
@@ -16,7 +16,8 @@ macro_rules! by_dimension {
     };
 }
 
-/// s = h + F x in the product of cones, and z. Vectors with a tilde are scaled: d̃s = W⁻¹ ds, d̃z = W dz.
+/// Slack variables s = h + F x in the product of cones, and multipliers z. Vectors with a tilde are scaled: d̃s = W⁻¹
+/// ds, d̃z = W dz.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cones {
     pub s: Vec<f64>,
@@ -25,7 +26,7 @@ pub(super) struct Cones {
     pub r: Vec<f64>,
     pub ds: Vec<f64>,
     pub dz: Vec<f64>,
-    /// W's w and η of each cone, and λ.
+    /// w and η of each cone's W, and λ.
     w: Vec<f64>,
     eta: Vec<f64>,
     lambda: Vec<f64>,
@@ -55,7 +56,7 @@ impl Cones {
         }
     }
 
-    /// r, the multipliers; adds to [‖r‖∞, sᵀ z, −hᵀ z].
+    /// Computes r and the multipliers; adds to [‖r‖∞, sᵀ z, −hᵀ z].
     pub(super) fn residuals(&mut self, h: &[f64], Fx: &[f64], multipliers: &mut [f64], sums: &mut [f64; 3]) {
         for i in 0..h.len() {
             self.r[i] = h[i] + Fx[i] - self.s[i];
@@ -66,7 +67,7 @@ impl Cones {
         }
     }
 
-    /// W and λ of each cone; false if a pair is not in the interior.
+    /// Computes W and λ of each cone; returns false if a pair is not in the interior.
     pub(super) fn scale(&mut self, cones: &[Cone]) -> bool {
         cones.iter().enumerate().all(|(k, cone)| by_dimension!(cone.dim, dim => self.scale_one(k, cone.at, dim)))
     }
@@ -82,7 +83,7 @@ impl Cones {
         true
     }
 
-    /// B = (W⁻¹ F)ᵀ, where F is not zero.
+    /// Computes B = (W⁻¹ F)ᵀ in the rows where F is non-zero.
     #[inline(always)]
     pub(super) fn scale_rows(&self, data: &Scaled, B: &mut [f64]) {
         let (ld, m) = (data.ld, data.rows());
@@ -92,7 +93,7 @@ impl Cones {
             let F = &data.K[(m + cone.at) * ld + rows.start..];
             let (head, tail) = B[cone.at * ld + rows.start..].split_at_mut(ld);
             let (f0, head) = (&F[..n], &mut head[..n]);
-            // w₁ᵀ F₁, in the head's place for now.
+            // w₁ᵀ F₁, stored in the head for now.
             head.fill(0.0);
             for i in 1..cone.dim {
                 let f = &F[i * ld..][..n];
@@ -113,7 +114,7 @@ impl Cones {
         }
     }
 
-    /// x ← W⁻² x.
+    /// Computes x ← W⁻² x.
     pub(super) fn weigh(&mut self, cones: &[Cone], x: &mut [f64]) {
         for (k, cone) in cones.iter().enumerate() {
             let at = cone.at..cone.at + cone.dim;
@@ -123,7 +124,7 @@ impl Cones {
         }
     }
 
-    /// p = λ \ ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z, of which the last part only if `second_order`, and the target
+    /// Computes p = λ \ ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z (the last term only with `second_order`), and the target
     /// W⁻¹ (p − W⁻¹ r).
     pub(super) fn target(&mut self, cones: &[Cone], centre: f64, second_order: bool, target: &mut [f64]) {
         for (k, cone) in cones.iter().enumerate() {
@@ -157,7 +158,7 @@ impl Cones {
         apply_inverse(eta, w, y, &mut target[at]);
     }
 
-    /// ds = F dx + r and dz = W⁻¹ (p − W⁻¹ ds); the inverse of the greatest step, if it is greater.
+    /// Computes ds = F dx + r and dz = W⁻¹ (p − W⁻¹ ds); raises `inverse` to the inverse of the greatest step.
     pub(super) fn direction(&mut self, cones: &[Cone], Fdx: &[f64], inverse: &mut f64) {
         for (k, cone) in cones.iter().enumerate() {
             by_dimension!(cone.dim, dim => self.direction_one(k, cone.at, dim, Fdx, inverse));
@@ -182,7 +183,7 @@ impl Cones {
         *inverse = inverse.max(inverse_step(lambda, ds_tilde)).max(inverse_step(lambda, dz_tilde));
     }
 
-    /// s += α ds, z += α dz.
+    /// Computes s += α ds and z += α dz.
     pub(super) fn advance(&mut self, rows: usize, step: f64) {
         for i in 0..rows {
             self.s[i] += step * self.ds[i];

@@ -1,41 +1,42 @@
-//! The iteration: how far each step goes, and when it ends.
+//! The iteration: length of each step, and conditions for the end.
 
 use super::certificate::REDUCED_TOLERANCE;
 use super::workspace::Workspace;
 use crate::cone_program::Status;
 use std::time::Instant;
 
-/// The share of the way to the boundary that a step goes: 1 − a tenth of what the predictor could not go, within these bounds.
-/// The upper one is what keeps slacks from becoming smaller than the rounding errors of what they are differences of.
+/// Bounds of a step's share of the distance to the boundary. The share is 1 − a tenth of the predictor's shortfall. The
+/// upper bound keeps slack variables larger than the rounding errors of the terms that they are differences of.
 const TO_BOUNDARY: [f64; 2] = [0.99, 0.9999];
 const SHORTFALL: f64 = 0.1;
-/// The last steps aim at this share of the gap that is allowed.
+/// Share of the allowed gap at which the last steps aim.
 const AIM: f64 = 0.1;
-/// So many iterations that come closer neither to a solution nor to a proof that there is none are the last ones.
+/// Maximum number of consecutive iterations that come closer neither to a solution nor to a proof that none exists.
 const PATIENCE: u32 = 5;
-/// Steps shorter than this are none.
+/// Minimum length of a step; a shorter one is a failure.
 const SHORT_STEP: f64 = 1e-7;
-/// A solution whose errors are this many times the tolerance is a reduced one.
+/// Maximum error of a reduced solution, as a multiple of the tolerance.
 const REDUCED: f64 = 1e4;
-/// A dual residual this many times what a step should have left asks for refinement of later solves, at most so often.
+/// Ratio of a dual residual to its expected value, above which later solves get one more refinement; at most
+/// `REFINEMENTS`.
 const INEXACT: f64 = 2.0;
 const REFINEMENTS: usize = 2;
 
-/// What ends an iteration.
+/// Limits that end an iteration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub tolerance: f64,
-    /// A count, together with what was counted before.
+    /// Maximum number of iterations, including earlier ones.
     pub iterations: u32,
-    /// When it began, and the seconds from then on.
+    /// Start time, and the seconds allowed from then on.
     pub clock: Option<(Instant, f64)>,
 }
 
 impl Workspace {
-    /// Iterates from where x, y, s and z stand; the error of the last iterate.
+    /// Iterates from the current x, y, s and z; returns the error of the last iterate.
     ///
     /// # Errors
-    /// [`Status`] if that error is above [`REDUCED`] times the tolerance.
+    /// [`Status`] if the error is above [`REDUCED`] times the tolerance.
     pub(super) fn iterate(&mut self, iterations: &mut u32, limits: Limits) -> Result<f64, Status> {
         let Limits { tolerance, .. } = limits;
         let (mut least, mut idle, mut refinements) = ([f64::INFINITY; 2], 0, 0);

@@ -1,12 +1,12 @@
-//! Our own back end: a primal–dual interior point method on dense matrices of some 10 to 60 unknowns.
+//! Condyle's own back end: a primal–dual interior-point method on dense matrices of about 10 to 60 unknowns.
 //!
 //! Mehrotra's predictor and corrector with Nesterov and Todd's scaling on bounds and second-order cones. Each iteration
-//! factorises P + Gᵀ D G + Fᵀ W⁻² F once and solves with it twice. It starts from the data, or from the last solution moved
-//! back into the interior. Blocks of zeros in rows are left out. Nothing allocates after construction, the same numbers give
-//! the same bits, and no result is NaN.
+//! factorises P + Gᵀ D G + Fᵀ W⁻² F once and solves with it twice. The iteration starts from the data, or from the last
+//! solution moved back into the interior. Blocks of zeros in rows are skipped. Nothing allocates after construction,
+//! the same numbers give the same bits, and no result is NaN.
 //!
-//! Sources: Mehrotra (1992); Nesterov and Todd (1998); Vandenberghe, *The CVXOPT linear and quadratic cone program solvers*
-//! (2010), whose formulas these are, with a two-sided row instead of two rows.
+//! Sources: Mehrotra (1992); Nesterov and Todd (1998); Vandenberghe, *The CVXOPT linear and quadratic cone program
+//! solvers* (2010). The formulas are Vandenberghe's, with a two-sided row instead of two rows.
 
 mod bounds;
 mod certificate;
@@ -26,7 +26,7 @@ use solution::Solution;
 use std::time::Instant;
 use workspace::Workspace;
 
-/// The iterations after which a warm start gives way to a cold one.
+/// Number of iterations after which a cold start replaces a warm one.
 const WARM_ITERATIONS: u32 = 20;
 
 /// A dense interior point method; see the [module](self).
@@ -40,13 +40,13 @@ pub(crate) struct InteriorPoint {
 }
 
 impl InteriorPoint {
-    /// A solver of programs with such a capacity.
+    /// Creates a solver of programs with this capacity.
     pub(crate) fn new(capacity: Size, settings: Settings) -> Self {
         let (work, solution) = (Workspace::new(capacity), Solution::new(capacity));
         Self { settings, capacity, size: Size::default(), work, solution }
     }
 
-    /// Minimises what was loaded; whether from the last solution, and the error of the result.
+    /// Minimises the loaded program; returns whether it started from the last solution, and the error of the result.
     fn minimise(&mut self, start: Start, iterations: &mut u32) -> (bool, Result<f64, Status>) {
         let Self { settings, work, solution, .. } = self;
         let Settings { tolerance, max_iterations, time_limit } = *settings;

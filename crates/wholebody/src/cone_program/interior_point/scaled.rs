@@ -1,75 +1,78 @@
-//! The program as the method sees it: padded, without what constrains nothing, and in units in which all is of size one.
+//! The program as the method receives it: padded, without empty constraints, and scaled to numbers of size one.
 //!
-//! x = D x̂, where Dⱼ is what the cost alone would make of xⱼ, C / √Pⱼⱼ with C = max |cⱼ| / √Pⱼⱼ, but no more than some times
-//! what rows with two bounds leave to it alone, max(|lᵢ|, |uᵢ|) / |Gᵢⱼ|: where a task asks for the impossible, a force of
-//! little weight would else have a unit of millions of newtons, in which its limits are nothing. The cost is divided by the
-//! greatest of |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². So weights that differ by many orders of magnitude, as those of tasks and of forces do,
-//! meet one tolerance. Rows of Ĝ = G D, and the longest row of each cone, have length one.
+//! x = D x̂, where Dⱼ is the size that the cost alone would give xⱼ: C / √Pⱼⱼ with C = max |cⱼ| / √Pⱼⱼ. Dⱼ is at most
+//! [`ROOM`] times the largest xⱼ that rows with two bounds allow on its own, max(|lᵢ|, |uᵢ|) / |Gᵢⱼ|. Otherwise, if a
+//! task is unreachable, a force of little weight would have a unit of millions of newtons, in which its limits vanish.
+//! The cost is divided by the greatest of |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². One tolerance thus serves weights that differ by many
+//! orders of magnitude, such as the weights of tasks and of forces. Rows of Ĝ = G D, and the longest row of each cone,
+//! have length one.
 
 use crate::cone_program::{ConeProgram, Size, Status};
 use condyle_linalg::{SLACK, View, add_product_vector, block, dot, mask, transposed_product_vector};
 use std::ops::Range;
 
-/// A diagonal entry of P below this share of the greatest counts as zero when units are chosen.
+/// Diagonal entry of P, relative to the greatest, below which it counts as zero when units are chosen.
 const NO_CURVATURE: f64 = 1e-14;
-/// A unit is at most so many times what bounds leave to its unknown alone. At 1, programs with a singular P lose digits; from
-/// 1000 on, some that ask for the impossible have no solution.
+/// Maximum ratio of a unit to the value that bounds allow its unknown on its own. At 1, programs with a singular P lose
+/// digits; from 1000 on, some programs with unreachable tasks have no solution.
 const ROOM: f64 = 30.0;
-/// Bounds make a unit no smaller than this share of the cost's: a P̂ⱼⱼ of its square is what rounding errors still leave.
+/// Minimum ratio of a unit to its size by the cost, when bounds reduce it: P̂ⱼⱼ of this ratio squared still exceeds
+/// rounding errors.
 const LEAST_SHARE: f64 = 1e-5;
-/// By this much, relative to its size, a bound of a row without coefficients may be exceeded.
+/// Absolute tolerance for the bounds of a row or cone without coefficients.
 const NO_ROW_TOLERANCE: f64 = 1e-9;
 
-/// Where a constraint came from.
+/// Origin of a constraint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Source {
     /// A row of A.
     Equality(usize),
     /// A row of G.
     Row(usize),
-    /// A row of F, of a cone of one dimension.
+    /// A row of F, for a cone of one dimension.
     Cone(usize),
 }
 
-/// A cone: its first row among the cones' rows here, its first row in F, its dimension.
+/// A cone: its first row among the cones' rows here, its first row in F, and its dimension.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cone {
     pub at: usize,
     pub source: usize,
     pub dim: usize,
-    /// What its rows of F were multiplied with.
+    /// Factor by which its rows of F were multiplied.
     pub scale: f64,
 }
 
-/// Columns of K that are not zero between the same rows.
+/// Adjacent columns of K that are non-zero in the same range of rows.
 #[derive(Clone, Debug)]
 struct Run {
     columns: Range<usize>,
     rows: Range<usize>,
 }
 
-/// The rows that a mask's blocks lie between.
+/// Returns the range of rows covered by a mask's blocks.
 fn range(mask: u64, n: usize, ld: usize) -> Range<usize> {
     let (block, first) = (block(ld), mask.trailing_zeros() as usize);
     let end = 64 - mask.leading_zeros() as usize;
     if mask == 0 { 0..0 } else { block * first..n.min(block * end) }
 }
 
-/// minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q; the columns of K are rows of G and of F.
+/// The program: minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q. The columns of K are rows of G
+/// and of F.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scaled {
-    /// Numbers of x.
+    /// Number of unknowns.
     pub n: usize,
-    /// From one column of a matrix to the next.
+    /// Distance from one column of a matrix to the next.
     pub ld: usize,
-    /// Both triangles.
+    /// P, both triangles.
     pub P: Vec<f64>,
     pub c: Vec<f64>,
     /// D, the unit of each unknown.
     pub units: Vec<f64>,
-    /// Scratch: one over what rows with two bounds leave to an unknown alone.
+    /// Scratch: one over the value that rows with two bounds allow an unknown on its own.
     inverse_limits: Vec<f64>,
-    /// P and c were multiplied with this.
+    /// Factor by which P and c were multiplied.
     pub cost: f64,
     /// Eᵀ: equalities, and rows of G with l = u.
     pub E: Vec<f64>,
@@ -78,20 +81,20 @@ pub(super) struct Scaled {
     pub equality_scales: Vec<f64>,
     /// [Gᵀ Fᵀ].
     pub K: Vec<f64>,
-    /// The blocks of each column that are not zero, in any of a cone's columns for those of a cone.
+    /// Mask of the non-zero blocks of each column; the columns of one cone share the union of their masks.
     pub masks: Vec<u64>,
     runs: Vec<Run>,
-    /// l and u, 0 where there is none.
+    /// l and u, 0 for a missing bound.
     pub lower: Vec<f64>,
     pub upper: Vec<f64>,
-    /// Whether there is one: 1 or 0.
+    /// 1 if the bound exists, otherwise 0.
     pub has_lower: Vec<f64>,
     pub has_upper: Vec<f64>,
     pub sources: Vec<Source>,
     pub scales: Vec<f64>,
     pub h: Vec<f64>,
     pub cones: Vec<Cone>,
-    /// The number of bounds and cones: what sᵀ z is divided by.
+    /// Number of bounds and cones, by which sᵀ z is divided.
     pub degree: f64,
 }
 
@@ -127,7 +130,7 @@ impl Scaled {
         }
     }
 
-    /// Rows of G in use.
+    /// Returns the number of rows of G in use.
     pub(super) fn rows(&self) -> usize {
         self.lower.len()
     }
@@ -136,12 +139,12 @@ impl Scaled {
         self.e.len()
     }
 
-    /// The rows of a column between which it is not zero, in whole blocks but for the last.
+    /// Returns the range of rows in which a column is non-zero, in whole blocks (except the last block).
     pub(super) fn range(&self, column: usize) -> Range<usize> {
         range(self.masks[column], self.n, self.ld)
     }
 
-    /// y = Kᵀ x: G x and F x. The slack of x is zero.
+    /// Computes y = Kᵀ x: G x and F x. The padding of x is zero.
     pub(super) fn multiply(&self, x: &[f64], y: &mut [f64]) {
         for Run { columns, rows } in &self.runs {
             let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
@@ -149,7 +152,7 @@ impl Scaled {
         }
     }
 
-    /// y += K x.
+    /// Computes y += K x.
     pub(super) fn add_transposed(&self, x: &[f64], y: &mut [f64]) {
         for Run { columns, rows } in &self.runs {
             let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
@@ -157,15 +160,15 @@ impl Scaled {
         }
     }
 
-    /// The columns of K, rows of G and of F.
+    /// Returns the number of columns of K: rows of G and of F.
     pub(super) fn columns(&self) -> usize {
         self.rows() + self.h.len()
     }
 
-    /// Takes the numbers of a program.
+    /// Loads the numbers of a program.
     ///
     /// # Errors
-    /// [`Status::Infeasible`] where bounds exclude each other, or a row without coefficients is outside of its bounds.
+    /// [`Status::Infeasible`] if bounds contradict each other, or a row without coefficients violates its bounds.
     pub(super) fn load(&mut self, program: &ConeProgram) -> Result<(), Status> {
         let (Size { unknowns: n, equalities, rows, .. }, ld) = (program.size, self.ld);
         let most = program.capacity().unknowns;
@@ -225,7 +228,7 @@ impl Scaled {
         Ok(())
     }
 
-    /// The masks and runs of K's columns.
+    /// Computes the masks and runs of K's columns.
     fn note_zeros(&mut self) {
         let (m, columns, ld) = (self.rows(), self.columns(), self.ld);
         self.masks.clear();
@@ -245,7 +248,7 @@ impl Scaled {
         }
     }
 
-    /// The units of the unknowns and of the cost; see the module.
+    /// Chooses the units of the unknowns and of the cost; see the module.
     fn choose_units(&mut self, program: &ConeProgram) {
         let (n, most) = (program.size.unknowns, program.capacity().unknowns);
         let (P, c) = (|j: usize| program.P.as_slice()[j * most + j], &program.c[..n]);
@@ -253,7 +256,7 @@ impl Scaled {
         let units = &mut self.units[..n];
         let mut size = 0.0_f64;
         for j in 0..n {
-            // Without curvature there is no size of its own: that of the others.
+            // An unknown without curvature has no size of its own: it gets the greatest curvature.
             let curvature = match P(j) {
                 own if own > NO_CURVATURE * greatest => own,
                 _ if greatest > 0.0 => greatest,
@@ -262,7 +265,7 @@ impl Scaled {
             units[j] = curvature.sqrt().recip();
             size = size.max(units[j] * c[j].abs());
         }
-        // Without any curvature only the cost has a size.
+        // Without any curvature, the unit of length is 1.
         let length = if greatest > 0.0 && size > 0.0 { size } else { 1.0 };
 
         // max |Gᵢⱼ| / max(|lᵢ|, |uᵢ|)
@@ -346,7 +349,7 @@ impl Scaled {
     }
 }
 
-/// √Σ (xᵢ Dᵢ)², in eight sums, which do not wait for each other.
+/// Returns √Σ (xᵢ Dᵢ)², in eight independent sums.
 fn length(x: &[f64], D: &[f64]) -> f64 {
     let (eights, units) = (x.chunks(8), D.chunks(8));
     let mut sums = [0.0; 8];

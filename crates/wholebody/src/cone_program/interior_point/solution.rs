@@ -1,17 +1,17 @@
-//! A solution in the numbers of the program.
+//! A solution in the units of the program.
 
 use super::scaled::Source;
 use super::workspace::Workspace;
 use crate::cone_program::{Multipliers, Size};
 
-/// x and the multipliers, with the size of the capacity.
+/// x and the multipliers, with the dimensions of the capacity.
 #[derive(Clone, Debug)]
 pub(super) struct Solution {
-    /// Whether it solves a program, and of how many unknowns.
+    /// Number of unknowns of the program that it solves; `None` if it solves no program.
     pub solves: Option<usize>,
     pub x: Vec<f64>,
     pub y: Vec<f64>,
-    /// z of the lower and of the upper bounds, and their difference.
+    /// z of the lower and of the upper bounds; the next field is their difference.
     pub sides: [Vec<f64>; 2],
     pub z: Vec<f64>,
     pub w: Vec<f64>,
@@ -33,7 +33,7 @@ impl Solution {
         }
     }
 
-    /// Takes numbers from elsewhere.
+    /// Stores a given solution.
     pub(super) fn set(&mut self, x: &[f64], multipliers: Multipliers<'_>) {
         self.clear();
         self.solves = Some(x.len());
@@ -46,7 +46,7 @@ impl Solution {
         }
     }
 
-    /// The multiplier of the lower (k = 0) or upper bound of what came from there.
+    /// Returns the multiplier of the lower (k = 0) or upper bound of a constraint with this origin.
     pub(super) fn of(&self, source: Source, k: usize) -> f64 {
         match source {
             Source::Row(i) => self.sides[k][i],
@@ -56,7 +56,7 @@ impl Solution {
         }
     }
 
-    /// Takes the iterate.
+    /// Stores the iterate, in the units of the program.
     pub(super) fn read(&mut self, work: &Workspace) {
         self.clear();
         let data = &work.data;

@@ -1,4 +1,4 @@
-//! Where the iteration begins: from the data, or from the last solution.
+//! Start of the iteration: from the data, or from the last solution.
 
 use super::cone::{margin, split, split_number};
 use super::scaled::Source;
@@ -6,16 +6,17 @@ use super::solution::Solution;
 use super::workspace::Workspace;
 use condyle_linalg::{View, add_product_vector, max_abs};
 
-/// The weight of s² against the cost, which is also the ratio of z to s, in a cold start.
+/// Weight of s² relative to the cost, which is also the ratio of z to s, in a cold start.
 const WEIGHT: f64 = 0.1;
-/// How far inside of its cone s is after it was moved there.
+/// Distance of s from the boundary of its cone after it was moved inside.
 const INSIDE: f64 = 1.0;
-/// √μ of a warm start as a share of how far the last solution is from solving this program, and the bounds of μ.
+/// √μ of a warm start, relative to the error of the last solution in this program; the next constant bounds μ.
 const SHARE: f64 = 0.02;
 const CENTRE: [f64; 2] = [1e-10, 1e-2];
 
 impl Workspace {
-    /// x from the minimum of the cost and of ω / 2 sᵀ s; s = h + F x and z = −ω s, both moved along e into the cone.
+    /// Computes x from the minimum of the cost and of ω / 2 sᵀ s; s = h + F x and z = −ω s, both moved along e into the
+    /// cone.
     ///
     /// Source: Vandenberghe (2010), section 5.3, where ω = 1.
     pub(super) fn cold_start(&mut self) -> bool {
@@ -77,11 +78,11 @@ impl Workspace {
         true
     }
 
-    /// x and y of the last solution, and s and z from s − z = (h + F x) − z* at that x with s ∘ z = μ e.
+    /// Computes x and y from the last solution, and s and z from s − z = (h + F x) − z* at that x with s ∘ z = μ e.
     ///
-    /// Each pair is exactly central, and but for μ / s the last one where s or z is large. s and z can be compared since
-    /// all is in units of size one. √μ is a share of how far the last solution is from solving this program: changes of
-    /// that size turn a bound on or off.
+    /// Each pair is exactly central. Where s or z is large, it differs from the last pair by μ / s only. s and z are
+    /// comparable, since all numbers are in units of size one. √μ is proportional to the last solution's error in this
+    /// program, because changes of this size turn a bound on or off.
     ///
     /// Source: Chen and Harker (1993), the smoothing of complementarity; here as a start, in the cones' algebra.
     pub(super) fn warm_start(&mut self, last: &Solution) {
@@ -114,7 +115,7 @@ impl Workspace {
                 multipliers[m + at] = cones.z[at];
             }
         }
-        // How far the last solution is from solving this program: P x + c − Kᵀ z − E y and min(s, z).
+        // Error of the last solution in this program: P x + c − Kᵀ z − E y and min(s, z).
         Px[..n].fill(0.0);
         forces[..n].fill(0.0);
         add_product_vector(Px, n, View::new(&data.P, data.ld), &x[..n]);

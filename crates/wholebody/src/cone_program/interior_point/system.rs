@@ -1,12 +1,12 @@
-//! The linear system of each iteration: positive definite in x, with the equalities as a Schur complement.
+//! Linear system of each iteration: positive definite in x, with the equalities as a Schur complement.
 //!
 //! ```text
 //! [ H   −Eᵀ ] [dx]   [r₁]        H = P + Gᵀ D G + Fᵀ W⁻² F
 //! [ E    0  ] [dy] = [r₂]
 //! ```
 //!
-//! With H = L Lᵀ and X = E L⁻ᵀ: X Xᵀ dy = r₂ − X L⁻¹ r₁, Lᵀ dx = L⁻¹ r₁ + Xᵀ dy. Where there are equalities, Eᵀ E is added to
-//! H and Eᵀ r₂ to r₁, which changes no solution and makes an H regular that is singular but for E.
+//! With H = L Lᵀ and X = E L⁻ᵀ: X Xᵀ dy = r₂ − X L⁻¹ r₁, Lᵀ dx = L⁻¹ r₁ + Xᵀ dy. If equalities exist, Eᵀ E is added to
+//! H and Eᵀ r₂ to r₁. This changes no solution, and makes H regular if it is singular only without E.
 
 use super::scaled::Scaled;
 use condyle_linalg::{
@@ -14,24 +14,25 @@ use condyle_linalg::{
     transposed_product_vector,
 };
 
-/// What is added to a diagonal of H, which costs of size one have entries of size one in; refinement takes it out again.
+/// Regularisation added to diagonals of H, whose entries have size one for costs of size one; refinement removes its
+/// effect.
 const REGULARISATION: f64 = 1e-13;
-/// The same relative to the diagonal entry, some roundings of a factor.
+/// Regularisation relative to the diagonal entry: some roundings of a factor.
 const RELATIVE_REGULARISATION: f64 = 1e-15;
-/// What is added to a diagonal of X Xᵀ, whose entries are of size one for costs of size one.
+/// Regularisation added to diagonals of X Xᵀ, whose entries have size one for costs of size one.
 const DUAL_REGULARISATION: f64 = 1e-13;
-/// Each attempt after a pivot that was not positive regularises so many times more.
+/// Factor of the regularisation from one attempt to the next, after a pivot that was not positive.
 const GROWTH: f64 = 1e3;
 const ATTEMPTS: usize = 4;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct System {
-    /// The lower triangle of [H; E], then of its factor.
+    /// Lower triangle of [H; E], then of its factor.
     H: Vec<f64>,
     ldh: usize,
-    /// The inverse of the factor's diagonal.
+    /// Inverse of the factor's diagonal.
     inverse: Vec<f64>,
-    /// Columns of K, scaled: √D G and W⁻¹ F, then those of E; only their blocks that are not zero are written and multiplied.
+    /// Scaled columns of K (√D G and W⁻¹ F), then columns of E; only their non-zero blocks are written and multiplied.
     pub B: OuterProducts,
     n: usize,
     me: usize,
@@ -56,7 +57,7 @@ impl System {
         }
     }
 
-    /// Takes the sizes of a program and which blocks of its columns are not zero; writes E, and zeros where K has them.
+    /// Sets the sizes of a program and the non-zero blocks of its columns; writes E, and zeros in the columns of K.
     pub(super) fn prepare(&mut self, data: &Scaled) {
         let (n, me, columns, ld) = (data.n, data.equalities(), data.columns(), data.ld);
         (self.n, self.me, self.ldh) = (n, me, n + me + SLACK);
@@ -67,13 +68,14 @@ impl System {
         B.rows[columns * ld..][..me * ld].copy_from_slice(&data.E[..me * ld]);
         for k in 0..columns + me {
             let row = &if k < columns { &data.K[k * ld..] } else { &data.E[(k - columns) * ld..] }[..ld];
-            // What W⁻¹ makes of a cone's rows has the blocks of all of them.
+            // W⁻¹ combines the rows of a cone: each result has the blocks of all of them.
             let mask = if k < columns { data.masks[k] } else { mask(row) };
             B.multiply([k, k], [mask, mask]);
         }
     }
 
-    /// Factorises P + B Bᵀ, where `B` has been written; false if even with the greatest regularisation it has no factor.
+    /// Factorises P + B Bᵀ, after `B` has been written; returns false if the factorisation fails with the greatest
+    /// regularisation.
     pub(super) fn factorize(&mut self, data: &Scaled) -> bool {
         let Self { H, ldh, B, n, me, inverse, .. } = self;
         let (n, me, ldh, ld) = (*n, *me, *ldh, data.ld);
@@ -106,7 +108,7 @@ impl System {
         false
     }
 
-    /// dx in place of r₁, dy in place of r₂, by the factor.
+    /// Replaces r₁ by dx and r₂ by dy, using the factor.
     fn solve_once(&mut self, data: &Scaled, x: &mut [f64], y: &mut [f64]) {
         let (n, me, ldh) = (self.n, self.me, self.ldh);
         let (L, (inverse, inverse_S)) = (View::new(&self.H, ldh), self.inverse[..n + me].split_at(n));
@@ -127,7 +129,7 @@ impl System {
         backward_solve(L, inverse, x);
     }
 
-    /// dx in place of r₁ and dy in place of r₂; writes K dx. `weigh` makes [D G dx; W⁻² F dx] of it, for `refinements`.
+    /// Replaces r₁ by dx and r₂ by dy; writes K dx. `weigh` turns it into [D G dx; W⁻² F dx], for `refinements`.
     pub(super) fn solve(
         &mut self,
         data: &Scaled,
@@ -174,7 +176,7 @@ impl System {
     }
 }
 
-/// The factor of −S in place of S, which is not positive; true if there is one.
+/// Replaces S, which is not positive, by the factor of −S; returns whether the factorisation succeeds.
 fn factorize_schur(S: &mut [f64], stride: usize, me: usize, regularisation: f64) -> bool {
     for j in 0..me {
         for x in &mut S[j * stride + j..][..me - j] {

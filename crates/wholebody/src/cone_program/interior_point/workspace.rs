@@ -1,4 +1,4 @@
-//! The iterate, its residuals, and the directions from it.
+//! The iterate, its residuals, and its directions.
 
 use super::bounds::{Direction, Residuals, Side, Target};
 use super::certificate::Candidate;
@@ -11,10 +11,10 @@ use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_product_vector, at_level, copy_scaled, dot, max_abs, transposed_product_vector,
 };
 
-/// A gap is relative to the objective, or to one unit of the program's cost, but to no less than this in the units of the method.
+/// Minimum of the cost's unit, in the method's units, in the size to which a gap is relative.
 const SMALL_COST: f64 = 1e-6;
 
-/// All memory but for the results.
+/// All memory except the results.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace {
     pub data: Scaled,
@@ -40,7 +40,7 @@ pub(super) struct Workspace {
     pub re: Vec<f64>,
 }
 
-/// D, and B: √D G and W⁻¹ F.
+/// Computes D and B: √D G and W⁻¹ F.
 struct Scale<'a> {
     data: &'a Scaled,
     sides: &'a [Side; 2],
@@ -63,25 +63,25 @@ impl Vectorized for Scale<'_> {
     }
 }
 
-/// How far an iterate is from a solution.
+/// Measures of an iterate's distance from a solution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measure {
-    /// sᵀ z for each bound or cone, and the size of the objective for each.
+    /// sᵀ z per bound or cone; the next field is the size of the objective per bound or cone.
     pub mu: f64,
     pub scale: f64,
     /// ‖P x + c − Kᵀ z − E y‖∞.
     pub dual: f64,
-    /// The greatest of residuals and gap, relative to the terms that they are differences of; NaN if one is not finite.
+    /// Greatest of residuals and gap, relative to the terms that they are differences of; NaN if one is not finite.
     pub error: f64,
-    /// What the iterate proves.
+    /// Status that the iterate proves.
     pub certificate: Option<Status>,
-    /// How far it is from proving that there is no solution.
+    /// Distance of the iterate from a proof that no solution exists.
     pub exclusion: f64,
 }
 
 impl Workspace {
     pub(super) fn new(capacity: Size) -> Self {
-        level(); // chosen now, as reading CONDYLE_LEVEL allocates
+        level(); // chosen now, because reading CONDYLE_LEVEL allocates
         let Size { unknowns: n, equalities, rows, cone_rows } = capacity;
         let (m, me, columns) = (rows + cone_rows, equalities + rows, rows + cone_rows);
         let vector = |length: usize| vec![0.0; length];
@@ -107,7 +107,7 @@ impl Workspace {
         }
     }
 
-    /// Whether all numbers of the iterate are finite.
+    /// Returns whether all numbers of the iterate are finite.
     pub(super) fn is_finite(&self) -> bool {
         let (n, me) = (self.data.n, self.data.equalities());
         let finite = |x: &[f64]| max_abs(x).is_finite();
@@ -118,7 +118,7 @@ impl Workspace {
             && finite(&self.cones.z[..rows])
     }
 
-    /// Residuals, D, and how far the iterate is from a solution.
+    /// Computes residuals, D, and the iterate's distance from a solution.
     pub(super) fn measure(&mut self) -> Measure {
         let Self { data, sides, cones, x, y, Kx, multipliers, Px, forces, rd, re, .. } = self;
         let (n, m, me, columns, ld) = (data.n, data.rows(), data.equalities(), data.columns(), data.ld);
@@ -167,7 +167,7 @@ impl Workspace {
         }
     }
 
-    /// D, W and B.
+    /// Computes D, W and B.
     pub(super) fn scale(&mut self) -> bool {
         let Self { data, sides, cones, D, system, .. } = self;
         if !cones.scale(&data.cones) {
@@ -177,8 +177,8 @@ impl Workspace {
         true
     }
 
-    /// The direction towards s ∘ z = `centre` e, corrected by the last one's second order or not; the inverse of the
-    /// greatest step.
+    /// Computes the direction towards s ∘ z = `centre` e, with `second_order` corrected by the last direction's
+    /// second-order term. Returns the inverse of the greatest step.
     pub(super) fn direction(&mut self, centre: f64, second_order: bool, refinements: usize) -> f64 {
         let Self { data, system, sides, cones, dx, dy, Kdx, target, D, rd, re, .. } = self;
         let (n, m, me, columns) = (data.n, data.rows(), data.equalities(), data.columns());

@@ -1,4 +1,4 @@
-//! How far a solution is from the conditions of Karush, Kuhn and Tucker.
+//! Errors of a solution in the Karush–Kuhn–Tucker conditions.
 
 use crate::cone_program::{ConeProgram, Multipliers};
 
@@ -10,14 +10,14 @@ fn radius(s: &[f64]) -> f64 {
     s.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// The errors, each relative to the terms that it is the difference of.
+/// Errors, each relative to the terms that it is the difference of.
 #[derive(Debug, Default)]
 pub(super) struct Errors {
     /// P x + c − Aᵀ y − Gᵀ z − Fᵀ w.
     pub stationarity: f64,
-    /// What constraints are exceeded by.
+    /// Violation of the constraints.
     pub primal: f64,
-    /// What w lies outside of its cone by.
+    /// Distance of w from its cone.
     pub dual: f64,
     /// zᵀ s over all bounds and cones, relative to the objective.
     pub complementarity: f64,

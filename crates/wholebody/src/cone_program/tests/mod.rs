@@ -1,4 +1,4 @@
-//! Both back ends on the same programs.
+//! Tests of both back ends on the same programs.
 
 mod allocations;
 mod closed_forms;

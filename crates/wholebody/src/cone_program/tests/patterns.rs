@@ -1,9 +1,9 @@
-//! clarabel's patterns grow with the numbers, and its rows with the solutions that they bind.
+//! Clarabel's patterns grow with non-zero numbers, and its rows grow with the limits that bind.
 
 use super::random::{Draw, Kind};
 use crate::cone_program::{Clarabel, ConeProgram, Settings, Size, Solver, Start, Status};
 
-/// Of x, of size one; both solves have the tolerance 1e-9.
+/// Tolerance of x, which has size one; both solves have the tolerance 1e-9.
 const AGREEMENT: f64 = 1e-6;
 
 fn assert_same(kept: &mut Clarabel, program: &ConeProgram) {
@@ -15,7 +15,7 @@ fn assert_same(kept: &mut Clarabel, program: &ConeProgram) {
     }
 }
 
-/// Zeros of P, A, G and F become numbers, and zeros again.
+/// Zeros of P, A, G and F become non-zero numbers, and zeros again.
 #[test]
 fn numbers_come_where_there_were_zeros() {
     for seed in 0..10 {
@@ -36,7 +36,7 @@ fn numbers_come_where_there_were_zeros() {
     }
 }
 
-/// ½ ‖x − a‖² within −1 ≤ x ≤ 1, whose solution is a cut off.
+/// Returns the program ½ ‖x − a‖² within −1 ≤ x ≤ 1, whose solution is a, clipped.
 fn within_a_box(a: [f64; 3]) -> ConeProgram {
     let mut program = ConeProgram::new(Size { unknowns: 3, equalities: 0, rows: 3, cone_rows: 0 });
     for i in 0..3 {
@@ -49,7 +49,7 @@ fn within_a_box(a: [f64; 3]) -> ConeProgram {
     program
 }
 
-/// The limits that a solution violates are found in the same solve, with their multipliers, whatever came before.
+/// Limits that a solution violates are found in the same solve, with their multipliers, after any earlier solves.
 #[test]
 fn limits_that_were_far_away_bind() {
     let mut kept = Clarabel::new(within_a_box([0.0; 3]).capacity(), Settings::default());
@@ -87,7 +87,7 @@ fn rows_left_out_change_no_status() {
     }
 }
 
-/// A row that was away for long is left out again, and comes back.
+/// A row that was away for a long time is left out again, and returns.
 #[test]
 fn limits_come_and_go() {
     let mut kept = Clarabel::new(within_a_box([0.0; 3]).capacity(), Settings::default());

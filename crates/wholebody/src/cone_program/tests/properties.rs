@@ -1,18 +1,18 @@
-//! Random programs of all kinds: conditions of optimality, agreement with clarabel.
+//! Random programs of all kinds: optimality conditions, and agreement with clarabel.
 
 use super::kkt::Errors;
 use super::random::{Draw, Kind};
 use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start};
 
-/// The solver's tolerance is 1e-9, relative to terms in its own units.
+/// Tolerance of the conditions; the solver's tolerance is 1e-9, relative to terms in its own units.
 const KKT_TOLERANCE: f64 = 1e-8;
-/// Both solvers' gaps together, relative to 1 + |objective|.
+/// Tolerance of the objective for the gaps of both solvers, relative to 1 + |objective|.
 const OBJECTIVE_TOLERANCE: f64 = 1e-6;
-/// Of entries of x of size one, from solutions with [`SHARP`] where P has no eigenvalue below 0.1.
+/// Tolerance of entries of x of size one, from solutions with [`SHARP`] where P has no eigenvalue below 0.1.
 const X_TOLERANCE: f64 = 1e-6;
 const SHARP: Settings = Settings { tolerance: 1e-12, max_iterations: 50, time_limit: f64::INFINITY };
 
-/// Sizes: unknowns, and equalities, rows, cones.
+/// Sizes: unknowns; equalities, rows and cones.
 const SHAPES: [(usize, [usize; 3]); 8] = [
     (1, [0, 3, 0]),
     (2, [0, 2, 1]),
@@ -23,7 +23,7 @@ const SHAPES: [(usize, [usize; 3]); 8] = [
     (44, [0, 96, 8]),
     (60, [6, 120, 16]),
 ];
-/// Programs of each shape.
+/// Number of programs of each shape.
 const DRAWS: u64 = 8;
 
 fn each(mut check: impl FnMut(Kind, &ConeProgram, String)) {
@@ -57,7 +57,7 @@ fn both_back_ends_find_the_same_optimum() {
         let reference = clarabel.solve(program, Start::Cold);
         let sharp = reference.stopped.is_none() && !reference.reduced;
         if !sharp {
-            // 1e-12 is more than it can do here.
+            // Clarabel cannot reach 1e-12 here.
             clarabel = Clarabel::new(program.capacity(), Settings::default());
             assert_eq!(clarabel.solve(program, Start::Cold).stopped, None, "{name}");
         }
@@ -72,7 +72,7 @@ fn both_back_ends_find_the_same_optimum() {
     });
 }
 
-/// Each cone as a pyramid of so many sides, on its inside or around it.
+/// Replaces each cone by a pyramid with this number of sides, inscribed or circumscribed.
 fn pyramids(program: &ConeProgram, sides: usize, inside: bool) -> ConeProgram {
     let (n, cones) = (program.size.unknowns, program.cones.len());
     let rows = program.size.rows + sides * cones;
@@ -101,7 +101,8 @@ fn pyramids(program: &ConeProgram, sides: usize, inside: bool) -> ConeProgram {
     out
 }
 
-/// The optimum lies between those of inscribed and circumscribed pyramids, which meet it as their sides increase.
+/// The optimum lies between the optima with inscribed and circumscribed pyramids, which converge as the number of sides
+/// grows.
 #[test]
 fn the_optimum_lies_between_those_of_pyramids() {
     let walk = super::walk::Walk::humanoid(3);

@@ -1,27 +1,27 @@
-//! Programs drawn at random, each of a kind that a solver may stumble over.
+//! Random programs, each of a kind that a solver may fail on.
 
 use crate::cone_program::{ConeProgram, Size};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-/// What is special in a program.
+/// Special property of a program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// Strictly convex and strictly feasible.
     Plain,
-    /// Rows, equalities and cones that stand there twice.
+    /// Rows, equalities and cones that occur twice.
     Duplicates,
     /// Rows with l = u.
     Fixed,
     /// Cones without coefficients: apex and interior.
     ZeroCones,
-    /// A minimiser at a vertex: almost no P.
+    /// A minimiser at a vertex: P is almost zero.
     Vertex,
-    /// P of half the rank, everything in a box.
+    /// P with half rank, all unknowns in a box.
     Semidefinite,
     /// Rows and cones scaled by 1e-4 … 1e4.
     BadlyScaled,
-    /// Only one row, or one cone, constrains.
+    /// A single row or a single cone as the only constraint.
     Few,
 }
 
@@ -45,12 +45,12 @@ impl Draw {
         Self(StdRng::seed_from_u64(seed))
     }
 
-    /// From −1 to 1.
+    /// Returns a number from −1 to 1.
     pub(super) fn number(&mut self) -> f64 {
         2.0 * self.0.random::<f64>() - 1.0
     }
 
-    /// From 0 to 1.
+    /// Returns a number from 0 to 1.
     pub(super) fn share(&mut self) -> f64 {
         self.0.random()
     }
@@ -59,7 +59,7 @@ impl Draw {
         (0..n).map(|_| self.number()).collect()
     }
 
-    /// P = R Rᵀ + a I with R of such a rank.
+    /// Sets P = R Rᵀ + a I, with R of this rank.
     pub(super) fn cost(&mut self, program: &mut ConeProgram, rank: usize, a: f64) {
         let n = program.size.unknowns;
         let R = nalgebra::DMatrix::from_fn(n, rank, |_, _| self.number());
@@ -69,7 +69,7 @@ impl Draw {
         }
     }
 
-    /// A feasible and bounded program with `n` unknowns and so many constraints.
+    /// Returns a feasible and bounded program with `n` unknowns and these numbers of constraints.
     pub(super) fn program(&mut self, kind: Kind, n: usize, [equalities, rows, cones]: [usize; 3]) -> ConeProgram {
         let dims: Vec<usize> = (0..cones).map(|k| [3, 3, 4, 2, 5, 1][k % 6]).collect();
         let cone_rows = dims.iter().sum();
@@ -91,7 +91,7 @@ impl Draw {
             }
         }
         if matches!(kind, Kind::Semidefinite | Kind::Vertex) {
-            // a box around what is free
+            // a box around the free unknowns
             for i in 0..rows.min(n) {
                 program.Gt.column_mut(i).fill(0.0);
                 program.Gt[(i, i)] = 1.0;

@@ -10,7 +10,7 @@ fn ours(program: &ConeProgram) -> InteriorPoint {
     InteriorPoint::new(program.capacity(), Settings::default())
 }
 
-/// Feasible, with a last row, a last equality and a last cone that a test spoils.
+/// Returns a feasible program with a last row, a last equality and a last cone, which tests spoil.
 fn program(seed: u64) -> ConeProgram {
     Draw::new(seed).program(Kind::Plain, 12, [2, 20, 4])
 }
@@ -88,7 +88,7 @@ fn numbers_that_are_not_finite_are_named() {
         }
     }
     let mut program = program(1);
-    program.P[(3, 5)] = f64::NAN; // is not read
+    program.P[(3, 5)] = f64::NAN; // not read
     program.lower[2] = f64::INFINITY;
     let stopped = ours(&program).solve(&program, Start::Cold).stopped;
     assert_eq!(stopped, Some(Status::NotFinite { name: "lower", index: 2 }));
@@ -111,7 +111,7 @@ fn limits_end_a_solve_with_a_finite_iterate() {
     }
 }
 
-/// Numbers so great or so different that no one could solve the program: whatever the status, nothing is NaN.
+/// Numbers too large or too different in size for any solver: for every status, no result is NaN.
 #[test]
 fn wild_numbers_never_become_nan() {
     for seed in 0..200 {

@@ -1,4 +1,4 @@
-//! Programs of the size and the structure of a whole-body controller's, which move slowly from tick to tick.
+//! Programs with the size and structure of a whole-body controller's programs, changing slowly from tick to tick.
 
 use super::random::Draw;
 use crate::cone_program::{ConeProgram, Size};
@@ -9,33 +9,33 @@ const FRICTION: f64 = 0.6;
 /// Seconds from one tick to the next.
 const TICK: f64 = 0.002;
 
-/// A robot-like sequence: x = (accelerations, forces at points).
+/// Sequence of programs as for a robot: x = (accelerations, forces at points).
 #[derive(Clone)]
 pub(super) struct Walk {
     accelerations: usize,
     points: usize,
     tasks: DMatrix<f64>,
     weights: Vec<f64>,
-    /// Amplitude, frequency and phase of what each task asks for, and of each limit's offset.
+    /// Amplitude, frequency and phase of each task's target; the next field: of each limit's offset.
     motion: Vec<[f64; 3]>,
     offsets: Vec<[f64; 3]>,
     references: Vec<[f64; 3]>,
     rows: DMatrix<f64>,
     limits: Vec<f64>,
-    /// What each coefficient of the rows changes with.
+    /// Amplitude of the change of each coefficient of the rows.
     drift: DMatrix<f64>,
     load: f64,
-    /// What the references are disturbed by at each tick, and at every fiftieth, relative to their size.
+    /// Disturbance of the references at each tick and at every fiftieth tick, relative to their size.
     noise: [f64; 2],
 }
 
 impl Walk {
-    /// A humanoid: 44 unknowns, 32 efforts, 64 accelerations, 8 points.
+    /// Creates a humanoid's programs: 44 unknowns, 32 efforts, 64 accelerations, 8 points.
     pub(super) fn humanoid(seed: u64) -> Self {
         Self::new(seed, 20, 8, [32, 64], 30)
     }
 
-    /// A quadruped: 18 unknowns, 12 efforts, 12 accelerations, 4 points.
+    /// Creates a quadruped's programs: 18 unknowns, 12 efforts, 12 accelerations, 4 points.
     pub(super) fn quadruped(seed: u64) -> Self {
         Self::new(seed, 6, 4, [12, 12], 10)
     }
@@ -72,7 +72,7 @@ impl Walk {
         }
     }
 
-    /// The same with references that are disturbed.
+    /// Returns the same sequence with disturbed references.
     pub(super) fn disturbed(self, noise: [f64; 2]) -> Self {
         Self { noise, ..self }
     }
@@ -86,7 +86,7 @@ impl Walk {
         program
     }
 
-    /// The program of a tick.
+    /// Writes the program of a tick.
     pub(super) fn write(&self, tick: usize, program: &mut ConeProgram) {
         let (n, na, t) = (program.size.unknowns, self.accelerations, TICK * tick as f64);
         let wave = |[amplitude, frequency, phase]: [f64; 3]| amplitude * (frequency * t + phase).sin();
@@ -95,7 +95,7 @@ impl Walk {
         program.P.fill(0.0);
         program.c.fill(0.0);
         for j in 0..n {
-            // Forces are drawn to their references, some of which lie outside of the cones.
+            // Forces are attracted to their references, some of which lie outside of the cones.
             program.P[(j, j)] = 1e-3;
             if j >= na {
                 let reference = if (j - na) % 3 == 2 {

@@ -1,13 +1,14 @@
-//! Sequences of programs: the last solution helps, and what is left of it never harms.
+//! Sequences of programs: the last solution helps, and its remains never harm.
 
 use super::kkt::Errors;
 use super::random::{Draw, Kind};
 use super::walk::Walk;
 use crate::cone_program::{InteriorPoint, Settings, Solver, Start};
 
-/// The solver's 1e-9 is relative to the greatest term of all, here each row is measured by its own terms.
+/// Tolerance of the conditions. The solver's 1e-9 is relative to the greatest of all terms; here each row is measured
+/// by its own terms.
 const KKT_TOLERANCE: f64 = 1e-7;
-/// Both gaps together, relative to the objective.
+/// Tolerance of the objective for both gaps together, relative to the objective.
 const OBJECTIVE_TOLERANCE: f64 = 1e-8;
 const TICKS: usize = 200;
 
@@ -37,7 +38,7 @@ fn a_sequence_that_moves_slowly_takes_half_the_iterations() {
     }
 }
 
-/// From the solution of another program, however different, of the same or of another size.
+/// Starts from the solution of another, very different program of the same or another size.
 #[test]
 fn a_useless_start_gives_way() {
     let mut solver = None;
@@ -57,7 +58,7 @@ fn a_useless_start_gives_way() {
     }
 }
 
-/// What was solved before leaves nothing behind: the same bits as from a new solver.
+/// Earlier solves leave nothing behind: a cold start gives the same bits as a new solver.
 #[test]
 fn a_cold_start_has_no_memory() {
     let mut used: Option<InteriorPoint> = None;
