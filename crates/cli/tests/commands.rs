@@ -264,7 +264,7 @@ fn what_is_wrong_is_named_in_one_line() {
         (&["check", &empty], "empty.urdf: has no XML element"),
         (&["budget", &negative], "negative.urdf:"),
         (&["inspect", folder.to_str().unwrap()], "expected a file, found a folder"),
-        (&["inspect", &mjcf, "--root", "free"], "--root: an MJCF says itself"),
+        (&["inspect", &mjcf, "--root", "free"], "--root: not for an MJCF"),
         (&["inspect", "arm7", "--root", "fre"], "'free'"),
         (&["budget", "quadruped", "--contacts", "LF_fot"], "unknown frame `LF_fot`; nearest is `LF_foot`"),
         (&["budget", "arm7", "--rate", "-5"], "--rate: must be above 0, not -5"),

@@ -116,7 +116,7 @@ fn limits_are_counted() {
             format!("{robot} limits {positions} of 2 positions, {velocities} of 2 velocities, {efforts} of 2 efforts");
         let total = positions + velocities + efforts;
         let sentence = match total {
-            0 => format!("{robot} limits no position, velocity or effort: there was none to check"),
+            0 => format!("{robot} limits no position, velocity or effort: nothing to check"),
             1 => format!("{counts}: the limit holds at all knots"),
             _ => format!("{counts}: all {total} hold at all knots"),
         };

@@ -212,10 +212,10 @@ compiled! {
     /// Implements [`OuterProducts::add_to`].
     fn add_products<V, COLUMNS>(h: &mut [f64], ldh: usize, sum: Sum<'_>) {
         let Sum { rows, stride, size, places } = sum;
-        assert!(size + SLACK <= stride, "rows without slack");
+        assert!(size + SLACK <= stride, "rows without padding");
         for Place { at: [left, right], length, .. } in places {
             let inside = [left, right].iter().all(|at| **at <= rows.len() && *length <= rows.len() - **at);
-            assert!(inside, "a product of rows that there are not");
+            assert!(inside, "a product of rows that do not exist");
         }
         let (wide, mut j) = (block(stride).trailing_zeros(), 0);
         while j < size {

@@ -48,7 +48,7 @@ impl Runs {
     /// If one of the rows does not contain all indices and [`SLACK`] numbers of padding after them.
     #[inline(always)]
     pub fn copy_scaled<V: Vector>(&self, row: &[f64], a: f64, to: &mut [f64]) {
-        assert!(self.ends[0] + SLACK <= row.len() && self.ends[1] + SLACK <= to.len(), "rows without slack");
+        assert!(self.ends[0] + SLACK <= row.len() && self.ends[1] + SLACK <= to.len(), "rows without padding");
         let a = V::splat(a);
         for &[from, place, length] in &self.runs {
             let mut i = 0;

@@ -31,7 +31,7 @@ narrow! {
         let slack = rows + V::N.max(COLUMNS) - 1;
         assert!(m <= size && size <= rows && reach <= rows, "a triangle with more columns than rows");
         assert!(holds(h, stride, [slack, size]), "a matrix ends before the last of its entries");
-        assert!(count == 0 || holds(x.data, x.stride, [rows + 4 * V::N, count]), "a row without slack");
+        assert!(count == 0 || holds(x.data, x.stride, [rows + 4 * V::N, count]), "a row without padding");
         let sum = Sum { x, count, reach };
         for j in 0..m {
             let mut i = j;

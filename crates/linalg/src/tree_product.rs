@@ -92,7 +92,7 @@ impl<'a> Inside<'a> {
         for &k in rows {
             last = last.max(k);
         }
-        assert!(last < n, "a row that there is not");
+        assert!(last < n, "a row index is too large");
         Self { rows, n }
     }
 }

@@ -33,7 +33,10 @@ impl<'a, A, B> Parts<'a, A, B> {
     /// If the cuts do not ascend from 0 to the length of both slices.
     pub fn new(first: &'a mut [A], second: &'a mut [B], cuts: &'a [usize], states: &'a mut Vec<AtomicU8>) -> Self {
         let covers = cuts.first() == Some(&0) && cuts.last() == Some(&first.len());
-        assert!(covers && cuts.is_sorted() && first.len() == second.len(), "parts that are not those of the slices");
+        assert!(
+            covers && cuts.is_sorted() && first.len() == second.len(),
+            "cuts do not ascend from 0 to the length of both slices"
+        );
         states.clear();
         states.resize_with(cuts.len() - 1, || AtomicU8::new(0));
         let (first, second) = (first.as_mut_ptr(), second.as_mut_ptr());
@@ -66,7 +69,7 @@ impl<'a, A, B> Parts<'a, A, B> {
         true
     }
 
-    /// Returns whether a part has not yet begun a stage: it waits for this stage, or an earlier stage is not finished.
+    /// Returns whether a stage of a part has yet to begin: the part waits for it, or an earlier stage is not finished.
     pub fn awaits(&self, part: usize, stage: u8) -> bool {
         self.states[part].load(Ordering::Relaxed) <= 2 * stage
     }

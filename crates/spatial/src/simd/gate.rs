@@ -85,7 +85,7 @@ macro_rules! kernel {
             if !$S::COMPILED {
                 return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
-            $(assert!(is::<$R, f64>(), "the constants of a model for numbers are numbers");)?
+            $(assert!(is::<$R, f64>(), "model constants for f64 and its lanes are f64");)?
             let f64 = is::<$S, f64>();
             $crate::if_vectors!({
                 use $crate::simd::gate::{Fused, Level, level};

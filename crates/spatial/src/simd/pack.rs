@@ -184,7 +184,10 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
         let fits = |last: Option<usize>, length: usize| last.is_some_and(|last| last < length);
         let (entry, place) = (last(down, along), last(stride, 1));
         assert!(fits(entry, from.len()), "a matrix ends before its last entry");
-        assert!(to.len() <= S::LANES && to.iter().all(|to| fits(place, to.len())), "no place for the last entry");
+        assert!(
+            to.len() <= S::LANES && to.iter().all(|to| fits(place, to.len())),
+            "a target ends before the last entry"
+        );
         let mut offsets = [0; MOST]; // offsets of the vectors of a tile
         if columns < S::LANES && stride == columns && rows * columns >= S::LANES {
             // Narrow rows without gaps are treated as one long row. Each tile except the last begins at the start of a
@@ -326,7 +329,7 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     }
     #[inline(always)]
     fn store(self, to: &mut [T]) {
-        *to.first_chunk_mut().expect("a place for each lane") = self.to_array();
+        *to.first_chunk_mut().expect("a slot for each lane") = self.to_array();
     }
     #[inline(always)]
     fn transpose(rows: &mut [Self]) {
