@@ -1,4 +1,4 @@
-//! Scene of the page: shapes and meshes from the robot's file, or bones between the joints if there are none.
+//! Scene of the page: shapes and meshes from the robot's file, or bones between the joints of robots without shapes.
 
 use crate::robot::{Format, Robot};
 use crate::visuals::{self, Geometry};

@@ -119,7 +119,7 @@ mod tests {
 
     /// Checks that each readable visual has its link, pose and colour.
     #[test]
-    fn of_each_link() {
+    fn visuals_of_each_link() {
         let visuals = read(ROBOT);
         let of: Vec<_> = visuals.iter().map(|v| (v.link.as_str(), &v.geometry, v.color)).collect();
         assert_eq!(
@@ -138,7 +138,7 @@ mod tests {
 
     /// Checks that a robot that the reader accepts has visuals, even if its text is not strict XML.
     #[test]
-    fn of_robots_that_are_not_strict() {
+    fn visuals_of_robots_that_are_not_strict_xml() {
         let prolog = "<!------ a ------>\n<?xml version='1.0'?><!DOCTYPE robot>";
         let text = format!("{prolog}{}", ROBOT.replace("<link name=\"b\">", "<gz:a/><link name=\"b\">"));
         assert_eq!(read(&text), read(ROBOT));
@@ -146,7 +146,7 @@ mod tests {
 
     /// Checks that a text without a robot, or a robot without shapes, has no visuals.
     #[test]
-    fn of_nothing() {
+    fn visuals_of_invalid_texts() {
         assert_eq!(read("<robot"), []);
         assert_eq!(read("<robot name='r'><link name='a'><visual><geometry/></visual></link></robot>"), []);
     }

@@ -1,4 +1,4 @@
-//! Parts that several threads work on.
+//! Parts on which several threads work.
 
 use condyle_linalg::threads::Parts;
 use std::panic::{AssertUnwindSafe, catch_unwind};

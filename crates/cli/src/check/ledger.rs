@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_fails_and_stays() {
+    fn nan_fails_and_stays() {
         let mut row = Row::new("", "", "");
         row.compare(&[f64::NAN, 1.0], &[0.0, 1.0], 0.0, 1e-10);
         row.compare(&[1.0], &[1.0], 0.0, 1e-10);
