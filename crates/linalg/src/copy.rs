@@ -13,7 +13,8 @@ narrow! {
     }
 
     /// Writes the symmetric matrix whose lower triangle is in A, of `size` rows, cyclically shifted. Row i of A becomes
-    /// row (i + `turn`) mod `size` of OUT, and likewise for columns. Both have padding rows; the padding of OUT changes.
+    /// row (i + `turn`) mod `size` of OUT, and likewise for columns. Both have padding rows; the padding of OUT
+    /// changes.
     pub fn copy_symmetric_turned<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize, turn: usize) {
         turned::<V>(out, ldo, a, [size - turn, turn]);
     }

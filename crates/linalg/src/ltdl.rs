@@ -294,8 +294,8 @@ impl<S: Scalar> Ltdl<S> {
 
     /// Computes X = M⁻¹, the full symmetric matrix, in O(n² d).
     ///
-    /// In L X = D⁻¹ L⁻ᵀ, the right side is upper triangular, so row k of X follows from the rows above: X_kj = −Σ L_ke
-    /// X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
+    /// In L X = D⁻¹ L⁻ᵀ, the right side is upper triangular, so row k of X follows from the rows above:
+    /// X_kj = −Σ L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
     ///
     /// # Panics
     /// If `X` is not nv × nv.

@@ -1,6 +1,6 @@
 //! Work sharing with rayon's threads, also in a process that was forked from a process with such threads.
 //!
-//! fork() copies the memory of a process, but only the thread that calls it. The child has a copy of the parent's
+//! fork() copies the memory of a process, but only one of its threads: the caller. The child has a copy of the parent's
 //! thread pool without its threads, and waiting for this pool never ends. So each process starts its own pool.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};

@@ -10,12 +10,12 @@ use crate::algebra::se3::Se3;
 use crate::algebra::vector::{Mat3, Sym3, Vec3};
 use crate::scalar::Scalar;
 
-/// Computes the entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, at t = θ²: cos θ, sin θ/θ, (1 − cos θ)/θ², (θ
-/// − sin θ)/θ³, (cos θ − 1 + θ²/2)/θ⁴, (sin θ − θ + θ³/6)/θ⁵.
+/// Computes the entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, at t = θ²:
+/// cos θ, sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, (cos θ − 1 + θ²/2)/θ⁴, (sin θ − θ + θ³/6)/θ⁵.
 ///
-/// Source: Stumpff (1959). For t < 1, c₄ and c₅ are computed by their series, and the others by the recurrence cₖ =
-/// 1/k! − t cₖ₊₂, to full relative precision (without cancellation). For t ≥ 1, sine and cosine and the same recurrence
-/// upwards give errors within 1e-15.
+/// Source: Stumpff (1959). For t < 1, c₄ and c₅ are computed by their series, and the others by the recurrence
+/// cₖ = 1/k! − t cₖ₊₂, to full relative precision (without cancellation). For t ≥ 1, sine and cosine and the same
+/// recurrence upwards give errors within 1e-15.
 ///
 /// ```
 /// let c = condyle_spatial::lie::stumpff(0.0_f64);
@@ -123,8 +123,9 @@ fn log3_near<S: Scalar>(n2: S, w: S) -> S {
 }
 
 /// Returns the coefficient a = 1/θ² − (cot(θ/2))/(2θ) of w×² in the inverse Jacobians, and its derivative a' with
-/// respect to t = θ². a = (c₂ − c₃)/(4 c₁) with c at θ/2. From cₖ' = (k cₖ₊₂ − cₖ₊₁)/2, a' = a²/2 − (c₃ − 3 c₄ + 3
-/// c₅)/(32 c₁).
+/// respect to t = θ².
+///
+/// With c at θ/2, a = (c₂ − c₃)/(4 c₁). From cₖ' = (k cₖ₊₂ − cₖ₊₁)/2 follows a' = a²/2 − (c₃ − 3 c₄ + 3 c₅)/(32 c₁).
 #[inline(always)]
 fn inverse_coefficient<S: Scalar>(t: S) -> [S; 2] {
     let c = stumpff(t * S::splat(0.25));
@@ -218,9 +219,11 @@ impl<S: Scalar> core::ops::Mul for MotionMap<S> {
     }
 }
 
-/// Returns the map with A = 1 + a w× + b w×² for the twist (v, w). B is the derivative of A with respect to w along v.
-/// `da` and `db` are the derivatives a', b' with respect to |w|². B = y× + w× x× + x× w×, with y = a v + 2 a' (v·w) w
-/// and x = b v + b' (v·w) w.
+/// Returns the map with A = 1 + a w× + b w×² for the twist (v, w), where B is the derivative of A with respect to w
+/// along v.
+///
+/// `da` and `db` are the derivatives a', b' with respect to |w|². B = y× + w× x× + x× w×,
+/// with y = a v + 2 a' (v·w) w and x = b v + b' (v·w) w.
 #[inline(always)]
 fn series_map<S: Scalar>(
     Motion { linear: v, angular: w }: Motion<S>,
