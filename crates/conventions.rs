@@ -1,34 +1,36 @@
-//! Numbers of other libraries: orders and frames, both ways.
+//! Conversions to and from the conventions of other libraries: order of components, and frames.
 //!
-//! In Rust the parts of motions and forces have names, so what needs converting is six bare numbers, and the position and
-//! velocity of a body that moves freely. Condyle's and Pinocchio's own: q = [x, y, z, qx, qy, qz, qw], v = [linear, angular]
-//! along the body's axes. The book's page on conversions (`docs/conversions.md`) has the tables; `condyle.conventions` in
-//! Python does the same for whole robots.
+//! In Rust, the parts of motions and forces have names. Only bare arrays of six numbers need conversion, and the
+//! position and velocity of a free body.
+//!
+//! Condyle and Pinocchio both use q = [x, y, z, qx, qy, qz, qw] and v = [linear, angular] along the body's axes. The
+//! book's page on conversions (`docs/conversions.md`) has the tables; `condyle.conventions` in Python does the same for
+//! whole robots.
 #![allow(non_snake_case)] // R, as in the formulas
 
 use condyle_dynamics::{Mat3, Quaternion, Vec3};
 
-/// The spatial vector with its angular part first, as Featherstone, RBDL, Drake and MuJoCo's `cvel` have it.
+/// Returns the spatial vector with its angular part first, as Featherstone, RBDL, Drake and MuJoCo's `cvel` store it.
 pub fn angular_first([a, b, c, d, e, f]: [f64; 6]) -> [f64; 6] {
     [d, e, f, a, b, c]
 }
 
-/// The spatial vector with its linear part first, as here, of one with its angular part first.
+/// Returns the spatial vector with its linear part first, as Condyle stores it. `x` has its angular part first.
 pub fn from_angular_first(x: [f64; 6]) -> [f64; 6] {
     angular_first(x)
 }
 
-/// The quaternion w, x, y, z of one that is x, y, z, w.
+/// Converts a quaternion from the order x, y, z, w to the order w, x, y, z.
 pub fn wxyz([x, y, z, w]: [f64; 4]) -> [f64; 4] {
     [w, x, y, z]
 }
 
-/// The quaternion x, y, z, w of one that is w, x, y, z.
+/// Converts a quaternion from the order w, x, y, z to the order x, y, z, w.
 pub fn xyzw([w, x, y, z]: [f64; 4]) -> [f64; 4] {
     [x, y, z, w]
 }
 
-/// R of the quaternion in q: coordinates in the body to coordinates in the world.
+/// Returns the rotation matrix R of the quaternion in q. R maps coordinates in the body to coordinates in the world.
 fn rotation(q: &[f64; 7]) -> Mat3<f64> {
     Quaternion::new(q[3], q[4], q[5], q[6]).to_rotation()
 }
@@ -41,7 +43,8 @@ fn joined(a: Vec3<f64>, b: Vec3<f64>) -> [f64; 6] {
     [a.x, a.y, a.z, b.x, b.y, b.z]
 }
 
-/// A free body in MuJoCo: qpos = [position, w, x, y, z], qvel = [linear along the world's axes, angular along the body's].
+/// Free body in MuJoCo: qpos = [position, w, x, y, z], qvel = [linear along the world's axes, angular along the body's
+/// axes].
 ///
 /// ```
 /// use condyle::conventions::MuJoCo;
@@ -55,29 +58,29 @@ fn joined(a: Vec3<f64>, b: Vec3<f64>) -> [f64; 6] {
 pub struct MuJoCo;
 
 impl MuJoCo {
-    /// Its positions, of ours.
+    /// Converts our q to MuJoCo's qpos.
     pub fn position([x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> [f64; 7] {
         [*x, *y, *z, *qw, *qx, *qy, *qz]
     }
 
-    /// Our positions, of its.
+    /// Converts MuJoCo's qpos to our q.
     pub fn position_from([x, y, z, qw, qx, qy, qz]: &[f64; 7]) -> [f64; 7] {
         [*x, *y, *z, *qx, *qy, *qz, *qw]
     }
 
-    /// Its velocities, of our q and v: ṗ = R v, ω.
+    /// Converts our q and v to MuJoCo's qvel: ṗ = R v, ω.
     pub fn velocity(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         joined(rotation(q) * vec3(&v[..3]), vec3(&v[3..]))
     }
 
-    /// Our velocities, of its positions and velocities: v = Rᵀ ṗ, ω.
+    /// Converts MuJoCo's qpos and qvel to our v: v = Rᵀ ṗ, ω.
     pub fn velocity_from(qpos: &[f64; 7], qvel: &[f64; 6]) -> [f64; 6] {
         let R = rotation(&Self::position_from(qpos));
         joined(R.transpose() * vec3(&qvel[..3]), vec3(&qvel[3..]))
     }
 }
 
-/// A free body in Drake: q = [w, x, y, z, position], v = [angular, linear], both along the world's axes.
+/// Free body in Drake: q = [w, x, y, z, position], v = [angular, linear], both along the world's axes.
 ///
 /// ```
 /// use condyle::conventions::Drake;
@@ -91,23 +94,23 @@ impl MuJoCo {
 pub struct Drake;
 
 impl Drake {
-    /// Its positions, of ours.
+    /// Converts our q to Drake's q.
     pub fn position([x, y, z, qx, qy, qz, qw]: &[f64; 7]) -> [f64; 7] {
         [*qw, *qx, *qy, *qz, *x, *y, *z]
     }
 
-    /// Our positions, of its.
+    /// Converts Drake's q to our q.
     pub fn position_from([qw, qx, qy, qz, x, y, z]: &[f64; 7]) -> [f64; 7] {
         [*x, *y, *z, *qx, *qy, *qz, *qw]
     }
 
-    /// Its velocities, of our q and v: R ω, R v.
+    /// Converts our q and v to Drake's v: R ω, R v.
     pub fn velocity(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         let R = rotation(q);
         joined(R * vec3(&v[3..]), R * vec3(&v[..3]))
     }
 
-    /// Our velocities, of its positions and velocities: Rᵀ ṗ, Rᵀ ω.
+    /// Converts Drake's q and v to our v: Rᵀ ṗ, Rᵀ ω.
     pub fn velocity_from(q: &[f64; 7], v: &[f64; 6]) -> [f64; 6] {
         let R = rotation(&Self::position_from(q)).transpose();
         joined(R * vec3(&v[3..]), R * vec3(&v[..3]))

@@ -1,9 +1,9 @@
-//! The error of the façade, to which those of all its crates convert.
+//! Error type of the façade. The errors of all its crates convert to it.
 
-/// Error of this library: those of all its crates convert to it, so that `?` works across them in one function.
+/// Error of this library. The errors of all its crates convert to it, so that `?` works across them in one function.
 ///
-/// Each part keeps an error of its own: [`ModelError`](crate::ModelError) of models and dynamics, `optimal::Error`,
-/// `wholebody::Error` and `wholebody::Status`. Its message and its source are those of the part.
+/// Each part keeps its own error type: [`ModelError`](crate::ModelError) for models and dynamics, `optimal::Error`,
+/// `wholebody::Error` and `wholebody::Status`. Message and source are passed on unchanged.
 ///
 #[cfg_attr(all(feature = "loaders", feature = "optimal", feature = "wholebody"), doc = "```")]
 #[cfg_attr(not(all(feature = "loaders", feature = "optimal", feature = "wholebody")), doc = "```ignore")]
@@ -37,20 +37,20 @@
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Error of a robot's description, of a name that is looked up in it, or of a state.
+    /// Error in a robot's description, in a name that is looked up in it, or in a state.
     #[error(transparent)]
     Model(#[from] condyle_dynamics::Error),
-    /// Inertia that no body of positive density has.
+    /// Inertia that no body of positive density can have.
     #[error(transparent)]
     NotPhysical(#[from] condyle_dynamics::inertial_parameters::NotPhysical),
-    /// Level of vectors that the processor does not support.
+    /// SIMD level that the processor does not support.
     #[error(transparent)]
     Level(#[from] condyle_dynamics::level::Unsupported),
-    /// Error of a problem, a warm start or the settings of a solver.
+    /// Error in a problem, in a warm start or in the settings of a solver.
     #[cfg(feature = "optimal")]
     #[error(transparent)]
     Optimal(#[from] condyle_optimal::Error),
-    /// Sweep that stopped before the first knot.
+    /// Sweep that stopped before it reached the first knot.
     #[cfg(feature = "optimal")]
     #[error(transparent)]
     Sweep(#[from] condyle_optimal::SweepError),
@@ -58,7 +58,7 @@ pub enum Error {
     #[cfg(feature = "wholebody")]
     #[error(transparent)]
     WholeBody(#[from] condyle_wholebody::Error),
-    /// Step of a whole-body controller that was not solved.
+    /// Step of a whole-body controller whose quadratic program was not solved.
     #[cfg(feature = "wholebody")]
     #[error(transparent)]
     Step(#[from] condyle_wholebody::Status),

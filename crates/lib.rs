@@ -10,7 +10,8 @@ pub use error::Error;
 #[cfg(all(feature = "optimal", feature = "wholebody"))]
 pub use plan::plan_of;
 
-/// Models and algorithms, all in one module. The names used most are at the top of this crate, the others in modules by theme.
+/// Models and algorithms in one module. The names used most are at the top of this crate, the others in modules by
+/// topic.
 #[doc(no_inline)]
 pub use condyle_dynamics as dynamics;
 #[cfg(feature = "optimal")]
@@ -59,7 +60,7 @@ pub mod configuration {
     };
 }
 
-/// Impacts, inverse dynamics under constraints, and the types of constraints and results.
+/// Impacts, inverse dynamics under constraints, and the types of constraints and of their results.
 pub mod constraints {
     pub use condyle_dynamics::{
         Constrained, ConstrainedDerivatives, ConstrainedEquations, ConstrainedInverse, ConstrainedInverseDerivatives,
@@ -69,7 +70,7 @@ pub mod constraints {
     };
 }
 
-/// Results of derivatives, second derivatives, and derivatives of other terms.
+/// Results of first and second derivatives, and derivatives of further terms.
 pub mod derivatives {
     pub use condyle_dynamics::{
         AbaDerivatives, AbaHessian, CoriolisDerivatives, EnergyDerivatives, Input, LaneJacobian, RneaDerivatives,
@@ -83,7 +84,7 @@ pub mod divide_conquer {
     pub use condyle_dynamics::{AssemblySize, DivideConquer};
 }
 
-/// Factors of the inertia matrix, and forward dynamics by them.
+/// Factors of the inertia matrix, and forward dynamics that use them.
 pub mod factors {
     pub use condyle_dynamics::{Cholesky, ColumnTree, ForwardDynamicsMethod, Ltdl, forward_dynamics};
 }
@@ -118,7 +119,7 @@ pub mod tree {
     };
 }
 
-/// The Rust blocks of the book, as doctests.
+/// Rust code blocks of the book, run as doctests.
 #[cfg(doctest)]
 mod book {
     #[doc = include_str!("../docs/lanes.md")]

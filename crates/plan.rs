@@ -1,14 +1,16 @@
-//! From an optimal control problem's solution to what the whole-body controller tracks.
+//! Conversion of the solution of an optimal control problem into a plan for the whole-body controller.
 
 use condyle_dynamics::Model;
 use condyle_optimal::Solution;
 use condyle_wholebody::{Error, Plan, PlanData};
 
-/// The plan of a solution, for [`WholeBodyController::track`](condyle_wholebody::WholeBodyController::track).
+/// Returns the plan of a solution, for [`WholeBodyController::track`](condyle_wholebody::WholeBodyController::track).
 ///
-/// times: of the N + 1 knots (s); an impact's two knots share theirs. touches: whether each of the controller's contacts
-/// touches from each knot to the next, flat: N·contacts. fade: over how long contacts are loaded and unloaded (s). Controls
-/// and gains are taken over from knots that have one control for each actuated coordinate; impacts have none.
+/// - `times`: times of the N + 1 knots (s); the two knots of an impact have the same time.
+/// - `touches`: whether each contact of the controller touches between one knot and the next. Length: N·contacts.
+/// - `fade`: duration over which contacts are loaded and unloaded (s).
+///
+/// Controls and gains are copied from knots that have one control per actuated coordinate. Impacts have no controls.
 ///
 /// ```
 /// use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};

@@ -1,29 +1,29 @@
 "use strict";
-// Meshes: what the program wrote as numbers of 16 bits becomes geometries, one for each body with colours and one without.
+// Meshes: converts the program's 16-bit numbers to geometries. Each body has one geometry with colours and one without.
 
-/** Neighbours whose normals are nearer than this are shaded as one: the cosine. */
+/** Cosine of the largest angle between neighbouring triangles that are shaded as one smooth surface. */
 const CREASE = Math.cos((38 * Math.PI) / 180);
 
-/** The numbers of 16 bits of a text in base64. */
+/** Decodes base64 text to 16-bit numbers. */
 function numbersOf(text) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   return new Uint16Array(bytes.buffer);
 }
 
-/** The pose of a shape, with its scale, as a function of a point [x, y, z]; and whether it turns inside out. */
+/** Returns the pose and scale of a shape as a function of a point (x, y, z), and whether the scale mirrors the shape. */
 function placing({ size, position, quaternion }) {
   const q = new THREE.Quaternion().fromArray(quaternion ?? [0, 0, 0, 1]), o = new THREE.Vector3().fromArray(position ?? [0, 0, 0]);
   const point = new THREE.Vector3();
   return { mirrored: size[0] * size[1] * size[2] < 0, place: (x, y, z) => point.set(x * size[0], y * size[1], z * size[2]).applyQuaternion(q).add(o) };
 }
 
-/** The corners of the box around a mesh, in its body's frame. */
+/** Returns the corners of the bounding box of a mesh, in the frame of its body. */
 function cornersOf(shape, { low, side }) {
   const { place } = placing(shape);
   return [0, 1, 2, 3, 4, 5, 6, 7].map((c) => place(...low.map((x, k) => x + ((c >> k) & 1) * side[k])).clone());
 }
 
-/** The meshes among a body's shapes as pairs of: whether it has colours of its own, and its geometry. */
+/** Returns the meshes among a body's shapes as pairs: whether they have their own colours, and their geometry. */
 function meshesOf(shapes, meshes) {
   const found = [];
   for (const coloured of [false, true]) {
@@ -33,7 +33,7 @@ function meshesOf(shapes, meshes) {
   return found;
 }
 
-/** One geometry of several parts: corner by corner, smooth but at creases. */
+/** Merges several parts into one geometry, smooth except at creases. */
 function meshGeometry(parts, meshes, coloured) {
   const decoded = parts.map((shape) => ({ shape, points: numbersOf(meshes[shape.part].points), corners: numbersOf(meshes[shape.part].triangles) }));
   const count = decoded.reduce((sum, { corners }) => sum + corners.length, 0);
@@ -61,7 +61,7 @@ function meshGeometry(parts, meshes, coloured) {
   return geometry;
 }
 
-/** The normal at each corner: the mean, by area, of the triangles at its point that lean little from its own. */
+/** Returns the normal at each corner: the area-weighted mean over triangles at its point whose normals are close to its own. */
 function normalsOf(points, corners) {
   const count = corners.length / 3, faces = new Float32Array(corners.length), areas = new Float32Array(count);
   const first = new Int32Array(points.length / 3 + 1);

@@ -1,48 +1,49 @@
 "use strict";
-// The page of a plan: header, player, tables; `scene.js` draws the robot and `plots.js` the curves.
+// Page of a plan: header, player, tables. `scene.js` draws the robot, `plots.js` the curves.
 //
-// The data, written by the program as JSON into the script element #data. SI units, radians; null: none or unknown
-// (a number that is not finite becomes null too). N knots have a control, N + 1 a state.
+// The data are JSON, which the program writes into the script element #data. Units: SI, radians. null means missing or
+// unknown; numbers that are not finite are null too. N knots have a control, N + 1 knots have a state.
 //
-//   robot, title      names: of the robot; the heading of the page
-//   status            "converged", "settled" (constraints hold, hardly anything left to gain), or in a few words why the solver stopped
+//   robot, title      name of the robot; heading of the page
+//   status            "converged", "settled" (constraints hold, the cost can hardly decrease), or the reason why the solver stopped
 //   frame             name of the end-effector frame, or null
-//   target            [x, y, z] that it is to reach, m, or null
-//   miss, tolerance   distance at the last knot, and what counts as reached, m, or null
+//   target            [x, y, z] that the frame should reach, m, or null
+//   miss, tolerance   distance at the last knot, and distance that counts as reached, m, or null
 //   dt, times         step (s); [N + 1] times of the knots (s), increasing
 //   joints            [J] of { name, unit: "rad" | "m", lower, upper, velocity, effort_lower, effort_upper }: one per
-//                     coordinate of v that is shown; its limits, or null each (|v| ≤ velocity)
+//                     shown coordinate of v, with its limits, each of which may be null (|v| ≤ velocity)
 //   q, v, tau         [N + 1][J], [N + 1][J], [N][J]: rad, rad/s, N·m, or m, m/s, N
 //   iterations        [] of { iteration, cost, gap, step, regularisation, stop }; step and stop may be null
 //   budget            { budget_ms, knots, per, rows: [] of { name, us_per_knot, ms_per_horizon }, total_ms,
-//                     alone: [] of the same, functions timed by themselves, no part of the total }, or null;
-//                     `per` says what is timed ("one solver iteration"); budget_ms null: no budget
+//                     alone: [] of the same, functions measured alone, not part of the total }, or null;
+//                     `per`: what is measured ("one solver iteration"); budget_ms null: no budget
 //   scene.bodies      [B] of { name, parent (index, −1 for the world), shapes: [] of { kind, size, position [3],
 //                     quaternion [x, y, z, w], color "#rrggbb" } }; position and quaternion: pose in the body, null for
-//                     the identity; color null: the page's own for bones and joints, light or dark. By kind, size is
+//                     the identity; color null: the page's colour for bones and joints, light or dark. size by kind:
 //                       box [x, y, z] · sphere [radius] · cylinder [radius, length], axis z ·
 //                       capsule [radius, length of its straight part], axis z · segment [from (3), to (3), radius] ·
-//                       mesh [scale along x, y, z], with `part`, its number among the meshes
-//   scene.meshes      [] of { low [3], side [3], points, triangles }: the box of a part of a mesh, its points (three numbers
-//                     each, point = low + side n / 65535) and the corners of its triangles: base64 of 16-bit numbers
+//                       mesh [scale along x, y, z], with `part`, its index in scene.meshes
+//   scene.meshes      [] of { low [3], side [3], points, triangles }: bounding box of a part of a mesh, its points (three
+//                     numbers each, point = low + side n / 65535) and the corners of its triangles, as base64 of
+//                     16-bit numbers
 //   scene.poses       [N + 1][B][7]: pose of each body in the world, px py pz qx qy qz qw
-//   scene.trail       [N + 1][3]: the end-effector in the world, or null
-//   contacts          { feet: [F] names, trails: [F][N + 1][3] (m), touches: [N][F], forces: [N][F] of [3] (N) or null where
-//                     the foot does not touch, weight: of the robot (N) }, or null, or left out; along the world's axes
-//   limits            { source, positions, velocities, efforts, of }: where the limits come from, the numbers of limited
-//                     coordinates of each kind, and the degrees of freedom of the robot
+//   scene.trail       [N + 1][3]: position of the end-effector in the world, or null
+//   contacts          { feet: [F] names, trails: [F][N + 1][3] (m), touches: [N][F], forces: [N][F] of [3] (N) or null if
+//                     the foot does not touch, weight: weight of the robot (N) }, or null, or missing; along the world's axes
+//   limits            { source, positions, velocities, efforts, of }: source of the limits, number of limited coordinates of
+//                     each kind, and number of degrees of freedom of the robot
 //   violations        [] of { what: "position" | "velocity" | "torque", joint (its name), at_knot, amount, limit }: the
-//                     worst knot of each joint and quantity that leaves its limits; amount beyond, limit that it crosses
-//   version, command  of the program that wrote the page; the command line, or null
+//                     worst knot of each joint and quantity that exceeds a limit; the excess, and the exceeded limit
+//   version, command  version of the program that wrote the page; its command line, or null
 //
-// `#t=0.4` in the address opens the page at rest at 0.4 s; the address follows the time while the player rests.
+// `#t=0.4` in the address opens the page paused at 0.4 s. While the player is paused, the address shows its time.
 
-const UNITS_NOTE = "Dashed lines are limits, in the colour of their joint; a limit far beyond the curves is left out.";
+const UNITS_NOTE = "Dashed lines are limits, in the colour of their joint. Limits far from the curves are not shown.";
 
 const $ = (id) => document.getElementById(id);
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
-/** A number for reading: some significant digits, a real minus, no ragged exponents. */
+/** Formats a number for readers: a few significant digits, a typographic minus, powers of ten. */
 function number(x, digits = 4) {
   if (x == null) return "–";
   if (x === 0) return "0";
@@ -51,11 +52,11 @@ function number(x, digits = 4) {
   const [mantissa, exponent] = x.toExponential(Math.min(digits, 3) - 1).split("e");
   return `${mantissa}·10${superscript(Number(exponent))}`.replace("-", "−");
 }
-/** The same without trailing zeros: for a figure in a sentence. */
+/** Formats a number without trailing zeros, for use in a sentence. */
 const brief = (x, digits = 3) => number(x, digits).replace(/(\.\d*?)0+(?=$|·)/, "$1").replace(/\.(?=$|·)/, "");
 const length = (metres) => (metres == null ? "–" : metres < 0.1 ? `${brief(1000 * metres)} mm` : `${brief(metres)} m`);
 
-/** The knot at or before time t, and the fraction of the way to the next. */
+/** Returns the knot at or before time t, and the fraction of the interval to the next knot. */
 function knotAt(times, t) {
   let low = 0, high = times.length - 1;
   while (low < high) {
@@ -66,7 +67,7 @@ function knotAt(times, t) {
   return { k: low, s: step > 0 ? Math.min(Math.max((t - times[low]) / step, 0), 1) : 0 };
 }
 
-/** An element with its attributes and children; text is never read as markup. */
+/** Creates an element with attributes and children; text is never parsed as HTML. */
 function element(name, attributes = {}, ...children) {
   const made = document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) key === "style" ? (made.style.cssText = value) : made.setAttribute(key, value);
@@ -95,7 +96,7 @@ function header(data) {
     item.append(text);
     $("badges").append(item);
   };
-  const solved = { converged: "Converged", settled: "Settled: constraints hold, the cost hardly falls any more" }[data.status];
+  const solved = { converged: "Converged", settled: "Settled: constraints hold, the cost hardly decreases" }[data.status];
   badge(solved ? "good" : "bad", solved ?? `Not converged: ${data.status}`);
   if (data.miss != null) {
     const reached = data.tolerance == null || data.miss <= data.tolerance;
@@ -163,12 +164,12 @@ function iterationLine(row) {
     ...part("step", brief(row.step)), ...part("regularisation", brief(row.regularisation)), ...part("stop", brief(row.stop)));
 }
 
-/** The table of the joints: legend of the plots, switch of each curve, and numbers at the time of the playback. */
+/** Makes the table of joints: legend of the plots, a switch for each curve, and the numbers at the playback time. */
 function makeJoints(data, plots, focus) {
   const shown = new Set(data.joints.keys());
   const body = $("joints").querySelector("tbody");
   const rows = data.joints.map((joint, j) => {
-    const button = element("button", { type: "button", title: "Show or hide; double-click: this one alone" }, element("span", { class: "chip" }), joint.name);
+    const button = element("button", { type: "button", title: "Show or hide; double-click: show only this one" }, element("span", { class: "chip" }), joint.name);
     const cells = plots.quantities.map(() => element("td", { class: "n" }, element("span"), element("i")));
     const row = element("tr", {}, element("th", { scope: "row" }, button), ...cells);
     row.addEventListener("pointerenter", () => focus(j));
@@ -201,7 +202,7 @@ function makeJoints(data, plots, focus) {
       row.querySelector(".chip").style.borderTop = `3.5px ${dash.length ? "dashed" : "solid"} ${colour}`;
     });
   }
-  // What changes with the time is written where it is another than it was: most of a robot's joints rest.
+  // A cell is written only if its content changes, because most of a robot's joints are at rest.
   let at = -1;
   const written = rows.map(() => plots.quantities.map(() => ({ text: null, share: null })));
   function show(k) {
@@ -217,12 +218,12 @@ function makeJoints(data, plots, focus) {
       if (share !== last.share) cell.lastChild.style.setProperty("--share", last.share = share);
     }));
   }
-  // The words under the pointer are made when it comes.
+  // The tooltip of a cell is made when the pointer enters it.
   rows.forEach(({ cells }, j) => cells.forEach((cell, i) => cell.addEventListener("pointerenter", () => {
     const quantity = plots.quantities[i], joint = data.joints[j], share = shareOf(plots.valueAt(quantity, at, j), quantity.limits(joint));
     cell.title = `${quantity.unit(joint.unit)}${share == null ? "" : `, ${Math.round(100 * Math.abs(share))} % of the way to its limit`}`;
   })));
-  // With the units, so that no number stands without one.
+  // The header names the units, so that each number has one.
   const units = [...new Set(data.joints.map((joint) => joint.unit))];
   plots.quantities.forEach((quantity, i) => {
     $("joints").tHead.rows[0].cells[i + 1].append(" ", element("small", {}, units.map(quantity.unit).join(", ")));
@@ -244,7 +245,7 @@ function violationTable(data, quantities, go) {
   }
 }
 
-/** The gait: when each foot touches, as bars over the time; returns what moves the line at the time of the playback. */
+/** Draws the gait: bars over time that show when each foot touches. Returns a function that moves the playback line. */
 function makeGait({ times, contacts }) {
   if (!contacts) return { show() {} };
   const host = $("gait"), start = times[0], span = times.at(-1) - start || 1;
@@ -267,7 +268,7 @@ function makeGait({ times, contacts }) {
   return { show(t) { for (const cursor of cursors) cursor.style.left = `${share(t)}%`; } };
 }
 
-/** The clock: playing, holding still under the pointer, stepping. Every picture follows `show`. */
+/** Makes the player: it plays, pauses under the pointer, and steps. It calls `show(t)` to update all views. */
 function makePlayer(times, show) {
   const start = times[0], end = times.at(-1), scrub = $("scrub"), play = $("play");
   const seconds = element("b"), knot = element("span");
@@ -285,7 +286,7 @@ function makePlayer(times, show) {
     show(t);
     if (!playing) remember();
   }
-  // The address tells the time at which the player rests, so that it can be passed on.
+  // The address contains the time at which the player is paused, so that users can share it.
   let later = null;
   function remember() {
     clearTimeout(later);
@@ -297,7 +298,7 @@ function makePlayer(times, show) {
   function frame(stamp) {
     if (!playing) return;
     if (before != null && !held) {
-      // a page that was hidden, or a slow frame, goes on where it was
+      // after a hidden page or a slow frame, playback continues without a jump
       let to = t + (Math.min(stamp - before, 250) / 1000) * Number($("speed").value);
       if (to >= end) {
         if ($("loop").getAttribute("aria-pressed") === "true") to = start + ((to - end) % (end - start || 1));
@@ -330,7 +331,7 @@ function makePlayer(times, show) {
   $("forth").addEventListener("click", () => step(1));
   scrub.addEventListener("input", () => { run(false); seek(Number(scrub.value)); });
   $("loop").addEventListener("click", ({ currentTarget: loop }) => loop.setAttribute("aria-pressed", loop.getAttribute("aria-pressed") !== "true"));
-  // Keys of a control that has the focus stay its own.
+  // A control with focus keeps its own keys.
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.altKey || event.metaKey || event.shiftKey) return;
     const on = event.target.closest?.("button, select, summary, a, input")?.matches("input[type=range]") ? "range" : event.target.closest?.("button, select, summary, a, input") ? "control" : "page";
@@ -355,11 +356,11 @@ let view = null;
 try {
   view = makeScene(data, $("view"));
 } catch (error) {
-  // No WebGL, or no memory for it: all else on the page works without.
+  // No WebGL, or not enough memory: the rest of the page works without it.
   console.warn(error);
   for (const part of $("view").children) part.hidden = part.id !== "view-note";
   $("view-note").hidden = false;
-  $("view-note").textContent = "The 3-D view needs WebGL, which this browser does not offer. The plots, the table and the time slider work without it.";
+  $("view-note").textContent = "The 3-D view needs WebGL, which this browser does not have. The plots, the table and the time slider work without it.";
 }
 
 const focus = (j) => { plots.focus(j); joints.mark(j); };
@@ -396,7 +397,7 @@ for (const input of document.querySelectorAll("input[name=scale]")) {
   input.addEventListener("change", () => {
     plots.scale(input.value === "share");
     $("limits-note").textContent = input.value === "share"
-      ? "0 % is the middle between the limits, ±100 % the limits; joints without limits are not drawn."
+      ? "0 % is the middle between the limits, ±100 % are the limits. Joints without limits are not drawn."
       : UNITS_NOTE;
   });
 }
@@ -416,5 +417,5 @@ addEventListener("hashchange", () => {
 addEventListener("beforeprint", () => view?.draw());
 const at = timeOf(location.hash);
 player.seek(at ? Number(at[1]) : data.times[0]);
-// The motion is shown once by itself, unless the reader's system asks for calm.
+// The motion plays once automatically, unless the user's system requests reduced motion.
 if (!at && !matchMedia("(prefers-reduced-motion: reduce)").matches) player.run(true);

@@ -1,20 +1,20 @@
 "use strict";
-// The plots: joint positions, velocities and torques over time, and the solver's progress.
+// Plots: joint positions, velocities and torques over time, and the solver's progress.
 
-// Hues that stay apart for the colour-blind and on both backgrounds; red is kept for what is wrong.
+// Hues that remain distinguishable for colour-blind readers and on both backgrounds. Red is reserved for exceeded limits.
 const HUES = {
   light: ["#2563c9", "#d0700b", "#12805c", "#8b4fd1", "#0a86a8", "#c0307f", "#7d7a10", "#7a5540"],
   dark: ["#79aefc", "#f5a04c", "#54cf9b", "#bd97ff", "#48cbe6", "#f584bd", "#d3cf55", "#cfa58a"],
 };
-const DASHES = [[], [9, 4], [3, 3], [12, 3, 3, 3]]; // after eight joints the hues come again, dashed
+const DASHES = [[], [9, 4], [3, 3], [12, 3, 3, 3]]; // after eight joints, the hues repeat with dashes
 
-/** Hue and dash of joint j. */
+/** Returns hue and dash of joint j. */
 function strokeOf(j) {
   const hues = HUES[matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"];
   return { colour: hues[j % hues.length], dash: DASHES[Math.floor(j / hues.length) % DASHES.length] };
 }
 
-/** The three quantities: unit, limits and values of each joint. */
+/** Returns the three quantities: unit, limits and values of each joint. */
 function quantitiesOf(data) {
   const rate = (unit) => `${unit}/s`;
   const effort = (unit) => (unit === "m" ? "N" : "N·m");
@@ -25,7 +25,7 @@ function quantitiesOf(data) {
   ];
 }
 
-/** Where `value` lies between its limits: −1 at the lower, 1 at the upper; null where there are none. */
+/** Returns the position of `value` between its limits: −1 at the lower, 1 at the upper limit; null without limits. */
 function shareOf(value, [lower, upper]) {
   if (value == null || lower == null || upper == null || upper <= lower) return null;
   return (2 * value - lower - upper) / (upper - lower);
@@ -38,17 +38,18 @@ function axis(more) {
 }
 
 /**
- * The three plots over time.
- * `on.seek(t)`: the pointer is at time t; `on.hold(yes)`: it is over a plot; `on.focus(j)`: it is near joint j's curve, or null.
+ * Makes the three plots over time.
+ * Callbacks: `on.seek(t)`: the pointer is at time t; `on.hold(yes)`: whether the pointer is over a plot; `on.focus(j)`: the
+ * pointer is near the curve of joint j, or near no curve (null).
  */
 function makePlots(data, on) {
   const joints = data.joints, times = data.times, last = times.length - 1;
   const quantities = quantitiesOf(data);
-  const mixed = new Set(joints.map((joint) => joint.unit)).size > 1; // metres and radians: an axis for each
+  const mixed = new Set(joints.map((joint) => joint.unit)).size > 1; // with metres and radians, each unit has its own axis
   const hidden = new Set();
   let inShares = false, focus = null, plots = [], now = times[0], zoom = null;
 
-  // A torque acts from its knot to the next: the last one is drawn to the end of the motion.
+  // A torque acts from its knot to the next knot, so the last torque is drawn to the end of the motion.
   const valueAt = (quantity, k, j) => quantity.rows[Math.min(k, quantity.rows.length - 1)]?.[j] ?? null;
 
   function build(quantity) {
@@ -62,7 +63,7 @@ function makePlots(data, on) {
     const scaleOf = (joint) => (inShares || joint.unit === joints[0].unit ? "y" : "y2");
     const inScale = (key) => joints.map((joint, j) => j).filter((j) => scaleOf(joints[j]) === key);
 
-    // All the curves that are shown, and their limits as long as these do not flatten the curves.
+    // The range covers all shown curves, and their limits unless these would flatten the curves.
     function range(key) {
       let low = Infinity, high = -Infinity;
       const take = (y) => { if (y != null) { low = Math.min(low, y); high = Math.max(high, y); } };
@@ -74,7 +75,7 @@ function makePlots(data, on) {
         for (const j of shown) for (const limit of quantity.limits(joints[j])) if (Math.abs(limit) <= reach) take(limit);
       }
       if (!(low <= high)) return [-1, 1];
-      // Two axes side by side share their zero, where zero means rest.
+      // If zero means rest, both axes have their zero at the same height.
       if (mixed && quantity.id !== "q") low = -(high = Math.max(high, -low));
       const room = 0.05 * (high - low) || 0.1 * Math.abs(high) || 1;
       return [low - room, high + room];
@@ -116,11 +117,11 @@ function makePlots(data, on) {
       ctx.restore();
     }
 
-    // Knots outside of the limits, marked whatever the scale.
+    // Marks the knots outside the limits, on either scale.
     function drawBreaches(u) {
       const { ctx } = u, ratio = devicePixelRatio;
       ctx.save();
-      ctx.setLineDash([]); // a dashed curve leaves its own
+      ctx.setLineDash([]); // otherwise the dashes of the last curve would apply
       ctx.fillStyle = css("--bad");
       ctx.strokeStyle = css("--card");
       ctx.lineWidth = 1.5 * ratio;
@@ -159,7 +160,7 @@ function makePlots(data, on) {
         focus: { prox: -1 },
         points: { size: 7 },
         drag: { x: true, y: false, dist: 6 },
-        bind: { mouseleave: () => () => null }, // the cursor is the playback's: it stays when the pointer goes
+        bind: { mouseleave: () => () => null }, // the cursor shows the playback time, so it stays when the pointer leaves
       },
       axes,
       series: [{}, ...joints.map((joint, j) => {
@@ -173,7 +174,7 @@ function makePlots(data, on) {
         setScale: [(self, key) => { if (key === "x") follow(self); }],
       },
     }, [times, ...columns], host);
-    host.setAttribute("aria-label", `${quantity.what} of ${joints.length} joints over ${times[last].toFixed(2)} s, with their limits. The joint table has the numbers at the time of the playback.`);
+    host.setAttribute("aria-label", `${quantity.what} of ${joints.length} joints over ${times[last].toFixed(2)} s, with their limits. The joint table has the numbers at the playback time.`);
     wire(u, quantity, columns, scaleOf);
     return u;
   }
@@ -212,20 +213,20 @@ function makePlots(data, on) {
     }
   }
 
-  // One zoom for all: a part of the motion is looked at in every quantity.
+  // All plots share one zoom, so that they show the same part of the motion.
   function follow(from) {
     if (!plots.includes(from)) return;
     const { min, max } = from.scales.x;
     zoom = min > times[0] || max < times[last] ? { min, max } : null;
-    for (const u of plots) if (u !== from) u.setScale("x", { min, max }); // ends there: equal scales call no hook
+    for (const u of plots) if (u !== from) u.setScale("x", { min, max }); // no endless recursion: uPlot calls no hook if the scale is unchanged
     show(now);
   }
 
-  /** Puts the cursor of every plot at time t. */
+  /** Moves the cursor of every plot to time t. */
   function show(t) {
     now = t;
     for (const u of plots) {
-      // its own sizes: to ask the document for them would lay it out, at every frame
+      // uPlot's own sizes: querying the document would force a layout at every frame
       const left = u.valToPos(t, "x"), width = u.bbox.width / uPlot.pxRatio, height = u.bbox.height / uPlot.pxRatio;
       u.setCursor({ left: left < 0 || left > width + 0.5 ? -10 : left, top: height / 2 }, false);
     }
@@ -250,32 +251,32 @@ function makePlots(data, on) {
     rebuild,
     quantities,
     valueAt,
-    /** Draws every quantity in its unit, or all joints between the same two limits. */
+    /** Selects the vertical scale: units, or percent of the limits. */
     scale(shares) { inShares = shares; rebuild(); },
-    /** Shows the joints that `visible(j)` names. */
+    /** Shows the joints j for which `visible(j)` is true, and hides the others. */
     filter(visible) {
       joints.forEach((_, j) => {
         visible(j) ? hidden.delete(j) : hidden.add(j);
         for (const u of plots) if (u.series[j + 1].show === hidden.has(j)) u.setSeries(j + 1, { show: !hidden.has(j) });
       });
     },
-    /** Brings joint j forward, or none. */
+    /** Highlights joint j, or no joint if j is null. */
     focus(j) {
       if (j === focus) return;
       focus = j;
       for (const u of plots) {
         u.setSeries(j == null ? null : j + 1, { focus: true });
-        u.redraw(false); // the limits follow the focus
+        u.redraw(false); // the limits are drawn according to the focus
       }
     },
   };
 }
 
-/** Cost and gap over the iterations, on logarithmic scales. `on.pick(i)`: the pointer is at row i, or null. */
+/** Plots cost and gap over the iterations, on logarithmic scales. `on.pick(i)`: the pointer is at row i, or at no row (null). */
 function makeProgress(iterations, on) {
   const host = document.getElementById("plot-iterations");
   const x = iterations.map((row) => row.iteration);
-  // A closed gap is zero, which no logarithm shows: it is drawn one decade under the smallest other value.
+  // A closed gap is zero, which has no logarithm. It is drawn one decade below the smallest other value.
   const logarithmic = (values) => {
     const positive = values.filter((y) => y > 0);
     if (!positive.length) return { values, log: false };
@@ -296,7 +297,7 @@ function makeProgress(iterations, on) {
       const bottom = Math.floor(Math.log10(low) + 1e-9), top = Math.max(Math.ceil(Math.log10(high) - 1e-9), bottom + 1);
       return { distr: 3, log: 10, range: [10 ** bottom, 10 ** top] };
     };
-    // Whole decades only, as many as there is room for; the value that stands for zero says so.
+    // Labels whole decades only, as many as there is space for. The value that represents zero is labelled 0.
     const decades = ({ floor }) => (_, splits) => {
       const whole = splits.map((y) => (y > 0 ? Math.log10(y) : NaN)).map((e) => (Math.abs(e - Math.round(e)) < 1e-6 ? Math.round(e) : null));
       const exponents = whole.filter((e) => e != null);

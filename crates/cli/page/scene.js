@@ -1,7 +1,7 @@
 "use strict";
-// The 3-D playback. World frame as in the data: metres, z up.
+// 3-D playback. The world frame is the one of the data: metres, z up.
 
-/** Draws `data.scene` into `host`. Returns what the player needs of it; throws where the browser offers no WebGL. */
+/** Draws `data.scene` into `host`. Returns the functions that the player calls. Throws if the browser has no WebGL. */
 function makeScene(data, host) {
   const { bodies, poses, trail } = data.scene;
   const renderer = new THREE.WebGLRenderer({ antialias: true });
@@ -11,7 +11,7 @@ function makeScene(data, host) {
   const canvas = renderer.domElement;
   canvas.tabIndex = 0;
   canvas.setAttribute("role", "img");
-  canvas.setAttribute("aria-label", `${data.robot} in motion. Drag to turn, right button to move, wheel to zoom; by keyboard Shift and the arrow keys turn, plus and minus zoom.`);
+  canvas.setAttribute("aria-label", `${data.robot} in motion. Drag to rotate, right button to move, wheel to zoom. Keyboard: Shift and arrow keys rotate, plus and minus zoom.`);
   host.prepend(canvas);
 
   const scene = new THREE.Scene();
@@ -21,22 +21,22 @@ function makeScene(data, host) {
   const controls = new THREE.OrbitControls(camera, canvas);
   controls.maxPolarAngle = Math.PI * 0.62;
 
-  // --- extent of the whole motion: it sizes camera, light, floor and markers, so that a gripper and a humanoid both fit
+  // --- extent of the whole motion: determines the sizes of camera, light, floor and markers, for grippers and humanoids alike
   const { cloud, lowest } = cloudOf(data);
   const box = new THREE.Box3().setFromPoints(cloud);
   const centre = box.getCenter(new THREE.Vector3());
   const size = Math.max(box.getSize(new THREE.Vector3()).length(), 1e-3);
-  // A robot on the ground stands on z = 0; one that swings below it must not be cut by the floor.
+  // A robot on the ground stands on z = 0. If a robot moves below z = 0, the floor is lowered so that it does not hide the robot.
   const floorZ = lowest < -0.05 * size ? lowest - 0.04 * size : 0;
   controls.minDistance = 0.2 * size;
   controls.maxDistance = 8 * size;
   camera.near = 0.02 * size;
   camera.far = 30 * size;
 
-  // --- light: a soft room, one lamp that casts shadows
+  // --- light: a soft environment, and one lamp that casts shadows
   const environment = new THREE.PMREMGenerator(renderer);
   scene.environment = environment.fromScene(new THREE.RoomEnvironment(), 0.04).texture;
-  scene.environmentRotation.x = Math.PI / 2; // the room is y up
+  scene.environmentRotation.x = Math.PI / 2; // the environment has y up
   environment.dispose();
   const lamp = new THREE.DirectionalLight(0xffffff, 1.3);
   lamp.position.copy(centre).add(new THREE.Vector3(0.5, -0.45, 1.3).multiplyScalar(size));
@@ -48,7 +48,7 @@ function makeScene(data, host) {
   Object.assign(lamp.shadow.camera, { left: -size, right: size, top: size, bottom: -size, near: 0.05 * size, far: 4 * size });
   scene.add(lamp, lamp.target);
 
-  // --- floor: lines every decimetre or so, fading into the background, and the robot's shadow
+  // --- floor: a grid that fades into the background, and the robot's shadow; the grid width depends on the robot's size
   const pitch = 10 ** Math.round(Math.log10(size / 8));
   const grid = new THREE.LineSegments(gridGeometry(pitch, 60), new THREE.LineBasicMaterial());
   grid.position.set(Math.round(centre.x / pitch) * pitch, Math.round(centre.y / pitch) * pitch, floorZ - 0.002 * size);
@@ -82,7 +82,7 @@ function makeScene(data, host) {
       const material = materials[`mesh ${coloured}`] ??= coloured
         ? new THREE.MeshStandardMaterial({ vertexColors: true, roughness: 0.55, metalness: 0.05 })
         : paint("mesh");
-      material.side = 2; // both: not every file has its triangles the right way round
+      material.side = 2; // both sides, because some files have triangles with the wrong orientation
       group.add(new THREE.Mesh(geometry, material));
     }
     for (const mesh of group.children) mesh.castShadow = mesh.receiveShadow = true;
@@ -90,7 +90,7 @@ function makeScene(data, host) {
     return group;
   });
 
-  // --- path of the end-effector: all of it faint, what has been travelled strong
+  // --- path of the end-effector: the whole path faint, the travelled part strong
   const tip = new THREE.Mesh(new THREE.SphereGeometry(0.009 * size, 24, 16), new THREE.MeshBasicMaterial());
   let travelled = null;
   if (trail && trail.length > 1) {
@@ -109,14 +109,14 @@ function makeScene(data, host) {
     scene.add(tip);
   }
 
-  // --- feet: the way of each, and an arrow for the force that holds it; a robot's weight is a third of its size long
+  // --- feet: the path of each, and an arrow for its contact force; the robot's weight is drawn a third of the scene's size long
   const contacts = data.contacts;
   const arrows = (contacts?.trails ?? []).map((way) => {
     const geometry = new THREE.LineGeometry().setPositions(way.flat());
     const line = new THREE.LineMaterial({ linewidth: 2, transparent: true, opacity: 0.55 });
     themed.push([line, "--accent"]);
     if (way.length > 1) scene.add(new THREE.Line2(geometry, line));
-    // seen through the robot, whose leg stands where the force acts
+    // visible through the robot, because a leg covers the point where the force acts
     const material = new THREE.MeshStandardMaterial({ roughness: 0.6, depthTest: false, transparent: true, opacity: 0.9 });
     themed.push([material, "--force"]);
     const shaft = new THREE.Mesh(new THREE.CylinderGeometry(0.006 * size, 0.006 * size, 1, 16).translate(0, 0.5, 0), material);
@@ -144,7 +144,7 @@ function makeScene(data, host) {
     });
   }
 
-  // --- target: a dot in three rings, seen from every side
+  // --- target: a dot in three rings, visible from every side
   if (data.target) {
     const material = new THREE.MeshBasicMaterial();
     themed.push([material, "--target"]);
@@ -160,7 +160,7 @@ function makeScene(data, host) {
     scene.add(mark);
   }
 
-  // --- drawing, only when something has changed
+  // --- drawing, only after a change
   let asked = false;
   function redraw() {
     if (asked) return;
@@ -176,7 +176,7 @@ function makeScene(data, host) {
   }
 
   const q0 = new THREE.Quaternion(), q1 = new THREE.Quaternion(), p1 = new THREE.Vector3();
-  /** Poses the robot between knot k and the next one, at the fraction s of the way. */
+  /** Poses the robot between knot k and the next one, at the fraction s of the interval. */
   function show(k, s) {
     const next = Math.min(k + 1, poses.length - 1);
     groups.forEach((group, b) => {
@@ -186,13 +186,13 @@ function makeScene(data, host) {
     });
     if (travelled) {
       tip.position.fromArray(trail[k]).lerp(p1.fromArray(trail[Math.min(k + 1, trail.length - 1)]), s);
-      travelled.instanceCount = k; // segments
+      travelled.instanceCount = k; // number of segments
     }
     showForces(k, s);
     redraw();
   }
 
-  /** Looks at the whole motion from the front right, as near as it fits. */
+  /** Shows the whole motion from the front right, as close as possible. */
   function reset() {
     moved = false;
     const back = new THREE.Vector3(1, -1.15, 0.62).normalize(); // from the robot to the camera
@@ -210,12 +210,12 @@ function makeScene(data, host) {
     redraw();
   }
 
-  // The page must stay scrollable under wheel and finger: the wheel zooms once the view has been clicked, and a finger
-  // turns it sideways (two fingers move and zoom).
+  // The page must stay scrollable by wheel and finger. The wheel zooms only after a click on the view. One finger rotates
+  // the view sideways, two fingers move and zoom it.
   canvas.style.touchAction = "pan-y";
   canvas.addEventListener("wheel", (event) => { if (document.activeElement !== canvas) event.stopImmediatePropagation(); }, { capture: true });
 
-  let moved = false; // by the user: then a new size of the window keeps the view
+  let moved = false; // whether the user changed the view; resizing the window then keeps it
   controls.addEventListener("start", () => { moved = true; });
   controls.addEventListener("change", redraw);
   canvas.addEventListener("keydown", (event) => {
@@ -234,7 +234,7 @@ function makeScene(data, host) {
     controls.update();
   });
 
-  /** Takes the colours of the style sheet, light or dark. */
+  /** Applies the colours of the style sheet, light or dark. */
   function recolour() {
     scene.background = scene.fog.color = new THREE.Color(css("--sky"));
     grid.material.color.set(css("--floor"));
@@ -260,8 +260,8 @@ function makeScene(data, host) {
 }
 
 /**
- * Points that enclose the motion: origins and shapes of the bodies at some knots, the path, the target;
- * and the height of the lowest middle of a shape, which says whether the robot stays above the ground.
+ * Returns points that enclose the motion: origins and shapes of the bodies at some knots, the path, and the target.
+ * Also returns the height of the lowest centre of a shape, which tells whether the robot stays above the ground.
  */
 function cloudOf({ scene: { bodies, poses, trail, meshes }, target }) {
   const boxes = bodies.map((body) => body.shapes.filter((shape) => shape.kind === "mesh").flatMap((shape) => cornersOf(shape, meshes[shape.part])));
@@ -291,12 +291,12 @@ function cloudOf({ scene: { bodies, poses, trail, meshes }, target }) {
   return { cloud: points, lowest };
 }
 
-/** The geometry of a shape of the data, or nothing where it has no extent. */
+/** Returns the geometry of a shape, or null if the shape has no extent. */
 function geometryOf({ kind, size }) {
   switch (kind) {
     case "box": return new THREE.BoxGeometry(...size);
     case "sphere": return new THREE.SphereGeometry(size[0], 40, 24);
-    // three.js draws these along y; the data has them along z, as a URDF does
+    // three.js draws these along y; in the data, as in a URDF, their axis is z
     case "cylinder": return new THREE.CylinderGeometry(size[0], size[0], size[1], 40).rotateX(Math.PI / 2);
     case "capsule": return new THREE.CapsuleGeometry(size[0], size[1], 12, 32).rotateX(Math.PI / 2);
     case "segment": return boneGeometry(size);
@@ -304,7 +304,7 @@ function geometryOf({ kind, size }) {
   }
 }
 
-/** A round bone from one point to another, a little thinner at its far end: it shows which way the chain runs. */
+/** Returns a round bone between two points. It is thinner at its far end, which shows the direction of the chain. */
 function boneGeometry([ax, ay, az, bx, by, bz, radius]) {
   const from = new THREE.Vector3(ax, ay, az), along = new THREE.Vector3(bx, by, bz).sub(from);
   const length = along.length();
@@ -322,7 +322,7 @@ function boneGeometry([ax, ay, az, bx, by, bz, radius]) {
   return new THREE.LatheGeometry(outline, 28).applyQuaternion(turn).translate(ax, ay, az);
 }
 
-/** A square grid in the plane z = 0, cut into cells so that the fog takes each by its own distance. */
+/** Returns a square grid in the plane z = 0, split into cells so that fog is computed for each cell's distance. */
 function gridGeometry(pitch, cells) {
   const points = [], half = (cells / 2) * pitch;
   for (let i = 0; i <= cells; i++) {

@@ -1,26 +1,26 @@
-//! The parts of a robot beside its tree: actuators, springs, keyframes and constraints.
+//! Parts of a robot besides its tree: actuators, springs, keyframes and constraints.
 
 use crate::terminal::{Table, heading, short};
 use condyle::Model;
 use condyle::tree::{Actuator, ModelConstraintKind, Transmission};
 use serde::Serialize;
 
-/// The parts of a robot beside its tree.
+/// Parts of a robot besides its tree.
 #[derive(Serialize)]
 pub(crate) struct Additions {
     actuators: Vec<ActuatorReport>,
     springs: Vec<SpringReport>,
-    /// The share of each body's weight that an unseen hand carries (kg), by the body's name.
+    /// Name of each body with gravity compensation, and the mass whose weight is compensated (kg).
     gravity_compensation: Vec<(String, f64)>,
     keyframes: Vec<KeyframeReport>,
     constraints: Vec<ConstraintReport>,
 }
 
-/// An actuator; null is no limit.
+/// Actuator; `null` in a range means no limit.
 #[derive(Serialize)]
 struct ActuatorReport {
     name: String,
-    /// The joint, tendon or frame that it drives.
+    /// Joint, tendon or frame that the actuator drives.
     drives: String,
     gear: [f64; 6],
     kp: f64,
@@ -45,7 +45,7 @@ struct KeyframeReport {
 #[derive(Serialize)]
 struct ConstraintReport {
     name: String,
-    /// The bodies or joints, and what holds between them.
+    /// Bodies or joints, and the constraint between them.
     what: String,
 }
 
@@ -86,7 +86,7 @@ impl Additions {
         }
     }
 
-    /// The parts as text, each under a heading.
+    /// Returns the parts as text, each kind under a heading.
     pub(crate) fn text(&self) -> String {
         let mut text = String::new();
         if !self.actuators.is_empty() {
@@ -103,7 +103,7 @@ impl Additions {
         let carried = |(body, mass): &(String, f64)| (body.clone(), format!("{} kg", short(*mass)));
         for (title, lines) in [
             ("Springs", self.springs.iter().map(spring).collect::<Vec<_>>()),
-            ("Weight that is carried", self.gravity_compensation.iter().map(carried).collect()),
+            ("Gravity compensation", self.gravity_compensation.iter().map(carried).collect()),
             ("Keyframes", self.keyframes.iter().map(|key| (key.name.clone(), list(&key.q))).collect()),
             ("Constraints", self.constraints.iter().map(|c| (c.name.clone(), c.what.clone())).collect()),
         ] {
@@ -130,18 +130,18 @@ impl ActuatorReport {
     }
 }
 
-/// The bodies of two frames, and what they do.
+/// Returns a phrase with the bodies of two frames and their constraint.
 fn bodies(model: &Model, frames: [usize; 2], what: &str) -> String {
     let [a, b] = frames.map(|frame| &*model.bodies()[model.frames()[frame].body].name);
     format!("{a} and {b} {what}")
 }
 
-/// Numbers in short, with spaces between them.
+/// Formats numbers in short form, separated by spaces.
 fn list(numbers: &[f64]) -> String {
     numbers.iter().map(|&x| short(x)).collect::<Vec<_>>().join(" ")
 }
 
-/// The least and the greatest number of a range.
+/// Formats a range of two limits; empty if there are no limits.
 fn range([lower, upper]: [Option<f64>; 2]) -> String {
     match (lower, upper) {
         (None, None) => String::new(),

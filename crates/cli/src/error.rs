@@ -1,8 +1,8 @@
-//! What the program ends with: a status for scripts, and one line for people.
+//! Errors of the program: an exit status for scripts, and one line of text for people.
 
 use std::process::ExitCode;
 
-/// The statuses with which the program ends, as `--help` lists them.
+/// Exit statuses of the program, as `--help` lists them.
 pub(crate) const STATUSES: &str = "\
 Exit status:
   0    done, and the answer is yes
@@ -10,49 +10,49 @@ Exit status:
   2    a file, flag, number or name is wrong: one line says which, and nothing is written
   130  stopped by Ctrl-C; the best found so far is written";
 
-/// Why the program does not end with 0.
+/// Reason why the exit status is not 0.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
-    /// The robot's file, or a name in it.
+    /// Error in the robot's file, or in a name that is looked up in it.
     #[error(transparent)]
     Model(#[from] condyle::ModelError),
-    /// The problem that was made of a task.
+    /// Error in the optimal control problem built from a task.
     #[error(transparent)]
     Problem(#[from] condyle::optimal::Error),
-    /// A flag.
+    /// Invalid value of an option.
     #[error("--{option}: {what}")]
     Option { option: &'static str, what: String },
-    /// No such robot.
+    /// Unknown robot name.
     #[error("no robot `{name}`{nearest}")]
     Robot { name: String, nearest: String },
-    /// A file that is no robot's.
+    /// File that is not a robot's file, or cannot be read.
     #[error("{file}: {what}")]
     File { file: String, what: String },
-    /// A line of a task.
+    /// Error in a line of a task file.
     #[error("{file}:{line}: {what}")]
     Task { file: String, line: usize, what: String },
-    /// A command of a feature with which the program was not built.
+    /// Command of a feature that is not part of this build.
     #[cfg(not(feature = "generate"))]
     #[error(
         "{command}: this program was built without the feature `{command}`: cargo install condyle-cli --features {command}"
     )]
     Feature { command: &'static str },
-    /// A robot without joints.
+    /// Robot without moving joints.
     #[error("the robot has no joint that moves")]
     Rigid,
-    /// A file that cannot be written.
+    /// File that cannot be written.
     #[error("{file}: {source}")]
     Write { file: String, source: std::io::Error },
-    /// A question that was answered with no.
+    /// Negative answer: for example over budget, or a check failed.
     #[error("{0}")]
     No(String),
-    /// Ctrl-C.
+    /// Interruption by Ctrl-C.
     #[error("interrupted")]
     Interrupted,
 }
 
 impl Error {
-    /// The status that belongs to it.
+    /// Returns the exit status of the error.
     pub(crate) fn status(&self) -> ExitCode {
         match self {
             Self::No(_) => ExitCode::from(1),
@@ -62,7 +62,7 @@ impl Error {
     }
 }
 
-/// A flag's number that must be above 0.
+/// Checks that the value of an option is above 0.
 pub(crate) fn positive(option: &'static str, value: f64) -> Result<(), Error> {
     match value > 0.0 && value.is_finite() {
         true => Ok(()),
@@ -70,7 +70,7 @@ pub(crate) fn positive(option: &'static str, value: f64) -> Result<(), Error> {
     }
 }
 
-/// The name that is most like another one, in words that go behind a message; nothing if there are none.
+/// Returns a suffix for an error message with the most similar name; empty if there are no names.
 pub(crate) fn nearest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let found = names.into_iter().min_by_key(|other| strsim::osa_distance(other, name));
     found.map_or(String::new(), |found| format!("; nearest is `{found}`"))

@@ -1,4 +1,4 @@
-//! Findings about a robot: the model's own warnings, and what makes its numbers hard to work with.
+//! Findings about a robot: warnings of the model, and values that cause numerical difficulties.
 
 use crate::lines::{Kind, Lines};
 use crate::terminal::{Style, styled};
@@ -6,20 +6,20 @@ use condyle::{Inertia, Model, neutral, tree::Body, tree::Warning};
 use nalgebra::Matrix3;
 use serde::Serialize;
 
-/// A warning of the library, or of this program.
+/// Warning of the library, or of this program.
 #[derive(Serialize)]
 pub(crate) struct Finding {
-    /// One of [`KINDS`].
+    /// Kind, one of [`KINDS`].
     pub kind: &'static str,
-    /// Name of the body or joint, or the element.
+    /// Name of the body, joint or element.
     pub name: String,
-    /// File, where it is not the robot's own; a robot may include others.
+    /// File, if it is not the robot's own file: a robot's file may include others.
     pub file: Option<String>,
     pub line: Option<u32>,
     pub what: String,
 }
 
-/// The kinds of findings, in the order in which they are listed: the library's, then this program's.
+/// Kinds of findings, in the order of the report: first the kinds of the library, then the kinds of this program.
 pub(crate) const KINDS: [&str; 13] = [
     "unknown",
     "left_out",
@@ -35,17 +35,17 @@ pub(crate) const KINDS: [&str; 13] = [
     "moment_ratio",
     "neutral",
 ];
-/// The heading of each of [`KINDS`].
+/// Heading of each kind in [`KINDS`].
 const HEADINGS: [&str; 13] = [
     "unknown, misspelt or misplaced: no effect",
     "left out: a model cannot hold it",
     "assumed: missing in the file",
-    "joints that could follow another one and are free",
+    "joints that could follow another joint, but move freely",
     "bodies that move and have no mass",
     "negative moments of inertia",
-    "moments of inertia that no body has",
+    "moments of inertia that no body can have",
     "joints that move nothing with inertia",
-    "inertias that cannot be meant",
+    "implausible inertias",
     "limits with which a joint cannot work",
     "masses far from the parent's",
     "moments of inertia far from the parent's",
@@ -53,13 +53,13 @@ const HEADINGS: [&str; 13] = [
 ];
 
 impl Finding {
-    /// A finding about the robot's own file.
+    /// Creates a finding about the robot's own file.
     fn own(kind: &'static str, name: &str, line: Option<u32>, what: String) -> Self {
         Self { kind, name: name.to_owned(), file: None, line, what }
     }
 }
 
-/// The findings as text, those of each kind under a heading; `source` is the robot's file.
+/// Formats the findings, grouped by kind under headings; `source` is the robot's file.
 pub(crate) fn text(findings: &[Finding], source: &str) -> String {
     let mut text = String::new();
     for (kind, heading) in KINDS.into_iter().zip(HEADINGS) {
@@ -77,13 +77,13 @@ pub(crate) fn text(findings: &[Finding], source: &str) -> String {
     text
 }
 
-/// Masses, or moments of inertia, of a body and its parent so many times apart are suspicious: a wrong unit, or a tip that
-/// makes M badly conditioned.
+/// Ratio between the masses, or moments of inertia, of a body and its parent that is suspicious. Causes are a wrong
+/// unit, or a light tip that makes M ill-conditioned.
 const APART: f64 = 1e3;
-/// Beyond a limit by less than this is rounding.
+/// Excess over a limit that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// All findings, in the order of the file.
+/// Returns all findings, ordered by line.
 pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
     let mut found: Vec<Finding> = model.warnings().iter().map(|warning| warned(model, warning, lines)).collect();
     for (i, b) in model.bodies().iter().enumerate().skip(1) {
@@ -98,11 +98,11 @@ pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
     found
 }
 
-/// A warning of the model, with its line.
+/// Converts a warning of the model to a finding with its line.
 fn warned(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
     let (kind, subject, mut what) = (warning.kind().name(), warning.subject(), warning.to_string());
     if let Some(place) = warning.place() {
-        // ``joint `loop` `` names its element
+        // in ``joint `loop` ``, the name is `loop`
         let name = subject.split('`').nth(1).unwrap_or(subject).to_owned();
         what.drain(..format!("{place}: ").len());
         return Finding { kind, name, file: Some(place.file.clone()), line: Some(place.line), what };
@@ -118,7 +118,7 @@ fn warned(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
     Finding::own(kind, subject, line, what)
 }
 
-/// Whether a body's mass, or else its greatest moment of inertia, is far from its parent's.
+/// Returns a finding if a body's mass, or else its largest moment of inertia, differs much from its parent's.
 fn neighbours(model: &Model, i: usize) -> Option<(&'static str, String)> {
     let (b, parent) = (&model.bodies()[i], &model.bodies()[model.bodies()[i].parent]);
     if b.parent == 0 {
@@ -130,7 +130,7 @@ fn neighbours(model: &Model, i: usize) -> Option<(&'static str, String)> {
         let which = if x < y { "less" } else { "more" };
         let (own, on) = (&b.name, &parent.name);
         format!(
-            "body `{own}`: its {what}, {x:.3e} {unit}, is {ratio:.1e} times {which} than the {y:.3e} of `{on}`, on which it sits"
+            "body `{own}`: its {what}, {x:.3e} {unit}, is {ratio:.1e} times {which} than the {y:.3e} of `{on}`, which carries it"
         )
     };
     let (m, n) = (b.inertia.mass, parent.inertia.mass);
@@ -141,7 +141,7 @@ fn neighbours(model: &Model, i: usize) -> Option<(&'static str, String)> {
     apart(m, n).map(|ratio| ("moment_ratio", say(ratio, "greatest moment of inertia", m, n, "kg m²")))
 }
 
-/// Whether the neutral position of a joint with one coordinate is outside of its limits.
+/// Returns a text if a joint with one coordinate has limits that exclude its neutral position.
 fn neutral_outside(model: &Model, b: &Body) -> Option<String> {
     if b.mimic.is_some() || b.joint.nq() != 1 {
         return None;
@@ -152,7 +152,7 @@ fn neutral_outside(model: &Model, b: &Body) -> Option<String> {
     is_outside.then(|| format!("joint `{joint}`: the neutral position {q} is outside of its limits [{lower}, {upper}]"))
 }
 
-/// The centre of mass (m), and the principal moments of inertia about it, least first (kg m²).
+/// Returns the centre of mass (m) and the principal moments of inertia about it (kg m²), smallest first.
 pub(crate) fn moments(I: Inertia<f64>) -> ([f64; 3], [f64; 3]) {
     if I.mass <= 0.0 {
         return ([0.0; 3], [0.0; 3]);

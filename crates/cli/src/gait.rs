@@ -13,10 +13,10 @@ use condyle::{ContactConstraint, Data, Joint, Model, Se3, Vec3, forward_kinemati
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A gait in the making: its knots so far, and where feet and centre of mass are at their end.
+/// Gait under construction: its knots so far, and the positions of feet and centre of mass at their end.
 pub(crate) struct Gait {
     model: Arc<Model>,
-    /// The state that it goes back to, and the one in which it begins.
+    /// State to which the robot returns, and initial state.
     rest: Vec<f64>,
     x0: Vec<f64>,
     dt: f64,
@@ -29,29 +29,30 @@ pub(crate) struct Gait {
     us: Vec<f64>,
     times: Vec<f64>,
     touches: Vec<Vec<bool>>,
-    /// Of positions and speeds, and of efforts, where they are held.
+    /// Limits of positions and speeds, and of efforts, if they are constraints.
     limits: Vec<Limit>,
     efforts: Vec<Limit>,
 }
 
-/// A gait that is ready to be solved.
+/// Gait as a problem with a warm start.
 pub(crate) struct Posed {
     pub problem: Problem,
     pub xs: Vec<f64>,
     pub us: Vec<f64>,
-    /// The time of each knot (s); an impact takes none.
+    /// Time of each knot (s); an impact has no duration.
     pub times: Vec<f64>,
-    /// Whether each foot touches, knot by knot.
+    /// Whether each foot touches, for each knot.
     pub touches: Vec<Vec<bool>>,
     pub feet: Vec<usize>,
 }
 
 impl Gait {
-    /// A robot in the posture of a task, with its feet at height 0 on average; `held` makes constraints of its limits.
+    /// Creates a gait in the posture of a task, with the feet at average height 0. With `held`, the robot's limits
+    /// become constraints.
     pub(crate) fn new(model: Arc<Model>, task: &Task, dt: f64, held: bool) -> Result<Self, Error> {
         let floats = model.bodies().get(1).is_some_and(|b| b.joint == Joint::FreeFlyer);
         if !floats {
-            let what = "a robot with feet floats: say root = \"free\"".to_owned();
+            let what = "a robot with feet needs a floating base: set root = \"free\"".to_owned();
             return Err(task.place.wrong("robot", what));
         }
         let mut frames = Vec::new();
@@ -63,7 +64,7 @@ impl Gait {
             Some(start) => posture(&model, start, task)?,
             None => rest.clone(),
         };
-        // Posture and start are moved so that their feet are in the same place on average, at height 0.
+        // Posture and start are shifted so that their feet have the same average position, at height 0.
         let middle = |q: &[f64]| {
             let feet = feet_at(&model, q, &frames);
             feet.iter().fold(Vec3::zero(), |sum, foot| sum + foot.1).scale(1.0 / feet.len() as f64)
@@ -108,14 +109,15 @@ impl Gait {
         frames.iter().map(|&frame| Contact::new(&self.name(frame), held(make(frame)))).collect()
     }
 
-    /// Back to the posture, with weights of the trunk's position and rotation, the joints, and their velocities.
+    /// Returns the cost of the distance from the posture. Weights: position and rotation of the trunk, joints, and
+    /// their velocities.
     fn rest(&self, weights: [f64; 6]) -> Cost {
         let counts = [3, 3, self.model.nv() - 6].repeat(2);
         let w = counts.iter().zip(weights).flat_map(|(&n, w)| vec![w; n]).collect();
         Cost::new("rest", 1e1, Residual::State { reference: self.rest.clone() }, Activation::Weighted(w))
     }
 
-    /// A foot should be at a point, a sole level too.
+    /// Returns the cost of a foot's distance from a point; a sole should also be level.
     fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
         let named = (&self.model.frames()[frame]).into();
         let residual = match self.sole {
@@ -125,7 +127,7 @@ impl Gait {
         Cost::new(&format!("{} moves", self.name(frame)), weight, residual, Activation::Quadratic)
     }
 
-    /// The costs of a knot on some feet, others on their way.
+    /// Returns the costs of a knot with feet in support and feet that move.
     fn costs(&self, support: &[usize], moving: &[(usize, Vec3<f64>)], com: Option<Vec3<f64>>) -> Vec<Cost> {
         let grip = |&frame: &usize| {
             let (contact, friction) = (self.name(frame), FrictionCone::new(self.friction));
@@ -148,7 +150,7 @@ impl Gait {
         costs
     }
 
-    /// Some knots on `support`; the k-th has the costs that `costs` gives. One action serves all.
+    /// Adds `count` knots on the feet `support`, all with one action. `costs` gives the costs of the k-th knot.
     fn knots(
         &mut self,
         support: &[usize],
@@ -183,10 +185,10 @@ impl Gait {
         Ok(())
     }
 
-    /// Feet set down where they are now.
+    /// Adds an impact: feet land at their current positions.
     fn land(&mut self, landing: &[usize]) -> Result<(), Error> {
         let mut costs = vec![self.rest([1e0, 1e1, 1e0, 1e1, 1e1, 1e1])];
-        // only height counts for the trunk, which has gone ahead
+        // for the trunk, which has moved ahead, only the height counts
         if let Activation::Weighted(w) = &mut costs[0].activation {
             w[..3].fill(0.0);
         }
@@ -199,7 +201,7 @@ impl Gait {
         self.stages.push(self.models.len() - 1);
         let all = self.touches.last().cloned().unwrap_or_default();
         self.touches.push(all.iter().enumerate().map(|(k, &touches)| touches || landing.contains(&k)).collect());
-        self.times.push(self.times.last().copied().unwrap_or(0.0)); // an impact takes no time
+        self.times.push(self.times.last().copied().unwrap_or(0.0)); // an impact has no duration
         Ok(())
     }
 
@@ -209,7 +211,7 @@ impl Gait {
         let swinging = match &phase.kind {
             PhaseKind::Stand => {
                 let feet: Vec<_> = self.feet.iter().map(|foot| foot.0).collect();
-                // Who is about to jump is free to crouch.
+                // Before a jump, the robot may crouch.
                 let free = next.is_some_and(|next| next.kind == PhaseKind::Jump);
                 return self.knots(&feet, phase.knots, &|gait, _| gait.costs(&feet, &[], (!free).then_some(gait.com)));
             }
@@ -225,7 +227,7 @@ impl Gait {
             let s = (k + 1) as f64 / knots as f64;
             let lift = Vec3::new(0.0, 0.0, height * (core::f64::consts::PI * s).sin());
             if jumps {
-                // the centre of mass on its parabola; the feet below it as they were
+                // the centre of mass follows its arc; only the posture cost acts on the feet
                 return gait.costs(&[], &[], Some(gait.com + ahead(s) + lift));
             }
             let moving: Vec<_> = swinging.iter().map(|&k| (gait.feet[k].0, gait.feet[k].1 + ahead(s) + lift)).collect();
@@ -239,7 +241,7 @@ impl Gait {
         self.land(&landing)
     }
 
-    /// The whole as a problem, with a warm start: standing still.
+    /// Returns the gait as a problem, with standing still as warm start.
     pub(crate) fn pose(self) -> Result<Posed, Error> {
         let terminal = vec![self.rest([0.0, 1e3, 1e-1, 1e2, 1e2, 1e2])];
         let end = FreeDynamics::terminal(self.model.clone(), terminal)?.with_limits(self.limits.clone())?;
@@ -250,14 +252,14 @@ impl Gait {
     }
 }
 
-/// Frames at a position, and where they are.
+/// Returns frames with their positions at q.
 fn feet_at(model: &Model, q: &[f64], frames: &[usize]) -> Vec<(usize, Vec3<f64>)> {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
     frames.iter().map(|&frame| (frame, placements.frame(frame).translation)).collect()
 }
 
-/// The position with these joints, the others neutral or mid-range.
+/// Returns the position with the given joint values; the other coordinates are neutral or mid-range.
 pub(crate) fn posture(model: &Model, joints: &BTreeMap<String, f64>, task: &Task) -> Result<Vec<f64>, Error> {
     let mut q = inside(model, neutral(model));
     for (name, &value) in joints {

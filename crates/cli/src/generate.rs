@@ -1,4 +1,4 @@
-//! `condyle generate`: a robot's dynamics as code.
+//! `condyle generate`: writes a robot's dynamics as code.
 
 use crate::error::{Error, nearest};
 use crate::robot::{self, RobotArguments, frames};
@@ -19,39 +19,39 @@ use std::path::PathBuf;
 pub(crate) struct Arguments {
     #[command(flatten)]
     robot: RobotArguments,
-    /// rnea, aba, crba, minv, gravity, nonlinear_effects, rnea_derivatives, aba_derivatives, rnea_hessian,
-    /// aba_hessian, frames, centroidal, constrained_dynamics, constrained_dynamics_derivatives, impulse_dynamics,
-    /// impulse_dynamics_derivatives
+    /// Functions to generate: rnea, aba, crba, minv, gravity, nonlinear_effects, rnea_derivatives, aba_derivatives,
+    /// rnea_hessian, aba_hessian, frames, centroidal, constrained_dynamics, constrained_dynamics_derivatives,
+    /// impulse_dynamics, impulse_dynamics_derivatives
     #[arg(long, value_name = "NAMES", value_delimiter = ',', required = true)]
     functions: Vec<String>,
-    /// c, c-float, c-4, c-8, c-float-4, c-float-8, c-casadi, rust, rust-float, cuda or cuda-float
+    /// Language: c, c-float, c-4, c-8, c-float-4, c-float-8, c-casadi, rust, rust-float, cuda or cuda-float
     #[arg(long, value_name = "NAME", default_value = "c")]
     language: String,
-    /// The folder for the files
+    /// Folder for the generated files
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// Frames, for `frames`
+    /// Frames for the function `frames`
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     frames: Vec<String>,
-    /// Frames that are point contacts, for constrained dynamics and impulses
+    /// Frames with point contacts, for constrained dynamics and impulses
     #[arg(long, value_name = "FRAMES", value_delimiter = ',')]
     contacts: Vec<String>,
-    /// Frames that are rigid contacts, likewise
+    /// Frames with rigid contacts, for constrained dynamics and impulses
     #[arg(long, value_name = "FRAMES", value_delimiter = ',')]
     rigid_contacts: Vec<String>,
-    /// Let dynamics take external forces on the bodies
+    /// Add external forces on the bodies to the arguments of the dynamics
     #[arg(long)]
     external_forces: bool,
-    /// What is an argument instead of a constant: inertia, armature, gravity
+    /// Quantities that become arguments instead of constants: inertia, armature, gravity
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     inputs: Vec<String>,
-    /// How many threads compute a state in CUDA, each some of the results, at most one for each limb and the trunk [default: as
-    /// many as pay where one thread has too few registers, while there are few states]
+    /// CUDA only: number of threads per state, each for a part of the results; at most one per limb and one for the
+    /// trunk [default: several if one thread has too few registers and there are few states]
     #[arg(long, value_name = "N")]
     shares: Option<NonZero<usize>>,
 }
 
-/// A name, if it is one of those that there are.
+/// Returns the name if it is a valid one.
 fn known<'a>(option: &'static str, name: &str, names: &[&'a str]) -> Result<&'a str, Error> {
     let what = || format!("`{name}` is none of {}{}", names.join(", "), nearest(name, names.iter().copied()));
     names.iter().copied().find(|&other| other == name).ok_or_else(|| Error::Option { option, what: what() })

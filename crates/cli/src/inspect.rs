@@ -1,4 +1,4 @@
-//! `condyle inspect`: what a robot's file says, and what is odd about it.
+//! `condyle inspect`: shows the content of a robot's file, with warnings.
 
 use crate::additions::Additions;
 use crate::error::Error;
@@ -11,13 +11,13 @@ use condyle::{Data, Model, forward_kinematics, neutral, tree::Body, tree::FrameK
 use serde::Serialize;
 use std::fmt::Write;
 
-/// Show what a robot's file says: tree, joints, limits, masses, and what is odd about it
+/// Show the content of a robot's file: tree, joints, limits, masses, and warnings about suspicious values
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   condyle inspect robot.urdf
   condyle inspect anymal.urdf --root free
   condyle inspect scene.xml --json | jq '.warnings'
-  condyle inspect humanoid --strict        # status 1 if something is odd
+  condyle inspect humanoid --strict        # status 1 if there is a warning
   condyle inspect robot.urdf --strict --allow left_out,assumed")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -25,7 +25,7 @@ pub(crate) struct Arguments {
     /// Write JSON instead of text
     #[arg(long)]
     json: bool,
-    /// End with status 1 if there is a warning
+    /// Exit with status 1 if there is a warning
     #[arg(long)]
     strict: bool,
     /// Kinds of warnings that --strict accepts
@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     allow: Vec<String>,
 }
 
-/// All that is told about a robot.
+/// Full report on a robot.
 #[derive(Serialize)]
 struct Report {
     name: String,
@@ -42,11 +42,11 @@ struct Report {
     nq: usize,
     nv: usize,
     frames: usize,
-    /// Of all that moves (kg).
+    /// Mass of all moving bodies (kg).
     mass: f64,
-    /// Of what is fixed to the world (kg).
+    /// Mass fixed to the world (kg).
     fixed_mass: f64,
-    /// The centre of mass of what moves, at the neutral position, in the world (m); none if nothing has mass.
+    /// Centre of mass of the moving bodies at the neutral position, in the world (m); `None` if nothing has mass.
     com: Option<[f64; 3]>,
     gravity: [f64; 3],
     limits: LimitCounts,
@@ -58,7 +58,7 @@ struct Report {
     warnings: Vec<Finding>,
 }
 
-/// A body and its joint. Arrays of limits have a number for each coordinate; null is no limit.
+/// Body and its joint. Arrays of limits have one number per coordinate; `null` means no limit.
 #[derive(Serialize)]
 struct BodyReport {
     index: usize,
@@ -75,7 +75,7 @@ struct BodyReport {
     lower: Vec<Option<f64>>,
     upper: Vec<Option<f64>>,
     velocity: Vec<Option<f64>>,
-    /// Greatest magnitude of effort.
+    /// Largest magnitude of the effort.
     effort: Vec<Option<f64>>,
     effort_lower: Vec<Option<f64>>,
     effort_upper: Vec<Option<f64>>,
@@ -84,24 +84,24 @@ struct BodyReport {
     armature: Vec<f64>,
     mass: f64,
     com: [f64; 3],
-    /// Principal moments of inertia about the centre of mass, least first (kg m²).
+    /// Principal moments of inertia about the centre of mass (kg m²), smallest first.
     moments: [f64; 3],
-    /// Links that fixed joints merge into this one.
+    /// Links that are merged into this body by fixed joints.
     merged: Vec<String>,
 }
 
-/// How a single call walks the tree.
+/// Order of computation of a single call.
 #[derive(Serialize)]
 struct Limbs {
     /// Whether bodies of different limbs share the lanes of a vector register.
     side_by_side: bool,
-    /// The steps from the root to the tips.
+    /// Number of steps from the root to the tips.
     steps: usize,
-    /// The bodies that they compute.
+    /// Number of bodies that the steps compute.
     bodies: usize,
 }
 
-/// A joint that follows another one.
+/// Joint that follows another joint.
 #[derive(Serialize)]
 struct Follower {
     joint: String,
@@ -109,7 +109,7 @@ struct Follower {
     ratio: f64,
     offset: f64,
     line: Option<u32>,
-    /// Whether it does, or has a coordinate of its own because `--mimic` is not given.
+    /// Whether the joint follows; if not, it has its own coordinate because `--mimic` is not given.
     follows: bool,
 }
 
@@ -161,7 +161,7 @@ impl Report {
     fn text(&self, model: &Model) -> String {
         let mut text = String::new();
         let out = &mut text;
-        // Writing to a string does not fail.
+        // Writing to a string cannot fail.
         let _ = writeln!(out, "{}  ({}, {})", styled(Style::Bold, &self.name), self.source, self.format);
         let _ = writeln!(
             out,
@@ -176,7 +176,7 @@ impl Report {
         } else {
             String::new()
         };
-        let _ = writeln!(out, "  mass {} kg that moves{fixed}", short(self.mass));
+        let _ = writeln!(out, "  moving mass {} kg{fixed}", short(self.mass));
         if let Some([x, y, z]) = self.com {
             let _ = writeln!(out, "  centre of mass ({x:.4}, {y:.4}, {z:.4}) m at the neutral position");
         }
@@ -185,9 +185,9 @@ impl Report {
         let _ = match self.limbs.side_by_side {
             true => writeln!(
                 out,
-                "  a single call takes {steps} steps of lanes for {bodies} bodies, up to four side by side"
+                "  a single call computes {bodies} bodies in {steps} steps, up to four bodies per step in SIMD lanes"
             ),
-            false => writeln!(out, "  a single call takes {steps} steps, one for each body: too few limbs for lanes"),
+            false => writeln!(out, "  a single call takes {steps} steps, one per body: too few limbs for SIMD lanes"),
         };
         *out += &heading("Tree");
         *out += &self.tree();
@@ -210,12 +210,12 @@ impl Report {
         text + &findings::text(&self.warnings, &self.source)
     }
 
-    /// The bodies under each other, with the joints that carry them.
+    /// Draws the bodies as a tree, with their joints.
     fn tree(&self) -> String {
         let mut children = vec![Vec::new(); self.bodies.len() + 1];
         self.bodies.iter().for_each(|b| children[b.parent].push(b.index));
         let mut text = "  world\n".to_owned();
-        // depth first: bodies that are still to be drawn, with what stands before them
+        // depth first: bodies still to be drawn, with the prefix of their lines
         let mut left: Vec<(usize, String, bool)> = Vec::new();
         let push = |left: &mut Vec<(usize, String, bool)>, of: usize, before: &str| {
             let last = children[of].last().copied();
@@ -321,7 +321,7 @@ impl BodyReport {
     }
 }
 
-/// The joints that follow others, or would with `--mimic`.
+/// Returns the joints that follow others, or would follow with `--mimic`.
 fn followers(robot: &Robot, arguments: &Arguments, lines: &Lines) -> Vec<Follower> {
     let follows = arguments.robot.options.mimic;
     let following = robot::ReadingOptions { mimic: true, ..arguments.robot.options.clone() };
@@ -339,7 +339,7 @@ fn followers(robot: &Robot, arguments: &Arguments, lines: &Lines) -> Vec<Followe
     model.bodies()[1..].iter().filter_map(follower).collect()
 }
 
-/// The places of n numbers from the first one on.
+/// Formats the indices of n numbers from `first` on.
 fn range(first: usize, n: usize) -> String {
     match n {
         0 => String::new(),

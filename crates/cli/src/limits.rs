@@ -1,4 +1,4 @@
-//! Limits of a robot's joints: how many there are, starts within them, and the limits as constraints of a problem.
+//! Limits of a robot's joints: their number, initial positions within them, and the limits as constraints of a problem.
 
 use crate::error::Error;
 use crate::robot::Robot;
@@ -7,20 +7,20 @@ use condyle::{Model, neutral};
 use serde::Serialize;
 use std::fmt;
 
-/// A coordinate with a limit.
+/// Coordinate with a limit.
 pub(crate) struct Limited<'a> {
     /// `position`, `velocity` or `torque`.
     pub what: &'static str,
-    /// The name of its joint.
+    /// Name of the joint.
     pub joint: &'a str,
-    /// The index in q of a position, in v otherwise.
+    /// Index in q for a position, in v otherwise.
     pub index: usize,
     pub lower: f64,
     pub upper: f64,
 }
 
-/// Lists the limited positions, velocities and efforts of a robot, joint after joint. A position has a limit of its own where the
-/// joint has as many positions as velocities; a limit of 0 for a velocity or an effort counts as none.
+/// Lists the limited positions, velocities and efforts of a robot, joint by joint. Positions count only for joints with
+/// as many positions as velocities. A velocity or effort limit of 0 counts as no limit.
 pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
     let limits = model.limits();
     let mut all = Vec::new();
@@ -45,15 +45,15 @@ pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
     all
 }
 
-/// The numbers of limited coordinates of a robot, and the source of the limits.
+/// Number of limited coordinates of a robot, and the source of the limits.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct LimitCounts {
-    /// The robot's file, or the name of a built-in robot: the only source of limits.
+    /// Robot's file, or name of a built-in robot: the only source of limits.
     pub source: String,
     pub positions: usize,
     pub velocities: usize,
     pub efforts: usize,
-    /// The degrees of freedom of the robot, nv.
+    /// Number of degrees of freedom of the robot, nv.
     pub of: usize,
 }
 
@@ -90,7 +90,7 @@ impl fmt::Display for LimitCounts {
     }
 }
 
-/// Refuses a start outside of the limits, with the joint's name.
+/// Returns an error with the joint's name if an initial position is outside the limits.
 pub(crate) fn check_start(model: &Model, q: &[f64]) -> Result<(), Error> {
     model.check_position(q)?;
     for body in model.bodies()[1..].iter().filter(|b| b.joint.nq() == 1 && b.mimic.is_none()) {
@@ -104,7 +104,7 @@ pub(crate) fn check_start(model: &Model, q: &[f64]) -> Result<(), Error> {
     Ok(())
 }
 
-/// The last frame on the body that is farthest from the root: the tip of an arm.
+/// Returns the last frame on the body that is farthest from the root: the tip of an arm.
 pub(crate) fn last_frame(model: &Model) -> usize {
     let depth = |mut body: usize| {
         let mut depth = 0;
@@ -117,12 +117,12 @@ pub(crate) fn last_frame(model: &Model) -> usize {
     (0..model.frames().len()).max_by_key(|&f| depth(model.frames()[f].body)).unwrap_or(0)
 }
 
-/// Neutral, but mid-range for the coordinates whose limits exclude it.
+/// Returns the neutral position, but mid-range for coordinates whose limits exclude neutral.
 pub(crate) fn start(model: &Model) -> Vec<f64> {
     inside(model, neutral(model))
 }
 
-/// A position, but mid-range for the coordinates whose limits exclude it.
+/// Returns the position q, but mid-range for coordinates whose limits exclude their value.
 pub(crate) fn inside(model: &Model, q: Vec<f64>) -> Vec<f64> {
     let limits = model.limits();
     let inside = |(k, q): (usize, f64)| {
@@ -132,12 +132,12 @@ pub(crate) fn inside(model: &Model, q: Vec<f64>) -> Vec<f64> {
     q.into_iter().enumerate().map(inside).collect()
 }
 
-/// The limits of positions and speeds, for the joints that have some; none where no joint has.
+/// Returns the limits of positions and speeds as constraints; empty if no joint has limits.
 pub(crate) fn limits_of(model: &Model, q: &[f64]) -> Vec<Limit> {
     let (nv, limits) = (model.nv(), model.limits());
     let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; 2 * nv], vec![f64::INFINITY; 2 * nv]);
     for body in model.bodies()[1..].iter().filter(|b| b.joint.nq() == 1 && b.mimic.is_none()) {
-        // x ⊖ x_ref of such a joint is q − q_ref
+        // for such a joint, x ⊖ x_ref is q − q_ref
         (lower[body.idx_v], upper[body.idx_v]) =
             (limits.lower[body.idx_q] - q[body.idx_q], limits.upper[body.idx_q] - q[body.idx_q]);
     }
@@ -148,8 +148,8 @@ pub(crate) fn limits_of(model: &Model, q: &[f64]) -> Vec<Limit> {
     bounded("positions and speeds", Residual::State { reference }, lower, upper)
 }
 
-/// Returns the least and greatest efforts of the last nu degrees of freedom. Where a robot leaves no range, as with an effort of
-/// 0, there is no limit.
+/// Returns the lower and upper efforts of the last nu degrees of freedom. An empty range, such as an effort of 0,
+/// counts as no limit.
 pub(crate) fn efforts(model: &Model, nu: usize) -> (Vec<f64>, Vec<f64>) {
     let (limits, first) = (model.limits(), model.nv() - nu);
     let range = |(&lower, &upper): (&f64, &f64)| {
@@ -158,7 +158,7 @@ pub(crate) fn efforts(model: &Model, nu: usize) -> (Vec<f64>, Vec<f64>) {
     limits.effort_lower[first..].iter().zip(&limits.effort_upper[first..]).map(range).unzip()
 }
 
-/// The limits of the efforts of the last nu degrees of freedom.
+/// Returns the limits of the efforts of the last nu degrees of freedom as constraints.
 pub(crate) fn efforts_of(model: &Model, nu: usize) -> Vec<Limit> {
     let (lower, upper) = efforts(model, nu);
     bounded("efforts", Residual::Control { reference: vec![0.0; nu] }, lower, upper)

@@ -1,20 +1,19 @@
-//! The lines of a robot's file on which its links and joints stand.
+//! Line numbers of links and joints in a robot's file.
 
 use std::collections::HashMap;
 
-/// Things that have a name and a line in a robot's file.
+/// Kind of element that has a name and a line in a robot's file.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) enum Kind {
     Body,
     Joint,
 }
 
-/// The line of each link (body) and joint, by name, as far as the file itself has them: those of a file that it includes
-/// are missing.
+/// Line numbers of links (bodies) and joints, by name. Elements of included files are missing.
 pub(crate) struct Lines(HashMap<(Kind, String), u32>);
 
 impl Lines {
-    /// Looks them up in the text of a URDF, MJCF or SDF, which need not be well-formed.
+    /// Finds the elements in the text of a URDF, MJCF or SDF, which need not be well-formed.
     pub(crate) fn new(text: &str) -> Self {
         let (mut lines, mut line, mut is_comment) = (HashMap::new(), 1, false);
         for piece in text.split('<') {
@@ -26,7 +25,7 @@ impl Lines {
                 _ => None,
             };
             if let (Some(kind), Some(name), false) = (kind, name(tag), is_comment) {
-                // The same tag names a link inside of a joint's <parent> in an SDF: the first one with a name counts.
+                // In an SDF, the same tag names a link inside a joint's <parent>. The first tag with a name counts.
                 lines.entry((kind, name.to_owned())).or_insert(line);
             }
             is_comment &= !piece.contains("-->");
@@ -35,13 +34,13 @@ impl Lines {
         Self(lines)
     }
 
-    /// The line of one of them.
+    /// Returns the line number of an element.
     pub(crate) fn of(&self, kind: Kind, name: &str) -> Option<u32> {
         self.0.get(&(kind, name.to_owned())).copied()
     }
 }
 
-/// The value of the attribute `name` in a start tag.
+/// Returns the value of the attribute `name` in a start tag.
 fn name(tag: &str) -> Option<&str> {
     let value = tag.split("name").skip(1).zip(tag.split("name")).find_map(|(rest, before)| {
         let value = rest.trim_start().strip_prefix('=')?.trim_start();

@@ -1,6 +1,6 @@
-//! What a robot is, whether its numbers are right, what they cost, and how it moves.
+//! Program `condyle`: shows a robot's model, checks its numbers, measures computing times, and plans motions.
 
-#![allow(non_snake_case)] // the names of the literature
+#![allow(non_snake_case)] // symbols of the literature
 
 mod additions;
 mod budget;
@@ -48,7 +48,7 @@ enum Command {
     Plan(Box<plan::Arguments>),
     #[cfg(feature = "generate")]
     Generate(generate::Arguments),
-    /// Write a robot's dynamics as code: of programs that were built with the feature `generate`
+    /// Write a robot's dynamics as code; only in programs built with the feature `generate`
     #[cfg(not(feature = "generate"))]
     #[command(hide = true, disable_help_flag = true)]
     Generate {
@@ -58,7 +58,7 @@ enum Command {
     /// Write a shell's completions to standard output
     #[command(after_help = "Example:\n  condyle completions bash > ~/.local/share/bash-completion/completions/condyle")]
     Completions {
-        /// The shell
+        /// Shell for which completions are written
         shell: clap_complete::Shell,
     },
 }
@@ -93,7 +93,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Says in one line what is wrong with the flags, and which one may have been meant; or shows the help that was asked for.
+/// Reports invalid command-line arguments in one line, with a similar name if there is one. Or prints the help that was
+/// requested.
 fn refuse(error: &clap::Error) -> ExitCode {
     let text = error.render().to_string();
     match error.kind() {

@@ -1,59 +1,59 @@
-//! A planned motion: what was asked for, and what came out.
+//! Planned motion: the request and the result.
 
 use crate::robot::Robot;
 use condyle::optimal::{Iteration, Solution, Status};
 use condyle::{Model, Vec3};
 use std::sync::Arc;
 
-/// A point that a frame was to reach.
+/// Target point of a frame.
 pub(crate) struct Goal {
     pub frame: usize,
     pub target: Vec3<f64>,
-    /// How far the frame ends from the target (m).
+    /// Final distance of the frame from the target (m).
     pub miss: f64,
     pub tolerance: f64,
-    /// How near a posture within the limits comes (m).
+    /// Smallest distance that was found for a posture within the limits (m).
     pub nearest: f64,
 }
 
-/// What was asked for, and what came out.
+/// Request and result of a plan.
 pub(crate) struct Plan {
     pub model: Arc<Model>,
-    /// The robot's file, of which the page draws the shapes.
+    /// Robot's file, whose shapes the page draws.
     pub robot: Robot,
     /// Whether the page draws the meshes that are found.
     pub meshes: bool,
     pub title: String,
     pub goal: Option<Goal>,
     pub feet: Vec<usize>,
-    /// Whether they are soles, else points.
+    /// Whether the feet are soles; otherwise they are points.
     pub soles: bool,
-    /// Whether each foot touches, knot by knot.
+    /// Whether each foot touches, for each knot.
     pub touches: Vec<Vec<bool>>,
-    /// The time of each knot (s); an impact takes none.
+    /// Time of each knot (s); an impact has no duration.
     pub times: Vec<f64>,
     pub dt: f64,
     pub budget_ms: f64,
     pub solution: Solution,
-    /// Where limits hold and hardly anything is left to gain, though the solver's own tolerance was not reached: the decrease
-    /// that is still expected, relative to the cost.
+    /// Expected decrease of the cost, relative to the cost. It is set only if the limits hold and the cost can hardly
+    /// decrease, although the solver did not reach its own tolerance.
     pub settled: Option<f64>,
-    /// The iterations of all solves.
+    /// Iterations of all solves.
     pub trace: Vec<Iteration>,
 }
 
 impl Plan {
-    /// Whether it is a solution.
+    /// Returns whether the result counts as a solution.
     pub(crate) fn is_solved(&self) -> bool {
         self.solution.status == Status::Converged || self.settled.is_some()
     }
 
-    /// The knots that have a control.
+    /// Returns the number of knots that have a control.
     pub(crate) fn knots(&self) -> usize {
         self.times.len() - 1
     }
 
-    /// The efforts of all degrees of freedom at a knot: 0 where nothing drives them, and at an impact.
+    /// Returns the efforts of all degrees of freedom at a knot: 0 for undriven ones and at an impact.
     pub(crate) fn effort(&self, t: usize) -> Vec<f64> {
         let (u, nv) = (self.solution.u(t), self.model.nv());
         let undriven = if u.is_empty() { nv } else { nv - u.len() };

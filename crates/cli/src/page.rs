@@ -1,4 +1,4 @@
-//! The page that `condyle plan` writes: plots and playback in one file that needs no network.
+//! HTML page of `condyle plan`: plots and playback in one file that needs no network.
 
 use crate::budget::held;
 use crate::limits::LimitCounts;
@@ -9,7 +9,8 @@ use condyle::{ConstraintSet, ContactConstraint, Data, Joint, Model, constrained_
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// The template's parts, in the order in which they go in: the data last, so that nothing in them is looked into.
+/// Placeholders of the template with their texts, in the order of replacement. The data are inserted last, so that
+/// placeholders in the data are not replaced.
 const PARTS: [(&str, &str); 8] = [
     ("/*{{uplot.css}}*/", include_str!("../page/vendor/uPlot.min.css")),
     ("/*{{plan.css}}*/", include_str!("../page/plan.css")),
@@ -21,7 +22,7 @@ const PARTS: [(&str, &str); 8] = [
     ("/*{{plan.js}}*/", include_str!("../page/plan.js")),
 ];
 
-/// Writes the page, and makes the folder for it. Says in a line which meshes are left out, if there are such.
+/// Writes the page, and creates its folder. Returns a one-line note on the meshes that are left out, if any.
 pub(crate) fn write(
     path: &Path,
     plan: &Plan,
@@ -41,18 +42,18 @@ pub(crate) fn write(
     Ok(note)
 }
 
-/// The joints that the page shows: those with a degree of freedom of their own.
+/// Returns the joints that the page shows: those with one degree of freedom of their own.
 fn shown(model: &Model) -> impl Iterator<Item = &condyle::tree::Body> {
     model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1 && b.mimic.is_none())
 }
 
-/// The knots that are shown: an impact takes no time, and the state before it is left out.
+/// Returns the knots that are shown. An impact has no duration, so the state before it is not shown.
 fn with_time(plan: &Plan) -> Vec<usize> {
     let times = &plan.times;
     (0..times.len()).filter(|&t| t + 1 == times.len() || times[t + 1] > times[t]).collect()
 }
 
-/// Where the feet are at the knots, whether they touch between them, and what forces hold them then.
+/// Returns the positions of the feet at the knots, and for each interval whether they touch and their contact forces.
 fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> {
     let (model, nq) = (&plan.model, plan.model.nq());
     let mut data = Data::new(model);
@@ -90,7 +91,8 @@ fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> 
     Ok(json!({"feet": names, "trails": trails, "touches": touches, "forces": forces, "weight": weight}))
 }
 
-/// All that the page shows, and a line on what it leaves out; the head of `plan.js` says what each entry is.
+/// Returns all data of the page, and a note on what is left out. The comment at the top of `plan.js` describes each
+/// entry.
 fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Option<String>) {
     let Plan { model, solution, .. } = plan;
     let (nq, limits) = (model.nq(), model.limits());
@@ -126,7 +128,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
     }
     let driven = &knots[..knots.len() - 1];
     let efforts: Vec<Vec<f64>> = (0..plan.knots()).map(|t| plan.effort(t)).collect();
-    // A knot that is left out is shown by the next one.
+    // A knot that is not shown is represented by the next one.
     let violations: Vec<Value> = violations
         .iter()
         .map(|v| {
@@ -163,7 +165,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
             "poses": poses,
             "trail": (!trail.is_empty()).then_some(trail),
         },
-        // A set of contacts that the solver took is one that can be made.
+        // Creating the set cannot fail: the solver has used the same contacts.
         "contacts": if plan.feet.is_empty() { None } else { contacts(plan, &knots).ok() },
         "limits": LimitCounts::new(&plan.robot),
         "violations": violations,
@@ -173,7 +175,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
     (data, note)
 }
 
-/// Numbers to six digits: what a screen can show.
+/// Rounds all numbers to six significant digits, which suffice for a screen.
 fn rounded(value: Value) -> Value {
     match value {
         Value::Number(n) if n.is_f64() => {

@@ -1,4 +1,4 @@
-//! `condyle plan`: motions by FDDP. An arm reaches for a point; a robot with feet stands, steps and jumps.
+//! `condyle plan`: plans motions with FDDP. An arm reaches for a point; a robot with feet stands, steps and jumps.
 
 use crate::error::{Error, positive};
 use crate::gait::Gait;
@@ -14,7 +14,7 @@ use condyle::{Data, Model, Vec3, forward_kinematics};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Plan a motion: an arm that reaches for a point, or the gait of a task file; and write it as a page to look at
+/// Plan a motion and write it as an HTML page: an arm reaches for a point, or a robot follows the gait of a task file
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   condyle plan
@@ -22,36 +22,38 @@ use std::sync::Arc;
   condyle plan --example trot > trot.toml
   condyle plan trot.toml --out trot.html --record trot.csv
 
-A task file is TOML; --example writes one that says what its entries mean. The limits that the robot's file gives for
-positions, speeds and efforts are held, and the report says how many these are. The exit status is 1 where a limit is
-exceeded or the target is missed. A motion is `settled`, and the status 0, where the limits hold and the cost is expected to
-fall by less than 1e-7 of itself, but the solver's own tolerance for the gradient of the Lagrangian is not reached. Ctrl-C
-ends the solver, and the page and the record are written with the best motion so far.")]
+A task file is TOML; --example writes one with comments on its entries. Limits of positions, speeds and efforts in the
+robot's file are enforced, and the report counts them. The exit status is 1 if a limit is exceeded or the target is missed.
+A motion is `settled`, with exit status 0, if the limits hold and the expected decrease of the cost is below 1e-7 of the
+cost, but the solver did not reach its tolerance for the gradient of the Lagrangian. Ctrl-C stops the solver; the page and
+the record then contain the best motion so far.")]
 pub(crate) struct Arguments {
-    /// A task file, in place of the flags for robot, frame and target
+    /// Task file, which replaces the options for robot, frame and target
     #[arg(value_name = "TASK.toml", conflicts_with_all = ["robot", "frame", "target", "q0", "knots", "tolerance"])]
     task: Option<PathBuf>,
-    /// Write a task to standard output, to begin with: reach, trot, walk, jump, stand-up
+    /// Write an example task file to standard output: reach, trot, walk, jump, stand-up
     #[arg(long, value_name = "NAME", exclusive = true)]
     example: Option<String>,
-    /// URDF, MJCF or SDF of the robot, or one that comes along; nothing needs its meshes. Default: arm7
+    /// Robot: a URDF, MJCF or SDF file, or a built-in robot (arm7, quadruped, humanoid); meshes are optional. Default:
+    /// arm7
     #[arg(long, value_name = "ROBOT")]
     robot: Option<String>,
     #[command(flatten)]
     options: ReadingOptions,
-    /// The frame that moves to the target: a link or joint of the URDF. Default: the last one that moves
+    /// Frame that moves to the target: a link or joint of the URDF. Default: the last frame of the outermost body
     #[arg(long, value_name = "NAME")]
     frame: Option<String>,
-    /// Where it goes, in the world's frame (m). Default: a point that the robot's own arm reaches
+    /// Target in the world frame (m); required with --robot. Default: a point that the default robot reaches
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers, allow_hyphen_values = true)]
     target: Option<Numbers>,
-    /// Where it starts, nq numbers (rad, m). Default: neutral, or mid-range where neutral is outside of the limits
+    /// Initial position, nq numbers (rad, m). Default: neutral, but mid-range for coordinates whose limits exclude
+    /// neutral
     #[arg(long, value_name = "Q,…", value_parser = numbers, allow_hyphen_values = true)]
     q0: Option<Numbers>,
-    /// Knots of the horizon
+    /// Number of knots of the horizon
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     knots: u32,
-    /// Seconds from knot to knot. Default: 0.01, or what the task says
+    /// Time between knots (s). Default: the `dt` of the task, else 0.01
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     dt: Option<f64>,
     /// Time budget per solver iteration (ms); overruns are reported but are not errors
@@ -63,13 +65,13 @@ pub(crate) struct Arguments {
     /// Maximum solver iterations (per inner solve when limits are enforced)
     #[arg(long, default_value_t = 200)]
     max_iterations: usize,
-    /// Where the page goes
+    /// File for the HTML page
     #[arg(long, default_value = "out/plan.html", value_name = "FILE")]
     out: PathBuf,
-    /// Meshes (STL, DAE, OBJ) in the page: those that are found, with at most 60 000 triangles in all, or none
+    /// Meshes (STL, DAE, OBJ) in the page: auto (all that are found, at most 60 000 triangles in total) or never
     #[arg(long, default_value = "auto", value_name = "WHEN", value_enum)]
     meshes: Show,
-    /// Also write the trajectory: to a file that ends in .csv, .npz or .json
+    /// Also write the trajectory to this file, which must end in .csv, .npz or .json
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Write a summary as JSON instead of text
@@ -77,14 +79,14 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Whether something is shown.
+/// Whether meshes are shown.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Show {
     Auto,
     Never,
 }
 
-/// Numbers on the command line, with commas between them.
+/// Numbers on the command line, separated by commas.
 #[derive(Clone)]
 struct Numbers(Vec<f64>);
 
@@ -96,23 +98,24 @@ fn numbers(text: &str) -> Result<Numbers, String> {
     text.split(',').map(number).collect::<Result<_, _>>().map(Numbers)
 }
 
-/// Where the frame of the arm that comes along goes, unless told otherwise.
+/// Default target of the default robot's frame (m).
 const DEFAULT_TARGET: [f64; 3] = [0.45, -0.25, 0.35];
 const DEFAULT_ROBOT: &str = "arm7";
 const DEFAULT_FRAME: &str = "tool";
 const DEFAULT_DT: f64 = 0.01;
-/// The costs of gaits are some hundreds: less than a millionth of them counts for nothing.
+/// Tolerance of the solver for gaits. Their costs are some hundreds, so less than a millionth of the cost is ignored.
 const GAIT_TOLERANCE: f64 = 1e-4;
-/// How large an entry of the Lagrangian's gradient may be where limits are held: beside costs of 1 and of hundreds.
+/// Maximum entry of the Lagrangian's gradient with limits as constraints: for reaching (costs of about 1) and for gaits
+/// (costs of hundreds).
 const DUAL: [f64; 2] = [1e-4, 1e0];
-/// How far beyond a limit is still held: half of what is reported (rad, m, N m, N, and per s).
+/// Maximum violation of a limit that still counts as held (rad, m, N m, N, and per s): half of `report::ROUNDING`.
 const HELD: f64 = 5e-6;
-/// Inner solves in which the limits must come to hold.
+/// Maximum number of inner solves until the limits must hold.
 const SOLVES: usize = 15;
-/// A decrease of the cost by this part of it counts for nothing.
+/// Expected decrease of the cost, relative to the cost, below which a solve has settled.
 const SETTLED: f64 = 1e-7;
 
-/// The whole of `condyle plan`.
+/// Runs `condyle plan`.
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     if let Some(name) = &arguments.example {
         let names = || task::EXAMPLES.iter().map(|example| example.0);
@@ -142,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     finish(arguments, &plan, record)
 }
 
-/// Tells what came out, writes it, and says whether it is what was asked for.
+/// Writes the page, the record and the report, and returns an error if the result is not what was requested.
 fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::Format)>) -> Result<(), Error> {
     let budget = report::measure(plan);
     let violations = report::violations(plan);
@@ -178,7 +181,7 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
                 "no posture was found that reaches it"
             }
             _ if nearest > tolerance => "no posture within the joints' limits was found that reaches it",
-            Status::Converged => "it may be too far for the time that there is; more --knots may help",
+            Status::Converged => "it may be too far away for the available time; more --knots may help",
             _ => "the solver did not converge; more --knots, more --max-iterations or another --q0 may help",
         };
         let frame = &plan.model.frames()[*frame].name;
@@ -197,7 +200,7 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
     }
 }
 
-/// Reaching for a point.
+/// Plans a motion to a point.
 fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
     let option = |option, what: String| Error::Option { option, what };
     let own = task.is_none() && arguments.robot.is_none();
@@ -225,7 +228,9 @@ fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
         (None, Some(Numbers(x))) if x.len() == 3 => Vec3::new(x[0], x[1], x[2]),
         (None, Some(Numbers(x))) => return Err(option("target", format!("expected 3 numbers, found {}", x.len()))),
         (None, None) if own => DEFAULT_TARGET.into(),
-        (None, None) => return Err(option("target", "say where to go: a robot of yours has no default".to_owned())),
+        (None, None) => {
+            return Err(option("target", "missing; only the default robot has a default target".to_owned()));
+        }
     };
     let q0 = match (&arguments.q0, task) {
         (Some(Numbers(q)), _) if q.len() == model.nq() => {
@@ -284,7 +289,7 @@ fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
     Ok(plan)
 }
 
-/// The gait of a task.
+/// Plans the gait of a task.
 fn gait(arguments: &Arguments, task: &Task) -> Result<Plan, Error> {
     let robot = robot::load(&task.robot, &options(arguments, Some(task)))?;
     let model = Arc::new(robot.model.clone());
@@ -335,7 +340,7 @@ fn gait(arguments: &Arguments, task: &Task) -> Result<Plan, Error> {
     Ok(plan)
 }
 
-/// Whether a solution leaves limits that are still to be held.
+/// Returns whether the solution exceeds limits, so that it must be solved again with constraints.
 fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
     let violations = report::violations(plan);
     if violations.is_empty() || watch::interrupted() {
@@ -345,13 +350,15 @@ fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
         let limits = LimitCounts::new(&plan.robot);
         let are = if violations.len() == 1 { "is" } else { "are" };
         let exceeded = format!("{} of these {} {are} exceeded", violations.len(), limits.total());
-        say(&format!("{limits}; {exceeded}: once more, with the limits as constraints\n"));
+        say(&format!("{limits}; {exceeded}: solving again, with the limits as constraints\n"));
     }
     true
 }
 
-/// Solves a problem with limits, from a solution that exceeds them. With the solution comes, where the solver's own tolerance
-/// was not reached but limits and cost say that nothing is left to do, the decrease that is still expected, relative to the cost.
+/// Solves a problem with limits as constraints, starting from a solution that exceeds them.
+///
+/// The second result is set if the solver did not reach its own tolerance, but the limits hold and the cost can hardly
+/// decrease. It is the expected decrease relative to the cost.
 fn hold(
     arguments: &Arguments,
     plan: &Plan,
@@ -364,16 +371,16 @@ fn hold(
     (solver.settings.tolerance, solver.settings.tolerance_dual) = (HELD, dual);
     let (xs, us) = (&plan.solution.xs, &plan.solution.us);
     let solution = solver.solve_with(&mut problem, xs, us, watch.quiet(arguments.json))?.clone();
-    // Along many knots of an unstable motion the gradient of the Lagrangian is lost in rounding, and never falls below its
-    // tolerance. What the cost is still expected to fall by (half of Newton's decrement, squared; FDDP itself stops by it) is
-    // no worse a witness: the limits hold, and there is nothing left to gain.
+    // For unstable motions with many knots, rounding keeps the gradient of the Lagrangian above its tolerance. The
+    // expected decrease of the cost is an equally good criterion (half of Newton's squared decrement, which FDDP also
+    // uses): the limits hold, and nothing is left to gain.
     let last = solution.trace.last().filter(|last| last.feasible && last.stop < SETTLED * solution.cost.abs());
     let settled = last.filter(|_| solution.status == Status::MaxIterations && solver.outcome().primal <= HELD);
     let settled = settled.map(|last| last.stop / solution.cost.abs());
     Ok((solution, settled))
 }
 
-/// Shows the robot and the task.
+/// Prints the robot and the task.
 fn introduce(arguments: &Arguments, model: &Model, task: &str) {
     if !arguments.json {
         say(&format!("{model}{task}\n\n"));
@@ -386,7 +393,7 @@ fn heading(arguments: &Arguments) {
     }
 }
 
-/// How the robot's file is read: as the flags say, else as the task does.
+/// Returns how to read the robot's file: command-line options take precedence over the task.
 fn options(arguments: &Arguments, task: Option<&Task>) -> ReadingOptions {
     let flags = &arguments.options;
     ReadingOptions {

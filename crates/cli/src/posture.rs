@@ -1,22 +1,24 @@
-//! A posture that reaches a point: where a plan ends, found before it is planned.
+//! Inverse kinematics: the final posture of a plan, computed before the plan.
 
 use condyle::{Data, Model, ReferenceFrame, Vec3, difference, forward_kinematics, integrate, random_configuration};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::{SeedableRng, rngs::StdRng};
 
-/// Postures to start from, beside the given one.
+/// Number of random postures to start from, besides the given one.
 const STARTS: usize = 40;
-/// Steps from each.
+/// Maximum number of steps from each start.
 const STEPS: usize = 100;
-/// Damping of a step (m), small against the arm and large against rounding.
+/// Damping of a step (m): small compared with the size of an arm, large compared with rounding.
 const DAMPING: f64 = 0.02;
-/// Close enough to count as reached (m): what is left is the plan's affair.
+/// Distance that counts as reached (m); the planner reduces the rest.
 const REACHED: f64 = 1e-4;
 
-/// A posture within the limits whose frame is at the target: of all found, the one nearest to `q0`; where none is
-/// found, the one whose frame comes nearest to the target. And how far from the target its frame is (m).
+/// Returns a posture within the limits whose frame is at the target, and the distance of its frame from the target (m).
+/// If several postures reach the target, the one nearest to `q0` is returned. If none does, the one whose frame is
+/// nearest to the target is returned.
 ///
-/// Damped least squares, q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), stopped at the limits (Nakamura and Hanafusa 1986).
+/// The method is damped least squares, q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), clamped to the limits (Nakamura and Hanafusa
+/// 1986).
 pub(crate) fn reaching(model: &Model, frame: usize, target: Vec3<f64>, q0: &[f64]) -> (Vec<f64>, f64) {
     let mut data = Data::new(model);
     let mut rng = StdRng::seed_from_u64(0);
@@ -52,7 +54,7 @@ pub(crate) fn reaching(model: &Model, frame: usize, target: Vec3<f64>, q0: &[f64
     best.map_or((q0.to_vec(), f64::INFINITY), |(miss, _, q)| (q, miss))
 }
 
-/// Each coordinate that has limits moved between them.
+/// Clamps each coordinate to its limits.
 fn within_limits(model: &Model, mut q: Vec<f64>) -> Vec<f64> {
     for ((q, lower), upper) in q.iter_mut().zip(&model.limits().lower).zip(&model.limits().upper) {
         *q = q.clamp(*lower, *upper);

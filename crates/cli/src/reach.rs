@@ -7,18 +7,18 @@ use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residua
 use condyle::{Data, Model, Vec3, difference, integrate, neutral, rnea, terms::gravity};
 use std::sync::Arc;
 
-/// What an effort without a limit is weighed with, as if its limit were 100 N m or N.
+/// Weight of an effort without a limit, as if its limit were 100 N m or N.
 const WITHOUT_LIMIT: f64 = 1e-4;
 
-/// A problem, and where the solver begins: states and efforts.
+/// Problem and warm start: problem, states and efforts.
 pub(crate) type Posed = (Problem, Vec<f64>, Vec<f64>);
 
-/// The optimal control problem, and a warm start: on the straight way to a posture that reaches the target, with the
-/// efforts that inverse dynamics gives for it.
+/// Returns the optimal control problem and a warm start. The warm start is a straight path to a posture that reaches
+/// the target, with the efforts from inverse dynamics.
 ///
-/// It weighs speed, the efforts beyond those that hold the start (each against its limit), and, as barriers, what lies
-/// outside of the limits of position, speed and effort; at the end, the distance to the target and the speed. Where limits
-/// are to be held they are constraints as well.
+/// Running costs are the speed and the efforts beyond those that hold the start, each relative to its limit. Barriers
+/// penalize positions, speeds and efforts outside their limits. Terminal costs are the distance to the target and the
+/// speed. With `held`, the limits are also constraints.
 pub(crate) fn problem(
     model: &Arc<Model>,
     frame: usize,
@@ -30,7 +30,7 @@ pub(crate) fn problem(
     let nv = model.nv();
     let limits = model.limits();
     let nu = Actuation::joints(model).nu();
-    let driven = nv - nu..; // all but a floating base
+    let driven = nv - nu..; // all degrees of freedom except a floating base
     let rest = |q: &[f64]| [q, &vec![0.0; nv]].concat();
     let x0 = rest(q0);
     let state = || Residual::State { reference: rest(&neutral(model)) };
@@ -61,7 +61,7 @@ pub(crate) fn problem(
         Cost::new("stop", 1e0, state(), moving(1.0)),
         Cost::new("limits", 1e2, state(), within()),
     ];
-    // the straight way with the least jerk: q0 ⊕ s(t) way, s = 10 r³ − 15 r⁴ + 6 r⁵, r = t/T
+    // straight path with minimum jerk: q0 ⊕ s(t) way, s = 10 r³ − 15 r⁴ + 6 r⁵, r = t/T
     let (mut data, mut q, mut way) = (Data::new(model), q0.to_vec(), vec![0.0; nv]);
     difference(model, q0, q_end, &mut way);
     let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();

@@ -1,4 +1,4 @@
-//! A planned trajectory as a file for other programs: CSV, NPZ or JSON, with columns named after the robot's joints.
+//! Planned trajectory as a file for other programs: CSV, NPZ or JSON, with columns named after the robot's joints.
 
 use crate::error::{Error, nearest};
 use crate::motion::Plan;
@@ -7,7 +7,7 @@ use serde_json::json;
 use std::io::{Cursor, Write};
 use std::path::Path;
 
-/// A kind of file.
+/// File format.
 #[derive(Clone, Copy)]
 pub(crate) enum Format {
     Csv,
@@ -15,7 +15,7 @@ pub(crate) enum Format {
     Json,
 }
 
-/// The kind that the end of a file's name says.
+/// Returns the format, given by the extension of the file name.
 pub(crate) fn format(path: &Path) -> Result<Format, Error> {
     match path.extension().and_then(|end| end.to_str()) {
         Some("csv") => Ok(Format::Csv),
@@ -29,7 +29,7 @@ pub(crate) fn format(path: &Path) -> Result<Format, Error> {
     }
 }
 
-/// The names of the parts of a joint's position and velocity.
+/// Returns the names of the components of a joint's position and velocity.
 fn parts(joint: Joint) -> (&'static [&'static str], &'static [&'static str]) {
     match joint {
         Joint::FreeFlyer => (&["x", "y", "z", "qx", "qy", "qz", "qw"], &["vx", "vy", "vz", "wx", "wy", "wz"]),
@@ -41,7 +41,7 @@ fn parts(joint: Joint) -> (&'static [&'static str], &'static [&'static str]) {
     }
 }
 
-/// The names of the numbers of q, and of v and τ.
+/// Returns the names of the entries of q, and of the entries of v and τ.
 fn columns(model: &Model) -> (Vec<String>, Vec<String>) {
     let (mut q, mut v) = (Vec::new(), Vec::new());
     for body in model.bodies()[1..].iter().filter(|b| b.mimic.is_none()) {
@@ -56,7 +56,7 @@ fn columns(model: &Model) -> (Vec<String>, Vec<String>) {
     (q, v)
 }
 
-/// A trajectory as numbers: N + 1 states, N efforts.
+/// Trajectory as numbers: N + 1 states and N efforts.
 struct Table<'a> {
     plan: &'a Plan,
     q: Vec<f64>,
@@ -79,7 +79,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Writes the trajectory.
+/// Writes the trajectory to a file.
 pub(crate) fn write(path: &Path, format: Format, plan: &Plan) -> std::io::Result<()> {
     let table = Table::new(plan);
     let bytes = match format {
@@ -93,7 +93,7 @@ pub(crate) fn write(path: &Path, format: Format, plan: &Plan) -> std::io::Result
     std::fs::write(path, bytes)
 }
 
-/// A text as a field of a CSV (RFC 4180).
+/// Escapes a text as a CSV field (RFC 4180).
 fn field(text: &str) -> String {
     match text.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
@@ -101,7 +101,7 @@ fn field(text: &str) -> String {
     }
 }
 
-/// A line for each knot; the last one has no efforts.
+/// Writes one line per knot; the last line has no efforts.
 fn csv(table: &Table) -> String {
     let Table { plan, q, v, tau, knots } = table;
     let (of_q, of_v) = columns(&plan.model);
@@ -143,7 +143,7 @@ fn json(table: &Table) -> String {
     value.to_string() + "\n"
 }
 
-/// Arrays of NumPy: times, q, v, tau, touches, q_names, v_names, feet.
+/// Writes NumPy arrays: times, q, v, tau, touches, q_names, v_names, feet.
 fn npz(table: &Table) -> std::io::Result<Vec<u8>> {
     let Table { plan, q, v, tau, knots } = table;
     let (of_q, of_v) = columns(&plan.model);
@@ -163,7 +163,7 @@ fn npz(table: &Table) -> std::io::Result<Vec<u8>> {
     add("tau", "<f8", &[*knots, of_v.len()], &floats(tau))?;
     add("touches", "|b1", &[plan.touches.len(), feet.len()], &touches)?;
     for (name, texts) in [("q_names", &of_q), ("v_names", &of_v), ("feet", &feet)] {
-        // texts of one length, in UTF-32, filled up with zeros
+        // texts of equal length in UTF-32, padded with zeros
         let length = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
         let text = |text: &String| {
             let mut codes: Vec<u32> = text.chars().map(u32::from).collect();
@@ -175,7 +175,7 @@ fn npz(table: &Table) -> std::io::Result<Vec<u8>> {
     Ok(zip.finish()?.into_inner())
 }
 
-/// The head of an array's file (NumPy's format 1.0): its length is a multiple of 64 bytes.
+/// Returns the header of a NumPy array file (format 1.0), padded to a multiple of 64 bytes.
 fn npy_header(kind: &str, shape: &[usize]) -> Vec<u8> {
     let sizes: String = shape.iter().map(|n| format!("{n}, ")).collect();
     let mut text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({sizes}), }}");

@@ -1,4 +1,4 @@
-//! What `condyle plan` prints: iterations, where the time went, what is beyond its limits.
+//! Output of `condyle plan`: iterations, computing times, and exceeded limits.
 
 use crate::limits::{LimitCounts, Limited, limited};
 use crate::motion::Plan;
@@ -9,9 +9,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Beyond a limit by less than this share of the range, or of 1, is the solver's tolerance, and not reported.
+/// Relative tolerance for limits: an excess below this fraction of the range (or of 1, if larger) is not reported.
 const ROUNDING: f64 = 1e-5;
-/// How often a function is timed; the median counts.
+/// Number of timed repetitions of a function; the median counts.
 const REPETITIONS: usize = 11;
 
 pub(crate) const ITERATION_HEADER: &str = "iteration           cost        gap    step  regularisation\n";
@@ -21,7 +21,7 @@ pub(crate) fn iteration(i: &Iteration) -> String {
     format!("{:9}  {:13.6}  {:9.2e}  {step:>6}  {:14.0e}\n", i.iteration, i.cost, i.gap, i.regularisation)
 }
 
-/// One line of the table of times.
+/// Row of the table of times.
 #[derive(Serialize)]
 pub(crate) struct Row {
     pub name: &'static str,
@@ -29,23 +29,23 @@ pub(crate) struct Row {
     pub ms_per_horizon: f64,
 }
 
-/// Where the time goes.
+/// Computing times of a solve.
 #[derive(Serialize)]
 pub(crate) struct Budget {
     pub budget_ms: f64,
     pub knots: usize,
     pub per: &'static str,
-    /// The parts of one iteration of the solver.
+    /// Times of the parts of one solver iteration.
     pub rows: Vec<Row>,
-    /// Their sum.
+    /// Sum of the rows.
     pub total_ms: f64,
-    /// The dynamics that they call, timed by itself.
+    /// Times of the dynamics functions that the iteration calls, measured alone.
     pub alone: Vec<Row>,
     #[serde(skip)]
     pub solve_ms: f64,
 }
 
-/// The median time of a pass over all knots.
+/// Returns the median time of a pass over all knots.
 fn median(knots: usize, mut f: impl FnMut(usize)) -> Duration {
     let mut times = [Duration::ZERO; REPETITIONS];
     for time in &mut times {
@@ -57,7 +57,7 @@ fn median(knots: usize, mut f: impl FnMut(usize)) -> Duration {
     times[REPETITIONS / 2]
 }
 
-/// Times the dynamics on the planned motion, and takes sweep and rollout from the solve.
+/// Measures the dynamics on the planned motion; the times of sweep and rollout come from the solve.
 pub(crate) fn measure(plan: &Plan) -> Budget {
     let (model, solution) = (&plan.model, &plan.solution);
     let (nq, nv) = (model.nq(), model.nv());
@@ -101,19 +101,19 @@ pub(crate) fn measure(plan: &Plan) -> Budget {
     }
 }
 
-/// A quantity beyond its limit, at the knot where it is farthest beyond.
+/// Exceeded limit of a quantity, at the knot with the largest excess.
 #[derive(Serialize)]
 pub(crate) struct Violation {
     /// `position`, `velocity` or `torque`.
     pub what: &'static str,
     pub joint: String,
     pub at_knot: usize,
-    /// How far beyond.
+    /// Largest excess over the limit.
     pub amount: f64,
     pub limit: f64,
 }
 
-/// All quantities that are beyond their limits.
+/// Returns all quantities that exceed their limits.
 pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
     let (model, solution) = (&plan.model, &plan.solution);
     let knots = plan.knots();
@@ -137,7 +137,7 @@ pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
     found
 }
 
-/// How the solve ended, in words.
+/// Returns the final status of the solve as text.
 pub(crate) fn status(plan: &Plan) -> &'static str {
     match plan.solution.status {
         _ if plan.settled.is_some() => "settled",
@@ -152,14 +152,16 @@ pub(crate) fn status(plan: &Plan) -> &'static str {
     }
 }
 
-/// Everything after the iterations.
+/// Returns the report that follows the iterations.
 pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> String {
     let (model, iterations) = (&plan.model, plan.trace.len());
     let ended = styled(if plan.is_solved() { Style::Good } else { Style::Bad }, status(plan));
     let mut text = format!("\n{ended} after {iterations} iterations, {:.1} ms\n", budget.solve_ms);
     if let Some(left) = plan.settled {
-        let why = "the gradient of the Lagrangian is lost in rounding above its tolerance";
-        text += &format!("settled: the constraints hold, the cost would fall by {left:.0e} of itself; {why}\n");
+        let why = "rounding keeps the gradient of the Lagrangian above its tolerance";
+        text += &format!(
+            "settled: the constraints hold, and the expected decrease of the cost is {left:.0e} of the cost; {why}\n"
+        );
     }
     if let Some(goal) = &plan.goal {
         text += &format!("`{}` ends {:.2} mm from the target\n", model.frames()[goal.frame].name, 1e3 * goal.miss);
@@ -186,7 +188,7 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> St
     text += &format!("one iteration is {verdict} the budget of {} ms\n", budget.budget_ms);
     let limits = LimitCounts::new(&plan.robot);
     text += &match (limits.total(), violations.len()) {
-        (0, _) => format!("\n{limits}: there was none to check\n"),
+        (0, _) => format!("\n{limits}: nothing to check\n"),
         (1, 0) => format!("\n{limits}: the limit holds at all knots\n"),
         (total, 0) => format!("\n{limits}: all {total} hold at all knots\n"),
         (total, beyond) => {
@@ -201,7 +203,7 @@ pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> St
     text
 }
 
-/// The same for programs.
+/// Returns the report as JSON.
 pub(crate) fn summary(plan: &Plan, budget: &Budget, violations: &[Violation]) -> Value {
     let goal = plan.goal.as_ref().map(|goal| {
         let frame = &plan.model.frames()[goal.frame].name;

@@ -1,39 +1,40 @@
-//! The robot of a command: a file of any kind, or one that comes along.
+//! Robot of a command: a file of any supported format, or a built-in robot.
 
 use crate::error::{Error, nearest};
 use condyle::{Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, robots};
 use condyle_meshes::Places;
 use std::path::{Path, PathBuf};
 
-/// The robots that come along, by name.
+/// Names of the built-in robots.
 pub(crate) const EMBEDDED: [&str; 3] = ["arm7", "quadruped", "humanoid"];
 
-/// Which robot, and how its file is read.
+/// Robot, and how its file is read.
 #[derive(clap::Args, Clone)]
 pub(crate) struct RobotArguments {
-    /// URDF, MJCF or SDF of the robot, or one that comes along: arm7, quadruped, humanoid
+    /// Robot: a URDF, MJCF or SDF file, or a built-in robot: arm7, quadruped, humanoid
     #[arg(value_name = "ROBOT")]
     pub robot: String,
     #[command(flatten)]
     pub options: ReadingOptions,
 }
 
-/// How a robot's file is read.
+/// Options for reading a robot's file.
 #[derive(clap::Args, Clone, Default)]
 pub(crate) struct ReadingOptions {
-    /// The joint between the world and the root link of a URDF or SDF. Default: fixed
+    /// Joint between the world and the root link of a URDF or SDF. Default: fixed; free for the built-in quadruped and
+    /// humanoid
     #[arg(long, value_name = "JOINT", value_enum)]
     pub root: Option<Root>,
-    /// Let joints with a <mimic> (MJCF: <equality>) follow another joint, instead of having a coordinate of their own
+    /// Make joints with a <mimic> (MJCF: <equality>) follow another joint; otherwise each has its own coordinate
     #[arg(long)]
     pub mimic: bool,
-    /// A folder with packages in it, for package:// addresses; may be given several times
+    /// Folder that contains packages, for package:// addresses; can be given several times
     #[arg(long, value_name = "FOLDER")]
     pub packages: Vec<PathBuf>,
-    /// A value for an argument of a .xacro file, which the installed program xacro expands; may be given several times
+    /// Value of an argument of a .xacro file, which the installed program xacro expands; can be given several times
     #[arg(long = "argument", value_name = "NAME=VALUE", value_parser = argument)]
     pub arguments: Vec<(String, String)>,
-    /// The one model of an SDF to read. Default: all of them
+    /// Model of an SDF to read. Default: all models
     #[arg(long, value_name = "MODEL")]
     pub model: Option<String>,
 }
@@ -47,13 +48,13 @@ impl ReadingOptions {
     }
 }
 
-/// Reads an argument of xacro, which it also writes as `name:=value`.
+/// Parses an argument for xacro: `name=value`, or `name:=value` as xacro writes it.
 fn argument(text: &str) -> Result<(String, String), &'static str> {
     let (name, value) = text.split_once(":=").or_else(|| text.split_once('=')).ok_or("expected NAME=VALUE")?;
     Ok((name.to_owned(), value.to_owned()))
 }
 
-/// The joint of a root link.
+/// Joint between the world and a root link.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 pub(crate) enum Root {
     Fixed,
@@ -75,7 +76,7 @@ impl Root {
     }
 }
 
-/// A kind of file.
+/// Format of a robot's file.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Format {
     Urdf,
@@ -93,19 +94,19 @@ impl Format {
     }
 }
 
-/// A robot, and where it comes from.
+/// Robot, and its source.
 pub(crate) struct Robot {
     pub model: Model,
-    /// The path, or the name of one that comes along.
+    /// Path of the file, or name of the built-in robot.
     pub source: String,
     pub format: Format,
-    /// The text of the file.
+    /// Text of the file.
     pub text: String,
-    /// Where its meshes are looked for.
+    /// Folders in which its meshes are searched.
     pub places: Places,
 }
 
-/// Reads a robot.
+/// Loads a robot from a file, or a built-in one.
 pub(crate) fn load(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     let places = |path: &Path| Places { folder: path.parent().map(Path::to_owned), packages: options.packages.clone() };
     let Some(path) = locate(name) else {
@@ -123,14 +124,14 @@ pub(crate) fn load(name: &str, options: &ReadingOptions) -> Result<Robot, Error>
     Ok(Robot { model, source: name.to_owned(), format, text, places: places(&found) })
 }
 
-/// The file of that name, if the name is none of a robot that comes along. An address of a package is looked up later.
+/// Returns the path of the file, or `None` for a built-in robot. A package:// address is resolved later.
 fn locate(name: &str) -> Option<PathBuf> {
     let path = Path::new(name);
     let plain = !EMBEDDED.contains(&name) || path.is_file();
     (plain && (path.exists() || name.starts_with("package://"))).then(|| path.to_owned())
 }
 
-/// Reads the model of a file of known kind.
+/// Reads the model from a file of known format.
 pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Result<Model, Error> {
     let (root_joint, mimic, packages) = (options.root.and_then(Root::joint), options.mimic, options.packages.clone());
     Ok(match format {
@@ -141,7 +142,7 @@ pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Resu
         }
         Format::Mjcf => {
             if options.root.is_some() {
-                let what = "an MJCF says itself how its bodies are joined to the world".to_owned();
+                let what = "not for an MJCF, which defines the joints of its bodies to the world".to_owned();
                 return Err(Error::Option { option: "root", what });
             }
             Model::from_mjcf(path, &MjcfOptions { mimic, packages, ..MjcfOptions::default() })?
@@ -149,7 +150,7 @@ pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Resu
     })
 }
 
-/// A robot that comes along, on its own root joint unless another one is asked for.
+/// Loads a built-in robot, with its own root joint unless another one is requested.
 fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     let (text, free) = match name {
         "arm7" => (robots::ARM7, false),
@@ -166,7 +167,7 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text: text.to_owned(), places: Places::default() })
 }
 
-/// An error for a name that is neither a file's nor that of a robot that comes along; with what it could have meant.
+/// Returns an error for a name that is neither a file nor a built-in robot, with the most similar name.
 fn unknown(name: &str) -> Error {
     let kinds = ["urdf", "xacro", "xml", "mjcf", "sdf"];
     if name.contains(['.', '/', '\\']) {
@@ -179,14 +180,14 @@ fn unknown(name: &str) -> Error {
     }
 }
 
-/// An error for a file that is not there, with the one of such kinds (extensions) that it could have been.
+/// Returns an error for a missing file, with the most similar file name of the given extensions.
 pub(crate) fn no_such_file(name: &str, kinds: &[&str]) -> Error {
     let files = files_beside(name, kinds);
     let nearest = nearest(name, files.iter().map(|file| &**file));
     Error::File { file: name.to_owned(), what: format!("No such file{nearest}") }
 }
 
-/// Files of some kinds (extensions) in the folder in which a file would be.
+/// Returns the files with the given extensions in the folder of `name`.
 fn files_beside(name: &str, kinds: &[&str]) -> Vec<String> {
     let folder = Path::new(name).parent().map_or("", |parent| parent.to_str().unwrap_or_default());
     let look_in = if folder.is_empty() { "." } else { folder };
@@ -199,7 +200,7 @@ fn files_beside(name: &str, kinds: &[&str]) -> Vec<String> {
     files.take(1000).collect()
 }
 
-/// The text of a file, and by its first element the kind of it.
+/// Returns the format of a file, which its first element determines, and the text of the file.
 fn sniff(path: &Path) -> Result<(Format, String), Error> {
     let wrong = |what: String| Error::File { file: path.display().to_string(), what };
     if path.to_str().is_some_and(|name| name.starts_with("package://")) {
@@ -219,7 +220,7 @@ fn sniff(path: &Path) -> Result<(Format, String), Error> {
     Ok((format, text))
 }
 
-/// The name of the first element of an XML text, behind its declaration and comments.
+/// Returns the name of the first element of an XML text, after its declaration and comments.
 fn first_tag(mut text: &str) -> Option<&str> {
     loop {
         let (_, rest) = text.split_once('<')?;
@@ -237,13 +238,13 @@ fn first_tag(mut text: &str) -> Option<&str> {
     }
 }
 
-/// Frames by name.
+/// Returns the indices of frames, given their names.
 pub(crate) fn frames(model: &Model, names: &[String]) -> Result<Vec<usize>, Error> {
     names.iter().map(|name| Ok(model.frame(name)?)).collect()
 }
 
-/// The robot with enough armature (kg m², kg) on the joints that move nothing with inertia, so that forward dynamics has
-/// an answer; and their names.
+/// Adds armature (kg m², kg) to the joints that move nothing with inertia, so that forward dynamics has a solution.
+/// Returns the robot and the names of these joints.
 pub(crate) fn regular(model: Model, armature: f64) -> Result<(Model, Vec<String>), Error> {
     let joints: Vec<String> = model.singular_joints().iter().map(|&i| model.bodies()[i].joint_name.clone()).collect();
     if joints.is_empty() {

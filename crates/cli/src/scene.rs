@@ -1,4 +1,4 @@
-//! What the page draws: the shapes and meshes of a robot's file, or bones between the joints where it has none.
+//! Scene of the page: shapes and meshes from the robot's file, or bones between the joints of robots without shapes.
 
 use crate::robot::{Format, Robot};
 use crate::visuals::{self, Geometry};
@@ -10,7 +10,7 @@ use condyle_meshes::{Drawn, Meshes, mjcf};
 use serde::Serialize;
 use std::collections::HashMap;
 
-/// A body, with what is drawn of it in its frame.
+/// Body, with the shapes that are drawn in its frame.
 #[derive(Serialize)]
 pub(crate) struct Body {
     name: String,
@@ -18,7 +18,7 @@ pub(crate) struct Body {
     shapes: Vec<Shape>,
 }
 
-/// A box, cylinder, sphere, a segment with round ends, or a part of a mesh, whose `size` is its scale.
+/// Box, cylinder, sphere, capsule, segment with round ends, or part of a mesh. For a mesh, `size` is its scale.
 #[derive(Clone, Serialize)]
 pub(crate) struct Shape {
     kind: &'static str,
@@ -26,18 +26,18 @@ pub(crate) struct Shape {
     position: [f64; 3],
     quaternion: [f64; 4],
     color: Option<String>,
-    /// The number of the part.
+    /// Index of the part of a mesh.
     #[serde(skip_serializing_if = "Option::is_none")]
     part: Option<usize>,
 }
 
-/// Position and quaternion (x, y, z, w).
+/// Returns position and quaternion (x, y, z, w).
 pub(crate) fn pose(placement: Se3<f64>) -> [f64; 7] {
     let (p, q) = (placement.translation, Quaternion::from_rotation(placement.rotation));
     [p.x, p.y, p.z, q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// All bodies, the world first; and the meshes that they show, where meshes are wanted.
+/// Returns all bodies, the world first, and their meshes if `wanted`.
 pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool) -> (Vec<Body>, Meshes) {
     let mut meshes = Meshes::new(robot.places.clone());
     let mut shapes = match robot.format {
@@ -45,7 +45,8 @@ pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool)
         Format::Mjcf if wanted => shapes_of_mjcf(model, &robot.text, &mut meshes),
         Format::Mjcf | Format::Sdf => HashMap::new(),
     };
-    // Bones where a mesh is left out; and everywhere but at meshes, unless most moving bodies have shapes of their own.
+    // Bones replace meshes that are left out. Unless most moving bodies have shapes of their own, bones also replace
+    // everything except meshes.
     let drawn = |b: &usize| shapes.get(b).is_some_and(|shapes| !shapes.is_empty());
     let few = 2 * (1..model.bodies().len()).filter(drawn).count() < model.bodies().len() - 1;
     for (body, bones) in bones(model, ends) {
@@ -64,14 +65,14 @@ pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool)
     (model.bodies().iter().enumerate().map(body).collect(), meshes)
 }
 
-/// A colour as style sheets write it.
+/// Returns a colour in CSS notation.
 fn hex(color: &[f64]) -> String {
     let byte = |x: &f64| format!("{:02x}", (255.0 * x.clamp(0.0, 1.0)).round() as u8);
     "#".to_owned() + &color.iter().take(3).map(byte).collect::<String>()
 }
 
-/// Boxes, cylinders, spheres, capsules and meshes of the URDF's visuals, by body; a body whose meshes are left out and that
-/// shows nothing else has an empty list.
+/// Returns the boxes, cylinders, spheres, capsules and meshes of the URDF's visuals, by body. If all meshes of a body
+/// are left out and it has no other shapes, its list is empty.
 fn shapes_of_urdf(model: &Model, urdf: &str, mut meshes: Option<&mut Meshes>) -> HashMap<usize, Vec<Shape>> {
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
     for visual in visuals::read(urdf) {
@@ -97,7 +98,7 @@ fn shapes_of_urdf(model: &Model, urdf: &str, mut meshes: Option<&mut Meshes>) ->
     shapes
 }
 
-/// The meshes of an MJCF's bodies.
+/// Returns the meshes of the bodies of an MJCF.
 fn shapes_of_mjcf(model: &Model, text: &str, meshes: &mut Meshes) -> HashMap<usize, Vec<Shape>> {
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
     for visual in mjcf::visuals(text) {
@@ -114,7 +115,7 @@ fn shapes_of_mjcf(model: &Model, text: &str, meshes: &mut Meshes) -> HashMap<usi
     shapes
 }
 
-/// The parts of a mesh. The colours that its own file gives come first, as RViz has them.
+/// Returns the parts of a mesh. Colours in the mesh file take precedence over `color`, as in RViz.
 fn parts(meshes: &mut Meshes, file: &str, scale: &[f64], pose: [f64; 7], color: Option<&str>) -> Vec<Shape> {
     let shape = |drawn: Drawn| Shape {
         kind: "mesh",
@@ -126,13 +127,13 @@ fn parts(meshes: &mut Meshes, file: &str, scale: &[f64], pose: [f64; 7], color: 
     meshes.get(file).into_iter().map(shape).collect()
 }
 
-/// A shape at a pose, without anything to see yet.
+/// Returns a shape at a pose, still without geometry.
 fn at(pose: [f64; 7]) -> Shape {
     let [x, y, z, quaternion @ ..] = pose;
     Shape { kind: "", size: vec![], position: [x, y, z], quaternion, color: None, part: None }
 }
 
-/// A segment from each body to the joints that it carries, a sphere at each joint, and a segment to each end.
+/// Returns a segment from each body to its child joints, a sphere at each joint, and a segment to each end frame.
 fn bones(model: &Model, ends: &[usize]) -> HashMap<usize, Vec<Shape>> {
     let mut data = Data::new(model);
     let q = condyle::neutral(model);

@@ -1,15 +1,15 @@
-//! Random states of a robot: positions within the limits, the rest normal.
+//! Random states of a robot: positions within the limits, all other quantities normally distributed.
 
 use condyle::{Model, random_configuration};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-/// A source of the same random numbers every time.
+/// Returns a random number generator with a fixed seed.
 pub(crate) fn source(seed: u64) -> StdRng {
     StdRng::seed_from_u64(seed)
 }
 
-/// n numbers of mean 0 and variance 1 (Box and Muller, 1958).
+/// Returns n numbers of mean 0 and variance 1 (Box and Muller, 1958).
 pub(crate) fn normal(random: &mut StdRng, n: usize) -> Vec<f64> {
     let mut one = || {
         let (a, b): (f64, f64) = (random.random(), random.random());
@@ -18,7 +18,7 @@ pub(crate) fn normal(random: &mut StdRng, n: usize) -> Vec<f64> {
     (0..n).map(|_| one()).collect()
 }
 
-/// States one after the other, as a batch takes them.
+/// States stored one after another, in the layout of a batch.
 pub(crate) struct States {
     pub q: Vec<f64>,
     pub v: Vec<f64>,
@@ -34,7 +34,7 @@ impl States {
         Self { q, v: vectors(), a: vectors(), tau: vectors() }
     }
 
-    /// The parts of state k.
+    /// Returns q, v, a and τ of state k.
     pub(crate) fn at(&self, model: &Model, k: usize) -> [&[f64]; 4] {
         let (q, v) = (k * model.nq()..(k + 1) * model.nq(), k * model.nv()..(k + 1) * model.nv());
         [&self.q[q], &self.v[v.clone()], &self.a[v.clone()], &self.tau[v]]

@@ -1,4 +1,4 @@
-//! A task as a file: TOML, checked with the line of what is wrong.
+//! Task file: TOML, with line numbers in all errors.
 
 use crate::error::{Error, nearest};
 use serde::Deserialize;
@@ -7,7 +7,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 use toml::Spanned;
 
-/// The tasks that come along, by name.
+/// Built-in example tasks, by name.
 pub(crate) const EXAMPLES: [(&str, &str); 5] = [
     ("reach", include_str!("../tasks/reach.toml")),
     ("trot", include_str!("../tasks/trot.toml")),
@@ -16,7 +16,7 @@ pub(crate) const EXAMPLES: [(&str, &str); 5] = [
     ("stand-up", include_str!("../tasks/stand-up.toml")),
 ];
 
-/// A task as its file has it.
+/// Task as stored in its file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -35,7 +35,7 @@ struct File {
     phase: Vec<Spanned<PhaseFile>>,
 }
 
-/// A point that a frame goes to.
+/// Target point of a frame.
 #[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Reach {
@@ -45,7 +45,7 @@ pub(crate) struct Reach {
     pub tolerance: Option<Spanned<f64>>,
 }
 
-/// What touches the ground.
+/// Feet: the frames that touch the ground.
 #[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Feet {
@@ -53,7 +53,7 @@ pub(crate) struct Feet {
     pub points: Vec<Spanned<String>>,
     #[serde(default)]
     pub soles: Vec<Spanned<String>>,
-    /// The sides of a sole along its x and y (m).
+    /// Side lengths of a sole along its x and y axes (m).
     pub size: Option<Spanned<[f64; 2]>>,
 }
 
@@ -68,12 +68,12 @@ struct PhaseFile {
     height: Option<f64>,
 }
 
-/// A part of a gait.
+/// Phase of a gait.
 #[derive(Clone)]
 pub(crate) struct Phase {
     pub kind: PhaseKind,
     pub knots: usize,
-    /// By how much the feet go ahead, to the left, and up on their way (m).
+    /// Distances that the feet move ahead and to the left, and their lift (m).
     pub length: f64,
     pub side: f64,
     pub height: f64,
@@ -81,15 +81,15 @@ pub(crate) struct Phase {
 
 #[derive(Clone, PartialEq)]
 pub(crate) enum PhaseKind {
-    /// On all feet.
+    /// All feet on the ground.
     Stand,
-    /// With these feet in the air, by their numbers among all.
+    /// Feet in the air, by their indices.
     Step(Vec<usize>),
-    /// With all feet in the air.
+    /// All feet in the air.
     Jump,
 }
 
-/// A task that makes sense; names of frames and joints are still to be looked up in the robot.
+/// Valid task. Names of frames and joints are not yet looked up in the robot.
 pub(crate) struct Task {
     pub robot: String,
     pub root: Option<crate::robot::Root>,
@@ -100,28 +100,28 @@ pub(crate) struct Task {
     pub start: Option<BTreeMap<String, f64>>,
     pub reach: Option<Reach>,
     pub feet: Vec<String>,
-    /// The sides of the soles; none for feet that are points.
+    /// Side lengths of the soles; `None` for point feet.
     pub sole: Option<[f64; 2]>,
     pub phases: Vec<Phase>,
     pub place: Place,
 }
 
-/// Where names stand in the file, for errors that are found later.
+/// Line numbers of names in the file, for errors that are found later.
 pub(crate) struct Place {
     file: String,
     lines: BTreeMap<String, usize>,
 }
 
 impl Place {
-    /// An error in the line of a name.
+    /// Returns an error in the line of a name.
     pub(crate) fn wrong(&self, name: &str, what: String) -> Error {
         Error::Task { file: self.file.clone(), line: self.lines.get(name).copied().unwrap_or(1), what }
     }
 }
 
-/// The most knots of a phase.
+/// Maximum number of knots of a phase.
 const MOST_KNOTS: u32 = 100_000;
-/// The most bytes of a task.
+/// Maximum size of a task file in bytes.
 const LARGEST: u64 = 1 << 20;
 
 /// Reads a task from a file.
@@ -133,11 +133,11 @@ pub(crate) fn read(path: &Path) -> Result<Task, Error> {
         _ => wrong(error.to_string()),
     })?;
     if !about.is_file() || about.len() > LARGEST {
-        return Err(wrong(format!("is no regular file of at most {LARGEST} bytes")));
+        return Err(wrong(format!("is not a regular file of at most {LARGEST} bytes")));
     }
     let text = std::fs::read_to_string(path).map_err(|error| wrong(error.to_string()))?;
     let mut task = parse(&text, &file)?;
-    // The robot's file is looked for beside the task.
+    // The path of the robot's file is relative to the folder of the task.
     let beside = path.parent().unwrap_or(Path::new("")).join(&task.robot);
     if !crate::robot::EMBEDDED.contains(&&*task.robot) && !task.robot.contains("://") {
         task.robot = beside.display().to_string();
@@ -145,7 +145,7 @@ pub(crate) fn read(path: &Path) -> Result<Task, Error> {
     Ok(task)
 }
 
-/// Reads a task from its text.
+/// Parses a task.
 pub(crate) fn parse(text: &str, file: &str) -> Result<Task, Error> {
     let line = |at: usize| text[..at.min(text.len())].matches('\n').count() + 1;
     let wrong = |at: usize, what: String| Error::Task { file: file.to_owned(), line: line(at), what };
@@ -250,7 +250,7 @@ pub(crate) fn parse(text: &str, file: &str) -> Result<Task, Error> {
     })
 }
 
-/// Checks a phase.
+/// Checks a phase and converts it.
 fn phase(from: &PhaseFile, feet: &[String], wrong: &dyn Fn(usize, String) -> Error) -> Result<Phase, Error> {
     let PhaseFile { kind, knots, length, side, height, .. } = from;
     if !(1..=MOST_KNOTS).contains(knots.get_ref()) {
@@ -294,13 +294,13 @@ fn phase(from: &PhaseFile, feet: &[String], wrong: &dyn Fn(usize, String) -> Err
         return Err(wrong(at, "only a `step` names feet".to_owned()));
     }
     if kind == PhaseKind::Stand && numbers.iter().any(Option::is_some) {
-        return Err(wrong(at, "who stands has no length, side or height".to_owned()));
+        return Err(wrong(at, "a `stand` has no length, side or height".to_owned()));
     }
     let [length, side, height] = numbers.map(|x| x.unwrap_or(0.0));
     Ok(Phase { kind, knots: *knots.get_ref() as usize, length, side, height })
 }
 
-/// The key that an unknown one was meant to be, after a message of the parser that lists those there are.
+/// Returns the key that is most similar to an unknown one, given a parser message that lists the valid keys.
 fn nearest_key(message: &str) -> String {
     let mut names = message.split('`').skip(1).step_by(2);
     match (message.starts_with("unknown field"), names.next()) {

@@ -1,8 +1,8 @@
-//! What goes to the terminal: text, tables, and colours where someone sees them.
+//! Terminal output: text, tables, and colours if standard output is a terminal.
 
 use std::io::{IsTerminal, Write};
 
-/// Writes to standard output. A reader who has gone (`| head`) is no error.
+/// Writes to standard output. A closed pipe (`| head`) is not an error.
 pub(crate) fn say(text: &str) {
     let mut out = std::io::stdout().lock();
     if out.write_all(text.as_bytes()).and_then(|()| out.flush()).is_err() {
@@ -12,18 +12,18 @@ pub(crate) fn say(text: &str) {
 
 /// Writes a value as JSON.
 pub(crate) fn say_json(value: &impl serde::Serialize) {
-    // Numbers that are not finite become null; nothing else here can fail.
+    // Numbers that are not finite become `null`; nothing else can fail here.
     say(&(serde_json::to_string_pretty(value).unwrap_or_default() + "\n"));
 }
 
-/// Whether colours are wanted: standard output is a terminal, and `NO_COLOR` is not set (no-color.org).
+/// Returns whether colours are wanted: standard output is a terminal, and `NO_COLOR` is not set (no-color.org).
 fn colours() -> bool {
     std::io::stdout().is_terminal()
         && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
         && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
 }
 
-/// A way to set off a word.
+/// Style of a word.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Style {
     Bold,
@@ -33,7 +33,7 @@ pub(crate) enum Style {
     Bad,
 }
 
-/// The text in a style, or as it is where there are no colours.
+/// Returns the text in a style, or unchanged if colours are off.
 pub(crate) fn styled(style: Style, text: &str) -> String {
     if !colours() {
         return text.to_owned();
@@ -48,12 +48,13 @@ pub(crate) fn styled(style: Style, text: &str) -> String {
     format!("\x1b[{code}m{text}\x1b[0m")
 }
 
-/// A heading.
+/// Returns a heading.
 pub(crate) fn heading(text: &str) -> String {
     format!("\n{}\n", styled(Style::Bold, text))
 }
 
-/// A number in as few digits as tell it from its neighbours by a part in 10⁵.
+/// Formats a number with at most five significant digits. Very small or very large numbers have three digits and an
+/// exponent.
 pub(crate) fn short(x: f64) -> String {
     if x == 0.0 {
         return "0".to_owned();
@@ -69,7 +70,7 @@ pub(crate) fn short(x: f64) -> String {
     }
 }
 
-/// A table with its columns in line: what looks like a number, or stands over numbers, to the right.
+/// Table with aligned columns: columns of numbers are right-aligned, others left-aligned.
 pub(crate) struct Table {
     head: Vec<String>,
     rows: Vec<Vec<String>>,
@@ -84,8 +85,8 @@ impl Table {
         self.rows.push(cells);
     }
 
-    /// The table as text. A column's cells are set to the right if most of them begin with a digit or a sign; the last
-    /// column is not filled up.
+    /// Returns the table as text. A column is right-aligned if most of its cells begin with a digit or a sign. The last
+    /// column is not padded.
     pub(crate) fn text(&self) -> String {
         let columns = self.head.len();
         let lines = || std::iter::once(&self.head).chain(&self.rows);
@@ -118,7 +119,7 @@ impl Table {
     }
 }
 
-/// The columns that a text takes: characters, without what sets colours.
+/// Returns the width of a text in characters, without colour codes.
 fn width(text: &str) -> usize {
     let mut parts = text.split('\x1b');
     let first = parts.next().unwrap_or_default().chars().count();

@@ -1,9 +1,9 @@
-//! The visuals of a URDF: what its author wants to be seen of each link.
+//! Visuals of a URDF: the shapes of each link that are meant to be seen.
 
 use condyle::{Model, Se3};
 use roxmltree::{Document, Node};
 
-/// A shape on a link, where it stands in the link's frame, and its colour.
+/// Shape on a link, with its pose in the link's frame and its colour.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Visual {
     pub(crate) link: String,
@@ -13,7 +13,7 @@ pub(crate) struct Visual {
     pub(crate) color: Option<[f64; 4]>,
 }
 
-/// A shape; lengths in m.
+/// Shape; lengths in m.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Geometry {
     Box([f64; 3]),
@@ -26,14 +26,15 @@ pub(crate) enum Geometry {
         length: f64,
     },
     Sphere(f64),
-    /// A file, as the URDF writes it, whose lengths are multiplied with a scale for each axis.
+    /// Mesh file, as named in the URDF. Its lengths are multiplied by a scale for each axis.
     Mesh {
         file: String,
         scale: [f64; 3],
     },
 }
 
-/// The visuals of all links, in the file's order. What cannot be read is left out: a picture is no reason to refuse a robot.
+/// Returns the visuals of all links, in the order of the file. Unreadable visuals are skipped: a picture is no reason
+/// to refuse a robot.
 pub(crate) fn read(urdf: &str) -> Vec<Visual> {
     let Ok(urdf) = Model::well_formed(urdf) else { return Vec::new() };
     let Ok(document) = Document::parse(&urdf) else { return Vec::new() };
@@ -58,7 +59,7 @@ fn child<'a, 'i>(node: Node<'a, 'i>, tag: &'static str) -> Option<Node<'a, 'i>> 
     children(node, tag).next()
 }
 
-/// The numbers of an attribute, if they are N, and finite.
+/// Returns the numbers of an attribute, if there are exactly N and all are finite.
 fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Option<[f64; N]> {
     let mut numbers = [0.0; N];
     let mut words = node.attribute(attribute)?.split_whitespace();
@@ -84,7 +85,7 @@ fn geometry(node: Node<'_, '_>) -> Option<Geometry> {
     }
 }
 
-/// The pose of a visual: `xyz`, and `rpy` about the fixed axes x, y, z in that order.
+/// Returns the pose of a visual: `xyz`, and `rpy` about the fixed axes x, y, z in that order.
 fn origin(visual: Node<'_, '_>) -> Se3<f64> {
     let origin = child(visual, "origin");
     let read = |attribute| origin.and_then(|o| numbers(o, attribute)).unwrap_or([0.0; 3]);
@@ -93,7 +94,7 @@ fn origin(visual: Node<'_, '_>) -> Se3<f64> {
     nalgebra::Isometry3::from_parts(xyz.into(), rotation).into()
 }
 
-/// The colour of a material, or of the robot's material of the same name.
+/// Returns the colour of a material, or of the robot's material with the same name.
 fn color(material: Node<'_, '_>, robot: Node<'_, '_>) -> Option<[f64; 4]> {
     let own = |material| child(material, "color").and_then(|c| numbers(c, "rgba"));
     let name = material.attribute("name");
@@ -116,9 +117,9 @@ mod tests {
         <link name="b"><visual><geometry><cylinder radius="0.1" length="2"/></geometry></visual></link>
     </robot>"#;
 
-    /// Each visual that can be read, with its link, its pose and its colour.
+    /// Checks that each readable visual has its link, pose and colour.
     #[test]
-    fn of_each_link() {
+    fn visuals_of_each_link() {
         let visuals = read(ROBOT);
         let of: Vec<_> = visuals.iter().map(|v| (v.link.as_str(), &v.geometry, v.color)).collect();
         assert_eq!(
@@ -135,17 +136,17 @@ mod tests {
         assert_eq!(visuals[0].origin.translation.to_array(), [1.0, 2.0, 3.0]);
     }
 
-    /// A robot that the reader takes has visuals, though its text is not strict XML.
+    /// Checks that a robot that the reader accepts has visuals, even if its text is not strict XML.
     #[test]
-    fn of_robots_that_are_not_strict() {
+    fn visuals_of_robots_that_are_not_strict_xml() {
         let prolog = "<!------ a ------>\n<?xml version='1.0'?><!DOCTYPE robot>";
         let text = format!("{prolog}{}", ROBOT.replace("<link name=\"b\">", "<gz:a/><link name=\"b\">"));
         assert_eq!(read(&text), read(ROBOT));
     }
 
-    /// What is no file of a robot has no visuals.
+    /// Checks that a text without a robot, or a robot without shapes, has no visuals.
     #[test]
-    fn of_nothing() {
+    fn visuals_of_invalid_texts() {
         assert_eq!(read("<robot"), []);
         assert_eq!(read("<robot name='r'><link name='a'><visual><geometry/></visual></link></robot>"), []);
     }

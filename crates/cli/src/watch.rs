@@ -1,4 +1,4 @@
-//! Who looks at a solve: shows how it goes, and ends it at Ctrl-C.
+//! Observer of a solve: shows the progress, and stops the solve on Ctrl-C.
 
 use crate::report;
 use crate::terminal::say;
@@ -10,9 +10,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Whether Ctrl-C was pressed.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// From now on the first Ctrl-C asks the solver to end with its best iterate, and the second ends the program.
+/// Installs a handler: the first Ctrl-C asks the solver to stop with its best iterate, the second ends the program.
 pub(crate) fn catch_interrupts() {
-    // A handler that is there already does the same; where signals cannot be caught they end the program, as ever.
+    // An existing handler does the same. Where signals cannot be caught, they end the program as usual.
     let _ = ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::SeqCst) {
             std::process::exit(130);
@@ -20,12 +20,12 @@ pub(crate) fn catch_interrupts() {
     });
 }
 
-/// Whether Ctrl-C was pressed.
+/// Returns whether Ctrl-C was pressed.
 pub(crate) fn interrupted() -> bool {
     STOP.load(Ordering::SeqCst)
 }
 
-/// A bar on a terminal; nothing anywhere else.
+/// Returns a progress bar, which is visible only on a terminal.
 pub(crate) fn bar(length: u64, what: &str) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr_with_hz(10));
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} {elapsed}");
@@ -36,7 +36,7 @@ pub(crate) fn bar(length: u64, what: &str) -> ProgressBar {
     bar
 }
 
-/// The iterations of a solve, or of several after each other.
+/// Iterations of one solve, or of several consecutive solves.
 pub(crate) struct Watch {
     bar: ProgressBar,
     pub trace: Vec<Iteration>,
@@ -47,19 +47,19 @@ impl Watch {
         Self { bar: bar(most as u64, "iterations"), trace: Vec::new() }
     }
 
-    /// An observer of a solve, who says nothing if it is to be quiet.
+    /// Returns an observer of a solve, which prints nothing if `quiet` is set.
     pub(crate) fn quiet(&mut self, quiet: bool) -> Eye<'_> {
         Eye { watch: self, quiet }
     }
 
-    /// No more iterations.
+    /// Removes the progress bar and returns all iterations.
     pub(crate) fn end(self) -> Vec<Iteration> {
         self.bar.finish_and_clear();
         self.trace
     }
 }
 
-/// The observer of one solve.
+/// Observer of one solve.
 pub(crate) struct Eye<'a> {
     watch: &'a mut Watch,
     quiet: bool,

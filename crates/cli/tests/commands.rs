@@ -1,4 +1,4 @@
-//! `condyle inspect`, `budget`, `check` and the flags, as a user meets them. No test asserts a time.
+//! `condyle inspect`, `budget`, `check` and the command-line options, as a user sees them. No test asserts a time.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::process::{Command, Output};
 
 const EMBEDDED: [(&str, usize, usize); 3] = [("arm7", 7, 7), ("quadruped", 19, 18), ("humanoid", 39, 38)];
 
-/// A folder of the test's own, empty.
+/// Returns an empty folder for a test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("commands_{test}"));
     let _ = std::fs::remove_dir_all(&folder);
@@ -18,7 +18,7 @@ fn condyle(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_condyle")).args(arguments).output().unwrap()
 }
 
-/// What it prints; it must end with this status.
+/// Returns the standard output; asserts the exit status.
 fn said(arguments: &[&str], status: i32) -> String {
     let output = condyle(arguments);
     let (out, error) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
@@ -30,7 +30,7 @@ fn json(arguments: &[&str], status: i32) -> Value {
     serde_json::from_str(&said(arguments, status)).unwrap()
 }
 
-/// A URDF of a chain: a base, and links of these masses (kg) behind each other.
+/// Returns a URDF of a chain: a base, and consecutive links with the given masses (kg).
 fn chain(masses: &[f64]) -> String {
     let mut urdf = "<robot name=\"chain\">\n<link name=\"base\"/>\n".to_owned();
     for (k, m) in masses.iter().enumerate() {
@@ -47,7 +47,7 @@ fn chain(masses: &[f64]) -> String {
 }
 
 #[test]
-fn inspect_tells_what_the_model_is() {
+fn inspect_describes_the_model() {
     for (robot, nq, nv) in EMBEDDED {
         let report = json(&["inspect", robot, "--json"], 0);
         assert_eq!((report["nq"].as_u64(), report["nv"].as_u64()), (Some(nq as u64), Some(nv as u64)), "{robot}");
@@ -69,7 +69,7 @@ fn inspect_tells_what_the_model_is() {
 }
 
 #[test]
-fn inspect_finds_what_is_odd_and_says_the_line() {
+fn inspect_warns_with_line_numbers() {
     let folder = folder("odd");
     let file = folder.join("chain.urdf");
     let urdf = chain(&[1.0, 1e-4, 0.0]).replacen("upper=\"1\"", "upper=\"-1\"", 1);
@@ -191,7 +191,7 @@ fn all_checks_pass() {
     assert!(said(&["check", "arm7", "--states", "5"], 0).contains("34 of 34 checks pass"));
 }
 
-/// A tip without inertia has no forward dynamics: it is given armature, and that is said.
+/// A tip without inertia has no forward dynamics, so it gets armature, which the report states.
 #[test]
 fn massless_tips_are_given_armature() {
     let file = folder("tip").join("chain.urdf");
@@ -204,7 +204,7 @@ fn massless_tips_are_given_armature() {
 }
 
 #[test]
-fn budget_measures_all_it_promises() {
+fn budget_measures_everything() {
     let flags = ["--knots", "4,9", "--repetitions", "2", "--cores", "2", "--json"];
     for (robot, contacts) in [
         ("arm7", &["--contacts", "tool"][..]),
@@ -228,7 +228,7 @@ fn budget_measures_all_it_promises() {
     }
 }
 
-/// A period of 100 s is enough for anything, one of a nanosecond for nothing.
+/// A period of 100 s is long enough for every horizon, and a nanosecond is too short for any.
 #[test]
 fn budget_ends_with_the_verdict() {
     let folder = folder("budget");
@@ -246,7 +246,7 @@ fn budget_ends_with_the_verdict() {
 }
 
 #[test]
-fn what_is_wrong_is_named_in_one_line() {
+fn errors_are_one_line() {
     let folder = folder("wrong");
     let write = |name: &str, text: &str| {
         std::fs::write(folder.join(name), text).unwrap();
@@ -264,7 +264,7 @@ fn what_is_wrong_is_named_in_one_line() {
         (&["check", &empty], "empty.urdf: has no XML element"),
         (&["budget", &negative], "negative.urdf:"),
         (&["inspect", folder.to_str().unwrap()], "expected a file, found a folder"),
-        (&["inspect", &mjcf, "--root", "free"], "--root: an MJCF says itself"),
+        (&["inspect", &mjcf, "--root", "free"], "--root: not for an MJCF"),
         (&["inspect", "arm7", "--root", "fre"], "'free'"),
         (&["budget", "quadruped", "--contacts", "LF_fot"], "unknown frame `LF_fot`; nearest is `LF_foot`"),
         (&["budget", "arm7", "--rate", "-5"], "--rate: must be above 0, not -5"),
@@ -285,7 +285,7 @@ fn what_is_wrong_is_named_in_one_line() {
     }
 }
 
-/// A program without `generate` says which one has it, whatever it is asked for.
+/// A program without the feature `generate` names this feature, whatever the arguments are.
 #[cfg(not(feature = "generate"))]
 #[test]
 fn generate_is_a_feature() {
@@ -297,7 +297,7 @@ fn generate_is_a_feature() {
     }
 }
 
-/// What `generate` writes is what the library makes; what is wrong is named.
+/// `generate` writes the library's code, and names wrong arguments.
 #[cfg(feature = "generate")]
 #[test]
 fn generate_writes_code() {

@@ -1,10 +1,10 @@
-//! `condyle plan` as a user meets it: what it prints, what it writes, and how it ends.
+//! `condyle plan` as a user sees it: output, files and exit status.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A folder of the test's own, empty.
+/// Returns an empty folder for a test.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
     let _ = std::fs::remove_dir_all(&folder);
@@ -19,7 +19,7 @@ fn plan(folder: &Path, arguments: &[&str]) -> Output {
     command.output().unwrap()
 }
 
-/// What it says when it fails; it must fail, and not by a panic.
+/// Returns the error message; asserts a failure that is not a panic.
 fn complaint(test: &str, arguments: &[&str]) -> String {
     let output = plan(&folder(test), arguments);
     let error = String::from_utf8(output.stderr).unwrap();
@@ -29,7 +29,7 @@ fn complaint(test: &str, arguments: &[&str]) -> String {
 }
 
 #[test]
-fn the_arm_that_comes_along_reaches_its_target() {
+fn the_built_in_arm_reaches_its_target() {
     let folder = folder("reach");
     let output = plan(&folder, &[]);
     let said = String::from_utf8(output.stdout).unwrap();
@@ -49,7 +49,7 @@ fn the_arm_that_comes_along_reaches_its_target() {
     assert_eq!(data["scene"]["poses"][100].as_array().unwrap().len(), 8);
 }
 
-/// A robot of the user's: here, of the one that comes along, without any shapes.
+/// A user's robot without shapes, here made from the built-in arm, is drawn as bones.
 #[test]
 fn a_robot_from_a_file_is_drawn_as_bones() {
     let folder = folder("file");
@@ -68,7 +68,7 @@ fn a_robot_from_a_file_is_drawn_as_bones() {
     assert!(page.contains("\"segment\""));
 }
 
-/// A chain of two links in a plane, whose joints are written as given.
+/// Writes a planar chain of two links with the given joints.
 fn chain(folder: &Path, joints: [&str; 2]) -> String {
     let mut urdf = "<robot name=\"chain\"><link name=\"base\"/>".to_owned();
     for (k, joint) in joints.iter().enumerate() {
@@ -88,8 +88,8 @@ fn chain(folder: &Path, joints: [&str; 2]) -> String {
     file.to_str().unwrap().to_owned()
 }
 
-/// Sentences on limits say how many there are and where they come from, in the report, the page and `inspect`; where there is
-/// none they do not say that any holds.
+/// The report, the page and `inspect` state the number and the source of the limits. Without limits, they do not claim
+/// that a limit holds.
 #[test]
 fn limits_are_counted() {
     let all = "type=\"revolute\"><limit lower=\"-2\" upper=\"2\" velocity=\"9\" effort=\"90\"/>";
@@ -116,7 +116,7 @@ fn limits_are_counted() {
             format!("{robot} limits {positions} of 2 positions, {velocities} of 2 velocities, {efforts} of 2 efforts");
         let total = positions + velocities + efforts;
         let sentence = match total {
-            0 => format!("{robot} limits no position, velocity or effort: there was none to check"),
+            0 => format!("{robot} limits no position, velocity or effort: nothing to check"),
             1 => format!("{counts}: the limit holds at all knots"),
             _ => format!("{counts}: all {total} hold at all knots"),
         };
@@ -136,7 +136,7 @@ fn limits_are_counted() {
     }
 }
 
-/// A link that is too weak falls out of its range: what is exceeded is counted among all limits.
+/// A joint that is too weak falls out of its range. The number of exceeded limits is given relative to all limits.
 #[test]
 fn limits_that_are_exceeded_are_counted() {
     let weak = "type=\"revolute\"><limit lower=\"1.19\" upper=\"1.21\" velocity=\"9\" effort=\"0.5\"/>";
@@ -153,7 +153,7 @@ fn limits_that_are_exceeded_are_counted() {
 }
 
 #[test]
-fn a_target_out_of_reach_is_missed_and_said_to_be() {
+fn a_target_out_of_reach_is_reported_as_missed() {
     let error = complaint("far", &["--target", "3,0,0", "--max-iterations", "3"]);
     assert!(error.contains("more than --tolerance 0.01 m: no posture within the joints' limits"), "{error}");
 }
@@ -199,7 +199,7 @@ fn going_over_the_budget_is_no_error() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("OVER the budget"));
 }
 
-/// Runs a task from a text; the page, the record and the status.
+/// Solves a task given as text. Returns the summary, the path of the record, the exit status and the error text.
 fn solve_task(test: &str, text: &str, record: &str) -> (Value, PathBuf, Option<i32>, String) {
     let folder = folder(test);
     let (task, record) = (folder.join("task.toml"), folder.join(record));
@@ -215,7 +215,7 @@ fn example(name: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Each example does what it says, and every number stays within the robot's limits.
+/// Each example does what it describes, and all values stay within the robot's limits.
 #[test]
 fn the_examples_hold_their_limits() {
     for (name, robot, ahead) in [
@@ -268,7 +268,7 @@ fn the_examples_hold_their_limits() {
     }
 }
 
-/// The forces on the page carry the robot: their mean over the gait, which begins and ends at rest, is its weight.
+/// The forces on the page carry the robot. The gait begins and ends at rest, so their mean equals the weight.
 #[test]
 fn contact_forces_carry_the_robot() {
     let (_, record, ..) = solve_task("forces", &example("trot"), "motion.json");
@@ -313,7 +313,7 @@ fn the_record_is_named_after_the_joints() {
     );
 }
 
-/// A finger that begins on its limit, and that the solver would press through it to gain a little.
+/// A joint starts on its limit, and the solver could reduce the cost by exceeding the limit.
 #[test]
 fn a_joint_that_starts_on_its_limit_stays_within() {
     let urdf = include_str!("../../model/models/arm7.urdf").replace(
@@ -340,7 +340,7 @@ fn a_joint_that_starts_on_its_limit_stays_within() {
 }
 
 #[test]
-fn what_is_wrong_in_a_task_is_named_with_its_line() {
+fn errors_in_a_task_have_a_line_number() {
     let trot = example("trot");
     let line = |text: &str, part: &str| text.lines().position(|line| line.contains(part)).unwrap() + 1;
     for (from, to, words) in [
@@ -376,7 +376,7 @@ fn what_is_wrong_in_a_task_is_named_with_its_line() {
     }
 }
 
-/// Ctrl-C ends the solver; what it has found by then is written.
+/// Ctrl-C stops the solver, and the best result so far is written.
 #[test]
 #[cfg(unix)]
 fn interrupted_it_leaves_the_best_iterate() {
@@ -390,7 +390,7 @@ fn interrupted_it_leaves_the_best_iterate() {
         .spawn()
         .unwrap();
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    lines.find(|line| line.as_ref().unwrap().starts_with("iteration ")).unwrap().unwrap(); // the solver begins
+    lines.find(|line| line.as_ref().unwrap().starts_with("iteration ")).unwrap().unwrap(); // the solver has started
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     let rest: Vec<String> = lines.map(Result::unwrap).collect();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{rest:?}");

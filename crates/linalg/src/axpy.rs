@@ -2,7 +2,7 @@
 
 use condyle_spatial::Scalar;
 
-/// y += x s.
+/// Computes y += s x.
 #[inline(always)]
 pub fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     for (y, &x) in y.iter_mut().zip(x) {
@@ -10,7 +10,7 @@ pub fn axpy<S: Scalar>(s: S, x: &[S], y: &mut [S]) {
     }
 }
 
-/// Σ xₖ yₖ in four sums, which do not wait for each other.
+/// Computes Σ xₖ yₖ as four independent partial sums, so that additions need not wait for each other.
 #[inline(always)]
 pub fn dot<S: Scalar>(x: &[S], y: &[S]) -> S {
     let n = x.len();

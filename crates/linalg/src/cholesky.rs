@@ -1,4 +1,4 @@
-//! The dense factorisation M = L Lᵀ on any scalar, stored by columns, L in the lower triangle.
+//! Dense factorization M = L Lᵀ on any scalar, column-major, with L in the lower triangle.
 //!
 //! Source: Golub and Van Loan, *Matrix Computations* (4th edition), algorithm 4.2.1, column by column.
 
@@ -6,7 +6,7 @@ use crate::axpy::{axpy, dot};
 use crate::check;
 use condyle_spatial::{Dense, DenseMatrix, Matrix, Scalar, alike, matrix};
 
-/// L in place of the lower triangle of M, as long as it is to go on; says whether it is done.
+/// Replaces the lower triangle of M by L, as long as `go_on` returns `true`. Returns whether L is complete.
 #[inline(always)]
 fn factorize<S: Scalar>(M: &mut [S], n: usize, mut go_on: impl FnMut() -> bool) -> bool {
     for j in 0..n {
@@ -27,14 +27,14 @@ fn factorize<S: Scalar>(M: &mut [S], n: usize, mut go_on: impl FnMut() -> bool) 
     true
 }
 
-/// x in place of b: L Lᵀ x = b.
+/// Solves L Lᵀ x = b in place.
 #[inline(always)]
 fn solve<S: Scalar>(L: &[S], b: &mut [S]) {
     forward(L, b, 0);
     backward(L, b, 0);
 }
 
-/// y in place of b: L y = b, where b is zero before `start`.
+/// Solves L y = b in place, where b is zero before index `start`.
 #[inline(always)]
 fn forward<S: Scalar>(L: &[S], b: &mut [S], start: usize) {
     let n = b.len();
@@ -45,7 +45,7 @@ fn forward<S: Scalar>(L: &[S], b: &mut [S], start: usize) {
     }
 }
 
-/// x in place of y from `end` on: Lᵀ x = y.
+/// Solves Lᵀ x = y in place, for the entries of x from index `end` on.
 #[inline(always)]
 fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
     let n = b.len();
@@ -55,11 +55,11 @@ fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
     }
 }
 
-/// M = L Lᵀ of any symmetric positive definite matrix.
+/// Factorization M = L Lᵀ of any symmetric positive definite matrix.
 ///
-/// [`factorize`](Self::factorize) and [`inverse`](Self::inverse) cost O(n³), [`solve`](Self::solve) O(n²). All memory is
-/// allocated by [`new`](Self::new). Source: Golub and Van Loan, algorithm 4.2.1. For the inertia matrix of a robot,
-/// [`Ltdl`](crate::Ltdl) has the same verbs and uses the zeros.
+/// [`factorize`](Self::factorize) and [`inverse`](Self::inverse) cost O(n³), [`solve`](Self::solve) O(n²).
+/// [`new`](Self::new) allocates all memory. Source: Golub and Van Loan, algorithm 4.2.1. For the inertia matrix of a
+/// robot, [`Ltdl`](crate::Ltdl) has the same methods and uses the zeros.
 ///
 /// ```
 /// use condyle_linalg::Cholesky;
@@ -80,7 +80,7 @@ pub struct Cholesky<S> {
 alike!(Cholesky { L });
 
 impl<S: Scalar> Cholesky<S> {
-    /// The most rows: of doubles, the factor is then 128 MiB.
+    /// Maximum number of rows; the factor then takes 128 MiB in doubles.
     pub const MOST_ROWS: usize = 4096;
 
     /// Allocates the factor of an n × n matrix.
@@ -93,14 +93,15 @@ impl<S: Scalar> Cholesky<S> {
         Self { L: matrix(n, n, S::zero()) }
     }
 
-    /// L, in the lower triangle; what stands above the diagonal has no meaning.
+    /// Returns L, in the lower triangle. Entries above the diagonal have no meaning.
     pub fn lower(&self) -> &Matrix<S> {
         &self.L
     }
 
-    /// M = L Lᵀ, in O(n³). Only the lower triangle is read.
+    /// Factorizes M = L Lᵀ, in O(n³). Only the lower triangle is read.
     ///
-    /// M: n × n, symmetric, positive definite; if it is not, some entries of L are not finite. Allocates nothing.
+    /// M: n × n, symmetric, positive definite. If it is not positive definite, some entries of L are not finite.
+    /// Allocates nothing.
     ///
     /// # Panics
     /// If `M` is not n × n.
@@ -110,8 +111,8 @@ impl<S: Scalar> Cholesky<S> {
         self.factorize_while(M, || true);
     }
 
-    /// As [`factorize`](Self::factorize), with a function that is asked before each column whether to go on; says whether
-    /// the factor is done.
+    /// Factorizes as [`factorize`](Self::factorize) does, and calls `go_on` before each column. Stops if it returns
+    /// `false`. Returns whether the factorization is complete.
     #[doc(hidden)]
     #[inline(always)]
     #[track_caller]
@@ -122,12 +123,12 @@ impl<S: Scalar> Cholesky<S> {
         factorize(self.L.as_mut_slice(), n, go_on)
     }
 
-    /// x = M⁻¹ b in place of b, in O(n²).
+    /// Solves M x = b in place, in O(n²).
     ///
-    /// b: n numbers. Allocates nothing.
+    /// b: n numbers, overwritten with x. Allocates nothing.
     ///
     /// # Panics
-    /// If `b` has not n numbers.
+    /// If `b` does not have n numbers.
     #[inline(always)]
     #[track_caller]
     pub fn solve(&self, b: &mut [S]) {
@@ -135,12 +136,12 @@ impl<S: Scalar> Cholesky<S> {
         solve(self.L.as_slice(), b);
     }
 
-    /// X = M⁻¹ B in place of B, column by column, each in O(n²).
+    /// Solves M X = B in place, column by column, each in O(n²).
     ///
-    /// B: n rows, any number of columns. Allocates nothing.
+    /// B: n rows, any number of columns, overwritten with X. Allocates nothing.
     ///
     /// # Panics
-    /// If `B` has not n rows.
+    /// If `B` does not have n rows.
     #[inline(always)]
     #[track_caller]
     pub fn solve_matrix(&self, B: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -150,7 +151,7 @@ impl<S: Scalar> Cholesky<S> {
         }
     }
 
-    /// X = M⁻¹, the full symmetric matrix, in O(n³).
+    /// Computes X = M⁻¹, the full symmetric matrix, in O(n³).
     ///
     /// X: n × n, overwritten. Allocates nothing.
     ///
@@ -162,8 +163,8 @@ impl<S: Scalar> Cholesky<S> {
         self.inverse_while(X, || true);
     }
 
-    /// As [`inverse`](Self::inverse), with a function that is asked before each column whether to go on; says whether X is
-    /// done.
+    /// Inverts as [`inverse`](Self::inverse) does, and calls `go_on` before each column. Stops if it returns `false`.
+    /// Returns whether X is complete.
     #[doc(hidden)]
     #[inline(always)]
     #[track_caller]
@@ -179,7 +180,7 @@ impl<S: Scalar> Cholesky<S> {
             column.fill(S::zero());
             column[j] = S::one();
             forward(L, column, j);
-            backward(L, column, j); // the rows from j on; the others by symmetry
+            backward(L, column, j); // the rows from j on; the others follow by symmetry
         }
         for j in 0..n {
             for k in 0..j {

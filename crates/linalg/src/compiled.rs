@@ -1,20 +1,21 @@
-//! Functions that are compiled for each level in this crate, and called from others.
+//! Functions that this crate compiles for each SIMD level and other crates call.
 
-/// Functions that are generic over the registers V and over the columns of a tile, COLUMNS, each made a function without
-/// parameters by the [gate](condyle_spatial::gate).
+/// Defines functions that are generic over the register type V and over COLUMNS, the number of columns of a tile. The
+/// [gate](condyle_spatial::gate) turns each into a function without generic parameters.
 macro_rules! compiled {
     ($($functions:tt)*) => { $crate::compiled::functions! { [Long, 8] $($functions)* } };
 }
 pub(crate) use compiled;
 
-/// The same with registers of four numbers at most: for work that mostly moves rows, of which many are shorter than eight
-/// numbers, and for small matrices.
+/// Defines functions as [`compiled`] does, with registers of at most four numbers. It suits small matrices, and work
+/// that mostly copies rows, because many rows are shorter than eight numbers.
 macro_rules! narrow {
     ($($functions:tt)*) => { $crate::compiled::functions! { [Short, 4] $($functions)* } };
 }
 pub(crate) use narrow;
 
-/// The functions of [`compiled`] and [`narrow`], after the longest registers that they use and how many columns go with these.
+/// Defines the functions of [`compiled`] and [`narrow`], given the longest register type and the number of columns used
+/// with it.
 macro_rules! functions {
     ([$long:ident, $columns:literal] $(
         $(#[$doc:meta])*

@@ -1,4 +1,4 @@
-//! Copies of matrices: whole ones, triangles and transposes.
+//! Copies of matrices: whole matrices, triangles and transposes.
 #![allow(unsafe_code)]
 
 use crate::compiled::{compiled, narrow};
@@ -7,19 +7,20 @@ use crate::tile::{SLACK, View, holds};
 use crate::vectors::copy;
 
 narrow! {
-    /// OUT = A, on `rows` rows and `columns` columns.
+    /// Copies A to OUT, on `rows` rows and `columns` columns.
     pub fn copy_matrix<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
         copy_block::<V>(out, ldo, a, shape);
     }
 
-    /// OUT = the symmetric matrix whose lower triangle is that of A, of `size` rows, turned: row i of A is row i + `turn` of OUT,
-    /// counted around, and so are its columns. Both have slack rows; those of OUT change.
+    /// Writes the symmetric matrix whose lower triangle is in A, of `size` rows, cyclically shifted. Row i of A becomes
+    /// row (i + `turn`) mod `size` of OUT, and likewise for columns. Both have padding rows; the padding of OUT
+    /// changes.
     pub fn copy_symmetric_turned<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize, turn: usize) {
         turned::<V>(out, ldo, a, [size - turn, turn]);
     }
 
-    /// OUT = A on `rows` rows and `columns` columns, unless OUT is empty. Returns Σ aᵢⱼ², where some entries may count two
-    /// or three times: enough to see whether one has diverged.
+    /// Copies A to OUT on `rows` rows and `columns` columns, unless OUT is empty. Returns Σ aᵢⱼ², where some entries
+    /// may count two or three times. This is exact enough to detect divergence.
     pub fn copy_with_squares<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) -> f64 {
         match out.is_empty() {
             true => squares::<V, false>(out, 0, a, shape),
@@ -29,14 +30,15 @@ narrow! {
 }
 
 compiled! {
-    /// The lower triangle of OUT = that of A, both square of `size` rows.
+    /// Copies the lower triangle of A to OUT; both are square with `size` rows.
     pub fn copy_lower<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
         lower::<V>(out, ldo, a, size);
     }
 
-    /// OUT = the symmetric matrix whose lower triangle is that of A, of `size` rows.
+    /// Writes to OUT the symmetric matrix whose lower triangle is in A, of `size` rows.
     pub fn copy_symmetric<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
-        // What lies below the diagonal to the right of it, in blocks of columns; with them comes what lies above.
+        // Transposes the lower triangle to the right of the diagonal, in blocks of columns; entries above the diagonal
+        // come along.
         let (width, mut j) = (V::N.min(size), 0);
         while j < size {
             let from = j.min(size - width);
@@ -47,18 +49,18 @@ compiled! {
         lower::<V>(out, ldo, a, size);
     }
 
-    /// OUT = Aᵀ, for an A of `rows` rows and `columns` columns.
+    /// Computes OUT = Aᵀ, for an A with `rows` rows and `columns` columns.
     pub fn transpose<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
         transposed::<V, false>(out, ldo, a, shape);
     }
 
-    /// OUT = −Aᵀ, for an A of `rows` rows and `columns` columns.
+    /// Computes OUT = −Aᵀ, for an A with `rows` rows and `columns` columns.
     pub fn transpose_negated<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
         transposed::<V, true>(out, ldo, a, shape);
     }
 }
 
-/// OUT = A, on `rows` rows and `columns` columns, without a function call.
+/// Copies A to OUT on `rows` rows and `columns` columns, without a function call.
 #[inline(always)]
 pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
     let [rows, columns] = shape;
@@ -72,12 +74,12 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
         }
         return;
     }
-    // Two registers of rows of all columns, then the next two; the last ones may overlap those before.
+    // Two registers of rows of all columns, then the next two; the last registers may overlap those before.
     let (last, mut i) = (rows - V::N, 0);
     loop {
         let (k, mut at, mut from) = ((i + V::N).min(last), 0, 0);
         for _ in 0..columns {
-            // SAFETY: registers of a column of those that were found to be inside.
+            // SAFETY: registers in columns that were found to be in bounds.
             unsafe {
                 move_register::<V>(out, at + i, a.data, from + i);
                 move_register::<V>(out, at + k, a.data, from + k);
@@ -91,10 +93,10 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
     }
 }
 
-/// Copies a register, from a place in `x` to a place in `to`.
+/// Copies a register from offset `from` in `x` to offset `at` in `to`.
 ///
 /// # Safety
-/// Both have N numbers there.
+/// Both slices have N numbers from their offset on.
 #[inline(always)]
 unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: usize) {
     debug_assert!(at + V::N <= to.len() && from + V::N <= x.len());
@@ -102,10 +104,11 @@ unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: u
     unsafe { V::load(x.get_unchecked(from..from + V::N)).store(to.get_unchecked_mut(at..at + V::N)) };
 }
 
-/// Copies a block of N rows and columns, or minus the block, from a place in `x` to its transpose's place in `to`.
+/// Copies the transpose of a block of N rows and columns, or minus it, from offset `from` in `x` to offset `at` in
+/// `to`.
 ///
 /// # Safety
-/// Both have a register of numbers there in each of N columns.
+/// Both have a register of numbers in each of N columns, from their offset on.
 #[inline(always)]
 unsafe fn move_transposed<V: Vector, const NEGATED: bool>(
     to: &mut [f64],
@@ -132,16 +135,17 @@ unsafe fn move_transposed<V: Vector, const NEGATED: bool>(
     }
 }
 
-/// The first row of the block after that of row i, of `size` rows in all; `size` if there is none.
+/// Returns the first row of the block after the block that starts at row i, for `size` rows; `size` if there is no
+/// further block.
 #[inline(always)]
 fn next_block<V: Vector>(i: usize, size: usize) -> usize {
     if i + V::N >= size { size } else { (i + V::N).min(size - V::N) }
 }
 
-/// Copies a block of N rows and columns to a place in `to`, and its transpose to another.
+/// Copies a block of N rows and columns to offset `at[0]` in `to`, and its transpose to offset `at[1]`.
 ///
 /// # Safety
-/// As of [`move_transposed`].
+/// As for [`move_transposed`].
 #[inline(always)]
 unsafe fn move_both<V: Vector>(to: &mut [f64], at: [usize; 2], ldo: usize, x: &[f64], from: usize, ldx: usize) {
     for k in 0..V::N {
@@ -152,7 +156,7 @@ unsafe fn move_both<V: Vector>(to: &mut [f64], at: [usize; 2], ldo: usize, x: &[
     unsafe { move_transposed::<V, false>(to, at[1], ldo, x, from, ldx) };
 }
 
-/// See [`copy_symmetric_turned`]: A = [VV ·; QV QQ] with `split` and `turn` rows becomes [QQ QV; VQ VV].
+/// Implements [`copy_symmetric_turned`]: A = [VV ·; QV QQ] with `split` and `turn` rows becomes [QQ QV; VQ VV].
 #[inline(always)]
 fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [usize; 2]) {
     let (size, View { data: x, stride }) = (split + turn, a);
@@ -171,15 +175,16 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
         }
         return;
     }
-    // In square blocks, of which the last ones overlap those before.
+    // In square blocks; the last block overlaps the one before.
     for (to, from, size) in [(turn, 0, split), (0, split, turn)] {
         let (to, from, mut j) = (to * (ldo + 1), from * (stride + 1), 0);
         while j < size {
             let (at, from) = (to + j * (ldo + 1), from + j * (stride + 1));
-            // SAFETY: both matrices have `size` columns of `size` rows and N − 1 more.
+            // SAFETY: both matrices have `size` columns, each with `size` rows and N − 1 padding rows.
             unsafe { move_transposed::<V, false>(out, at, ldo, x, from, stride) };
             for k in 0..V::N {
-                // Over what lies below the diagonal; behind the last row is slack, or what is written later.
+                // Overwrites the transposed part below the diagonal; after the last row comes padding, or entries that
+                // are written later.
                 // SAFETY: as above.
                 unsafe { move_register::<V>(out, at + k * (ldo + 1), x, from + k * (stride + 1)) };
             }
@@ -206,7 +211,7 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
     }
 }
 
-/// See [`copy_with_squares`].
+/// Implements [`copy_with_squares`].
 #[inline(always)]
 fn squares<V: Vector, const COPY: bool>(out: &mut [f64], ldo: usize, a: View<'_>, [rows, columns]: [usize; 2]) -> f64 {
     if rows == 0 || columns == 0 {
@@ -229,7 +234,7 @@ fn squares<V: Vector, const COPY: bool>(out: &mut [f64], ldo: usize, a: View<'_>
         let (k, mut at, mut from) = ((i + V::N).min(last), 0, 0);
         for _ in 0..columns {
             for (sum, i) in sums.iter_mut().zip([i, k]) {
-                // SAFETY: a register of a column of those that were found to be inside.
+                // SAFETY: a register in a column that was found to be in bounds.
                 unsafe {
                     let x = V::load(a.data.get_unchecked(from + i..from + i + V::N));
                     *sum = x.mul_add(x, *sum);
@@ -256,19 +261,19 @@ fn lower<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
     assert!(inside, "a matrix ends before the last of its entries");
     for j in 0..size {
         let (at, from, rows) = (j * ldo + j, j * a.stride + j, size - j);
-        // SAFETY: column j of those that were found to be inside, from its diagonal on.
+        // SAFETY: column j from its diagonal on, which was found to be in bounds.
         let (to, x) = unsafe { (out.get_unchecked_mut(at..at + rows), a.data.get_unchecked(from..from + rows)) };
         copy::<V>(to, x);
     }
 }
 
-/// OUT = Aᵀ, for an A of `rows` rows and `columns` columns, without a function call.
+/// Computes OUT = Aᵀ, for an A with `rows` rows and `columns` columns, without a function call.
 #[inline(always)]
 pub fn transpose_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
     transposed::<V, false>(out, ldo, a, shape);
 }
 
-/// OUT = Aᵀ, or −Aᵀ.
+/// Computes OUT = Aᵀ, or −Aᵀ.
 #[inline(always)]
 fn transposed<V: Vector, const NEGATED: bool>(out: &mut [f64], ldo: usize, a: View<'_>, [rows, columns]: [usize; 2]) {
     if columns == 0 {
@@ -285,12 +290,12 @@ fn transposed<V: Vector, const NEGATED: bool>(out: &mut [f64], ldo: usize, a: Vi
     }
     let inside = holds(a.data, a.stride, [rows, columns]) && holds(out, ldo, [columns, rows]);
     assert!(inside, "a matrix ends before the last of its entries");
-    // In square blocks, of which the last ones overlap those before.
+    // In square blocks; the last block overlaps the one before.
     let mut j = 0;
     loop {
         let mut i = 0;
         loop {
-            // SAFETY: a block's rows and columns are among those of the matrix, which is inside.
+            // SAFETY: the rows and columns of a block are within the matrix, which is in bounds.
             unsafe { move_transposed::<V, NEGATED>(out, i * ldo + j, ldo, a.data, j * a.stride + i, a.stride) };
             if i + V::N >= rows {
                 break;

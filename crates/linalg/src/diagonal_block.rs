@@ -1,10 +1,10 @@
-//! A block on the diagonal of a Cholesky factor, and the rows below it, whose columns stay in registers while they are solved.
+//! Diagonal block of a Cholesky factor, and the rows below it. Columns stay in registers while they are solved.
 #![allow(unsafe_code)]
 
 use crate::registers::Vector;
 use crate::tile::{View, has_strip, next_strip, tile_rows};
 
-/// A block on the diagonal of L, of `width` ≤ COLUMNS columns: column after column, and 1 by its diagonal.
+/// Diagonal block of L with `width` ≤ COLUMNS columns: its columns, and the inverses of its diagonal entries.
 pub(crate) struct DiagonalBlock<const COLUMNS: usize> {
     pub(crate) L: [[f64; COLUMNS]; COLUMNS],
     pub(crate) inverse: [f64; COLUMNS],
@@ -12,13 +12,13 @@ pub(crate) struct DiagonalBlock<const COLUMNS: usize> {
 }
 
 impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
-    /// A block of `width` columns, to be written.
+    /// Creates a block of `width` columns, to be written.
     #[inline(always)]
     pub(crate) fn new(width: usize) -> Self {
         Self { L: [[0.0; COLUMNS]; COLUMNS], inverse: [0.0; COLUMNS], width }
     }
 
-    /// The block of `width` columns that L begins with.
+    /// Copies the first `width` columns of the leading diagonal block of L.
     #[inline(always)]
     pub(crate) fn of(L: View<'_>, width: usize) -> Self {
         let mut block = Self::new(width);
@@ -30,11 +30,11 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         block
     }
 
-    /// Factorises the block of H that begins in row j0 of some columns of it, after a bᵀ over the j0 columns before them was
-    /// subtracted; S registers hold COLUMNS rows. The entries above the diagonal lose their meaning.
+    /// Factorizes the block of H that begins in row j0 of `columns`. First it subtracts a bᵀ over the j0 columns before
+    /// them. S registers hold COLUMNS rows. The entries above the diagonal lose their meaning.
     ///
     /// # Errors
-    /// The first column whose pivot is not positive, or not finite, and the pivot.
+    /// Returns the first column whose pivot is not positive or not finite, and the pivot.
     #[inline(always)]
     pub(crate) fn factor<V: Vector, const S: usize>(
         &mut self,
@@ -71,7 +71,7 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         Ok(())
     }
 
-    /// C ← (C − a bᵀ) L⁻ᵀ on some rows of C, where a bᵀ is over `length` columns.
+    /// Computes C ← (C − a bᵀ) L⁻ᵀ on the given rows of C. The product a bᵀ is over `length` columns.
     #[inline(always)]
     pub(crate) fn solve_rows<V: Vector>(
         &self,
@@ -94,7 +94,7 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         }
     }
 
-    /// C ← (C − a bᵀ) L⁻ᵀ on S registers of rows of C from i on.
+    /// Computes C ← (C − a bᵀ) L⁻ᵀ on S registers of rows of C from row i on.
     #[inline(always)]
     fn solve_strip<V: Vector, const S: usize>(
         &self,
@@ -118,14 +118,14 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
                     x[j][s] = x[j][s].mul(V::splat(self.inverse[j]));
                 }
                 let at = j * ldc + i;
-                // SAFETY: column j of the strip, all of which `difference` has found to be inside.
+                // SAFETY: column j of the strip, which `difference` found to be in bounds.
                 store(&x[j], unsafe { c.get_unchecked_mut(at..at + S * V::N) }, 0);
             }
         }
     }
 }
 
-/// C − a bᵀ, over `length` columns, on S registers of rows of C from i on and on its first `width` columns.
+/// Returns C − a bᵀ, over `length` columns, on S registers of rows of C from row i on and on its first `width` columns.
 #[inline(always)]
 fn difference<V: Vector, const S: usize, const COLUMNS: usize>(
     c: &[f64],
@@ -141,7 +141,7 @@ fn difference<V: Vector, const S: usize, const COLUMNS: usize>(
     for j in 0..COLUMNS {
         if j < width {
             let at = j * ldc + i;
-            // SAFETY: column j of the strip, all of which was found to be inside.
+            // SAFETY: column j of the strip, which the assertion found to be in bounds.
             let column = unsafe { c.get_unchecked(at..at + S * V::N) };
             for s in 0..S {
                 tile[j][s] = V::load(&column[s * V::N..]).sub(tile[j][s]);
@@ -151,7 +151,7 @@ fn difference<V: Vector, const S: usize, const COLUMNS: usize>(
     tile
 }
 
-/// Writes S registers, from a place on.
+/// Writes S registers to `to`, from index `at` on.
 #[inline(always)]
 fn store<V: Vector, const S: usize>(x: &[V; S], to: &mut [f64], at: usize) {
     let to = &mut to[at..][..S * V::N];

@@ -1,29 +1,29 @@
-//! The elimination tree: where the factor of a matrix with the zeros of a tree has entries.
+//! Elimination tree: the entries of the factor of a matrix whose zeros follow a tree.
 //!
-//! If each row of the matrix stands for one column of the tree, that is the tree itself. Where several columns share a row,
-//! branches are coupled; the rows are then eliminated in the order of least coupling, and the factor follows the elimination
-//! tree of that order (Liu, *The role of elimination trees in sparse factorization*, 1990).
+//! If each row of the matrix corresponds to one column of the tree, the elimination tree is that tree. If several
+//! columns share a row, branches are coupled. The rows are then eliminated in order of least coupling, and the factor
+//! follows the elimination tree of that order (Liu, *The role of elimination trees in sparse factorization*, 1990).
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 use core::iter::successors;
 
-/// A tree of columns, and the rows of a symmetric matrix for which they stand: the matrix may differ from zero where one of
-/// two columns is on the other's way to the root.
+/// Tree of columns, and the rows of a symmetric matrix to which they correspond. An entry of the matrix may differ from
+/// zero if one of its two columns is on the other's path to the root.
 ///
-/// A robot's model is one: a column is a degree of freedom of a joint, a row of M a coordinate.
+/// A robot's model is such a tree: a column is a degree of freedom of a joint, and a row of M is a coordinate.
 pub trait ColumnTree {
-    /// The number of rows of the matrix.
+    /// Returns the number of rows of the matrix.
     fn rows(&self) -> usize;
-    /// The number of columns: as many as rows, or more if several stand for the same row.
+    /// Returns the number of columns: the number of rows, or more if several columns share a row.
     fn columns(&self) -> usize;
-    /// The column before c on the way to the root; its number is smaller than c.
+    /// Returns the column before c on the path to the root; its index is smaller than c.
     fn parent(&self, c: usize) -> Option<usize>;
-    /// The row for which column c stands.
+    /// Returns the row to which column c corresponds.
     fn row(&self, c: usize) -> usize;
 }
 
-/// The parents of columns that stand for a row each, in order.
+/// Tree given by the parent of each column; column c corresponds to row c.
 impl ColumnTree for [Option<usize>] {
     fn rows(&self) -> usize {
         self.len()
@@ -39,28 +39,29 @@ impl ColumnTree for [Option<usize>] {
     }
 }
 
-/// Stands for the parent of a root.
+/// Parent of a root.
 pub const NONE: usize = usize::MAX;
 
-/// The entries of the factor L that may differ from zero: a tree on *places*, numbered depth first, parents before children.
+/// Pattern of the factor L: the entries that may differ from zero. It is a tree of positions, which are numbered depth
+/// first, parents before children.
 #[derive(Clone, Debug)]
 pub struct EliminationTree {
-    /// The row of the matrix that each place stands for. Shape: n.
+    /// Row of the matrix at each position. Length: n.
     pub order: Vec<usize>,
-    /// The exchanges that take rows to places, one after the other; none if each column has a row of its own.
+    /// Exchanges that move rows to their positions, in order; empty if each column has its own row.
     pub swaps: Vec<(usize, usize)>,
-    /// The place before it on the way to the root. Shape: n.
+    /// Parent of each position on the path to the root, or [`NONE`]. Length: n.
     pub parent: Vec<usize>,
-    /// The number of places between each and the root. Shape: n.
+    /// Number of positions between each position and the root. Length: n.
     pub depth: Vec<usize>,
-    /// The first of the consecutive places that are all on its way to the root and end with it. Shape: n.
+    /// First of the consecutive positions that are on the path to the root and end with this position. Length: n.
     pub run: Vec<usize>,
-    /// The beginning of each row in `Ltdl::rows`, a multiple of the step, and at the end their length. Shape: n + 1.
+    /// Start of each row in `Ltdl::rows`, a multiple of the step; the last entry is the total length. Length: n + 1.
     pub first: Vec<usize>,
 }
 
 impl EliminationTree {
-    /// The elimination tree for some columns, with the factor's rows stored in steps of `step` numbers.
+    /// Computes the elimination tree for the columns; the factor's rows are stored in steps of `step` numbers.
     pub fn new(columns: &(impl ColumnTree + ?Sized), step: usize) -> Self {
         let n = columns.rows();
         if columns.columns() == n {
@@ -68,7 +69,7 @@ impl EliminationTree {
                 (0..n).map(|c| (columns.row(c), columns.parent(c).unwrap_or(NONE))).unzip();
             return Self::depth_first(&order, &parent, step);
         }
-        let mut coupled = vec![BTreeSet::new(); n]; // of each row, those with which it shares an entry of the matrix
+        let mut coupled = vec![BTreeSet::new(); n]; // for each row, the rows with which it shares an entry of the matrix
         for c in 0..columns.columns() {
             let k = columns.row(c);
             for ancestor in successors(columns.parent(c), |&c| columns.parent(c)) {
@@ -84,7 +85,7 @@ impl EliminationTree {
         for (k, &row) in order.iter().enumerate() {
             place[row] = k;
         }
-        // Liu (1990), from the last place to the first
+        // Liu (1990), from the last position to the first
         let mut parent = vec![NONE; n];
         for i in (0..n).rev() {
             for k in coupled[order[i]].iter().map(|&k| place[k]).filter(|&k| k > i) {
@@ -100,7 +101,7 @@ impl EliminationTree {
         Self::depth_first(&order, &parent, step)
     }
 
-    /// The same tree with its places numbered depth first, which does not change the rows.
+    /// Numbers the positions of a tree depth first, which does not change the rows of the factor.
     fn depth_first(order: &[usize], parent: &[usize], step: usize) -> Self {
         let n = order.len();
         let mut children = vec![Vec::new(); n];
@@ -125,7 +126,7 @@ impl EliminationTree {
             tree.first.push(tree.first[place] + (tree.depth[place] + 1).next_multiple_of(step));
             stack.extend(children[k].iter().map(|&child| (child, place))); // the first child on top
         }
-        let mut at: Vec<usize> = (0..n).collect(); // which row stands where, as the exchanges go on
+        let mut at: Vec<usize> = (0..n).collect(); // row at each position, while the exchanges are recorded
         for place in 0..n {
             let other = (place..n).find(|&k| at[k] == tree.order[place]).expect("the order is a permutation");
             if other != place {
@@ -137,9 +138,11 @@ impl EliminationTree {
     }
 }
 
-/// The rows, last the one that is coupled with the fewest others, before it the one that then is, and so on (Tinney
-/// and Walker, *Direct solutions of sparse network equations by optimally ordered triangular factorization*, 1967). Of
-/// equals, the one that was coupled with the fewest at first is later, so that a shared row comes before those of
+/// Returns the rows in an order of minimum degree. The last row is coupled with the fewest others; the row before it is
+/// then coupled with the fewest remaining rows, and so on. Source: Tinney and Walker, *Direct solutions of sparse
+/// network equations by optimally ordered triangular factorization* (1967).
+///
+/// Among equal rows, the one with the fewest initial couplings comes later. So a shared row comes before the rows of
 /// one branch.
 fn minimum_degree(mut coupled: Vec<BTreeSet<usize>>) -> Vec<usize> {
     let at_first: Vec<usize> = coupled.iter().map(BTreeSet::len).collect();

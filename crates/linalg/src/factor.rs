@@ -1,4 +1,4 @@
-//! The Cholesky factor of part of a symmetric matrix, and solves with it.
+//! Cholesky factor of the leading part of a symmetric matrix, and solves with it.
 #![allow(non_snake_case)] // L, X, B
 
 use crate::compiled::compiled;
@@ -7,12 +7,13 @@ use crate::registers::Vector;
 use crate::tile::{SLACK, Store, View, column_block};
 
 compiled! {
-    /// Eliminates the first m of the columns of a symmetric H, of which the lower triangle is given, for `shape` = [rows,
-    /// columns, m]; rows below the square are right-hand sides. H = [Hᵤᵤ ·; Hₓᵤ Hₓₓ] becomes [L ·; X Hₓₓ − X Xᵀ] with
-    /// L Lᵀ = Hᵤᵤ and X = Hₓᵤ L⁻ᵀ. H has slack rows.
+    /// Eliminates the first m columns of a symmetric H, whose lower triangle is given. `shape` = [rows, columns, m];
+    /// rows below the square part are right-hand sides.
+    ///
+    /// H = [Hᵤᵤ ·; Hₓᵤ Hₓₓ] becomes [L ·; X Hₓₓ − X Xᵀ] with L Lᵀ = Hᵤᵤ and X = Hₓᵤ L⁻ᵀ. H has padding rows.
     ///
     /// # Errors
-    /// The first column whose pivot is not positive, or not finite, and the pivot.
+    /// Returns the first column whose pivot is not positive or not finite, and the pivot.
     pub fn eliminate<V, COLUMNS>(h: &mut [f64], stride: usize, shape: [usize; 3]) -> Result<(), (usize, f64)> {
         let ([rows, size, m], mut j0) = (shape, 0);
         while j0 < m {
@@ -38,8 +39,9 @@ compiled! {
         Ok(())
     }
 
-    /// As [`eliminate`] of rows G = [Gᵤ Gₓ] that are not below H, given what it left of H: G becomes [Y Gₓ − Y Xᵀ] for
-    /// Y = Gᵤ L⁻ᵀ. `shape` = [rows of G, columns, m]; `h` is [L; X], from column 0 on. Both have slack rows.
+    /// Eliminates as [`eliminate`] does, for rows G = [Gᵤ Gₓ] that are not stored below H, given the eliminated H. G
+    /// becomes [Y Gₓ − Y Xᵀ] with Y = Gᵤ L⁻ᵀ. `shape` = [rows of G, columns, m]; `h` is [L; X], from column 0 on. G and
+    /// H have padding rows.
     pub fn eliminate_rows<V, COLUMNS>(g: &mut [f64], stride: usize, shape: [usize; 3], h: View<'_>) {
         let ([rows, size, m], mut j0) = (shape, 0);
         while j0 < m {
@@ -57,7 +59,7 @@ compiled! {
         }
     }
 
-    /// x ← L⁻¹ x for the L of an H of which columns were eliminated, with the inverse of L's diagonal; x has slack.
+    /// Computes x ← L⁻¹ x, with L in an eliminated H and the inverse of L's diagonal. x has padding.
     pub fn forward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
         let (m, mut j) = (inverse_diagonal.len(), 0);
         while j < m {
@@ -85,7 +87,7 @@ compiled! {
         }
     }
 
-    /// x ← L⁻ᵀ x, as [`forward_solve`]; the slack of x becomes zero.
+    /// Computes x ← L⁻ᵀ x, with arguments as for [`forward_solve`]. The padding of x becomes zero.
     pub fn backward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
         let m = inverse_diagonal.len();
         x[m..m + V::N].fill(0.0);
@@ -94,7 +96,7 @@ compiled! {
             block -= 1;
             let j = block * V::N;
             let width = V::N.min(m - j);
-            // Σ over the rows below the block, for its columns together.
+            // Sums over the rows below the block, for all columns of the block together.
             let mut products = [0.0; SLACK];
             if j + V::N < m {
                 let (mut sums, mut i) = ([V::splat(0.0); SLACK], j + V::N);
@@ -122,10 +124,10 @@ compiled! {
         }
     }
 
-    /// X ← X L⁻¹, for the X in the rows `first`..`rows` of H's first m columns and the L in the lower triangle above them;
-    /// `shape` = [first, rows, m]. H has slack rows.
+    /// Computes X ← X L⁻¹. X is in the rows `first`..`rows` of H's first m columns, L in the lower triangle above them.
+    /// `shape` = [first, rows, m]. H has padding rows.
     ///
-    /// `upper` (m + [`SLACK`] rows, m columns) is scratch for Lᵀ.
+    /// `upper` (m + [`SLACK`] rows, m columns) is scratch memory for Lᵀ.
     pub fn solve_right<V, COLUMNS>(h: &mut [f64], stride: usize, shape: [usize; 3], upper: &mut [f64]) {
         let [first, rows, m] = shape;
         let ldu = m + SLACK;
@@ -157,7 +159,8 @@ compiled! {
     }
 }
 
-/// H[i, j] −= Σ_{p < length} H[i, p] H[j, p] for i ≥ j, on `width` ≤ COLUMNS columns from j ≥ `length` on.
+/// Computes H[i, j] −= Σ_{p < length} H[i, p] H[j, p] for i ≥ j, on `width` ≤ COLUMNS columns from column j ≥ `length`
+/// on.
 #[inline(always)]
 fn subtract_outer<V: Vector, const COLUMNS: usize>(
     h: &mut [f64],
@@ -176,7 +179,8 @@ fn subtract_outer<V: Vector, const COLUMNS: usize>(
     column_block::<V, COLUMNS>(columns, stride, j..rows, 0, width, factor, b, length, Store::Subtract);
 }
 
-/// y −= Σ X[i.., p] B[j, p] over the columns p on `rows` rows, in whole registers: what follows them is slack.
+/// Computes y −= Σ X[i.., p] B[j, p] over the columns p, on `rows` rows, in whole registers. Padding follows these
+/// rows.
 #[inline(always)]
 fn subtract_multiples<V: Vector>(
     y: &mut [f64],
@@ -199,7 +203,7 @@ fn subtract_multiples<V: Vector>(
     }
 }
 
-/// y ← factor · y on `rows` rows, in whole registers.
+/// Computes y ← factor · y on `rows` rows, in whole registers.
 #[inline(always)]
 fn scale<V: Vector>(y: &mut [f64], rows: usize, factor: f64) {
     let (factor, mut k) = (V::splat(factor), 0);

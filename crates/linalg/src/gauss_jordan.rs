@@ -1,15 +1,15 @@
-//! The inverse of a small symmetric matrix without a factor.
+//! Inverse of a small symmetric matrix without factorization.
 
 use condyle_spatial::{Dense, DenseMatrix, Scalar};
 
-/// X = M⁻¹ for at most `MOST` rows. In the order k = 0, 1, …, with the pivot d = 1/A_kk and the column c of it,
+/// Computes X = M⁻¹ for at most `MOST` rows. For k = 0, 1, …, with the pivot d = 1/A_kk and its column c:
 ///
 /// ```text
 /// A_ij ← A_ij − c_i d c_j,    A_ik ← c_i d,    A_kk ← −d:     from M to −M⁻¹
 /// ```
 ///
-/// of which the lower triangle is read: in lanes it is all that is computed, of a single number whole columns are, which
-/// are registers, column k among them, so that the loop has no gap.
+/// Only the lower triangle of A is read. For lanes, only this triangle is computed. For single numbers, whole columns
+/// are computed, column k included, because columns are registers and the loop then has no gap.
 #[inline(always)]
 pub fn gauss_jordan<S: Scalar, const MOST: usize>(
     M: &DenseMatrix<S, impl Dense<S>>,
@@ -17,7 +17,7 @@ pub fn gauss_jordan<S: Scalar, const MOST: usize>(
 ) {
     let n = X.nrows();
     assert!(M.nrows() == n && n <= MOST, "M: expected {n} × {n}, found {:?}", M.shape());
-    let mut A = [[S::zero(); MOST]; MOST]; // column by column
+    let mut A = [[S::zero(); MOST]; MOST]; // stored column by column
     for (column, from) in A.iter_mut().zip(M.as_slice().chunks_exact(n.max(1))) {
         column[..n].copy_from_slice(from);
     }

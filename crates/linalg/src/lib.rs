@@ -1,11 +1,12 @@
-//! Dense kernels and factors for small matrices, and those with the zeros of a tree. It knows no robot.
+//! Dense kernels and factorizations for small matrices, and for matrices whose zeros follow a tree. This crate does not
+//! depend on robot models.
 //!
-//! Matrices are column-major: entry (i, j) of a matrix with the stride `ld` is number j · ld + i. Kernels work in whole
-//! registers, and so touch up to [`SLACK`] numbers behind the last row of a matrix that has such slack; what they hold does
-//! not matter. Nothing allocates.
+//! Matrices are column-major: entry (i, j) of a matrix with stride `ld` has index j · ld + i. Kernels work in whole
+//! registers and may read and write up to [`SLACK`] numbers after the last row of a matrix with padding. The content of
+//! this padding does not matter. Nothing allocates.
 //!
-//! Each dense kernel is compiled here, once for each [level](condyle_spatial::level) of vector instructions, and a call runs
-//! the one for the level in use. Work that has vector loops of its own is compiled for the level by [`at_level`].
+//! Each dense kernel is compiled here once for each [SIMD level](condyle_spatial::level), and a call runs the version
+//! for the level in use. [`at_level`] compiles other work with vector loops for the level.
 //!
 //! # Features
 //! `threads` and `std` are on by default; without `std` the crate needs `alloc` and the feature `libm`.
@@ -63,7 +64,7 @@ pub use small_elimination::eliminate_sum;
 pub use tile::{SLACK, View};
 pub use vectors::{add_product_vector, add_scaled_product, copy, copy_scaled, dot, max_abs, transposed_product_vector};
 
-/// Panics unless an argument has as many numbers as it must have.
+/// Panics unless an argument has the expected number of entries.
 #[doc(hidden)]
 #[inline]
 #[track_caller]
@@ -73,7 +74,7 @@ pub fn check(argument: &str, found: usize, expected: usize) {
     }
 }
 
-/// Panics unless an index is below the number of the things that it counts: `check_index("frame", frame, 12, "frames")`.
+/// Panics unless an index is below the number of things that it refers to: `check_index("frame", frame, 12, "frames")`.
 #[doc(hidden)]
 #[inline(always)]
 #[track_caller]
@@ -83,7 +84,7 @@ pub fn check_index(argument: &str, found: usize, count: usize, things: &str) {
     }
 }
 
-/// The panic of [`check_index`], not inlined.
+/// Panics for [`check_index`]; not inlined.
 #[cold]
 #[inline(never)]
 #[track_caller]
@@ -91,7 +92,7 @@ fn wrong_index(argument: &str, found: usize, count: usize, things: &str) -> ! {
     panic!("{argument}: expected an index below {count}, the number of {things}, found {found}");
 }
 
-/// The panic of [`check`], not inlined: hundreds of calls check several arguments each.
+/// Panics for [`check`]; not inlined, because hundreds of functions check several arguments each.
 #[cold]
 #[inline(never)]
 #[track_caller]

@@ -1,23 +1,23 @@
-//! The sparse factorisation M = Lᵀ D L of the joint-space inertia matrix, without fill-in.
+//! Sparse factorization M = Lᵀ D L of the joint-space inertia matrix, without fill-in.
 //!
-//! Source: Featherstone, *Efficient factorization of the joint-space inertia matrix for branched kinematic trees* (2005).
-//! Mᵢⱼ is zero unless one of the coordinates i, j carries the other. Eliminated from the tips to the root, the matrix
-//! keeps its zeros: row k of L has entries at the coordinates between k and the root and nowhere else.
+//! Source: Featherstone, *Efficient factorization of the joint-space inertia matrix for branched kinematic trees*
+//! (2005). Mᵢⱼ is zero unless one of the coordinates i, j is an ancestor of the other. Eliminated from the tips to the
+//! root, the matrix keeps its zeros: row k of L has entries only at the coordinates between k and the root.
 //!
-//! Where joints share a coordinate (mimic), the tree is that of `elimination_tree.rs`.
+//! If joints share a coordinate (mimic), the tree is the elimination tree of `elimination_tree.rs`.
 
 use crate::axpy::{axpy, dot};
 use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
 use crate::{check, check_index};
 use condyle_spatial::{Array, Dense, DenseMatrix, Scalar, alike};
 
-/// Rows are stored in steps of this many numbers, so that the innermost loop has no remainder. What stands behind a
-/// row's end has no meaning.
+/// Returns the step to which row lengths are rounded up, so that the innermost loop has no remainder. The padding after
+/// a row's end has no meaning.
 const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { 4 } else { 1 }
 }
 
-/// y += Σ xₖ sₖ for some x, so that y is loaded and stored once; in whole steps.
+/// Computes y += Σ xₖ sₖ for N vectors x, so that y is loaded and stored once. Works in whole steps.
 #[inline(always)]
 fn update<S: Scalar, const N: usize>(s: [S; N], x: [&[S]; N], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -41,7 +41,7 @@ fn update<S: Scalar, const N: usize>(s: [S; N], x: [&[S]; N], y: &mut [S]) {
     }
 }
 
-/// Eliminates N consecutive places of a run; returns N.
+/// Eliminates N consecutive positions of a run and returns N.
 #[inline(always)]
 fn eliminate<S: Scalar, const N: usize>(
     tree: &EliminationTree,
@@ -81,12 +81,13 @@ fn eliminate<S: Scalar, const N: usize>(
     N
 }
 
-/// M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D diagonal.
+/// Factorization M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
+/// diagonal.
 ///
-/// With depth d of the tree (columns on the way to the root) and n = nv, [`factorize`](Self::factorize) costs O(n d²),
-/// [`solve`](Self::solve) O(n d), [`inverse`](Self::inverse) O(n² d); a chain has d = n. All memory is allocated by
-/// [`new`](Self::new). Source: Featherstone (2005). [`Cholesky`](crate::Cholesky) has the same verbs
-/// for any positive definite matrix.
+/// With depth d of the tree (number of columns on the path to the root) and n = nv, [`factorize`](Self::factorize)
+/// costs O(n d²), [`solve`](Self::solve) O(n d), and [`inverse`](Self::inverse) O(n² d). A chain has d = n.
+/// [`new`](Self::new) allocates all memory. Source: Featherstone (2005). [`Cholesky`](crate::Cholesky) has the same
+/// methods for any positive definite matrix.
 ///
 /// ```
 /// use condyle_linalg::Ltdl;
@@ -103,56 +104,57 @@ fn eliminate<S: Scalar, const N: usize>(
 #[repr(C)]
 pub struct Ltdl<S> {
     tree: EliminationTree,
-    /// Each place's row of L from the root on, then its D. Shape: nonzeros, each row in whole steps. Written by:
-    /// `factorize`.
+    /// Row of L from the root on, then its D, for each position. Length: nonzeros, with each row rounded up to whole
+    /// steps. Written by: `factorize`.
     rows: Array<S>,
-    /// 1/D. Shape: nv. Written by: `factorize`.
+    /// 1/D. Length: nv. Written by: `factorize`.
     D_inv: Array<S>,
 }
 
 alike!(Ltdl { rows, D_inv } same { tree });
 
 impl<S: Scalar> Ltdl<S> {
-    /// Finds the zeros of the matrices with the zeros of a tree, as a robot's model is one, and allocates the factor.
+    /// Finds the zeros of a matrix, given its tree (for example a robot's model), and allocates the factor.
     pub fn new(tree: &(impl ColumnTree + ?Sized)) -> Self {
         let tree = EliminationTree::new(tree, step::<S>());
         let n = tree.order.len();
         Self { rows: vec![S::zero(); tree.first[n]].into(), D_inv: vec![S::zero(); n].into(), tree }
     }
 
-    /// The order and the tree of the places.
+    /// Returns the elimination tree, with the order of its positions.
     #[doc(hidden)]
     pub fn tree(&self) -> &EliminationTree {
         &self.tree
     }
 
-    /// Row k of L from the root on, without its diagonal.
+    /// Returns row k of L from the root on, without its diagonal.
     #[doc(hidden)]
     #[inline(always)]
     pub fn row_from_root(&self, k: usize) -> &[S] {
         &self.rows[self.tree.first[k]..][..self.tree.depth[k]]
     }
 
-    /// 1/D, in the order of the places.
+    /// Returns 1/D, in elimination order.
     #[doc(hidden)]
     #[inline(always)]
     pub fn inverse_diagonal(&self) -> &[S] {
         &self.D_inv
     }
 
-    /// The number of entries of L and D that may differ from zero, the ones on L's diagonal not counted.
+    /// Returns the number of entries of L and D that may differ from zero, without the ones on L's diagonal.
     pub fn nonzeros(&self) -> usize {
         self.tree.depth.iter().map(|d| d + 1).sum()
     }
 
-    /// The coordinates in their order from the root to the tips: they are eliminated last to first.
+    /// Returns the coordinates ordered from the root to the tips. They are eliminated from last to first.
     ///
-    /// It is 0, 1, 2, … unless joints share coordinates.
+    /// The order is 0, 1, 2, … unless joints share coordinates.
     pub fn order(&self) -> &[usize] {
         &self.tree.order
     }
 
-    /// Row k of L in the [`order`](Self::order), entry by entry from the diagonal's left to the root: (place, value).
+    /// Returns row k of L in the [`order`](Self::order), from the entry left of the diagonal to the root: (position,
+    /// value).
     ///
     /// # Panics
     /// If k is not less than nv.
@@ -164,15 +166,15 @@ impl<S: Scalar> Ltdl<S> {
         core::iter::successors(above(k), move |&k| above(k)).zip(row.iter().rev().copied())
     }
 
-    /// D, in the [`order`](Self::order) of the places.
+    /// Returns D, in the [`order`](Self::order) of positions.
     pub fn diagonal(&self) -> impl Iterator<Item = S> {
         self.tree.first.iter().zip(&self.tree.depth).map(|(&first, &depth)| self.rows[first + depth])
     }
 
-    /// M = Lᵀ D L, in O(n d²). Of two entries that are equal by symmetry, one is read: that of the lower triangle in the
-    /// [`order`](Self::order).
+    /// Factorizes M = Lᵀ D L, in O(n d²). Of two symmetric entries, only the one in the lower triangle with respect to
+    /// [`order`](Self::order) is read.
     ///
-    /// M: nv × nv, symmetric, positive definite (as `crba` gives it); if it is not, some D are not
+    /// M: nv × nv, symmetric, positive definite (as `crba` returns it). If M is not positive definite, some D are not
     /// positive. Allocates nothing. Source: Featherstone (2005).
     ///
     /// # Panics
@@ -183,8 +185,8 @@ impl<S: Scalar> Ltdl<S> {
         self.factorize_while(M, || true);
     }
 
-    /// As [`factorize`](Self::factorize), with a function that is asked before each few rows whether to go on; says whether
-    /// the factor is done.
+    /// Factorizes as [`factorize`](Self::factorize) does, and calls `go_on` before every few rows. Stops if it returns
+    /// `false`. Returns whether the factorization is complete.
     #[doc(hidden)]
     #[inline(always)]
     #[track_caller]
@@ -203,12 +205,13 @@ impl<S: Scalar> Ltdl<S> {
                 e = parent[e];
             }
         }
-        let mut end = nv; // the rows from here on are done
+        let mut end = nv; // rows from here on are finished
         while end > 0 {
             if !go_on() {
                 return false;
             }
-            // Several places of a run at a time where there are as many: rows above are loaded and stored once for all.
+            // Handle several positions of a run at once where possible: rows above them are then loaded and stored once
+            // for all.
             end -= match end - run[end - 1] {
                 4.. => eliminate::<S, 4>(tree, rows, D_inv, end - 4),
                 2.. => eliminate::<S, 2>(tree, rows, D_inv, end - 2),
@@ -218,12 +221,12 @@ impl<S: Scalar> Ltdl<S> {
         true
     }
 
-    /// x = M⁻¹ b in place of b, in O(n d): Lᵀ y = b, then L x = D⁻¹ y.
+    /// Solves M x = b in place, in O(n d): Lᵀ y = b, then L x = D⁻¹ y.
     ///
-    /// b: nv numbers. Allocates nothing. Source: Featherstone (2005).
+    /// b: nv numbers, overwritten with x. Allocates nothing. Source: Featherstone (2005).
     ///
     /// # Panics
-    /// If `b` has not nv numbers.
+    /// If `b` does not have nv numbers.
     #[inline(always)]
     #[track_caller]
     pub fn solve(&self, b: &mut [S]) {
@@ -236,7 +239,7 @@ impl<S: Scalar> Ltdl<S> {
             let row = &self.rows[first[k]..];
             let (x, mut lo, mut hi) = (-b[k], run[k], k);
             loop {
-                axpy(x, &row[depth[lo]..], &mut b[lo..hi]); // b_e −= L_ke b_k on all places e above
+                axpy(x, &row[depth[lo]..], &mut b[lo..hi]); // b_e −= L_ke b_k for all positions e above
                 if parent[lo] == NONE {
                     break;
                 }
@@ -263,9 +266,9 @@ impl<S: Scalar> Ltdl<S> {
         }
     }
 
-    /// X = M⁻¹ B in place of B, column by column, each in O(n d).
+    /// Solves M X = B in place, column by column, each in O(n d).
     ///
-    /// B: nv rows, any number of columns. Allocates nothing.
+    /// B: nv rows, any number of columns, overwritten with X. Allocates nothing.
     ///
     /// ```
     /// use condyle_linalg::Ltdl;
@@ -279,7 +282,7 @@ impl<S: Scalar> Ltdl<S> {
     /// ```
     ///
     /// # Panics
-    /// If `B` has not nv rows.
+    /// If `B` does not have nv rows.
     #[inline(always)]
     #[track_caller]
     pub fn solve_matrix(&self, B: &mut DenseMatrix<S, impl Dense<S>>) {
@@ -289,9 +292,9 @@ impl<S: Scalar> Ltdl<S> {
         }
     }
 
-    /// X = M⁻¹, the full symmetric matrix, in O(n² d).
+    /// Computes X = M⁻¹, the full symmetric matrix, in O(n² d).
     ///
-    /// L X = D⁻¹ L⁻ᵀ has an upper triangle on its right, so row k of X follows from the rows above:
+    /// In L X = D⁻¹ L⁻ᵀ, the right side is upper triangular, so row k of X follows from the rows above:
     /// X_kj = −Σ L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
     ///
     /// # Panics
@@ -302,8 +305,8 @@ impl<S: Scalar> Ltdl<S> {
         self.inverse_while(X, || true);
     }
 
-    /// As [`inverse`](Self::inverse), with a function that is asked before each row whether to go on; says whether X is
-    /// done.
+    /// Inverts as [`inverse`](Self::inverse) does, and calls `go_on` before each row. Stops if it returns `false`.
+    /// Returns whether X is complete.
     #[doc(hidden)]
     #[inline(always)]
     #[track_caller]
@@ -312,7 +315,7 @@ impl<S: Scalar> Ltdl<S> {
         assert!(X.shape() == (nv, nv), "X: expected {nv} × {nv}, found {:?}", X.shape());
         let EliminationTree { swaps, parent, depth, first, .. } = &self.tree;
         let rows = X.as_mut_slice(); // row k is column k: X is symmetric
-        let mut root = 0; // of the tree: beside its places are zeros
+        let mut root = 0; // root of the current tree; columns outside this tree are zero
         for k in 0..nv {
             if !go_on() {
                 return false;

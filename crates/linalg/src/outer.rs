@@ -1,4 +1,4 @@
-//! Sums of outer products of rows that have blocks of zeros.
+//! Sums of outer products of rows with blocks of zeros.
 #![allow(unsafe_code)]
 
 use crate::compiled::compiled;
@@ -7,23 +7,23 @@ use crate::tile::{SLACK, Store, add_outer, next_strip, store_tile};
 use crate::vectors::copy_scaled;
 use alloc::vec::Vec;
 
-/// Rows of numbers, one after the other, and for each row which of its blocks are not zero (see [`mask`]).
+/// Rows of numbers, stored one after another, with a [`mask`] of nonzero blocks for each row.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SparseRows {
-    /// The numbers, with zeros up to the stride.
+    /// Numbers of all rows; each row is padded with zeros up to the stride.
     pub numbers: Vec<f64>,
-    /// The mask of each row.
+    /// Mask of each row.
     pub masks: Vec<u64>,
 }
 
 impl SparseRows {
-    /// Makes it so many rows; allocates only where there were never so many.
+    /// Sets the number of rows. Allocates only if the number is larger than ever before.
     pub fn resize(&mut self, rows: usize, stride: usize) {
         self.numbers.resize(rows * stride, 0.0);
         self.masks.resize(rows, 0);
     }
 
-    /// Notes which blocks are not zero.
+    /// Computes the masks of all rows.
     #[inline(always)]
     pub fn mark(&mut self, stride: usize) {
         for (to, row) in self.masks.iter_mut().zip(self.numbers.chunks_exact(stride)) {
@@ -32,7 +32,7 @@ impl SparseRows {
     }
 }
 
-/// The blocks of a row that are not zero: bit k stands for the columns from k times [`block`] on.
+/// Returns the mask of a row's nonzero blocks: bit k stands for the [`block`] columns from k·`block` on.
 #[inline(always)]
 pub fn mask(row: &[f64]) -> u64 {
     let (fours, rest) = row.as_chunks::<4>();
@@ -47,16 +47,16 @@ pub fn mask(row: &[f64]) -> u64 {
     mask | u64::from(any(&last)) << (fours.len() >> wide)
 }
 
-/// Whether one of four numbers is not zero, as a NaN is not.
+/// Returns whether one of four numbers is nonzero. NaN counts as nonzero.
 #[inline(always)]
 fn any(x: &[f64; 4]) -> bool {
     (x[0] != 0.0) | (x[1] != 0.0) | (x[2] != 0.0) | (x[3] != 0.0)
 }
 
-/// y −= Σ aᵢ xᵢ in whole registers: less than one at the end, if there is less, stays.
+/// Computes y −= Σ aᵢ xᵢ in whole registers. Numbers at the end that do not fill a register are not changed.
 ///
 /// # Panics
-/// If an x has not as many numbers as y.
+/// If an x and y have different lengths.
 #[inline(always)]
 pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a: [f64; N]) {
     let n = y.len();
@@ -68,76 +68,77 @@ pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a
     for (i, y) in y.chunks_exact_mut(V::N).enumerate() {
         let mut sum = V::load(y);
         for k in 0..N {
-            // SAFETY: all rows have n numbers, as y has.
+            // SAFETY: all rows have n numbers, as y does.
             sum = V::load(unsafe { x[k].get_unchecked(i * V::N..(i + 1) * V::N) }).mul_add(factors[k], sum);
         }
         sum.store(y);
     }
 }
 
-/// The number of columns that one bit of a [`mask`] stands for, in rows of `stride` numbers: a power of two.
+/// Returns the number of columns per bit of a [`mask`], for rows of `stride` numbers: a power of two.
 #[inline(always)]
 pub fn block(stride: usize) -> usize {
     4 * stride.div_ceil(4 * 64).next_power_of_two()
 }
 
-/// A run of outer products, of some rows on the left, one after the other, each with one of as many on the right.
+/// Run of outer products: `count` consecutive left rows, each multiplied by the corresponding one of `count`
+/// consecutive right rows.
 #[derive(Debug, Clone, Copy)]
 struct Run {
-    /// The first row on the left, and on the right.
+    /// Index of the first left row and of the first right row.
     rows: [usize; 2],
     count: usize,
-    /// The masks of all rows on the left, and on the right.
+    /// Mask that all left rows have, and mask that all right rows have.
     masks: [u64; 2],
 }
 
-/// Where a run is in the rows.
+/// Position of a run in the numbers of all rows.
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
-    /// The first numbers on the left and on the right.
+    /// Offsets of the first left row and of the first right row.
     at: [usize; 2],
-    /// The numbers from the first row on the left to behind the last.
+    /// Number of numbers from the start of the first left row to the end of the last.
     length: usize,
     masks: [u64; 2],
 }
 
-/// A sum Σ left rightᵀ of outer products, without the blocks that are zero. Each row has a number more than the sum has
-/// columns: on the left it is the row's part of a gradient, which is a last row of the sum.
+/// Sum Σ left rightᵀ of outer products, computed without the zero blocks. Each row has one number more than the sum has
+/// columns. In left rows, this number belongs to the gradient, which is the last row of the sum.
 #[derive(Debug, Clone, Default)]
 pub struct OuterProducts {
-    /// The numbers of all rows.
+    /// Numbers of all rows.
     pub rows: Vec<f64>,
-    /// The step from one row to the next.
+    /// Distance from one row to the next.
     stride: usize,
-    /// The columns of the sum.
+    /// Number of columns of the sum.
     size: usize,
-    /// The number of rows.
+    /// Number of rows.
     count: usize,
     runs: Vec<Run>,
-    /// Scratch for the places of the runs.
+    /// Positions of the runs (scratch).
     places: Vec<Place>,
 }
 
 impl OuterProducts {
-    /// Room for `numbers` numbers of all rows together, and for `products` products.
+    /// Allocates memory for `numbers` numbers of all rows together, and for `products` products.
     pub fn with_capacity(numbers: usize, products: usize) -> Self {
         let places = Vec::with_capacity(products);
         Self { rows: vec![0.0; numbers], runs: Vec::with_capacity(products), places, ..Self::default() }
     }
 
-    /// An empty sum with `size` columns, of rows that are `stride` apart.
+    /// Resets the sum to zero, with `size` columns and rows that are `stride` apart.
     pub fn clear(&mut self, size: usize, stride: usize) {
         (self.size, self.stride, self.count) = (size, stride, 0);
         self.runs.clear();
     }
 
-    /// The number of rows.
+    /// Returns the number of rows.
     #[inline(always)]
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Makes room for `count` more rows, whose numbers are to be written; returns the number of the first.
+    /// Adds `count` rows, which the caller must write, and returns the index of the first.
     #[inline(always)]
     pub fn add_rows(&mut self, count: usize) -> usize {
         let first = self.count;
@@ -148,7 +149,7 @@ impl OuterProducts {
         first
     }
 
-    /// Adds a row, a x; returns all of its numbers, of which those behind x keep a value that does not matter.
+    /// Adds the row a x and returns its numbers. The numbers after x have arbitrary values.
     #[inline(always)]
     pub fn push<V: Vector>(&mut self, x: &[f64], a: f64) -> &mut [f64] {
         let at = self.add_rows(1) * self.stride;
@@ -157,7 +158,7 @@ impl OuterProducts {
         row
     }
 
-    /// Adds the product of the row `rows[0]` on the left with `rows[1]` on the right, with such masks, to the sum.
+    /// Adds the product of left row `rows[0]` and right row `rows[1]` to the sum; `masks` are the masks of both rows.
     #[inline(always)]
     pub fn multiply(&mut self, rows: [usize; 2], masks: [u64; 2]) {
         match self.runs.last_mut() {
@@ -170,7 +171,7 @@ impl OuterProducts {
         }
     }
 
-    /// Adds d₂ x xᵀ to the sum and d₁ x to the gradient, for a row x with such a mask.
+    /// Adds d₂ x xᵀ to the sum and d₁ x to the gradient, for a row x with the given mask and [d, dd] = [d₁, d₂].
     #[inline(always)]
     pub fn square<V: Vector>(&mut self, x: &[f64], mask: u64, [d, dd]: [f64; 2]) {
         let (k, size) = (self.count, self.size);
@@ -186,8 +187,8 @@ impl OuterProducts {
         }
     }
 
-    /// Adds the lower triangle of the sum, and the gradient below it, to H (with some of what is above the diagonal). H has
-    /// slack rows.
+    /// Adds the lower triangle of the sum, and the gradient below it, to H. Some entries above the diagonal change as
+    /// well. H has padding rows.
     pub fn add_to(&mut self, h: &mut [f64], ldh: usize) {
         let Self { rows, stride, size, runs, places, .. } = self;
         places.clear();
@@ -198,7 +199,7 @@ impl OuterProducts {
     }
 }
 
-/// A sum of outer products, as [`OuterProducts`] holds it.
+/// Sum of outer products, as stored in [`OuterProducts`].
 #[derive(Clone, Copy)]
 struct Sum<'a> {
     rows: &'a [f64],
@@ -208,13 +209,13 @@ struct Sum<'a> {
 }
 
 compiled! {
-    /// See [`OuterProducts::add_to`].
+    /// Implements [`OuterProducts::add_to`].
     fn add_products<V, COLUMNS>(h: &mut [f64], ldh: usize, sum: Sum<'_>) {
         let Sum { rows, stride, size, places } = sum;
-        assert!(size + SLACK <= stride, "rows without slack");
+        assert!(size + SLACK <= stride, "rows without padding");
         for Place { at: [left, right], length, .. } in places {
             let inside = [left, right].iter().all(|at| **at <= rows.len() && *length <= rows.len() - **at);
-            assert!(inside, "a product of rows that there are not");
+            assert!(inside, "a product of rows that do not exist");
         }
         let (wide, mut j) = (block(stride).trailing_zeros(), 0);
         while j < size {
@@ -222,8 +223,8 @@ compiled! {
             while i <= size {
                 let strip = next_strip::<V>(size + 1 - i);
                 let masks = [bits(wide, i, strip * V::N), columns];
-                // SAFETY: the places are those of rows that exist, of which each has `stride` numbers, and the last of the
-                // strip's is at most `SLACK` behind the sum's size.
+                // SAFETY: the positions refer to existing rows of `stride` numbers, and the strip extends at most
+                // `SLACK` past the sum's size.
                 unsafe {
                     match strip {
                         1 => add_strip::<V, 1, COLUMNS>(h, ldh, sum, masks, [i, j]),
@@ -238,17 +239,17 @@ compiled! {
     }
 }
 
-/// The bits of a [`mask`] for some numbers, of which each stands for 2ʷⁱᵈᵉ numbers.
+/// Returns the bits of a [`mask`] for `length` numbers from index `from` on; each bit stands for 2ʷⁱᵈᵉ numbers.
 #[inline(always)]
 fn bits(wide: u32, from: usize, length: usize) -> u64 {
     let (first, last) = (from >> wide, (from + length - 1) >> wide);
     (2_u64 << (last - first)).wrapping_sub(1) << first
 }
 
-/// H[i.., j..] += the runs of which a strip of S registers of rows has a part.
+/// Adds the runs with nonzero blocks in this tile to H[i.., j..]; the tile has S registers of rows.
 ///
 /// # Safety
-/// Each row on the left has S registers of numbers from i on, and each on the right COLUMNS numbers from j on.
+/// Each left row has S registers of numbers from i on, and each right row COLUMNS numbers from j on.
 #[inline(always)]
 unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
     h: &mut [f64],
@@ -264,7 +265,7 @@ unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
         }
         let [left, right] = run.at;
         debug_assert!((left + i + S * V::N).max(right + j + COLUMNS) + run.length <= sum.rows.len() + sum.stride);
-        // SAFETY: by the caller, of the first row; the others are `stride` apart.
+        // SAFETY: by the caller for the first row; the others are `stride` apart.
         let from = |at: usize, count| unsafe { core::slice::from_raw_parts(sum.rows.as_ptr().add(at), count) };
         let mut row = 0;
         while row < run.length {

@@ -5,23 +5,24 @@ use crate::registers::Vector;
 use crate::tile::{SLACK, Store, View, column_block, holds, tile_rows};
 
 compiled! {
-    /// C = A Bᵀ, for `shape` = [rows of A, rows of B, columns of both]. C has slack rows.
+    /// Computes C = A Bᵀ, for `shape` = [rows of A, rows of B, columns of both]. C has padding rows.
     pub fn product<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
         whole::<V, COLUMNS, false>(c, ldc, shape, a, b, Store::Set);
     }
 
-    /// C += A Bᵀ, for a shape as of [`product`]. C has slack rows.
+    /// Computes C += A Bᵀ, with `shape` as for [`product`]. C has padding rows.
     pub fn add_product<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
         whole::<V, COLUMNS, false>(c, ldc, shape, a, b, Store::Add);
     }
 
-    /// The lower triangle (with some of the upper one) of C += A Bᵀ, for a shape as of [`product`]. C has slack rows.
+    /// Computes the lower triangle of C += A Bᵀ, with `shape` as for [`product`]. Some entries above the diagonal
+    /// change as well. C has padding rows.
     pub fn add_product_lower<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
         whole::<V, COLUMNS, true>(c, ldc, shape, a, b, Store::Add);
     }
 
-    /// The lower triangle of C += (A Bᵀ)ᵀ for square A and B of `size` rows, by way of the upper triangle of A Bᵀ, which is
-    /// left in `scratch` (stride `lds`, `size` columns, slack rows).
+    /// Computes the lower triangle of C += (A Bᵀ)ᵀ for square A and B with `size` rows. The upper triangle of A Bᵀ is
+    /// left in `scratch` (stride `lds`, `size` columns, padding rows).
     pub fn add_transposed_product_lower<V, COLUMNS>(
         c: &mut [f64],
         ldc: usize,
@@ -44,20 +45,21 @@ compiled! {
         }
     }
 
-    /// C = A Bᵀ for an upper triangular B with n rows, and an A with `rows` rows. C has slack rows.
+    /// Computes C = A Bᵀ for an upper triangular B with n rows and an A with `rows` rows; `shape` = [rows, n]. C has
+    /// padding rows.
     pub fn product_with_upper<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 2], a: View<'_>, b: View<'_>) {
         let [rows, n] = shape;
         from_diagonal::<V, COLUMNS, false>(c, ldc, [rows, n], a, b);
     }
 
-    /// The lower triangle (with some of the upper one) of C = A Bᵀ for an upper triangular A, both with n rows and n columns.
-    /// C has slack rows.
+    /// Computes the lower triangle of C = A Bᵀ for an upper triangular A; A and B have n rows and n columns. Some
+    /// entries above the diagonal change as well. C has padding rows.
     pub fn product_of_upper_lower<V, COLUMNS>(c: &mut [f64], ldc: usize, n: usize, a: View<'_>, b: View<'_>) {
         from_diagonal::<V, COLUMNS, true>(c, ldc, [n, n], a, b);
     }
 
-    /// C = A Bᵀ, for a shape as of [`product`] and a C without slack rows. Where rows of A are rows of B, C has the same
-    /// bits on both sides of the diagonal.
+    /// Computes C = A Bᵀ for a C without padding rows, with `shape` as for [`product`]. If A and B have common rows,
+    /// the corresponding entries of C on both sides of the diagonal have the same bits.
     pub fn product_without_slack<V, COLUMNS>(
         c: &mut [f64],
         ldc: usize,
@@ -96,7 +98,7 @@ compiled! {
                         tile[jj][0].store(&mut numbers);
                         for k in 0..V::N {
                             if k < rows {
-                                to[k] = numbers[k]; // one by one: no function call
+                                to[k] = numbers[k]; // one by one, to avoid a function call
                             }
                         }
                     }
@@ -107,7 +109,8 @@ compiled! {
         }
     }
 
-    /// C += A, on `rows` rows and `columns` columns, in whole registers: C and A have slack rows, and those of C change.
+    /// Computes C += A on `rows` rows and `columns` columns, in whole registers. C and A have padding rows; the padding
+    /// of C changes.
     pub fn add_matrix<V, COLUMNS>(c: &mut [f64], ldc: usize, a: View<'_>, shape: [usize; 2]) {
         let [rows, columns] = shape;
         for j in 0..columns {
@@ -120,8 +123,8 @@ compiled! {
     }
 }
 
-/// X = A₁ + s B₁ and Y = A₂ + s (X + B₂), for [A₁; A₂] = A and [B₁; B₂] = B of `shape` = [rows of X, columns], without a
-/// function call. They are written to OUT wherever `of_x` and `of_y` say that an X or a Y begins.
+/// Computes X = A₁ + s B₁ and Y = A₂ + s (X + B₂), without a function call, for A = [A₁; A₂] and B = [B₁; B₂]. `shape`
+/// = [rows of X, columns]. `of_x` and `of_y` are the offsets in OUT at which copies of X and of Y are written.
 #[inline(always)]
 pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
     out: &mut [f64],
@@ -153,7 +156,7 @@ pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
                 }
                 continue;
             }
-            // SAFETY: a register of rows, i ≤ rows − N, of a column of those that were found to be inside.
+            // SAFETY: a register of rows, i ≤ rows − N, in a column that was found to be in bounds.
             unsafe {
                 let load = |x: &[f64], at: usize| V::load(x.get_unchecked(at..at + V::N));
                 let x = load(b.data, from_b).mul_add(step, load(a.data, from_a));
@@ -175,7 +178,7 @@ pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
     }
 }
 
-/// OUT = A + B, on `rows` rows and `columns` columns, without a function call.
+/// Computes OUT = A + B on `rows` rows and `columns` columns, without a function call.
 #[inline(always)]
 pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'_>, shape: [usize; 2]) {
     let [rows, columns] = shape;
@@ -194,7 +197,7 @@ pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'
             continue;
         }
         loop {
-            // SAFETY: a register of rows, i ≤ rows − N, of a column of those that were found to be inside.
+            // SAFETY: a register of rows, i ≤ rows − N, in a column that was found to be in bounds.
             unsafe {
                 let load = |x: &[f64], at: usize| V::load(x.get_unchecked(at..at + V::N));
                 let sum = load(a.data, from_a + i).add(load(b.data, from_b + i));
@@ -208,7 +211,8 @@ pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'
     }
 }
 
-/// C ← A Bᵀ in blocks of columns, each from its diagonal on if only the lower triangle is wanted.
+/// Computes C ← A Bᵀ in blocks of columns. With LOWER, each block begins at its diagonal. `how` selects whether the
+/// product is set, added or subtracted.
 #[inline(always)]
 fn whole<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     c: &mut [f64],
@@ -226,7 +230,8 @@ fn whole<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     }
 }
 
-/// C ← A Bᵀ of which the sums for column j of C begin with product j: all rows of C, or those from the diagonal on.
+/// Computes C ← A Bᵀ, where the sums for column j of C begin with term j. With LOWER, only the rows from the diagonal
+/// on.
 #[inline(always)]
 fn from_diagonal<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     c: &mut [f64],

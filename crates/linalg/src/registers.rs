@@ -1,4 +1,4 @@
-//! Vector registers for the dense kernels, and the choice of those that this machine has.
+//! Vector registers for the dense kernels, and selection of the registers of this machine.
 
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Real, Witness};
@@ -6,42 +6,42 @@ use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// The registers of [`Level::Avx512`]; on other processors the same as `Short`.
+/// Register of [`Level::Avx512`]; on other processors the same as `Short`.
 pub(crate) type Long = <f64 as Real>::Long<Gate>;
-/// The registers of [`Level::Avx2`], [`Level::Neon`] or [`Level::Simd128`].
+/// Register of [`Level::Avx2`], [`Level::Neon`] or [`Level::Simd128`].
 pub(crate) type Short = <f64 as Real>::Short<Gate>;
 
-/// The promise of this crate, by which it names registers.
+/// Witness of this crate, which allows it to name register types.
 pub(crate) struct Gate;
 
-// SAFETY: registers are used in functions that are called at their level, and in kernels entered through their door.
+// SAFETY: registers are used only in functions called at their level, and in kernels entered through `enter`.
 #[allow(unsafe_code)]
 unsafe impl Witness for Gate {}
 
-/// A register of N numbers.
+/// Register of N numbers.
 pub trait Vector: Copy {
-    /// The number of numbers in a register.
+    /// Number of numbers in a register.
     const N: usize;
 
-    /// The first N numbers of `x`.
+    /// Loads the first N numbers of `x`.
     fn load(x: &[f64]) -> Self;
     /// Writes the first N numbers of `x`.
     fn store(self, x: &mut [f64]);
-    /// x in every lane.
+    /// Returns x in every lane.
     fn splat(x: f64) -> Self;
-    /// self · b + c, fused where the processor can.
+    /// Returns self · b + c, fused if the processor supports it.
     fn mul_add(self, b: Self, c: Self) -> Self;
-    /// self + b.
+    /// Returns self + b.
     fn add(self, b: Self) -> Self;
-    /// self − b.
+    /// Returns self − b.
     fn sub(self, b: Self) -> Self;
-    /// self · b.
+    /// Returns self · b.
     fn mul(self, b: Self) -> Self;
-    /// The transpose of N registers: number i of register k becomes number k of register i.
+    /// Transposes N registers: number i of register k becomes number k of register i.
     fn transpose(rows: &mut [Self]);
 }
 
-/// Two numbers, which the compiler keeps in a register of the kind that every processor has.
+/// Two numbers, which the compiler keeps in a register that every processor has.
 #[derive(Clone, Copy)]
 pub(crate) struct Pair([f64; 2]);
 
@@ -121,10 +121,10 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// Work with vector loops, generic over the registers; see [`at_level`].
+/// Work with vector loops, generic over the register type; see [`at_level`].
 pub trait Vectorized: Sized {
-    /// The work. It must be `#[inline(always)]`, and so must be what it calls with registers: so all is compiled for the
-    /// instructions of the function that [`at_level`] puts it in.
+    /// Does the work. It must be `#[inline(always)]`, and so must each function that it calls with registers. Then
+    /// everything is compiled for the instructions of the function in which [`at_level`] calls it.
     fn run<V: Vector>(self);
 }
 
@@ -157,8 +157,8 @@ pub fn at_level(work: impl Vectorized) {
     }
 }
 
-/// As [`at_level`], with registers of four numbers at most: for work that mostly moves rows, of which many are shorter than
-/// eight numbers.
+/// Runs work as [`at_level`] does, with registers of at most four numbers. It suits work that mostly copies rows,
+/// because many rows are shorter than eight numbers.
 pub fn at_narrow_level(work: impl Vectorized) {
     match level() {
         Level::Baseline => work.run::<Pair>(),
@@ -166,7 +166,7 @@ pub fn at_narrow_level(work: impl Vectorized) {
     }
 }
 
-/// Work on registers V, as the gate takes it.
+/// Adapter that runs work on registers V as a kernel.
 struct On<W, V>(W, PhantomData<V>);
 
 impl<W: Vectorized, V: Vector> Kernel for On<W, V> {

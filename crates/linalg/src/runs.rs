@@ -1,32 +1,32 @@
-//! Runs of numbers that go to other places.
+//! Runs of consecutive numbers that are copied to other indices.
 #![allow(unsafe_code)]
 
 use crate::registers::Vector;
 use crate::tile::SLACK;
 use alloc::vec::Vec;
 
-/// Numbers of a row that go to other places, in runs of neighbours that stay neighbours.
+/// Map from indices of one row to indices of another row, stored as runs of consecutive indices.
 #[derive(Clone, Debug, Default)]
 pub struct Runs {
-    /// The first place in the one row and in the other, and how many they are.
+    /// First source index, first target index, and length of each run.
     runs: Vec<[usize; 3]>,
-    /// What is behind the last of all places, in both rows.
+    /// Ends (index after the last) over all runs, in the source row and in the target row.
     ends: [usize; 2],
 }
 
 impl Runs {
-    /// No run, and room for so many.
+    /// Creates an empty map with memory for `runs` runs.
     pub fn with_capacity(runs: usize) -> Self {
         Self { runs: Vec::with_capacity(runs), ends: [0; 2] }
     }
 
-    /// Forgets all runs.
+    /// Removes all runs.
     pub fn clear(&mut self) {
         self.runs.clear();
         self.ends = [0; 2];
     }
 
-    /// The number at `from` goes to `to`.
+    /// Adds the pair of source index `from` and target index `to`.
     #[inline(always)]
     pub fn push(&mut self, from: usize, to: usize) {
         match self.runs.last_mut() {
@@ -36,25 +36,25 @@ impl Runs {
         self.ends = [self.ends[0].max(from + 1), self.ends[1].max(to + 1)];
     }
 
-    /// The runs: the first place in the one row and in the other, and how many they are.
+    /// Returns the runs: first source index, first target index, and length.
     pub fn iter(&self) -> impl Iterator<Item = [usize; 3]> {
         self.runs.iter().copied()
     }
 
-    /// Writes a times the numbers of a row to their places, whole registers at a time: what is behind a run may change, up to
-    /// [`SLACK`] numbers, and the run after it goes over that.
+    /// Writes a times the numbers of a row to their target indices, in whole registers. Up to [`SLACK`] numbers after a
+    /// run may change; the run after it overwrites them.
     ///
     /// # Panics
-    /// If one of the rows has not all places and slack behind them.
+    /// If one of the rows does not contain all indices and [`SLACK`] numbers of padding after them.
     #[inline(always)]
     pub fn copy_scaled<V: Vector>(&self, row: &[f64], a: f64, to: &mut [f64]) {
-        assert!(self.ends[0] + SLACK <= row.len() && self.ends[1] + SLACK <= to.len(), "rows without slack");
+        assert!(self.ends[0] + SLACK <= row.len() && self.ends[1] + SLACK <= to.len(), "rows without padding");
         let a = V::splat(a);
         for &[from, place, length] in &self.runs {
             let mut i = 0;
             while i < length {
-                // SAFETY: i is in the run, which ends `SLACK` numbers before its rows do, and a register has no more than these
-                // and one.
+                // SAFETY: i is in the run. The run ends `SLACK` numbers before the end of both rows, and a register has
+                // at most `SLACK` + 1 numbers.
                 unsafe {
                     let x = V::load(row.get_unchecked(from + i..from + i + V::N));
                     x.mul(a).store(to.get_unchecked_mut(place + i..place + i + V::N));

@@ -1,19 +1,22 @@
-//! The elimination of a few columns of a small matrix, with a sum of squares that comes into its tiles as they are computed.
+//! Elimination of the first columns of a small matrix plus a sum of squares. The squares are added to each tile when
+//! the tile is computed.
 #![allow(unsafe_code, non_snake_case)] // H, X
 
 use crate::compiled::narrow;
 use crate::registers::Vector;
 use crate::tile::{View, add_outer, has_strip, holds};
 
-/// Columns of a tile.
+/// Number of columns of a tile.
 const COLUMNS: usize = 4;
 
 narrow! {
-    /// As [`eliminate`](crate::eliminate), of H + Σ xₖ xₖᵀ for columns x of X. `shape` = [rows, columns, m], and `length` = [numbers
-    /// in a column of X, columns]; behind these numbers, up to four registers behind H's last row, X has zeros. H has slack rows.
+    /// Eliminates columns as [`eliminate`](crate::eliminate) does, for the matrix H + Σ xₖ xₖᵀ with the columns x of X.
+    ///
+    /// `shape` = [rows, columns, m] of H. `length` = [numbers in a column of X, number of columns of X]. After these
+    /// numbers, X has zeros until four registers after the last row of H. H has padding rows.
     ///
     /// # Errors
-    /// The first column whose pivot is not positive, or not finite, and the pivot.
+    /// Returns the first column whose pivot is not positive or not finite, and the pivot.
     pub fn eliminate_sum<V, WIDE>(
         h: &mut [f64],
         stride: usize,
@@ -28,13 +31,13 @@ narrow! {
         let slack = rows + V::N.max(COLUMNS) - 1;
         assert!(m <= size && size <= rows && reach <= rows, "a triangle with more columns than rows");
         assert!(holds(h, stride, [slack, size]), "a matrix ends before the last of its entries");
-        assert!(count == 0 || holds(x.data, x.stride, [rows + 4 * V::N, count]), "a row without slack");
+        assert!(count == 0 || holds(x.data, x.stride, [rows + 4 * V::N, count]), "a row without padding");
         let sum = Sum { x, count, reach };
         for j in 0..m {
             let mut i = j;
             let mut factor = 0.0;
             while i < rows {
-                // SAFETY: as was found.
+                // SAFETY: the assertions above.
                 unsafe {
                     match (rows - i).div_ceil(V::N) {
                         1 => eliminate_strip::<V, 1>(h, stride, [i, j], sum, &mut factor)?,
@@ -48,7 +51,7 @@ narrow! {
         }
         let mut j = m;
         while j < size {
-            // SAFETY: as was found.
+            // SAFETY: the assertions above.
             unsafe { add_tiles::<V>(h, stride, [rows, j], COLUMNS.min(size - j), sum, m) };
             j += COLUMNS;
         }
@@ -56,7 +59,7 @@ narrow! {
     }
 }
 
-/// The squares that are added.
+/// Squares that are added: the columns of X.
 #[derive(Clone, Copy)]
 struct Sum<'a> {
     x: View<'a>,
@@ -64,10 +67,11 @@ struct Sum<'a> {
     reach: usize,
 }
 
-/// H ← H + Σ x xᵀ − Σ of the first m columns of H, on some columns from j on, and on the rows from j to `rows`.
+/// Computes H ← H + Σ x xᵀ − Σ h hᵀ, with h the first m columns of H. It covers `columns` columns from j on, and the
+/// rows from j to `rows`.
 ///
 /// # Safety
-/// H has slack rows behind the rows, and X four registers of them.
+/// H has padding rows after `rows`, and X has four registers of padding.
 #[inline(always)]
 unsafe fn add_tiles<V: Vector>(
     h: &mut [f64],
@@ -90,10 +94,10 @@ unsafe fn add_tiles<V: Vector>(
     }
 }
 
-/// See [`add_tiles`], on S registers of rows from i on.
+/// Computes one tile for [`add_tiles`]: S registers of rows from row i on.
 ///
 /// # Safety
-/// As of [`add_tiles`].
+/// As for [`add_tiles`].
 #[inline(always)]
 unsafe fn add_tile<V: Vector, const S: usize>(
     h: &mut [f64],
@@ -139,7 +143,7 @@ unsafe fn add_tile<V: Vector, const S: usize>(
     }
 }
 
-/// tile −= strip · rowᵀ, with S registers of rows.
+/// Computes tile −= strip · rowᵀ, with S registers of rows.
 #[inline(always)]
 fn subtract_outer<V: Vector, const S: usize>(tile: &mut [[V; S]; COLUMNS], strip: &[f64], row: &[f64]) {
     for jj in 0..COLUMNS {
@@ -150,14 +154,14 @@ fn subtract_outer<V: Vector, const S: usize>(tile: &mut [[V; S]; COLUMNS], strip
     }
 }
 
-/// Column j of L and X, from what is added to it and the columns before it, on S registers of rows from i on: first those that
-/// begin on the diagonal, which give `factor`, the inverse of its entry there.
+/// Computes column j of L and X from its sum and the columns before it, on S registers of rows from row i on. The first
+/// call for a column starts on the diagonal and sets `factor`, the inverse of the diagonal entry.
 ///
 /// # Errors
-/// The column, if its pivot is not positive or not finite, and the pivot.
+/// Returns the column and its pivot, if the pivot is not positive or not finite.
 ///
 /// # Safety
-/// The first j columns and column j have S registers of numbers from row i on, and so has X if i is within its reach.
+/// The first j columns and column j have S registers of numbers from row i on; so does X if i < `sum.reach`.
 #[inline(always)]
 unsafe fn eliminate_strip<V: Vector, const S: usize>(
     h: &mut [f64],

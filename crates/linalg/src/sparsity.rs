@@ -1,20 +1,20 @@
-//! Entries of matrices with the zeros of a tree.
+//! Nonzero entries of matrices whose zeros follow a tree.
 
 use alloc::vec::Vec;
 
-/// The rows in which a column of such a matrix may differ from zero.
+/// Rows in which a column of such a matrix may differ from zero.
 #[derive(Clone, Debug)]
 pub struct NonzeroRows {
-    /// The rows, in the order in which products go through them.
+    /// Row indices, in the order in which products use them.
     pub rows: Vec<usize>,
-    /// The number of columns one after the other, from this one on, that have the same rows.
+    /// Number of consecutive columns, from this one on, with the same rows.
     pub same_pattern: usize,
 }
 
 condyle_spatial::alike!(NonzeroRows);
 
 impl NonzeroRows {
-    /// For all columns of a matrix, given the rows of each.
+    /// Returns the value for each column of a matrix, given the rows of each column.
     pub fn of_columns(rows: Vec<Vec<usize>>) -> Vec<Self> {
         let mut same = vec![1; rows.len()];
         for c in (1..rows.len()).rev().filter(|&c| rows[c - 1] == rows[c]) {

@@ -1,4 +1,4 @@
-//! Threads that share work, if the feature `threads` has them.
+//! Threads that share work, if the feature `threads` is on.
 
 #[cfg(not(feature = "threads"))]
 mod alone;

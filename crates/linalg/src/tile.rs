@@ -1,35 +1,35 @@
-//! The tile that all dense kernels are built from: a strip of registers of rows by a few columns, accumulated in registers.
+//! Tile on which all dense kernels are built: a strip of rows by a few columns, accumulated in registers.
 #![allow(unsafe_code)]
 
 use crate::registers::Vector;
 
-/// Rows that a strip may reach past the last row, and columns that a tile may reach past the last column.
+/// Maximum number of rows a strip may extend past the last row, and of columns a tile may extend past the last column.
 pub const SLACK: usize = 8;
 
-/// A matrix in column-major storage, from one of its entries on.
+/// Column-major matrix, or the part of it from one of its entries on.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// The numbers, the first one that entry's.
+    /// Numbers, starting with the first entry of the view.
     pub data: &'a [f64],
-    /// The distance from one column to the next.
+    /// Distance from one column to the next.
     pub stride: usize,
 }
 
 impl<'a> View<'a> {
-    /// The matrix in `data` whose columns are `stride` apart.
+    /// Creates a view of the matrix in `data` whose columns are `stride` apart.
     #[inline]
     pub fn new(data: &'a [f64], stride: usize) -> Self {
         Self { data, stride }
     }
 
-    /// The matrix from entry (i, j) on; nothing where there is no such entry.
+    /// Returns the view from entry (i, j) on; it is empty if this entry does not exist.
     #[inline]
     pub fn at(self, i: usize, j: usize) -> Self {
         Self { data: self.data.get(j * self.stride + i..).unwrap_or_default(), ..self }
     }
 }
 
-/// Whether a matrix has so many rows in so many columns, one at least.
+/// Returns whether a matrix has the given numbers of rows and columns, with at least one column.
 #[inline(always)]
 pub(crate) fn holds(data: &[f64], stride: usize, [rows, columns]: [usize; 2]) -> bool {
     match (columns - 1).checked_mul(stride) {
@@ -38,7 +38,7 @@ pub(crate) fn holds(data: &[f64], stride: usize, [rows, columns]: [usize; 2]) ->
     }
 }
 
-/// Some rows of the first columns of a matrix, one column after the other, where all of them were found to be inside.
+/// Iterator over the columns of a block of rows. Bounds are checked once, in `new`.
 #[derive(Clone, Copy)]
 struct Walk<'a> {
     data: &'a [f64],
@@ -47,7 +47,7 @@ struct Walk<'a> {
 }
 
 impl<'a> Walk<'a> {
-    /// `count` rows from `first` on, of `length` > 0 columns.
+    /// Creates the iterator over `length` > 0 columns, with `count` rows from row `first` on.
     #[inline(always)]
     fn new(of: View<'a>, first: usize, count: usize, length: usize) -> Self {
         let View { data, stride } = of;
@@ -55,21 +55,21 @@ impl<'a> Walk<'a> {
         Self { data, at: first, stride }
     }
 
-    /// The rows in this column; those in the next one come next.
+    /// Returns the rows of the current column, and advances to the next column.
     ///
     /// # Safety
-    /// It is called `length` times, for the `count` rows of [`new`](Self::new).
+    /// It is called at most `length` times, with the `count` of [`new`](Self::new).
     #[inline(always)]
     unsafe fn next(&mut self, count: usize) -> &'a [f64] {
         debug_assert!(self.at + count <= self.data.len());
-        // SAFETY: by the caller, and by what `new` has found.
+        // SAFETY: by the caller, and by the check in `new`.
         let rows = unsafe { core::slice::from_raw_parts(self.data.as_ptr().add(self.at), count) };
         self.at += self.stride;
         rows
     }
 }
 
-/// tile = a[i.., ..length] · b[j.., ..length]ᵀ, with S registers of rows.
+/// Computes tile = a[i.., ..length] · b[j.., ..length]ᵀ, with S registers of rows.
 #[inline(always)]
 pub(crate) fn tile_rows<V: Vector, const S: usize, const COLUMNS: usize>(
     a: View<'_>,
@@ -84,14 +84,14 @@ pub(crate) fn tile_rows<V: Vector, const S: usize, const COLUMNS: usize>(
     }
     let (mut a, mut b) = (Walk::new(a, i, S * V::N, length), Walk::new(b, j, COLUMNS, length));
     for _ in 0..length {
-        // SAFETY: so many times, for so many rows.
+        // SAFETY: called `length` times, with the row counts given to `new`.
         let (strip, row) = unsafe { (a.next(S * V::N), b.next(COLUMNS)) };
         add_outer(&mut tile, strip, row);
     }
     tile
 }
 
-/// tile += strip · rowᵀ, with S registers of rows.
+/// Computes tile += strip · rowᵀ, with S registers of rows.
 #[inline(always)]
 pub(crate) fn add_outer<V: Vector, const S: usize, const COLUMNS: usize>(
     tile: &mut [[V; S]; COLUMNS],
@@ -110,8 +110,9 @@ pub(crate) fn add_outer<V: Vector, const S: usize, const COLUMNS: usize>(
     }
 }
 
-/// The number of registers of rows that the next strip has, of `rows` that are left: three where there are 32 registers, if
-/// that leaves no single one; else two. (Three of 16 leave too few for the other operand: they were measured to spill.)
+/// Returns the number of registers of rows in the next strip, given the number of `rows` left. With 32 vector
+/// registers, it is three, unless this would leave a single register; otherwise two. (With 16 registers, strips of
+/// three were measured to spill.)
 #[inline(always)]
 pub(crate) fn next_strip<V: Vector>(rows: usize) -> usize {
     match rows.div_ceil(V::N) {
@@ -122,18 +123,18 @@ pub(crate) fn next_strip<V: Vector>(rows: usize) -> usize {
     }
 }
 
-/// The new value of an entry of C.
+/// Operation that stores a product in an entry of C.
 #[derive(Clone, Copy)]
 pub(crate) enum Store {
-    /// The product.
+    /// C = product.
     Set,
-    /// C plus the product.
+    /// C = C + product.
     Add,
-    /// C minus the product.
+    /// C = C − product.
     Subtract,
 }
 
-/// Whether a matrix has S registers of rows in so many columns, one at least, from a place on.
+/// Returns whether a matrix has S registers of rows in `columns` columns (at least one), from offset `at` on.
 #[inline(always)]
 pub(crate) fn has_strip<V: Vector, const S: usize>(data: &[f64], stride: usize, at: usize, columns: usize) -> bool {
     at <= data.len() && holds(&data[at..], stride, [S * V::N, columns])
@@ -154,7 +155,7 @@ pub(crate) fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
     for jj in 0..COLUMNS {
         if jj < columns {
             let at = at + jj * ldc;
-            // SAFETY: column jj of the strip, all of which was found to be inside.
+            // SAFETY: column jj of the strip, which the assertion found to be in bounds.
             let column = unsafe { c.get_unchecked_mut(at..at + S * V::N) };
             for s in 0..S {
                 let place = &mut column[s * V::N..];
@@ -169,8 +170,8 @@ pub(crate) fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
     }
 }
 
-/// C[i, j] ← A[i, ..length] · B[j, ..length]ᵀ for some rows and for `columns` columns from j on, in strips of up to three
-/// registers.
+/// Computes C[i, j] ← A[i, ..length] · B[j, ..length]ᵀ for the given rows and for `columns` columns from j on, in
+/// strips of up to three registers. `how` selects whether the product is set, added or subtracted.
 #[inline(always)]
 pub(crate) fn column_block<V: Vector, const COLUMNS: usize>(
     c: &mut [f64],

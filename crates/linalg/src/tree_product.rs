@@ -1,4 +1,4 @@
-//! X = −A B, of square matrices, where the columns of B have the zeros of a tree.
+//! Products X = −A B of square matrices, where the zeros of B's columns follow a tree.
 #![allow(unsafe_code)]
 
 use crate::axpy::axpy;
@@ -12,17 +12,18 @@ use condyle_spatial::kernel;
 use core::marker::PhantomData;
 use core::ops::Range;
 
-/// C = −A B, where column j of B has zeros but in the rows of `nonzero_rows[j]`.
+/// Computes C = −A B, where column j of B is zero except in the rows of `nonzero_rows[j]`.
 ///
-/// Four columns with the same rows, as those of one limb have, go together: as many entries of each as there are registers
-/// for stay there while their sums grow. Other columns take four columns of A at a time, so that they are loaded and stored
-/// a quarter as often.
+/// Four columns with the same rows, for example columns of one limb, are computed together. A group of their entries
+/// stays in registers while the sums accumulate. For other columns, four columns of A are used at a time, so that the
+/// sums are loaded and stored a quarter as often.
 #[inline(always)]
 pub fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
     minus_block_product(A, B, C, nonzero_rows, 0..nonzero_rows.len());
 }
 
-/// Those rows and columns of C = −A B that are a block of the diagonal, where B has nothing beside it in these columns.
+/// Computes the diagonal block `block` of C = −A B. In the columns of the block, B must be zero outside the block's
+/// rows.
 #[inline(always)]
 pub fn minus_block_product<S: Scalar>(
     A: &[S],
@@ -50,7 +51,8 @@ pub fn minus_block_product<S: Scalar>(
     }
 }
 
-/// Twice `minus_product` with one A that is symmetric, in lanes, where matrices are too large for the nearest cache.
+/// Computes `minus_product` for two matrices B and one symmetric A. It is for lanes, whose matrices are too large for
+/// the first-level cache.
 #[inline(always)]
 fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
     let (n, mut j) = (nonzero_rows.len(), 0);
@@ -75,7 +77,7 @@ fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2]
     }
 }
 
-/// Rows of a matrix with n of them.
+/// Row indices, checked to be below n.
 #[derive(Clone, Copy)]
 struct Inside<'a> {
     rows: &'a [usize],
@@ -83,22 +85,22 @@ struct Inside<'a> {
 }
 
 impl<'a> Inside<'a> {
-    /// The rows, after a look at each.
+    /// Checks each row index.
     #[inline(always)]
     fn new(rows: &'a [usize], n: usize) -> Self {
         let mut last = 0;
         for &k in rows {
             last = last.max(k);
         }
-        assert!(last < n, "a row that there is not");
+        assert!(last < n, "a row index is too large");
         Self { rows, n }
     }
 }
 
-/// An entry of a column of n numbers.
+/// Returns entry k of a column of n numbers.
 ///
 /// # Safety
-/// It is one of the rows of [`Inside`] for this n.
+/// k is one of the rows of an [`Inside`] with this n.
 #[inline(always)]
 unsafe fn entry<T: Copy>(column: &[T], k: usize) -> T {
     debug_assert!(k < column.len());
@@ -106,7 +108,8 @@ unsafe fn entry<T: Copy>(column: &[T], k: usize) -> T {
     unsafe { *column.get_unchecked(k) }
 }
 
-/// The sums of `subtract_column` for N rows of M columns at a time: of A, N columns are read from end to end.
+/// Computes the sums of `subtract_column` for N rows of M columns at a time. A is symmetric, so N of its columns are
+/// read from start to end.
 #[inline(always)]
 fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&mut [S]; 2], rows: Inside<'_>) {
     let (Inside { rows, n }, [B0, B1], [C0, C1]) = (rows, B, C);
@@ -148,7 +151,7 @@ fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&
     }
 }
 
-/// c −= A b in some of its rows, where b has zeros but in these rows.
+/// Computes c −= A b on the rows `of_c` of c, where b is zero except in `rows`.
 #[inline(always)]
 pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize], of_c: Range<usize>) {
     let (n, A) = (c.len(), &A[of_c.start..]);
@@ -168,7 +171,7 @@ pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize],
     }
 }
 
-/// The sums of `subtract_column`, in the same order, so that the bits are the same.
+/// Computes the sums of `subtract_column` for four columns, in the same order and therefore with the same bits.
 #[inline(always)]
 fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], [n, start, end]: [usize; 3]) {
     let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);
@@ -205,7 +208,7 @@ fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: 
     }
 }
 
-/// X = −A B for two matrices B and one A that is symmetric; column j of both B has zeros but in the rows of
+/// Computes X = −A B for two matrices B and one symmetric A. Column j of both B is zero except in the rows of
 /// `nonzero_rows[j]`.
 #[inline]
 pub fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
@@ -221,7 +224,7 @@ pub fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzer
 }
 
 kernel! {
-    /// The products, scalar by scalar.
+    /// Computes the products for any scalar.
     fn one_by_one<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
         if S::LANES > 1 {
             minus_product_twice(A, B, X, nonzero_rows);
@@ -231,7 +234,7 @@ kernel! {
     }
 }
 
-/// The products of single numbers, in the vector registers of the level.
+/// Computes the products for `f64`, in the vector registers of the level.
 fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[NonzeroRows]) {
     if level() >= Level::Avx512 && nonzero_rows.len() >= 8 {
         Long::enter(InRegisters::<Long> { A, B, X, nonzero_rows, vector: PhantomData });
@@ -240,15 +243,16 @@ fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[N
     }
 }
 
-/// The number of columns of B that go together.
+/// Number of columns of B that are computed together.
 const SIDE: usize = 4;
-/// The number of operations that are under way at any time: fewer sums than that take no less time.
+/// Number of operations in flight at any time; fewer sums than this save no time.
 const UNDER_WAY: usize = 8;
 
-/// The products in vector registers.
+/// Products in vector registers.
 ///
-/// As many entries of four columns of X as there are registers for stay there while their sums grow. The last of them begin
-/// where they still fit, and so are computed twice. Each entry is the same sum in the same order as in `minus_product`.
+/// As many entries of four columns of X as fit in registers stay there while their sums accumulate. The last group of
+/// rows ends at the last row and overlaps the group before, so some entries are computed twice. Each entry is the same
+/// sum in the same order as in `minus_product`.
 struct InRegisters<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],
@@ -261,7 +265,8 @@ impl<V: Block<Number = f64>> Kernel for InRegisters<'_, V> {
     #[inline(always)]
     fn run(mut self) {
         let n = self.nonzero_rows.len();
-        // how many vectors of a column stay in registers: for the fewest operations, the most
+        // number of vectors of a column that stay in registers: the one with the fewest operations; if equal, the
+        // largest
         let (mut best, mut least) = (1, usize::MAX);
         for many in 1..=3 {
             let cost = n.div_ceil(many * V::LANES) * UNDER_WAY.max(many * SIDE);
@@ -283,7 +288,7 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
         let mut j = 0;
         while j < self.nonzero_rows.len() {
             let NonzeroRows { rows, same_pattern } = &self.nonzero_rows[j];
-            // columns j, …, j + same − 1 of the one matrix, then of the other
+            // columns j, …, j + same − 1 of the first matrix, then of the second
             let (same, mut k) = (*same_pattern, 0);
             let rows = Inside::new(rows, self.nonzero_rows.len());
             while k < 2 * same {
@@ -299,7 +304,7 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
         }
     }
 
-    /// Some columns of X: of which matrix, and which.
+    /// Computes M columns of X; `which` gives the matrix and the column index of each.
     #[inline(always)]
     fn columns<const M: usize, const N: usize>(&mut self, which: [(usize, usize); M], rows: Inside<'_>) {
         let (Inside { rows, n }, wide) = (rows, N * V::LANES);

@@ -1,4 +1,4 @@
-//! Operations on vectors, and of a matrix on a vector.
+//! Operations on vectors, and products of a matrix and a vector.
 #![allow(unsafe_code)]
 
 use crate::compiled::compiled;
@@ -6,7 +6,7 @@ use crate::registers::Vector;
 use crate::tile::{SLACK, View, holds};
 
 compiled! {
-    /// y += α A x.
+    /// Computes y += α A x.
     pub fn add_scaled_product<V, COLUMNS>(y: &mut [f64], alpha: f64, a: View<'_>, x: &[f64]) {
         let rows = y.len();
         if rows == 0 || x.is_empty() {
@@ -25,7 +25,7 @@ compiled! {
         // SAFETY: the last register begins N rows before the end, and the others before it.
         let sum = |y: &[f64], i: usize| unsafe { scaled_rows::<V>(y, alpha, a, x, i) };
         let (last, mut i) = (rows - V::N, 0);
-        let end = sum(y, last); // before the rows that it shares with another register are written
+        let end = sum(y, last); // computed before rows that it shares with another register are written
         while i < last {
             sum(y, i).store(&mut y[i..]);
             i += V::N;
@@ -34,10 +34,10 @@ compiled! {
     }
 }
 
-/// y + α A x on a register of rows.
+/// Returns y + α A x for one register of rows from row i on.
 ///
 /// # Safety
-/// y has a register of numbers from row i on, and so has each of as many columns of A as x has numbers.
+/// y and the columns of A have a register of numbers from row i on. A has as many columns as x has numbers.
 #[inline(always)]
 unsafe fn scaled_rows<V: Vector>(y: &[f64], alpha: f64, a: View<'_>, x: &[f64], i: usize) -> V {
     debug_assert!(i + V::N <= y.len() && (x.len() - 1) * a.stride + i + V::N <= a.data.len());
@@ -47,18 +47,18 @@ unsafe fn scaled_rows<V: Vector>(y: &[f64], alpha: f64, a: View<'_>, x: &[f64], 
     for x in x {
         // SAFETY: by the caller.
         let column = V::load(unsafe { a.data.get_unchecked(at..at + V::N) });
-        sum = sum.add(column.mul(alpha.mul(V::splat(*x)))); // rounded as one by one
+        sum = sum.add(column.mul(alpha.mul(V::splat(*x)))); // rounds as if computed one by one
         at += a.stride;
     }
     sum
 }
 
 compiled! {
-    /// y += A x for an A of `rows` rows; a y of them and of slack.
+    /// Computes y += A x for an A with `rows` rows. y has `rows` numbers and padding.
     pub fn add_product_vector<V, COLUMNS>(y: &mut [f64], rows: usize, a: View<'_>, x: &[f64]) {
         let mut i = 0;
         while i < rows {
-            // Four registers of rows at a time, of which the last ones may be slack beyond one register.
+            // Up to four registers of rows at a time; the last one may extend into the padding.
             if rows - i > 3 * V::N {
                 strip::<V, 4>(&mut y[i..], a, i, x);
             } else if rows - i > 2 * V::N {
@@ -72,8 +72,8 @@ compiled! {
         }
     }
 
-    /// y = Aᵀ x for an A of `rows` rows, where rows of A and numbers of x beyond them, up to a whole register, multiply to
-    /// zero; A has as many columns as y has numbers, and columns of slack.
+    /// Computes y = Aᵀ x for an A with `rows` rows. Rows of A and numbers of x after them, up to a whole register, must
+    /// have zero products. A has as many columns as y has numbers, and padding columns.
     pub fn transposed_product_vector<V, COLUMNS>(y: &mut [f64], rows: usize, a: View<'_>, x: &[f64]) {
         let mut k = 0;
         while k < y.len() {
@@ -105,7 +105,7 @@ compiled! {
     }
 }
 
-/// y += A[i.., :] x on S registers of rows.
+/// Computes y += A[i.., :] x on S registers of rows.
 #[inline(always)]
 fn strip<V: Vector, const S: usize>(y: &mut [f64], a: View<'_>, i: usize, x: &[f64]) {
     let y = &mut y[..S * V::N];
@@ -124,13 +124,14 @@ fn strip<V: Vector, const S: usize>(y: &mut [f64], a: View<'_>, i: usize, x: &[f
     }
 }
 
-/// xᵀ y.
+/// Returns xᵀ y.
 #[inline]
 pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// ‖x‖∞; NaN if an entry is. As integers, absolute values have the same order, and those of NaN are the largest.
+/// Returns ‖x‖∞; NaN if an entry is NaN. The bits of absolute values, read as integers, have the same order, and NaN is
+/// the largest.
 #[inline]
 pub fn max_abs(x: &[f64]) -> f64 {
     let abs = |x: f64| x.abs().to_bits() as i64;
@@ -145,12 +146,12 @@ pub fn max_abs(x: &[f64]) -> f64 {
     f64::from_bits(most.into_iter().fold(rest, i64::max) as u64)
 }
 
-/// to = x, without the function call that copying a few numbers would be.
+/// Copies x to `to`, without the function call that the compiler would emit for a few numbers.
 #[inline(always)]
 pub fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
     let length = x.len();
     let to = &mut to[..length];
-    // the last numbers may overlap what was copied before
+    // the last numbers may overlap numbers that were copied before
     match length {
         0 => {}
         1 => to[0] = x[0],
@@ -159,7 +160,7 @@ pub fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
         _ => {
             let (last, mut i) = (length - V::N, 0);
             while i < last {
-                // SAFETY: i + N < length, and both have so many numbers.
+                // SAFETY: i + N < length, and both slices have `length` numbers.
                 unsafe { V::load(x.get_unchecked(i..i + V::N)).store(to.get_unchecked_mut(i..i + V::N)) };
                 i += V::N;
             }
@@ -168,7 +169,7 @@ pub fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
     }
 }
 
-/// Copies the first M numbers and the last M.
+/// Copies the first M and the last M numbers.
 #[inline(always)]
 fn copy_ends<const M: usize>(to: &mut [f64], x: &[f64]) {
     let last = x.len() - M;
@@ -177,7 +178,7 @@ fn copy_ends<const M: usize>(to: &mut [f64], x: &[f64]) {
     to[last..].copy_from_slice(&end);
 }
 
-/// to = a x, without a function call.
+/// Computes to = a x, without a function call.
 #[inline(always)]
 pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
     let length = x.len();
@@ -188,11 +189,11 @@ pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
         }
         return;
     }
-    // Two registers at a time, of which the last ones may overlap those before.
+    // Two registers at a time; the last ones may overlap those before.
     let (a, last, mut i) = (V::splat(a), length - V::N, 0);
     loop {
         let k = (i + V::N).min(last);
-        // SAFETY: i and k are N or more before the end, and both have so many numbers.
+        // SAFETY: i and k are at least N before the end, and both slices have `length` numbers.
         unsafe {
             V::load(x.get_unchecked(i..i + V::N)).mul(a).store(to.get_unchecked_mut(i..i + V::N));
             V::load(x.get_unchecked(k..k + V::N)).mul(a).store(to.get_unchecked_mut(k..k + V::N));

@@ -1,11 +1,12 @@
-//! Parts that several threads work on.
+//! Parts on which several threads work.
 
 use condyle_linalg::threads::Parts;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Four threads race for every stage of every part: each is done once, in turn, and what one thread wrote the next one reads.
+/// Four threads compete for every stage of every part. Each stage is done once and in order, and each thread sees the
+/// data that the previous one wrote.
 #[test]
 fn each_stage_of_each_part_is_done_once() {
     let (cuts, stages) = ([0, 3, 3, 4, 9, 16, 40], 5);
@@ -42,7 +43,7 @@ fn each_stage_of_each_part_is_done_once() {
 }
 
 #[test]
-fn a_panic_is_told_and_its_part_stays() {
+fn a_panic_is_reported_and_its_part_does_not_advance() {
     let (mut first, mut second, mut states) = ([1, 2], [3, 4], Vec::new());
     let parts = Parts::new(&mut first, &mut second, &[0, 1, 2], &mut states);
     let panics = catch_unwind(AssertUnwindSafe(|| parts.work(1, 0, |start, first, _| assert_eq!(start, first.len()))));
@@ -55,8 +56,8 @@ fn a_panic_is_told_and_its_part_stays() {
 }
 
 #[test]
-#[should_panic(expected = "parts that are not those of the slices")]
-fn parts_are_those_of_the_slices() {
+#[should_panic(expected = "cuts do not ascend from 0 to the length of both slices")]
+fn cuts_must_cover_the_slices() {
     let (mut first, mut second, mut states) = ([0; 3], [0; 3], Vec::new());
     Parts::new(&mut first, &mut second, &[0, 2], &mut states);
 }

@@ -1,4 +1,4 @@
-//! Factors and products with the zeros of a tree, against dense ones.
+//! Factorizations and products with the zeros of a tree, compared with dense ones.
 #![allow(non_snake_case)]
 
 use condyle_linalg::sparsity::NonzeroRows;
@@ -6,10 +6,10 @@ use condyle_linalg::tree_product::{minus_product, minus_products};
 use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
 use nalgebra::{DMatrix, DVector};
 
-/// Rounding of sums of some ten products of numbers of the size of 1, and of solves with matrices of condition 10.
+/// Rounding error of sums of about ten products of numbers near 1, and of solves with matrices of condition number 10.
 const ROUNDING: f64 = 1e-13;
 
-/// A trunk of three columns, and two limbs of five on it.
+/// Parents of the columns: a trunk of three columns that carries two limbs of five.
 const PARENTS: [Option<usize>; 13] = {
     let mut parents = [None; 13];
     let mut c = 1;
@@ -20,7 +20,7 @@ const PARENTS: [Option<usize>; 13] = {
     parents
 };
 
-/// The same columns, the first of either limb standing for one row.
+/// Tree of the same columns, where the first column of each limb shares one row.
 struct Shared;
 
 impl ColumnTree for Shared {
@@ -42,18 +42,18 @@ impl ColumnTree for Shared {
     }
 }
 
-/// Some number between −1 and 1 for each i.
+/// Returns a number between −1 and 1 for each i.
 fn number(i: usize) -> f64 {
     (1.0 + 7.3 * i as f64).sin()
 }
 
-/// Whether each of two columns is, or is not, on the other's way to the root.
+/// Returns whether one of two columns is on the other's path to the root.
 fn related(tree: &(impl ColumnTree + ?Sized), c: usize, d: usize) -> bool {
     let (low, high) = (c.min(d), c.max(d));
     core::iter::successors(Some(high), |&c| tree.parent(c)).any(|c| c == low)
 }
 
-/// A positive definite matrix with the zeros of a tree.
+/// Returns a positive definite matrix with the zeros of a tree.
 fn matrix(tree: &(impl ColumnTree + ?Sized)) -> DMatrix<f64> {
     let n = tree.rows();
     let mut M = DMatrix::from_diagonal_element(n, n, 10.0);

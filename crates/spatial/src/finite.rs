@@ -1,4 +1,4 @@
-//! Limits as files have them: JSON knows no infinity, so where there is no limit stands nothing.
+//! Serialization of limits. JSON has no infinity: an infinite limit is written as `null`.
 //!
 //! ```
 //! use serde::{Deserialize, Serialize};
@@ -23,57 +23,57 @@ fn vector_or<'de, D: Deserializer<'de>>(from: D, otherwise: f64) -> Result<Vec<f
     Ok(limits.into_iter().map(|x| x.unwrap_or(otherwise)).collect())
 }
 
-/// Least values, −∞ where there is none.
+/// Lower limits; `null` stands for −∞.
 pub mod lower {
     use super::*;
 
-    /// Writes nothing for what is not finite.
+    /// Writes non-finite values as `null`.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// Returns the errors of the serializer.
     pub fn serialize<S: Serializer>(limits: &[f64], to: S) -> Result<S::Ok, S::Error> {
         to.collect_seq(limits.iter().map(|x| x.is_finite().then_some(*x)))
     }
 
-    /// Reads −∞ for nothing.
+    /// Reads `null` as −∞.
     ///
     /// # Errors
-    /// Those of the deserializer.
+    /// Returns the errors of the deserializer.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
         vector_or(from, f64::NEG_INFINITY)
     }
 }
 
-/// Greatest values, ∞ where there is none.
+/// Upper limits; `null` stands for ∞.
 pub mod upper {
     pub use super::lower::serialize;
     use super::*;
 
-    /// Reads ∞ for nothing.
+    /// Reads `null` as ∞.
     ///
     /// # Errors
-    /// Those of the deserializer.
+    /// Returns the errors of the deserializer.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<f64>, D::Error> {
         vector_or(from, f64::INFINITY)
     }
 }
 
-/// A greatest value, ∞ if there is none.
+/// A single upper limit; `null` stands for ∞.
 pub mod greatest {
     use super::*;
 
-    /// Writes nothing for what is not finite.
+    /// Writes a non-finite value as `null`.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// Returns the errors of the serializer.
     pub fn serialize<S: Serializer>(limit: &f64, to: S) -> Result<S::Ok, S::Error> {
         limit.is_finite().then_some(*limit).serialize(to)
     }
 
-    /// Reads ∞ for nothing.
+    /// Reads `null` as ∞.
     ///
     /// # Errors
-    /// Those of the deserializer.
+    /// Returns the errors of the deserializer.
     pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
         Ok(Option::<f64>::deserialize(from)?.unwrap_or(f64::INFINITY))
     }

@@ -1,11 +1,12 @@
 //! Spatial algebra, generic over the scalar.
 //!
-//! [`Scalar`] is a number: `f64`, `f32`, a dual number of [num-dual](https://docs.rs/num-dual), several numbers side by side.
-//! [`Motion`] and [`Force`] are the two kinds of spatial vector, [`Inertia`] takes one to the other, and a pose
-//! [`Se3`] changes their coordinates. [`lie`] has rotations, exponentials, logarithms and their Jacobians.
+//! [`Scalar`] is the number type: `f64`, `f32`, a dual number of [num-dual](https://docs.rs/num-dual), or several
+//! numbers in SIMD lanes. [`Motion`] and [`Force`] are the two kinds of spatial vector. [`Inertia`] maps motions to
+//! forces, and a pose [`Se3`] changes their coordinates. [`lie`] has rotations, exponentials, logarithms and their
+//! Jacobians.
 //!
-//! Flattened to six numbers, motions and forces read linear first, angular second. `aXb` is the pose of frame b in
-//! frame a, and `aXb.act(x)` takes x from coordinates in b to coordinates in a.
+//! As six numbers, motions and forces have their linear part first and their angular part second. `aXb` is the pose of
+//! frame b in frame a, and `aXb.act(x)` maps x from coordinates in b to coordinates in a.
 //!
 //! ```
 //! use condyle_spatial::{Act, Force, Mat3, Motion, Se3, Vec3};
@@ -17,8 +18,10 @@
 //! ```
 //!
 //! # Features
-//! `std` (on by default): the processor is asked which vectors it has, and numbers of num-dual are scalars. Without it the crate
-//! needs `alloc` and, for the functions of floats, the feature `libm`. `serde` (on by default): all that a file may have.
+//! `std` (on by default): SIMD instructions are detected at run time, and num-dual's numbers are scalars. Without it,
+//! the crate needs `alloc` and the feature `libm` for floating-point functions.
+//!
+//! `serde` (on by default): serialization of all types that are stored in files.
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
 

@@ -1,7 +1,8 @@
-//! What workspaces keep their numbers in: arrays and matrices whose layout does not depend on the name of the scalar.
+//! Storage of workspaces: arrays and matrices whose memory layout is the same for `f64` and for `Fused`.
 //!
-//! The standard library and nalgebra do not promise that a `Vec<f64>` and a `Vec<Fused>` have their words in one order, so a
-//! workspace that held some could not be read under the other name ([`Alike`](crate::simd::alike::Alike)). These are `repr(C)`.
+//! The standard library and nalgebra do not guarantee that `Vec<f64>` and `Vec<Fused>` have the same layout. A
+//! workspace that contains them could not be reinterpreted ([`Alike`](crate::simd::alike::Alike)). The types here are
+//! `repr(C)`.
 #![allow(unsafe_code)]
 
 use crate::alike;
@@ -16,8 +17,7 @@ use core::ops::{Deref, DerefMut};
 use core::ptr::NonNull;
 use nalgebra::{Dyn, IsContiguous, Owned, RawStorage, RawStorageMut, Storage, U1, VecStorage};
 
-/// An array of a fixed length on the heap: a boxed slice whose layout is that of two words, pointer and length, whatever it
-/// holds.
+/// Array of fixed length on the heap: a boxed slice, stored as pointer and length in this order for every `T`.
 #[repr(C)]
 pub struct Array<T> {
     start: NonNull<T>,
@@ -31,11 +31,11 @@ unsafe impl<T: Send> Send for Array<T> {}
 unsafe impl<T: Sync> Sync for Array<T> {}
 
 impl<T> Array<T> {
-    /// The boxed slice that this is made of.
+    /// Converts the array back into the boxed slice it was created from.
     #[inline]
     fn into_boxed_slice(self) -> Box<[T]> {
         let this = ManuallyDrop::new(self);
-        // SAFETY: pointer and length are those of a boxed slice (`From<Vec<T>>`), which `this` will not drop.
+        // SAFETY: pointer and length come from a boxed slice (`From<Vec<T>>`), which `this` will not drop.
         unsafe { Box::from_raw(core::ptr::slice_from_raw_parts_mut(this.start.as_ptr(), this.len)) }
     }
 }
@@ -43,7 +43,7 @@ impl<T> Array<T> {
 impl<T> Drop for Array<T> {
     #[inline]
     fn drop(&mut self) {
-        // SAFETY: pointer and length are those of a boxed slice, which is dropped here alone.
+        // SAFETY: pointer and length come from a boxed slice, which is dropped only here.
         drop(unsafe { Box::from_raw(core::ptr::slice_from_raw_parts_mut(self.start.as_ptr(), self.len)) });
     }
 }
@@ -52,7 +52,7 @@ impl<T> Deref for Array<T> {
     type Target = [T];
     #[inline(always)]
     fn deref(&self) -> &[T] {
-        // SAFETY: pointer and length are those of a slice that `self` owns.
+        // SAFETY: pointer and length describe a slice that `self` owns.
         unsafe { core::slice::from_raw_parts(self.start.as_ptr(), self.len) }
     }
 }
@@ -60,7 +60,7 @@ impl<T> Deref for Array<T> {
 impl<T> DerefMut for Array<T> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut [T] {
-        // SAFETY: as for `deref`, and `self` is borrowed alone.
+        // SAFETY: as for `deref`, and `self` is borrowed exclusively.
         unsafe { core::slice::from_raw_parts_mut(self.start.as_ptr(), self.len) }
     }
 }
@@ -88,7 +88,7 @@ impl<T> FromIterator<T> for Array<T> {
 }
 
 impl<T> Default for Array<T> {
-    /// The empty array.
+    /// Returns the empty array.
     #[inline]
     fn default() -> Self {
         Vec::new().into()
@@ -133,8 +133,8 @@ impl<'a, T> IntoIterator for &'a mut Array<T> {
     }
 }
 
-// SAFETY: it is `repr(C)`, of a thin pointer, a number and nothing. Who drops it as an array of B drops entries that are alike,
-// from memory of the same layout.
+// SAFETY: the struct is `repr(C)` and consists of a thin pointer, a number and a zero-sized field. Dropping it as an
+// array of B drops entries that are alike, and frees memory of the same layout.
 #[doc(hidden)]
 unsafe impl<A: Alike<B>, B> Alike<Array<B>> for Array<A> {}
 
@@ -147,9 +147,9 @@ impl<A: Alike<B>, B> Rename<Array<B>> for Array<A> {
     }
 }
 
-/// A matrix that a workspace keeps, and that calls give out: one of nalgebra's, by columns, over an [`Array`].
+/// Matrix in a workspace or in a result: nalgebra's matrix type, column-major, over an [`Array`].
 ///
-/// It indexes, multiplies, compares and is viewed as a `DMatrix` is; `clone_owned` copies it into one.
+/// It is indexed, multiplied, compared and viewed like a `DMatrix`. `clone_owned` copies it into a `DMatrix`.
 ///
 /// ```
 /// use condyle_spatial::{Matrix, matrix};
@@ -162,9 +162,9 @@ impl<A: Alike<B>, B> Rename<Array<B>> for Array<A> {
 /// ```
 pub type Matrix<T> = nalgebra::Matrix<T, Dyn, Dyn, MatrixStorage<T>>;
 
-/// A matrix whose numbers stand by columns without gaps: a [`Matrix`] or one of nalgebra's own, a `DMatrix`.
+/// Matrix whose entries are stored column by column without gaps: a [`Matrix`] or nalgebra's `DMatrix`.
 ///
-/// A view is none, because there may be gaps between its rows or columns. It does not compile where such a matrix is expected:
+/// A view does not qualify, because there may be gaps between its rows or columns. Passing one does not compile:
 ///
 /// ```compile_fail,E0277
 /// use condyle_spatial::{Dense, DenseMatrix};
@@ -177,7 +177,7 @@ pub type Matrix<T> = nalgebra::Matrix<T, Dyn, Dyn, MatrixStorage<T>>;
 /// ```
 pub type DenseMatrix<T, Storage> = nalgebra::Matrix<T, Dyn, Dyn, Storage>;
 
-/// The storage of a [`DenseMatrix`].
+/// Storage of a [`DenseMatrix`].
 pub trait Dense<T>: RawStorageMut<T, Dyn, Dyn> + IsContiguous {}
 impl<T, Storage: RawStorageMut<T, Dyn, Dyn> + IsContiguous> Dense<T> for Storage {}
 
@@ -193,11 +193,11 @@ pub fn matrix<T: nalgebra::Scalar>(rows: usize, columns: usize, entry: T) -> Mat
     Matrix::from_data(MatrixStorage { numbers, rows: Dyn(rows), columns: Dyn(columns) })
 }
 
-/// What a [`Matrix`] keeps its numbers in.
+/// Storage of a [`Matrix`].
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct MatrixStorage<T> {
-    /// By columns. Shape: rows · columns, which nothing changes.
+    /// Entries, column by column. Length: rows · columns, which never changes.
     numbers: Array<T>,
     rows: Dyn,
     columns: Dyn,
@@ -205,7 +205,7 @@ pub struct MatrixStorage<T> {
 
 alike!(MatrixStorage { numbers } same { rows, columns });
 
-// SAFETY: nalgebra's matrix is `repr(C)`, of a storage and nothing else, as is looked at below.
+// SAFETY: nalgebra's matrix is `repr(C)` and contains only its storage, as the assertions below check.
 #[doc(hidden)]
 unsafe impl Alike<Matrix<Fused>> for Matrix<f64> {}
 
@@ -223,7 +223,7 @@ const _: () = {
     assert!(size_of::<Matrix<Fused>>() == size_of::<MatrixStorage<Fused>>());
 };
 
-// SAFETY: there are rows · columns numbers, by columns, and no way to change how many.
+// SAFETY: there are rows · columns numbers, column by column, and their number cannot change.
 unsafe impl<T> RawStorage<T, Dyn, Dyn> for MatrixStorage<T> {
     type RStride = U1;
     type CStride = Dyn;
@@ -250,7 +250,7 @@ unsafe impl<T> RawStorage<T, Dyn, Dyn> for MatrixStorage<T> {
     }
 }
 
-// SAFETY: as above; the pointer is that of numbers which `self` owns.
+// SAFETY: as above; the pointer refers to numbers that `self` owns.
 unsafe impl<T> RawStorageMut<T, Dyn, Dyn> for MatrixStorage<T> {
     #[inline(always)]
     fn ptr_mut(&mut self) -> *mut T {
@@ -262,7 +262,7 @@ unsafe impl<T> RawStorageMut<T, Dyn, Dyn> for MatrixStorage<T> {
     }
 }
 
-// SAFETY: all numbers are initialised, and copies have as many.
+// SAFETY: all numbers are initialised, and copies have the same length.
 unsafe impl<T: nalgebra::Scalar> Storage<T, Dyn, Dyn> for MatrixStorage<T> {
     #[inline]
     fn into_owned(self) -> Owned<T, Dyn, Dyn> {
@@ -275,10 +275,10 @@ unsafe impl<T: nalgebra::Scalar> Storage<T, Dyn, Dyn> for MatrixStorage<T> {
     #[inline]
     fn forget_elements(self) {
         let mut numbers = Vec::from(self.numbers);
-        // SAFETY: an empty vector has no entries that would have to be there.
+        // SAFETY: length 0 requires no initialised entries.
         unsafe { numbers.set_len(0) };
     }
 }
 
-// SAFETY: entries are numbered by columns, without gaps.
+// SAFETY: entries are stored column by column, without gaps.
 unsafe impl<T> IsContiguous for MatrixStorage<T> {}

@@ -1,4 +1,4 @@
-//! Motions, forces, poses and inertias: the identities of spatial algebra, on random ones.
+//! Identities of spatial algebra on random motions, forces, poses and inertias.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,7 +7,7 @@ use common::{config, distance, flat, force, inertia, motion, pose, rotation, vec
 use condyle_spatial::{Act, ArticulatedInertia, Cross, Force, Inertia, Motion, Se3, Sym3, Vec3};
 use proptest::prelude::*;
 
-/// Numbers are at most some hundreds (inertias some hundreds too), and a handful of operations round each.
+/// Rounding error of a few operations on numbers of at most some hundreds.
 const ROUNDING: f64 = 1e-12;
 
 fn unit(k: usize) -> Motion<f64> {
@@ -70,20 +70,20 @@ proptest! {
     fn inertia_is_symmetric_and_positive(I in inertia(), u in motion(), v in motion()) {
         prop_assert!((u.dot(I * v) - v.dot(I * u)).abs() < ROUNDING);
         prop_assert!(v.dot(I * v) > 0.0);
-        // no power in turning: v · (v ×* I v) = 0
+        // a rotation produces no power: v · (v ×* I v) = 0
         prop_assert!(v.dot(v.cross(I * v)).abs() < 10.0 * ROUNDING);
     }
 
     #[test]
     fn gyroscopic_torque(c in vec3(), mass in 0.1..2.0, w in vec3(), d in prop::array::uniform3(0.1..2.0)) {
-        // about the centre of mass of a body that turns there: n = ω × J ω, no force
+        // about the centre of mass, for a body that rotates about it: n = ω × J ω, no force
         let J = Sym3 { xx: d[0], yy: d[1], zz: d[2], ..Sym3::zero() };
         let at_com = Inertia::from_com(mass, Vec3::zero(), J);
         let v = Motion::new(Vec3::zero(), w);
         let f = v.cross(at_com * v);
         prop_assert!(distance(f.linear.to_array(), [0.0; 3]) < ROUNDING);
         prop_assert!(distance(f.angular.to_array(), w.cross(J * w).to_array()) < ROUNDING);
-        // about a point away from it: the centripetal force m ω × (ω × c), at c
+        // about another point: the centripetal force m ω × (ω × c), which acts at c
         let away = Inertia::from_com(mass, c, J);
         let f = v.cross(away * v);
         let pull = w.cross(w.cross(c)).scale(mass);
@@ -93,7 +93,7 @@ proptest! {
 
     #[test]
     fn inertia_is_a_sum_of_points(points in prop::collection::vec((0.1..2.0, vec3()), 3), v in motion()) {
-        // the momentum of a point at c: m (v + ω × c), with its moment about the origin
+        // momentum of a point at c: m (v + ω × c), with its moment about the origin
         let mut I = Inertia::zero();
         let mut momentum = Force::zero();
         for (m, c) in points {
@@ -109,7 +109,7 @@ proptest! {
         let IA = ArticulatedInertia::from(I);
         prop_assert!(distance((IA * v).to_array(), (I * v).to_array()) < 10.0 * ROUNDING);
         let U = IA * s;
-        let eliminated = IA.minus_outer(U, 1.0 / s.dot(U)); // free along s: no force resists there
+        let eliminated = IA.minus_outer(U, 1.0 / s.dot(U)); // no force acts along s, so the body moves freely there
         prop_assert!(distance((eliminated * s).to_array(), [0.0; 6]) < 100.0 * ROUNDING);
         for k in 0..6 {
             let expected = (IA * unit(k)).to_array()[k] - U.to_array()[k] * U.to_array()[k] / s.dot(U);
@@ -123,7 +123,7 @@ proptest! {
         let U = IA * s;
         let Ia = IA.minus_outer(U, 1.0 / s.dot(U));
         let there = X.act(Ia);
-        // X (Iᴬ v) = (X Iᴬ X⁻¹) (X v), and back again
+        // X (Iᴬ v) = (X Iᴬ X⁻¹) (X v), and the inverse transformation
         prop_assert!(distance((there * X.act(v)).to_array(), X.act(Ia * v).to_array()) < 1000.0 * ROUNDING);
         prop_assert!(distance((X.act_inv(there) * v).to_array(), (Ia * v).to_array()) < 1000.0 * ROUNDING);
     }

@@ -1,11 +1,11 @@
-//! Dual numbers of lanes, and functions that are computed from others, beside those of num-dual.
+//! Dual numbers over lanes, and tanh and exp on dual numbers, compared with num-dual.
 
 use condyle_spatial::Scalar;
 use condyle_spatial::elementary::{exp, tanh};
 use condyle_spatial::lane_dual::LaneDual;
 use num_dual::{Dual64, DualNum};
 
-/// A few roundings.
+/// A few rounding errors.
 const ROUNDING: f64 = 2e-15;
 
 fn all<S: Scalar>(x: S, y: S) -> Vec<S> {
@@ -23,7 +23,7 @@ fn all<S: Scalar>(x: S, y: S) -> Vec<S> {
 }
 
 #[test]
-fn the_rules_are_those_of_dual_numbers() {
+fn lane_duals_agree_with_num_dual() {
     for (x, y) in [(0.7, 1.9), (-0.7, 1.9), (1.9, -0.7), (-3.0, -0.1)] {
         for (dx, dy) in [(0.3, -0.4), (1.0, 0.0), (0.0, 1.0)] {
             let mine = all(LaneDual { re: x, eps: dx }, LaneDual { re: y, eps: dy });
@@ -36,9 +36,9 @@ fn the_rules_are_those_of_dual_numbers() {
     }
 }
 
-/// The exponential has as many roundings more as its argument is large.
+/// The error bound of exp grows with the magnitude of its argument.
 #[test]
-fn as_the_library_computes_them() {
+fn tanh_and_exp_agree_with_the_library() {
     for k in -4000..=4000 {
         let x = f64::from(k) * 0.01;
         let (found, expected) = (tanh(Dual64::new(x, 1.0)), Dual64::new(x, 1.0).tanh());

@@ -1,15 +1,15 @@
-//! The environment variable that chooses the level of vector instructions.
+//! Environment variable that selects the SIMD level.
 
 use condyle_spatial::level::{Level, level};
 use std::process::Command;
 
-/// A program that uses vectors; `refused_levels` runs it.
+/// Program that uses vectors; `refused_levels` runs it.
 #[test]
 fn program() {
     println!("level {}, then {}", level(), level());
 }
 
-/// What the program prints and complains of with this value of the variable.
+/// Returns what the program writes to standard output and standard error with this value of the variable.
 fn run(value: &str) -> [String; 2] {
     let mut program = Command::new(std::env::current_exe().unwrap());
     let output = program.args(["--exact", "program", "--nocapture"]).env("CONDYLE_LEVEL", value).output().unwrap();
@@ -17,7 +17,7 @@ fn run(value: &str) -> [String; 2] {
     [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap())
 }
 
-/// A value that cannot be obeyed is reported once, and the best level is used.
+/// An invalid value is reported once, and the best level is used.
 #[test]
 fn refused_levels() {
     let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap();

@@ -1,4 +1,5 @@
-//! Rotations and rigid motions: exponentials against logarithms and matrix exponentials, Jacobians against dual numbers.
+//! Rotations and rigid motions: exponentials against logarithms and matrix exponentials, Jacobians against dual
+//! numbers.
 #![allow(non_snake_case)]
 
 mod common;
@@ -11,16 +12,16 @@ use nalgebra::{Matrix3, Matrix4, Vector3};
 use num_dual::{Dual, Dual64};
 use proptest::prelude::*;
 
-/// A dozen operations on numbers of size 1 to 4.
+/// Rounding error of a dozen operations on numbers between 1 and 4.
 const ROUNDING: f64 = 2e-14;
-/// nalgebra's matrix exponential scales and squares: its error, not ours, is the larger.
+/// Rounding error of nalgebra's matrix exponential, which scales and squares; it is larger than ours.
 const MATRIX_EXPONENTIAL: f64 = 1e-12;
 
 fn four(q: Quaternion<f64>) -> [f64; 4] {
     [q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// The numbers x + ε d.
+/// Returns the numbers x + ε d.
 fn dual(x: Vec3<f64>, d: Vec3<f64>) -> Vec3<Dual64> {
     let (x, d) = (x.to_array(), d.to_array());
     core::array::from_fn(|k| Dual64::new(x[k], d[k])).into()
@@ -50,7 +51,7 @@ proptest! {
         prop_assert!(distance(lie::log3(lie::exp3(w)).to_array(), w.to_array()) < ROUNDING);
     }
 
-    /// Beyond π the shortest way round has the opposite sense.
+    /// Beyond π, the shortest rotation has the opposite sense.
     #[test]
     fn log3_is_the_shortest(n in axis(), angle in PI + 1e-9..TAU) {
         let w = lie::log3(lie::exp3(n.scale(angle)));
@@ -61,7 +62,7 @@ proptest! {
     fn exp3_undoes_log3(q in (vec3(), -2.0..2.0).prop_filter("a direction", |(v, _)| v.norm_squared() > 1e-6)) {
         let q = Quaternion { vector: q.0, scalar: q.1 }.normalize();
         let back = lie::exp3(lie::log3(q));
-        let sign = if q.scalar < 0.0 { -1.0 } else { 1.0 }; // q and −q are one rotation
+        let sign = if q.scalar < 0.0 { -1.0 } else { 1.0 }; // q and −q are the same rotation
         prop_assert!(distance(four(back), four(q).map(|x| sign * x)) < ROUNDING);
     }
 
@@ -180,7 +181,7 @@ proptest! {
         prop_assert!(distance(four(a * a.conjugate()), four(Quaternion::identity())) < ROUNDING);
     }
 
-    /// Of half turns too, where a rotation's matrix is symmetric and iterations stand still.
+    /// Includes half turns, whose rotation matrix is symmetric, so that iterative methods stall.
     #[test]
     fn nalgebra_isometry(X in pose(), x in vec3()) {
         let peer = nalgebra::Isometry3::from(X);
@@ -192,7 +193,7 @@ proptest! {
     }
 }
 
-/// By half a turn, where either sense is right.
+/// For half turns, either sign of the rotation vector is correct.
 #[test]
 fn log3_of_half_turns() {
     for w in [[PI, 0.0, 0.0], [0.0, -PI, 0.0], [0.0, 0.6 * PI, 0.8 * PI], [PI / 3.0, -2.0 * PI / 3.0, 2.0 * PI / 3.0]] {
@@ -201,7 +202,7 @@ fn log3_of_half_turns() {
     }
 }
 
-/// At the removable singularity itself the second derivatives are there too: ∂(J_exp d)/∂w along e is −½ e × d.
+/// Second derivatives are correct at the removable singularity: ∂(J_exp d)/∂w along e is −½ e × d.
 #[test]
 fn second_derivatives_at_zero() {
     type Second = Dual<Dual64>;
@@ -218,7 +219,7 @@ fn second_derivatives_at_zero() {
     assert!(distance(back.map(|x| x.eps.eps), [0.0; 3]) < ROUNDING);
 }
 
-/// cₖ(n/64) to 2⁻⁹⁰, by its series in whole numbers.
+/// Returns cₖ(n/64) with an error of 2⁻⁹⁰, from its series in integer arithmetic.
 fn stumpff_exactly(k: u32, n: i128) -> f64 {
     const ONE: i128 = 1 << 100;
     let mut term = ONE / (1..=i128::from(k)).product::<i128>();
@@ -231,8 +232,8 @@ fn stumpff_exactly(k: u32, n: i128) -> f64 {
     sum as f64 / ONE as f64
 }
 
-/// Full precision relative to cₖ(0) = 1/k!; above the switch at 1 the recurrence adds the rounding of sine and cosine
-/// to it twice, unscaled.
+/// Below 1, the error is the rounding error relative to cₖ. Above 1, the recurrence adds the rounding errors of sine
+/// and cosine twice, relative to 1.
 #[test]
 fn stumpff_functions() {
     const ABSOLUTE: f64 = 4.0 * f64::EPSILON;
@@ -257,7 +258,7 @@ fn stumpff_functions() {
 fn stumpff_is_continuous_at_the_switch() {
     let (below, above) = (lie::stumpff(1f64.next_down()), lie::stumpff(1.0));
     assert!(distance(below, above) < 4.0 * f64::EPSILON);
-    // and so are its derivatives: c_k' = (k c_{k+2} − c_{k+1}) / 2
+    // so are its derivatives: c_k' = (k c_{k+2} − c_{k+1}) / 2
     for t in [1f64.next_down(), 1.0, 1e-300, 0.0, 9.0] {
         let c = lie::stumpff(Dual64::new(t, 1.0));
         for k in 0..4 {
@@ -268,7 +269,7 @@ fn stumpff_is_continuous_at_the_switch() {
     }
 }
 
-/// Lanes see the same branch for NaN as for large t, and nothing panics.
+/// For NaN, lanes take the same branch as for large t, and nothing panics.
 #[test]
 fn stumpff_of_nan_is_nan() {
     assert!(lie::stumpff(f64::NAN).iter().all(|c| c.is_nan()));

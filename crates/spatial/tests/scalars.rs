@@ -1,21 +1,21 @@
-//! One generic function on every kind of number: the same value, and the derivatives that it has.
+//! One generic function on every kind of number: its values and derivatives agree.
 #![allow(non_snake_case)]
 
 use condyle_spatial::{Constant, Scalar, Vec3, lie};
 use num_dual::{Dual, Dual2_64, Dual3_64, Dual64, DualSVec64, HyperDual64, HyperHyperDual64};
 
-/// Some tens of operations on numbers of size 1.
+/// Rounding error of some tens of operations on numbers of about 1, in double precision.
 const ROUNDING: f64 = 1e-14;
-/// The same in single precision.
+/// Rounding error of the same operations in single precision.
 const ROUNDING_F32: f64 = 1e-5;
-/// Central differences with a step of 1e-5 have errors of step² and rounding/step.
+/// Error of central differences with a step of 1e-5: step² and rounding/step.
 const DIFFERENCES: f64 = 1e-8;
-/// Central second differences with a step of 1e-4.
+/// Error of central second differences with a step of 1e-4.
 const SECOND_DIFFERENCES: f64 = 1e-6;
 
 const AT: [f64; 3] = [0.7, -0.4, 1.3];
 
-/// Every operation that a scalar has.
+/// Function that uses every operation of a scalar.
 fn everything<S: Scalar>(x: S, y: S, z: S) -> S {
     let (sin, cos) = (x * y).sin_cos();
     let smaller = S::select(S::and(x.lt(z), y.lt(z)), x * x, z * z * z);
@@ -30,7 +30,7 @@ fn f(x: [f64; 3]) -> f64 {
     everything(x[0], x[1], x[2])
 }
 
-/// The gradient and the matrix of second derivatives by central differences.
+/// Returns the gradient and the matrix of second derivatives by central differences.
 fn differences() -> ([f64; 3], [[f64; 3]; 3]) {
     let moved = |steps: &[(usize, f64)]| {
         let mut x = AT;
@@ -103,7 +103,7 @@ fn second_derivatives() {
     }
 }
 
-/// On every half axis and in every quadrant, with the derivatives ∂/∂y = x/r², ∂/∂x = −y/r².
+/// Checks every half axis and every quadrant, with the derivatives ∂/∂y = x/r², ∂/∂x = −y/r².
 #[test]
 fn atan2_of_duals() {
     for (y, x) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 2.0), (0.0, -2.0), (1.0, 2.0), (2.0, -1.0), (-2.0, -1.0), (-1.0, 2.0)]
@@ -125,7 +125,7 @@ fn atan2_of_duals() {
     }
 }
 
-/// A rotation there and back in single precision, at all angles.
+/// Rotates forward and back in single precision, at all angles.
 #[test]
 fn single_precision() {
     for k in 0..64 {

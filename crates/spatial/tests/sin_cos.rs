@@ -1,13 +1,13 @@
-//! Sine and cosine of `f64` and `f32`, which are our own, against those of the platform.
+//! Sine and cosine of `f64` and `f32` in this crate, compared with the platform's functions.
 
 use condyle_spatial::Scalar;
 
-/// Ours are within 2.3e-16, the platform's within half of the last place of a number below 1.
+/// Error bound: 2.3e-16 for this crate, and half a unit in the last place below 1 for the platform.
 const DOUBLE: f64 = 2.3e-16 + 0.6e-16;
-/// Some roundings of single precision.
+/// Some rounding errors of single precision.
 const SINGLE: f64 = 2e-7;
 
-/// Angles of all sizes, multiples of π/4 and their neighbours among them.
+/// Returns angles of all magnitudes, including multiples of π/4 and numbers next to them.
 fn angles(largest: f64) -> impl Iterator<Item = f64> {
     let steps = 400_000;
     let spread = (0..=steps).map(move |k| largest * (2.0 * f64::from(k) / f64::from(steps) - 1.0));
@@ -37,7 +37,7 @@ fn single_precision() {
     }
 }
 
-/// Beyond what the parts of π/2 suffice for, the platform's are taken.
+/// Larger angles, for which the parts of π/2 are not exact enough, use the platform's functions.
 #[test]
 fn beyond() {
     for x in [1e5_f64.next_up(), 1e9, -3e22, f64::MAX] {

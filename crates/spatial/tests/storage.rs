@@ -7,7 +7,7 @@ use condyle_spatial::{Array, Matrix, Motion, matrix};
 use nalgebra::{DMatrix, RawStorage, Storage, dmatrix};
 use std::rc::Rc;
 
-/// The entries have another owner each, so that it shows who has been dropped.
+/// Each entry has a different owner, so that its reference count shows whether it was dropped.
 #[test]
 fn arrays_drop_and_clone_each_entry_once() {
     let owners: Vec<Rc<usize>> = (0..5).map(Rc::new).collect();
@@ -24,7 +24,7 @@ fn arrays_drop_and_clone_each_entry_once() {
     assert!(owners.iter().all(|owner| Rc::strong_count(owner) == 1));
 }
 
-/// A vector with more room than entries gives back the rest.
+/// A vector with unused capacity is shrunk.
 #[test]
 fn arrays_take_vectors_with_room() {
     let mut entries = Vec::with_capacity(10);
@@ -53,7 +53,7 @@ fn arrays_hold_entries_without_size() {
     assert_eq!((units.len(), units.clone().len(), Vec::from(units).len()), (7, 7, 7));
 }
 
-/// Vectors of eight numbers stand at multiples of 64 bytes.
+/// Vectors of eight numbers are aligned to 64 bytes.
 #[test]
 fn arrays_align_their_entries() {
     #[derive(Clone, Debug, PartialEq)]
@@ -65,7 +65,7 @@ fn arrays_align_their_entries() {
     assert_eq!((array[2].0[7], copy), (2.0, array.clone()));
 
     struct Gate;
-    // SAFETY: vectors are filled where the processor has them.
+    // SAFETY: vectors are created only where the processor supports them.
     unsafe impl Witness for Gate {}
     type Long = gate::Long<Gate>;
     if !cfg!(target_arch = "x86_64") || Level::Avx512.is_supported() {
@@ -82,7 +82,7 @@ fn arrays_cross_threads() {
 }
 
 #[test]
-fn what_is_alike_is_read_and_written_under_both_names() {
+fn alike_types_are_reinterpreted() {
     let mut M: Matrix<f64> = matrix(2, 2, 3.0);
     let same: &mut Matrix<Fused> = Rename::renamed(&mut M);
     same[(1, 0)] = Fused(5.0);
@@ -132,7 +132,7 @@ fn matrices_may_be_empty() {
     }
 }
 
-/// Those of nalgebra's that take entries out one by one leave them to be dropped by whoever has taken them.
+/// Functions of nalgebra that move entries out one by one leave the dropping to their caller.
 #[test]
 fn matrices_forget_their_elements() {
     let owner = Rc::new(0);

@@ -1,17 +1,18 @@
-//! Time over knots, as a figure.
+//! Chart of computing time over the number of knots.
 
 use super::Report;
 use std::fmt::Write;
 
 const SIZE: (f64, f64) = (720.0, 420.0);
-/// Left, right, top and bottom of the axes.
+/// Left, right, top and bottom of the axes (px).
 const FRAME: [f64; 4] = [80.0, 520.0, 30.0, 360.0];
 const COLOURS: [&str; 5] = ["#30638e", "#00798c", "#2e933c", "#d1495b", "#8f2d56"];
 
-/// A curve: its name and its points (knots, p50, p99), times in seconds.
+/// Curve: name, and points (knots, p50, p99) with times in seconds.
 type Curve = (String, Vec<(usize, f64, f64)>);
 
-/// The times of all horizons on logarithmic axes: lines are p50, thin ones p99; the period is dashed.
+/// Draws the times of all horizons on logarithmic axes. Thick lines are p50, thin lines p99; the dashed line is the
+/// period.
 pub(super) fn svg(report: &Report) -> String {
     let curves = curves(report);
     let period = report.verdicts.first().and_then(|v| v.period_s);
@@ -37,7 +38,7 @@ pub(super) fn svg(report: &Report) -> String {
         escaped(&format!("{}: time of a horizon, {} cores", report.robot, report.cores))
     );
     let out = &mut svg;
-    // Writing to a string does not fail.
+    // Writing to a string cannot fail.
     for decade in low as i32..=high as i32 {
         let at = y(10f64.powi(decade));
         let _ = writeln!(out, "<path d=\"M{left} {at:.1}H{right}\" stroke=\"#ddd\"/>");
@@ -116,7 +117,7 @@ fn curves(report: &Report) -> Vec<Curve> {
     curves
 }
 
-/// 10ⁿ s in words.
+/// Formats 10ⁿ s with a unit.
 fn unit(decade: i32) -> String {
     let (power, unit) = match decade {
         ..-6 => (decade + 9, "ns"),

@@ -1,32 +1,32 @@
-//! Times of something that is repeated.
+//! Time measurements of repeated work.
 
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
-/// The half and all but a hundredth of the measured times are below these (s).
+/// Median (p50) and 99th percentile (p99) of the measured times (s).
 #[derive(Clone, Copy, Serialize)]
 pub(crate) struct Times {
     #[serde(rename = "p50_s")]
     pub p50: f64,
     #[serde(rename = "p99_s")]
     pub p99: f64,
-    /// How often it was measured; of fewer than a hundred times p99 is the longest.
+    /// Number of measurements. With fewer than a hundred, p99 is the longest time.
     pub samples: usize,
 }
 
-/// How often and how long something is measured.
+/// Limits of a measurement.
 #[derive(Clone, Copy)]
 pub(crate) struct Effort {
-    /// The most repetitions.
+    /// Maximum number of repetitions.
     pub repetitions: usize,
-    /// No repetition begins after this, but for the least number of them.
+    /// Time after which no repetition begins, except the first [`LEAST`] ones.
     pub time: Duration,
 }
 
-/// As few as tell a median from an outlier.
+/// Minimum number of repetitions: enough to tell a median from an outlier.
 const LEAST: usize = 5;
 
-/// Measures `f`, after one run that is not counted.
+/// Measures `f`, after one run that does not count.
 pub(crate) fn measure(effort: Effort, mut f: impl FnMut()) -> Times {
     f();
     timed(effort, || {
@@ -43,7 +43,7 @@ pub(crate) fn timed(effort: Effort, mut f: impl FnMut() -> Duration) -> Times {
         times.push(f().as_secs_f64());
     }
     times.sort_by(f64::total_cmp);
-    // the least time that so large a part of all of them does not exceed
+    // the smallest time that at least this part of all times does not exceed
     let quantile = |part: f64| times[((part * times.len() as f64).ceil() as usize).clamp(1, times.len()) - 1];
     Times { p50: quantile(0.5), p99: quantile(0.99), samples: times.len() }
 }

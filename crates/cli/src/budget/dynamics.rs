@@ -1,4 +1,4 @@
-//! What the algorithms cost for each knot: one call after the other, in the lanes of vectors, on several threads.
+//! Time of the algorithms per knot: with single calls, in SIMD lanes, and on several threads.
 
 use super::clock::{Effort, Times, measure};
 use crate::states::States;
@@ -7,20 +7,20 @@ use rayon::ThreadPool;
 use serde::Serialize;
 use std::hint::black_box;
 
-/// The times of a pass over a horizon, in the three ways to compute it.
+/// Times of a pass over a horizon, computed in three variants.
 #[derive(Serialize)]
 pub(crate) struct Row {
     pub name: &'static str,
     pub knots: usize,
-    /// One call a knot.
+    /// One call per knot.
     pub single: Times,
-    /// A batch on one thread: several knots in the lanes of vectors.
+    /// Batch on one thread: several knots in SIMD lanes.
     pub lanes: Times,
-    /// A batch on all threads; none where there is one.
+    /// Batch on all threads; `None` if there is only one thread.
     pub threads: Option<Times>,
 }
 
-/// What is timed.
+/// Work that is measured.
 #[derive(Clone, Copy)]
 enum Work {
     Rnea,
@@ -49,7 +49,7 @@ impl Work {
         }
     }
 
-    /// One state.
+    /// Computes one state.
     fn single(self, model: &Model, data: &mut Data<f64>, [q, v, a, tau]: [&[f64]; 4]) {
         match self {
             Self::Rnea => {
@@ -78,7 +78,7 @@ impl Work {
         }
     }
 
-    /// All states.
+    /// Computes all states.
     fn batch(self, model: &Model, batch: &mut Batch, [q, v, a, tau]: [&[f64]; 4]) {
         match self {
             Self::Rnea => {
@@ -108,7 +108,7 @@ impl Work {
     }
 }
 
-/// A robot with random states, and room to compute them.
+/// Robot with random states, and memory to compute them.
 pub(crate) struct Bench<'a> {
     model: &'a Model,
     states: States,
@@ -131,12 +131,12 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// ABA, its derivatives and RNEA at each knot.
+    /// Measures ABA, its derivatives and RNEA at each knot.
     pub(crate) fn horizon(&mut self, knots: usize) -> Row {
         self.row(Work::Horizon, knots)
     }
 
-    /// Each algorithm.
+    /// Measures each algorithm.
     pub(crate) fn algorithms(&mut self, knots: usize) -> Vec<Row> {
         Work::ALGORITHMS.into_iter().map(|work| self.row(work, knots)).collect()
     }

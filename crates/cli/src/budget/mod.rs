@@ -1,4 +1,4 @@
-//! `condyle budget`: whether a horizon fits into a period, for this robot, on this machine.
+//! `condyle budget`: measures whether a horizon fits into a period, for a robot on this machine.
 
 mod chart;
 mod clock;
@@ -19,7 +19,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Measure what horizons cost, for this robot and on this machine, and whether they fit into a period
+/// Measure the computing time of horizons for a robot on this machine, and whether they fit into a period
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   condyle budget quadruped
@@ -34,48 +34,48 @@ counts is p99, and the faster of one thread and all of them. In contact where co
 pub(crate) struct Arguments {
     #[command(flatten)]
     robot: RobotArguments,
-    /// Knots of the horizons
+    /// Horizon lengths to measure, in knots
     #[arg(long, value_delimiter = ',', value_name = "N,…", default_value = "20,60,100,200", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     knots: Vec<u32>,
-    /// Periods in a second into which iterations should fit (Hz)
+    /// Control rate (Hz); the iterations should fit into its period
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
     rate: Option<f64>,
-    /// Iterations that a period needs
+    /// Number of iterations per period
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     iterations: u32,
-    /// Threads to use. Default: as many as the machine has cores
+    /// Number of threads. Default: the number of cores
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1024))]
     cores: Option<u32>,
-    /// Frames whose origins touch the world: feet, a tool
+    /// Frames in point contact with the world: feet, a tool
     #[arg(long, value_delimiter = ',', value_name = "FRAME,…")]
     contacts: Vec<String>,
-    /// Frames that touch the world and do not turn: soles, a grip
+    /// Frames in rigid contact with the world, which do not rotate: soles, a gripper
     #[arg(long, value_delimiter = ',', value_name = "FRAME,…")]
     rigid_contacts: Vec<String>,
-    /// How often each thing is measured at most; each takes half a second at most, but is measured five times at least
+    /// Maximum repetitions of a measurement. It ends after half a second, but not before five repetitions
     #[arg(long, default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     repetitions: u32,
     /// Write JSON instead of text
     #[arg(long)]
     json: bool,
-    /// Also draw time over knots, as SVG
+    /// Also write a plot of time over knots to this SVG file
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
 
-/// How long one thing is measured at most.
+/// Maximum duration of a measurement.
 const TIME: Duration = Duration::from_millis(500);
-/// What joints without inertia get, so that forward dynamics can be timed (kg m², kg).
+/// Armature added to joints without inertia, so that forward dynamics can be measured (kg m², kg).
 const ARMATURE: f64 = 1e-2;
 
-/// All that was measured.
+/// All measurements.
 #[derive(Serialize)]
 struct Report {
     robot: String,
     nv: usize,
     level: String,
     cores: usize,
-    /// Joints that were given armature, as they move nothing with inertia.
+    /// Joints that were given armature because they move nothing with inertia.
     armature_added: Vec<String>,
     contacts: Vec<String>,
     horizons: Vec<dynamics::Row>,
@@ -84,19 +84,19 @@ struct Report {
     verdicts: Vec<Verdict>,
 }
 
-/// Whether iterations of a horizon fit, and what would.
+/// Result for a horizon: whether its iterations fit into the period, and what would fit.
 #[derive(Serialize)]
 struct Verdict {
     knots: usize,
     name: &'static str,
-    /// One iteration, p99 (s).
+    /// Time of one iteration, p99 (s).
     iteration_s: f64,
-    /// The rate at which the wanted iterations just fit (Hz).
+    /// Highest rate at which the required iterations still fit (Hz).
     highest_rate: f64,
-    /// The period (s), and with it the rest; none without `--rate`.
+    /// Period (s). It and the following fields are `None` without `--rate`.
     period_s: Option<f64>,
     iterations_per_period: Option<u64>,
-    /// The most knots, by a straight line through what was measured.
+    /// Maximum number of knots that fit, by linear regression of the measured times.
     largest_knots: Option<u64>,
     fits: Option<bool>,
 }
@@ -141,7 +141,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     let model = Arc::new(model.clone());
     let iterate = solver::Bench { q: limits::start(&model), model: model.clone(), contacts, pool: &pool, effort };
     let mut iterations = Vec::new();
-    // A line needs two points: half of the horizon as well, where there is only one.
+    // A line needs two points: for a single horizon, half of it is measured too.
     let half = (knots.len() == 1 && most > 1).then_some(most / 2);
     for in_contact in [false, true] {
         if !in_contact || !iterate.contacts.is_empty() {
@@ -187,12 +187,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     }
 }
 
-/// The number nearest to a wanted one.
+/// Returns the number that is nearest to `wanted`.
 fn nearest(numbers: &[usize], wanted: usize) -> usize {
     numbers.iter().copied().min_by_key(|n| n.abs_diff(wanted)).unwrap_or(wanted)
 }
 
-/// What an iteration of each horizon means for the period: in contact, if there are contacts.
+/// Returns the result for each horizon, with contacts if there are any.
 fn verdicts(iterations: &[solver::Row], knots: &[usize], arguments: &Arguments) -> Vec<Verdict> {
     let counted = iterations.last().map_or("free", |row| row.name);
     let rows: Vec<&solver::Row> = iterations.iter().filter(|row| row.name == counted).collect();
@@ -215,10 +215,10 @@ fn verdicts(iterations: &[solver::Row], knots: &[usize], arguments: &Arguments) 
     rows.iter().filter(|row| knots.contains(&row.knots)).map(verdict).collect()
 }
 
-/// The most knots of which an iteration takes no longer than `time`: by the line a + b N that is nearest to the measured
-/// times, each relative to itself.
+/// Returns the maximum number of knots whose iteration takes at most `time`. The line a + b N is fitted to the measured
+/// times with relative weights.
 fn largest(rows: &[&solver::Row], time: f64) -> u64 {
-    // Σ ((a + b N)/t − 1)² is least: normal equations with weights 1/t²
+    // minimize Σ ((a + b N)/t − 1)²: normal equations with weights 1/t²
     let (mut w, mut wn, mut wnn, mut wt, mut wnt) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for row in rows {
         let (n, t) = (row.knots as f64, row.best().p99);
@@ -231,7 +231,7 @@ fn largest(rows: &[&solver::Row], time: f64) -> u64 {
         true => ((wt * wnn - wnt * wn) / det, (w * wnt - wn * wt) / det),
         false => (0.0, wnt / wnn),
     };
-    // Noise may tilt the line: it never falls, and begins at 0 or above.
+    // Noise may tilt the line: it must not fall, and must begin at 0 or above.
     let (a, b) = if a < 0.0 || b <= 0.0 { (0.0, wnt / wnn) } else { (a, b) };
     ((time - a) / b).max(0.0) as u64
 }

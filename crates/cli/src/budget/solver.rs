@@ -1,4 +1,4 @@
-//! What an iteration of FDDP costs, as an MPC asks for it: from the last solution, with a new initial state.
+//! Time of an FDDP iteration as in MPC: started from the last solution, with a new initial state.
 
 use super::clock::{Effort, Times, timed};
 use crate::error::Error;
@@ -14,22 +14,22 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// The times of an iteration.
+/// Times of an iteration.
 #[derive(Serialize)]
 pub(crate) struct Row {
-    /// `free` or `in contact`.
+    /// Kind of horizon: `free` or `in contact`.
     pub name: &'static str,
     pub knots: usize,
-    /// On one thread.
+    /// Times on one thread.
     pub one: Times,
-    /// On all threads; none where there is one.
+    /// Times on all threads; `None` if there is only one thread.
     pub threads: Option<Times>,
-    /// Whether the solver could go on all the time.
+    /// Whether all solves remained finite.
     pub finite: bool,
 }
 
 impl Row {
-    /// The faster way, by p99.
+    /// Returns the faster variant, compared by p99.
     pub(crate) fn best(&self) -> Times {
         match self.threads {
             Some(threads) if threads.p99 < self.one.p99 => threads,
@@ -38,19 +38,19 @@ impl Row {
     }
 }
 
-/// The threads from which on a sweep in segments may be the faster one.
+/// Number of threads from which a sweep in segments may be faster.
 const SEGMENTS_FROM: usize = 4;
-/// Seconds from knot to knot.
+/// Time between knots (s).
 const DT: f64 = 0.01;
-/// How far a new initial state is from the last one (rad, m, and per s).
+/// Standard deviation of the change of the initial state (rad, m, and per s).
 const DISTURBANCE: f64 = 1e-3;
-/// How fast a contact's slip decays (1/s).
+/// Decay rate of a contact's slip (1/s).
 const HOLD: f64 = 40.0;
-/// μ where contacts say the same thing twice (1/kg).
+/// Damping μ for redundant contacts (1/kg).
 const DAMPING: f64 = 1e-6;
 const FRICTION: f64 = 0.7;
 
-/// What is timed: the robot, its posture, its contacts.
+/// Robot, posture and contacts whose iterations are measured.
 pub(crate) struct Bench<'a> {
     pub model: Arc<Model>,
     pub q: Vec<f64>,
@@ -60,7 +60,7 @@ pub(crate) struct Bench<'a> {
 }
 
 impl Bench<'_> {
-    /// An iteration of a horizon of so many knots.
+    /// Measures an iteration of a horizon with the given number of knots.
     pub(crate) fn iteration(&self, knots: usize, in_contact: bool) -> Result<Row, Error> {
         let cores = self.pool.current_num_threads();
         let mut damping = 0.0;
@@ -71,7 +71,7 @@ impl Bench<'_> {
         }
         let (one, finite) = one?;
         let mut threads: Option<Times> = None;
-        let segments = [(2, 1), (SEGMENTS_FROM, cores)]; // a sweep beside the derivatives, or in segments
+        let segments = [(2, 1), (SEGMENTS_FROM, cores)]; // a sweep concurrent with the derivatives, or in segments
         for (_, segments) in segments.into_iter().filter(|(least, _)| cores >= *least) {
             let (times, _) = self.pool.install(|| self.times(knots, [cores, segments], in_contact, damping))?;
             threads = threads.filter(|best| best.p99 <= times.p99).or(Some(times));
@@ -89,7 +89,7 @@ impl Bench<'_> {
         let (mut problem, us) = self.problem(knots, in_contact, damping)?;
         let (x0, nq) = (problem.x0().to_vec(), self.model.nq());
         let mut solver = Fddp::new(&problem);
-        solver.settings.tolerance = 0.0; // it makes all iterations that it may
+        solver.settings.tolerance = 0.0; // so that it makes the maximum number of iterations
         (solver.settings.threads, solver.settings.segments) = (threads, segments);
         solver.settings.max_iterations = 3;
         solver.solve(&mut problem, &x0.repeat(knots + 1), &us)?;
@@ -111,7 +111,8 @@ impl Bench<'_> {
         failed.map_or(Ok((times, finite)), |error| Err(error.into()))
     }
 
-    /// Stay where you are, with little effort; in contact, do not slip.
+    /// Returns the problem of holding the posture with little effort, and in contact without slip; and initial
+    /// controls.
     fn problem(&self, knots: usize, in_contact: bool, damping: f64) -> Result<(Problem, Vec<f64>), Error> {
         let (model, nv) = (&self.model, self.model.nv());
         let x0 = [&self.q[..], &vec![0.0; nv]].concat();
@@ -144,7 +145,7 @@ impl Bench<'_> {
     }
 }
 
-/// The gains of a contact that is timed, and planned with.
+/// Returns the contact with the gains used for measurements and plans.
 pub(crate) fn held(constraint: condyle::ContactConstraint) -> condyle::ContactConstraint {
     condyle::ContactConstraint { kd: HOLD, reference: condyle::ReferenceFrame::LocalWorldAligned, ..constraint }
 }

@@ -1,19 +1,19 @@
-//! The report as text.
+//! Report of `condyle budget` as text.
 
 use super::clock::Times;
 use super::{Arguments, Report, dynamics, solver};
 use crate::terminal::{Style, Table, heading, styled};
 use std::fmt::Write;
 
-/// The columns of the bar that a period is.
+/// Width of the bar that represents a period, in characters.
 const BAR: usize = 40;
 
-/// p50 and p99 of a horizon, in µs.
+/// Formats p50 and p99 of a horizon, in µs.
 fn pair(times: Option<Times>) -> [String; 2] {
     times.map_or([String::new(), String::new()], |t| [format!("{:.1}", 1e6 * t.p50), format!("{:.1}", 1e6 * t.p99)])
 }
 
-/// p50 and p99 for each knot, in µs.
+/// Formats p50 and p99 per knot, in µs.
 fn per_knot(times: Option<Times>, knots: usize) -> [String; 2] {
     let each = |t: f64| format!("{:.3}", 1e6 * t / knots as f64);
     times.map_or([String::new(), String::new()], |t| [each(t.p50), each(t.p99)])
@@ -59,7 +59,7 @@ impl Report {
         table.text()
     }
 
-    /// What fits, as words and as bars.
+    /// Returns what fits, as text with bars.
     fn verdict(&self, arguments: &Arguments) -> String {
         let Some(first) = self.verdicts.first() else { return String::new() };
         let mut text = heading(&match first.period_s {
@@ -69,7 +69,7 @@ impl Report {
         let out = &mut text;
         for v in &self.verdicts {
             let time = f64::from(arguments.iterations) * v.iteration_s;
-            // Writing to a string does not fail.
+            // Writing to a string cannot fail.
             let _ = match v.period_s {
                 None => writeln!(out, "  {:>6} knots  {:9.3} ms  {:9.0} Hz", v.knots, 1e3 * time, v.highest_rate),
                 Some(period) => {
@@ -82,7 +82,7 @@ impl Report {
                     };
                     writeln!(
                         out,
-                        "  {:>6} knots  {} {:6.1} %  {}  {} iterations a period, up to {:.0} Hz",
+                        "  {:>6} knots  {} {:6.1} %  {}  {} iterations per period, up to {:.0} Hz",
                         v.knots,
                         styled(style, &bar),
                         100.0 * share,
@@ -118,7 +118,7 @@ fn iterations(rows: &[solver::Row]) -> String {
     for row in rows {
         let [one, threads] = [Some(row.one), row.threads].map(pair);
         let each = format!("{:.2}", 1e6 * row.best().p50 / row.knots as f64);
-        let note = if row.finite { String::new() } else { "not finite: times of steps that failed".to_owned() };
+        let note = if row.finite { String::new() } else { "not finite: times of failed steps".to_owned() };
         let head = vec![row.name.to_owned(), row.knots.to_string()];
         table.row([head, one.into(), threads.into(), vec![each, note]].concat());
     }

@@ -1,7 +1,7 @@
-//! The derivatives of inverse and forward dynamics against dual numbers and against central differences.
+//! Checks of the derivatives of inverse and forward dynamics against dual numbers and central differences.
 //!
-//! Forward dynamics undo inverse ones, rnea(q, v, q̈(q, v, τ)) = τ, so their derivatives follow from those of RNEA at q̈: dual
-//! numbers are sent through RNEA alone.
+//! Forward dynamics is the inverse of RNEA: rnea(q, v, q̈(q, v, τ)) = τ. So its derivatives follow from the derivatives
+//! of RNEA at q̈, and dual numbers are needed only for RNEA.
 
 use super::identities::{SOLVES, inverted, spectrum};
 use super::ledger::Row;
@@ -10,32 +10,32 @@ use condyle::{Data, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_der
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Both are exact but for rounding.
+/// Bound if both sides are exact except for rounding.
 const ROUNDING: f64 = 1e-10;
-/// A central difference of step 1e-6.
+/// Bound for a central difference with step 1e-6.
 const DIFFERENCE: f64 = 1e-5;
-/// How much more than what steps of h and 2h differ by a difference may be off: a third of it if the step is too long, some
-/// of it if it is too short.
+/// Allowed error of a central difference, as a multiple of its change between steps h and 2h. The error is a third of
+/// this change if the step is too long, and a part of it if the step is too short.
 const UNCERTAIN: f64 = 10.0;
 const STEP: f64 = 1e-6;
 
-/// The variables.
+/// Variable of differentiation.
 #[derive(Clone, Copy)]
 enum By {
     Position,
     Velocity,
-    /// The third argument: accelerations of RNEA, efforts of ABA.
+    /// Third argument: accelerations of RNEA, efforts of ABA.
     Input,
 }
 
-/// RNEA or ABA.
+/// Function under test.
 #[derive(Clone, Copy)]
 enum Function {
     Rnea,
     Aba,
 }
 
-/// A state with its input.
+/// State with its input.
 type State<'a> = [&'a [f64]; 3];
 
 pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
@@ -45,7 +45,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
     };
     let make = |function| {
         let (exact, relations) = match function {
-            Function::Rnea => ("both exact but for rounding", ["analytical = dual numbers"; 3]),
+            Function::Rnea => ("both exact except for rounding", ["analytical = dual numbers"; 3]),
             Function::Aba => (
                 SOLVES,
                 [
@@ -55,7 +55,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
                 ],
             ),
         };
-        let steps = "a step of 1e-6, or what steps of h and 2h differ by";
+        let steps = "step 1e-6, or the difference between steps h and 2h";
         let names = names(function);
         let dual = core::array::from_fn(|i| Row::new(names[i], relations[i], exact));
         let difference = names.map(|name| Row::new(name, "analytical = central differences", steps));
@@ -115,7 +115,7 @@ fn analytical(function: Function, model: &Model, data: &mut Data<f64>, [q, v, x]
     }
 }
 
-/// Derivatives of RNEA, a column for each variable: the ε of rnea(q ⊕ ε δ, …).
+/// Returns derivatives of RNEA, one column per variable: the ε part of rnea(q ⊕ ε δ, …).
 fn by_duals(by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) -> DMatrix<f64> {
     let nv = model.nv();
     let mut J = DMatrix::zeros(nv, nv);
@@ -137,7 +137,7 @@ fn by_duals(by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) ->
     J
 }
 
-/// A column for each variable: (f(q ⊕ h δ, …) − f(q ⊖ h δ, …)) / 2h.
+/// Returns derivatives by differences, one column per variable: (f(q ⊕ h δ, …) − f(q ⊖ h δ, …)) / 2h.
 fn by_differences(
     function: Function,
     by: By,

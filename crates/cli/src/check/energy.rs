@@ -1,4 +1,4 @@
-//! What the integrators make of the energy of a robot that nothing drives and nothing brakes.
+//! Check of the integrators: energy of a robot without drive and friction.
 
 use super::ledger::Row;
 use crate::error::Error;
@@ -7,26 +7,28 @@ use crate::states::{normal, source};
 use condyle::simulation::{Integrator, Settings, Simulation};
 use condyle::{Data, Model, forward_velocities};
 
-/// The longest steps that are tried, one after the other (s): light links swing faster than a long step can follow.
+/// Step lengths that are tried in order (s), because light links swing faster than a long step can follow.
 const STEPS: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
-/// So many of them are made, and twice and four times as many of half and a quarter of the length.
+/// Number of steps. With half and a quarter of the step length, twice and four times as many steps are made.
 const COUNT: usize = 200;
-/// A drift below this is rounding and tells no order.
+/// Drift below which the error is rounding and its order cannot be measured.
 const ROUNDING: f64 = 1e-13;
-/// How fast it begins (rad/s, m/s).
+/// Initial speed (rad/s, m/s).
 const SPEED: f64 = 0.1;
 /// Name, integrator, bound and order.
 type Rule = (&'static str, Integrator, f64, f64);
 
-/// max |E(t) − E(0)|, relative to the greatest kinetic energy, that is allowed with the shortest step; and the order by
-/// which it may fall instead: light links swing faster than any step, and then only the order tells.
+/// Rules for each integrator. Either max |E(t) − E(0)|, relative to the largest kinetic energy, is within the bound at
+/// the shortest step; or the error falls at least with the given order. Light links may swing faster than any step, and
+/// then only the order is meaningful.
 const RULES: [Rule; 3] = [
     ("energy, RK4", Integrator::RungeKutta4, 1e-7, 3.0),
     ("energy, variational", Integrator::Variational, 1e-3, 1.5),
     ("energy, semi-implicit Euler", Integrator::SemiImplicitEuler, 1e-2, 0.7),
 ];
 
-/// A row for each integrator. Where limbs are so light that no step follows them, all joints get armature, and the row says so.
+/// Returns a row for each integrator. If limbs are too light for any step, all joints get armature, and the row notes
+/// it.
 pub(super) fn check(model: &Model, armature: f64) -> Result<Vec<Row>, Error> {
     let mut heavier = model.armature().to_vec();
     for body in model.bodies()[1..].iter().filter(|body| body.joint.nv() == 1) {
@@ -39,13 +41,13 @@ pub(super) fn check(model: &Model, armature: f64) -> Result<Vec<Row>, Error> {
             return own;
         }
         let mut other = measure(&heavier, rule);
-        other.note += &format!("; no step follows its light limbs: with {armature} kg m² on each joint");
+        other.note += &format!("; limbs too light for any step: {armature} kg m² of armature on each joint");
         if other.pass { other } else { own }
     };
     Ok(RULES.into_iter().map(row).collect())
 }
 
-/// The drift that an integrator makes of the longest steps that pass.
+/// Measures the drift of an integrator with the longest step length that passes.
 fn measure(model: &Model, (name, integrator, bound, order): Rule) -> Row {
     let q = limits::start(model);
     let v: Vec<f64> = normal(&mut source(3), model.nv()).into_iter().map(|x| SPEED * x).collect();
@@ -75,7 +77,7 @@ fn measure(model: &Model, (name, integrator, bound, order): Rule) -> Row {
     row
 }
 
-/// max |E(t) − E(0)| / max T; none where a step failed.
+/// Returns max |E(t) − E(0)| / max T; `None` if a step failed.
 fn drift(model: &Model, integrator: Integrator, dt: f64, count: usize, q: &[f64], v: &[f64]) -> Option<f64> {
     let mut data = Data::new(model);
     let mut energy = |q: &[f64], v: &[f64]| {

@@ -1,7 +1,7 @@
-//! Identities that hold at every state, whatever the robot.
+//! Identities that hold at every state of every robot.
 //!
-//! Errors are max |found − expected|, relative to 1 + the largest number that takes part. What contains M⁻¹ may be off by
-//! the condition number κ(M) times rounding, where that is more than the bound of the others.
+//! Errors are max |found − expected|, relative to 1 + the largest number involved. Results that contain M⁻¹ may have an
+//! error of the condition number κ(M) times rounding, if this exceeds the other bound.
 
 use super::ledger::Row;
 use crate::states::States;
@@ -20,47 +20,48 @@ use condyle::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Some hundreds of operations.
+/// Bound for some hundreds of operations.
 const ROUNDING: f64 = 1e-12;
-/// The same operations on the same numbers.
+/// Bound for the same operations on the same numbers.
 const EXACT: f64 = 1e-14;
-/// What a factor of M, or a sum of several algorithms, may add.
+/// Bound for results that use a factorization of M, or sums of several algorithms.
 const INVERTED: f64 = 1e-10;
-/// A central difference of step h = 1e-6: h² of the function, ε/h of rounding.
+/// Bound for a central difference with step h = 1e-6: error h² of the function, ε/h of rounding.
 const DIFFERENCE: f64 = 1e-6;
 const STEP: f64 = 1e-6;
-/// The part of a number that M⁻¹ may lose: three digits are left.
+/// Maximum relative error of M⁻¹: three digits are left.
 const LOST: f64 = 1e-3;
-/// Rounding errors of a solve, in units of ε κ(M).
+/// Rounding error of a solve, in units of ε κ(M).
 const ROUNDINGS: f64 = 100.0;
 
-/// Why a bound is what it is, in the words of the table.
+/// Reasons for the bounds, as shown in the table.
 const SAME: &str = "same operations";
 const SUMS: &str = "sums of some hundreds of terms";
-const PATHS: &str = "two ways to the same sums";
-pub(super) const SOLVES: &str = "100 ε κ(M), 1e-10 at least";
+const PATHS: &str = "two computations of the same sums";
+pub(super) const SOLVES: &str = "100 ε κ(M), at least 1e-10";
 const STEPS: &str = "central differences";
 const DIGITS: &str = "three digits of M⁻¹ are left";
 
-/// What M⁻¹ may be off by.
+/// Returns the allowed error of results that contain M⁻¹.
 pub(super) fn inverted(condition: f64) -> f64 {
     INVERTED.max(ROUNDINGS * f64::EPSILON * condition)
 }
 
-/// Least eigenvalue and condition number of M.
+/// Returns the smallest eigenvalue and the condition number of M.
 pub(super) fn spectrum(M: &Matrix<f64>) -> (f64, f64) {
     let values = M.clone().symmetric_eigenvalues();
     (values.min(), if values.min() > 0.0 { values.max() / values.min() } else { f64::INFINITY })
 }
 
-/// Whether the first body floats, and all others hang on it. A base with armature does not: it has a mass without weight.
+/// Returns whether the first body floats and carries all others. A base with armature does not count: armature is mass
+/// without weight.
 fn floats(model: &Model) -> bool {
     let bodies = model.bodies();
     let floats = bodies.len() > 1 && bodies[1].joint == Joint::FreeFlyer && bodies[2..].iter().all(|b| b.parent > 0);
     floats && model.armature()[..3] == [0.0; 3]
 }
 
-/// The identities of rigid-body dynamics, at so many random states.
+/// Checks the identities of rigid-body dynamics at `states` random states.
 pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
     let mut inverse = Row::new("RNEA, CRBA", "rnea(q, v, a) = M a + h", SUMS);
     let mut round = Row::new("RNEA of ABA", "rnea(q, v, aba(q, v, τ)) = τ", SOLVES);
@@ -113,7 +114,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         }
 
         let qdd = aba(model, &mut data, q, v, tau, &[]).to_vec();
-        // the numbers of which τ is the sum: |M| |q̈| + |h|
+        // upper bound of the terms whose sum is τ: |M| |q̈| + |h|
         let parts = largest((M.abs() * vector(&qdd).abs()).as_slice()) + largest(&h);
         round.compare(rnea(model, &mut data, q, v, &qdd, &[]), tau, parts, bound);
         let again = aba(model, &mut data, q, v, &tau_of_a, &[]);
@@ -182,12 +183,12 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
     rows.into_iter().filter(|row| row.cases > 0).collect()
 }
 
-/// The largest of some numbers.
+/// Returns the largest magnitude of the numbers.
 pub(super) fn largest(x: &[f64]) -> f64 {
     x.iter().fold(0.0, |most, x| most.max(x.abs()))
 }
 
-/// Ṁ along v: the ε of M(q ⊕ ε v).
+/// Returns Ṁ along v: the ε part of M(q ⊕ ε v).
 fn inertia_rate(model: &Model, q: &[f64], v: &[f64]) -> DMatrix<f64> {
     let q: Vec<Dual64> = q.iter().map(|&q| Dual64::from(q)).collect();
     let way: Vec<Dual64> = v.iter().map(|&v| Dual64::new(0.0, v)).collect();

@@ -1,24 +1,24 @@
-//! What a check has found: the worst case of each identity, beside what is allowed.
+//! Results of a check: the worst case of each identity, with its bound.
 
 use serde::Serialize;
 
-/// An identity, and the state in which it holds least.
+/// Identity, and the state with its largest error relative to the bound.
 #[derive(Serialize)]
 pub(crate) struct Row {
-    /// What is checked.
+    /// Name of the check.
     pub name: &'static str,
-    /// The equation.
+    /// Equation that is checked.
     pub equation: &'static str,
-    /// The measured error, relative as the equation's file says; null is not a number.
+    /// Measured relative error, as defined in the module of the equation; `null` if it is not a number.
     pub error: f64,
-    /// The most that is allowed there.
+    /// Allowed error in this state.
     pub bound: f64,
-    /// Why that much is.
+    /// Reason for the bound.
     pub because: &'static str,
-    /// How often it was looked at.
+    /// Number of checked cases.
     pub cases: usize,
     pub pass: bool,
-    /// What else there is to say.
+    /// Further remarks.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
 }
@@ -28,10 +28,10 @@ impl Row {
         Self { name, equation, because, error: 0.0, bound: 0.0, cases: 0, pass: true, note: String::new() }
     }
 
-    /// Counts a case; the one that uses most of what it is allowed is kept.
+    /// Counts a case, and keeps it if its error is the largest relative to its bound.
     pub(super) fn see(&mut self, error: f64, bound: f64) {
         let (now, before) = (error / bound, if self.cases == 0 { -1.0 } else { self.error / self.bound });
-        // an error that is not a number stays
+        // an error that is NaN is kept
         if !before.is_nan() && (now > before || now.is_nan()) {
             (self.error, self.bound) = (error, bound);
         }
@@ -39,10 +39,10 @@ impl Row {
         self.pass &= error <= bound;
     }
 
-    /// Compares lists of numbers: max |x − y| relative to 1 + max |y| and to `scale`.
+    /// Compares lists of numbers: max |x − y|, relative to the larger of 1 + max |y| and 1 + `scale`.
     pub(super) fn compare(&mut self, found: &[f64], expected: &[f64], scale: f64, bound: f64) {
         let largest = expected.iter().fold(1.0 + scale, |most: f64, y| most.max(1.0 + y.abs()));
-        // f64::max would lose what is not a number
+        // f64::max would discard NaN
         let error =
             found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, |a: f64, b| if a > b { a } else { b });
         let error = if found.iter().chain(expected).all(|x| x.is_finite()) { error / largest } else { f64::NAN };
@@ -59,14 +59,14 @@ mod tests {
         let mut row = Row::new("", "", "");
         row.compare(&[1.0, 2.0], &[1.0, 2.0 + 3e-12], 0.0, 1e-10);
         assert!(row.pass && row.error > 0.9e-12 && row.error < 1.1e-12);
-        row.see(1e-3, 1e-2); // uses more of what it is allowed
+        row.see(1e-3, 1e-2); // a larger part of its bound
         assert!(row.pass && row.error == 1e-3);
         row.see(2e-10, 1e-10);
         assert!(!row.pass && row.error == 2e-10 && row.cases == 3);
     }
 
     #[test]
-    fn what_is_no_number_fails_and_stays() {
+    fn nan_fails_and_stays() {
         let mut row = Row::new("", "", "");
         row.compare(&[f64::NAN, 1.0], &[0.0, 1.0], 0.0, 1e-10);
         row.compare(&[1.0], &[1.0], 0.0, 1e-10);

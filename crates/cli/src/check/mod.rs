@@ -1,4 +1,4 @@
-//! `condyle check`: whether the numbers of a robot are right, on this machine.
+//! `condyle check`: checks the numbers computed for a robot on this machine.
 
 mod derivatives;
 mod energy;
@@ -12,22 +12,22 @@ use crate::terminal::{Style, Table, heading, say, say_json, styled};
 use ledger::Row;
 use serde::Serialize;
 
-/// Check identities, derivatives and energies of a robot on random states, each against its bound
+/// Check identities, derivatives and energies of a robot at random states, each against an error bound
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   condyle check robot.urdf
   condyle check talos.urdf --root free --states 10000 --seed 7
   condyle check humanoid --json | jq '.rows[] | select(.pass | not)'
 
-Errors are relative to 1 + the largest number that takes part. What contains the inverse of the inertia matrix M may be
-off by 100 ε times the condition number of M, where that is more than its bound. The exit status is 1 if a check fails.")]
+Errors are relative to 1 + the largest number involved. If the inverse of the inertia matrix M is involved, an error of
+100 ε times the condition number of M is allowed where this exceeds the bound. The exit status is 1 if a check fails.")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     robot: RobotArguments,
-    /// Random states for identities; derivatives take a fiftieth, but five at least
+    /// Number of random states for identities; derivatives use a fiftieth of them, at least five
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     states: u32,
-    /// Which random states
+    /// Seed of the random states
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Write JSON instead of text
@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// What joints without inertia get, so that forward dynamics can be checked (kg m², kg).
+/// Armature added to joints without inertia, so that forward dynamics can be checked (kg m², kg).
 const ARMATURE: f64 = 1e-2;
 
 #[derive(Serialize)]
@@ -45,7 +45,7 @@ struct Report {
     nv: usize,
     states: u32,
     seed: u64,
-    /// Joints that were given armature, as they move nothing with inertia.
+    /// Joints that were given armature because they move nothing with inertia.
     armature_added: Vec<String>,
     pass: bool,
     rows: Vec<Row>,

@@ -1,4 +1,4 @@
-//! A mass ratio of 10⁶: heavy tips on light limbs, where forward dynamics loses most digits.
+//! Check with a mass ratio of 10⁶: heavy tips on light limbs, where forward dynamics loses most digits.
 
 use super::identities::{SOLVES, inverted, largest, spectrum};
 use super::ledger::Row;
@@ -8,11 +8,11 @@ use crate::states::States;
 use condyle::{Data, Inertia, Model, aba, crba, nonlinear_effects, regressors::inertial_parameters, rnea};
 use nalgebra::DVector;
 
-/// How many times a tip is heavier than the body that it sits on.
+/// Mass of a tip relative to the body that carries it.
 const RATIO: f64 = 1e6;
 
-/// ABA of the robot with heavy tips, against RNEA and against a solve with M; no rows where no body with mass carries
-/// another one.
+/// Checks ABA of the robot with heavy tips against RNEA, and against a solve with M. Returns no rows if no body with
+/// mass carries another one.
 pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> Result<Vec<Row>, Error> {
     let mut round = Row::new("mass ratio 10⁶", "rnea(q, v, aba(q, v, τ)) = τ", SOLVES);
     let mut forward = Row::new("mass ratio 10⁶", "aba(q, v, τ) = M⁻¹ (τ − h)", SOLVES);
@@ -46,12 +46,12 @@ pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> R
     Ok(vec![round, forward].into_iter().filter(|row| row.cases > 0).collect())
 }
 
-/// What each body's inertia is multiplied by: a body with mass at the end of a limb so that it is 10⁶ times as heavy as the
-/// next one with mass below it.
+/// Returns the factor for each body's inertia. A body with mass at the end of a limb becomes 10⁶ times as heavy as the
+/// next body with mass towards the root.
 fn factors(model: &Model) -> Vec<f64> {
     let bodies = model.bodies();
     let mut factors = vec![1.0; bodies.len()];
-    let mut carries = vec![false; bodies.len()]; // a body with mass
+    let mut carries = vec![false; bodies.len()]; // whether each body carries a body with mass
     for i in (1..bodies.len()).rev() {
         let (b, mut below) = (&bodies[i], bodies[i].parent);
         while below > 0 && bodies[below].inertia.mass == 0.0 {

@@ -1,17 +1,17 @@
-//! Threads that share work where there are none: the calling one does it all, with the same bits.
+//! Work sharing without the feature `threads`: the calling thread does all work, with the same bits.
 
-/// The number of threads that share work: one.
+/// Returns the number of threads that share work: one.
 pub fn threads() -> usize {
     1
 }
 
-/// Does two pieces of work, one after the other.
+/// Executes two closures, one after the other.
 pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     one();
     other();
 }
 
-/// Waits a little for another thread.
+/// Waits briefly for another thread.
 pub fn pause() {
     core::hint::spin_loop();
 }

@@ -1,51 +1,55 @@
-//! Parts of a horizon that go through stages, each in the hands of whichever thread comes first.
+//! Parts of a horizon that go through stages. Whichever thread comes first does a stage of a part.
 #![allow(unsafe_code)]
 
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-/// A part's state while a thread works on it: one more than when it waited for the stage, which is twice the stage's number.
+/// State of a part: 2·stage while it waits for the stage, and 2·stage + `AT_WORK` while a thread works on it.
 const AT_WORK: u8 = 1;
 
-/// Parts of two slices of equal length, cut in the same places. Each part goes through the stages 0, 1, … in turn, one thread
-/// at a time.
+/// Parts of two slices of equal length, split at the same indices. Each part goes through the stages 0, 1, … in turn;
+/// one thread at a time works on it.
 #[derive(Debug)]
 pub struct Parts<'a, A, B> {
     first: *mut A,
     second: *mut B,
-    /// Where each part begins, and the end of the last one.
+    /// Start index of each part, and the end of the last part.
     cuts: &'a [usize],
     states: &'a [AtomicU8],
-    /// Whether a thread has panicked at work.
+    /// Whether a thread has panicked during its work.
     abandoned: AtomicBool,
     marker: PhantomData<(&'a mut [A], &'a mut [B])>,
 }
 
-// SAFETY: a part is in the hands of one thread at a time.
+// SAFETY: only one thread at a time accesses a part.
 unsafe impl<A: Send, B: Send> Sync for Parts<'_, A, B> {}
 
 impl<'a, A, B> Parts<'a, A, B> {
-    /// The parts of two slices between the `cuts`, at stage 0. `states` is scratch, that grows where there were never so many.
+    /// Splits two slices at the indices `cuts`; all parts wait for stage 0. `states` is scratch memory, which grows if
+    /// it is too short.
     ///
     /// # Panics
     /// If the cuts do not ascend from 0 to the length of both slices.
     pub fn new(first: &'a mut [A], second: &'a mut [B], cuts: &'a [usize], states: &'a mut Vec<AtomicU8>) -> Self {
         let covers = cuts.first() == Some(&0) && cuts.last() == Some(&first.len());
-        assert!(covers && cuts.is_sorted() && first.len() == second.len(), "parts that are not those of the slices");
+        assert!(
+            covers && cuts.is_sorted() && first.len() == second.len(),
+            "cuts do not ascend from 0 to the length of both slices"
+        );
         states.clear();
         states.resize_with(cuts.len() - 1, || AtomicU8::new(0));
         let (first, second) = (first.as_mut_ptr(), second.as_mut_ptr());
         Self { first, second, cuts, states, abandoned: AtomicBool::new(false), marker: PhantomData }
     }
 
-    /// The number of parts.
+    /// Returns the number of parts.
     pub fn count(&self) -> usize {
         self.states.len()
     }
 
-    /// Does the work of a stage on a part if it has come to it and nobody does it; says whether it did. What a part of each
-    /// slice holds is the closure's, with the number of its first item.
+    /// Executes a stage on a part, if the part waits for this stage. Returns whether it did. The closure gets the index
+    /// of the part's first item and the part of each slice.
     pub fn work(&self, part: usize, stage: u8, work: impl FnOnce(usize, &mut [A], &mut [B])) -> bool {
         let (state, waiting) = (&self.states[part], 2 * stage);
         if state.compare_exchange(waiting, waiting + AT_WORK, Ordering::Acquire, Ordering::Relaxed).is_err() {
@@ -53,8 +57,8 @@ impl<'a, A, B> Parts<'a, A, B> {
         }
         let mut at_work = AtWork { abandoned: &self.abandoned, panics: true };
         let (start, end) = (self.cuts[part], self.cuts[part + 1]);
-        // SAFETY: the cuts ascend within both slices, and parts do not overlap. Nobody else has this one: of those that find
-        // it waiting one goes on, and it waits again when that thread has let it go.
+        // SAFETY: the cuts ascend within both slices, and parts do not overlap. No other thread has this part: of all
+        // threads that find it waiting, only one succeeds, and it waits again only after that thread has finished.
         let (first, second) = unsafe {
             let first = core::slice::from_raw_parts_mut(self.first.add(start), end - start);
             (first, core::slice::from_raw_parts_mut(self.second.add(start), end - start))
@@ -65,18 +69,18 @@ impl<'a, A, B> Parts<'a, A, B> {
         true
     }
 
-    /// Whether a part has yet to come to a stage, or waits for it.
+    /// Returns whether a stage of a part has yet to begin: the part waits for it, or an earlier stage is not finished.
     pub fn awaits(&self, part: usize, stage: u8) -> bool {
         self.states[part].load(Ordering::Relaxed) <= 2 * stage
     }
 
-    /// Whether a thread has panicked at work, so that its part stays where it is.
+    /// Returns whether a thread has panicked during its work, so that its part will not advance.
     pub fn is_abandoned(&self) -> bool {
         self.abandoned.load(Ordering::Relaxed)
     }
 }
 
-/// Tells the other threads if the work panics.
+/// Guard that informs the other threads if the work panics.
 struct AtWork<'a> {
     abandoned: &'a AtomicBool,
     panics: bool,

@@ -1,45 +1,45 @@
-//! Threads that share work: those of rayon, also in a process that was forked from one that had them.
+//! Work sharing with rayon's threads, also in a process that was forked from a process with such threads.
 //!
-//! A fork copies the memory of a process, but of its threads only the one that forks. A pool of threads that was started
-//! before is there in the child, and has nobody in it: who waits for it waits for ever. So each process shares work in a
-//! pool that it has started itself.
+//! fork() copies the memory of a process, but only one of its threads: the caller. The child has a copy of the parent's
+//! thread pool without its threads, and waiting for this pool never ends. So each process starts its own pool.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::error::Error;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// The process that works in rayon's global pool: the first one that asks for threads. 0 until then.
+/// Process that uses rayon's global pool: the first one that asks for threads. 0 before that.
 static FIRST: AtomicU32 = AtomicU32::new(0);
 
-/// The number of threads of the global pool; 1 if it could not be started.
+/// Number of threads of the global pool; 1 if the pool could not be started.
 static GLOBAL: OnceLock<usize> = OnceLock::new();
 
-/// The pool of the first process that was forked from `FIRST` and asked for threads.
+/// Pool of the first process that was forked from `FIRST` and asked for threads.
 static FORKED: OnceLock<Forked> = OnceLock::new();
 
-/// The pool of a forked process. It is never dropped, and read without a lock, which a thread might hold at a fork.
+/// Pool of a forked process. It is never dropped. It is read without a lock, because a thread might hold the lock
+/// during a fork.
 struct Forked {
     process: u32,
-    /// None if no thread could be started.
+    /// Thread pool; `None` if no thread could be started.
     pool: Option<ThreadPool>,
-    /// The pool of a process that was forked from this one.
+    /// Pool of a process that was forked from this one.
     next: OnceLock<Box<Forked>>,
 }
 
-/// Where work is shared.
+/// Thread pool in which work is shared.
 enum Pool {
-    /// The pool that the calling thread belongs to.
+    /// Pool to which the calling thread belongs.
     Current,
-    /// The global pool.
+    /// Global pool.
     Global,
-    /// The pool of a forked process.
+    /// Pool of a forked process.
     Forked(&'static ThreadPool),
-    /// Nowhere: no thread could be started.
+    /// No pool: no thread could be started.
     Missing,
 }
 
-/// The pool in which the calling thread shares work.
+/// Returns the pool in which the calling thread shares work.
 fn pool() -> Pool {
     if rayon::current_thread_index().is_some() {
         return Pool::Current;
@@ -56,7 +56,7 @@ fn pool() -> Pool {
     forked.pool.as_ref().map_or(Pool::Missing, Pool::Forked)
 }
 
-/// Starts the global pool, unless somebody has; returns the number of its threads.
+/// Starts the global pool unless it exists, and returns the number of its threads.
 fn start_global() -> usize {
     match ThreadPoolBuilder::new().build_global() {
         Err(error) if error.source().is_some() => 1, // the system refuses threads
@@ -65,15 +65,15 @@ fn start_global() -> usize {
 }
 
 impl Forked {
-    /// A pool for this process, of as many threads as the one that is lost.
+    /// Starts a pool for this process, with as many threads as the parent's pool.
     fn start(process: u32) -> Self {
-        let threads = GLOBAL.get().copied().unwrap_or(0); // 0: as many as there are processors
+        let threads = GLOBAL.get().copied().unwrap_or(0); // 0: one thread per processor
         Self { process, pool: ThreadPoolBuilder::new().num_threads(threads).build().ok(), next: OnceLock::new() }
     }
 }
 
-/// The number of threads that share work: those of the pool of rayon in which it is called, else of the global one, or in a
-/// forked process of one that takes its place.
+/// Returns the number of threads that share work. Inside a rayon pool, these are the threads of that pool; else of the
+/// global pool, or in a forked process of the pool that replaces it.
 pub fn threads() -> usize {
     match pool() {
         Pool::Current | Pool::Global => rayon::current_num_threads(),
@@ -82,7 +82,7 @@ pub fn threads() -> usize {
     }
 }
 
-/// Does two pieces of work, at the same time if one of the [`threads`] is free.
+/// Executes two closures, at the same time if one of the [`threads`] is free.
 pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     let (mut one, mut other) = (Some(one), Some(other));
     join_dyn(&mut || one.take().into_iter().for_each(|one| one()), &mut || {
@@ -90,8 +90,9 @@ pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
     });
 }
 
-/// [`join`], compiled once for all kinds of work: what rayon makes of each is some kilobytes. A thread that is not of the pool
-/// does its piece itself: to be woken takes a thread some 50 µs, and what a core has in its cache stays there.
+/// Executes [`join`] for all types of closures. It is compiled only once, because rayon's code for each type takes some
+/// kilobytes. A calling thread outside the pool runs its closure itself: waking another thread takes some 50 µs, and
+/// the data in this core's cache stays useful.
 fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
     match pool() {
         Pool::Current => {
@@ -112,7 +113,7 @@ fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
     }
 }
 
-/// Waits a little for another thread, and lets it have the processor if both need the same one.
+/// Waits briefly for another thread, and yields the processor in case both threads need the same one.
 pub fn pause() {
     for _ in 0..32 {
         std::hint::spin_loop();

@@ -4,7 +4,7 @@ use crate::at_each_level;
 use condyle_linalg::{SLACK, View, backward_solve, eliminate, eliminate_rows, forward_solve, solve_right};
 use nalgebra::DMatrix;
 
-/// Entries of size one, sums of 30 of them: 1e-12 leaves room for rounding and nothing else.
+/// Rounding error of sums of 30 numbers near 1.
 const TOLERANCE: f64 = 1e-12;
 
 fn entry(i: usize, j: usize) -> f64 {
@@ -53,7 +53,7 @@ fn elimination_and_solves_match_nalgebra_for_every_edge() {
     });
 }
 
-/// Rows that are eliminated for themselves come out as they do below the matrix.
+/// Rows that are eliminated separately give the same result as rows below the matrix.
 #[test]
 fn rows_apart_are_rows_below() {
     at_each_level(|| {

@@ -1,4 +1,4 @@
-//! Dense kernels, on every level that this processor has.
+//! Dense kernels, at every SIMD level that this processor has.
 #![allow(non_snake_case)]
 
 mod copy;
@@ -11,10 +11,10 @@ mod vectors;
 use condyle_spatial::level::{Level, level, pin};
 use std::sync::Mutex;
 
-/// The level belongs to the whole process.
+/// Lock for the SIMD level, which is global to the process.
 static PINNED: Mutex<()> = Mutex::new(());
 
-/// Runs `f` at every level of this processor.
+/// Runs `f` at every SIMD level of this processor.
 fn at_each_level(f: impl Fn()) {
     let _guard = PINNED.lock();
     let before = level();

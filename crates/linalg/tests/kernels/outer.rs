@@ -3,10 +3,10 @@
 use crate::at_each_level;
 use condyle_linalg::{OuterProducts, SLACK, SparseRows, Vector, Vectorized, at_level};
 
-/// Entries of size one, sums of 20 of them: 1e-12 leaves room for rounding and nothing else.
+/// Rounding error of sums of 20 numbers near 1.
 const TOLERANCE: f64 = 1e-12;
 
-/// Squares of the first rows, and products of the later ones with each other.
+/// Squares of the first rows, and products of each later row with the next one.
 struct Fill<'a> {
     sum: &'a mut OuterProducts,
     rows: &'a SparseRows,

@@ -7,14 +7,14 @@ use condyle_linalg::{
 };
 use nalgebra::DMatrix;
 
-/// Entries of size one, sums of 30 of them: 1e-12 leaves room for rounding and nothing else.
+/// Rounding error of sums of 30 numbers near 1.
 const TOLERANCE: f64 = 1e-12;
 
 fn entry(i: usize, j: usize) -> f64 {
     ((i * 31 + j * 17 + 5) % 23) as f64 / 23.0 - 0.4
 }
 
-/// A copy with slack rows.
+/// Returns a copy with padding rows.
 fn padded(a: &DMatrix<f64>) -> (Vec<f64>, usize) {
     let stride = a.nrows() + SLACK;
     let mut out = vec![0.0; stride * a.ncols()];
@@ -24,7 +24,7 @@ fn padded(a: &DMatrix<f64>) -> (Vec<f64>, usize) {
     (out, stride)
 }
 
-/// Each of the products of A with B.
+/// Checks each product of A with B.
 fn check_products(a: &DMatrix<f64>, b: &DMatrix<f64>) {
     let (rows, columns, length) = (a.nrows(), b.nrows(), a.ncols());
     let (shape, expected) = ([rows, columns, length], a * b.transpose());
@@ -76,7 +76,7 @@ fn products_match_nalgebra_for_every_edge() {
     });
 }
 
-/// The sums of some rows and columns, each written to two places.
+/// Sums of some rows and columns, each written to two places.
 struct Sums<'a>(&'a mut [f64], usize, [View<'a>; 2], [usize; 2]);
 
 impl Vectorized for Sums<'_> {

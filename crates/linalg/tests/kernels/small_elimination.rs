@@ -1,13 +1,13 @@
-//! Elimination of a sum of products in one go.
+//! Elimination of a matrix plus a sum of products, in one function.
 
 use crate::at_each_level;
 use condyle_linalg::{SLACK, View, add_product_lower, eliminate, eliminate_sum};
 
-/// Entries of size one, sums of 40 of them: 1e-12 leaves room for rounding and nothing else.
+/// Rounding error of sums of 40 numbers near 1.
 const TOLERANCE: f64 = 1e-12;
 
 #[test]
-fn it_is_the_elimination_of_the_sum() {
+fn eliminate_sum_equals_elimination_of_the_sum() {
     at_each_level(|| {
         for (m, n, below, count) in
             [(0, 3, 1, 2), (1, 1, 0, 0), (3, 6, 1, 5), (7, 14, 8, 7), (9, 18, 10, 12), (16, 5, 3, 1)]

@@ -1,9 +1,9 @@
-//! Products of matrices with vectors.
+//! Products of matrices and vectors.
 
 use crate::at_each_level;
 use condyle_linalg::{SLACK, View, add_product_vector, add_scaled_product, transposed_product_vector};
 
-/// Entries of size one, sums of 20 of them: 1e-12 leaves room for rounding and nothing else.
+/// Rounding error of sums of 20 numbers near 1.
 const TOLERANCE: f64 = 1e-12;
 
 #[test]

@@ -1,4 +1,4 @@
-//! Inertias of rigid bodies, and of articulated ones.
+//! Inertias of rigid bodies and of articulated bodies.
 
 use crate::algebra::motion::{Force, Motion};
 use crate::algebra::se3::{Act, Se3};
@@ -6,22 +6,22 @@ use crate::algebra::vector::{Mat3, Sym3, Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
 
-/// The inertia of a rigid body: the ten numbers that its dynamics is linear in.
+/// Inertia of a rigid body: the ten numbers in which its dynamics is linear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Inertia<S> {
-    /// m (kg).
+    /// Mass m (kg).
     pub mass: S,
-    /// h = m c, mass times the centre of mass in the frame (kg m).
+    /// Mass times centre of mass, h = m c, in the frame (kg m).
     pub mass_com: Vec3<S>,
-    /// Ī, the rotational inertia about the origin of the frame (kg m²).
+    /// Rotational inertia Ī about the origin of the frame (kg m²).
     pub rotational: Sym3<S>,
 }
 impl_linear!(Inertia { mass, mass_com, rotational });
 
 impl<S: Scalar> Inertia<S> {
-    /// An inertia from mass, centre of mass and rotational inertia about the centre of mass: Ī = I_c − m c× c×.
+    /// Creates an inertia from mass, centre of mass and rotational inertia about the centre of mass: Ī = I_c − m c× c×.
     ///
     /// ```
     /// use condyle_spatial::{Inertia, Motion, Sym3, Vec3};
@@ -36,7 +36,7 @@ impl<S: Scalar> Inertia<S> {
 
 impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
     type Output = Force<S>;
-    /// I v = [m v − h × ω; Ī ω + h × v].
+    /// Returns I v = [m v − h × ω; Ī ω + h × v].
     #[inline(always)]
     fn mul(self, v: Motion<S>) -> Force<S> {
         Force {
@@ -47,7 +47,7 @@ impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
 }
 
 impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
-    /// Rotate, then shift the origin: h' = R h + m p, Ī' = R Ī Rᵀ − p× Rh× − Rh× p× − m p× p×.
+    /// Rotates, then shifts the origin: h' = R h + m p, Ī' = R Ī Rᵀ − p× Rh× − Rh× p× − m p× p×.
     #[inline(always)]
     fn act(&self, I: Inertia<S>) -> Inertia<S> {
         let p = self.translation;
@@ -66,16 +66,16 @@ impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
     }
 }
 
-/// The inertia that an articulated body shows at its handle: a symmetric 6×6 matrix, in blocks
-/// [[linear, coupling], [couplingᵀ, rotational]].
+/// Inertia of an articulated body as felt at its handle: a symmetric 6×6 matrix, in blocks [[linear, coupling],
+/// [couplingᵀ, rotational]].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct ArticulatedInertia<S> {
-    /// Force per linear acceleration.
+    /// Force per linear acceleration (kg).
     pub linear: Sym3<S>,
-    /// Force per angular acceleration.
+    /// Force per angular acceleration (kg m).
     pub coupling: Mat3<S>,
-    /// Moment per angular acceleration.
+    /// Moment per angular acceleration (kg m²).
     pub rotational: Sym3<S>,
 }
 impl_linear!(ArticulatedInertia { linear, coupling, rotational });
@@ -99,7 +99,7 @@ impl<S: Scalar> Mul<Motion<S>> for ArticulatedInertia<S> {
 }
 
 impl<S: Scalar> ArticulatedInertia<S> {
-    /// I − s U Uᵀ.
+    /// Returns I − s U Uᵀ.
     #[inline(always)]
     pub fn minus_outer(self, U: Force<S>, s: S) -> Self {
         let (s, Mat3 { x, y, z }) = (-s, self.coupling);
@@ -117,8 +117,9 @@ impl<S: Scalar> ArticulatedInertia<S> {
 }
 
 impl<S: Scalar> Act<ArticulatedInertia<S>> for Se3<S> {
-    /// The linear motion of the body's origin, at p, is that of the frame's origin plus ω × p, and a force f at p has the moment
-    /// p × f about it: with M, B, C the turned linear part, coupling and rotational part,
+    /// Rotates, then shifts the origin. The body's origin at p moves with the linear motion of the frame's origin plus
+    /// ω × p. A force f at p has the moment p × f about the frame's origin. With M, B, C the rotated linear, coupling
+    /// and rotational parts:
     ///
     /// ```text
     /// M' = M,   B' = B − M [p]ₓ,   C' = C + [p]ₓ B' + ([p]ₓ B)ᵀ
@@ -129,7 +130,7 @@ impl<S: Scalar> Act<ArticulatedInertia<S>> for Se3<S> {
         let (linear, rotational) = (I.linear.rotate(R), I.rotational.rotate(R));
         let B = R * I.coupling * R.transpose();
         let Mat3 { x, y, z } = linear.full();
-        // M [p]ₓ by its columns: [p]ₓ has the columns (0, p_z, −p_y), (−p_z, 0, p_x), (p_y, −p_x, 0)
+        // M [p]ₓ, column by column; the columns of [p]ₓ are (0, p_z, −p_y), (−p_z, 0, p_x), (p_y, −p_x, 0)
         let Mp = Mat3 {
             x: y.scale_add(p.z, -z.scale(p.y)),
             y: z.scale_add(p.x, -x.scale(p.z)),

@@ -1,8 +1,8 @@
 //! Rotations and rigid motions as Lie groups: exponentials, logarithms, Jacobians.
 //!
-//! Exact near 0 and near π, on any scalar: whatever has a removable singularity is written with the entire functions
-//! of [`stumpff`]. Rotation vectors are in rad; a twist is a [`Motion`], linear first. Jacobians are *right* ones,
-//! exp(x + δ) = exp(x) exp(J δ), as tangent vectors of a configuration are in the body's frame.
+//! Results are exact near 0 and near π, on any scalar: functions with a removable singularity are written with the
+//! entire functions of [`stumpff`]. Rotation vectors are in rad; a twist is a [`Motion`], linear first. Jacobians are
+//! *right* Jacobians, exp(x + δ) = exp(x) exp(J δ), because tangent vectors of a configuration are in the body's frame.
 
 use crate::algebra::motion::Motion;
 pub use crate::algebra::quaternion::Quaternion;
@@ -10,11 +10,12 @@ use crate::algebra::se3::Se3;
 use crate::algebra::vector::{Mat3, Sym3, Vec3};
 use crate::scalar::Scalar;
 
-/// The entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, of t = θ²:
+/// Computes the entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, at t = θ²:
 /// cos θ, sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, (cos θ − 1 + θ²/2)/θ⁴, (sin θ − θ + θ³/6)/θ⁵.
 ///
-/// Source: Stumpff (1959). Below 1 from the series of c₄ and c₅ and the recurrence cₖ = 1/k! − t cₖ₊₂, to full relative
-/// precision (no cancellation there); above from sine and cosine and the same recurrence upwards, within 1e-15.
+/// Source: Stumpff (1959). For t < 1, c₄ and c₅ are computed by their series, and the others by the recurrence
+/// cₖ = 1/k! − t cₖ₊₂, to full relative precision (without cancellation). For t ≥ 1, sine and cosine and the same
+/// recurrence upwards give errors within 1e-15.
 ///
 /// ```
 /// let c = condyle_spatial::lie::stumpff(0.0_f64);
@@ -26,7 +27,7 @@ pub fn stumpff<S: Scalar>(t: S) -> [S; 6] {
     if S::all(small) {
         return stumpff_near(t);
     }
-    // each of a number that is harmless where the other is meant
+    // Each branch gets a harmless argument in the lanes that use the other branch.
     let far = stumpff_far(S::select(small, S::one(), t));
     if !S::any(small) {
         return far;
@@ -38,10 +39,10 @@ pub fn stumpff<S: Scalar>(t: S) -> [S; 6] {
     c
 }
 
-/// 1/k!.
+/// 1/k!, at index k.
 const INVERSE_FACTORIAL: [f64; 4] = [1.0, 1.0, 1.0 / 2.0, 1.0 / 6.0];
 
-/// The series, for t < 1.
+/// Computes the functions from the series, for t < 1.
 #[inline(always)]
 fn stumpff_near<S: Scalar>(t: S) -> [S; 6] {
     let (s4, s5) =
@@ -53,7 +54,7 @@ fn stumpff_near<S: Scalar>(t: S) -> [S; 6] {
     [s0, s1, s2, s3, s4, s5]
 }
 
-/// The closed forms, for t ≥ 1.
+/// Computes the functions from the closed forms, for t ≥ 1.
 #[inline(always)]
 fn stumpff_far<S: Scalar>(t: S) -> [S; 6] {
     let angle = t.sqrt();
@@ -66,7 +67,8 @@ fn stumpff_far<S: Scalar>(t: S) -> [S; 6] {
     [l0, l1, l2, l3, l4, l5]
 }
 
-/// k! cₖ(t) for t < 1 by Horner's rule: 1 − t/((k+1)(k+2)) (1 − t/((k+3)(k+4)) (…)), to the last term a double can see.
+/// Computes k! cₖ(t) for t < 1 with Horner's rule: 1 − t/((k+1)(k+2)) (1 − t/((k+3)(k+4)) (…)). Further terms would be
+/// below double precision.
 #[inline(always)]
 fn stumpff_series<S: Scalar, const K: u32>(t: S) -> S {
     let mut sum = S::one();
@@ -77,14 +79,14 @@ fn stumpff_series<S: Scalar, const K: u32>(t: S) -> S {
     sum
 }
 
-/// exp of a rotation vector: the rotation by |w| about w.
+/// Computes the exponential of a rotation vector w: the rotation by |w| about w.
 #[inline(always)]
 pub fn exp3<S: Scalar>(w: Vec3<S>) -> Quaternion<S> {
-    let [cos, sinc, ..] = stumpff(w.norm_squared() * S::splat(0.25)); // of half the angle
+    let [cos, sinc, ..] = stumpff(w.norm_squared() * S::splat(0.25)); // at half the angle
     Quaternion { vector: w.scale(sinc * S::splat(0.5)), scalar: cos }
 }
 
-/// The rotation vector of a rotation, of length at most π.
+/// Returns the rotation vector of a rotation, of length at most π.
 #[inline(always)]
 pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
     // q and −q are the same rotation: take the one with w ≥ 0.
@@ -109,7 +111,7 @@ pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
     v.scale(half * S::splat(2.0))
 }
 
-/// The series of θ/(2n).
+/// Sums the series of θ/(2n).
 #[inline(always)]
 fn log3_near<S: Scalar>(n2: S, w: S) -> S {
     let r = n2 * (w * w).recip();
@@ -120,8 +122,10 @@ fn log3_near<S: Scalar>(n2: S, w: S) -> S {
     sum * w.recip()
 }
 
-/// 1/θ² − (cot(θ/2))/(2θ) of t = θ², the coefficient of w×² in the inverse Jacobians, and its derivative by t:
-/// a = (c₂ − c₃)/(4 c₁) at θ/2, and by cₖ' = (k cₖ₊₂ − cₖ₊₁)/2 there, a' = a²/2 − (c₃ − 3 c₄ + 3 c₅)/(32 c₁).
+/// Returns the coefficient a = 1/θ² − (cot(θ/2))/(2θ) of w×² in the inverse Jacobians, and its derivative a' with
+/// respect to t = θ².
+///
+/// With c at θ/2, a = (c₂ − c₃)/(4 c₁). From cₖ' = (k cₖ₊₂ − cₖ₊₁)/2 follows a' = a²/2 − (c₃ − 3 c₄ + 3 c₅)/(32 c₁).
 #[inline(always)]
 fn inverse_coefficient<S: Scalar>(t: S) -> [S; 2] {
     let c = stumpff(t * S::splat(0.25));
@@ -130,7 +134,7 @@ fn inverse_coefficient<S: Scalar>(t: S) -> [S; 2] {
     [a, a * a * S::splat(0.5) - (c[3] - (c[4] - c[5]) * S::splat(3.0)) * r * S::splat(0.125)]
 }
 
-/// 1 + a w× + b w×².
+/// Returns 1 + a w× + b w×².
 #[inline(always)]
 fn rotation_series<S: Scalar>(w: Vec3<S>, a: S, b: S) -> Mat3<S> {
     // [w]ₓ² = w wᵀ − |w|² 1
@@ -139,29 +143,29 @@ fn rotation_series<S: Scalar>(w: Vec3<S>, a: S, b: S) -> Mat3<S> {
     (square + w.scale(a).skew()).add_diagonal(S::one() - bw.dot(w))
 }
 
-/// The right Jacobian of [`exp3`]: 1 − c₂ w× + c₃ w×².
+/// Returns the right Jacobian of [`exp3`]: 1 − c₂ w× + c₃ w×².
 #[inline(always)]
 pub fn jexp3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
     let c = stumpff(w.norm_squared());
     rotation_series(w, -c[2], c[3])
 }
 
-/// Its inverse, the right Jacobian of [`log3`]: 1 + w×/2 + (1/θ² − cot(θ/2)/(2θ)) w×².
+/// Returns the inverse of [`jexp3`], the right Jacobian of [`log3`]: 1 + w×/2 + (1/θ² − cot(θ/2)/(2θ)) w×².
 #[inline(always)]
 pub fn jlog3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
     rotation_series(w, S::splat(0.5), inverse_coefficient(w.norm_squared())[0])
 }
 
-/// exp of a twist: the pose after moving with it for one unit of time.
+/// Computes the exponential of a twist: the pose after moving with the twist for one unit of time.
 ///
-/// Returns the rotation as a quaternion (what a configuration stores), and the translation V v, V = 1 + c₂ w× + c₃ w×².
+/// Returns the rotation as a quaternion, as configurations store it, and the translation V v, V = 1 + c₂ w× + c₃ w×².
 #[inline(always)]
 pub fn exp6<S: Scalar>(m: Motion<S>) -> (Quaternion<S>, Vec3<S>) {
     let c = stumpff(m.angular.norm_squared());
     (exp3(m.angular), rotation_series(m.angular, c[2], c[3]) * m.linear)
 }
 
-/// The twist of a pose (rotation, translation), of angle at most π: [V⁻¹ p; w].
+/// Returns the twist of a pose (rotation, translation), of angle at most π: [V⁻¹ p; w].
 #[inline(always)]
 pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<S> {
     let w = log3(rotation);
@@ -169,22 +173,22 @@ pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<
     Motion { linear: V_inverse * translation, angular: w }
 }
 
-/// A linear map of motions that keeps rotations apart: [[A, B], [0, A]] on [linear; angular].
+/// Linear map of motions: [[A, B], [0, A]] on [linear; angular]. The angular result depends only on the angular part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionMap<S> {
-    /// The block of linear on linear, and of angular on angular.
+    /// A: maps linear to linear, and angular to angular.
     pub diagonal: Mat3<S>,
-    /// The block of angular on linear.
+    /// B: maps angular to linear.
     pub coupling: Mat3<S>,
 }
 
 impl<S: Scalar> MotionMap<S> {
-    /// The map aXb: motions in b to motions in a.
+    /// Returns the map of the pose aXb: motions in b to motions in a.
     #[inline(always)]
     pub fn adjoint(aXb: Se3<S>) -> Self {
         Self { diagonal: aXb.rotation, coupling: aXb.translation.skew() * aXb.rotation }
     }
-    /// The six columns, for the unit motions in order.
+    /// Returns the six columns: the images of the unit motions, in order.
     #[inline(always)]
     pub fn columns(self) -> [Motion<S>; 6] {
         let (A, B, o) = (self.diagonal, self.coupling, Vec3::zero());
@@ -215,8 +219,11 @@ impl<S: Scalar> core::ops::Mul for MotionMap<S> {
     }
 }
 
-/// 1 + a w× + b w×² on the diagonal, and how it changes along v beside it, for the twist (v, w) and derivatives a', b' of the
-/// coefficients by |w|². With y = a v + 2 a' (v·w) w and x = b v + b' (v·w) w that is y× + w× x× + x× w×.
+/// Returns the map with A = 1 + a w× + b w×² for the twist (v, w), where B is the derivative of A with respect to w
+/// along v.
+///
+/// `da` and `db` are the derivatives a', b' with respect to |w|². B = y× + w× x× + x× w×,
+/// with y = a v + 2 a' (v·w) w and x = b v + b' (v·w) w.
 #[inline(always)]
 fn series_map<S: Scalar>(
     Motion { linear: v, angular: w }: Motion<S>,
@@ -231,9 +238,11 @@ fn series_map<S: Scalar>(
     MotionMap { diagonal: rotation_series(w, a, b), coupling }
 }
 
-/// The right Jacobian of [`exp6`]: [[J, J'], [0, J]], where J = [`jexp3`] changes by J' along the linear part.
+/// Returns the right Jacobian of [`exp6`]: [[J, J'], [0, J]] with J = [`jexp3`]. J' is the derivative of J along the
+/// linear part.
 ///
-/// Source: Barfoot and Furgale (2014), equations 100 and 102, which the derivative of J along a vector sums up.
+/// Source: Barfoot and Furgale (2014), equations 100 and 102. The derivative of J along a vector is a shorter form of
+/// both.
 #[inline(always)]
 pub fn jexp6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
     let [_, _, c2, c3, c4, c5] = stumpff(m.angular.norm_squared());
@@ -242,7 +251,8 @@ pub fn jexp6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
     series_map(m, [-c2, c3], [c3 * half - c4, c5 * S::splat(1.5) - c4 * half])
 }
 
-/// Its inverse, the right Jacobian of [`log6`], at the twist m: [[J, J'], [0, J]] with J = [`jlog3`], likewise.
+/// Returns the inverse of [`jexp6`], the right Jacobian of [`log6`], at the twist m: [[J, J'], [0, J]] with J =
+/// [`jlog3`] and J' as above.
 #[inline(always)]
 pub fn jlog6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
     let [a, da] = inverse_coefficient(m.angular.norm_squared());

@@ -3,26 +3,26 @@
 use crate::algebra::vector::{Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
 
-/// The cross product of spatial algebra, chosen by type: v × m of motions, v ×* f of a motion and a force.
+/// Cross product of spatial algebra, selected by type: v × m for motions, v ×* f for a motion and a force.
 pub trait Cross<T> {
-    /// v × x: how fast x changes when it is fixed in a body that moves with v.
+    /// Returns v × x: the rate of change of x if x is fixed in a body that moves with v.
     fn cross(self, x: T) -> T;
 }
 
-/// A spatial velocity or acceleration, [linear; angular]: that of the body's point at the frame's origin, and of the
-/// body's rotation.
+/// Spatial velocity or acceleration, [linear; angular]: motion of the body's point at the frame's origin, and rotation
+/// of the body.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Motion<S> {
-    /// The motion of the point of the body at the origin of the frame: m/s or m/s².
+    /// Motion of the body's point at the origin of the frame (m/s or m/s²).
     pub linear: Vec3<S>,
-    /// The motion of the body's rotation: rad/s or rad/s².
+    /// Rotation of the body (rad/s or rad/s²).
     pub angular: Vec3<S>,
 }
 impl_linear!(Motion { linear, angular });
 
-/// A spatial force or momentum, [linear; angular]: the sum of the forces, and their moment about the frame's origin.
+/// Spatial force or momentum, [linear; angular]: sum of the forces, and their moment about the frame's origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
@@ -37,12 +37,12 @@ impl_linear!(Force { linear, angular });
 macro_rules! impl_six {
     ($type:ident) => {
         impl<S: Scalar> $type<S> {
-            /// A vector from its linear and angular part.
+            /// Creates a vector from its linear and angular parts.
             #[inline(always)]
             pub fn new(linear: Vec3<S>, angular: Vec3<S>) -> Self {
                 Self { linear, angular }
             }
-            /// The six numbers, linear first.
+            /// Returns the six numbers, linear first.
             #[inline(always)]
             pub fn to_array(self) -> [S; 6] {
                 let (l, a) = (self.linear, self.angular);
@@ -61,7 +61,7 @@ impl_six!(Motion);
 impl_six!(Force);
 
 impl<S: Scalar> Force<S> {
-    /// [f; p × f]: the force f (N) that acts at a point p (m), about the frame's origin.
+    /// Returns [f; p × f]: the force f (N) that acts at a point p (m), with its moment about the frame's origin.
     ///
     /// ```
     /// use condyle_spatial::{Act, Force, Mat3, Se3, Vec3};
@@ -77,13 +77,13 @@ impl<S: Scalar> Force<S> {
 }
 
 impl<S: Scalar> Motion<S> {
-    /// v + ω × p: the velocity of the body's point that is at p (m) in the frame (m/s).
+    /// Returns v + ω × p: the velocity (m/s) of the body's point at p (m) in the frame.
     #[inline(always)]
     pub fn velocity_at(self, point: Vec3<S>) -> Vec3<S> {
         self.angular.cross_add(point, self.linear)
     }
 
-    /// ⟨m, f⟩ = m · f: the power of force f on motion m (W).
+    /// Returns ⟨m, f⟩ = m · f: the power of force f on motion m (W).
     #[inline(always)]
     pub fn dot(self, f: Force<S>) -> S {
         self.linear.dot_add(f.linear, self.angular.dot(f.angular))
@@ -91,7 +91,7 @@ impl<S: Scalar> Motion<S> {
 }
 
 impl<S: Scalar> Cross<Motion<S>> for Motion<S> {
-    /// v × m = [ω × mᵥ + v × m_ω; ω × m_ω].
+    /// Returns v × m = [ω × mᵥ + v × m_ω; ω × m_ω].
     #[inline(always)]
     fn cross(self, m: Motion<S>) -> Motion<S> {
         Motion {
@@ -102,7 +102,7 @@ impl<S: Scalar> Cross<Motion<S>> for Motion<S> {
 }
 
 impl<S: Scalar> Cross<Force<S>> for Motion<S> {
-    /// v ×* f = [ω × f; ω × n + v × f].
+    /// Returns v ×* f = [ω × f; ω × n + v × f].
     #[inline(always)]
     fn cross(self, f: Force<S>) -> Force<S> {
         Force {

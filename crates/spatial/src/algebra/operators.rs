@@ -1,4 +1,5 @@
-//! Operators of vectors with scalars, indices, sums and norms: thin names for what [`Vec3`], [`Motion`] and [`Force`] compute.
+//! Operators of vectors with scalars, indices, sums and norms: short forms of methods of [`Vec3`], [`Motion`] and
+//! [`Force`].
 
 use crate::algebra::motion::{Force, Motion};
 use crate::algebra::quaternion::Quaternion;
@@ -8,13 +9,13 @@ use crate::scalar::Scalar;
 use core::iter::Sum;
 use core::ops::{Div, DivAssign, Index, IndexMut, Mul, MulAssign};
 
-/// Product with a scalar and quotient by one, for a struct that has `scale`. A number on the left is an `f64`, so that literals
-/// need no type.
+/// Implements product with and quotient by a scalar, for a struct that has `scale`. A number on the left is an `f64`,
+/// so that literals need no type.
 macro_rules! impl_scalar_product {
     ($type:ident) => {
         impl<S: Scalar> Mul<S> for $type<S> {
             type Output = Self;
-            /// Each component times s.
+            /// Multiplies each component by s.
             #[inline(always)]
             fn mul(self, s: S) -> Self {
                 self.scale(s)
@@ -28,7 +29,7 @@ macro_rules! impl_scalar_product {
         }
         impl<S: Scalar> Div<S> for $type<S> {
             type Output = Self;
-            /// Each component times 1/s.
+            /// Multiplies each component by 1/s.
             #[inline(always)]
             fn div(self, s: S) -> Self {
                 self.scale(s.recip())
@@ -42,7 +43,7 @@ macro_rules! impl_scalar_product {
         }
         impl Mul<$type<f64>> for f64 {
             type Output = $type<f64>;
-            /// Each component times the number.
+            /// Multiplies each component by the number.
             #[inline(always)]
             fn mul(self, x: $type<f64>) -> $type<f64> {
                 x.scale(self)
@@ -55,7 +56,7 @@ impl_scalar_product!(Mat3);
 impl_scalar_product!(Motion);
 impl_scalar_product!(Force);
 
-/// Indices in flattened order, the zero as default, and sums.
+/// Implements indices in flattened order, zero as default, and sums.
 macro_rules! impl_components {
     ($type:ident, $n:literal: $($i:literal => $($field:ident).+),*) => {
         impl<S> Index<usize> for $type<S> {
@@ -81,7 +82,7 @@ macro_rules! impl_components {
             }
         }
         impl<S: Scalar> Default for $type<S> {
-            /// All components zero.
+            /// Returns the zero vector.
             #[inline(always)]
             fn default() -> Self {
                 Self::zero()
@@ -99,7 +100,7 @@ impl_components!(Vec3, 3: 0 => x, 1 => y, 2 => z);
 impl_components!(Motion, 6: 0 => linear.x, 1 => linear.y, 2 => linear.z, 3 => angular.x, 4 => angular.y, 5 => angular.z);
 impl_components!(Force, 6: 0 => linear.x, 1 => linear.y, 2 => linear.z, 3 => angular.x, 4 => angular.y, 5 => angular.z);
 
-/// The panic of an index that is too large.
+/// Panics because of an index that is too large.
 #[cold]
 #[inline(never)]
 #[track_caller]
@@ -108,7 +109,7 @@ fn outside(i: usize, n: usize) -> ! {
 }
 
 impl<S: Scalar> Vec3<S> {
-    /// |a| = √(a · a). Its derivative at a = 0 is not finite.
+    /// Returns |a| = √(a · a). Its derivative at a = 0 is not finite.
     ///
     /// ```
     /// use condyle_spatial::Vec3;
@@ -142,7 +143,7 @@ impl_norm!(Motion, "m²/s² and rad²/s², so it suits errors and tolerances onl
 impl_norm!(Force, "N² and N² m², so it suits errors and tolerances only");
 
 impl<S: Scalar> Default for Se3<S> {
-    /// The identity.
+    /// Returns the identity.
     #[inline(always)]
     fn default() -> Self {
         Self::identity()
@@ -150,7 +151,7 @@ impl<S: Scalar> Default for Se3<S> {
 }
 
 impl<S: Scalar> Default for Quaternion<S> {
-    /// The identity.
+    /// Returns the identity.
     #[inline(always)]
     fn default() -> Self {
         Self::identity()

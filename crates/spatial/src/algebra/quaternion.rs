@@ -3,39 +3,39 @@
 use crate::algebra::vector::{Mat3, Vec3};
 use crate::scalar::Scalar;
 
-/// A unit quaternion, stored x, y, z, w.
+/// Unit quaternion, stored as x, y, z, w.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Quaternion<S> {
-    /// sin(θ/2) times the axis.
+    /// Vector part: sin(θ/2) times the axis.
     pub vector: Vec3<S>,
-    /// cos(θ/2).
+    /// Scalar part: cos(θ/2).
     pub scalar: S,
 }
 
 impl<S: Scalar> Quaternion<S> {
-    /// A quaternion from x, y, z, w.
+    /// Creates a quaternion from x, y, z, w.
     #[inline(always)]
     pub fn new(x: S, y: S, z: S, w: S) -> Self {
         Self { vector: Vec3::new(x, y, z), scalar: w }
     }
-    /// No rotation.
+    /// Returns the identity: no rotation.
     #[inline(always)]
     pub fn identity() -> Self {
         Self { vector: Vec3::zero(), scalar: S::one() }
     }
-    /// The inverse rotation.
+    /// Returns the inverse rotation.
     #[inline(always)]
     pub fn conjugate(self) -> Self {
         Self { vector: -self.vector, scalar: self.scalar }
     }
-    /// The same direction at length 1.
+    /// Returns the quaternion divided by its length.
     #[inline(always)]
     pub fn normalize(self) -> Self {
         let r = self.scalar.mul_add(self.scalar, self.vector.norm_squared()).sqrt().recip();
         Self { vector: self.vector.scale(r), scalar: self.scalar * r }
     }
-    /// The rotation's matrix.
+    /// Returns the rotation matrix.
     #[inline(always)]
     pub fn to_rotation(self) -> Mat3<S> {
         let (v, w) = (self.vector, self.scalar);
@@ -50,7 +50,7 @@ impl<S: Scalar> Quaternion<S> {
             z: Vec3::new(xz + wy, yz - wx, one - xx - yy),
         }
     }
-    /// The quaternion of a rotation's matrix, its largest component computed first (Shepperd 1978).
+    /// Returns the quaternion of a rotation matrix. Its largest component is computed first (Shepperd 1978).
     #[inline(always)]
     pub fn from_rotation(R: Mat3<S>) -> Self {
         let (a, b, c) = (R.x.x, R.y.y, R.z.z);
@@ -80,7 +80,7 @@ impl<S: Scalar> core::ops::Mul for Quaternion<S> {
     }
 }
 
-/// p where the mask holds, q elsewhere.
+/// Returns p where the mask holds, q elsewhere.
 #[inline(always)]
 fn choose<S: Scalar>(m: S::Mask, p: [S; 4], q: [S; 4]) -> [S; 4] {
     [S::select(m, p[0], q[0]), S::select(m, p[1], q[1]), S::select(m, p[2], q[2]), S::select(m, p[3], q[3])]

@@ -1,42 +1,42 @@
-//! Poses, and how they act on motions, forces, inertias and points.
+//! Poses, and their action on motions, forces, inertias and points.
 
 use crate::algebra::motion::{Force, Motion};
 use crate::algebra::vector::{Mat3, Vec3, impl_lift};
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
 
-/// The pose aXb of frame b in frame a: it takes coordinates in b to coordinates in a.
+/// Pose aXb of frame b in frame a. It maps coordinates in b to coordinates in a.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Se3<S> {
-    /// aRb: its columns are the axes of b in a.
+    /// Rotation aRb: its columns are the axes of b in a.
     pub rotation: Mat3<S>,
-    /// The origin of b in a (m).
+    /// Origin of b in a (m).
     pub translation: Vec3<S>,
 }
 impl_lift!(Se3 { rotation, translation });
 
-/// What a pose does to the coordinates of a `T`.
+/// Action of a pose on the coordinates of a `T`.
 pub trait Act<T> {
-    /// The map from coordinates in b to coordinates in a, for the pose aXb.
+    /// Maps coordinates in b to coordinates in a, for the pose aXb.
     fn act(&self, x: T) -> T;
-    /// The map from coordinates in a to coordinates in b, for the pose aXb.
+    /// Maps coordinates in a to coordinates in b, for the pose aXb.
     fn act_inv(&self, x: T) -> T;
 }
 
 impl<S: Scalar> Se3<S> {
-    /// The pose of a frame in itself.
+    /// Returns the identity: the pose of a frame in itself.
     #[inline(always)]
     pub fn identity() -> Self {
         Self { rotation: Mat3::identity(), translation: Vec3::zero() }
     }
-    /// A pose from rotation and translation.
+    /// Creates a pose from rotation and translation.
     #[inline(always)]
     pub fn new(rotation: Mat3<S>, translation: Vec3<S>) -> Self {
         Self { rotation, translation }
     }
-    /// bXa = (aXb)⁻¹.
+    /// Returns bXa = (aXb)⁻¹.
     #[inline(always)]
     pub fn inverse(self) -> Self {
         let Rt = self.rotation.transpose();
@@ -46,7 +46,7 @@ impl<S: Scalar> Se3<S> {
 
 impl<S: Scalar> Mul for Se3<S> {
     type Output = Self;
-    /// aXc = aXb bXc.
+    /// Returns aXc = aXb bXc.
     #[inline(always)]
     fn mul(self, o: Self) -> Self {
         Self {
@@ -57,13 +57,13 @@ impl<S: Scalar> Mul for Se3<S> {
 }
 
 impl<S: Scalar> Act<Motion<S>> for Se3<S> {
-    /// [R v + p × R ω; R ω].
+    /// Returns [R v + p × R ω; R ω].
     #[inline(always)]
     fn act(&self, m: Motion<S>) -> Motion<S> {
         let angular = self.rotation * m.angular;
         Motion { linear: self.translation.cross_add(angular, self.rotation * m.linear), angular }
     }
-    /// [Rᵀ(v − p × ω); Rᵀ ω].
+    /// Returns [Rᵀ(v − p × ω); Rᵀ ω].
     #[inline(always)]
     fn act_inv(&self, m: Motion<S>) -> Motion<S> {
         Motion {
@@ -74,13 +74,13 @@ impl<S: Scalar> Act<Motion<S>> for Se3<S> {
 }
 
 impl<S: Scalar> Act<Force<S>> for Se3<S> {
-    /// [R f; R n + p × R f].
+    /// Returns [R f; R n + p × R f].
     #[inline(always)]
     fn act(&self, f: Force<S>) -> Force<S> {
         let linear = self.rotation * f.linear;
         Force { linear, angular: self.translation.cross_add(linear, self.rotation * f.angular) }
     }
-    /// [Rᵀ f; Rᵀ(n − p × f)].
+    /// Returns [Rᵀ f; Rᵀ(n − p × f)].
     #[inline(always)]
     fn act_inv(&self, f: Force<S>) -> Force<S> {
         Force {
@@ -90,14 +90,14 @@ impl<S: Scalar> Act<Force<S>> for Se3<S> {
     }
 }
 
-/// A point.
+/// Action on a point.
 impl<S: Scalar> Act<Vec3<S>> for Se3<S> {
-    /// R x + p.
+    /// Returns R x + p.
     #[inline(always)]
     fn act(&self, x: Vec3<S>) -> Vec3<S> {
         self.rotation.mul_add(x, self.translation)
     }
-    /// Rᵀ(x − p).
+    /// Returns Rᵀ(x − p).
     #[inline(always)]
     fn act_inv(&self, x: Vec3<S>) -> Vec3<S> {
         self.rotation.transpose_mul(x - self.translation)

@@ -3,8 +3,8 @@
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
 
-/// Component-wise `+`, `−`, negation, `+=`, `−=`, product with a scalar, and lifting of constants, for a struct whose
-/// fields have them.
+/// Implements component-wise `+`, `−`, negation, `+=`, `−=`, product with a scalar, and lifting of constants. The
+/// fields of the struct must have these operations.
 macro_rules! impl_linear {
     ($type:ident { $($field:ident),* }) => {
         impl<S: Scalar> core::ops::Add for $type<S> {
@@ -41,17 +41,17 @@ macro_rules! impl_linear {
             }
         }
         impl<S: Scalar> $type<S> {
-            /// All components zero.
+            /// Returns the value with all components zero.
             #[inline(always)]
             pub fn zero() -> Self {
                 Self { $($field: crate::algebra::vector::Zero::zero()),* }
             }
-            /// Each component times s.
+            /// Multiplies each component by s.
             #[inline(always)]
             pub fn scale(self, s: S) -> Self {
                 Self { $($field: crate::algebra::vector::Scale::scale(self.$field, s)),* }
             }
-            /// self · s + o, fused where the instruction set has it.
+            /// Returns self · s + o, with one rounding if the instruction set has fused products.
             #[inline(always)]
             pub fn scale_add(self, s: S, o: Self) -> Self {
                 Self { $($field: crate::algebra::vector::Scale::scale_add(self.$field, s, o.$field)),* }
@@ -78,11 +78,11 @@ macro_rules! impl_linear {
 }
 pub(crate) use impl_linear;
 
-/// The model constants in a struct as scalars of a pass.
+/// Implements `lift` for a struct of model constants.
 macro_rules! impl_lift {
     ($type:ident { $($field:ident),* }) => {
         impl<R: Copy> $type<R> {
-            /// The same, with each component a scalar of type `S`.
+            /// Converts each component to a scalar of type `S`.
             #[inline(always)]
             pub fn lift<S: Scalar>(self) -> $type<S>
             where
@@ -95,7 +95,7 @@ macro_rules! impl_lift {
 }
 pub(crate) use impl_lift;
 
-/// Additive neutral element of a component, for the macro above.
+/// Zero of a component type, for the macro above.
 pub(crate) trait Zero {
     fn zero() -> Self;
 }
@@ -122,7 +122,7 @@ impl<S: Scalar> Scale<S> for S {
     }
 }
 
-/// A vector in three dimensions.
+/// Vector in three dimensions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
@@ -135,22 +135,22 @@ pub struct Vec3<S> {
 impl_linear!(Vec3 { x, y, z });
 
 impl<S: Scalar> Vec3<S> {
-    /// The vector (x, y, z).
+    /// Creates the vector (x, y, z).
     #[inline(always)]
     pub fn new(x: S, y: S, z: S) -> Self {
         Self { x, y, z }
     }
-    /// a · b.
+    /// Returns a · b.
     #[inline(always)]
     pub fn dot(self, o: Self) -> S {
         self.x.mul_add(o.x, self.y.mul_add(o.y, self.z * o.z))
     }
-    /// a · b + s.
+    /// Returns a · b + s.
     #[inline(always)]
     pub fn dot_add(self, o: Self, s: S) -> S {
         self.x.mul_add(o.x, self.y.mul_add(o.y, self.z.mul_add(o.z, s)))
     }
-    /// a × b + c.
+    /// Returns a × b + c.
     #[inline(always)]
     pub fn cross_add(self, o: Self, c: Self) -> Self {
         Self {
@@ -159,7 +159,7 @@ impl<S: Scalar> Vec3<S> {
             z: self.x.mul_add(o.y, (-self.y).mul_add(o.x, c.z)),
         }
     }
-    /// a × b.
+    /// Returns a × b.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
         Self {
@@ -168,18 +168,18 @@ impl<S: Scalar> Vec3<S> {
             z: self.x.mul_add(o.y, -(self.y * o.x)),
         }
     }
-    /// |a|².
+    /// Returns |a|².
     #[inline(always)]
     pub fn norm_squared(self) -> S {
         self.dot(self)
     }
-    /// a×, the matrix with a× b = a × b.
+    /// Returns the matrix [a]ₓ with [a]ₓ b = a × b.
     #[inline(always)]
     pub fn skew(self) -> Mat3<S> {
         let o = S::zero();
         Mat3 { x: Self::new(o, self.z, -self.y), y: Self::new(-self.z, o, self.x), z: Self::new(self.y, -self.x, o) }
     }
-    /// The components as an array.
+    /// Returns the components as an array.
     #[inline(always)]
     pub fn to_array(self) -> [S; 3] {
         [self.x, self.y, self.z]
@@ -193,7 +193,7 @@ impl<S> From<[S; 3]> for Vec3<S> {
     }
 }
 
-/// A 3×3 matrix by its columns. Of a rotation aRb they are the axes of b in a.
+/// 3×3 matrix, stored by columns. For a rotation aRb, the columns are the axes of b in a.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
@@ -206,34 +206,34 @@ pub struct Mat3<S> {
 impl_linear!(Mat3 { x, y, z });
 
 impl<S: Scalar> Mat3<S> {
-    /// The identity.
+    /// Returns the identity.
     #[inline(always)]
     pub fn identity() -> Self {
         let (o, i) = (S::zero(), S::one());
         Self { x: Vec3::new(i, o, o), y: Vec3::new(o, i, o), z: Vec3::new(o, o, i) }
     }
-    /// A b + c.
+    /// Returns A b + c.
     #[inline(always)]
     pub fn mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
         self.x.scale_add(b.x, self.y.scale_add(b.y, self.z.scale_add(b.z, c)))
     }
-    /// Aᵀ b + c.
+    /// Returns Aᵀ b + c.
     #[inline(always)]
     pub fn transpose_mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
         Vec3::new(self.x.dot_add(b, c.x), self.y.dot_add(b, c.y), self.z.dot_add(b, c.z))
     }
-    /// Aᵀ b.
+    /// Returns Aᵀ b.
     #[inline(always)]
     pub fn transpose_mul(self, b: Vec3<S>) -> Vec3<S> {
         Vec3::new(self.x.dot(b), self.y.dot(b), self.z.dot(b))
     }
-    /// Aᵀ.
+    /// Returns Aᵀ.
     #[inline(always)]
     pub fn transpose(self) -> Self {
         let Self { x, y, z } = self;
         Self { x: Vec3::new(x.x, y.x, z.x), y: Vec3::new(x.y, y.y, z.y), z: Vec3::new(x.z, y.z, z.z) }
     }
-    /// A + s 1.
+    /// Returns A + s 1.
     #[inline(always)]
     pub fn add_diagonal(mut self, s: S) -> Self {
         self.x.x += s;
@@ -241,20 +241,19 @@ impl<S: Scalar> Mat3<S> {
         self.z.z += s;
         self
     }
-    /// The columns.
+    /// Returns the columns.
     #[inline(always)]
     pub fn columns(self) -> [Vec3<S>; 3] {
         [self.x, self.y, self.z]
     }
 }
 
-/// The distance from a rotation that a matrix may have (in length, in cosines of right angles): that of a file of seven
-/// digits.
+/// Maximum `rotation_error` of a rotation: the rounding error of a file with seven digits.
 const ROTATION_ROUNDING: f64 = 1e-6;
 
 impl Mat3<f64> {
-    /// Whether it is a rotation: its columns are unit vectors at right angles, right-handed, all up to 1e-6 (in length, in
-    /// cosines of right angles). It is none if a number is not finite.
+    /// Returns whether the matrix is a rotation: its columns are unit vectors, orthogonal and right-handed, all up to
+    /// 1e-6 (see [`rotation_error`](Self::rotation_error)). Returns `false` if a number is not finite.
     ///
     /// ```
     /// use condyle_spatial::{Mat3, Vec3};
@@ -265,8 +264,8 @@ impl Mat3<f64> {
         self.rotation_error() < ROTATION_ROUNDING
     }
 
-    /// The distance from a rotation: the largest of |xᵀx − 1|, |yᵀy − 1|, |xᵀy| and ‖x × y − z‖ of its columns x, y, z. It is
-    /// NaN or infinite if a number is not finite.
+    /// Returns the distance from a rotation: the largest of |xᵀx − 1|, |yᵀy − 1|, |xᵀy| and ‖x × y − z‖, with columns
+    /// x, y, z. Returns NaN or infinity if a number is not finite.
     ///
     /// ```
     /// use condyle_spatial::Mat3;
@@ -296,7 +295,7 @@ impl<S: Scalar> Mul for Mat3<S> {
     }
 }
 
-/// A symmetric 3×3 matrix.
+/// Symmetric 3×3 matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
@@ -312,18 +311,18 @@ pub struct Sym3<S> {
 impl_linear!(Sym3 { xx, xy, yy, xz, yz, zz });
 
 impl<S: Scalar> Sym3<S> {
-    /// s 1.
+    /// Returns s 1.
     #[inline(always)]
     pub fn diagonal(s: S) -> Self {
         let o = S::zero();
         Self { xx: s, xy: o, yy: s, xz: o, yz: o, zz: s }
     }
-    /// a aᵀ.
+    /// Returns a aᵀ.
     #[inline(always)]
     pub fn outer(a: Vec3<S>) -> Self {
         Self { xx: a.x * a.x, xy: a.x * a.y, yy: a.y * a.y, xz: a.x * a.z, yz: a.y * a.z, zz: a.z * a.z }
     }
-    /// A + s a aᵀ.
+    /// Returns A + s a aᵀ.
     #[inline(always)]
     pub fn add_outer(self, s: S, a: Vec3<S>) -> Self {
         let b = a.scale(s);
@@ -336,7 +335,7 @@ impl<S: Scalar> Sym3<S> {
             zz: b.z.mul_add(a.z, self.zz),
         }
     }
-    /// A b + c.
+    /// Returns A b + c.
     #[inline(always)]
     pub fn mul_add(self, b: Vec3<S>, c: Vec3<S>) -> Vec3<S> {
         Vec3::new(
@@ -345,7 +344,7 @@ impl<S: Scalar> Sym3<S> {
             self.xz.mul_add(b.x, self.yz.mul_add(b.y, self.zz.mul_add(b.z, c.z))),
         )
     }
-    /// a bᵀ + b aᵀ.
+    /// Returns a bᵀ + b aᵀ.
     #[inline(always)]
     pub fn outer_sum(a: Vec3<S>, b: Vec3<S>) -> Self {
         let two = S::splat(2.0);
@@ -358,7 +357,7 @@ impl<S: Scalar> Sym3<S> {
             zz: two * a.z * b.z,
         }
     }
-    /// A + s 1.
+    /// Returns A + s 1.
     #[inline(always)]
     pub fn add_diagonal(mut self, s: S) -> Self {
         self.xx += s;
@@ -366,11 +365,11 @@ impl<S: Scalar> Sym3<S> {
         self.zz += s;
         self
     }
-    /// R A Rᵀ.
+    /// Returns R A Rᵀ.
     #[inline(always)]
     pub fn rotate(self, R: Mat3<S>) -> Self {
         let B = (R * self.full()).transpose(); // the columns of B are the rows of R A
-        let Rt = R.transpose(); // and those of Rᵀ the rows of R
+        let Rt = R.transpose(); // and the columns of Rᵀ are the rows of R
         Self {
             xx: B.x.dot(Rt.x),
             xy: B.x.dot(Rt.y),
@@ -380,7 +379,7 @@ impl<S: Scalar> Sym3<S> {
             zz: B.z.dot(Rt.z),
         }
     }
-    /// The same as a full matrix.
+    /// Returns the same matrix as a full matrix.
     #[inline(always)]
     pub fn full(self) -> Mat3<S> {
         Mat3 {

@@ -1,6 +1,6 @@
-//! num-dual's numbers as scalars: exact derivatives of whatever is generic over [`Scalar`].
+//! `Scalar` for the number types of num-dual: exact derivatives of every function that is generic over [`Scalar`].
 //!
-//! The dual types nest: `Dual<Dual64>` carries second derivatives, and so on. A comparison looks at the real part.
+//! The dual types nest: `Dual<Dual64>` carries second derivatives, and so on. Comparisons use the real part only.
 
 use super::{Constant, Scalar};
 use nalgebra::Const;
@@ -37,7 +37,8 @@ macro_rules! impl_dual {
             }
             #[inline]
             fn atan2(self, x: Self) -> Self {
-                // The slope of the smaller by the larger: num-dual's own divides by x, also where x is 0.
+                // Uses the smaller coordinate divided by the larger. num-dual's own `atan2` divides by x even if x is
+                // 0.
                 let mut angle = if Scalar::abs(x.re).lt(Scalar::abs(self.re)) { -(x / self).atan() } else { (self / x).atan() };
                 angle.re = Scalar::atan2(self.re, x.re);
                 angle

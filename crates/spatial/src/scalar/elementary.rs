@@ -1,17 +1,18 @@
-//! tanh and exp of a [`Scalar`], out of its arithmetic: one source for floats, lanes and dual numbers. And the logarithm of a
-//! number, which is the platform's.
+//! tanh and exp of a [`Scalar`], computed with its arithmetic: one source for floats, lanes and dual numbers. The
+//! logarithm is the platform's and takes an `f64`.
 
 use crate::scalar::Scalar;
 
-/// From here on tanh is 1 to the last bit of a double.
+/// |x| from which tanh x is ±1 to the last bit of a double.
 const SATURATED: f64 = 20.0;
-/// log₂ of what an argument is divided by before a series is summed.
+/// log₂ of the divisor of an argument before a series is summed.
 const HALVINGS: u32 = 6;
-/// What an argument is multiplied by before a series is summed.
+/// Factor of an argument before a series is summed.
 const SCALE: f64 = 1.0 / (1u32 << HALVINGS) as f64;
 
-/// tanh x, to a few units of the last place of x: the continued fraction of x/64, then six times
-/// tanh 2y = 2 tanh y / (1 + tanh² y), which amplifies no relative error. ±1 without slope beyond ±20.
+/// Computes tanh x, with an error of a few units in the last place of x. It evaluates the continued fraction at x/64
+/// and then applies tanh 2y = 2 tanh y / (1 + tanh² y) six times, which amplifies no relative error. The result is ±1
+/// without slope beyond ±20.
 #[inline(always)]
 pub fn tanh<S: Scalar>(x: S) -> S {
     let inside = x.abs().lt(S::splat(SATURATED));
@@ -28,8 +29,8 @@ pub fn tanh<S: Scalar>(x: S) -> S {
     S::select(inside, tanh, S::select(x.lt(S::zero()), -S::one(), S::one()))
 }
 
-/// exp x, to about 1 + |x| units of the last place: the series of exp(x/64) − 1, then six times
-/// e²ʸ − 1 = (eʸ − 1)(2 + (eʸ − 1)). For |x| up to 64.
+/// Computes exp x for |x| up to 64, with an error of about 1 + |x| units in the last place. It sums the series of
+/// exp(x/64) − 1 and then applies e²ʸ − 1 = (eʸ − 1)(2 + (eʸ − 1)) six times.
 #[inline(always)]
 pub fn exp<S: Scalar>(x: S) -> S {
     let negative = x.lt(S::zero());
@@ -46,7 +47,7 @@ pub fn exp<S: Scalar>(x: S) -> S {
     S::select(negative, exp.recip(), exp)
 }
 
-/// ln x.
+/// Computes ln x.
 pub fn ln(x: f64) -> f64 {
     #[cfg(feature = "std")]
     return x.ln();

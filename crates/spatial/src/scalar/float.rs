@@ -1,4 +1,4 @@
-//! `f64` and `f32`.
+//! `Scalar` for `f64` and `f32`.
 
 use super::Scalar;
 use super::number::Number;
@@ -17,7 +17,8 @@ macro_rules! impl_float {
             }
             #[inline(always)]
             fn mul_add(self, b: Self, c: Self) -> Self {
-                // Without the instruction, a fused product is a library call, thirty times slower than two roundings.
+                // Without the FMA instruction, a fused product is a library call, which takes thirty times as long as
+                // two roundings.
                 if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
                     Platform::fused(self, b, c)
                 } else {

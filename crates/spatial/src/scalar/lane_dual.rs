@@ -1,25 +1,26 @@
-//! Dual numbers over lanes: derivatives in as many directions as there are lanes, or of as many states, in one pass.
+//! Dual numbers over SIMD lanes: one pass computes derivatives in several directions, or of several states, one per
+//! lane.
 
 use super::operators::operators;
 use super::{Constant, Scalar};
 use crate::simd::kernel::Kernel;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// x + x′ε with ε² = 0, both vectors of numbers: lane by lane a value and its derivative.
+/// Dual number x + x′ε with ε² = 0, where x and x′ are vectors: each lane has a value and its derivative.
 ///
-/// num-dual's numbers do not serve here: they ask of what they are made of an order, a conversion into one number and
-/// functions that branch on it, which several numbers side by side have not. The rules are the same.
+/// num-dual's types cannot be used: their components need an order, a conversion into one number, and functions that
+/// branch on it. Lanes have none of these. The rules of differentiation are the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct LaneDual<S> {
-    /// The value.
+    /// Value of each lane.
     pub re: S,
-    /// The derivative.
+    /// Derivative of each lane.
     pub eps: S,
 }
 
 impl<S: Scalar> LaneDual<S> {
-    /// f(x) and f′(x) x′.
+    /// Returns f(x) and f′(x) x′, for value = f(x) and slope = f′(x).
     #[inline(always)]
     fn chain(self, value: S, slope: S) -> Self {
         Self { re: value, eps: slope * self.eps }
@@ -103,7 +104,7 @@ impl<S: Scalar> Scalar for LaneDual<S> {
     }
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
-        // (x y′ − y x′)/(x² + y²), by quotients that do not overflow
+        // (x y′ − y x′)/(x² + y²), computed with quotients that do not overflow
         let scale = S::select(x.re.abs().lt(self.re.abs()), self.re, x.re);
         let (sin, cos) = (self.re / scale, x.re / scale);
         let slope = (cos * self.eps - sin * x.eps) / (scale * sin.mul_add(sin, cos * cos));

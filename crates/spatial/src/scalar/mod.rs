@@ -1,4 +1,4 @@
-//! The numbers an algorithm can run on.
+//! Number types on which an algorithm can run.
 
 #[cfg(any(feature = "std", test))]
 mod dual;
@@ -16,11 +16,11 @@ use crate::simd::kernel::Kernel;
 use core::fmt::Debug;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// A number: `f64`, `f32`, a dual number of num-dual, or several numbers side by side (lanes).
+/// Number type: `f64`, `f32`, a dual number of num-dual, or several numbers in SIMD lanes.
 ///
-/// There is no order on scalars, so generic code cannot branch on a value, which is right for lanes (each has its own
-/// answer) and for dual numbers (each branch has its own derivative) alike: compare with [`lt`](Self::lt), choose with
-/// [`select`](Self::select).
+/// Scalars have no order, so generic code cannot branch on a value. A branch would be wrong for lanes (each lane has
+/// its own answer) and for dual numbers (each branch has its own derivative). Compare with [`lt`](Self::lt) and choose
+/// with [`select`](Self::select) instead.
 ///
 /// ```
 /// use condyle_spatial::Scalar;
@@ -45,32 +45,33 @@ pub trait Scalar:
     + SubAssign
     + 'static
 {
-    /// The outcome of a comparison: `bool`, or one for each lane.
+    /// Result of a comparison: `bool`, or one boolean per lane.
     type Mask: Copy;
-    /// The number of numbers that lie side by side in one value.
+    /// Number of lanes of one value.
     const LANES: usize;
-    /// Whether the crates that own algorithms have compiled them for it: `f64` and its lanes.
+    /// Whether the crates that define algorithms contain compiled code for this scalar: `f64` and its lanes.
     #[doc(hidden)]
     const COMPILED: bool = false;
 
-    /// Runs a kernel on this scalar, compiled for its level.
+    /// Runs a kernel that is compiled for the SIMD level of this scalar.
     #[doc(hidden)]
     #[inline(always)]
     fn enter(kernel: impl Kernel) {
         kernel.run();
     }
 
-    /// The constant `x`, in every lane, without derivative.
+    /// Returns the constant `x`, in every lane, without derivative.
     fn splat(x: f64) -> Self;
-    /// self · b + c, fused where the instruction set in use has it.
+    /// Returns self · b + c, with one rounding if the instruction set in use has fused products.
     fn mul_add(self, b: Self, c: Self) -> Self;
-    /// 1 / self.
+    /// Returns 1 / self.
     fn recip(self) -> Self;
-    /// √self.
+    /// Returns √self.
     fn sqrt(self) -> Self;
-    /// (sin self, cos self).
+    /// Returns (sin self, cos self).
     fn sin_cos(self) -> (Self, Self);
-    /// The sines of some angles in their place, and their cosines; the bits of [`sin_cos`](Self::sin_cos).
+    /// Replaces angles by their sines and writes their cosines. The bits are the same as with
+    /// [`sin_cos`](Self::sin_cos).
     #[doc(hidden)]
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
@@ -78,58 +79,59 @@ pub trait Scalar:
             (*sin, *cos) = sin.sin_cos();
         }
     }
-    /// The angle of the point (x, self), in (−π, π].
+    /// Returns the angle of the point (x, self), in (−π, π].
     fn atan2(self, x: Self) -> Self;
-    /// |self|.
+    /// Returns |self|.
     fn abs(self) -> Self;
-    /// The same number; of a recorded one, a value whose sign is not taken out of products, so that sums which are alike are
-    /// written alike.
+    /// Returns the same number. For a recorded value, the result keeps its sign: the sign is not moved out of products,
+    /// so that equal sums are written equally.
     #[doc(hidden)]
     #[inline(always)]
     fn kept(self) -> Self {
         self
     }
-    /// self < other.
+    /// Returns self < other.
     fn lt(self, other: Self) -> Self::Mask;
-    /// a where the mask holds, b elsewhere.
+    /// Returns a where the mask holds, b elsewhere.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
-    /// Both masks hold.
+    /// Returns whether both masks hold.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Whether at least one of the masks holds.
+    /// Returns whether at least one of the masks holds.
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Whether a mask holds in every lane; `false` also where that is not known, because a program is being recorded.
+    /// Returns whether a mask holds in every lane; `false` if that is unknown because a program is being recorded.
     #[doc(hidden)]
     #[inline(always)]
     fn all(mask: Self::Mask) -> bool {
         Self::select(mask, Self::one(), Self::zero()) == Self::one()
     }
-    /// Whether a mask holds in some lane; `true` also where that is not known.
+    /// Returns whether a mask holds in at least one lane; `true` if that is unknown because a program is being
+    /// recorded.
     #[doc(hidden)]
     #[inline(always)]
     fn any(mask: Self::Mask) -> bool {
         Self::select(mask, Self::zero(), Self::one()) != Self::one()
     }
 
-    /// 0.
+    /// Returns 0.
     #[inline(always)]
     fn zero() -> Self {
         Self::splat(0.0)
     }
-    /// 1.
+    /// Returns 1.
     #[inline(always)]
     fn one() -> Self {
         Self::splat(1.0)
     }
 }
 
-/// A constant of a model, as the scalar `S` of a pass sees it.
+/// Constant of a model, which an algorithm converts to its scalar `S`.
 ///
-/// Model constants are `f64` and take part in a pass on any scalar. They can also be of the scalar's own type: a model
-/// whose inertias are dual numbers gives the derivatives with respect to inertias.
+/// Model constants are `f64` and can be used with any scalar. They can also have the scalar's own type: a model whose
+/// inertias are dual numbers gives the derivatives with respect to inertias.
 pub trait Constant<S>: Copy + Debug + Send + Sync + 'static {
-    /// This constant as a scalar.
+    /// Converts this constant to the scalar.
     fn lift(self) -> S;
-    /// The constant `x`.
+    /// Returns the constant `x`.
     fn of(x: f64) -> Self;
 }
 

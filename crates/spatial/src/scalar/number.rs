@@ -1,14 +1,15 @@
-//! Numbers that lanes are made of.
+//! Numbers that a lane can hold.
 
 use super::Scalar;
 
-/// A number that lanes are made of.
+/// Number that a lane can hold: `f64` or `f32`.
 pub trait Number: Scalar<Mask = bool> {
-    /// The largest angle that `near` takes.
+    /// Largest |x| that `near` accepts.
     const LARGEST: f64;
 
-    /// (sin x, cos x) of some x in this precision, for |x| up to `LARGEST`: their constants are loaded once.
+    /// Computes (sin x, cos x) of N values with |x| up to `LARGEST`, in this precision. The constants are loaded once
+    /// for all N.
     fn near<S: Scalar, const N: usize>(x: [S; N]) -> ([S; N], [S; N]);
-    /// (sin self, cos self), however large, of the platform.
+    /// Computes (sin self, cos self) with the platform's functions, for any size of self.
     fn far(self) -> (Self, Self);
 }

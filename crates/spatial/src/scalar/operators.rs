@@ -1,4 +1,4 @@
-//! Operators that follow from others.
+//! Assignment operators, derived from `+` and `−`.
 
 macro_rules! operators {
     ($type:ty $(, $($of:tt)*)?) => {

@@ -1,14 +1,14 @@
-//! What the platform computes of floats: the standard library, or where there is none, the crate libm.
+//! Floating-point functions of the platform: from the standard library, or from the crate libm without it.
 
-/// A float with the functions that are not arithmetic.
+/// Float with the functions that are not basic arithmetic.
 pub(super) trait Platform: Copy {
-    /// self · b + c, rounded once.
+    /// Returns self · b + c, rounded once.
     fn fused(self, b: Self, c: Self) -> Self;
-    /// √self.
+    /// Returns √self.
     fn root(self) -> Self;
-    /// (sin self, cos self).
+    /// Returns (sin self, cos self).
     fn sine_cosine(self) -> (Self, Self);
-    /// The angle of the point (x, self).
+    /// Returns the angle of the point (x, self).
     fn angle(self, x: Self) -> Self;
 }
 

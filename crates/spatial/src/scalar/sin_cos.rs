@@ -1,23 +1,24 @@
-//! Sine and cosine for every kind of number that has no derivative: one sequence of sums and products without branches, so
-//! that a lane and a single number give the same bits.
+//! Sine and cosine for every kind of number without derivative: one sequence of sums and products without branches. So
+//! a lane and a single number give the same bits.
 //!
-//! x = n π/2 + r with |r| ≤ π/4, n π/2 subtracted in three parts (Cody and Waite, *Software manual for the elementary
-//! functions*, 1980), each but the last short enough that its product with n is exact; then a polynomial for each of the
-//! two, with the coefficients of Moshier's Cephes library. In `f64`, for |x| up to 1e5, the error is at most 2.3e-16; sin −0 is 0.
+//! x = n π/2 + r with |r| ≤ π/4. n π/2 is subtracted in three parts (Cody and Waite, *Software manual for the
+//! elementary functions*, 1980). Each part except the last is short enough that its product with n is exact. Sine and
+//! cosine of r are polynomials with the coefficients of Moshier's Cephes library. In `f64`, for |x| up to 1e5, the
+//! error is at most 2.3e-16. The sine of −0 is 0.
 
 use super::Scalar;
 use super::number::Number;
 use super::platform::Platform;
 
-/// The constants of a precision.
+/// Constants for one floating-point precision.
 struct Precision<const T: usize> {
-    /// π/2 in parts, the largest first.
+    /// Parts of π/2, the largest first.
     parts: [f64; 3],
-    /// Adding it and taking it away again rounds to a whole number: 1.5 times the largest number with a fraction.
+    /// 1.5 times the largest number that can have a fraction. Adding and subtracting it rounds to an integer.
     magic: f64,
-    /// (sin r − r)/r³ as a polynomial of r², the highest power first.
+    /// Coefficients of (sin r − r)/r³ as a polynomial in r², highest power first.
     sin: [f64; T],
-    /// (cos r − 1 + r²/2)/r⁴, likewise.
+    /// Coefficients of (cos r − 1 + r²/2)/r⁴ as a polynomial in r², highest power first.
     cos: [f64; T],
 }
 
@@ -49,7 +50,7 @@ const SINGLE: Precision<3> = Precision {
     cos: [2.443_315_711_809_948e-5, -1.388_731_625_493_765e-3, 4.166_664_568_298_827e-2],
 };
 
-/// The polynomial of each z with these coefficients, the highest power's first.
+/// Evaluates the polynomial with coefficients c, highest power first, at each z.
 #[inline(always)]
 fn polynomial<S: Scalar, const T: usize, const N: usize>(c: &[f64; T], z: [S; N]) -> [S; N] {
     let mut sum = [S::splat(c[0]); N];
@@ -79,7 +80,7 @@ fn reduced<S: Scalar, const T: usize, const N: usize>(x: [S; N], of: &Precision<
         let c = (cos[k] * z).mul_add(z, z.mul_add(S::splat(-0.5), one)); // 1 − r²/2 + r⁴ Q(r²)
         // the quadrant m, n modulo 4, between −2 and 2
         let m = (n[k].mul_add(S::splat(0.25), magic) - magic).mul_add(S::splat(-4.0), n[k]);
-        // cos m π/2 and sin m π/2, of which one is 0 and one is ±1: sums with them are not rounded
+        // cos(m π/2) and sin(m π/2): one is 0 and the other ±1, so products with them are exact
         let along = one - m.abs();
         let across = m.mul_add(along, m);
         sin[k] = across.mul_add(c, along * s);
@@ -91,7 +92,7 @@ fn reduced<S: Scalar, const T: usize, const N: usize>(x: [S; N], of: &Precision<
 macro_rules! number {
     ($float:ident: $precision:ident up to $largest:literal) => {
         impl Number for $float {
-            /// The parts of π/2 suffice.
+            /// Bound up to which the parts of π/2 are exact enough.
             const LARGEST: f64 = $largest;
 
             #[inline(always)]

@@ -1,4 +1,4 @@
-//! Types of which the memory is the same under two names of a scalar: `f64`, and [`Fused`], which is a transparent wrapper of it.
+//! Types with the same memory layout for two scalars: `f64`, and [`Fused`], which is a transparent wrapper of `f64`.
 #![allow(unsafe_code)]
 
 use crate::algebra::inertia::{ArticulatedInertia, Inertia};
@@ -9,30 +9,31 @@ use crate::algebra::vector::{Mat3, Sym3, Vec3};
 use crate::simd::fused::Fused;
 use core::mem::ManuallyDrop;
 
-/// A type that may be read and written as `B`, where it stands in memory.
+/// Type whose values in memory may be read and written as `B`.
 ///
-/// What a kernel is called with is made of such types: a `Vec<S>` in a workspace, whose layout nobody promises, is refused by the
-/// compiler, where an [`Array`](crate::storage::Array) is not. [`alike!`](crate::alike) says it of a struct.
+/// Kernels take only arguments of such types. The compiler rejects a `Vec<S>` in a workspace, whose layout is not
+/// guaranteed, and accepts an [`Array`](crate::storage::Array). The macro [`alike!`](crate::alike) implements this
+/// trait for a struct.
 ///
 /// # Safety
-/// Both types have the same size, the same alignment and the same fields in the same places, each alike in its turn. So what is
-/// valid as the one is valid as the other.
+/// Both types have the same size, the same alignment, and the same fields at the same offsets; each pair of fields is
+/// alike too. So a valid value of one type is a valid value of the other.
 pub unsafe trait Alike<B>: Rename<B> {}
 
-/// A value that can be taken for a `B`: an argument of a kernel.
+/// Value that can be converted to a `B` without change of its bits: an argument of a kernel.
 pub trait Rename<B> {
-    /// The value under its other name.
+    /// Returns the value as a `B`.
     fn renamed(self) -> B;
 }
 
-/// A value of a type that has two names, under the other one.
+/// Reinterprets a value as another type.
 ///
 /// # Safety
-/// `A` and `B` are the same type, as code finds out that is generic in one of them; or they are [`Alike`].
+/// `A` and `B` are the same type, as generic code has checked; or they are [`Alike`].
 #[inline(always)]
 pub unsafe fn same<A, B>(a: A) -> B {
     assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
-    // SAFETY: by the caller; `a` is not dropped, so there is one of it.
+    // SAFETY: by the caller; `a` is not dropped, so the value exists once.
     unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
@@ -40,7 +41,7 @@ pub unsafe fn same<A, B>(a: A) -> B {
 impl<'a, A: Alike<B>, B> Rename<&'a B> for &'a A {
     #[inline(always)]
     fn renamed(self) -> &'a B {
-        // SAFETY: what stands there is a B as well.
+        // SAFETY: the value is a valid B as well.
         unsafe { &*core::ptr::from_ref(self).cast() }
     }
 }
@@ -49,7 +50,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a B> for &'a A {
 impl<'a, A: Alike<B>, B> Rename<&'a mut B> for &'a mut A {
     #[inline(always)]
     fn renamed(self) -> &'a mut B {
-        // SAFETY: what stands there is a B as well, and each B that is written there is an A.
+        // SAFETY: the value is a valid B as well, and each B that is written through the reference is a valid A.
         unsafe { &mut *core::ptr::from_mut(self).cast() }
     }
 }
@@ -58,7 +59,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a mut B> for &'a mut A {
 impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
     #[inline(always)]
     fn renamed(self) -> &'a [B] {
-        // SAFETY: as for a reference to one; the size and hence the distance of entries are the same.
+        // SAFETY: as for a reference to one value; the size, and so the distance between entries, is the same.
         unsafe { &*(core::ptr::from_ref(self) as *const [B]) }
     }
 }
@@ -67,7 +68,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
 impl<'a, A: Alike<B>, B> Rename<&'a mut [B]> for &'a mut [A] {
     #[inline(always)]
     fn renamed(self) -> &'a mut [B] {
-        // SAFETY: as for a reference to one; the size and hence the distance of entries are the same.
+        // SAFETY: as for a reference to one value; the size, and so the distance between entries, is the same.
         unsafe { &mut *(core::ptr::from_mut(self) as *mut [B]) }
     }
 }
@@ -88,7 +89,7 @@ impl<A: Rename<B>, B, const N: usize> Rename<[B; N]> for [A; N] {
     }
 }
 
-// SAFETY: the layout of an array is that of its entries, one after another.
+// SAFETY: an array stores its entries one after another, without gaps.
 #[doc(hidden)]
 unsafe impl<A: Alike<B>, B, const N: usize> Alike<[B; N]> for [A; N] {}
 
@@ -116,11 +117,13 @@ impl Rename<f64> for Fused {
     }
 }
 
-/// Says of structs over a scalar that those over `f64` and over [`Fused`] are [`Alike`], with the names of their fields: those that
-/// depend on the scalar, then, behind `same`, those that do not. The compiler checks that there are no others, that each is alike
-/// or the same, and that each stands in the same place, as it does where the struct is `repr(C)`.
+/// Implements [`Alike`] for a struct over a scalar: the struct over `f64` is alike the struct over [`Fused`].
 ///
-/// Of types that do not depend on a scalar it says that they are what they are.
+/// First name the fields that depend on the scalar; after `same`, name those that do not. The compiler checks three
+/// things: no field is missing, each field is alike or the same, and each has the same offset. Offsets are equal if the
+/// struct is `repr(C)`.
+///
+/// A type that does not depend on a scalar is declared to be alike itself.
 ///
 /// ```
 /// use condyle_spatial::{Array, Motion, alike};
@@ -129,7 +132,7 @@ impl Rename<f64> for Fused {
 /// alike!(Workspace { v, tau } same { order });
 /// ```
 ///
-/// A field whose layout would not be the same, or that is left out, does not compile:
+/// A field with a different layout, or a missing field, does not compile:
 ///
 /// ```compile_fail,E0277
 /// # use condyle_spatial::{Array, alike};
@@ -161,7 +164,7 @@ macro_rules! alike {
         }
     )+};
     ($name:ident { $($field:ident),* $(,)? } $(same { $($same:ident),* $(,)? })?) => {
-        // SAFETY: the fields are alike or the same, and in the same places, or what follows would not compile.
+        // SAFETY: the fields are alike or the same and have equal offsets, else the checks below would not compile.
         #[doc(hidden)]
         #[allow(unsafe_code)]
         unsafe impl $crate::simd::alike::Alike<$name<$crate::simd::Fused>> for $name<f64> {}

@@ -1,4 +1,4 @@
-//! A single number that computes as a lane does.
+//! Single number that rounds as a lane does.
 #![allow(unsafe_code)]
 
 use crate::scalar::Scalar;
@@ -10,20 +10,20 @@ use crate::simd::level::{Level, SHORT, VECTORS, assert_supported, level};
 use crate::simd::pack::Block;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// An `f64` whose products and sums are fused where those of lanes are (in WebAssembly they are not): what a lane is, alone.
+/// Single `f64` that rounds like a lane: products and sums are fused wherever lanes fuse them (not in WebAssembly).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
 pub struct Fused(pub f64);
 
 impl Fused {
-    /// Numbers under this name.
+    /// Reinterprets a slice of `f64` as a slice of `Fused`.
     #[inline(always)]
     pub fn of(x: &[f64]) -> &[Self] {
         // SAFETY: it is a transparent wrapper.
         unsafe { core::slice::from_raw_parts(x.as_ptr().cast(), x.len()) }
     }
 
-    /// Numbers to be written, under this name.
+    /// Reinterprets a mutable slice of `f64` as a slice of `Fused`.
     #[inline(always)]
     pub fn of_mut(x: &mut [f64]) -> &mut [Self] {
         // SAFETY: as for `of`.
@@ -108,7 +108,7 @@ impl Scalar for Fused {
         let (sin, cos) = self.0.far();
         (Self(sin), Self(cos))
     }
-    /// Two vectors of four at a time: where there are lanes, there are these.
+    /// Uses two vectors of four at a time. Code on `Fused` runs only at a level that has these vectors.
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
         assert_supported(SHORT);
@@ -156,13 +156,13 @@ impl<const N: usize> Lanes<f64, N>
 where
     f64: Element<N>,
 {
-    /// Single numbers, one for each lane.
+    /// Creates a vector from one number per lane.
     #[inline(always)]
     pub fn from_fused(x: &[Fused; N]) -> Self {
         // SAFETY: `Fused` is a transparent wrapper of `f64`.
         Self::from_array(unsafe { *core::ptr::from_ref(x).cast() })
     }
-    /// The single number in each lane.
+    /// Returns the number in each lane.
     #[inline(always)]
     pub fn to_fused(self) -> [Fused; N] {
         let x = self.to_array();

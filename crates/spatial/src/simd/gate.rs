@@ -1,19 +1,20 @@
-//! The gate to vector instructions: where kernels are compiled, for which scalars, and with what.
+//! Gate to vector instructions: decides where a kernel is compiled, for which scalars, and with which instructions.
 //!
-//! [`kernel!`](crate::kernel) wraps a pass, a tile or a factor, whose body is generic and inlined throughout, into a
-//! function that is called:
+//! [`kernel!`](crate::kernel) wraps a pass, a tile or a factorization, whose body is generic and always inlined, into a
+//! function:
 //!
-//! - for the scalars of every day, `f64` and its lanes, it is compiled in the crate that owns it, once, with the vector
-//!   instructions that the scalar is made of; whoever uses the library calls that code;
-//! - a single `f64` computes with fused products and sums where the processor has them, as [`Fused`], which is the same
-//!   64 bits under another name: arguments, workspaces included, are taken for the same over [`Fused`], which they are
-//!   [`Alike`];
-//! - a single `f32` is compiled there too, without vector instructions, so that debug builds of users do not slow it down;
-//! - for all other scalars (dual numbers, lanes of `f32`, a user's own) it is compiled where it is used.
+//! - For the common scalars, `f64` and its lanes, it is compiled once, in the crate that defines it. It uses the vector
+//!   instructions of the scalar. Users of the library call this compiled code.
+//! - A single `f64` uses fused products and sums where the processor has them: it is converted to [`Fused`], which has
+//!   the same 64 bits. Arguments, workspaces included, are reinterpreted as types over `Fused` ([`Alike`]).
+//! - A single `f32` is compiled there too, without vector instructions, so that users' debug builds do not slow it
+//!   down.
+//! - For all other scalars (dual numbers, lanes of `f32`, a user's own type) it is compiled in the crate that uses it.
 //!
-//! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the level's registers within one
-//! state, and [`level_function!`](crate::level_function) for small functions that are called often, such as the tiles of dense
-//! kernels: it passes arguments in registers, where the two others pass them as one value in memory.
+//! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the vector registers of the
+//! level within one state. [`level_function!`](crate::level_function) is for small functions that are called often,
+//! such as the tiles of dense kernels. It passes arguments in registers; the two others pass them as one value in
+//! memory.
 #![allow(unsafe_code)]
 
 pub use crate::simd::alike::{Alike, Rename, same};
@@ -23,19 +24,19 @@ pub use crate::simd::level::{Level, level};
 pub use crate::simd::pack::{Real, Witness};
 use core::any::TypeId;
 
-/// Four numbers at once, with AVX2, NEON or SIMD128.
+/// Vector of four numbers, with AVX2, NEON or SIMD128.
 pub type Short<W> = <f64 as Real>::Short<W>;
-/// Eight numbers at once, with AVX-512; elsewhere the same as `Short`.
+/// Vector of eight numbers, with AVX-512; elsewhere the same as `Short`.
 pub type Long<W> = <f64 as Real>::Long<W>;
 
-/// Whether two types are the same one.
+/// Returns whether two types are the same.
 #[inline(always)]
 pub fn is<A: 'static, B: 'static>() -> bool {
     TypeId::of::<A>() == TypeId::of::<B>()
 }
 
-/// Statements for vectors, where the processor may have some ([`VECTORS`](crate::simd::level::VECTORS)), else others: so that
-/// nothing is compiled for vectors that a microcontroller has not.
+/// Expands to the first block where the processor may have vectors ([`VECTORS`](crate::simd::level::VECTORS)), else to
+/// the second. So no vector code is compiled for a microcontroller, which has no vectors.
 #[cfg(any(
     all(target_arch = "x86_64", feature = "std"),
     target_arch = "aarch64",
@@ -46,7 +47,7 @@ pub fn is<A: 'static, B: 'static>() -> bool {
 macro_rules! if_vectors {
     ({ $($with:tt)* } else { $($without:tt)* }) => { $($with)* };
 }
-/// What stands in the place of code for vectors, which are not here.
+/// Expands to the second block, because this target has no vectors.
 #[cfg(not(any(
     all(target_arch = "x86_64", feature = "std"),
     target_arch = "aarch64",
@@ -58,8 +59,9 @@ macro_rules! if_vectors {
     ({ $($with:tt)* } else { $($without:tt)* }) => { $($without)* };
 }
 
-/// A function that runs a pass, generic over the scalar `S` and, where it sees a model, over the type `R` of its constants; see
-/// [`gate`](crate::simd::gate). It returns nothing: what it computes is in its arguments.
+/// Defines a function that runs a pass, generic over the scalar `S`. If the pass uses a model, it is also generic over
+/// the type `R` of the model's constants. See [`gate`](crate::simd::gate). The function returns nothing: results are
+/// written to its arguments.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! kernel {
@@ -83,13 +85,13 @@ macro_rules! kernel {
             if !$S::COMPILED {
                 return $S::enter(Work::<_, ($S, $($R)?)>(($($arg,)*), ::core::marker::PhantomData));
             }
-            $(assert!(is::<$R, f64>(), "the constants of a model for numbers are numbers");)?
+            $(assert!(is::<$R, f64>(), "model constants for f64 and its lanes are f64");)?
             let f64 = is::<$S, f64>();
             $crate::if_vectors!({
                 use $crate::simd::gate::{Fused, Level, level};
 
                 struct Gate;
-                // SAFETY: each scalar's code is entered through its door.
+                // SAFETY: each scalar's code is entered through its `enter`.
                 unsafe impl $crate::simd::gate::Witness for Gate {}
                 type Short = $crate::simd::gate::Short<Gate>;
                 type Long = $crate::simd::gate::Long<Gate>;
@@ -102,7 +104,8 @@ macro_rules! kernel {
             $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
         }
     };
-    // the function compiled for one scalar, if it is the one; with a condition on which numbers are taken for it
+    // the function compiled for one scalar, called if `$S` is this scalar; with `numbers if`, also for `f64` if the
+    // condition holds
     (@call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*) $(, numbers if $fused:expr)?) => {
         let chosen = $chosen;
         {
@@ -137,9 +140,9 @@ macro_rules! kernel {
     };
 }
 
-/// A function on `f64` whose body is generic over the vector registers `V` that it may use: the widest of the level,
-/// compiled for them in the crate that owns it. It is for levels that have registers, above the baseline, and returns
-/// nothing.
+/// Defines a function on `f64` whose body is generic over the vector registers `V`. `V` are the widest registers of the
+/// SIMD level, and the body is compiled for them in the crate that defines it. Call it only at levels above the
+/// baseline. The function returns nothing.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! register_kernel {
@@ -163,7 +166,7 @@ macro_rules! register_kernel {
                 use $crate::simd::gate::{Level, level};
 
                 struct Gate;
-                // SAFETY: the registers' code is entered through their door.
+                // SAFETY: code for the registers is entered through their `enter`.
                 unsafe impl $crate::simd::gate::Witness for Gate {}
                 type Short = $crate::simd::gate::Short<Gate>;
                 type Long = $crate::simd::gate::Long<Gate>;
@@ -174,15 +177,16 @@ macro_rules! register_kernel {
                     <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
                 }
             } else {
-                // as right, if anybody called it
+                // never called on such targets, but correct
                 <f64 as $crate::Scalar>::enter(Work::<_, f64>(work, ::core::marker::PhantomData));
             });
         }
     };
 }
 
-/// A function that is compiled for each level in the crate that owns it: `item` is what it consists of, `long`, `short` and
-/// `baseline` are the functions of its arguments for registers of eight, of four, and of those that every processor has.
+/// Defines a function that is compiled for each SIMD level in the crate that defines it. `item` is its implementation.
+/// `long`, `short` and `baseline` are the functions to call for registers of eight numbers, of four numbers, and of the
+/// registers that every processor has.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! level_function {

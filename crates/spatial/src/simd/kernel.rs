@@ -1,19 +1,21 @@
-//! Work that is compiled for the instructions of a level, and the doors through which it is entered.
+//! Work that is compiled for the instructions of a SIMD level, and the functions that enter it.
 #![allow(unsafe_code)]
 
 use crate::simd::level::{SHORT, assert_supported};
 
-/// Work that is to be compiled for a level: `run` is always inlined, and so takes the level of the function it stands in.
+/// Work that is compiled for a SIMD level. `run` is always inlined, so it is compiled for the level of the function
+/// that calls it.
 pub trait Kernel: Sized {
-    /// The work.
+    /// Does the work.
     fn run(self);
 }
 
-/// Runs a kernel with the instructions of [`Real::Short`](crate::simd::pack::Real::Short): those of
-/// [`Level::Avx2`](crate::simd::level::Level::Avx2), or where the processor is of another kind, of its only level.
+/// Runs a kernel with the instructions of [`Real::Short`](crate::simd::pack::Real::Short).
+///
+/// On x86-64, these belong to [`Level::Avx2`](crate::simd::level::Level::Avx2). Other processors have only one level.
 ///
 /// # Panics
-/// If the processor does not have them.
+/// If the processor does not have these instructions.
 #[inline(always)]
 pub fn short(kernel: impl Kernel) {
     #[inline(never)]
@@ -23,7 +25,7 @@ pub fn short(kernel: impl Kernel) {
     }
     assert_supported(SHORT);
     // SAFETY: the processor has the instructions.
-    #[allow(unused_unsafe)] // elsewhere than on x86-64 every processor has them
+    #[allow(unused_unsafe)] // except on x86-64, every processor has the instructions
     unsafe {
         with_instructions(kernel);
     }

@@ -1,13 +1,16 @@
-//! Which vector instructions this machine has, and which of them are used.
+//! SIMD levels: which vector instructions this machine has, and which of them are used.
 //!
-//! A build holds code for every level of its architecture; the best that the processor has is chosen at the first call. The
-//! environment variable `CONDYLE_LEVEL` (`baseline`, `simd128`, `neon`, `avx2`, `avx512`) or [`pin`] chooses a lower one, so that
-//! results can be repeated to the last bit on machines of one architecture that differ: a level decides where products and
-//! sums are fused. (On Arm they are wherever an algorithm asks for it, at the baseline too.)
+//! A build contains code for every SIMD level of its architecture. The first call chooses the best level that the
+//! processor has. The environment variable `CONDYLE_LEVEL` (`baseline`, `simd128`, `neon`, `avx2`, `avx512`) or [`pin`]
+//! chooses a lower one.
 //!
-//! A WebAssembly module cannot ask: it has SIMD128 if it was compiled with `-C target-feature=+simd128`, and then runs only where
-//! that is known, which is in every browser since 2023. Nor can a program without the standard library: it runs at the
-//! baseline of its processor, on a 64-bit Arm with NEON.
+//! A level decides where products and sums are fused. With the same level, different machines of one architecture give
+//! the same results to the last bit. (On Arm, products are fused wherever an algorithm asks for it, at the baseline
+//! too.)
+//!
+//! A WebAssembly module cannot query the processor. It has SIMD128 if it was compiled with `-C
+//! target-feature=+simd128`, and then runs only in browsers with SIMD128: every browser since 2023. A program without
+//! the standard library cannot query the processor either. It runs at the baseline, and on 64-bit Arm with NEON.
 
 #[cfg(feature = "std")]
 mod requested;
@@ -17,22 +20,23 @@ use core::sync::atomic::{AtomicU8, Ordering};
 #[cfg(feature = "std")]
 pub use requested::{Refused, requested};
 
-/// A set of vector instructions.
+/// SIMD level: a set of vector instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// One number at a time, with what every processor of its architecture has: SSE2, or fused products on Arm.
+    /// One number at a time, with instructions that every processor of the architecture has: SSE2, or fused products on
+    /// Arm.
     Baseline = 1,
-    /// SIMD128 of WebAssembly: four numbers at once in two registers; products are not fused.
+    /// SIMD128 of WebAssembly: four numbers at once in two registers, without fused products.
     Simd128 = 2,
-    /// NEON, which every 64-bit Arm has: four numbers at once in two registers, fused products.
+    /// NEON, which every 64-bit Arm has: four numbers at once in two registers, with fused products.
     Neon = 3,
-    /// AVX2 and FMA: four numbers at once, fused products.
+    /// AVX2 and FMA: four numbers at once, with fused products.
     Avx2 = 4,
-    /// AVX-512 (F, DQ, VL, BW): eight numbers at once.
+    /// AVX-512 (F, DQ, VL, BW): eight numbers at once, with fused products.
     Avx512 = 5,
 }
 
-/// The level at which there are vectors of four, for the kind of processor that this is compiled for.
+/// Level with vectors of four numbers, for the architecture that this is compiled for.
 pub(crate) const SHORT: Level = if cfg!(target_arch = "aarch64") {
     Level::Neon
 } else if cfg!(target_arch = "wasm32") {
@@ -41,7 +45,7 @@ pub(crate) const SHORT: Level = if cfg!(target_arch = "aarch64") {
     Level::Avx2
 };
 
-/// Whether there can be a level above the baseline. Where there cannot, nobody has to ask.
+/// Whether a level above the baseline is possible on this target. If not, no run-time query is needed.
 #[doc(hidden)]
 pub const VECTORS: bool = cfg!(any(
     all(target_arch = "x86_64", feature = "std"),
@@ -50,10 +54,10 @@ pub const VECTORS: bool = cfg!(any(
 ));
 
 impl Level {
-    /// All levels, the lowest first.
+    /// All levels, lowest first.
     pub const ALL: [Self; 5] = [Self::Baseline, Self::Simd128, Self::Neon, Self::Avx2, Self::Avx512];
 
-    /// Whether this processor can run it.
+    /// Returns whether this processor can run the level.
     pub fn is_supported(self) -> bool {
         match self {
             Self::Baseline => true,
@@ -74,7 +78,7 @@ impl Level {
         }
     }
 
-    /// The name of a level, as `CONDYLE_LEVEL` writes it.
+    /// Returns the name of the level, as used in `CONDYLE_LEVEL`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Baseline => "baseline",
@@ -96,10 +100,10 @@ impl fmt::Display for Level {
     }
 }
 
-/// A level that this processor does not have.
+/// Error: this processor does not have the level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unsupported(
-    /// The level.
+    /// Missing level.
     pub Level,
 );
 
@@ -111,12 +115,12 @@ impl fmt::Display for Unsupported {
 
 impl core::error::Error for Unsupported {}
 
-/// The level in use; 0 until it is first asked for.
+/// Level in use; 0 before the first query.
 static LEVEL: AtomicU8 = AtomicU8::new(0);
 
-/// The level in use: the one pinned, else `CONDYLE_LEVEL`, else the best that this processor has.
+/// Returns the level in use: the pinned one, else `CONDYLE_LEVEL`, else the best level of this processor.
 ///
-/// A `CONDYLE_LEVEL` that cannot be obeyed ([`requested`]) is reported on the standard error, once, and the best level is
+/// If `CONDYLE_LEVEL` is invalid or unsupported ([`requested`]), standard error gets one report and the best level is
 /// used.
 ///
 /// ```
@@ -138,10 +142,10 @@ pub fn level() -> Level {
     }
 }
 
-/// Asserts that this processor has a level: at each door to code that is compiled for it.
+/// Panics if this processor does not have a level. Each function that enters code compiled for a level calls it.
 #[inline(always)]
 pub(crate) fn assert_supported(level: Level) {
-    /// The best level of this processor; 0 until it is first asked for. (Each has all below that are of its kind.)
+    /// Best level of this processor; 0 before the first query. (It includes all lower levels of its architecture.)
     static BEST: AtomicU8 = AtomicU8::new(0);
     #[cold]
     fn find(level: Level) {
@@ -164,7 +168,7 @@ fn choose() -> Level {
     };
     #[cfg(not(feature = "std"))]
     let level = best;
-    // another thread may have chosen or pinned one meanwhile
+    // another thread may have chosen or pinned a level meanwhile
     match LEVEL.compare_exchange(0, level as u8, Ordering::Relaxed, Ordering::Relaxed) {
         Ok(_) => {
             #[cfg(feature = "std")]
@@ -177,7 +181,7 @@ fn choose() -> Level {
     }
 }
 
-/// Uses this level from now on, in all threads.
+/// Sets the level to use from now on, in all threads.
 ///
 /// ```
 /// use condyle_spatial::level::{Level, level, pin};
@@ -187,7 +191,7 @@ fn choose() -> Level {
 /// ```
 ///
 /// # Errors
-/// [`Unsupported`], if this processor does not have it.
+/// Returns [`Unsupported`] if this processor does not have the level.
 pub fn pin(level: Level) -> Result<(), Unsupported> {
     if !level.is_supported() {
         return Err(Unsupported(level));

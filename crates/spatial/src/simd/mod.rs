@@ -1,4 +1,4 @@
-//! Vector instructions: which there are, numbers side by side in registers, and the one gate to code that is compiled for them.
+//! Vector instructions: detection of the SIMD level, lanes in registers, and the gate to code compiled for a level.
 
 pub mod alike;
 pub mod fused;

@@ -1,7 +1,7 @@
-//! Packers: rows of numbers, one row for each lane, to vectors, one for each place in a row, and back.
+//! Conversion between rows of numbers and SIMD vectors: one row per lane, one vector per column.
 //!
-//! L rows of L numbers are L vectors, and what is wanted is their transpose: log₂ L exchanges of ever larger parts, each
-//! of which keeps one half of a vector and takes the other from its partner.
+//! L rows of L numbers are L vectors, and the result is their transpose. It takes log₂ L exchange steps between ever
+//! larger parts. In each step, a vector keeps one half and takes the other half from its partner.
 #![allow(unsafe_code)]
 
 use crate::algebra::motion::Force;
@@ -9,21 +9,22 @@ use crate::scalar::Scalar;
 use crate::simd::kernel::Kernel;
 use crate::simd::lanes::{self, Element, Lanes};
 
-/// A scalar that is made of numbers side by side, or is one of them.
+/// Scalar that consists of several lanes, or of one number.
 pub trait Block: Scalar {
-    /// One of the numbers.
+    /// Number type of a lane.
     type Number: Scalar;
 
-    /// The first numbers of a slice, one for each lane.
+    /// Loads the first `LANES` numbers of a slice, one per lane.
     fn load(from: &[Self::Number]) -> Self;
     /// Writes the number of each lane.
     fn store(self, to: &mut [Self::Number]);
-    /// Of as many vectors as there are lanes, number i of vector k becomes number k of vector i.
+    /// Transposes `LANES` vectors: number i of vector k becomes number k of vector i.
     fn transpose(rows: &mut [Self]);
 }
 
-/// Rows of numbers become vectors: number i of row k becomes lane k of `to[i]`, for rows of as many numbers as `to` has, one
-/// after the other in `from`. If there are fewer rows than lanes, the last one fills up.
+/// Converts rows of numbers to vectors: number i of row k becomes lane k of `to[i]`. Each row has the length of `to`;
+/// the rows are stored one after another in `from`. If there are fewer rows than lanes, the last row fills the
+/// remaining lanes.
 #[inline]
 pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
     let (n, mut each) = (to.len(), [&from[..0]; MOST]);
@@ -32,7 +33,7 @@ pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
     }
     let mut last = [S::Number::zero(); MOST];
     if n < S::LANES && 2 * n >= S::LANES && rows > 0 {
-        // each row with the beginning of the next one, so that it is as long as a vector, and nothing after the last
+        // extends each row by the beginning of the next one to the length of a vector, and the last row by zeros
         for (k, row) in each[..rows - 1].iter_mut().enumerate() {
             *row = &from[k * n..][..S::LANES];
         }
@@ -42,13 +43,13 @@ pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
     gather_rows(&each[..rows], to);
 }
 
-/// Rows of numbers become vectors, as in [`gather`], for rows that stand anywhere; they may be longer than `to`.
+/// Converts rows of numbers to vectors as [`gather`] does. The rows may be anywhere in memory, and longer than `to`.
 #[inline]
 pub fn gather_rows<S: Block>(from: &[&[S::Number]], to: &mut [S]) {
     S::enter(Gather(from, to));
 }
 
-/// Vectors become rows of numbers: lane k of `from[i]` becomes number i of row k, for the first `rows` lanes.
+/// Converts vectors to rows of numbers: lane k of `from[i]` becomes number i of row k, for the first `rows` lanes.
 #[inline]
 pub fn scatter<S: Block>(from: &[S], rows: usize, to: &mut [S::Number]) {
     let mut each: [&mut [S::Number]; MOST] = Default::default();
@@ -60,7 +61,7 @@ pub fn scatter<S: Block>(from: &[S], rows: usize, to: &mut [S::Number]) {
     }
 }
 
-/// Vectors become rows of numbers, as in [`scatter`], to rows that stand anywhere.
+/// Converts vectors to rows of numbers as [`scatter`] does. The rows may be anywhere in memory.
 #[inline]
 pub fn scatter_rows<S: Block>(from: &[S], to: &mut [&mut [S::Number]]) {
     let columns = from.len();
@@ -71,23 +72,23 @@ pub fn scatter_rows<S: Block>(from: &[S], to: &mut [&mut [S::Number]]) {
     );
 }
 
-/// Lane k of a matrix of vectors becomes a matrix of numbers in `to[k]`, row by row, with `stride` numbers from one row to
-/// the next.
+/// Writes lane k of a matrix of vectors to a matrix of numbers in `to[k]`, row by row. `stride` is the distance between
+/// the starts of consecutive rows.
 #[inline]
 pub fn scatter_matrix<S: Block>(from: &Strided<'_, S>, to: &mut [&mut [S::Number]], stride: usize) {
     S::enter(Scatter(*from, to, stride));
 }
 
-/// A matrix of vectors, or minus it.
+/// Matrix of vectors with strides, and a sign.
 #[derive(Clone, Copy, Debug)]
 pub struct Strided<'a, S> {
-    /// Its entries.
+    /// Storage of the entries.
     pub vectors: &'a [S],
-    /// The distances from one row to the next, and from one column to the next.
+    /// Distances from one row to the next, and from one column to the next.
     pub strides: [usize; 2],
-    /// The numbers of rows and columns.
+    /// Numbers of rows and columns.
     pub shape: [usize; 2],
-    /// Whether minus the matrix is meant.
+    /// Whether the value is minus the stored matrix.
     pub negative: bool,
 }
 
@@ -132,10 +133,10 @@ impl<S: Block> Kernel for Gather<'_, S> {
     }
 }
 
-/// Writes as many vectors as there are lanes, or minus them, to `to[k][at..]` what is in lane k.
+/// Writes lane k of the `LANES` vectors of a tile, or minus it, to `to[k][at..]`.
 ///
 /// # Safety
-/// There is a place for as many numbers as a vector has.
+/// Each slice in `to` has at least `LANES` numbers from index `at`.
 #[inline(always)]
 unsafe fn write_tile<S: Block>(mut tile: [S; MOST], negative: bool, to: &mut [&mut [S::Number]], at: usize) {
     if negative {
@@ -183,10 +184,14 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
         let fits = |last: Option<usize>, length: usize| last.is_some_and(|last| last < length);
         let (entry, place) = (last(down, along), last(stride, 1));
         assert!(fits(entry, from.len()), "a matrix ends before its last entry");
-        assert!(to.len() <= S::LANES && to.iter().all(|to| fits(place, to.len())), "no place for the last entry");
-        let mut offsets = [0; MOST]; // of the vectors of a tile
+        assert!(
+            to.len() <= S::LANES && to.iter().all(|to| fits(place, to.len())),
+            "a target ends before the last entry"
+        );
+        let mut offsets = [0; MOST]; // offsets of the vectors of a tile
         if columns < S::LANES && stride == columns && rows * columns >= S::LANES {
-            // narrow rows, one after the other, as if they were one: each tile but the last begins with a row
+            // Narrow rows without gaps are treated as one long row. Each tile except the last begins at the start of a
+            // row.
             let mut walk = |mut i: usize, mut j: usize| {
                 for k in 0..S::LANES {
                     offsets[k] = i * down + j * along;
@@ -201,10 +206,10 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             let (mut i, mut first) = (0, 0);
             loop {
                 for k in 0..S::LANES {
-                    // SAFETY: the tile ends with the last entry or before, which is there.
+                    // SAFETY: the tile ends at the last entry or before it, and the last entry exists.
                     block[k] = *unsafe { from.get_unchecked(i * down + tile[k]) };
                 }
-                // SAFETY: as above; the last entry has a place.
+                // SAFETY: as above; the last entry has a slot in each slice of `to`.
                 unsafe { write_tile(block, negative, to, first) };
                 if first + S::LANES >= n {
                     return;
@@ -231,7 +236,7 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             }
             return;
         }
-        // SAFETY: the last entry is there and has a place, and there are as many columns as lanes, at least.
+        // SAFETY: the last entry exists and has a slot in `to`, and there are at least as many columns as lanes.
         unsafe {
             match along {
                 1 => write_rows::<S, true>(self.0, to, stride),
@@ -241,10 +246,10 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
     }
 }
 
-/// Writes a matrix, with its columns side by side or not.
+/// Writes a matrix; `BESIDE`: whether consecutive columns are adjacent in memory.
 ///
 /// # Safety
-/// It is at least as wide as a vector, its last entry is there, and has a place.
+/// The matrix is at least as wide as a vector. Its last entry exists and has a slot in `to`.
 #[inline(always)]
 unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut [&mut [S::Number]], stride: usize) {
     let Strided { vectors, strides: [down, along], shape: [rows, columns], negative } = of;
@@ -252,8 +257,8 @@ unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut 
     for k in 0..S::LANES {
         offsets[k] = k * along;
     }
-    // Tiles of a long row begin at a line of the cache, the first one but for what it shares with the next: stores that touch two
-    // lines take longer. Rows that follow each other begin anywhere.
+    // Tiles of a long row begin at a cache line, because stores across two lines take longer. The first tile is an
+    // exception: it may overlap the next one. Rows that follow each other begin anywhere.
     let beyond_line = to[0].as_ptr().addr() / size_of::<S::Number>() % S::LANES;
     let mut shared = if rows == 1 && columns >= 2 * S::LANES { beyond_line } else { 0 };
     for i in 0..rows {
@@ -275,26 +280,26 @@ unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut 
     }
 }
 
-/// The numbers in the lanes of some vectors.
+/// Returns the numbers in the lanes of vectors, vector by vector.
 pub fn lanes<S: Block>(of: &[S]) -> &[S::Number] {
     assert!(size_of::<S>() == S::LANES * size_of::<S::Number>());
-    // SAFETY: a vector is its numbers side by side, as the assertion says too, and is aligned at least as they are.
+    // SAFETY: a vector consists only of its numbers, as the assertion also checks, and its alignment suffices for them.
     unsafe { core::slice::from_raw_parts(of.as_ptr().cast(), of.len() * S::LANES) }
 }
 
-/// The numbers of some forces, six of each.
+/// Reinterprets forces as numbers, six per force.
 pub fn flat<S>(forces: &[Force<S>]) -> &[S] {
-    // SAFETY: a force is `repr(C)`, of two vectors that are `repr(C)`, of three numbers each: six numbers and nothing else.
+    // SAFETY: a force is `repr(C)`, of two `repr(C)` vectors of three numbers each: six numbers and nothing else.
     unsafe { core::slice::from_raw_parts(forces.as_ptr().cast(), 6 * forces.len()) }
 }
 
-/// The numbers of some forces, to be written.
+/// Reinterprets mutable forces as numbers, six per force.
 pub fn flat_mut<S>(forces: &mut [Force<S>]) -> &mut [S] {
     // SAFETY: as for `flat`.
     unsafe { core::slice::from_raw_parts_mut(forces.as_mut_ptr().cast(), 6 * forces.len()) }
 }
 
-/// More lanes than this no vector has.
+/// Maximum number of lanes of a vector.
 pub const MOST: usize = 16;
 
 macro_rules! single {
@@ -324,7 +329,7 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     }
     #[inline(always)]
     fn store(self, to: &mut [T]) {
-        *to.first_chunk_mut().expect("a place for each lane") = self.to_array();
+        *to.first_chunk_mut().expect("a slot for each lane") = self.to_array();
     }
     #[inline(always)]
     fn transpose(rows: &mut [Self]) {
@@ -332,9 +337,9 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     }
 }
 
-/// A promise, by which the types of vectors can be named. Their operations are instructions that not every processor has,
-/// and no operation looks whether this one does; so nobody else can name them, and code that is generic over its scalar
-/// meets them only where it was entered through a door that does look ([`Scalar::enter`]).
+/// Unsafe marker that is required to name vector types. Vector operations are instructions that a processor may lack,
+/// and they do not check for it. Code that is generic over its scalar is entered through [`Scalar::enter`], which does
+/// check.
 ///
 /// ```compile_fail
 /// use condyle_spatial::{Scalar, block::Real};
@@ -354,17 +359,17 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
 /// let four = condyle_spatial::moves::sum(condyle_spatial::Scalar::splat(1.0));
 /// ```
 ///
-/// # Safety
-/// Whoever implements this uses vectors only where the processor has their instructions: in kernels that were entered
-/// through their door, and in functions that were called at their level.
+/// The implementer uses vectors only where the processor has their instructions: in kernels that were entered through
+/// `Scalar::enter`, and in functions that were called at the level of the vectors.
 pub unsafe trait Witness: 'static {}
 
-/// A number with its vectors.
+/// Number type with its vector types.
 pub trait Real: Block<Number = Self> {
-    /// The vectors of [`Level::Avx2`](crate::simd::level::Level::Avx2), of
-    /// [`Level::Neon`](crate::simd::level::Level::Neon), or of [`Level::Simd128`](crate::simd::level::Level::Simd128).
+    /// Vector of [`Level::Avx2`](crate::simd::level::Level::Avx2), [`Level::Neon`](crate::simd::level::Level::Neon) or
+    /// [`Level::Simd128`](crate::simd::level::Level::Simd128).
     type Short<W: Witness>: Block<Number = Self>;
-    /// The vectors of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as short ones where there is none.
+    /// Vector of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as `Short` where this level does not
+    /// exist.
     type Long<W: Witness>: Block<Number = Self>;
 }
 

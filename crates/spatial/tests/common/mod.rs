@@ -1,4 +1,4 @@
-//! What the tests of this crate draw at random, and how they compare.
+//! Random inputs and comparisons for the tests of this crate.
 #![allow(dead_code)] // each test file uses a part of it
 
 use condyle_spatial::{Force, Inertia, Mat3, Motion, Quaternion, Se3, Sym3, Vec3, lie};
@@ -6,17 +6,17 @@ use core::f64::consts::PI;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// The same cases in every run: a test that fails does so for everybody.
+/// Returns a configuration with a fixed seed, so that every run tests the same cases.
 pub(crate) fn config() -> ProptestConfig {
     ProptestConfig { cases: 1024, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
 }
 
-/// Components in (−2, 2).
+/// Draws a vector with components in (−2, 2).
 pub(crate) fn vec3() -> impl Strategy<Value = Vec3<f64>> {
     prop::array::uniform3(-2.0..2.0).prop_map(Vec3::from)
 }
 
-/// A unit vector, the coordinate axes included.
+/// Draws a unit vector, including the coordinate axes.
 pub(crate) fn axis() -> impl Strategy<Value = Vec3<f64>> {
     let e = |k: usize| Vec3::from(core::array::from_fn(|i| if i == k { 1.0 } else { 0.0 }));
     prop_oneof![
@@ -26,7 +26,7 @@ pub(crate) fn axis() -> impl Strategy<Value = Vec3<f64>> {
     ]
 }
 
-/// Angles of [0, π), crowded towards both ends. At π itself the sense of a rotation is a matter of rounding.
+/// Draws an angle in [0, π), with more samples near both ends. At π itself, rounding decides the sense of a rotation.
 pub(crate) fn angle() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => 0.0..PI,
@@ -36,12 +36,12 @@ pub(crate) fn angle() -> impl Strategy<Value = f64> {
     ]
 }
 
-/// A rotation vector shorter than π.
+/// Draws a rotation vector shorter than π.
 pub(crate) fn rotation_vector() -> impl Strategy<Value = Vec3<f64>> {
     (axis(), angle()).prop_map(|(axis, angle)| axis.scale(angle))
 }
 
-/// A rotation's matrix, half turns included.
+/// Draws a rotation matrix, including half turns.
 pub(crate) fn rotation() -> impl Strategy<Value = Mat3<f64>> {
     let half_turn = axis().prop_map(|n| Quaternion { vector: n, scalar: 0.0 });
     prop_oneof![8 => rotation_vector().prop_map(lie::exp3), 1 => half_turn].prop_map(Quaternion::to_rotation)
@@ -51,7 +51,7 @@ pub(crate) fn motion() -> impl Strategy<Value = Motion<f64>> {
     (vec3(), vec3()).prop_map(|(linear, angular)| Motion { linear, angular })
 }
 
-/// A twist of angle below π.
+/// Draws a twist with an angle below π.
 pub(crate) fn twist() -> impl Strategy<Value = Motion<f64>> {
     (vec3(), rotation_vector()).prop_map(|(linear, angular)| Motion { linear, angular })
 }
@@ -64,20 +64,20 @@ pub(crate) fn pose() -> impl Strategy<Value = Se3<f64>> {
     (rotation(), vec3()).prop_map(|(rotation, translation)| Se3 { rotation, translation })
 }
 
-/// A body made of four mass points.
+/// Draws the inertia of a body of four mass points.
 pub(crate) fn inertia() -> impl Strategy<Value = Inertia<f64>> {
     prop::collection::vec((0.1..2.0, vec3()), 4).prop_map(|points| {
         points.into_iter().fold(Inertia::zero(), |I, (m, c)| I + Inertia::from_com(m, c, Sym3::zero()))
     })
 }
 
-/// A 3×3 matrix by its columns as the 9 numbers.
+/// Returns the 9 numbers of a 3×3 matrix, column by column.
 pub(crate) fn flat(A: Mat3<f64>) -> [f64; 9] {
     let [x, y, z] = A.columns().map(Vec3::to_array);
     [x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]]
 }
 
-/// max |a − b|; NaN anywhere gives infinity.
+/// Returns max |a − b|; infinity if any difference is NaN.
 pub(crate) fn distance(a: impl AsRef<[f64]>, b: impl AsRef<[f64]>) -> f64 {
     let (a, b) = (a.as_ref(), b.as_ref());
     assert_eq!(a.len(), b.len());

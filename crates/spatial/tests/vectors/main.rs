@@ -1,4 +1,4 @@
-//! Vectors of numbers: in each lane what a single number gives, to the last bit.
+//! Vectors of numbers: each lane gives the same bits as a single number.
 
 mod packers;
 
@@ -9,21 +9,21 @@ use condyle_spatial::moves::{Move, sum};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// The promise to use vectors at their level.
+/// Witness that allows the tests to name vector types.
 struct Here;
 
-// SAFETY: each level is looked for before its vectors are used.
+// SAFETY: each level is checked before its vectors are used.
 #[allow(unsafe_code)]
 unsafe impl Witness for Here {}
 
 type Four = <f64 as Real>::Short<Here>;
 
-/// A single number.
+/// Single number.
 trait Number: Real<Mask = bool> {
-    /// self · b + c, rounded once.
+    /// Returns self · b + c, rounded once.
     fn fused(self, b: Self, c: Self) -> Self;
     fn bits(self) -> u64;
-    /// Those at which something special happens, and some more; as many as suit all vectors.
+    /// Returns special values and some others; their count is a multiple of all lane counts.
     fn some() -> Vec<Self>;
 }
 
@@ -33,7 +33,7 @@ macro_rules! number {
             fn fused(self, b: Self, c: Self) -> Self {
                 $float::mul_add(self, b, c)
             }
-            /// Not-a-numbers are all alike.
+            /// Returns the bits of the number; all NaNs are equal.
             fn bits(self) -> u64 {
                 if self.is_nan() { u64::MAX } else { self.to_bits().into() }
             }
@@ -95,8 +95,8 @@ impl<S: Block<Number: Number>> Operations<S> {
     }
 }
 
-/// Sines and cosines of an odd number of vectors: the bits of each vector alone, and of single numbers but for rounding. Large
-/// angles stand beside small ones.
+/// Checks sines and cosines of an odd number of vectors. The bits equal the results for each vector alone, and single
+/// numbers agree up to rounding. Small and large angles are mixed.
 struct Sines<S>(PhantomData<S>);
 
 impl<S: Block<Number: Number>> Kernel for Sines<S> {
@@ -124,7 +124,7 @@ impl<S: Block<Number: Number>> Kernel for Sines<S> {
     }
 }
 
-/// Between lanes: each of four numbers to each lane, and all together.
+/// Checks operations between lanes: moves of each number to each lane, and the sum of all lanes.
 struct Moves;
 
 impl Kernel for Moves {
@@ -139,7 +139,7 @@ impl Kernel for Moves {
                 assert_eq!(found.map(f64::to_bits), expected.map(f64::to_bits));
             }
         }
-        let x = [1e16, 3.0, -1e16, 0.1]; // of which each order has another sum
+        let x = [1e16, 3.0, -1e16, 0.1]; // each order of summation gives another sum
         assert_eq!(sum::<Here>(Four::from_array(x)).to_array(), [3.1; 4]);
     }
 }

@@ -1,4 +1,4 @@
-//! Rows of numbers to vectors and back.
+//! Conversion of rows of numbers to vectors and back.
 
 use crate::Here;
 use condyle_spatial::Scalar;
@@ -7,10 +7,10 @@ use condyle_spatial::level::{Level, Unsupported};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// The most lanes that a vector has.
+/// Maximum number of lanes of a vector.
 const MOST: usize = 16;
 
-/// Rows there and back, with some rows and numbers over.
+/// Converts rows to vectors and back, with incomplete groups of rows and numbers.
 struct Back<S>(PhantomData<S>);
 
 impl<S: Block<Number: From<u16> + PartialEq>> Kernel for Back<S> {
@@ -45,7 +45,7 @@ impl<S: Block<Number: From<u16> + PartialEq>> Back<S> {
             scatter(&again, S::LANES, &mut back);
             (0..S::LANES).for_each(|k| assert!(back[k * n..][..n] == rows[k.min(some - 1) * n..][..n]));
         }
-        // as a matrix, and minus its transpose, of as many columns and of fewer than lanes
+        // as a matrix, and as minus its transpose, with fewer or more columns than lanes
         for (columns, more) in [(n, 3), (1, 3), (n, 0), (1, 0), (2, 0), (2, 3)] {
             if !n.is_multiple_of(columns) {
                 continue;
@@ -71,7 +71,7 @@ impl<S: Block<Number: From<u16> + PartialEq>> Back<S> {
 }
 
 #[test]
-fn there_and_back() {
+fn rows_to_vectors_and_back() {
     fn back<S: Block<Number: From<u16> + PartialEq>>() {
         S::enter(Back::<S>(PhantomData));
     }

@@ -1,14 +1,14 @@
-//! Lanes of a processor whose vectors we do not know: arrays, as the compiler sees fit. No level uses them; they are here so
-//! that code on lanes needs no second version.
+//! Lanes for a processor whose vector instructions are not supported here: arrays, which the compiler may vectorize. No
+//! SIMD level uses them. They exist so that code on lanes needs no second version.
 
 use super::{Element, Lanes, Register};
 use crate::scalar::number::Number;
 use crate::simd::kernel::Kernel;
 use crate::simd::pack::Witness;
 
-/// The widest vectors of `f64`.
+/// Widest vector of `f64`.
 pub(crate) type LongF64 = Lanes<f64, 4>;
-/// The widest vectors of `f32`.
+/// Widest vector of `f32`.
 pub(crate) type LongF32 = Lanes<f32, 8>;
 impl Element<4> for f64 {
     type Register = [Self; 4];
@@ -17,7 +17,7 @@ impl Element<8> for f32 {
     type Register = [Self; 8];
 }
 
-/// Functions of the numbers in lane k.
+/// Defines functions that compute lane k from the numbers in lane k.
 macro_rules! each {
     ($(fn $name:ident($($x:ident: $type:ty),*) -> $out:ty = [$first:expr; $k:ident => $lane:expr])*) => {$(
         #[inline(always)]
@@ -62,19 +62,19 @@ impl<T: Number, const N: usize> Register<T, N> for [T; N] {
     }
 }
 
-/// Numbers that change their lane, in vectors of four.
+/// Moves of numbers between the lanes of a vector of four.
 pub mod moves {
     use super::{Lanes, Witness};
 
-    /// Which lane's number goes to which lane; a lane to which none goes becomes 0.
+    /// Assignment of source lanes to target lanes. A target lane without a source becomes 0.
     #[derive(Clone, Copy, Debug)]
     pub struct Move {
-        /// Of each lane, that of the number that it gets; 4 of one that gets none.
+        /// Source lane of each target lane; 4 if it has no source.
         from: [usize; 4],
     }
 
     impl Move {
-        /// A move from lane to lane, for each pair.
+        /// Creates a move from pairs (source lane, target lane).
         pub fn new(pairs: &[(usize, usize)]) -> Self {
             let mut this = Self { from: [4; 4] };
             for &(from, to) in pairs {
@@ -83,7 +83,7 @@ pub mod moves {
             this
         }
 
-        /// The numbers in their new lanes.
+        /// Returns the numbers in their new lanes.
         #[inline(always)]
         pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             let [a, b, c, d] = x.0;
@@ -92,7 +92,7 @@ pub mod moves {
         }
     }
 
-    /// The sum of the numbers, in every lane: (x₀ + x₂) + (x₁ + x₃).
+    /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
     pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         let [a, b, c, d] = x.0;

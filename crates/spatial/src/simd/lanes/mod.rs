@@ -1,13 +1,16 @@
-//! Several numbers side by side in one vector register.
+//! SIMD lanes: several numbers side by side in vector registers.
 //!
-//! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 and FMA, or NEON or SIMD128, where they are two registers each;
-//! `Lanes<f64, 8>` and `Lanes<f32, 16>` AVX-512; and [`Fused`](super::Fused) is a single `f64` where products and sums are fused. They are
-//! for code that has been entered through a function compiled for their [`Level`](crate::simd::level::Level), which is the
-//! business of a dispatcher: anywhere else each operation would be a function call, and on a processor without the
-//! instructions an illegal one. Only who promises to keep to this can name them ([`Witness`](crate::simd::pack::Witness)). Every operation treats each lane alone, so what one lane holds (not-a-numbers included) never
-//! reaches another.
+//! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 and FMA, or NEON or SIMD128, where each uses two registers.
+//! `Lanes<f64, 8>` and `Lanes<f32, 16>` need AVX-512. [`Fused`](super::Fused) is a single `f64` with fused products and
+//! sums.
 //!
-//! What a processor does is in the file of its kind, x86.rs, neon.rs or wasm.rs, as an implementation of [`Register`].
+//! Use these types only in code that was entered through a function compiled for their
+//! [`Level`](crate::simd::level::Level). Elsewhere each operation would be a function call, and an illegal instruction
+//! on a processor that lacks it. So only a [`Witness`](crate::simd::pack::Witness) can name these types.
+//!
+//! Every operation treats each lane separately: the content of one lane (NaN included) never affects another.
+//!
+//! Each architecture implements [`Register`] in its own file: x86.rs, neon.rs or wasm.rs.
 #![allow(unsafe_code)]
 
 use crate::scalar::number::Number;
@@ -33,56 +36,56 @@ pub(crate) use processor::{LongF32, LongF64};
 )]
 mod processor;
 
-/// A number of which vectors of N exist.
+/// Number type for which vectors of N lanes exist.
 pub trait Element<const N: usize>: Number {
-    /// The place where they are.
+    /// Register or registers that hold the vector.
     type Register: Register<Self, N>;
 }
 
-/// N numbers in one vector register or in two. They are used only in code that is compiled for their level and runs where the
-/// processor has it.
+/// N numbers in one or two vector registers. They are used only in code that is compiled for their level and that runs
+/// on a processor with this level.
 pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
-    /// The outcome of a comparison.
+    /// Result of a comparison.
     type Mask: Copy;
 
     /// Runs a kernel with the instructions of these registers.
     fn enter(kernel: impl Kernel);
-    /// The numbers of an array.
+    /// Loads the numbers of an array.
     fn load(x: [T; N]) -> Self;
-    /// The lanes as an array.
+    /// Returns the lanes as an array.
     fn store(a: Self) -> [T; N];
-    /// x in every lane.
+    /// Returns x in every lane.
     fn splat(x: T) -> Self;
-    /// 0 in every lane: bits, where [`splat`](Self::splat) is an instruction. Workspaces are filled with it by code that is
-    /// compiled for any processor, where an instruction of these registers would be a call.
+    /// Returns 0 in every lane, as zero bits; [`splat`](Self::splat) is an instruction. Code compiled for any processor
+    /// fills workspaces with this value. There, an instruction of these registers would be a function call.
     fn zero() -> Self;
-    /// a + b.
+    /// Returns a + b.
     fn add(a: Self, b: Self) -> Self;
-    /// a − b.
+    /// Returns a − b.
     fn sub(a: Self, b: Self) -> Self;
-    /// a b.
+    /// Returns a b.
     fn mul(a: Self, b: Self) -> Self;
-    /// a / b.
+    /// Returns a / b.
     fn div(a: Self, b: Self) -> Self;
-    /// a b + c, rounded once; in WebAssembly, which has no such instruction, twice.
+    /// Returns a b + c, rounded once; in WebAssembly, which has no such instruction, rounded twice.
     fn mul_add(a: Self, b: Self, c: Self) -> Self;
-    /// √a.
+    /// Returns √a.
     fn sqrt(a: Self) -> Self;
-    /// −a.
+    /// Returns −a.
     fn neg(a: Self) -> Self;
-    /// |a|.
+    /// Returns |a|.
     fn abs(a: Self) -> Self;
-    /// a < b.
+    /// Returns a < b.
     fn lt(a: Self, b: Self) -> Self::Mask;
-    /// a where the mask holds, b elsewhere.
+    /// Returns a where the mask holds, b elsewhere.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
-    /// Both masks hold.
+    /// Returns whether both masks hold.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Whether at least one of the masks holds.
+    /// Returns whether at least one of the masks holds.
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// The mask holds in some lane.
+    /// Returns whether the mask holds in at least one lane.
     fn any(mask: Self::Mask) -> bool;
-    /// Number i of row k becomes number k of row i.
+    /// Transposes N rows: number i of row k becomes number k of row i.
     #[inline(always)]
     fn transpose(rows: &mut [Self; N]) {
         let mut to = [[T::zero(); N]; N];
@@ -98,13 +101,13 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     }
 }
 
-/// N numbers side by side.
+/// Vector of N numbers.
 #[derive(Clone, Copy)]
 #[repr(transparent)]
 pub struct Lanes<T: Element<N>, const N: usize>(T::Register);
 
-/// Functions of the instructions that a processor has.
-#[allow(unused_macros)] // where it has none
+/// Defines functions that consist of instructions of a processor.
+#[allow(unused_macros)] // unused without vector instructions
 macro_rules! instructions {
     ($($(#[$doc:meta])* fn $name:ident($($x:ident: $type:ty),*) $(-> $out:ty)? { $body:expr })*) => {$(
         $(#[$doc])*
@@ -157,23 +160,23 @@ impl<T: Element<N>, const N: usize> fmt::Debug for Lanes<T, N> {
 }
 
 impl<T: Element<N>, const N: usize> Lanes<T, N> {
-    /// One number for each lane.
+    /// Creates a vector from one number per lane.
     #[inline(always)]
     pub fn from_array(x: [T; N]) -> Self {
         Self(T::Register::load(x))
     }
-    /// The number in each lane.
+    /// Returns the number in each lane.
     #[inline(always)]
     pub fn to_array(self) -> [T; N] {
         T::Register::store(self.0)
     }
-    /// Of as many vectors as there are lanes, number i of vector k becomes number k of vector i.
+    /// Transposes N vectors: number i of vector k becomes number k of vector i.
     #[inline(always)]
     pub(crate) fn transpose(rows: &mut [Self; N]) {
         // SAFETY: these are transparent wrappers.
         T::Register::transpose(unsafe { &mut *core::ptr::from_mut(rows).cast() });
     }
-    /// (sin x, cos x) of some vectors.
+    /// Computes (sin x, cos x) of K vectors.
     #[inline(always)]
     pub(crate) fn sines_and_cosines<const K: usize>(x: [Self; K]) -> ([Self; K], [Self; K]) {
         let largest = Self::splat(T::LARGEST);
@@ -190,7 +193,7 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
         }
         (sin, cos)
     }
-    /// Each lane alone, by a function of one number.
+    /// Applies a function of one number to each lane.
     #[inline(always)]
     fn each(self, f: fn(T) -> (T, T)) -> (Self, Self) {
         let x = self.to_array();
@@ -217,7 +220,7 @@ impl<T: Number, const N: usize> Constant<Unused<T, N>> for [T; N] {
     }
 }
 
-/// A constant of its own in each lane.
+/// Model constant with a different value in each lane.
 #[doc(hidden)]
 impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
     #[inline(always)]
@@ -264,7 +267,7 @@ impl<T: Element<N>, const N: usize> Scalar for Lanes<T, N> {
         let ([sin], [cos]) = Self::sines_and_cosines([self]);
         (sin, cos)
     }
-    /// Two at a time.
+    /// Computes two vectors at a time.
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
         let (angles, others) = angles.as_chunks_mut::<2>();

@@ -1,17 +1,17 @@
-//! Lanes by NEON, which every 64-bit Arm has: two registers side by side, so that there is as much to do at once as with
-//! AVX2, and one source and one plan of limbs serve both.
+//! Lanes with NEON, which every 64-bit Arm has. A vector is two registers, so it has as many lanes as with AVX2. The
+//! same source code, and the same assignment of limbs to lanes, serve both.
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, short};
 use crate::simd::pack::Witness;
 use core::arch::aarch64::*;
 
-/// The widest vectors of `f64`.
+/// Widest vector of `f64`.
 pub(crate) type LongF64 = Lanes<f64, 4>;
-/// The widest vectors of `f32`.
+/// Widest vector of `f32`.
 pub(crate) type LongF32 = Lanes<f32, 8>;
 
-/// A mask is two vectors with all bits of a lane set or none.
+/// Implements a pair of registers. A mask is two vectors; all bits of a lane are 1 where it holds, else 0.
 macro_rules! pair {
     (
         $pair:ident of $n:literal $float:ident, $mask:ident:
@@ -56,7 +56,7 @@ macro_rules! pair {
 }
 
 instructions! {
-    /// The largest of two numbers' halves.
+    /// Returns the largest 32-bit half of two 64-bit numbers.
     fn largest_half(x: uint64x2_t) -> u32 { vmaxvq_u32(vreinterpretq_u32_u64(x)) }
 }
 
@@ -80,19 +80,20 @@ pair! {
     vabsq_f32 vcltq_f32 vbslq_f32 vandq_u32 vorrq_u32 vmaxvq_u32;
 }
 
-/// Numbers that change their lane, in vectors of four.
+/// Moves of numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 
-    /// Which lane's number goes to which lane; a lane to which none goes becomes 0.
+    /// Assignment of source lanes to target lanes. A target lane without a source becomes 0.
     #[derive(Clone, Copy, Debug)]
     pub struct Move {
-        /// Of each lane, the eight bytes of the number that it gets; of one that gets none, no byte of a vector.
+        /// Indices of the eight bytes of the source number, for each target lane; an index outside the vector if it has
+        /// no source.
         from: [[u8; 8]; 4],
     }
 
     impl Move {
-        /// A move from lane to lane, for each pair.
+        /// Creates a move from pairs (source lane, target lane).
         pub fn new(pairs: &[(usize, usize)]) -> Self {
             let mut this = Self { from: [[u8::MAX; 8]; 4] };
             for &(from, to) in pairs {
@@ -101,7 +102,7 @@ pub mod moves {
             this
         }
 
-        /// The numbers in their new lanes.
+        /// Returns the numbers in their new lanes.
         #[inline(always)]
         pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             // SAFETY: a vector of this kind exists, so the level is supported; two rows of the array have 16 bytes.
@@ -114,7 +115,7 @@ pub mod moves {
         }
     }
 
-    /// The sum of the numbers, in every lane: (x₀ + x₂) + (x₁ + x₃).
+    /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
     pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         // SAFETY: a vector of this kind exists, so the level is supported.

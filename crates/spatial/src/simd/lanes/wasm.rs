@@ -1,17 +1,17 @@
-//! Lanes by SIMD128 of WebAssembly: two registers side by side, as with NEON. There is no fused product: where one is asked
-//! for, the product is rounded before the sum is, in lanes and in single numbers alike.
+//! Lanes with SIMD128 of WebAssembly: a vector is two registers, as with NEON. There are no fused products: `mul_add`
+//! rounds the product before the sum, in lanes and in single numbers alike.
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, short};
 use crate::simd::pack::Witness;
 use core::arch::wasm32::*;
 
-/// The widest vectors of `f64`.
+/// Widest vector of `f64`.
 pub(crate) type LongF64 = Lanes<f64, 4>;
-/// The widest vectors of `f32`.
+/// Widest vector of `f32`.
 pub(crate) type LongF32 = Lanes<f32, 8>;
 
-/// Two registers with all bits of a lane set or none.
+/// Mask of two registers; all bits of a lane are 1 where it holds, else 0.
 #[derive(Clone, Copy)]
 pub struct Mask(v128, v128);
 
@@ -21,7 +21,7 @@ macro_rules! pair {
         $splat:ident $add:ident $sub:ident $mul:ident $div:ident $sqrt:ident $neg:ident $abs:ident $lt:ident;
         $($transpose:tt)*
     ) => {
-        /// Numbers side by side in two registers.
+        /// Vector of numbers in two registers.
         #[derive(Clone, Copy)]
         pub struct $pair(v128, v128);
 
@@ -83,20 +83,20 @@ pair! {
     f32x4_splat f32x4_add f32x4_sub f32x4_mul f32x4_div f32x4_sqrt f32x4_neg f32x4_abs f32x4_lt;
 }
 
-/// Numbers that change their lane, in vectors of four.
+/// Moves of numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 
-    /// Which lane's number goes to which lane; a lane to which none goes becomes 0.
+    /// Assignment of source lanes to target lanes. A target lane without a source becomes 0.
     #[derive(Clone, Copy, Debug)]
     pub struct Move {
-        /// Of each lane, the eight bytes of the number that it gets, of those in the first register and of those in the
-        /// second; no byte of a register where there is none.
+        /// Indices of the eight bytes of the source number, for each source register and target lane. The index is
+        /// outside the register if the source number is not in this register.
         from: [[[u8; 8]; 4]; 2],
     }
 
     impl Move {
-        /// A move from lane to lane, for each pair.
+        /// Creates a move from pairs (source lane, target lane).
         pub fn new(pairs: &[(usize, usize)]) -> Self {
             let mut this = Self { from: [[[u8::MAX; 8]; 4]; 2] };
             for &(from, to) in pairs {
@@ -105,7 +105,7 @@ pub mod moves {
             this
         }
 
-        /// The numbers in their new lanes.
+        /// Returns the numbers in their new lanes.
         #[inline(always)]
         pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             let [first, second] = &self.from;
@@ -118,7 +118,7 @@ pub mod moves {
         }
     }
 
-    /// The sum of the numbers, in every lane: (x₀ + x₂) + (x₁ + x₃).
+    /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
     pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         let pairs = f64x2_add(x.0.0, x.0.1);

@@ -1,4 +1,4 @@
-//! Lanes by AVX2 with FMA, and by AVX-512.
+//! Lanes with AVX2 and FMA, and with AVX-512.
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, short};
@@ -6,15 +6,15 @@ use crate::simd::level::{Level, assert_supported};
 use crate::simd::pack::Witness;
 use core::arch::x86_64::*;
 
-/// The widest vectors of `f64`.
+/// Widest vector of `f64`.
 pub(crate) type LongF64 = Lanes<f64, 8>;
-/// The widest vectors of `f32`.
+/// Widest vector of `f32`.
 pub(crate) type LongF32 = Lanes<f32, 16>;
 
 /// Runs a kernel with the instructions of [`Level::Avx512`](crate::simd::level::Level::Avx512).
 ///
 /// # Panics
-/// If the processor does not have them.
+/// If the processor does not have these instructions.
 #[inline(always)]
 fn long(kernel: impl Kernel) {
     #[inline(never)]
@@ -27,7 +27,7 @@ fn long(kernel: impl Kernel) {
     unsafe { with_instructions(kernel) }
 }
 
-/// The operations of all registers, by the names of the instructions.
+/// Implements `Register` for a register type, given the names of its instructions.
 macro_rules! register {
     (
         $register:ident of $n:literal $float:ident, $mask:ident, $enter:ident;
@@ -65,7 +65,7 @@ macro_rules! register {
     };
 }
 
-/// A mask is a vector with all bits of a lane set or none.
+/// Implements an AVX2 register. A mask is a vector; all bits of a lane are 1 where it holds, else 0.
 macro_rules! avx2 {
     (
         $register:ident of $n:literal $float:ident: $($alike:ident)*;
@@ -84,7 +84,7 @@ macro_rules! avx2 {
     };
 }
 
-/// A mask is a number with a bit for each lane.
+/// Implements an AVX-512 register. A mask is an integer with one bit per lane.
 macro_rules! avx512 {
     (
         $register:ident of $n:literal $float:ident, $mask:ident: $($alike:ident)*;
@@ -111,7 +111,7 @@ avx2! {
     fn transpose(rows: &mut [Self; 4]) {{
         let [a, b, c, d] = *rows;
         let (even, odd) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b)); // numbers 0, 2 and 1, 3 of rows 0, 1
-        let (even2, odd2) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d)); // of rows 2, 3
+        let (even2, odd2) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d)); // the same of rows 2, 3
         *rows = [
             _mm256_permute2f128_pd::<0x20>(even, even2),
             _mm256_permute2f128_pd::<0x20>(odd, odd2),
@@ -147,7 +147,7 @@ avx512! {
 }
 
 instructions! {
-    /// Numbers k, k + 2, k + 4, k + 6 of eight rows, from (k, k + 2, …) of two rows each.
+    /// Returns numbers k, k + 2, k + 4, k + 6 of eight rows, given numbers (k, k + 2, …) of two rows in each vector.
     fn columns(x: [__m512d; 4]) -> [__m512d; 4] {{
         let (low, high) = (_mm512_shuffle_f64x2::<0x88>(x[0], x[1]), _mm512_shuffle_f64x2::<0x88>(x[2], x[3]));
         let (low2, high2) = (_mm512_shuffle_f64x2::<0xdd>(x[0], x[1]), _mm512_shuffle_f64x2::<0xdd>(x[2], x[3]));
@@ -160,21 +160,21 @@ instructions! {
     }}
 }
 
-/// Numbers that change their lane, in vectors of four.
+/// Moves of numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 
-    /// Which lane's number goes to which lane; a lane to which none goes becomes 0.
+    /// Assignment of source lanes to target lanes. A target lane without a source becomes 0.
     #[derive(Clone, Copy, Debug)]
     pub struct Move {
-        /// Of each lane, the two halves of the number that it gets.
+        /// Indices of the two 32-bit halves of the source number, for each target lane.
         from: [i32; 8],
-        /// All bits set in a lane that gets a number.
+        /// Mask: all bits set in a lane that receives a number, else 0.
         to: [i64; 4],
     }
 
     impl Move {
-        /// A move from lane to lane, for each pair.
+        /// Creates a move from pairs (source lane, target lane).
         pub fn new(pairs: &[(usize, usize)]) -> Self {
             let mut this = Self { from: [0; 8], to: [0; 4] };
             for &(from, to) in pairs {
@@ -184,7 +184,7 @@ pub mod moves {
             this
         }
 
-        /// The numbers in their new lanes.
+        /// Returns the numbers in their new lanes.
         #[inline(always)]
         pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             // SAFETY: a vector of this kind exists, so the level is supported; the arrays have 32 bytes each.
@@ -197,7 +197,7 @@ pub mod moves {
         }
     }
 
-    /// The sum of the numbers, in every lane: (x₀ + x₂) + (x₁ + x₃).
+    /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
     pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         // SAFETY: a vector of this kind exists, so the level is supported.

@@ -1,20 +1,20 @@
-//! The level that the environment asks for.
+//! SIMD level that the environment requests.
 
 use super::{Level, Unsupported};
 use core::fmt;
 
-/// A `CONDYLE_LEVEL` that cannot be obeyed.
+/// Error: `CONDYLE_LEVEL` has a value that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Refused {
-    /// The value names no level.
+    /// The value is not the name of a level.
     Unknown(
-        /// The value.
+        /// Value of the variable.
         String,
     ),
     /// This processor does not have the level.
     Unsupported(
-        /// The level.
+        /// Requested level.
         Level,
     ),
 }
@@ -32,7 +32,7 @@ impl fmt::Display for Refused {
 
 impl core::error::Error for Refused {}
 
-/// Levels as a sentence names them.
+/// List of levels for a sentence.
 struct List<'a>(&'a [Level]);
 
 impl fmt::Display for List<'_> {
@@ -51,7 +51,7 @@ impl fmt::Display for List<'_> {
     }
 }
 
-/// The level that `CONDYLE_LEVEL` asks for, if it is set.
+/// Returns the level that `CONDYLE_LEVEL` requests, or `None` if it is not set.
 ///
 /// ```
 /// let requested = condyle_spatial::level::requested()?; // a program that would rather stop than run another level
@@ -60,7 +60,7 @@ impl fmt::Display for List<'_> {
 /// ```
 ///
 /// # Errors
-/// [`Refused`], if it names no level, or one that this processor does not have.
+/// Returns [`Refused`] if the value is not the name of a level, or if this processor does not have the level.
 pub fn requested() -> Result<Option<Level>, Refused> {
     let Some(name) = std::env::var_os("CONDYLE_LEVEL") else { return Ok(None) };
     let Some(level) = Level::ALL.into_iter().find(|level| name == level.name()) else {
