@@ -1,4 +1,4 @@
-//! Hyper-dual numbers as Python objects, which NumPy's arrays of objects calculate with.
+//! Hyper-dual numbers as Python objects, which NumPy stores in arrays of objects.
 
 use crate::arrays::{Give, Number, check_shape};
 use condyle::Scalar;
@@ -10,33 +10,33 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// The hyper-dual number that the library computes with. Its operations are called, not inlined: a model's functions have
-/// thousands of them, and what takes time is Python's making and reading of each number.
+/// A hyper-dual number for the library's computations. Its operations are function calls, not inlined: a model's
+/// functions contain thousands of them, and the time goes into creating and reading the Python objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hyper(HyperDual64);
 
 impl Hyper {
-    /// A number that changes in the first direction at the rate 1.
+    /// Returns a number that changes in the first direction at the rate 1.
     pub(crate) fn first(x: f64) -> Self {
         Self(HyperDual64::new(x, 1.0, 0.0, 0.0))
     }
-    /// A number that changes in the second direction at the rate 1.
+    /// Returns a number that changes in the second direction at the rate 1.
     pub(crate) fn second(x: f64) -> Self {
         Self(HyperDual64::new(x, 0.0, 1.0, 0.0))
     }
-    /// A number that changes in both directions at some rates.
+    /// Returns a number that changes in the two directions at the given rates.
     pub(crate) fn with(x: f64, [first, second]: [f64; 2]) -> Self {
         Self(HyperDual64::new(x, first, second, 0.0))
     }
-    /// The number itself.
+    /// Returns the number without derivatives.
     pub(crate) fn value(self) -> f64 {
         self.0.re
     }
-    /// The second derivative by both directions.
+    /// Returns the mixed second derivative in the two directions.
     pub(crate) fn curvature(self) -> f64 {
         self.0.eps1eps2
     }
-    /// The derivatives in both directions.
+    /// Returns the derivatives in the two directions.
     pub(crate) fn slopes(self) -> [f64; 2] {
         [self.0.eps1, self.0.eps2]
     }
@@ -110,12 +110,12 @@ impl Scalar for Hyper {
     }
 }
 
-/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0: it knows its derivatives in two
-/// directions, and the second derivative by both.
+/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. It carries its derivatives in two
+/// directions, and the mixed second derivative.
 ///
-/// Arrays of them are NumPy arrays of objects; arithmetic and NumPy's elementary functions work on these, and so do
-/// all functions of a model and a state, which then return such arrays. Comparisons look at `re`. `condyle.jacobian`,
-/// `gradient` and `hessian` make them and read the derivatives.
+/// Store them in NumPy arrays of objects. Arithmetic and NumPy's elementary functions work on these, and so do all
+/// functions of a model and a state, which then return such arrays. Comparisons use `re`. `condyle.jacobian`,
+/// `gradient` and `hessian` create these numbers and read the derivatives.
 ///
 /// Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
 ///
@@ -126,7 +126,8 @@ impl Scalar for Hyper {
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct HyperDual(HyperDual64);
 
-/// The other number of an operation: hyper-dual or real. It is no array: an array has operations of its own.
+/// The other operand of an operation: a hyper-dual or real number. Arrays are not accepted, since NumPy handles their
+/// operations.
 pub(crate) struct Operand(HyperDual64);
 
 impl<'py> FromPyObject<'_, 'py> for Operand {
@@ -165,7 +166,7 @@ impl HyperDual {
     fn eps2(&self) -> f64 {
         self.0.eps2
     }
-    /// The second derivative by both.
+    /// The mixed second derivative.
     #[getter]
     fn eps1eps2(&self) -> f64 {
         self.0.eps1eps2
@@ -175,7 +176,7 @@ impl HyperDual {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = self.0;
         format!("HyperDual({re}, eps1={eps1}, eps2={eps2}, eps1eps2={eps1eps2})")
     }
-    /// The parts of a pickle.
+    /// Returns the parts of a pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = slf.get().0;
         Ok((slf.get_type(), (re, eps1, eps2, eps1eps2)).into_pyobject(slf.py())?.into_any())
@@ -226,14 +227,14 @@ impl HyperDual {
         Self(Scalar::abs(self.0))
     }
     fn __richcmp__(&self, other: Operand, by: CompareOp) -> bool {
-        let order = self.0.re.partial_cmp(&other.0.re); // none beside NaN
+        let order = self.0.re.partial_cmp(&other.0.re); // `None` if one is NaN
         order.map_or(matches!(by, CompareOp::Ne), |order| by.matches(order))
     }
     fn __bool__(&self) -> bool {
         self.0.re != 0.0
     }
 
-    /// The angle of the point (x, self) in the plane.
+    /// Returns the angle of the point (x, self) in the plane.
     fn arctan2(&self, x: Operand) -> Self {
         Self(Scalar::atan2(self.0, x.0))
     }
@@ -334,7 +335,7 @@ impl HyperDual {
     }
 }
 
-/// Whether an argument contains a hyper-dual number.
+/// Returns whether an argument contains a hyper-dual number.
 pub(crate) fn within(given: &Bound<'_, PyAny>) -> bool {
     if given.cast::<PyUntypedArray>().is_ok_and(|array| array.dtype().kind() != b'O') {
         return false;
