@@ -79,7 +79,8 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; method: M
     b.forward_dynamics(model, q, v, tau, f_ext, method)
 }
 
-/// The joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+/// Computes the joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n
+/// depth).
 ///
 /// q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
 ///
@@ -92,7 +93,7 @@ fn crba(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.crba(model, q) }
 
-/// The inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
+/// Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
 ///
 /// q: nq numbers.
 ///
@@ -136,7 +137,7 @@ fn static_torque(model, data; q: Position, f_ext: Forces = None; out) {
 }
 batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque(model, q, f_ext) }
 
-/// The Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
+/// Computes the Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
 ///
 /// q: nq numbers; v: nv.
 ///

@@ -24,7 +24,7 @@ fn com(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.com(model, q) }
 
-/// The velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
+/// Computes the velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
 ///
 /// q: nq numbers; v: nv.
 fn com_velocity(model, data; q: Position, v: Tangent; out) {
@@ -32,8 +32,8 @@ fn com_velocity(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.com_velocity(model, q, v) }
 
-/// The acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3 numbers
-/// (m/s²); O(n).
+/// Computes the acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3
+/// numbers (m/s²); O(n).
 ///
 /// q: nq numbers; v, a: nv.
 fn com_acceleration(model, data; q: Position, v: Tangent, a: Tangent; out) {
@@ -41,7 +41,7 @@ fn com_acceleration(model, data; q: Position, v: Tangent, a: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.com_acceleration(model, q, v, a) }
 
-/// The Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
+/// Computes the Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 ///
 /// q: nq numbers. It is a part of `centroidal_map`.
 fn com_jacobian(model, data; q: Position; out) {
@@ -92,7 +92,7 @@ fn centroidal_momentum_rate(model, data; q: Position, v: Tangent, a: Tangent; ou
 }
 batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.centroidal_momentum_rate(model, q, v, a) }
 
-/// The kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
+/// Computes the kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
 ///
 /// q: nq numbers; v: nv.
 ///
@@ -105,7 +105,7 @@ fn kinetic_energy(model, data; q: Position, v: Tangent) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy(model, q, v) }
 
-/// The potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
+/// Computes the potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
 ///
 /// q: nq numbers.
 fn potential_energy(model, data; q: Position) {
@@ -113,7 +113,7 @@ fn potential_energy(model, data; q: Position) {
 }
 batch b: any(q: Position) -> One { b.potential_energy(model, q) }
 
-/// The mechanical energy E = T + V (J); O(n).
+/// Computes the mechanical energy E = T + V (J); O(n).
 ///
 /// q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
 fn mechanical_energy(model, data; q: Position, v: Tangent) {

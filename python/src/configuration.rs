@@ -30,7 +30,7 @@ pub(crate) fn random_configuration<'py>(model: &Bound<'py, Model>, seed: Option<
 }
 
 functions! {
-/// The neutral position, nq numbers: zeros, and the identity for rotations.
+/// Returns the neutral position, nq numbers: zeros, and the identity for rotations.
 ///
 /// >>> condyle.neutral(condyle.robots.quadruped())[:7]
 /// array([0., 0., 0., 0., 0., 0., 1.])
@@ -123,7 +123,8 @@ fn transport(model; v: Tangent, X: Tangents; out) {
     moved
 }
 
-/// The Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not depend on q.
+/// Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not
+/// depend on q.
 ///
 /// v: nv numbers; argument: 'position' for q or 'velocity' for v.
 fn integrate_jacobian(model; v: Tangent, argument: Word; out) {

@@ -236,7 +236,7 @@ impl ConstraintSet {
         format!("<condyle.ConstraintSet of '{robot}': {n} constraints, {rows} rows>")
     }
 
-    /// The number of constraints.
+    /// Returns the number of constraints.
     fn __len__(&self) -> usize {
         self.inner.len()
     }
@@ -247,7 +247,7 @@ impl ConstraintSet {
         self.inner.rows()
     }
 
-    /// The rows of constraint k, as a slice.
+    /// Returns the rows of constraint k, as a slice.
     fn range<'py>(&self, py: Python<'py>, k: usize) -> PyResult<Bound<'py, PySlice>> {
         let range = self.inner.range(self.checked(k)?);
         Ok(PySlice::new(py, range.start as isize, range.end as isize, 1))

@@ -238,98 +238,98 @@ impl HyperDual {
     fn arctan2(&self, x: Operand) -> Self {
         Self(Scalar::atan2(self.0, x.0))
     }
-    /// The hypotenuse √(self² + other²).
+    /// Returns the hypotenuse √(self² + other²).
     fn hypot(&self, other: Operand) -> Self {
         Self(DualNum::sqrt(&(self.0 * self.0 + other.0 * other.0)))
     }
-    /// The absolute value of self.
+    /// Returns the absolute value of self.
     fn fabs(&self) -> Self {
         self.__abs__()
     }
 
     // elementary functions, by NumPy's names
 
-    /// The square root of self.
+    /// Returns the square root of self.
     fn sqrt(&self) -> Self {
         Self(DualNum::sqrt(&self.0))
     }
-    /// The cubic root of self.
+    /// Returns the cubic root of self.
     fn cbrt(&self) -> Self {
         Self(DualNum::cbrt(&self.0))
     }
-    /// The exponential of self, e to the power of self.
+    /// Returns the exponential of self, e to the power of self.
     fn exp(&self) -> Self {
         Self(DualNum::exp(&self.0))
     }
-    /// The power of 2 with exponent self.
+    /// Returns the power of 2 with exponent self.
     fn exp2(&self) -> Self {
         Self(DualNum::exp2(&self.0))
     }
-    /// The exponential of self, minus 1.
+    /// Returns the exponential of self, minus 1.
     fn expm1(&self) -> Self {
         Self(DualNum::exp_m1(&self.0))
     }
-    /// The natural logarithm of self.
+    /// Returns the natural logarithm of self.
     fn log(&self) -> Self {
         Self(DualNum::ln(&self.0))
     }
-    /// The logarithm of self to the base 2.
+    /// Returns the logarithm of self to the base 2.
     fn log2(&self) -> Self {
         Self(DualNum::log2(&self.0))
     }
-    /// The logarithm of self to the base 10.
+    /// Returns the logarithm of self to the base 10.
     fn log10(&self) -> Self {
         Self(DualNum::log10(&self.0))
     }
-    /// The natural logarithm of 1 + self.
+    /// Returns the natural logarithm of 1 + self.
     fn log1p(&self) -> Self {
         Self(DualNum::ln_1p(&self.0))
     }
-    /// The sine of self.
+    /// Returns the sine of self.
     fn sin(&self) -> Self {
         Self(DualNum::sin(&self.0))
     }
-    /// The cosine of self.
+    /// Returns the cosine of self.
     fn cos(&self) -> Self {
         Self(DualNum::cos(&self.0))
     }
-    /// The tangent of self.
+    /// Returns the tangent of self.
     fn tan(&self) -> Self {
         Self(DualNum::tan(&self.0))
     }
-    /// The angle whose sine is self.
+    /// Returns the angle whose sine is self.
     fn arcsin(&self) -> Self {
         Self(DualNum::asin(&self.0))
     }
-    /// The angle whose cosine is self.
+    /// Returns the angle whose cosine is self.
     fn arccos(&self) -> Self {
         Self(DualNum::acos(&self.0))
     }
-    /// The angle whose tangent is self.
+    /// Returns the angle whose tangent is self.
     fn arctan(&self) -> Self {
         Self(DualNum::atan(&self.0))
     }
-    /// The hyperbolic sine of self.
+    /// Returns the hyperbolic sine of self.
     fn sinh(&self) -> Self {
         Self(DualNum::sinh(&self.0))
     }
-    /// The hyperbolic cosine of self.
+    /// Returns the hyperbolic cosine of self.
     fn cosh(&self) -> Self {
         Self(DualNum::cosh(&self.0))
     }
-    /// The hyperbolic tangent of self.
+    /// Returns the hyperbolic tangent of self.
     fn tanh(&self) -> Self {
         Self(DualNum::tanh(&self.0))
     }
-    /// The number whose hyperbolic sine is self.
+    /// Returns the number whose hyperbolic sine is self.
     fn arcsinh(&self) -> Self {
         Self(DualNum::asinh(&self.0))
     }
-    /// The number whose hyperbolic cosine is self.
+    /// Returns the number whose hyperbolic cosine is self.
     fn arccosh(&self) -> Self {
         Self(DualNum::acosh(&self.0))
     }
-    /// The number whose hyperbolic tangent is self.
+    /// Returns the number whose hyperbolic tangent is self.
     fn arctanh(&self) -> Self {
         Self(DualNum::atanh(&self.0))
     }

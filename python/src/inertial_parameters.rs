@@ -113,7 +113,8 @@ pub(crate) fn log_cholesky<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound<'
     rust::log_cholesky(read_inertia("inertia", inertia)?).map_err(refused)?.give(inertia.py(), None)
 }
 
-/// The `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of `log_cholesky`.
+/// Returns the `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of
+/// `log_cholesky`.
 ///
 /// theta: 10 numbers; α within ±32 and dᵢ within ±64.
 #[pyfunction]

@@ -105,7 +105,7 @@ impl Joint {
         format!("<condyle.Joint {}{axis}>", kind(self.0))
     }
 
-    /// The parts of a pickle.
+    /// Returns the parts of a pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, joint) = (slf.py(), slf.get().0);
         let axis = joint.axis().map(Vec3::to_array);

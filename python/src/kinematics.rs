@@ -64,7 +64,7 @@ batch b: any(q: Position; frame: FrameOf) -> One { b.frame_placement(model, q, f
 }
 
 functions! {
-/// The Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
+/// Computes the Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 ///
 /// q: nq numbers; frame: its name or index. reference: 'local', the velocity of the frame's origin, along the frame's
 /// axes; 'world', the velocity of the body's point at the world's origin, along the world's axes; or
@@ -83,7 +83,7 @@ batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
     b.frame_jacobian(model, q, frame, reference)
 }
 
-/// The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
+/// Computes the Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 ///
 /// q: nq numbers; body: its index or its joint's name, 0 being the world; reference: as for `frame_jacobian`, for the
 /// body's own frame.
@@ -122,7 +122,7 @@ fn frame_point_jacobian(model, data; q: Position, frame: FrameOf, point: Point; 
     J
 }
 
-/// The Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
+/// Computes the Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
 ///
 /// q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
 fn body_point_jacobian(model, data; q: Position, body: BodyOf, point: Point; out) {
@@ -131,15 +131,15 @@ fn body_point_jacobian(model, data; q: Position, body: BodyOf, point: Point; out
     J
 }
 
-/// The velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+/// Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
 ///
 /// q: nq numbers; v: nv; frame: its name or index; point: in the frame, 3 numbers (m).
 fn frame_point_velocity(model, data; q: Position, v: Tangent, frame: FrameOf, point: Point; out) {
     condyle::forward_velocities(model, data, &q, &v).frame_point_velocity(frame, point.lift()).to_array()
 }
 
-/// The velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of the body's own
-/// frame.
+/// Computes the velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of
+/// the body's own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
 fn body_point_velocity(model, data; q: Position, v: Tangent, body: BodyOf, point: Point; out) {
@@ -160,15 +160,15 @@ motions! {
 /// True
 fn frame_velocity(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
-/// The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
-/// velocity as seen from the world, expressed in the reference; O(n).
+/// Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its
+/// spatial velocity as seen from the world, expressed in the reference; O(n).
 ///
 /// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// The classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the reference
-/// (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the frame's
-/// origin; O(n).
+/// Computes the classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the
+/// reference (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the
+/// frame's origin; O(n).
 ///
 /// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 ///
@@ -181,31 +181,31 @@ fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v
 /// True
 fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// The rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
+/// Computes the rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 ///
 /// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`. dJ v + J a is the spatial
 /// acceleration for 'local' and 'world', and the classical one for 'local_world_aligned', whose origin moves with the
 /// frame.
 fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
 
-/// The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
+/// Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_velocity(body: BodyOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
-/// The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
-/// own frame; O(n).
+/// Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of
+/// its own frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
-/// frame; O(n).
+/// Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its
+/// own frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_classical_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// The rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+/// Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_jacobian_rate(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
