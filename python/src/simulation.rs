@@ -26,7 +26,7 @@ use std::sync::Arc;
 /// passive: the smoothing ε of `passive_torque` (rad/s, m/s), which adds damping, friction, springs and gravity
 ///     compensation; None leaves them out.
 /// tolerance: Newton's method ('variational') ends when the imbalance of the momenta is at most this fraction of their
-/// sum.
+///     sum.
 /// max_iterations: the maximum number of iterations of Newton's method.
 /// ground: a `Ground` on which the robot stands, slides and lands; None for no ground. Requires 'semi_implicit_euler'.
 ///

@@ -351,7 +351,7 @@ def test_pickle_of_results(quadruped: Robot) -> None:
 
 def test_damaged_pickles(quadruped: Robot) -> None:
     make, (state,) = quadruped.model.__reduce__()
-    with pytest.raises(condyle.ModelError, match="^the pickle is not of condyle "):
+    with pytest.raises(condyle.ModelError, match="^pickle was not written by condyle "):
         make(b"x" + state)
     with pytest.raises(condyle.ModelError, match="^the pickle is damaged: "):
         make(state[:100])

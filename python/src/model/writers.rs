@@ -85,7 +85,9 @@ const MAGIC: &str = concat!("condyle ", env!("CARGO_PKG_VERSION"), "\n");
 pub(crate) fn model_from_bytes(data: &[u8]) -> PyResult<Model> {
     let Some(model) = data.strip_prefix(MAGIC.as_bytes()) else {
         let version = env!("CARGO_PKG_VERSION");
-        return Err(ModelError::new_err(format!("the pickle is not of condyle {version}, or of no model")));
+        return Err(ModelError::new_err(format!(
+            "pickle was not written by condyle {version}, or does not contain a Model"
+        )));
     };
     let model: condyle::Model =
         postcard::from_bytes(model).map_err(|e| ModelError::new_err(format!("the pickle is damaged: {e}")))?;

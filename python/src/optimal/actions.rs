@@ -90,7 +90,7 @@ pub(super) fn knot(
 /// dt: Δt in seconds, or None for a terminal knot, which has no controls and the cost Σ w a(r).
 /// costs: a list of `Cost`.
 /// costs_at: lists of `Cost` by index of the knot, for knots with costs of their own; so one action can serve a phase
-/// of several knots.
+///     of several knots.
 /// actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
 /// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.

@@ -125,7 +125,12 @@ fn its_numbers<'py>(given: &Bound<'py, PyAny>, expected: Sizes) -> PyResult<Boun
         return Err(PyValueError::new_err(message));
     }
     let numbers = given.getattr("_numbers")?.cast_into::<PyArrayDyn<f64>>()?;
-    if numbers.len()? == count(expected) { Ok(numbers) } else { Err(PyValueError::new_err("references: are broken")) }
+    let (n, m) = (count(expected), numbers.len()?);
+    if m == n {
+        return Ok(numbers);
+    }
+    let message = format!("references: expected {n} numbers, found {m}; create them with controller.hold(q)");
+    Err(PyValueError::new_err(message))
 }
 
 /// Reads references that were made for the same robot, frames and contacts.

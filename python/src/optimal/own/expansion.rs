@@ -63,7 +63,7 @@ impl SeveralKnots {
 
 impl SeveralKnots {
     fn refused() -> PyErr {
-        PyTypeError::new_err("the number of the knot is not one number here")
+        PyTypeError::new_err("t: all knots are evaluated in one call here, so t cannot be used as one integer")
     }
 }
 
