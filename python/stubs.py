@@ -1,14 +1,14 @@
 #!/usr/bin/env python3
-"""Writes condyle/_condyle.pyi: what editors and type checkers know of the extension module.
+"""Writes condyle/_condyle.pyi, the description of the extension module for editors and type checkers.
 
     python3 python/stubs.py [--check]        with --check nothing is written; it fails if the file is out of date
 
-Names, signatures and docstrings are those of the installed module: they are written once, in the Rust sources. The
-module does not know the types; they stand in the tables below, by the names of arguments and of functions. A name
-without a type is an error, and so is an entry that nothing needs.
+Names, signatures and docstrings come from the installed module: they are written once, in the Rust sources. The module
+does not know the types; the tables below define them by the names of arguments and of functions. A name without a type
+is an error, and so is an unused entry.
 
-The file is kept in the repository: a wheel is packed before its module can be imported, and type checkers read an
-editable installation, and the sources, without building them.
+The file is kept in the repository for two reasons. A wheel is packed before its module can be imported. And type
+checkers read an editable installation, and the sources, without building them.
 """
 
 import ast
@@ -23,7 +23,7 @@ from typing import Any
 
 FILE = Path(__file__).parent / "condyle" / "_condyle.pyi"
 WIDTH = 120
-DERIVABLE = 1 << 10  # Py_TPFLAGS_BASETYPE: a class from which others can be derived
+DERIVABLE = 1 << 10  # Py_TPFLAGS_BASETYPE: a class that can be subclassed
 
 ALIASES = {
     "_Array": "NDArray[np.float64]",
@@ -52,7 +52,7 @@ ALIASES = {
 }
 
 # The functions of `condyle.pinocchio`.
-SPELLED = [  # the first two have no `data`
+SPELLED = [  # the first two do not take `data`
     "_spelled_difference",
     "_spelled_integrate",
     "_spelled_crba",
@@ -77,7 +77,7 @@ SPELLED = [  # the first two have no `data`
     "updateFramePlacements",
 ]
 
-# The type of an argument, by its name, `Class.name` or `function.name`. Those that are None by default may be None.
+# The type of an argument, by its name, `Class.name` or `function.name`. Arguments with default None may be None.
 ARGUMENTS = {
     "ArrayLike": """
         A B M Q R S X a acceleration actuation armature axis b d effort_lower effort_upper f f_ext gear gravity lambda_
@@ -166,7 +166,7 @@ ARGUMENTS = {
     "Sequence[int] | None": "stages",
     "_Controls": "us",
     "Problem": "problem",
-    # arrays of floats, or of numbers that know their derivatives
+    # arrays of floats, or of numbers that carry their derivatives
     "Callable[[Any, NDArray[Any], NDArray[Any]], tuple[Any, Any]]": "Action.calc DifferentialAction.calc",
     "Callable[[Any, _Array, _Array], dict[str, ArrayLike]]": """
         Action.calc_diff DifferentialAction.calc_diff Residual.own_cost.calc_diff""",
@@ -200,8 +200,9 @@ ARGUMENTS = {
     "list[ContactConstraint]": "_generate.constraints",
 }
 
-# The type of a result or a property, by its name, `Class.name` or `function`. Unless said otherwise, what takes `out`
-# returns an array, a static method one of its class, and a method of a class that stands here the type of that class.
+# The type of a result or a property, by its name, `Class.name` or `function`. Defaults: a function that takes `out`
+# returns an array, a static method returns its class, and a method of a class in this table returns the type of that
+# class.
 RESULTS = {
     "tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]": "_generate",
     "tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]": "_borrowed",
@@ -318,7 +319,7 @@ RESULTS = {
 
 
 class Table:
-    """A table from names to types, which keeps the names that it lacks, and those that nobody has asked for."""
+    """A table from names to types, which records missing names and unused ones."""
 
     def __init__(self, names_by_type: dict[str, str]) -> None:
         self.types = {name: kind for kind, names in names_by_type.items() for name in names.split()}
@@ -326,7 +327,7 @@ class Table:
         self.missing: list[str] = []
 
     def find(self, *names: str, otherwise: str | None = None) -> str:
-        """The type of the first of the names that has one."""
+        """Returns the type of the first name that has one."""
         for name in names:
             if name in self.types:
                 self.unused.discard(name)
@@ -337,7 +338,9 @@ class Table:
 
 
 def wrapped(head: str, parts: list[str], tail: str, indent: str = "") -> str:
-    """A definition or a list as Ruff formats it: in one line, else its parts in one line, else each in its own."""
+    """Formats a definition or a list as Ruff does: in one line, else its parts in one line, else each part in its own
+    line.
+    """
     inside = ", ".join(parts)
     if len(indent + head + inside + tail) <= WIDTH:
         return indent + head + inside + tail
@@ -347,21 +350,23 @@ def wrapped(head: str, parts: list[str], tail: str, indent: str = "") -> str:
 
 
 def docstring(item: Any, indent: str) -> str:
-    """The docstring of an item as a statement."""
+    """Returns the docstring of an item as a statement."""
     text = (inspect.getdoc(item) or "").replace("\\", "\\\\")
     lines = [f"{indent}{line}".rstrip() for line in text.splitlines()]
     return f'{indent}"""' + "\n".join(lines).lstrip() + ('"""' if len(lines) == 1 else f'\n{indent}"""')
 
 
 class Writer:
-    """Writes the items of a module, whose named tuples stand in another one."""
+    """Writes the items of a module, whose named tuples are defined in another one."""
 
     def __init__(self, module: ModuleType, types: ModuleType) -> None:
         self.module, self.types = module, types
         self.arguments, self.results = Table(ARGUMENTS), Table(RESULTS)
 
     def out(self, result: str) -> str:
-        """The type of `out`, for a function that returns this: what it fills, such as an earlier result."""
+        """Returns the type of `out` for a function with this result: the arrays that it fills, such as an earlier
+        result.
+        """
         if result == "_Array":
             return result
         members = re.findall("_Array", result)
@@ -372,7 +377,7 @@ class Writer:
         return f"{result} | Sequence[_Array]"
 
     def function(self, item: Any, name: str, owner: str = "", indent: str = "") -> str:
-        """A function, or a method of the class `owner`, or what makes one of this class."""
+        """Writes a function, a method of the class `owner`, or the constructor of this class."""
         constructor = name == "__new__"
         full = owner if constructor else f"{owner}.{name}".lstrip(".")
         arguments = ast.parse(f"def f{item.__text_signature__.replace('$self', 'self')}: ...").body[0].args
@@ -416,7 +421,7 @@ class Writer:
         return f"{decorator}{head}\n{docstring(item, indent + '    ')}"
 
     def klass(self, item: type, name: str) -> str:
-        """A class with its members: what makes one, properties, methods."""
+        """Writes a class with its members: constructor, properties, methods."""
         members, known = vars(item), self.results.types
         final = "@disjoint_base\n" if item.__flags__ & DERIVABLE else "@final\n"
         text = f"{final}class {name}:\n{docstring(item, '    ')}\n\n"
@@ -425,7 +430,7 @@ class Writer:
         for member in sorted(k for k, v in members.items() if inspect.isdatadescriptor(v)):
             head = f"    @property\n    def {member}(self) -> {self.results.find(f'{name}.{member}')}:\n"
             text += head + docstring(members[member], "        ") + "\n\n"
-        for member, value in sorted(members.items()):  # the parts of a class are linked in any order
+        for member, value in sorted(members.items()):  # the order of a class's members depends on the linker
             special = member.startswith("__") and name not in known and f"{name}.{member}" not in known
             if callable(value) and not special and member not in ("__new__", "__repr__"):
                 method = self.function(getattr(item, member), member, name, "    ")
@@ -433,7 +438,7 @@ class Writer:
         return text.rstrip()
 
     def items(self) -> Iterator[str]:
-        """Constants, exceptions, and then classes and functions in the order in which the module has them."""
+        """Yields constants, exceptions, and then classes and functions in the order of the module."""
         items = {name: getattr(self.module, name) for name in self.module.__all__}
         yield "\n".join(f"{name}: {type(item).__name__}" for name, item in items.items() if not callable(item))
         for name, item in items.items():
@@ -447,7 +452,7 @@ class Writer:
 
 
 def alias(name: str, value: str) -> str:
-    """The definition of a type's short name."""
+    """Returns the definition of a type alias."""
     line = f"{name}: TypeAlias = {value}"
     if len(line) > WIDTH:
         inside = value if len(value) + 4 <= WIDTH else re.sub(r" \| (?![^\[]*\])", "\n    | ", value)
@@ -456,7 +461,7 @@ def alias(name: str, value: str) -> str:
 
 
 def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str:
-    """The text of the file. Named tuples stand in `types`, other classes written in Python in others."""
+    """Returns the text of the file. `types` defines the named tuples, `others` define other Python classes."""
     writer = Writer(module, types)
     body = "\n\n".join(writer.items())
     aliases = "\n".join(alias(name, value) for name, value in ALIASES.items())
@@ -471,7 +476,7 @@ def stub(module: ModuleType, types: ModuleType, others: list[ModuleType]) -> str
         head = f"from .{part.__name__.split('.')[-1]} import "
         line = head + ", ".join(own)
         imports.append(line if len(line) <= WIDTH else wrapped(f"{head}(", own, ")"))
-    imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")  # others there have names of ours
+    imports.insert(1, "from ._spelling import Force, Motion, ReferenceFrame")  # other names there equal names of ours
     names = sorted(module.__all__, key=lambda name: (not name.isupper(), not name[0].isupper(), name))
     return f'''\
 """{inspect.getdoc(module)}"""
@@ -497,7 +502,7 @@ from typing_extensions import disjoint_base
 
 
 def main() -> None:
-    """Writes the file, or compares it."""
+    """Writes the file, or compares it with the existing one."""
     sys.path.pop(0)  # the folder of the sources, where the module is not built
     from condyle import _condyle, _inertia, _types, _wholebody
 

@@ -1,6 +1,6 @@
 """Rigid-body dynamics with exact derivatives, for MPC and DDP.
 
-A `Model` is a robot, frozen; a `Data` is one thread's scratch; an algorithm is a function of both:
+A `Model` is a robot and never changes; a `Data` is scratch memory for one thread; an algorithm is a function of both:
 
 >>> import condyle
 >>> quadruped = condyle.robots.quadruped()
@@ -10,42 +10,43 @@ A `Model` is a robot, frozen; a `Data` is one thread's scratch; an algorithm is 
 >>> round(float(a[2]), 6)  # it falls
 -9.81
 
-Numbers and layout are Pinocchio's: linear parts before angular ones, quaternions x, y, z, w, joints in the same order.
-Functions return new arrays, or fill those given as `out`. Arguments may be anything that NumPy understands as an array
-of real numbers; float64 C-contiguous arrays are read where they lie. A wrong shape is a `ValueError`.
+Numbers and layout are the same as in Pinocchio: linear parts before angular ones, quaternions x, y, z, w, joints in the
+same order. Functions return new arrays, or fill the arrays given as `out`. Arguments may be anything that NumPy
+understands as an array of real numbers; float64 C-contiguous arrays are read without a copy. A wrong shape is a
+`ValueError`.
 
-Where a state goes, many go: positions, velocities, efforts and forces may have one more axis in front, and results
-then have it too. The dynamics and its derivatives compute several states side by side in vector registers, with the
-interpreter's lock released, on as many threads as the `Data` was made for:
+Many states in one call: positions, velocities, efforts and forces may have one more axis in front, and results then
+have it too. The dynamics and its derivatives compute several states at once in SIMD lanes. The interpreter's lock is
+released, and as many threads are used as the `Data` was made for:
 
 >>> arm = condyle.robots.arm7()
 >>> data = condyle.Data(arm, threads=2)
 >>> condyle.crba(arm, data, np.zeros((100, 7))).shape
 (100, 7, 7)
 
-`out` may be an input, or share memory with one; results that would share memory are refused. While a call computes
-with the lock released, as batches and solves do, no other thread may write to its arrays: it would read some of the old
-numbers and some of the new ones.
+`out` may be an input, or share memory with one; results that would share memory with each other are refused. Batches
+and solves release the interpreter's lock while they compute. No other thread may write to their arrays then, since they
+would read a mix of old and new numbers.
 
-A forked process may go on with all that it has inherited, and starts threads of its own. Signals are looked at while a
-call lasts, every 10 ms in batches and 25 ms in solves and simulations: what a handler raises, as KeyboardInterrupt for
-Ctrl-C, ends the call. A solver then has the best iterate as its `solution`, a simulation the state after its last step,
-and `out` is written as far as the call came.
+A forked process may continue with everything that it has inherited, and starts its own threads. Signals are checked
+during a call, every 10 ms in batches and every 25 ms in solves and simulations. An exception of a signal handler, such
+as KeyboardInterrupt for Ctrl-C, ends the call. A solver then has the best iterate as its `solution`, a simulation has
+the state after its last step, and `out` holds the results so far.
 
-The environment variable `CONDYLE_LEVEL` chooses the vector instructions: "baseline", "neon", "avx2" or "avx512". If
-this processor does not have them, or there are none of that name, the import fails. `LEVEL` is the one in use.
+The environment variable `CONDYLE_LEVEL` chooses the SIMD level: "baseline", "neon", "avx2" or "avx512". If this
+processor lacks the level, or the name is unknown, the import fails. `LEVEL` is the level in use.
 
-Derivatives of one's own function of the state are exact, by `HyperDual` numbers in arrays of objects:
+Derivatives of your own function of the state are exact, by `HyperDual` numbers in arrays of objects:
 
 >>> def effort(x):
 ...     return (condyle.rnea(arm, data, x[:7], x[7:], np.zeros(7)) ** 2).sum()
 >>> value, by_q_and_v = condyle.gradient(arm, np.full(14, 0.3), effort)
 
-By theme; `help(condyle.rnea)` says more of each:
+By theme; for details of a name see for example `help(condyle.rnea)`:
 
 Robots: `Model` (from URDF, MJCF, SDF), `ModelBuilder`, `Joint`, `Inertia`, `Mimic`, `Coupling`, `BodyId`, `WORLD`,
     `Frame`, `Limits`, `Spring`, `GravityCompensation`, `Actuator`, `ModelWarning`, `load` (by a robot's name),
-    `robots`, `inertial_parameters`; `Data`, the scratch
+    `robots`, `inertial_parameters`; `Data`, scratch memory
 Dynamics: `rnea`, `aba`, `crba`, `minv`, `nonlinear_effects`, `gravity`, `static_torque`, `coriolis_matrix`,
     `forward_dynamics`, `compute_all_terms` (`AllTerms`), `passive_torque`; `DivideConquer` (`AssemblySize`)
 Derivatives of dynamics: `rnea_derivatives` (`RneaDerivatives`), `aba_derivatives` (`AbaDerivatives`),
@@ -53,11 +54,11 @@ Derivatives of dynamics: `rnea_derivatives` (`RneaDerivatives`), `aba_derivative
     `passive_torque_derivatives` (`PassiveDerivatives`), `rnea_input_derivative`, `aba_input_derivative`
 Second derivatives: `rnea_hessian` (`RneaHessian`), `aba_hessian` (`AbaHessian`), `rnea_second_derivatives`
     (`RneaSecondDerivatives`)
-Derivatives of one's own functions: `gradient`, `jacobian`, `hessian`, `HyperDual`
+Derivatives of your own functions: `gradient`, `jacobian`, `hessian`, `HyperDual`
 Bodies and frames: `forward_kinematics`, `frame_placement`, `frame_jacobian`, `frame_velocity`, `frame_acceleration`,
     `frame_classical_acceleration`, `frame_jacobian_rate`, `body_jacobian`, `body_velocity`, `body_acceleration`,
     `body_classical_acceleration`, `body_jacobian_rate`; of points: `frame_point_jacobian`, `frame_point_velocity`,
-    `body_point_jacobian`, `body_point_velocity`; by q, v and a: `frame_velocity_derivative`,
+    `body_point_jacobian`, `body_point_velocity`; derivatives: `frame_velocity_derivative`,
     `frame_acceleration_derivatives`, `frame_classical_acceleration_derivatives`, `body_velocity_derivative`,
     `body_acceleration_derivatives`
 Positions: `neutral`, `random_configuration`, `integrate`, `difference`, `interpolate`, `distance`, `normalize`,
@@ -73,9 +74,9 @@ Poses, motions, forces: `SE3`, `Motion`, `Force`, `exp3`, `log3`, `exp6`, `log6`
 Regressors: `joint_torque_regressor`, `kinetic_energy_regressor`, `potential_energy_regressor`
 Factors of the inertia matrix: `Ltdl`, `Cholesky`
 Errors: `Error`, `ParseError`, `ModelError`, `NotPhysicalError`
-Many solves: `sweep` (`Variations`), in this process or on a Ray cluster; `LEVEL`, of vector instructions
+Many solves: `sweep` (`Variations`), in this process or on a Ray cluster; `LEVEL`, the SIMD level
 Modules: `optimal` (FDDP, DDP and their problems), `wholebody` (control), `simulation`, `algebra`
-    (poses, motions, forces), `conventions` (other libraries' numbers); imported by themselves `casadi`, `pinocchio`
+    (poses, motions, forces), `conventions` (other libraries' numbers); to be imported separately `casadi`, `pinocchio`
     (its spelling), `crocoddyl` (its problems), `codegen` (straight-line C), `cuda` (kernels) and `viz` (pictures)
 """
 

@@ -1,4 +1,4 @@
-"""Actions and drives that are a few lines of the others."""
+"""Actions and actuation matrices built from other ones in a few lines."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
@@ -10,7 +10,7 @@ from ._condyle import Action, Model, ProblemError
 
 _Array = NDArray[np.float64]
 _SCHEMES = {
-    # the times of the stages in the step, and their weights; each stage starts from the one before
+    # per scheme: times of the stages within the step, and their weights; each stage starts from the stage before
     "euler": ([0.0], [1.0]),
     "runge_kutta_2": ([0.0, 0.5], [0.0, 1.0]),
     "runge_kutta_3": ([0.0, 1 / 3, 2 / 3], [0.25, 0.0, 0.75]),
@@ -21,18 +21,19 @@ _SCHEMES = {
 def thrusters(
     model: Model, placements: Sequence[ArrayLike], torques: Sequence[float] | float = 0.0, joints: bool = True
 ) -> _Array:
-    """The `actuation` of a free-flying base with thrusters: S of shape (nv, nu), with a control, its force, for each.
+    """Returns the `actuation` of a free-flying base with thrusters: S of shape (nv, nu), with one control for each
+    thruster, its force.
 
-    A thruster pushes along the z axis of its placement; its force f turns the base by p × f + c f too, with its place p
-    and the ratio c of its rotor's torque to its thrust. Crocoddyl's `ActuationModelFloatingBaseThrusters` has c
-    as `ctorque`, positive for `CW` and negative for `CCW`.
+    A thruster pushes along the z axis of its placement. At position p, its force f also turns the base by p × f + c f,
+    where c is the ratio of its rotor's torque to its thrust. Crocoddyl's `ActuationModelFloatingBaseThrusters` has c as
+    `ctorque`, positive for `CW` and negative for `CCW`.
 
     model: a robot whose root joint is a free-flyer.
     placements: the thrusters' placements in the base's frame, homogeneous matrices (4, 4).
-    torques: c of each (m), or of all.
-    joints: whether the other joints have controls of their own, which follow those of the thrusters.
+    torques: c of each thruster (m), or of all.
+    joints: whether the other joints have controls of their own, which follow the thrusters' controls.
 
-    Raises `ProblemError` for a robot of another kind, or a placement that is none.
+    Raises `ProblemError` for a robot of another kind, or an invalid placement.
 
     >>> place = np.eye(4)
     >>> place[:3, 3] = [0.2, 0.0, 0.1]
@@ -65,11 +66,12 @@ def ode_action(
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
 ) -> Action:
-    """An `Action` of a differential equation ẋ = f(x, u) with a cost per second, in steps of Δt with constant controls.
+    """Returns an `Action` for a differential equation ẋ = f(x, u) with a cost per second, in steps of Δt with constant
+    controls.
 
-    For accelerations see `DifferentialAction`. Derivatives are those of calc, exact, as of `Action`.
+    For accelerations see `DifferentialAction`. Derivatives are exact derivatives of calc, as for `Action`.
 
-    nx, nu, lower, upper: as of `Action`.
+    nx, nu, lower, upper: as for `Action`.
     calc: a function of (t, x, u) that returns ẋ, nx numbers, and the cost per second.
     dt: Δt in seconds.
     integrator: 'euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.

@@ -1,4 +1,4 @@
-"""Robots of Crocoddyl, which are Pinocchio's, as ours."""
+"""Conversion of Crocoddyl's robots, which are Pinocchio models."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ _Array = NDArray[np.float64]
 
 
 class NoCounterpartError(Exception):
-    """Something of Crocoddyl that is not here, by its name."""
+    """Raised for an object of Crocoddyl without a counterpart here; the message has its name."""
 
 
 _FREE = {
@@ -31,7 +31,7 @@ _UNALIGNED = {
 
 
 class Robot:
-    """A `pinocchio.Model` and some armature beside its own; and the same as ours."""
+    """A `pinocchio.Model` with additional armature, and the same robot as a `Model`."""
 
     def __init__(self, theirs: Any, armature: _Array) -> None:
         self.theirs, self.armature = theirs, armature
@@ -42,7 +42,7 @@ class Robot:
             inertia = Inertia.from_com(own.mass, own.lever, own.inertia)
             on = bodies[theirs.parents[i]]
             bodies.append(builder.body(f"body of {name}", on, _joint(theirs, i), place, inertia, joint_name=name))
-        # frames of ours have names that differ
+        # our frames must have unique names
         self._names: list[str] = []
         for k, frame in enumerate(theirs.frames):
             self._names.append(f"{frame.name} ({k})" if frame.name in self._names else frame.name)
@@ -53,16 +53,16 @@ class Robot:
         self._numbers = [users[name] for name in self._names]
 
     def is_of(self, theirs: Any, armature: _Array) -> bool:
-        """Whether it is the same robot with the same armature."""
+        """Returns whether it is the same robot with the same armature."""
         return np.array_equal(self.armature, armature) and (self.theirs is theirs or bool(self.theirs == theirs))
 
     def frame(self, number: int) -> int:
-        """The number of a frame of theirs in our model."""
+        """Returns the index in our model of a frame of the Pinocchio model."""
         return self._numbers[number]
 
 
 def _joint(theirs: Any, i: int) -> Joint:
-    """Joint i of a model."""
+    """Returns joint i of a model."""
     joint = theirs.joints[i]
     name = joint.shortname()
     own = joint.extract() if hasattr(joint, "extract") else joint

@@ -1,7 +1,6 @@
-"""Costs, constraints, contacts and drives of Crocoddyl as ours.
+"""Conversion of Crocoddyl's costs, constraints, contacts and actuation models.
 
-Objects of Crocoddyl are told apart by the names of their classes, so that it need not be installed where nothing is
-converted.
+Objects of Crocoddyl are identified by the names of their classes, so Crocoddyl is needed only for a conversion.
 """
 
 from collections.abc import Callable
@@ -17,10 +16,10 @@ from ._types import ContactConstraint
 _Array = NDArray[np.float64]
 
 NO_BOUND = 1e300
-"""Bounds of this size are none."""
+"""Magnitude from which a bound counts as infinite."""
 REFERENCES = {"LOCAL": "local", "WORLD": "world", "LOCAL_WORLD_ALIGNED": "local_world_aligned"}
 HELD = {"LOCAL": "local", "WORLD": "local_world_aligned", "LOCAL_WORLD_ALIGNED": "local_world_aligned"}
-"""The axes of contacts, which in Crocoddyl's WORLD are the world's at the frame's origin."""
+"""Axes of contacts. In Crocoddyl, WORLD means the world's axes at the frame's origin."""
 AT_THE_END = {
     "ResidualModelControl",
     "ResidualModelJointAcceleration",
@@ -30,25 +29,25 @@ AT_THE_END = {
     "ResidualModelContactWrenchCone",
     "ResidualModelContactCoPPosition",
 }
-"""Residuals that do not depend on anything in Crocoddyl's models of the end: zero, or efforts less their reference."""
+"""Residuals that are constant in Crocoddyl's terminal models: zero, or minus the reference of the efforts."""
 
 
 def kind(theirs: Any) -> str:
-    """The name of an object's class; of one that is not Crocoddyl's own with its module, whatever it is called."""
+    """Returns the name of an object's class, with its module if the class is not Crocoddyl's own."""
     made = type(theirs)
     own = made.__module__.split(".")[0] == "crocoddyl"
     return made.__name__ if own else f"{made.__module__}.{made.__name__}"
 
 
 def bounds(numbers: Any) -> _Array:
-    """Bounds, infinite where there is none."""
+    """Returns bounds, infinite for no bound."""
     x = np.asarray(numbers, float)
     out: _Array = np.where(np.abs(x) < NO_BOUND, x, np.copysign(np.inf, x))
     return out
 
 
 class Drives:
-    """τ = S u, of an actuation model whose S is always the same."""
+    """An actuation model τ = S u with constant S."""
 
     def __init__(self, theirs: Any, state: Any) -> None:
         nv, nu = state.nv, theirs.nu
@@ -64,7 +63,7 @@ class Drives:
 
     @staticmethod
     def _at(theirs: Any, x: _Array, u: _Array) -> tuple[_Array, _Array, _Array]:
-        """τ, ∂τ/∂u and ∂τ/∂x."""
+        """Returns τ, ∂τ/∂u and ∂τ/∂x."""
         data = theirs.createData()
         theirs.calc(data, x, u)
         theirs.calcDiff(data, x, u)
@@ -72,37 +71,37 @@ class Drives:
         return np.array(data.tau), np.array(data.dtau_du, float).reshape(shape), np.array(data.dtau_dx, float)
 
     def given(self) -> _Array | None:
-        """S for our actions; None where each joint but a free-flyer at the root has a control."""
+        """Returns S for our actions; None if each joint has a control, except a free-flyer at the root."""
         return None if self.usual else self.matrix
 
 
 class Terms:
-    """The costs and constraints of an action.
+    """Converts the costs and constraints of an action.
 
-    names: the contacts by the numbers of their frames; drives: where accelerations are controls, those of the efforts.
+    names: names of the contacts by index of their frame; drives: the actuation model, if accelerations are controls.
     """
 
     def __init__(self, robot: Robot, names: dict[int, str], drives: Drives | None = None, end: bool = False) -> None:
         self.robot, self.names, self.drives, self.end = robot, names, drives, end
 
     def costs(self, theirs: Any) -> list[Cost]:
-        """The costs of a `CostModelSum`, by name, that count."""
+        """Returns the active costs of a `CostModelSum`, by name."""
         items = [item.data() for item in theirs if item.data().active]
         return [self._cost(item) for item in items if not self._vanishes(item.cost)]
 
     def limits(self, theirs: Any) -> list[Limit]:
-        """The constraints of a `ConstraintModelManager`, by name, that count."""
+        """Returns the active constraints of a `ConstraintModelManager`, by name."""
         items = [item.data() for item in theirs if item.data().active]
         counts = [item for item in items if not self.end or item.constraint.T_constraint]
         return [self._limit(item) for item in counts if not self._vanishes(item.constraint)]
 
     def _vanishes(self, term: Any) -> bool:
-        """Whether a term is zero at the end, where its residual is; what is constant there counts in the whole cost."""
+        """Returns whether a term is zero in a terminal model because its residual is; other constants are errors."""
         residual: Any = getattr(term, "residual", None)
         if not self.end or kind(residual) not in AT_THE_END:
             return False
         r = np.zeros(residual.nr) - (residual.reference if kind(residual) == "ResidualModelJointEffort" else 0.0)
-        if hasattr(term, "activation"):  # as costs have it, and constraints do not
+        if hasattr(term, "activation"):  # costs have an activation, constraints do not
             data = term.activation.createData()
             term.activation.calc(data, r)
             if data.a_value:
@@ -137,7 +136,7 @@ class Terms:
         return self.names[theirs.id]
 
     def _residual(self, theirs: Any) -> tuple[Residual, tuple[_Array, int]]:
-        """A residual, and which of how many entries of ours theirs are."""
+        """Returns a residual, the indices of its entries that Crocoddyl's residual has, and its number of entries."""
         make = _RESIDUALS.get(kind(theirs))
         if kind(theirs) == "ResidualModelJointEffort":
             return self._efforts(theirs)
@@ -146,13 +145,15 @@ class Terms:
         return make(self, theirs), (np.arange(theirs.nr), theirs.nr)
 
     def _means_the_same(self, name: str) -> bool:
-        """Whether a residual is the same here: not the one of gravity in contact, nor that of a jump at the end."""
+        """Returns whether a residual is the same here. The gravity residual in contact and the jump at the terminal
+        knot differ.
+        """
         if name == "ResidualModelControlGrav":
             return self.drives is None and not self.end and not self.names
         return not (self.end and name == "ResidualModelImpulseCoM")
 
     def _efforts(self, theirs: Any) -> tuple[Residual, tuple[_Array, int]]:
-        """The efforts of drives: controls, or those of inverse dynamics."""
+        """Returns the residual of efforts: the controls, or the efforts of inverse dynamics."""
         if self.drives is None:
             return Residual.control(theirs.reference), (np.arange(theirs.nr), theirs.nr)
         if not self.drives.usual:
@@ -169,7 +170,7 @@ def _cone(theirs: Any) -> FrictionCone:
 
 
 def _framed(make: Callable[..., Residual]) -> Callable[["Terms", Any], Residual]:
-    """A residual of a frame with a target."""
+    """Returns a function that converts a residual of a frame with a target."""
 
     def made(terms: "Terms", theirs: Any) -> Residual:
         target = getattr(theirs.reference, "homogeneous", theirs.reference)
@@ -208,7 +209,7 @@ _RESIDUALS: dict[str, Callable[[Terms, Any], Residual]] = {
 
 
 def activation(theirs: Any, entries: tuple[_Array, int]) -> Activation:
-    """The activation of a residual, of which some entries count."""
+    """Returns the activation of a residual; entries: indices of its active entries, and its number of entries."""
     which, n = entries
     name, all_of_them = kind(theirs), len(which) == n
     if name == "ActivationModelQuad" and all_of_them:
@@ -223,7 +224,7 @@ def activation(theirs: Any, entries: tuple[_Array, int]) -> Activation:
         return Activation.barrier(lower, upper)
     if name in ("ActivationModelSmooth1Norm", "ActivationModelSmooth2Norm") and all_of_them:
         data = theirs.createData()
-        theirs.calc(data, np.zeros(n))  # n √ε, and √ε
+        theirs.calc(data, np.zeros(n))  # the values are n √ε, and √ε
         if name == "ActivationModelSmooth1Norm":
             return Activation.smooth1((data.a_value / n) ** 2)
         return Activation.smooth2(data.a_value**2)
@@ -231,7 +232,7 @@ def activation(theirs: Any, entries: tuple[_Array, int]) -> Activation:
 
 
 def contact(robot: Robot, theirs: Any) -> ContactConstraint:
-    """A contact of a `ContactModelMultiple`, or an impulse."""
+    """Converts a contact of a `ContactModelMultiple`, or an impulse."""
     name, place, turned, axes = kind(theirs), np.eye(4), None, HELD[str(theirs.type)]
     if name in ("ContactModel6D", "ContactModel3D", "ContactModel2D", "ContactModel1D"):
         kp, kd = theirs.gains

@@ -1,4 +1,4 @@
-"""NVIDIA's driver and run-time compiler, loaded when they are first needed: what `condyle.cuda` stands on."""
+"""NVIDIA's driver and run-time compiler for `condyle.cuda`, loaded when they are first needed."""
 
 import ctypes
 import os
@@ -56,7 +56,7 @@ _COMPILER: dict[str, list[Any]] = {
     "nvrtcDestroyProgram": [POINTER(_HANDLE)],
 }
 
-# Attributes, flags, options and statuses, by their numbers in CUDA's headers.
+# Attributes, flags, options and statuses, with their values in CUDA's headers.
 _MULTIPROCESSORS, _CAPABILITY = 16, (75, 76)
 _LOCAL_BYTES, _REGISTERS = 3, 4
 _POINTER_DEVICE = 9
@@ -67,7 +67,7 @@ _LOG = 16384
 
 
 def _load(what: str, variable: str, files: Sequence[str], functions: dict[str, list[Any]]) -> ctypes.CDLL:
-    """A library with the types of its functions, or an error that says what was tried."""
+    """Loads a library and sets the types of its functions; the error lists the files that were tried."""
     given = os.environ.get(variable)
     reasons = []
     for file in [given] if given else files:
@@ -94,17 +94,17 @@ class Driver:
         self.call("cuInit", 0)
 
     def status(self, function: str, *arguments: Any) -> int:
-        """What a function returns."""
+        """Calls a function and returns its status."""
         return int(getattr(self._library, function)(*arguments))
 
     def call(self, function: str, *arguments: Any) -> None:
-        """Calls a function; an error has its name and CUDA's words."""
+        """Calls a function; an error has its name and CUDA's message."""
         status = self.status(function, *arguments)
         if status != 0:
             raise RuntimeError(f"{function}: {self.text(status)} (status {status})")
 
     def text(self, status: int) -> str:
-        """A status by its name and in CUDA's words."""
+        """Returns a status as its name and CUDA's message."""
         said = []
         for function in ("cuGetErrorName", "cuGetErrorString"):
             text = c_char_p()
@@ -114,11 +114,11 @@ class Driver:
 
 
 _MADE: dict[object, Any] = {}
-"""What has been loaded: "driver", "compiler", and devices by their numbers."""
+"""Loaded objects: "driver", "compiler", and devices by index."""
 
 
 def driver() -> Driver:
-    """The driver, loaded when it is first asked for."""
+    """Returns the driver, loaded on first use."""
     if "driver" not in _MADE:
         _MADE["driver"] = Driver()
     made: Driver = _MADE["driver"]
@@ -126,7 +126,7 @@ def driver() -> Driver:
 
 
 def names() -> list[str]:
-    """The devices' names."""
+    """Returns the devices' names."""
     count, device, name = c_int(), c_int(), ctypes.create_string_buffer(256)
     driver().call("cuDeviceGetCount", byref(count))
     found = []
@@ -138,7 +138,7 @@ def names() -> list[str]:
 
 
 class Current:
-    """A context that is the thread's current one in a block."""
+    """Makes a context the thread's current one within a `with` block."""
 
     def __init__(self, driver: Driver, context: c_void_p) -> None:
         self._driver, self._context = driver, context
@@ -152,7 +152,9 @@ class Current:
 
 
 class Device:
-    """A device with its primary context, which other libraries of the process use too; it is held until the end."""
+    """A device with its primary context, which other libraries of the process also use; it is held until the process
+    ends.
+    """
 
     def __init__(self, ordinal: int) -> None:
         self.driver = driver()
@@ -175,29 +177,29 @@ class Device:
         return value.value
 
     def current(self) -> "Current":
-        """The driver, with this device's context as the thread's current one."""
+        """Returns a `with` block in which this device's context is the thread's current one."""
         return Current(self.driver, self._context)
 
     def owns(self, address: int) -> bool:
-        """Whether this is an address in the device's memory."""
+        """Returns whether an address is in the device's memory."""
         found = c_int()
         with self.current() as driver:
             status = driver.status("cuPointerGetAttribute", byref(found), _POINTER_DEVICE, address)
         return status == 0 and found.value == self.ordinal
 
     def hold(self, until: "Event", things: list[Any]) -> None:
-        """Keeps things until an event has happened, and lets go of the oldest ones whose event has."""
+        """Keeps objects alive until an event has happened, and drops the oldest ones whose event has happened."""
         dropped = []
         with self._lock:
             while self._held and self._held[0][0].has_happened():
                 dropped.append(self._held.popleft())
             if things:
                 self._held.append((until, things))
-        dropped.clear()  # without the lock: what is let go of may run anything
+        dropped.clear()  # outside the lock: destructors may run any code
 
 
 def device(ordinal: int) -> Device:
-    """The device of that number."""
+    """Returns the device with this index."""
     if ordinal not in _MADE:
         _MADE[ordinal] = Device(ordinal)
     made: Device = _MADE[ordinal]
@@ -205,7 +207,7 @@ def device(ordinal: int) -> Device:
 
 
 class Memory:
-    """Memory of a device, given back with this object, after what all streams do with it."""
+    """Memory of a device; freed with this object, after all streams have finished their work on it."""
 
     def __init__(self, device: Device, size: int) -> None:
         self.device = device
@@ -222,7 +224,7 @@ class Memory:
 
 
 class Event:
-    """The moment when all is done that was in a stream when this was made."""
+    """The moment at which all work is done that was in a stream when this event was created."""
 
     def __init__(self, device: Device, stream: int) -> None:
         self.device = device
@@ -232,12 +234,12 @@ class Event:
             driver.call("cuEventRecord", self._handle, stream)
 
     def has_happened(self) -> bool:
-        """Whether that is so; an error of a kernel counts as the end too."""
+        """Returns whether the work is done; an error of a kernel counts as done."""
         with self.device.current() as driver:
             return driver.status("cuEventQuery", self._handle) != _NOT_READY
 
     def before(self, stream: int) -> None:
-        """Lets what goes into a stream from now on wait for this."""
+        """Makes all later work in a stream wait for this event."""
         with self.device.current() as driver:
             driver.call("cuStreamWaitEvent", stream, self._handle, 0)
 
@@ -248,7 +250,7 @@ class Event:
 
 
 class Function:
-    """A kernel that has been loaded; its module is unloaded with this object."""
+    """A loaded kernel; its module is unloaded with this object."""
 
     def __init__(self, device: Device, symbol: str, image: bytes, shares: int, *, always: bool) -> None:
         self.device, self.shares = device, shares
@@ -274,9 +276,9 @@ class Function:
         return value.value
 
     def launch(self, stream: int, n: int, addresses: Sequence[int]) -> None:
-        """Starts a thread for each state, or for each share of one as long as all are on the device at a time.
+        """Launches one thread per state, or one per share of a state if all of these fit on the device at a time.
 
-        Blocks are smaller than the best for many where these would leave multiprocessors idle.
+        Blocks are smaller than the optimal size for many states if that size would leave multiprocessors idle.
         """
         rows = self.shares if n <= self._most_shared else 1
         share = -(-rows * n // self.device.multiprocessors)
@@ -293,12 +295,12 @@ class Function:
     def __del__(self) -> None:
         if getattr(self, "_module", None):
             with self.device.current() as driver:
-                driver.status("cuCtxSynchronize")  # it may be running
+                driver.status("cuCtxSynchronize")  # the kernel may be running
                 driver.status("cuModuleUnload", self._module)
 
 
 def _compilers() -> list[str]:
-    """Where NVIDIA's run-time compiler may be: in the wheels of this Python, or where the system finds it."""
+    """Returns possible files of NVIDIA's run-time compiler, in the wheels of this Python and in the system."""
     import importlib.util
 
     files = []
@@ -326,13 +328,15 @@ class Compiler:
         self._known = list(known)
 
     def architecture(self, capability: tuple[int, int]) -> str:
-        """What to compile for: this device, or the newest one before it that is known."""
+        """Returns the target of a compilation: this device, or the newest known one before it."""
         wanted = 10 * capability[0] + capability[1]
         best = max((known for known in self._known if known <= wanted), default=wanted)
         return f"sm_{wanted}" if best == wanted else f"compute_{best}"
 
     def compile(self, name: str, text: str, architecture: str) -> bytes:
-        """The code for "sm_90", machine code of such devices, or "compute_90", PTX for them and newer ones."""
+        """Compiles to machine code for an architecture such as "sm_90", or, for one such as "compute_90", to PTX for
+        these devices and newer ones.
+        """
         program = c_void_p()
         library = self._library
         if library.nvrtcCreateProgram(byref(program), text.encode(), f"{name}.cu".encode(), 0, None, None) != 0:
@@ -356,7 +360,7 @@ class Compiler:
 
 
 def compiler() -> Compiler:
-    """The compiler, loaded when it is first asked for."""
+    """Returns the compiler, loaded on first use."""
     if "compiler" not in _MADE:
         _MADE["compiler"] = Compiler()
     made: Compiler = _MADE["compiler"]

@@ -1,4 +1,4 @@
-"""Arrays in a GPU's memory: our own, and those that other libraries lend by DLPack or `__cuda_array_interface__`."""
+"""Arrays in a GPU's memory: our own, and arrays that other libraries lend by DLPack or `__cuda_array_interface__`."""
 
 import sys
 from collections.abc import Sequence
@@ -12,17 +12,18 @@ from . import _condyle
 from ._cuda_driver import Device, Event, Memory
 
 LEGACY = 1
-"""The legacy default stream, by the number that it has in DLPack and in the driver."""
+"""The legacy default stream, by its number in DLPack and in the driver."""
 _FLOAT, _READ_ONLY = 2, 1
 _CUDA, _CUDA_MANAGED = 2, 13
 _VERSION = (1, 0)
 
 
 class DeviceArray:
-    """Numbers in a GPU's memory, as `condyle.cuda` makes them.
+    """An array in a GPU's memory, as `condyle.cuda` creates it.
 
-    Other libraries take it without a copy, after what is under way: `torch.from_dlpack(x)`, `cupy.from_dlpack(x)`,
-    `jax.numpy.from_dlpack(x)`, and what knows `__cuda_array_interface__`, as Numba. `x.numpy()` copies it to the host.
+    Other libraries take it without a copy, after pending work: `torch.from_dlpack(x)`, `cupy.from_dlpack(x)`,
+    `jax.numpy.from_dlpack(x)`, and libraries that know `__cuda_array_interface__`, such as Numba. `x.numpy()` copies it
+    to the host.
     """
 
     def __init__(
@@ -37,13 +38,13 @@ class DeviceArray:
         self.dtype: np.dtype[Any] = dtype
         self.shape: tuple[int, ...] = shape
         self.strides: tuple[int, ...] = strides
-        """How far numbers are apart along each axis, counted in numbers."""
+        """The distance between numbers along each axis, counted in numbers."""
         self._written = written
-        """The stream that has written last, and the moment when it has; one for all views."""
+        """The stream that wrote last, and the event of that write; all views share it."""
 
     @property
     def device(self) -> int:
-        """The number of the device."""
+        """The index of the device."""
         return self._memory.device.ordinal
 
     @property
@@ -58,17 +59,17 @@ class DeviceArray:
         return f"DeviceArray({self.shape}, {self.dtype}, device={self.device})"
 
     def swapaxes(self, a: int, b: int) -> "DeviceArray":
-        """The same numbers with two axes exchanged: a view."""
+        """Returns a view with two axes exchanged."""
         order = list(range(self.ndim))
         order[a], order[b] = order[b], order[a]
         shape, strides = (tuple(x[k] for k in order) for x in (self.shape, self.strides))
         return DeviceArray(self._memory, self.dtype, shape, strides, self._written)
 
     def numpy(self) -> NDArray[Any]:
-        """A copy in the host's memory, after what is under way."""
+        """Returns a copy in the host's memory, after pending work."""
         host = np.empty(self.shape, self.dtype)
         order = sorted(range(self.ndim), key=lambda k: (-self.strides[k], k))
-        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # as it lies in memory
+        dense = np.empty(tuple(self.shape[k] for k in order), self.dtype)  # in memory order
         if dense.nbytes > 0:
             self._before(LEGACY)
             with self._memory.device.current() as driver:
@@ -78,7 +79,7 @@ class DeviceArray:
         return host
 
     def _before(self, stream: int) -> None:
-        """Lets a stream wait until the numbers are there."""
+        """Makes a stream wait until the numbers are written."""
         for writer, event in self._written:
             if writer != stream:
                 event.before(stream)
@@ -94,7 +95,7 @@ class DeviceArray:
         dl_device: tuple[int, int] | None = None,
         copy: bool | None = None,
     ) -> Any:
-        """A capsule for another library, which says on which stream it is going to use the numbers."""
+        """Returns a capsule for another library, which passes the stream on which it will use the numbers."""
         if dl_device is not None and tuple(dl_device) != self.__dlpack_device__():
             raise BufferError(f"dl_device: expected {self.__dlpack_device__()}, found {tuple(dl_device)}")
         if copy:
@@ -111,7 +112,7 @@ class DeviceArray:
 
     @property
     def __cuda_array_interface__(self) -> dict[str, Any]:
-        """What Numba and others read: with the stream after which the numbers are there."""
+        """The description that Numba and others read, with the stream after whose work the numbers are valid."""
         size = self.dtype.itemsize
         return {
             "shape": self.shape,
@@ -124,17 +125,17 @@ class DeviceArray:
 
 
 def new(device: Device, dtype: "np.dtype[Any]", shape: tuple[int, ...]) -> DeviceArray:
-    """An array in row order whose numbers are not there yet."""
+    """Returns an array in row order whose numbers are not yet written."""
     return DeviceArray(Memory(device, prod(shape) * dtype.itemsize), dtype, shape, row_order(shape), [])
 
 
 def row_order(shape: Sequence[int]) -> tuple[int, ...]:
-    """The strides of an array in row order, in numbers."""
+    """Returns the strides of an array in row order, in numbers."""
     return tuple(prod(shape[k + 1 :]) for k in range(len(shape)))
 
 
 class View(NamedTuple):
-    """Where the numbers of an array are, as long as `owner` is there."""
+    """Location and layout of an array's numbers, valid as long as `owner` exists."""
 
     owner: Any
     address: int
@@ -145,7 +146,7 @@ class View(NamedTuple):
 
 
 def view(name: str, array: Any, device: Device, stream: int) -> View:
-    """An array of any library's on this device, which the stream may use after what its library has under way."""
+    """Returns a view of any library's array on this device; the stream waits for pending work of that library."""
     if isinstance(array, DeviceArray):
         _on_device(name, device, *array.__dlpack_device__())
         array._before(stream)
@@ -155,7 +156,7 @@ def view(name: str, array: Any, device: Device, stream: int) -> View:
         _on_device(name, device, int(kind), int(ordinal))
         try:
             capsule = array.__dlpack__(stream=stream, max_version=_VERSION)
-        except TypeError:  # libraries that do not know of versions
+        except TypeError:  # libraries without versioned DLPack
             capsule = array.__dlpack__(stream=stream)
         address, (code, bits, lanes), shape, strides, _, flags = _condyle._borrowed(capsule)
         dtype = f"float{bits}" if (code, lanes) == (_FLOAT, 1) else f"type {code} of {lanes} x {bits} bits"
@@ -182,7 +183,7 @@ def _on_device(name: str, device: Device, kind: int, ordinal: int) -> None:
 
 
 def _interface(name: str, array: Any, device: Device, stream: int) -> View:
-    """An array by its `__cuda_array_interface__`, which does not say on which device it is."""
+    """Returns a view of an array by its `__cuda_array_interface__`, which does not name the device."""
     said = array.__cuda_array_interface__
     address, is_read_only = said["data"]
     shape, dtype, their = tuple(said["shape"]), np.dtype(said["typestr"]), said.get("stream")
@@ -199,7 +200,9 @@ def _interface(name: str, array: Any, device: Device, stream: int) -> View:
 
 
 def current_stream(array: Any, device: Device) -> int | None:
-    """The stream on which the library of an array works at present, where it says so: PyTorch and CuPy do."""
+    """Returns the stream that the library of an array currently uses, if the library reports it, as PyTorch and CuPy
+    do.
+    """
     library = type(array).__module__.partition(".")[0]
     module: Any = sys.modules.get(library)
     if library == "torch":
@@ -211,7 +214,7 @@ def current_stream(array: Any, device: Device) -> int | None:
 
 
 def stream_number(stream: Any) -> int:
-    """A stream by its number: an address, or an object of PyTorch's, CuPy's or another library's."""
+    """Returns the number of a stream, given as an address, or as an object of PyTorch, CuPy or another library."""
     if hasattr(stream, "__cuda_stream__"):
         _, number = stream.__cuda_stream__()
     else:
@@ -222,7 +225,7 @@ def stream_number(stream: Any) -> int:
 
 
 def importer(array: Any) -> Any:
-    """`from_dlpack` of an array's library, or None where there is none."""
+    """Returns `from_dlpack` of an array's library, or None if it does not exist."""
     if isinstance(array, DeviceArray):
         return None
     namespace = getattr(array, "__array_namespace__", None)

@@ -1,4 +1,4 @@
-"""Derivatives of a function of the state, by hyper-dual numbers: as `differentiate.rs` has them for Rust."""
+"""Derivatives of a function of the state, by hyper-dual numbers; the Rust version is `differentiate.rs`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,7 +12,7 @@ Function = Callable[[NDArray[Any]], Any]
 
 
 def _state(model: Model, x: ArrayLike) -> tuple[NDArray[np.float64], int]:
-    """The numbers of a state, and the number of its directions."""
+    """Returns the numbers of a state, and the number of its directions."""
     numbers = np.asarray(x, dtype=np.float64)
     if numbers.ndim != 1 or len(numbers) < model.nq:
         raise ValueError(f"x: expected a vector of at least {model.nq} numbers, found shape {numbers.shape}")
@@ -20,13 +20,15 @@ def _state(model: Model, x: ArrayLike) -> tuple[NDArray[np.float64], int]:
 
 
 def _moved(model: Model, x: NDArray[np.float64], delta: NDArray[Any]) -> NDArray[Any]:
-    """The sum x ⊕ δ, of numbers that know the directions of δ."""
+    """Returns x ⊕ δ as hyper-dual numbers with derivatives in the directions of δ."""
     q, others = x[: model.nq], x[model.nq :]
     return np.concatenate([integrate(model, q, delta[: model.nv]), others + delta[model.nv :]])
 
 
 def _directions(n: int, first: int | None, second: int | None) -> NDArray[Any]:
-    """The change δ = 0 of n entries, one of which has the first infinitesimal part, and one the second."""
+    """Returns the change δ = 0 of n entries. Entry `first` has the first infinitesimal part, entry `second` the second
+    one.
+    """
     return np.array([HyperDual(0.0, eps1=float(k == first), eps2=float(k == second)) for k in range(n)], dtype=object)
 
 
@@ -35,10 +37,10 @@ def _number(value: Any) -> HyperDual:
 
 
 def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The value f(x) and the Jacobian ∂f(x ⊕ δ)/∂δ, exact, as `(value, J)`: m numbers, and (m, nv + others).
+    """Computes the value f(x) and the exact Jacobian ∂f(x ⊕ δ)/∂δ, as `(value, J)`: m numbers, and (m, nv + others).
 
-    x: a position of nq numbers, then any others, of which only the position moves by `integrate`. f takes an array like
-    x, of `HyperDual`s, and returns a vector; it is called once for every two directions.
+    x: a position of nq numbers, then any other numbers; ⊕ is `integrate` for the position and addition for the others.
+        f takes an array like x, of `HyperDual`s, and returns a vector; it is called once for every two directions.
 
     >>> arm = condyle.robots.arm7()
     >>> data = condyle.Data(arm)
@@ -59,7 +61,7 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
 
 
 def gradient(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np.float64]]:
-    """The value f(x) and the gradient ∂f(x ⊕ δ)/∂δ, exact, as `(value, gradient)`: a number, and nv + others.
+    """Computes the value f(x) and the exact gradient ∂f(x ⊕ δ)/∂δ, as `(value, gradient)`: a number, and nv + others.
 
     x: as for `jacobian`. f returns a number; it is called once for every two directions.
 
@@ -74,7 +76,7 @@ def gradient(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np
 
 
 def hessian(model: Model, x: ArrayLike, f: Function) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """The value f(x), the gradient and the Hessian ∂²f(x ⊕ δ)/∂δ∂δ, exact, as `(value, gradient, H)`.
+    """Computes the value f(x), and exact gradient and Hessian ∂²f(x ⊕ δ)/∂δ∂δ, as `(value, gradient, H)`.
 
     x: as for `jacobian`. f returns a number; it is called once for every pair of directions, n (n + 1)/2 times.
 

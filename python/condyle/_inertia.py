@@ -1,4 +1,4 @@
-"""The inertia of a body: of its mass and centre, of simple shapes, moved, and added up."""
+"""The inertia of a body: from mass and centre, or of simple shapes; transformation and sums."""
 
 from typing import NamedTuple
 
@@ -11,17 +11,19 @@ _Array = NDArray[np.float64]
 
 
 def parallel_axes(mass: ArrayLike, com: _Array) -> _Array:
-    """m (c·c 1 − c cᵀ): what a mass m at c adds to the rotational inertia about the origin, (…, 3, 3)."""
+    """Returns m (c·c 1 − c cᵀ), the contribution of a mass m at c to the rotational inertia about the origin, (…, 3,
+    3).
+    """
     square = (com * com).sum(-1)[..., None, None] * np.eye(3)
     out: _Array = np.asarray(mass)[..., None, None] * (square - com[..., :, None] * com[..., None, :])
     return out
 
 
 class Inertia(NamedTuple):
-    """The inertia of a body, along the axes of its frame.
+    """The inertia of a body, in the axes of its frame.
 
-    I * v is the momentum of a body that moves with v, a `condyle.algebra.Motion`; X * I, where X is a `SE3`, is the
-    inertia in another frame; I + J is that of two bodies as one, given in one frame.
+    I * v is the momentum of a body with velocity v, a `condyle.algebra.Motion`. X * I, where X is an `SE3`, is the
+    inertia in another frame. I + J is the inertia of two bodies as one, given in one frame.
 
     >>> from condyle.algebra import SE3, Motion
     >>> rod = condyle.Inertia.from_cylinder(2.0, radius=0.05, length=1.0)
@@ -36,15 +38,18 @@ class Inertia(NamedTuple):
     mass: float
     """The mass (kg)."""
     com: _Array
-    """The centre of mass in the body's frame (m), 3 numbers; zeros if there is no mass."""
+    """The centre of mass in the body's frame (m), 3 numbers; zeros if the mass is zero."""
     about_com: _Array
-    """The rotational inertia about the centre of mass (kg m²), (3, 3), as a URDF gives it."""
+    """The rotational inertia about the centre of mass (kg m²), (3, 3), as in a URDF."""
     rotational: _Array
-    """The rotational inertia about the origin of the body's frame (kg m²), (3, 3): of the two, the one that is read."""
+    """The rotational inertia about the origin of the body's frame (kg m²), (3, 3). Functions that take an inertia read
+    this one and ignore `about_com`.
+    """
 
     @classmethod
     def from_com(cls, mass: float, com: ArrayLike, about_com: ArrayLike) -> "Inertia":
-        """The inertia of a body with this mass (kg), centre of mass (m), and rotational inertia about it (kg m²).
+        """Returns the inertia of a body with this mass (kg), centre of mass (m), and rotational inertia about it (kg
+        m²).
 
         >>> condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3)).rotational[0, 0].item()
         0.6
@@ -58,46 +63,48 @@ class Inertia(NamedTuple):
 
     @classmethod
     def from_sphere(cls, mass: float, radius: float) -> "Inertia":
-        """The inertia of a solid ball about its centre: 2/5 m r²."""
+        """Returns the inertia of a solid ball about its centre: 2/5 m r²."""
         r = _lengths("radius", radius, 1)
         return _solid(mass, 0.4 * r * r * np.ones(3))
 
     @classmethod
     def from_ellipsoid(cls, mass: float, radii: ArrayLike) -> "Inertia":
-        """The inertia of a solid ellipsoid about its centre, its half axes being `radii`: m/5 (b² + c²)."""
+        """Returns the inertia of a solid ellipsoid about its centre, with half axes `radii`: m/5 (b² + c²)."""
         return _solid(mass, _others(_lengths("radii", radii, 3) ** 2) / 5.0)
 
     @classmethod
     def from_box(cls, mass: float, size: ArrayLike) -> "Inertia":
-        """The inertia of a solid box about its centre, its edges being `size`: m/12 (b² + c²)."""
+        """Returns the inertia of a solid box about its centre, with edges `size`: m/12 (b² + c²)."""
         return _solid(mass, _others(_lengths("size", size, 3) ** 2) / 12.0)
 
     @classmethod
     def from_cylinder(cls, mass: float, radius: float, length: float) -> "Inertia":
-        """The inertia of a solid cylinder along z about its centre: m/12 (3 r² + l²), and m/2 r² about z."""
+        """Returns the inertia of a solid cylinder along z about its centre: m/12 (3 r² + l²), and m/2 r² about z."""
         r, l = _lengths("radius", radius, 1), _lengths("length", length, 1)  # noqa: E741
         across = (3.0 * r * r + l * l) / 12.0
         return _solid(mass, np.array([across, across, 0.5 * r * r]))
 
     @classmethod
     def from_capsule(cls, mass: float, radius: float, length: float) -> "Inertia":
-        """The inertia of a solid capsule along z about its centre: a cylinder of `length` between two half balls."""
+        """Returns the inertia of a solid capsule along z about its centre: a cylinder of `length` between two half
+        balls.
+        """
         r, l = _lengths("radius", radius, 1), _lengths("length", length, 1)  # noqa: E741
-        ball = 4.0 * r / (4.0 * r + 3.0 * l)  # the share of the mass: 4/3 π r³ of 4/3 π r³ + π r² l
-        # each half ball has its centre of mass 3/8 r from the cylinder: 2/5 r² + l²/4 + 3/8 l r about the middle
+        ball = 4.0 * r / (4.0 * r + 3.0 * l)  # fraction of the mass in the ball: 4/3 π r³ of 4/3 π r³ + π r² l
+        # the centre of mass of a half ball is 3/8 r from the cylinder: 2/5 r² + l²/4 + 3/8 l r about the middle
         across = ball * (0.4 * r * r + 0.25 * l * l + 0.375 * l * r) + (1.0 - ball) * (3.0 * r * r + l * l) / 12.0
         along = ball * 0.4 * r * r + (1.0 - ball) * 0.5 * r * r
         return _solid(mass, np.array([across, across, along]))
 
     @property
     def matrix(self) -> _Array:
-        """[m 1, −m ĉ; m ĉ, Ī], (6, 6): the momentum for a motion, linear parts first."""
+        """The matrix [m 1, −m ĉ; m ĉ, Ī], (6, 6), which maps a motion to the momentum, linear parts first."""
         x, y, z = self.mass * self.com
         h = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         return np.block([[self.mass * np.eye(3), -h], [h, self.rotational]])
 
     def __add__(self, other: object) -> "Inertia":
-        """The inertia of two bodies as one."""
+        """Returns the inertia of two bodies as one."""
         if not isinstance(other, Inertia):
             return NotImplemented
         mass, rotational = self.mass + other.mass, self.rotational + other.rotational
@@ -110,20 +117,20 @@ Inertia.__module__ = "condyle"
 
 
 def _solid(mass: float, moments: _Array) -> Inertia:
-    """The inertia about the centre of mass, by its moments for each kilogram."""
+    """Returns the inertia about the centre of mass from its moments per kilogram."""
     if not (np.isfinite(mass) and mass >= 0.0):
         raise ValueError(f"mass: expected at least 0 kg, found {mass}")
     return Inertia.from_com(mass, np.zeros(3), np.diag(mass * moments))
 
 
 def _others(squares: _Array) -> _Array:
-    """(b² + c², a² + c², a² + b²)."""
+    """Returns (b² + c², a² + c², a² + b²)."""
     out: _Array = squares.sum() - squares
     return out
 
 
 def _lengths(name: str, given: ArrayLike, count: int) -> _Array:
-    """One length or several."""
+    """Reads one length or several."""
     found = np.array(given, np.float64)
     shape = () if count == 1 else (count,)
     if found.shape != shape:

@@ -1,4 +1,4 @@
-"""Robots by their names, from the packages that have their files."""
+"""Robots by name, from the packages that contain their files."""
 
 from importlib import import_module
 from types import ModuleType
@@ -7,19 +7,20 @@ from typing import Any
 from ._condyle import Model
 
 PACKAGES = ("example_robot_data", "robot_descriptions")
-"""The packages that are asked, the first one first."""
+"""Packages to search, in this order."""
 
 
 def load(name: str, package: str | None = None, root_joint: str | None = None) -> Model:
-    """The robot of this name, from example_robot_data or robot_descriptions, whichever is installed and has it.
+    """Returns the robot with this name, from example_robot_data or robot_descriptions, whichever is installed and has
+    it.
 
-    name: as the package has it: 'talos', 'panda', 'anymal_c_mj', ….
-    package: 'example_robot_data' or 'robot_descriptions'; None is the first that has the robot.
-    root_joint: as for `Model.from_urdf`, for the URDFs of robot_descriptions; example_robot_data knows it.
+    name: the package's name for it: 'talos', 'panda', 'anymal_c_mj', ….
+    package: 'example_robot_data' or 'robot_descriptions'; None is the first package that has the robot.
+    root_joint: as for `Model.from_urdf`, for the URDFs of robot_descriptions; example_robot_data defines it itself.
 
-    Robots of example_robot_data are those that its own `load` returns, with their root joint and armature; they come
-    through Pinocchio, on which it depends. robot_descriptions gets the files from the net when it is first asked for a
-    robot.
+    A robot of example_robot_data is the one that the package's own `load` returns, with its root joint and armature. It
+    is converted from Pinocchio, on which the package depends. robot_descriptions downloads the files of a robot on
+    first use.
 
     Raises ImportError if neither package is installed, ValueError if none has the robot.
     """
@@ -37,7 +38,7 @@ def load(name: str, package: str | None = None, root_joint: str | None = None) -
 
 
 def _example(name: str, root_joint: str | None) -> Model | None:
-    """A robot of example_robot_data."""
+    """Returns a robot of example_robot_data."""
     robots = import_module("example_robot_data.robots_loader").ROBOTS
     if name not in robots:
         return None
@@ -47,7 +48,7 @@ def _example(name: str, root_joint: str | None) -> Model | None:
 
 
 def _described(name: str, root_joint: str | None) -> Model | None:
-    """A robot of robot_descriptions, whose modules know where its files are."""
+    """Returns a robot of robot_descriptions, whose modules know the paths of its files."""
     module = _description(name)
     if module is None:
         return None
@@ -66,5 +67,5 @@ def _description(name: str) -> ModuleType | None:
 
 
 def find_spec(module: str) -> bool:
-    """Whether a module is installed."""
+    """Returns whether a module is installed."""
     return import_module("importlib.util").find_spec(module) is not None

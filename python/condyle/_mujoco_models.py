@@ -1,7 +1,7 @@
-"""Models of MuJoCo as plain MJCF: what its compiler has made, without anything that needs a compiler or other files.
+"""Compiled MuJoCo models as plain MJCF: without elements that need MuJoCo's compiler or other files.
 
-`Model.from_mujoco` reads the text as it reads any MJCF, so the rules for limits, springs, actuators and warnings are
-the same. Numbers keep all digits.
+`Model.from_mujoco` reads this text like any MJCF, so the rules for limits, springs, actuators and warnings are the
+same. Numbers keep all digits.
 """
 
 import sys
@@ -18,23 +18,23 @@ JOINTS = ("free", "ball", "slide", "hinge")
 CAMERAS = ("fixed", "track", "trackcom", "targetbody", "targetbodycom")
 JOINT_WRAP, SITE_WRAP = 1, 3
 SITE_OBJECT = 6
-"""The number of sites among MuJoCo's types of objects."""
+"""The value of sites in MuJoCo's enumeration of object types."""
 FLAGS = {
     "equality": 1 << 1, "frictionloss": 1 << 2, "limit": 1 << 3, "spring": 1 << 5, "damper": 1 << 6, "gravity": 1 << 7,
     "clampctrl": 1 << 8, "actuation": 1 << 11,
 }  # fmt: skip
-"""What may be disabled, with its bit in MuJoCo 4; another version is asked for its own."""
+"""Features that can be disabled, with their bits in MuJoCo 4; other versions are asked for their own bits."""
 
 _Attributes = dict[str, Any]
 
 
 def mjcf(model: Any) -> str:
-    """The text of an MJCF that describes a compiled model."""
+    """Returns the text of an MJCF that describes a compiled model."""
     return _Text(model).text()
 
 
 class _Text:
-    """The parts of a text, and the names that it gives to what has none."""
+    """Writes the parts of the text, and gives names to unnamed items."""
 
     def __init__(self, model: Any) -> None:
         self.m = model
@@ -45,7 +45,7 @@ class _Text:
         self.tendons = self._names("tendon", model.ntendon)
 
     def text(self) -> str:
-        """The whole document, a line for each element."""
+        """Returns the whole document, a line for each element."""
         m = self.m
         compiler = {"angle": "radian", "autolimits": False, "inertiafromgeom": False, "balanceinertia": False}
         option = {"gravity": m.opt.gravity, "density": m.opt.density, "viscosity": m.opt.viscosity, "wind": m.opt.wind}
@@ -89,7 +89,7 @@ class _Text:
         return [self._name(int(address)) for address in getattr(self.m, f"name_{kind}adr")[:count]] if count else []
 
     def _name_the_unnamed(self) -> None:
-        """Names bodies and joints as the reader of MJCF does, so that they can be referred to."""
+        """Names bodies and joints as our MJCF reader does, so that they can be referred to."""
         taken = {*self.bodies}, {*self.joints}
         for body in range(1, self.m.nbody):
             name = self.bodies[body] = self.bodies[body] or _free(f"body{body}", taken[0])
@@ -99,7 +99,7 @@ class _Text:
                 self.joints[joint] = self.joints[joint] or _free(f"{name}_joint{number}", taken[1])
 
     def _word(self, enumeration: str, prefix: str, number: int, otherwise: tuple[str, ...]) -> str:
-        """The word for a number of an enumeration, in the version of MuJoCo that the model is of."""
+        """Returns the word for a value of an enumeration, in the MuJoCo version of the model."""
         package = sys.modules.get(type(self.m).__module__.partition(".")[0])
         members = getattr(getattr(package, enumeration, None), "__members__", {})
         words = {int(value): name.removeprefix(prefix).lower() for name, value in members.items()}
@@ -114,7 +114,7 @@ class _Text:
         return [_element("flag", disabled)] if disabled else []
 
     def _inside(self, body: int) -> Iterator[str]:
-        """Inertia, joints, sites, cameras and plugins of a body."""
+        """Yields inertia, joints, sites, cameras and plugins of a body."""
         m = self.m
         if body and (m.body_mass[body] or np.any(m.body_inertia[body])):
             pose = {"pos": m.body_ipos[body], "quat": m.body_iquat[body]}
@@ -260,7 +260,8 @@ class _Text:
         names = self._names("key", self.m.nkey)
         for k, name in enumerate(names):
             q, v = self.m.key_qpos[k], self.m.key_qvel[k]
-            if name or np.any(v) or not np.array_equal(q, self.m.qpos0):  # else room that a file has asked for
+            # other keyframes are empty slots that the file reserved
+            if name or np.any(v) or not np.array_equal(q, self.m.qpos0):
                 yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q, "qvel": v})
 
 
@@ -273,11 +274,11 @@ TRANSMISSIONS = {
     "body": (("body", "bodies"),),
     "so3": (("joint", "joints"),),
 }
-"""The attribute that names the thing that an actuator drives, and the list of the things' names."""
+"""Per type of transmission: the attribute that names the driven item, and the list with the names of these items."""
 
 
 def _free(name: str, taken: set[str]) -> str:
-    """The name, or one like it that is not taken; it is taken then."""
+    """Returns the name, or a similar one that is free, and marks it as taken."""
     while name in taken:
         name += "_"
     taken.add(name)
@@ -285,13 +286,13 @@ def _free(name: str, taken: set[str]) -> str:
 
 
 def _row(model: Any, field: str, number: int) -> Any:
-    """A row of a field, 0 in a version of MuJoCo that does not have the field."""
+    """Returns a row of a field, 0 if the MuJoCo version lacks the field."""
     numbers = getattr(model, field, None)
     return 0.0 if numbers is None else numbers[number]
 
 
 def _polynomial(first: Any, others: Any) -> list[float]:
-    """A coefficient and the higher ones, where one of these is not 0."""
+    """Returns a coefficient, and the higher ones if one of these is not 0."""
     higher = [float(x) for x in np.ravel(others)]
     return [float(first), *higher] if any(higher) else [float(first)]
 
@@ -301,7 +302,7 @@ def _range(name: str, limited: str, limits: Any, numbers: Any) -> _Attributes:
 
 
 def _element(tag: str, attributes: _Attributes, inside: Iterable[str] = ()) -> str:
-    """An element, with its numbers in all digits."""
+    """Returns an element, with its numbers in all digits."""
     words = [f" {name}={quoteattr(_value(value))}" for name, value in attributes.items()]
     content = "".join(inside)
     return f"<{tag}{''.join(words)}" + (f">{content}</{tag}>" if content else "/>")

@@ -1,4 +1,4 @@
-"""Batches in Pinocchio's spelling: one column for each state."""
+"""Batches with Pinocchio's interface: one column for each state."""
 
 import os
 from typing import Any
@@ -13,23 +13,23 @@ _Array = NDArray[np.float64]
 
 
 def omp_get_max_threads() -> int:
-    """The number of threads that this machine runs at once."""
+    """Returns the number of threads that this machine can run at once."""
     return os.cpu_count() or 1
 
 
 class ModelPool:
-    """A model with scratch for several threads."""
+    """A model with scratch memory for several threads."""
 
     def __init__(self, model: Model, size: int | None = None) -> None:
         self._model = model
         self._data: dict[int, ours.Data] = {}
 
     def model(self) -> Model:
-        """The model."""
+        """Returns the model."""
         return self._model
 
     def _of(self, threads: int) -> ours.Data:
-        """Scratch for so many threads, kept for the next call."""
+        """Returns scratch memory for this number of threads, kept for the next call."""
         if threads not in self._data:
             self._data[threads] = ours.Data(self._model.ours, threads=threads)
         return self._data[threads]
@@ -38,14 +38,14 @@ class ModelPool:
 def rneaInParallel(
     num_thread: int, pool: ModelPool, q: ArrayLike, v: ArrayLike, a: ArrayLike, tau: _Array | None = None
 ) -> _Array | None:
-    """τ of each column, (nv, N), or into `tau`."""
+    """Computes τ of each column, (nv, N), into `tau` if it is given."""
     return _columns(ours.rnea, num_thread, pool, (q, v, a), tau)
 
 
 def abaInParallel(
     num_thread: int, pool: ModelPool, q: ArrayLike, v: ArrayLike, tau: ArrayLike, a: _Array | None = None
 ) -> _Array | None:
-    """q̈ of each column, (nv, N), or into `a`."""
+    """Computes q̈ of each column, (nv, N), into `a` if it is given."""
     return _columns(ours.aba, num_thread, pool, (q, v, tau), a)
 
 

@@ -1,4 +1,4 @@
-"""Models in Pinocchio's spelling: from files, from each other, and those that are built in."""
+"""Models with Pinocchio's interface: from files, from other models, and built-in ones."""
 
 import os
 from collections.abc import Sequence
@@ -12,42 +12,42 @@ from ._spelling import JointModelFreeFlyer, Model
 
 
 def buildModelFromUrdf(path: str, root_joint: JointModelFreeFlyer | None = None, mimic: bool = False) -> Model:
-    """A robot from a URDF."""
+    """Reads a robot from a URDF file."""
     return Model(ours.Model.from_urdf(path, root_joint="free_flyer" if root_joint else None, mimic=mimic))
 
 
 def buildModelFromXML(text: str, root_joint: JointModelFreeFlyer | None = None, mimic: bool = False) -> Model:
-    """A robot from a URDF's text."""
+    """Reads a robot from a URDF's text."""
     return Model(ours.Model.from_urdf_str(text, root_joint="free_flyer" if root_joint else None, mimic=mimic))
 
 
 def buildModelFromMJCF(path: str) -> Model:
-    """A robot from an MJCF."""
+    """Reads a robot from an MJCF file."""
     return Model(ours.Model.from_mjcf(path))
 
 
 def buildSampleModelManipulator() -> Model:
-    """Pinocchio's arm of six joints."""
+    """Returns Pinocchio's arm with six joints."""
     return Model(samples.manipulator())
 
 
 def buildSampleModelHumanoid() -> Model:
-    """Pinocchio's humanoid of 28 joints on a free-flyer."""
+    """Returns Pinocchio's humanoid with 28 joints on a free-flyer."""
     return Model(samples.humanoid())
 
 
 def buildSampleModelHumanoidRandom() -> Model:
-    """A humanoid of the same form as Pinocchio's, on a free-flyer; its numbers are others, drawn by NumPy."""
+    """Returns a humanoid like Pinocchio's random one, on a free-flyer; its numbers differ, since NumPy draws them."""
     return Model(samples.random_humanoid())
 
 
 def buildReducedModel(model: Model, joints: Sequence[int], q: ArrayLike) -> Model:
-    """The robot with joints held where q has them."""
+    """Returns the robot with joints locked at their positions in q."""
     return Model(model.ours.lock([model.names[joint] for joint in joints], q))
 
 
 def appendModel(modelA: Model, modelB: Model, frameInModelA: int, aMb: algebra.SE3) -> Model:
-    """Both robots, the second one's world at aMb in a frame of the first."""
+    """Returns both robots as one, with the second robot's world at aMb in a frame of the first."""
     frame = frameInModelA - 1 if frameInModelA else None
     return Model(modelA.ours.append(frame, modelB.ours, aMb.homogeneous))
 
@@ -55,15 +55,15 @@ def appendModel(modelA: Model, modelB: Model, frameInModelA: int, aMb: algebra.S
 def transformJointIntoMimic(
     model: Model, index_mimicked: int, index_mimicking: int, scaling: float, offset: float
 ) -> Model:
-    """The robot with a joint that follows another one."""
+    """Returns the robot with one more joint that follows another one."""
     return Model(model.ours.with_mimic(index_mimicking, index_mimicked, scaling, offset))
 
 
 def loadReferenceConfigurations(model: Model, filename: str | os.PathLike[str], verbose: bool = False) -> None:
-    """Puts the named positions of an SRDF into model.referenceConfigurations."""
+    """Adds the named positions of an SRDF file to model.referenceConfigurations."""
     model.referenceConfigurations |= model.ours.reference_configurations(filename)
 
 
 def loadReferenceConfigurationsFromXML(model: Model, xmlStream: str, verbose: bool = False) -> None:
-    """Puts the named positions of an SRDF's text into model.referenceConfigurations."""
+    """Adds the named positions of an SRDF's text to model.referenceConfigurations."""
     model.referenceConfigurations |= model.ours.reference_configurations_str(xmlStream)

@@ -1,4 +1,4 @@
-"""Models of Pinocchio as ours, and ours as Pinocchio's."""
+"""Conversion of models from and to Pinocchio."""
 
 import warnings
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from ._condyle import WORLD, BodyId, Joint, Model, ModelBuilder, ModelError
 from ._inertia import Inertia
 
 _Part = tuple[Joint, NDArray[np.float64]]
-"""A joint, and its place."""
+"""A joint, and its placement."""
 
 ALIGNED: dict[str, Callable[..., Joint]] = {
     "JointModelR": Joint.revolute,
@@ -33,11 +33,11 @@ FREE = {
     "JointModelFreeFlyer": Joint.free_flyer,
 }
 NO_LIMIT = 1e30
-"""Limits of this size are none: Pinocchio has infinity or the largest number for them."""
+"""Magnitude from which a limit counts as infinite: Pinocchio uses infinity or the largest number."""
 
 
 def from_pinocchio(theirs: Any) -> Model:
-    """Ours of theirs; see `Model.from_pinocchio`."""
+    """Converts a model from Pinocchio; see `Model.from_pinocchio`."""
     _check_order(theirs)
     builder, bodies = ModelBuilder(theirs.name), [WORLD]
     builder.gravity(theirs.gravity.linear)
@@ -78,7 +78,7 @@ def from_pinocchio(theirs: Any) -> Model:
 
 
 def warn_of_armature(model: Model) -> None:
-    """Warns of armature that the libraries take along different axes."""
+    """Warns of armature that the two libraries apply along different axes."""
     for name, kind, at in zip(model.names, model.joint_types, model.idx_vs, strict=True):
         if kind == "free_flyer" and model.armature[at : at + 3].any():
             text = f"joint `{name}`: its armature {model.armature[at]} is along the axes of its parent in Condyle"
@@ -86,11 +86,13 @@ def warn_of_armature(model: Model) -> None:
 
 
 TURNS = {"free_flyer": 3, "planar": 2}
-"""Where in the position of a joint its rotation begins, if not at 0."""
+"""Index in a joint's position at which its rotation begins, if not 0."""
 
 
 def _check_order(theirs: Any) -> None:
-    """Joints must stand depth first: that of each one's parent is on the way from the root to the joint before."""
+    """Checks that joints are numbered depth first: the parent of each joint is on the path from the root to the joint
+    before.
+    """
     way = [0]
     for i in range(1, theirs.njoints):
         parent = theirs.parents[i]
@@ -105,7 +107,7 @@ def _check_order(theirs: Any) -> None:
 
 
 def _parts(joint: Any, name: str) -> list[_Part]:
-    """The joints that one of Pinocchio's is made of, and where each sits in the frame of the one before."""
+    """Returns the joints that make up a joint of Pinocchio, each with its placement in the frame of the one before."""
     kind, here = joint.shortname(), np.eye(4)
     if kind in FREE:
         return [(FREE[kind](), here)]
@@ -133,14 +135,14 @@ def _parts(joint: Any, name: str) -> list[_Part]:
 
 
 def _motion(joint: Any) -> NDArray[np.float64]:
-    """S, the motion of a joint of one degree of freedom for a unit velocity, which does not depend on its position."""
+    """Returns S, the motion at unit velocity of a joint with one degree of freedom, which is constant."""
     data = joint.createData()
     joint.calc(data, np.eye(max(joint.idx_q + 2, 2))[joint.idx_q])
     return np.array(data.S, float).ravel()
 
 
 def _follower(S: NDArray[np.float64], name: str) -> Joint:
-    """The joint that moves along S, whose length is the square of the ratio, when the one that it follows moves."""
+    """Returns a mimic joint that moves along S. Its axis has the length of S, which is the square of the ratio."""
     linear, angular = S[:3], S[3:]
     if not S.any():
         raise ModelError(f"joint `{name}`: follows another one with the ratio 0")
@@ -161,7 +163,7 @@ def _limits(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _losses(theirs: Any, joint: Any, name: str) -> dict[str, float]:
-    """Damping and friction, which a joint has once here."""
+    """Returns damping and friction; a joint has a single value of each here."""
     out = {}
     for what, numbers in ("damping", theirs.damping), ("friction", theirs.upperDryFrictionLimit):
         own = np.array(numbers[joint.idx_v : joint.idx_v + joint.nv])
@@ -172,13 +174,13 @@ def _losses(theirs: Any, joint: Any, name: str) -> dict[str, float]:
 
 
 def _check_lossless(theirs: Any, joint: Any, name: str) -> None:
-    """Joints that become a chain have no damping nor friction."""
+    """Checks that a joint that becomes a chain has neither damping nor friction."""
     if any(_losses(theirs, joint, name).values()):
         raise ModelError(f"joint `{name}`: damping and friction of a {joint.shortname()} have no place here")
 
 
 def _is_link(frame: Any) -> bool:
-    """Whether a frame is that of a joint's body itself."""
+    """Returns whether a frame is the frame of a joint's body itself."""
     return str(frame.type) == "BODY" and np.array_equal(frame.placement.homogeneous, np.eye(4))
 
 
@@ -190,7 +192,7 @@ def _add_frames(builder: ModelBuilder, bodies: Sequence[BodyId], theirs: Any) ->
 
 
 def to_pinocchio(ours: Model) -> Any:
-    """Theirs of ours; see `Model.to_pinocchio`."""
+    """Converts a model to Pinocchio; see `Model.to_pinocchio`."""
     pin: Any = import_module("pinocchio")
     theirs = pin.Model()
     theirs.name = ours.name
@@ -201,7 +203,7 @@ def to_pinocchio(ours: Model) -> Any:
             theirs.addJoint(
                 ours.parents[i], _their_joint(pin, ours.joints[i], ours.joint_types[i]), place, ours.names[i]
             )
-        inertia, own = pin.Inertia.Zero(), ours.inertias[i]  # its constructor refuses what some files have
+        inertia, own = pin.Inertia.Zero(), ours.inertias[i]  # the constructor refuses inertias that occur in files
         inertia.mass, inertia.lever, inertia.inertia = own.mass, own.com, own.about_com
         theirs.inertias[i] = inertia
     for i, mimic in enumerate(ours.mimics):
@@ -230,7 +232,7 @@ def to_pinocchio(ours: Model) -> Any:
 
 
 def _their_joint(pin: Any, joint: Joint | None, kind: str) -> Any:
-    """The joint of Pinocchio's of this kind, along an axis by its own name where it has one."""
+    """Returns Pinocchio's joint of this kind, of the class for x, y or z if it has that axis."""
     assert joint is not None
     free = {"spherical": "Spherical", "planar": "Planar", "translation": "Translation", "free_flyer": "FreeFlyer"}
     if kind in free:
@@ -248,7 +250,7 @@ def _their_joint(pin: Any, joint: Joint | None, kind: str) -> Any:
 
 
 def _unbounded(pin: Any, axis: NDArray[np.float64]) -> Any:
-    """A joint that turns without limits about any axis: in Python only Pinocchio's reader of URDFs makes one."""
+    """Returns a joint that turns without limits about any axis; in Python only Pinocchio's URDF reader makes one."""
     xyz = " ".join(repr(float(x)) for x in axis)
     inertia = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
     ends = f'<parent link="a"/><child link="b"/><axis xyz="{xyz}"/>'

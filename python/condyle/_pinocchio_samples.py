@@ -1,4 +1,4 @@
-"""The robots that are built into Pinocchio: an arm of six joints, a humanoid of such limbs, and a random one."""
+"""The sample robots of Pinocchio: an arm with six joints, a humanoid with such limbs, and a random humanoid."""
 
 import numpy as np
 
@@ -30,7 +30,7 @@ def _link(
     inertia: Inertia,
     limits: tuple[float, float, float, float] | None = (-3.14, 3.14, 10.0, 10.0),
 ) -> BodyId:
-    """A body on a joint, with frames for both; limits: of the position, of the velocity, and of the effort."""
+    """Adds a body on a joint, with frames for both; limits: minimum and maximum position, velocity, and effort."""
     least, most, velocity, effort = limits or (None,) * 4
     position = None if least is None or most is None else (least, most)
     names = f"{name}_body", f"{name}_joint"
@@ -55,7 +55,7 @@ def _limb(robot: ModelBuilder, prefix: str, on: BodyId, begin: SE3, foot: bool =
         at = SE3(np.eye(3), offset)
         if name == "shoulder1":
             at = begin
-        elif name == "wrist2" and foot:  # a quarter of a turn about y
+        elif name == "wrist2" and foot:  # a quarter turn about y
             at = exp6(Motion(np.zeros(3), [0.0, np.pi / 2.0, 0.0])) * at
         on = _link(robot, f"{prefix}{name}", on, Joint.revolute(axis), at, inertia)
         for link in links:
@@ -63,14 +63,14 @@ def _limb(robot: ModelBuilder, prefix: str, on: BodyId, begin: SE3, foot: bool =
 
 
 def manipulator() -> Model:
-    """The arm."""
+    """Returns the arm."""
     robot = ModelBuilder("")
     _limb(robot, "", WORLD, SE3.identity())
     return robot.build()
 
 
 def humanoid() -> Model:
-    """The humanoid, on a free-flyer."""
+    """Returns the humanoid, on a free-flyer."""
     robot = ModelBuilder("")
     base = robot.body("root_body", WORLD, Joint.free_flyer(), None, _LIGHT, joint_name="root_joint")
     robot.frame("root_joint", base, kind="joint")
@@ -90,7 +90,9 @@ def humanoid() -> Model:
 
 
 def random_humanoid() -> Model:
-    """A humanoid of 26 joints on a free-flyer, whose placements, inertias and limits NumPy's generator draws."""
+    """Returns a humanoid with 26 joints on a free-flyer, with placements, inertias and limits drawn by NumPy's
+    generator.
+    """
     robot, draw = ModelBuilder(""), np.random.random
 
     def link(name: str, on: BodyId, axis: list[float]) -> BodyId:

@@ -1,4 +1,4 @@
-"""Playback of a motion in the browser, by viser."""
+"""Playback of a motion in the browser, with viser."""
 
 import threading
 import time
@@ -20,7 +20,7 @@ GREY, ORANGE = (158, 170, 186), (235, 120, 20)
 
 
 class Player:
-    """A motion that the browser shows: `show` a knot, `play`, `pause`, `close`; in a notebook it shows itself."""
+    """A motion shown in the browser: `show` a knot, `play`, `pause`, `close`; in a notebook it displays itself."""
 
     def __init__(
         self, model: Model, q: _Array, dt: float, shapes: list[Shape], arrows: list[_Array], server: Any
@@ -62,7 +62,7 @@ class Player:
         return f"http://localhost:{self.server.get_port()}"
 
     def show(self, knot: int) -> None:
-        """Shows a knot; those beyond the last one are the last one."""
+        """Shows a knot; indices beyond the last knot show the last one."""
         with self._moving:
             self.knot = min(max(knot, 0), len(self._poses) - 1)
             with self.server.atomic():
@@ -77,17 +77,17 @@ class Player:
             self.slider.value = self.knot * self.dt
 
     def play(self) -> None:
-        """Plays on from the knot that is shown, again and again, until `pause`."""
+        """Plays from the current knot, in a loop, until `pause`."""
         self.button.label = "pause"
         self._playing.set()
 
     def pause(self) -> None:
-        """Stops at the knot that is shown."""
+        """Stops at the current knot."""
         self.button.label = "play"
         self._playing.clear()
 
     def close(self) -> None:
-        """Ends the server of the page."""
+        """Stops the web server."""
         self._closed.set()
         self._playing.set()
         self._thread.join()
@@ -107,7 +107,7 @@ class Player:
                 time.sleep(min(self.dt, 1.0 / 60.0))
 
     def _look(self, poses: _Array) -> None:
-        """Where the page looks from, so that all of the motion is seen."""
+        """Sets the initial camera so that the whole motion is visible."""
         points = poses[:, 1:, :3, 3].reshape(-1, 3)
         low, high = points.min(0), points.max(0)
         middle, far = (low + high) / 2.0, 0.6 + 0.9 * np.linalg.norm(high - low)
@@ -131,16 +131,16 @@ def play(
     newtons_per_metre: float = 500.0,
     port: int = 8080,
 ) -> Player:
-    """Shows a motion in the browser, at the address that the returned `Player` has.
+    """Shows a motion in the browser, at the address of the returned `Player`.
 
-    q: positions, (N, nq), as `solution.xs[:, :model.nq]`; they are shown without being checked.
+    q: positions, (N, nq), such as `solution.xs[:, :model.nq]`; they are shown without checks.
     dt: the time from one knot to the next (s).
-    forces: contact forces of each knot, by the names of frames: the first three numbers are an arrow at the frame,
-        along the axes of the world; `solution.forces` of contacts whose rows are 'local_world_aligned' and whose names
-        are those of frames.
+    forces: contact forces of each knot, by name of a frame; the first three numbers are drawn as an arrow at the frame,
+        in the world's axes. `solution.forces` has this form if contacts have the names of their frames and their rows
+        are 'local_world_aligned'.
     urdf: the file with the robot's shapes and meshes; `packages` are folders for `package://`. Without it, and for
-        meshes that are not there, bodies are capsules from joint to joint.
-    port: the page's port; the next free one is taken if it is in use.
+        missing meshes, bodies are capsules from joint to joint.
+    port: the page's port; if it is in use, the next free port is taken.
 
     Raises ImportError without viser (pip install condyle[viz]).
     """
@@ -159,7 +159,7 @@ def play(
 
 
 def _arrows(model: Model, q: _Array, forces: _Forces, scale: float) -> list[_Array]:
-    """The ends of each knot's arrows, (n, 2, 3)."""
+    """Returns the end points of each knot's arrows, (n, 2, 3)."""
     data, out = Data(model), []
     for position, knot in zip(q, forces, strict=False):
         poses, ends = forward_kinematics(model, data, position), []
@@ -175,7 +175,7 @@ def _arrows(model: Model, q: _Array, forces: _Forces, scale: float) -> list[_Arr
 
 
 def _some(points: _Array) -> NDArray[np.float32]:
-    """Arrows that can be drawn, where there may be none."""
+    """Returns points that can be drawn even if there are no arrows."""
     return (points if len(points) else np.zeros((1, 2, 3))).astype(np.float32)
 
 

@@ -1,4 +1,4 @@
-"""What is shown of a solve while it goes on."""
+"""Progress output of a solve."""
 
 import importlib
 import sys
@@ -11,7 +11,7 @@ _HEAD = "iter         cost         gap        stop        step  regularisation"
 
 
 class Reporter:
-    """A callback of a solver that prints its iterations, or shows them by tqdm."""
+    """A callback of a solver that prints its iterations, or shows them with tqdm."""
 
     def __init__(self, callback: Callable[[Iteration], object] | None, verbose: bool, progress: bool) -> None:
         self._callback, self._lines = callback, verbose
@@ -35,14 +35,14 @@ class Reporter:
         return None if self._callback is None else self._callback(now)
 
     def close(self) -> None:
-        """Ends the bar."""
+        """Closes the progress bar."""
         sys.stdout.flush()
         if self._bar is not None:
             self._bar.close()
 
 
 def _bar(**options: Any) -> Any:
-    """A bar of tqdm, or None where that is not installed."""
+    """Returns a tqdm progress bar, or None if tqdm is not installed."""
     try:
         tqdm: Any = importlib.import_module("tqdm.auto")
     except ImportError:
@@ -51,7 +51,9 @@ def _bar(**options: Any) -> Any:
 
 
 def counter(progress: bool | Callable[[int, int], object], total: int, done: int) -> Callable[[int | None], None]:
-    """Who is told how many more are done, and None at the end; shows it as `progress` says."""
+    """Returns a function to be called with the number of newly finished variations, and with None at the end. It shows
+    the progress as `progress` requests.
+    """
     bar = _bar(desc="sweep", unit=" variations", total=total, initial=done) if progress is True else None
 
     def more(count: int | None) -> None:

@@ -1,4 +1,4 @@
-"""Shapes of a robot's bodies: those of its URDF, or capsules from joint to joint."""
+"""Shapes of a robot's bodies: from its URDF, or capsules from joint to joint."""
 
 import os
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ class Shape(NamedTuple):
 
 
 def capsules(model: Model, only: set[int] | None = None) -> list[Shape]:
-    """A capsule from the origin of each body to each joint and link on it; of some bodies only, or of all."""
+    """Returns capsules from the origin of each body to each joint and link on it, for all bodies or those in `only`."""
     ends: list[list[_Array]] = [[] for _ in range(model.nbodies)]
     for body in range(1, model.nbodies):
         ends[model.parents[body]].append(model.joint_placements[body][:3, 3])
@@ -49,7 +49,7 @@ def capsules(model: Model, only: set[int] | None = None) -> list[Shape]:
 
 
 def capsule(radius: float, length: float, sides: int = 16, rings: int = 4) -> tuple[_Array, NDArray[np.int64]]:
-    """The triangles of a cylinder along z, from 0 to its length, with half a ball on each end."""
+    """Returns the triangles of a cylinder along z, from 0 to its length, with half a ball on each end."""
     angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, 2 * rings + 2)
     profile = np.stack([radius * np.cos(angles), radius * np.sin(angles)], -1)
     profile[rings + 1 :, 1] += length
@@ -57,7 +57,7 @@ def capsule(radius: float, length: float, sides: int = 16, rings: int = 4) -> tu
 
 
 def _turned(profile: _Array, sides: int) -> tuple[_Array, NDArray[np.int64]]:
-    """The triangles of a profile (r, z) that is turned about z."""
+    """Returns the triangles of the surface that a profile (r, z) forms when it rotates about z."""
     turn = 2.0 * np.pi * np.arange(sides) / sides
     r, z = profile[:, :1], profile[:, 1:]
     vertices = np.stack([r * np.cos(turn), r * np.sin(turn), np.broadcast_to(z, (len(profile), sides))], -1)
@@ -68,7 +68,7 @@ def _turned(profile: _Array, sides: int) -> tuple[_Array, NDArray[np.int64]]:
 
 
 def _along(end: _Array) -> _Array:
-    """The pose whose z axis points to `end`."""
+    """Returns a pose whose z axis points to `end`."""
     X, length = np.eye(4), np.linalg.norm(end)
     if length > 0.0:
         z = end / length
@@ -80,7 +80,7 @@ def _along(end: _Array) -> _Array:
 
 
 def visuals(model: Model, urdf: str | os.PathLike[str], packages: Sequence[str | os.PathLike[str]]) -> list[Shape]:
-    """The shapes of a URDF's `<visual>`s; capsules for bodies none of whose shapes can be read."""
+    """Returns the shapes of a URDF's `<visual>`s; for bodies without a readable shape, capsules."""
     path = Path(urdf)
     root = import_module("xml.etree.ElementTree").parse(path).getroot()
     links = {frame.name: frame for frame in model.frames if frame.kind == "link"}
@@ -97,7 +97,7 @@ def visuals(model: Model, urdf: str | os.PathLike[str], packages: Sequence[str |
 
 
 def _triangles(visual: Any, path: Path, packages: list[Path]) -> Shape | None:
-    """The shape of a `<visual>` at the origin of its body; none if its mesh is not there or cannot be read."""
+    """Returns the shape of a `<visual>` at the origin of its body; None if its mesh is missing or cannot be read."""
     geometry = visual.find("geometry")
     shape = geometry[0] if geometry is not None and len(geometry) else None
     if shape is None:
@@ -116,7 +116,7 @@ def _triangles(visual: Any, path: Path, packages: list[Path]) -> Shape | None:
         return None
     try:
         mesh = import_module("trimesh").load(file, force="mesh")
-    except Exception:  # a format whose reader is not installed, or a file that is none
+    except Exception:  # no reader for this format is installed, or the file is invalid
         return None
     mesh.apply_scale(np.array((shape.get("scale") or "1 1 1").split(), float))
     return Shape(0, np.eye(4), np.zeros((0, 3)), np.zeros((0, 3), int), mesh=mesh)
@@ -133,7 +133,9 @@ def _box(half: _Array) -> tuple[_Array, NDArray[np.int64]]:
 
 
 def mesh_path(name: str, urdf: Path, packages: Sequence[Path]) -> Path | None:
-    """The file of a mesh, by its path, or by `package://` in folders that are given, hold the URDF, or are ROS's."""
+    """Returns the file of a mesh, by its path. For `package://`, searches the given folders, the folders around the
+    URDF, and ROS's.
+    """
     if not name.startswith("package://"):
         file = urdf.parent / name.removeprefix("file://")
         return file if file.is_file() else None
@@ -147,7 +149,7 @@ def mesh_path(name: str, urdf: Path, packages: Sequence[Path]) -> Path | None:
 
 
 def _origin(origin: Any) -> _Array:
-    """The pose of an `<origin>`: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Returns the pose of an `<origin>`: R = Rz(yaw) Ry(pitch) Rx(roll)."""
     X = np.eye(4)
     if origin is not None:
         roll, pitch, yaw = np.array((origin.get("rpy") or "0 0 0").split(), float)
@@ -158,7 +160,7 @@ def _origin(origin: Any) -> _Array:
 
 
 def _color(visual: Any, root: Any) -> tuple[int, int, int] | None:
-    """The colour of a `<visual>`, of its own or by the name of a material of the robot."""
+    """Returns the colour of a `<visual>`: its own, or the colour of a material of the robot that it names."""
     material = visual.find("material")
     if material is None:
         return None

@@ -1,4 +1,4 @@
-"""The types of `condyle.pinocchio`: models, data, frames, and the algebra with Pinocchio's names."""
+"""Types of `condyle.pinocchio`: models, data, frames, and algebra with Pinocchio's names."""
 
 from collections.abc import Callable, Sequence
 from enum import Enum
@@ -24,7 +24,7 @@ class ReferenceFrame(Enum):
 
 
 class Motion(algebra.Motion):
-    """`condyle.algebra.Motion`, also of six numbers, with Pinocchio's names."""
+    """A `condyle.algebra.Motion` with Pinocchio's names; can also be made from six numbers."""
 
     __slots__ = ()
 
@@ -34,12 +34,12 @@ class Motion(algebra.Motion):
 
     @classmethod
     def Zero(cls) -> "Motion":
-        """Six zeros."""
+        """Returns the zero motion."""
         return cls(np.zeros(6))
 
 
 class Force(algebra.Force):
-    """`condyle.algebra.Force`, also of six numbers, with Pinocchio's names."""
+    """A `condyle.algebra.Force` with Pinocchio's names; can also be made from six numbers."""
 
     __slots__ = ()
 
@@ -49,12 +49,12 @@ class Force(algebra.Force):
 
     @classmethod
     def Zero(cls) -> "Force":
-        """Six zeros."""
+        """Returns the zero force."""
         return cls(np.zeros(6))
 
 
 class SE3(algebra.SE3):
-    """`condyle.algebra.SE3`, also of a matrix (4, 4), with Pinocchio's names."""
+    """A `condyle.algebra.SE3` with Pinocchio's names; can also be made from a matrix (4, 4)."""
 
     __slots__ = ()
 
@@ -64,16 +64,16 @@ class SE3(algebra.SE3):
 
     @classmethod
     def Identity(cls) -> "SE3":
-        """The pose of a frame in itself."""
+        """Returns the identity."""
         return cls(np.eye(4))
 
     def actInv(self, x: Any) -> Any:
-        """What is written in a, in b."""
+        """Converts coordinates in frame a to coordinates in frame b."""
         return self.act_inv(x)
 
     @property
     def dualAction(self) -> _Array:
-        """aXb* of forces, (6, 6)."""
+        """The action aXb* on forces, (6, 6)."""
         return self.dual_action
 
 
@@ -86,7 +86,7 @@ class Frame(NamedTuple):
 
 
 class Lazy(Sequence[_T]):
-    """A list whose members are made when they are looked at."""
+    """A list whose elements are created on access."""
 
     __slots__ = ("_count", "_make")
 
@@ -113,11 +113,11 @@ class Lazy(Sequence[_T]):
 
 
 class JointModelFreeFlyer:
-    """The root joint of a robot that moves freely."""
+    """The root joint of a robot with a floating base."""
 
 
 class Model(ours._SpelledModel):
-    """A `condyle.Model`, which is `ours`, with Pinocchio's names."""
+    """A `condyle.Model`, available as `ours`, with Pinocchio's names."""
 
     def __init__(self, model: ours.Model) -> None:
         limits = model.limits
@@ -134,7 +134,7 @@ class Model(ours._SpelledModel):
         self.referenceConfigurations: dict[str, _Array] = {}
         self._frame_ids = {frame.name: k for k, frame in reversed(list(enumerate(self.frames)))}
         self._moving_mass = sum(inertia.mass for inertia in model.inertias[1:])
-        self._lengths = np.zeros(self.nq, bool)  # the coordinates that are no part of a rotation
+        self._lengths = np.zeros(self.nq, bool)  # coordinates that do not belong to a rotation
         turns = {"free_flyer": 4, "spherical": 4, "continuous": 2, "planar": 2}
         for kind, at, n in zip(model.joint_types, model.idx_qs, model.nqs, strict=True):
             self._lengths[at : at + n - turns.get(kind, 0)] = n > 0
@@ -143,28 +143,28 @@ class Model(ours._SpelledModel):
         return type(self), (self.ours,), self.__dict__
 
     def createData(self) -> "Data":
-        """Scratch, and the place where results are left."""
+        """Creates scratch memory, which also stores results."""
         return Data(self)
 
     def getFrameId(self, name: str) -> int:
-        """The frame's number, or the number of frames if there is none."""
+        """Returns the frame's index, or the number of frames if it does not exist."""
         return self._frame_ids.get(name, self.nframes)
 
     def existFrame(self, name: str) -> bool:
-        """Whether there is a frame of this name."""
+        """Returns whether a frame with this name exists."""
         return self.getFrameId(name) < self.nframes
 
     def getJointId(self, name: str) -> int:
-        """The joint's number, or the number of joints if there is none."""
+        """Returns the joint's index, or the number of joints if it does not exist."""
         return self.names.index(name) if name in self.names else self.njoints
 
     def existJointName(self, name: str) -> bool:
-        """Whether there is a joint of this name."""
+        """Returns whether a joint with this name exists."""
         return name in self.names
 
 
 class Data(ours._SpelledData):
-    """Where results are left: oMi, oMf, v, a, tau, ddq, M, com, hg, …, each from when a function has made it."""
+    """Stores results: oMi, oMf, v, a, tau, ddq, M, com, hg, …; each exists once a function has computed it."""
 
     vcom: list[_Array]
     acom: list[_Array]
@@ -228,22 +228,22 @@ class Data(ours._SpelledData):
 
 
 def exp6(m: ArrayLike | algebra.Motion) -> SE3:
-    """exp of a motion."""
+    """Returns the exponential of a motion."""
     return SE3._of(algebra.exp6(m).homogeneous)
 
 
 def log6(X: algebra.SE3 | ArrayLike) -> Motion:
-    """The motion whose exponential X is."""
+    """Returns the motion whose exponential is X."""
     return Motion._of(algebra.log6(X).vector)
 
 
 def Jlog3(R: ArrayLike) -> _Array:
-    """∂ log3(R exp δ)/∂δ."""
+    """Computes ∂ log3(R exp δ)/∂δ."""
     return algebra.Jlog3(log3(R))
 
 
 utils = SimpleNamespace(zero=np.zeros, eye=np.eye, rand=np.random.random)
-"""Some of `pinocchio.utils`."""
+"""A part of `pinocchio.utils`."""
 
 log = log6
 exp3, log3, skew = algebra.exp3, algebra.log3, algebra.skew

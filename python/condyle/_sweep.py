@@ -1,4 +1,4 @@
-"""Many solves of problems that vary: in this process, or on the machines of a Ray cluster."""
+"""Solves of many variations of a problem: in this process, or on the machines of a Ray cluster."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -18,27 +18,27 @@ _Rows = dict[str, NDArray[Any]]
 
 
 class Variations(NamedTuple):
-    """The results of a `sweep`: row i is of variation i.
+    """The results of a `sweep`: row i belongs to variation i.
 
-    The numbers of a variation that failed with an error are NaN, its status is "error".
+    If a variation fails with an error, its numbers are NaN and its status is "error".
     """
 
     status: NDArray[np.str_]
-    """The end of each solve, as the status of a `Solution`; "error" where there is an `error`."""
+    """The final status of each solve, as the status of a `Solution`; "error" if there is an `error`."""
     cost: _Array
     """The cost of each trajectory."""
     gap: _Array
     """The largest gap of each trajectory."""
     iterations: NDArray[np.int64]
-    """The iterations of each solve."""
+    """The number of iterations of each solve."""
     seconds: _Array
-    """The time that each solve took."""
+    """The duration of each solve (s)."""
     error: NDArray[np.str_]
-    """What went wrong where a variation could not be made or solved; else empty."""
+    """The error message if a variation could not be made or solved; else empty."""
     xs: _Array | None
     """States, (V, N + 1, nx)."""
     us: _Array | None
-    """Controls, (V, N, nu); where knots differ in nu, those of all knots one after the other, (V, Σ nu)."""
+    """Controls, (V, N, nu); if knots differ in nu, the controls of all knots one after the other, (V, Σ nu)."""
     K: _Array | None
     """Feedback gains, (V, N, nu, ndx), or (V, Σ nu · ndx); None unless `keep` names them."""
     k: _Array | None
@@ -46,9 +46,9 @@ class Variations(NamedTuple):
 
     @staticmethod
     def load(folder: "str | PathLike[str]") -> "Variations":
-        """The results that a `sweep` has written to a folder: all, or those of the chunks that are done.
+        """Returns the results that a `sweep` has written to a folder: all, or the results of the finished chunks.
 
-        Raises ValueError if the folder holds no sweep, or none of its chunks is done.
+        Raises ValueError if the folder does not contain a sweep, or no chunk is finished.
         """
         from ._sweep_folder import Folder
 
@@ -59,7 +59,7 @@ class Variations(NamedTuple):
 
 
 class Job(NamedTuple):
-    """What all variations share: it travels to each worker once."""
+    """The data that all variations share, sent to each worker once."""
 
     problem: Problem
     start: tuple[Any, Any]
@@ -88,28 +88,28 @@ def sweep(
 
     problem: the nominal problem.
     variations: initial states, (V, nx); or with `vary` a sequence of anything.
-    vary: a function of the problem and a variation. It returns the problem to solve, such as one of a heavier robot, or
-        changes what it is given and returns None; then it must set the same things for each variation, since the next
-        one gets the same problem. None sets the initial state.
+    vary: a function of the problem and a variation. It returns the problem to solve, such as one of a heavier robot. Or
+        it changes the given problem and returns None; then it must set the same things for each variation, since the
+        next one gets the same problem. None sets the initial state.
     start: states and controls from which all solves start, or a `Solution`. None solves the nominal problem from rest,
-        and starts from its solution. The first state is that of the variation.
+        and starts from its solution. The first state is replaced by the variation's initial state.
     solver: `Fddp` or `AugmentedLagrangian`, which is made for each problem with the `settings`.
-    keep: what is kept of each solution: "xs", "us", "K", "k".
-    folder: where results are written, chunk by chunk, as NPZ files. A sweep that was cut off goes on from there when it
-        is called again with the same arguments; `Variations.load` reads it. None writes nothing.
-    chunk: how many variations travel, and are written, together.
-    cluster: None solves in this process; True on the processors of this machine, or of the cluster that `ray` is
-        connected to; else the address of a Ray cluster (`pip install condyle[ray]`). Problem and start travel once to
-        each worker, which computes at this process's level of vector instructions (`condyle.LEVEL`): the results have
-        the same bits. The share of a worker that is lost is done again by another one.
-    workers: how many workers there are on the cluster; None is one for each of its processors.
-    progress: whether to show the progress (by tqdm where that is installed); or a function of the numbers of variations
-        that are done and that there are.
+    keep: the parts of each solution to keep: "xs", "us", "K", "k".
+    folder: the folder to which results are written, chunk by chunk, as NPZ files. An interrupted sweep continues from
+        there when it is called again with the same arguments; `Variations.load` reads it. None writes nothing.
+    chunk: the number of variations that are sent and written together.
+    cluster: None solves in this process; True uses the processors of this machine, or of the cluster to which `ray` is
+        connected; else the address of a Ray cluster (`pip install condyle[ray]`). Problem and start are sent once to
+        each worker. Workers compute at this process's SIMD level (`condyle.LEVEL`), so results are bit-identical. If a
+        worker is lost, another one repeats its chunk.
+    workers: the number of workers on the cluster; None is one for each processor.
+    progress: whether to show the progress (with tqdm if it is installed); or a function of the number of finished
+        variations and the total number.
 
-    Returns `Variations`. An error of one variation is in its row, and ends no sweep.
+    Returns `Variations`. The error of a variation is stored in its row, and does not end the sweep.
 
-    Raises ValueError for arguments that make no sense, and for a folder with the results of another sweep; ImportError
-    where Ray is not installed; RuntimeError if workers are lost again and again.
+    Raises ValueError for invalid arguments, and for a folder with the results of another sweep; ImportError if Ray is
+    not installed; RuntimeError if workers are lost repeatedly.
 
     >>> arm, rest = condyle.robots.arm7(), np.zeros(14)
     >>> from condyle.optimal import Cost, FreeDynamics, Problem, Residual
@@ -153,7 +153,7 @@ def sweep(
 def _solved(
     job: Job, missing: list[tuple[int, int, Any]], cluster: bool | str | None, workers: int | None
 ) -> Iterator[tuple[int, _Rows]]:
-    """The chunks as they are done: their numbers and rows."""
+    """Yields finished chunks: their indices and rows."""
     if cluster:
         from ._sweep_ray import on_cluster
 
@@ -165,14 +165,14 @@ def _solved(
 
 
 class Worker:
-    """Who solves chunks, with one solver for all of them where the problem stays the same."""
+    """Solves chunks, with one solver for all of them if the problem stays the same."""
 
     def __init__(self, job: Job) -> None:
         self._job = job
         self._same = None if job.vary else job.solver(job.problem, **job.settings)
 
     def solve(self, first: int, items: Any) -> _Rows:
-        """The rows of the variations `items`, of which the first has the number `first`."""
+        """Returns the rows of the variations `items`; `first` is the index of the first one."""
         found: list[Solution | str] = []
         for number, item in enumerate(items, first):
             try:
@@ -205,7 +205,7 @@ def _states(problem: Problem, variations: ArrayLike) -> _Array:
 def _start(
     problem: Problem, start: Solution | tuple[Any, Any] | None, solver: Any, settings: dict[str, Any]
 ) -> tuple[Any, Any]:
-    """The states and controls from which all solves start."""
+    """Returns the states and controls from which all solves start."""
     if isinstance(start, Solution):
         return start.xs, start.us
     if start is not None:
@@ -222,12 +222,12 @@ def _start(
 
 
 def _flat(x: Any) -> _Array:
-    """Numbers of all knots: an array, of knots that differ one after the other."""
+    """Returns the numbers of all knots: as an array, or joined knot by knot if knots differ in size."""
     return np.concatenate([np.ravel(part) for part in x]) if isinstance(x, list) else np.asarray(x, float)
 
 
 def _shapes(job: Job) -> dict[str, tuple[int, ...]]:
-    """The shape of what is kept of a solution, by the start and the problem."""
+    """Returns the shapes of the kept parts of a solution, from the start and the problem."""
     us = _flat(job.start[1])
     n, ndx = job.problem.horizon, job.problem.ndx
     wide = us.ndim == 2
@@ -240,7 +240,7 @@ def _shapes(job: Job) -> dict[str, tuple[int, ...]]:
 
 
 def _rows(found: list[Solution | str], job: Job) -> _Rows:
-    """The table of some variations."""
+    """Returns the table of some variations."""
     shapes = _shapes(job)
     solved = [None if isinstance(one, str) else one for one in found]
     rows: _Rows = {

@@ -1,4 +1,4 @@
-"""The folder of a sweep: what it is a sweep of, and the chunks that are done."""
+"""The folder of a sweep: a description of the sweep, and its finished chunks."""
 
 import hashlib
 import json
@@ -19,14 +19,14 @@ _HEAD = "sweep.json"
 
 
 class Folder:
-    """A folder with a head, which tells one sweep from another, and a file for each chunk that is done."""
+    """A folder with a head file, which identifies the sweep, and a file for each finished chunk."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     @classmethod
     def open(cls, path: "str | os.PathLike[str]") -> "Folder":
-        """A folder that holds a sweep."""
+        """Opens a folder that contains a sweep."""
         if not (Path(path) / _HEAD).is_file():
             raise ValueError(f"folder: {path} holds no sweep (no {_HEAD})")
         return cls(Path(path))
@@ -35,7 +35,7 @@ class Folder:
     def create(
         cls, path: "str | os.PathLike[str]", job: "Job", items: Any, chunk: int, more: dict[str, str]
     ) -> "Folder":
-        """A folder for a sweep: a new one, or one that holds a part of the same sweep."""
+        """Creates the folder of a sweep, or opens one that contains a part of the same sweep."""
         path = Path(path)
         head: dict[str, Any] = {"variations": len(items), "chunk": chunk, "keep": list(job.keep), **more}
         head["solver"] = job.solver.__name__
@@ -60,7 +60,7 @@ class Folder:
         return cls(path)
 
     def done(self) -> dict[int, _Rows]:
-        """The chunks that are done, by their numbers."""
+        """Returns the finished chunks, by index."""
         chunks: dict[int, _Rows] = {}
         for path in sorted(self._path.glob("chunk-*.npz")):
             with np.load(path, allow_pickle=False) as arrays:
@@ -68,7 +68,7 @@ class Folder:
         return chunks
 
     def write(self, number: int, rows: _Rows) -> None:
-        """Keeps a chunk: its file is there when it is whole."""
+        """Writes a chunk; its file appears only when it is complete."""
         path = self._path / f"chunk-{number:06d}.npz"
         part = path.with_suffix(".part")
         with open(part, "wb") as file:

@@ -1,4 +1,4 @@
-"""The results of functions that are more than an array, and some arguments: named tuples."""
+"""Named tuples: results of functions that return more than one array, and some arguments."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn, TypeAlias
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 else:
 
     def disjoint_base(cls: type) -> type:
-        """Says to type checkers that a class has room of its own beside that of its base."""
+        """Tells type checkers that a class has instance storage of its own, besides its base's."""
         return cls
 
 
@@ -19,7 +19,8 @@ _Array: TypeAlias = NDArray[np.float64]
 
 
 class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
-    """Numbers of a model, which never changes. Whoever writes to them is told how to make another model.
+    """Numbers of a model, which are read-only since a model never changes. The error on a write names the method that
+    makes a changed model.
 
     Results of arithmetic, and copies, are plain arrays.
     """
@@ -28,7 +29,9 @@ class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
 
     @classmethod
     def of(cls, numbers: _Array, instead: str) -> "ReadOnly":
-        """These numbers; `instead` is the method of `Model` that makes a model with others, if there is one."""
+        """Returns these numbers as a read-only array; `instead` is the method of `Model` that makes a model with other
+        numbers, if there is one.
+        """
         array = numbers.view(cls)
         array._instead = instead
         array.flags.writeable = False
@@ -56,7 +59,7 @@ class ReadOnly(np.ndarray[Any, np.dtype[np.float64]]):
         return getattr(ufunc, method)(*plain, **options)
 
     def copy(self, order: Literal["K", "A", "C", "F"] | None = "C") -> _Array:  # type: ignore[override]
-        """A plain array with these numbers."""
+        """Returns a plain array with these numbers."""
         return np.array(self, order=order)
 
     def __reduce__(self) -> Any:
@@ -94,43 +97,43 @@ class RneaHessian(NamedTuple):
     """The Hessian of λᵀ rnea(q, v, a), each block (nv, nv)."""
 
     dqdq: _Array
-    """The block by q and q, symmetric."""
+    """The block for q and q, symmetric."""
     dvdq: _Array
-    """The block by v and q: entry [j, k] by v_j and q_k."""
+    """The block for v and q: entry [j, k] is for v_j and q_k."""
     dvdv: _Array
-    """The block by v and v, symmetric."""
+    """The block for v and v, symmetric."""
     dadq: _Array
-    """The block by a and q: entry [j, k] by a_j and q_k."""
+    """The block for a and q: entry [j, k] is for a_j and q_k."""
 
 
 class AbaHessian(NamedTuple):
     """The Hessian of λᵀ aba(q, v, τ), each block (nv, nv)."""
 
     dqdq: _Array
-    """The block by q and q, symmetric."""
+    """The block for q and q, symmetric."""
     dvdq: _Array
-    """The block by v and q: entry [j, k] by v_j and q_k."""
+    """The block for v and q: entry [j, k] is for v_j and q_k."""
     dvdv: _Array
-    """The block by v and v, symmetric."""
+    """The block for v and v, symmetric."""
     dtaudq: _Array
-    """The block by τ and q: entry [j, k] by τ_j and q_k."""
+    """The block for τ and q: entry [j, k] is for τ_j and q_k."""
 
 
 class RneaSecondDerivatives(NamedTuple):
     """The second derivatives of τ = rnea(q, v, a), each (nv, nv, nv): member[i] is a block of the Hessian of τ_i."""
 
     dqdq: _Array
-    """The blocks by q and q."""
+    """The blocks for q and q."""
     dvdq: _Array
-    """The blocks by v and q: entry [i, j, k] by v_j and q_k."""
+    """The blocks for v and q: entry [i, j, k] is for v_j and q_k."""
     dvdv: _Array
-    """The blocks by v and v."""
+    """The blocks for v and v."""
     dadq: _Array
-    """The blocks by a and q: entry [i, j, k] by a_j and q_k."""
+    """The blocks for a and q: entry [i, j, k] is for a_j and q_k."""
 
 
 class CentroidalDerivatives(NamedTuple):
-    """The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c; axes of the world."""
+    """The derivatives of the centroidal momentum hg, its rate dhg, and the centre of mass c; in the world's axes."""
 
     dh_dq: _Array
     """∂hg/∂q, (6, nv), linear rows first."""
@@ -176,9 +179,9 @@ class CoriolisDerivatives(NamedTuple):
     """The derivatives of C(q, v) v, each (nv, nv)."""
 
     dq: _Array
-    """The derivative by q."""
+    """The derivative with respect to q."""
     dv: _Array
-    """The derivative by v."""
+    """The derivative with respect to v."""
 
 
 class Constrained(NamedTuple):
@@ -187,15 +190,15 @@ class Constrained(NamedTuple):
     a: _Array
     """q̈, nv numbers (rad/s², m/s²)."""
     lambda_: _Array
-    """λ, the force of each constraint on the body of its frame, along the axes of its rows (N, N m)."""
+    """λ, the force of each constraint on the body of its frame, in the axes of its rows (N, N m)."""
     residual: float
-    """The largest number in J q̈ + γ (m/s², rad/s²): how well the constraints are satisfied."""
+    """The largest number in J q̈ + γ (m/s², rad/s²), which measures how well the constraints are satisfied."""
     redundant: float
-    """The number of rows of J that depend on rows before them, up to rounding: they have no force of their own."""
+    """The number of rows of J that depend on earlier rows, up to rounding: they have no force of their own."""
 
 
 class ConstrainedDerivatives(NamedTuple):
-    """The result of `constrained_dynamics_derivatives`: that of `constrained_dynamics` and its derivatives.
+    """The result of `constrained_dynamics_derivatives`: the result of `constrained_dynamics` and its derivatives.
 
     ∂/∂q is taken in the tangent space.
     """
@@ -217,11 +220,11 @@ class ConstrainedDerivatives(NamedTuple):
     dlambda_dtau: _Array
     """∂λ/∂τ, (rows, nv)."""
     inertia: _Array
-    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia that the robot shows to its constraints."""
+    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along its constraints."""
 
 
 class ConstrainedEquations(NamedTuple):
-    """The result of `constrained_dynamics_equations`: that of `constrained_dynamics`, and its equations.
+    """The result of `constrained_dynamics_equations`: the result of `constrained_dynamics`, and its equations.
 
     ∂/∂q is taken in the tangent space.
     """
@@ -248,15 +251,15 @@ class Impulse(NamedTuple):
     v: _Array
     """v⁺, the velocity after the impact, nv numbers (rad/s, m/s)."""
     lambda_: _Array
-    """Λ, the impulse of each constraint on the body of its frame, along the axes of its rows (N s, N m s)."""
+    """Λ, the impulse of each constraint on the body of its frame, in the axes of its rows (N s, N m s)."""
     residual: float
     """The largest number in J (v⁺ + ε v) (m/s, rad/s)."""
     redundant: float
-    """The number of rows of J that depend on rows before them, up to rounding: they have no force of their own."""
+    """The number of rows of J that depend on earlier rows, up to rounding: they have no impulse of their own."""
 
 
 class ImpulseDerivatives(NamedTuple):
-    """The result of `impulse_dynamics_derivatives`: that of `impulse_dynamics` and its derivatives.
+    """The result of `impulse_dynamics_derivatives`: the result of `impulse_dynamics` and its derivatives.
 
     ∂/∂q is taken in the tangent space.
     """
@@ -274,49 +277,52 @@ class ImpulseDerivatives(NamedTuple):
     dlambda_dv: _Array
     """∂Λ/∂v, (rows, nv)."""
     inertia: _Array
-    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia that the robot shows to its constraints."""
+    """(J M⁻¹ Jᵀ)⁻¹, (rows, rows): the inertia of the robot along its constraints."""
 
 
 class ContactConstraint(NamedTuple):
     """A contact of a frame with the world, or a loop that two frames close.
 
-    With velocity v and acceleration a of the frame relative to the other body, and its pose X in the other frame moved
-    to the target, it asks for a − a* + kd (v − v*) + kp e = 0 with e = log X ('rigid'), or the difference of the
-    frames' origins ('point'), along the axes of `reference` at the frame's origin: Pinocchio's RigidConstraintModel and
-    Crocoddyl's contacts. A point's acceleration is the classical one, a rigid frame's the spatial one. A 'line' has
-    the row of a point along the third of `axes`, a 'plane' those along the first and the third: Crocoddyl's
-    ContactModel1D, whose rotation R and reference x are axes=R.T and a placement at R @ (0, 0, x), and ContactModel2D.
+    Let v and a be the velocity and acceleration of the frame relative to the other body, and X its pose in the other
+    frame relative to the target. The constraint is a − a* + kd (v − v*) + kp e = 0. Here e = log X ('rigid'), or the
+    difference of the frames' origins ('point'), in the axes of `reference` at the frame's origin. This is Pinocchio's
+    RigidConstraintModel, and Crocoddyl's contacts. A point has the classical acceleration, a rigid frame the spatial
+    one. A 'line' has a point's row along the third of `axes`, a 'plane' has the rows along the first and the third.
+    These are Crocoddyl's ContactModel1D and ContactModel2D. A ContactModel1D with rotation R and reference x has
+    axes=R.T and a placement at R @ (0, 0, x).
     """
 
     frame: str | int
-    """The frame that is held."""
+    """The constrained frame."""
     kind: Literal["point", "line", "plane", "rigid"]
-    """What is held: the frame's origin, 3 rows; along one axis or two; or the whole frame, 6 rows, linear first."""
+    """The constrained part: the frame's origin, 3 rows; its motion along one axis or two; or the whole frame, 6 rows,
+    linear first.
+    """
     other: str | int | None = None
-    """The frame to which it is held; None is the world."""
+    """The other frame of the constraint; None is the world."""
     reference: Literal["local", "local_world_aligned"] = "local"
     """The axes of rows and forces: the frame's or the world's."""
     kp: float = 0.0
-    """The gain of an error of position (1/s²)."""
+    """The gain of the position error (1/s²)."""
     kd: float = 0.0
-    """The gain of an error of velocity (1/s)."""
+    """The gain of the velocity error (1/s)."""
     placement: ArrayLike | None = None
-    """The wanted pose of the frame in the other frame, (4, 4); of all but 'rigid', the translation alone."""
+    """The target pose of the frame in the other frame, (4, 4); except for 'rigid', only the translation is used."""
     velocity: ArrayLike | None = None
-    """v*, six numbers along the axes of `reference` (m/s, rad/s)."""
+    """v*, six numbers in the axes of `reference` (m/s, rad/s)."""
     acceleration: ArrayLike | None = None
-    """a*, six numbers along the axes of `reference` (m/s², rad/s²)."""
+    """a*, six numbers in the axes of `reference` (m/s², rad/s²)."""
     axes: ArrayLike | None = None
-    """The axes of a line or a plane as columns along those of `reference`, a rotation (3, 3); None are the same."""
+    """The axes of a line or a plane as columns in the axes of `reference`, a rotation (3, 3); None is the identity."""
 
 
 class Coupling(NamedTuple):
-    """Two coupled joints of a robot's file: the follower is at Σ cᵢ qⁱ, with q the position of the leader."""
+    """Two coupled joints of a robot's file: the follower's position is Σ cᵢ qⁱ, with q the position of the leader."""
 
     follower: str
     """The joint that follows."""
     leader: str | None
-    """The joint that leads; without one the follower is at c₀."""
+    """The joint that leads; None keeps the follower at c₀."""
     coefficients: tuple[float, ...]
     """c₀ to c₄."""
 
@@ -342,7 +348,7 @@ class CentroidalMapRate(NamedTuple):
     dAg: _Array  # noqa: N815
     """dAg/dt along the velocity, (6, nv)."""
     hg: _Array
-    """The momentum about the centre of mass, along the axes of the world (kg m/s, kg m²/s), 6 numbers."""
+    """The momentum about the centre of mass, in the axes of the world (kg m/s, kg m²/s), 6 numbers."""
     Ig: _Array
     """The inertia of all moving bodies about their centre of mass, as if they were one, (6, 6): [m 1, 0; 0, Ī]."""
     com: _Array
@@ -357,11 +363,11 @@ class AllTerms(NamedTuple):
     """The terms of the equations of motion M a + h = τ, momentum and energies."""
 
     M: _Array
-    """M(q), (nv, nv), as of `crba`."""
+    """M(q), (nv, nv), as returned by `crba`."""
     h: _Array
-    """h(q, v), nv numbers, as of `nonlinear_effects`."""
+    """h(q, v), nv numbers, as returned by `nonlinear_effects`."""
     centroidal: CentroidalMapRate
-    """Momentum, its map and the map's rate, centre of mass, as of `centroidal_map_rate`."""
+    """Momentum, its map and the map's rate, centre of mass, as returned by `centroidal_map_rate`."""
     kinetic_energy: float
     """T = ½ vᵀ M v (J)."""
     potential_energy: float
@@ -382,37 +388,37 @@ class Frame(NamedTuple):
 
 
 class AssemblySize(NamedTuple):
-    """The work of the assembly of a `DivideConquer`, counted."""
+    """The work of the assembly of a `DivideConquer`, as counts of operations."""
 
     bodies: int
     """The number of moving bodies: each is eliminated once."""
     runs: int
-    """The number of pieces within which bodies are eliminated one after the other."""
+    """The number of runs, within which bodies are eliminated one after the other."""
     longest_run: int
-    """The number of bodies in the largest of them."""
+    """The number of bodies in the largest run."""
     joins: int
-    """The number of pairs of pieces that are joined, one below the other."""
+    """The number of pairs of pieces that are joined in series, one below the other."""
     gathers: int
-    """The number of pairs of pieces that are added up, both on one body."""
+    """The number of pairs of pieces on the same body, whose contributions are added."""
     levels: int
-    """The number of pieces, from a run to the whole, that wait for one another."""
+    """The length of the longest chain of pieces, from a run to the whole, that must be computed one after the other."""
 
 
 class Limits(NamedTuple):
-    """Limits of position, velocity and effort; infinite where there are none."""
+    """Limits of position, velocity and effort; infinite where a limit is missing."""
 
     lower: _Array
-    """Least position (rad, m), nq numbers."""
+    """Minimum position (rad, m), nq numbers."""
     upper: _Array
-    """Greatest position (rad, m), nq numbers."""
+    """Maximum position (rad, m), nq numbers."""
     velocity: _Array
-    """Greatest speed (rad/s, m/s), nv numbers."""
+    """Maximum speed (rad/s, m/s), nv numbers."""
     effort: _Array
-    """Greatest magnitude of effort (N m, N), nv numbers."""
+    """Maximum magnitude of effort (N m, N), nv numbers."""
     effort_lower: _Array
-    """Least effort (N m, N), nv numbers, as a rule negative."""
+    """Minimum effort (N m, N), nv numbers, usually negative."""
     effort_upper: _Array
-    """Greatest effort (N m, N), nv numbers."""
+    """Maximum effort (N m, N), nv numbers."""
 
 
 class Spring(NamedTuple):
@@ -421,64 +427,66 @@ class Spring(NamedTuple):
     joint: str
     """The joint's name."""
     stiffness: _Array
-    """k₀, k₁ and k₂ (N m/rad, N/m, and these per rad or m, and per its square)."""
+    """k₀, k₁ and k₂ (N m/rad or N/m; k₁ is per rad or m, k₂ per square of it)."""
     rest: _Array
-    """The position of the joint at which the spring is at rest, as many numbers as q has for the joint."""
+    """The joint's position at which the spring is at rest, as many numbers as the joint has in q."""
 
 
 class GravityCompensation(NamedTuple):
-    """A part of a body's weight that is carried by an unseen hand: the force −mass g acts at mass_com / mass."""
+    """A supported part of a body's weight: the force −mass g acts at mass_com / mass."""
 
     body: str
     """The body's name."""
     mass: float
-    """The mass whose weight is carried (kg)."""
+    """The mass whose weight is supported (kg)."""
     mass_com: _Array
-    """That mass times its centre, in the body's frame (kg m), 3 numbers."""
+    """This mass times its centre, in the body's frame (kg m), 3 numbers."""
 
 
 class Actuator(NamedTuple):
     """An actuator of a robot, as its file describes it.
 
-    With the control u, and the length l, which is the gear times the position that it drives, it acts with the force
-    f = gain u + bias − kp l − kv l̇. The effort at the joint is gear · f. A motor has the gain 1 and nothing else; a
-    servo of position has the gain kp, one of velocity the gain kv.
+    u is the control, and the length l is the gear times the driven position. The force is f = gain u + bias − kp l − kv
+    l̇, and the effort at the joint is gear · f. A motor has the gain 1, and the other coefficients are zero. A position
+    servo has the gain kp, a velocity servo the gain kv.
     """
 
     name: str
     """The name, or an empty string."""
     joint: str | None
-    """The name of the joint that it drives; None if it drives none."""
+    """The name of the driven joint; None if it does not drive a joint."""
     tendon: str | None
-    """The name of the tendon that it drives; None if it drives none."""
+    """The name of the driven tendon; None if it does not drive a tendon."""
     frame: str | None
-    """The name of the frame on which it acts; None if it acts on none."""
+    """The name of the frame on which it acts; None if it does not act on a frame."""
     coefficients: dict[str, float]
     """The joints of the tendon by name, each with its coefficient (1, m/rad)."""
     gear: _Array
-    """The effort at the joint for each unit of force (1, m), 6 numbers. Joints of one degree of freedom and tendons
-    have the first one. A ball has three: an axis in its body. A frame has six, linear first, along its axes. A free
-    joint has six too: a force along the world's axes and a torque along the body's."""
+    """The effort at the joint per unit of force (1, m), 6 numbers. Joints with one degree of freedom and tendons use
+    the first one. A ball joint uses three: an axis in its body. A frame uses six, linear first, in its axes. A free
+    joint uses six too: a force in the world's axes and a torque in the body's.
+    """
     gain: float
-    """The force for each unit of control."""
+    """The force per unit of control."""
     bias: float
-    """The force without control, at length 0 and at rest (N, N m)."""
+    """The force at zero control, zero length and rest (N, N m)."""
     kp: float
-    """The gain of position (N/m, N m/rad); 0 for a motor."""
+    """The position gain (N/m, N m/rad); 0 for a motor."""
     kv: float
-    """The gain of velocity (N s/m, N m s/rad); 0 for a motor."""
+    """The velocity gain (N s/m, N m s/rad); 0 for a motor."""
     control: tuple[float, float]
-    """The least and greatest control; infinite where there is no limit."""
+    """The minimum and maximum control; infinite for no limit."""
     force: tuple[float, float]
-    """The least and greatest force before the gear (N, N m); infinite where there is no limit."""
+    """The minimum and maximum force before the gear (N, N m); infinite for no limit."""
 
 
 class ModelWarning(str):
     """A warning about a robot or its file: the text, with its parts as attributes."""
 
     kind: str
-    """The kind, by which a strict reader may allow it: 'massless', 'negative', 'triangle', 'singular', 'unlikely',
-    'limit', 'unknown', 'left_out', 'assumed' or 'mimic'."""
+    """The kind, which a strict reader may be told to allow: 'massless', 'negative', 'triangle', 'singular', 'unlikely',
+    'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
+    """
     subject: str
     """The name of the body or joint, or the element of the file."""
     file: str | None
@@ -487,18 +495,20 @@ class ModelWarning(str):
     """The line in the file, counted from 1; None if the warning is not about a file."""
 
     def __new__(cls, text: str, kind: str, subject: str, file: str | None = None, line: int | None = None) -> "Self":
-        """A warning of these parts."""
+        """Creates a warning from these parts."""
         warning = super().__new__(cls, text)
         warning.kind, warning.subject, warning.file, warning.line = kind, subject, file, line
         return warning
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """The parts of a pickle."""
+        """Returns the parts of a pickle."""
         return type(self), (str(self), self.kind, self.subject, self.file, self.line)
 
 
 class Mimic(NamedTuple):
-    """The rule by which a joint follows another one: its position is ratio * q + offset, q being that of the other."""
+    """The rule by which a joint follows another one: its position is ratio * q + offset, with q the other joint's
+    position.
+    """
 
     ratio: float
     """The ratio (1; m/rad, rad/m)."""
@@ -510,29 +520,29 @@ class Iteration(NamedTuple):
     """A record of one iteration of a solver."""
 
     iteration: int
-    """Its number, from 0."""
+    """Index of the iteration, from 0."""
     cost: float
     """Cost of the iterate after the step."""
     gap: float
     """Largest gap of the iterate before the step."""
     stop: float
-    """The decrease of the cost expected of the full step; compared with the tolerance."""
+    """The expected decrease of the cost for the full step; compared with the tolerance."""
     step: float
-    """The step length tried last, which is the accepted one if one was."""
+    """The last step length tried, which is the accepted one if a step was accepted."""
     regularisation: float
     """Regularisation after the iteration."""
     d1: float
-    """Slope of the expected change: the cost should fall by α (d1 + ½ α d2)."""
+    """Slope of the expected change: the cost should fall by α (d1 + ½ α d2) for a step length α."""
     d2: float
     """Curvature of the expected change."""
     feasible: bool
     """Whether the iterate after the step satisfies the dynamics."""
     accepted: bool
-    """Whether a step was accepted; if not, the iterate is as before."""
+    """Whether a step was accepted; if not, the iterate is unchanged."""
 
 
 class Timings(NamedTuple):
-    """The time that the parts of a solve took (s)."""
+    """The duration of the parts of a solve (s)."""
 
     calc: float
     """Dynamics and cost of the warm start."""
@@ -545,12 +555,13 @@ class Timings(NamedTuple):
     total: float
     """The whole solve."""
     overrun: float = 0.0
-    """The time beyond `time_budget`: above zero where the budget is shorter than an iteration, or something delayed the
-    solve. A budget of 0 asks for no iteration, and is never overrun."""
+    """The time in excess of `time_budget`: above zero if the budget is shorter than an iteration, or the solve was
+    delayed. A budget of 0 requests no iteration, and is never overrun.
+    """
 
 
 class Evaluation(NamedTuple):
-    """The cost of states and controls, and what the dynamics of their knots compute."""
+    """The cost of states and controls, and the results of the dynamics at each knot."""
 
     cost: float
     """The sum of the costs of all knots."""
@@ -561,11 +572,12 @@ class Evaluation(NamedTuple):
     gaps: _Array
     """x̂₀ ⊖ x₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁, (N + 1, ndx)."""
     accelerations: list[_Array]
-    """The accelerations of each knot of a robot, nv numbers; none of other knots and of impacts."""
+    """The accelerations of each knot of a robot, nv numbers; empty for other knots and for impacts."""
     efforts: list[_Array]
-    """The efforts of all joints of each knot of a robot, nv numbers; none of other knots and of impacts."""
+    """The efforts of all joints at each knot of a robot, nv numbers; empty for other knots and for impacts."""
     forces: list[dict[str, _Array]]
-    """The forces of each knot's contacts by name, 1 to 6 numbers in the axes of their rows; of impacts the impulses."""
+    """The forces of each knot's contacts by name, 1 to 6 numbers in the axes of their rows; for impacts the impulses.
+    """
 
 
 class _Solution(NamedTuple):
@@ -593,22 +605,23 @@ class _Solution(NamedTuple):
         "infeasible",
         "not_finite",
     ]
-    """The end of the solve in a word.
+    """The reason why the solve ended.
 
-    "constraints_violated": the penalty reached its limit and limits do not hold; no proof that no solution exists.
-    "infeasible": a proof, in `outcome.worst`: the initial state violates a limit of knot 0 that no control can change.
+    "constraints_violated": the penalty reached its maximum and limits do not hold; this does not prove that no solution
+    exists. "infeasible": the initial state violates a limit of knot 0 that no control can change. `outcome.worst` has
+    that limit, which proves that no solution exists.
     """
     trace: list[Iteration]
-    """A record per iteration."""
+    """One record per iteration."""
     timings: Timings
-    """The time that its parts took."""
+    """The duration of the solve's parts."""
 
 
 @disjoint_base
 class Solution(_Solution):
     """The result of a solve: the best iterate, whatever the status says.
 
-    Where knots differ in nu, what belongs to controls is a list of N arrays instead of one array.
+    If knots differ in nu, arrays of controls are replaced by lists of N arrays.
     """
 
     _source: Any = None
@@ -624,21 +637,21 @@ class Solution(_Solution):
 
     @property
     def accelerations(self) -> list[_Array]:
-        """The accelerations of each knot, as in an `Evaluation`; computed when they are first asked for."""
+        """The accelerations of each knot, as in an `Evaluation`; computed on first access."""
         return self._evaluated().accelerations
 
     @property
     def efforts(self) -> list[_Array]:
-        """The efforts of all joints of each knot, likewise."""
+        """The efforts of all joints at each knot, as in an `Evaluation`; computed on first access."""
         return self._evaluated().efforts
 
     @property
     def forces(self) -> list[dict[str, _Array]]:
-        """The forces of each knot's contacts, by their names, likewise."""
+        """The forces of each knot's contacts by name, as in an `Evaluation`; computed on first access."""
         return self._evaluated().forces
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """The parts of a pickle: the numbers, without the problem."""
+        """Returns the parts of a pickle: the numbers, without the problem."""
         return type(self), tuple(self)
 
 
@@ -677,45 +690,45 @@ class SweepResult(NamedTuple):
 
 
 class Violation(NamedTuple):
-    """A row of a limit, or of the dynamics, that does not hold at the end of a solve."""
+    """A row of a limit, or of the dynamics, that is violated at the end of a solve."""
 
     kind: Literal["constraint", "gap"]
-    """A limit or constraint of a knot, or a gap of the dynamics."""
+    """'constraint', a limit or constraint of a knot, or 'gap', a gap of the dynamics."""
     knot: int
     """The knot, 0 … N."""
     row: int
-    """The index in `multipliers[knot]`, or of a gap the entry of the tangent vector."""
+    """The index in `multipliers[knot]`; for a gap the entry of the tangent vector."""
     name: str | None
-    """The name of the limit, None for a constraint of a `ConstrainedAction` and for a gap."""
+    """The name of the limit; None for a constraint of a `ConstrainedAction` and for a gap."""
     entry: int
-    """The row within the limit of that name, else `row`."""
+    """The row within the limit `name`, else `row`."""
     amount: float
-    """The distance from the bound, or of a gap its size; infinite if it is not a number."""
+    """The distance from the bound; for a gap its size; infinite instead of NaN."""
 
 
 class Outcome(NamedTuple):
-    """The state of the limits after a solve of `AugmentedLagrangian`, beside its `Solution`."""
+    """The state of the limits after a solve of `AugmentedLagrangian`, in addition to its `Solution`."""
 
     cost: float
     """The cost without the terms of the limits."""
     primal: float
-    """The largest distance of a limit's number from its bounds, or gap of the dynamics."""
+    """The largest distance of a limited number from its bounds, or the largest gap of the dynamics."""
     dual: float
-    """The largest entry of the gradient of the Lagrangian by the controls, projected on their bounds."""
+    """The largest entry of the Lagrangian's gradient with respect to the controls, projected on their bounds."""
     multipliers: list[_Array]
-    """The multipliers of each knot, limit after limit: positive at an upper bound, negative at a lower one."""
+    """The multipliers of each knot, limit by limit: positive at an upper bound, negative at a lower one."""
     penalty: float
     """1/μ at the end."""
     solves: int
     """The number of inner solves."""
     iterations: int
-    """The number of iterations of all of them."""
+    """The total number of iterations of the inner solves."""
     worst: Violation | None = None
     """The largest violation; None if all limits hold exactly."""
 
 
 class Control(NamedTuple):
-    """The state that a control law sees before a step of a `Simulation`, and the efforts and forces that it sets."""
+    """The state that a control law gets before a step of a `Simulation`, and the efforts and forces that it sets."""
 
     time: float
     """The time at which the step begins (s)."""
@@ -726,51 +739,54 @@ class Control(NamedTuple):
     tau: _Array
     """The joint efforts during the step, nv numbers (N m, N); 0 when the law is called, which sets them in place."""
     f_ext: _Array
-    """The force on each body during the step, (nbodies, 6), at its origin and in its frame; likewise."""
+    """The force on each body during the step, (nbodies, 6), at its origin and in its frame; 0 when the law is called,
+    which sets it in place.
+    """
 
 
 class Ground(NamedTuple):
-    """The plane on which a simulated robot stands, slides and lands, and the points of the robot that may touch it.
+    """A plane on which a simulated robot stands, slides and lands, and the robot's points that may touch it.
 
-    Rigid contacts with Coulomb friction at the level of velocities (Moreau 1988; Stewart and Trinkle 1996; Anitescu and
-    Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ with 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0 and the exact disc
-    ‖λ_t‖ ≤ μ λ_n of each point, whose velocity after the step is u⁺ = J v⁺ and whose gap to the plane is φ. Forces of
-    redundant contacts are not unique; their sum is. Errors are O(h). Only points and the plane meet: edges of soles,
-    other bodies and limits of joints do not. With a restitution above 0 (Newton's law) and friction, an impact of
-    several points may raise the energy. A point below the plane is taken out by a fifth of its depth a step, at most
-    0.5 m/s.
+    Contacts are rigid, with Coulomb friction, at the level of velocities (Moreau 1988; Stewart and Trinkle 1996;
+    Anitescu and Potra 1997): v⁺ = v + h aba(q, v, τ) + M⁻¹ Jᵀ λ. Each point satisfies 0 ≤ λ_n ⊥ u_n⁺ + max(φ, 0)/h ≥ 0
+    and the exact disc ‖λ_t‖ ≤ μ λ_n. Its velocity after the step is u⁺ = J v⁺, and φ is its gap to the plane. Forces of
+    redundant contacts are not unique; their sum is. Errors are O(h). Only the points touch the plane: edges of soles,
+    other bodies and joint limits are ignored. With a restitution above 0 (Newton's law) and friction, an impact of
+    several points may increase the energy. A point below the plane is moved out by a fifth of its depth per step, at
+    most 0.5 m/s.
     """
 
     points: Sequence[str | int | tuple[str | int, ArrayLike]]
     """The points that may touch: a list of frames, each for its origin, or of pairs of a frame and the corners of a
-    sole in it, (n, 3) (m)."""
+    sole in this frame, (n, 3) (m).
+    """
     normal: ArrayLike = (0.0, 0.0, 1.0)
-    """The direction out of the ground, in the world's frame; need not be a unit vector."""
+    """The direction out of the ground, in the world's frame; it need not be a unit vector."""
     height: float = 0.0
     """The height of the plane along the normal (m)."""
     friction: float = 0.7
-    """μ, Coulomb's coefficient."""
+    """The friction coefficient μ."""
     restitution: float = 0.0
-    """The share of its normal speed that a point has after it has hit the ground, from 0 to 1."""
+    """The fraction of its normal speed that a point keeps after an impact, from 0 to 1."""
     tolerance: float = 1e-8
-    """The largest error in the laws of contact (m/s)."""
+    """The maximum error of the contact laws (m/s)."""
     max_iterations: int = 500
     """The maximum number of iterations of the contact solver in a step."""
 
 
 class GroundContacts(NamedTuple):
-    """The contacts of the points of a `Ground` in the last step of a `Simulation`, in the order of the points."""
+    """The contacts of a `Ground`'s points in the last step of a `Simulation`, in the order of the points."""
 
     position: _Array
     """The points in the world at the beginning of the step (m), (n, 3)."""
     force: _Array
-    """The forces on the robot along the axes of the world, mean values over the step (N), (n, 3)."""
+    """The forces on the robot in the axes of the world, mean values over the step (N), (n, 3)."""
     touches: NDArray[np.bool_]
-    """Whether the ground pushed a point, (n,)."""
+    """Whether the ground pushed each point, (n,)."""
 
 
 _NUMBERS = 12
-"""The number of numbers of a vector, and of things in a list, that a result shows; else it shows the shape."""
+"""Maximum length of a vector or list that a result prints in full; otherwise it prints the shape."""
 
 
 def _shown(value: object) -> str:
@@ -784,11 +800,11 @@ def _shown(value: object) -> str:
 
 
 def _repr(self: Any) -> str:
-    """The members in short."""
+    """Returns a short text with the members."""
     return f"{type(self).__name__}({', '.join(f'{k}={_shown(v)}' for k, v in self._asdict().items())})"
 
 
-# where users find them, and pickle too
+# the modules in which users and pickle find these classes
 _MODULES = {
     "Iteration": "optimal",
     "Timings": "optimal",

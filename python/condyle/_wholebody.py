@@ -1,4 +1,4 @@
-"""What a whole-body controller is told and what it answers: named tuples, and references, views of one array."""
+"""Arguments and results of a whole-body controller: named tuples, and references, which are views of one array."""
 
 from collections.abc import Iterator
 from typing import Any, Literal, NamedTuple, TypeAlias, overload
@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._condyle import ControllerError, _check_pose, _check_rotations
 
 _Array: TypeAlias = NDArray[np.float64]
-_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # the joint, and the range in q of what has length 1
+_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # joint, and range in q of the numbers with length 1
 
 
 class Gains(NamedTuple):
@@ -22,7 +22,7 @@ class Gains(NamedTuple):
 
     @classmethod
     def critical(cls, stiffness: float) -> "Gains":
-        """The gains of a critically damped error of this stiffness (1/s²): d = 2 √k.
+        """Returns the gains of a critically damped error with this stiffness (1/s²): d = 2 √k.
 
         >>> condyle.wholebody.Gains.critical(100.0)
         Gains(stiffness=100.0, damping=20.0)
@@ -31,35 +31,37 @@ class Gains(NamedTuple):
 
 
 class Pyramid(NamedTuple):
-    """A friction cone described by a pyramid, for comparison with other controllers."""
+    """A pyramid that approximates the friction cone, for comparison with other controllers."""
 
     sides: int = 4
     """The number of its faces, at least 3."""
     inscribed: bool = True
-    """Whether it lies within the cone and touches it with its edges, or around it and touches it with its faces."""
+    """Whether it lies inside the cone and touches it with its edges, or outside the cone and touches it with its faces.
+    """
 
 
 class JointLimits(NamedTuple):
-    """How joints are kept within their limits: by bounds on q̈, for a time T to look ahead.
+    """Parameters that keep joints within their limits, by bounds on q̈ over a look-ahead time T.
 
         (v_min − v) / T ≤ q̈ ≤ (v_max − v) / T                        velocity
         (q_min − q) / T² − 2 v / T ≤ q̈ ≤ (q_max − q) / T² − 2 v / T    position
 
-    Each bound is no further than a_max from 0 on the other's side: a joint that is beyond its limit, or too fast
-    towards it, is led back with at most a_max. Where they exclude each other, the position's bound holds; where
-    dynamics, contacts and torques leave nothing within them, they become tasks of great weight at that tick.
+    A lower bound is at most a_max, and an upper bound at least −a_max. So a joint beyond its limit, or too fast towards
+    it, is led back with at most a_max. If velocity and position bounds exclude each other, the position's bound holds.
+    If dynamics, contacts and torques leave no solution within the bounds, the bounds become tasks of large weight at
+    that tick.
     """
 
     look_ahead: float = 0.05
-    """T (s); some ticks at least."""
+    """T (s); at least some ticks."""
     max_acceleration: float = 200.0
     """a_max (rad/s², m/s²)."""
     lower: ArrayLike | None = None
-    """Least position (rad, m), nq numbers; None for the model's."""
+    """Minimum position (rad, m), nq numbers; None for the model's limits."""
     upper: ArrayLike | None = None
-    """Greatest position (rad, m), nq numbers; None for the model's."""
+    """Maximum position (rad, m), nq numbers; None for the model's limits."""
     velocity: ArrayLike | None = None
-    """Greatest speed (rad/s, m/s), nv numbers; None for the model's."""
+    """Maximum speed (rad/s, m/s), nv numbers; None for the model's limits."""
 
 
 class Settings(NamedTuple):
@@ -70,76 +72,82 @@ class Settings(NamedTuple):
     """
 
     acceleration_weight: float = 1e-6
-    """The weight of ½ ‖q̈‖², which decides what the tasks leave open; above 0."""
+    """The weight of ½ ‖q̈‖², which determines the freedom that the tasks leave; above 0."""
     force_weight: float = 1e-7
-    """The weight of ½ Σ ‖f − f_ref‖² (1/N²), which spreads the forces; above 0. A moment of a sole's wrench counts as
-    the forces at the corners that make it, so that pressure stays away from the edges."""
+    """The weight of ½ Σ ‖f − f_ref‖² (1/N²), which distributes the forces; above 0. A moment of a sole's wrench counts
+    as the equivalent forces at the corners, so that the pressure stays away from the edges.
+    """
     contact_gains: Gains = Gains(0.0, 0.0)
-    """Baumgarte's: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0."""
+    """Gains of the Baumgarte stabilisation: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0."""
     max_correction: float = 50.0
-    """The greatest such acceleration (m/s², rad/s²): a foot that lands fast is stopped over some ticks."""
+    """The maximum acceleration of this stabilisation (m/s², rad/s²): a foot that lands fast is stopped over some ticks.
+    """
     friction: Literal["cone"] | Pyramid = "cone"
-    """The description of friction: ‖f_t‖ ≤ μ f_n itself, or a `Pyramid`."""
+    """The form of the friction constraint: the exact cone ‖f_t‖ ≤ μ f_n, or a `Pyramid`."""
     effort: ArrayLike | None = None
-    """Greatest effort of each coordinate (N m, N), nv numbers, infinite where there is none. None: the model's. It is
-    above 0 for each actuated coordinate."""
+    """Maximum effort of each coordinate (N m, N), nv numbers, infinite for no limit; None for the model's limits. It is
+    above 0 for each actuated coordinate.
+    """
     joint_limits: JointLimits | None = JointLimits()
-    """The limits of the joints' position and velocity; None for no such limits."""
+    """The limits of the joints' position and velocity; None to ignore them."""
     hold_ticks: int = 5
-    """The number of ticks after the last solution during which its torques serve as the safe command."""
+    """The number of ticks after the last solution during which its torques are the safe command."""
     damping: float = 0.02
-    """The damping of the safe command that follows: −D v, D in this part of the greatest effort for 1 rad/s (s/rad)."""
+    """The damping of the safe command after that: −D v. D at 1 rad/s is this fraction of the maximum effort (s/rad)."""
     backend: Literal["interior_point", "clarabel"] = "interior_point"
     """The solver: our own dense interior point method, warm-started from the last tick, or clarabel."""
     form: Literal["condensed", "full"] = "condensed"
-    """The unknowns: what the elimination of base and contacts leaves, or, for comparison, all of (q̈, f)."""
+    """The unknowns: those that remain after elimination of base and contacts, or, for comparison, all of (q̈, f)."""
     warm_start: bool = True
-    """Whether the solver begins at the last tick's solution, if it can."""
+    """Whether the solver starts from the last tick's solution if possible."""
     tolerance: float = 1e-9
     """The tolerance of the solver, absolute and relative, on feasibility and duality gap."""
     max_iterations: int = 50
     """The number of iterations after which a step fails."""
     time_limit: float = float("inf")
-    """The time after which a step fails (s). What depends on it depends on the machine's load."""
+    """The time after which a step fails (s). Results that depend on it depend on the machine's load."""
 
 
 class Optimality(NamedTuple):
-    """The errors of the conditions of Karush, Kuhn and Tucker at a step."""
+    """The errors of the Karush–Kuhn–Tucker conditions at a step."""
 
     stationarity: float
     """The gradient of the Lagrangian, relative to the largest of its terms."""
     primal: float
     """The violation of the worst equality, bound or cone, relative to its row and the unknowns."""
     dual: float
-    """How far the multipliers are outside of their cones, relative to themselves."""
+    """The distance of the multipliers from their cones, relative to their size."""
     complementarity: float
-    """The sum of the products of slacks and multipliers, relative to 1 and the terms of the objective."""
+    """The sum of the products of slack variables and multipliers, relative to 1 and the terms of the objective."""
 
 
 class Command(NamedTuple):
-    """What the robot should do now: finite, and within the limits of the torques, whatever the status says.
+    """The command for the robot at this tick: finite, and within the torque limits, for every status.
 
-    Of a safe command, all members from `a` to `violation` are the last solution's.
+    In a safe command, all members from `a` to `violation` are from the last solution.
     """
 
     status: Literal[
         "solved", "infeasible", "iteration_limit", "time_limit", "numerical_error", "not_finite", "invalid_state"
     ]
-    """The end of the step in a word."""
+    """The reason why the step ended."""
     reason: str
-    """End of the step in a sentence. It names the index of a number that is not finite, or the joint or the frame whose
-    rotation is invalid."""
+    """The reason as a sentence. It gives the index of a number that is not finite, or the joint or the frame whose
+    rotation is invalid.
+    """
     source: Literal["solution", "last_solution", "gravity_compensation"]
-    """The origin of the command. A solver that has not finished may still give an iterate that holds all constraints:
-    a 'solution'. Others are safe commands: the last solution's torques for some ticks, then gravity compensation with
-    damping."""
+    """The origin of the command. A solver that has not finished may still return an iterate that satisfies all
+    constraints: a 'solution'. The other two are safe commands: the last solution's torques for some ticks, then gravity
+    compensation with damping.
+    """
     tau: _Array
     """τ, the efforts of the motors (N m, N), nv numbers, 0 at a free-flyer."""
     a: _Array
-    """q̈, the acceleration that follows if the contacts hold (rad/s², m/s²), nv numbers."""
+    """q̈, the resulting acceleration if the contacts hold (rad/s², m/s²), nv numbers."""
     forces: _Array
     """The force of the environment on the robot at each contact, (contacts, 6), linear first, about the origin of the
-    contact's frame along the world's axes (N, N m)."""
+    contact's frame in the world's axes (N, N m).
+    """
     com_acceleration: _Array
     """c̈ = J q̈ + J̇ v of the centre of mass, in the world's frame (m/s²), 3 numbers."""
     violation: float
@@ -147,12 +155,12 @@ class Command(NamedTuple):
     iterations: int
     """The number of iterations of the solver."""
     reduced_accuracy: bool
-    """Whether the solver fell short of the tolerance and met only its reduced one."""
+    """Whether the solver missed the tolerance and met only its reduced tolerance."""
     limits_relaxed: bool
-    """Whether the limits of joints had to give way to dynamics, contacts and torques."""
+    """Whether joint limits were relaxed in favour of dynamics, contacts and torques."""
 
     def solved(self) -> "Command":
-        """The command itself if its status is 'solved'.
+        """Returns the command itself if its status is 'solved'.
 
         Raises `ControllerError` with the reason otherwise.
         """
@@ -162,7 +170,7 @@ class Command(NamedTuple):
 
 
 class Numbers:
-    """A member of a `Target`: some of its numbers, read as a view of them and set from whatever has their shape."""
+    """A member of a `Target`: a view of some of its numbers, which can be set from anything with their shape."""
 
     def __init__(self, first: int, *shape: int) -> None:
         self.first, self.shape = first, shape
@@ -185,7 +193,7 @@ class Numbers:
         view[...] = given
 
     def check(self, target: "Target", given: _Array) -> None:
-        """Raises `ValueError` for numbers that these cannot be."""
+        """Raises `ValueError` for values that are invalid here."""
 
 
 class Pose(Numbers):
@@ -207,7 +215,7 @@ class Position(Numbers):
 
 
 class Target:
-    """Some numbers of `References`, by name."""
+    """A part of the numbers of `References`, with named members."""
 
     __slots__ = ("_name", "_numbers", "_views")
     SIZE: int
@@ -229,7 +237,7 @@ class Target:
 
 
 class ComTarget(Target):
-    """Where the centre of mass should be, in the world's frame."""
+    """The target of the centre of mass, in the world's frame."""
 
     __slots__ = ()
     SIZE = 9
@@ -242,7 +250,7 @@ class ComTarget(Target):
 
 
 class MomentumTarget(Target):
-    """What the angular momentum about the centre of mass should be, along the world's axes."""
+    """The target of the angular momentum about the centre of mass, in the world's axes."""
 
     __slots__ = ()
     SIZE = 6
@@ -253,8 +261,9 @@ class MomentumTarget(Target):
 
 
 class FrameTarget(Target):
-    """Where a frame should be. Velocity and acceleration are those of its origin and of its rotation, along the world's
-    axes: linear first, the first and second time derivative of the position (a classical acceleration)."""
+    """The target of a frame. Velocity and acceleration are of its origin and its rotation, in the world's axes, linear
+    first. They are the first and second time derivative of the position (a classical acceleration).
+    """
 
     __slots__ = ()
     SIZE = 28
@@ -267,24 +276,26 @@ class FrameTarget(Target):
 
 
 class ContactTarget(Target):
-    """Whether a contact touches, where it is held, and about which force its force is regularised; in the world."""
+    """The target of a contact: whether it touches, where it is held, and the reference of its force; in the world."""
 
     __slots__ = ()
     SIZE = 23
     pose = Pose(1)
-    """Where the frame is held, a homogeneous (4, 4) matrix; acts only if `Settings.contact_gains` have a stiffness. Of
-    a point, the translation alone."""
+    """The pose at which the frame is held, a homogeneous (4, 4) matrix; it acts only if `Settings.contact_gains` have a
+    stiffness. For a point only the translation is used.
+    """
     force = Numbers(17, 6)
-    """What the environment should do to the robot, linear first, about the frame's origin (N, N m): a planned force, or
-    a share of the weight."""
+    """The reference force of the environment on the robot, linear first, about the frame's origin (N, N m): a planned
+    force, or a share of the weight.
+    """
 
     @property
     def activation(self) -> float:
-        """α, from 0 (it does not touch: no force, and the frame may move) to 1 (it touches).
+        """The activation α, from 0 (it does not touch: no force, and the frame may move) to 1 (it touches).
 
-        Between them the frame is held and the normal force is at most α times the contact's `max_force`, or the robot's
-        weight if that is infinite: a ramp over some ticks loads or unloads the contact without a jump in the torques.
-        Numbers outside of 0 to 1 are clamped.
+        Between 0 and 1 the frame is held. The normal force is at most α times the contact's `max_force`, or α times the
+        robot's weight if `max_force` is infinite. So a ramp over some ticks loads or unloads the contact without a jump
+        in the torques. Numbers outside 0 to 1 are clamped.
         """
         return float(self._numbers[0])
 
@@ -294,7 +305,7 @@ class ContactTarget(Target):
 
 
 class PostureTarget(Target):
-    """Where the joints should be: a state of the robot. Entries of a free-flyer do not act."""
+    """The target of the joints: a state of the robot. Entries of a free-flyer are ignored."""
 
     __slots__ = ("_rotations",)
 
@@ -315,10 +326,11 @@ class PostureTarget(Target):
 
 
 class References:
-    """What all tasks aim at during one tick. `WholeBodyController.hold` makes one to start from.
+    """The targets of all tasks during one tick. `WholeBodyController.hold` creates the first one.
 
-    Its members are views of one array: they are changed in place, or set. A copy has numbers of its own. What is set is
-    checked at once: rotations are rotations, quaternions and pairs (cos, sin) have length 1. A step checks all of it.
+    Its members are views of one array: they are changed in place, or set. A copy has its own numbers. Values are
+    checked when they are set: rotations must be valid, quaternions and pairs (cos, sin) must have length 1. A step
+    checks all values.
 
     >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
     >>> robot = condyle.robots.quadruped()
@@ -339,7 +351,7 @@ class References:
     posture: PostureTarget
     """The joints."""
     frames: tuple[FrameTarget, ...]
-    """One for each task that names a frame to be moved, in the same order."""
+    """One for each task that moves a frame, in the same order."""
     contacts: tuple[ContactTarget, ...]
     """One for each `FrictionContact`, in the same order."""
 
@@ -354,14 +366,14 @@ class References:
         self.contacts = tuple(ContactTarget(f"contacts[{k}]", next(parts)) for k in range(contacts))
 
     def _parts(self) -> Iterator[_Array]:
-        """The numbers of each target."""
+        """Yields the numbers of each target."""
         nq, nv, frames, contacts = self._sizes
         sizes = [ComTarget.SIZE, MomentumTarget.SIZE, nq + 2 * nv]
         sizes += [FrameTarget.SIZE] * frames + [ContactTarget.SIZE] * contacts
         yield from np.split(self._numbers, np.cumsum(sizes)[:-1])
 
     def copy(self) -> "References":
-        """References with the same numbers, which do not change with these."""
+        """Returns independent references with the same numbers."""
         return References(self._sizes, self._numbers.copy(), self._rotations)
 
     def __copy__(self) -> "References":
@@ -384,6 +396,6 @@ class References:
         return f"<condyle.wholebody.References of {len(self.frames)} frames and {len(self.contacts)} contacts>"
 
 
-# where users find them, and pickle too
+# the modules in which users and pickle find these classes
 for _class in [_item for _item in globals().values() if isinstance(_item, type) and _item.__module__ == __name__]:
     _class.__module__ = "condyle.wholebody"

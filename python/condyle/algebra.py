@@ -1,8 +1,9 @@
 """Poses, motions, forces, inertias, and the exponentials of SO(3) and SE(3), in NumPy and for batches.
 
-Numbers are Pinocchio's: linear parts first. A `SE3` is the pose aXb of frame b in frame a: it takes what is written in
-b to a. Motions and forces are different types, so that a change of frame uses each one's own rule, and a motion is not
-added to a force. All of them, and all functions here, take arrays with any number of axes in front.
+The layout is the same as in Pinocchio: linear parts first. An `SE3` is the pose aXb of frame b in frame a: it converts
+coordinates in b to coordinates in a. Motions and forces are different types. So a change of frame uses the right rule
+for each, and a motion cannot be added to a force. All of these types and functions take arrays with any number of axes
+in front.
 
 >>> import numpy as np
 >>> from condyle.algebra import SE3, Force, Motion, exp6, log6
@@ -44,11 +45,11 @@ _Array = NDArray[np.float64]
 _new = object.__new__
 _S = TypeVar("_S", bound="_Spatial")
 _P = TypeVar("_P", bound="SE3")
-_CLOSE = 1e-12  # what `==` lets pass: some roundings, relative to 1 and to the larger number
+_CLOSE = 1e-12  # tolerance of `==`: some roundings, relative to 1 and to the larger number
 
 
 def skew(x: ArrayLike) -> _Array:
-    """x̂ with x̂ y = x × y, (…, 3, 3)."""
+    """Returns the matrix x̂ with x̂ y = x × y, (…, 3, 3)."""
     x = _shaped(x, "x", 3)
     out = np.zeros((*x.shape, 3))
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -x[..., 2], x[..., 1], -x[..., 0]
@@ -68,20 +69,20 @@ class _Spatial:
 
     @classmethod
     def from_vector(cls, vector: ArrayLike) -> Any:
-        """Of six numbers, linear first, (…, 6)."""
+        """Creates one from six numbers, linear first, (…, 6)."""
         vector = _shaped(vector, "vector", 6)
         return cls(vector[..., :3], vector[..., 3:])
 
     @classmethod
     def _of(cls: type[_S], vector: _Array) -> _S:
-        """Of six numbers that nobody else changes, as they are."""
+        """Creates one from six numbers without a copy; the caller must not change them afterwards."""
         x = _new(cls)
         x.vector = vector
         return x
 
     @classmethod
     def zero(cls) -> Any:
-        """Six zeros."""
+        """Returns six zeros."""
         return cls(np.zeros(3), np.zeros(3))
 
     @property
@@ -116,12 +117,12 @@ class _Spatial:
 
 
 class Motion(_Spatial):
-    """A velocity or an acceleration: (v, ω), of the point at the frame's origin."""
+    """A velocity or an acceleration: (v, ω), with v at the frame's origin."""
 
     __slots__ = ()
 
     def __rmul__(self, factor: Any) -> Any:
-        """The momentum I v = (m v + ω × m c, Ī ω + m c × v), for an inertia on the left; or a multiple."""
+        """Returns the momentum I v = (m v + ω × m c, Ī ω + m c × v) for an inertia on the left, else a product."""
         if not isinstance(factor, Inertia):
             return self * factor
         h = np.asarray(factor.mass)[..., None] * factor.com
@@ -129,7 +130,7 @@ class Motion(_Spatial):
         return Force(linear, _times(factor.rotational, self.angular) + np.cross(h, self.linear))
 
     def dot(self, force: "Force") -> _Array:
-        """The power vᵀ f + ωᵀ n, of shape (…)."""
+        """Returns the power vᵀ f + ωᵀ n, of shape (…)."""
         if not isinstance(force, Force):
             raise TypeError("the product of a motion is with a force")
         out: _Array = (self.vector * force.vector).sum(-1)
@@ -140,7 +141,7 @@ class Motion(_Spatial):
     @overload
     def cross(self, other: "Force") -> "Force": ...
     def cross(self, other: Union["Motion", "Force"]) -> Union["Motion", "Force"]:
-        """v × m or v ×* f: the rate of what moves along with v."""
+        """Returns v × m or v ×* f: the rate of a motion or force that moves along with v."""
         if isinstance(other, Motion):
             linear = np.cross(self.angular, other.linear) + np.cross(self.linear, other.angular)
             return type(other)(linear, np.cross(self.angular, other.angular))
@@ -151,13 +152,13 @@ class Motion(_Spatial):
 
     @property
     def action(self) -> _Array:
-        """v ×, (…, 6, 6)."""
+        """The matrix v ×, (…, 6, 6)."""
         omega = skew(self.angular)
         return _blocks(omega, skew(self.linear), np.zeros_like(omega), omega)
 
     @property
     def dual_action(self) -> _Array:
-        """v ×* = −(v ×)ᵀ, (…, 6, 6)."""
+        """The matrix v ×* = −(v ×)ᵀ, (…, 6, 6)."""
         return -self.action.swapaxes(-1, -2)
 
 
@@ -167,7 +168,7 @@ class Force(_Spatial):
     __slots__ = ()
 
     def dot(self, motion: Motion) -> _Array:
-        """The power, of shape (…)."""
+        """Returns the power, of shape (…)."""
         if not isinstance(motion, Motion):
             raise TypeError("the product of a force is with a motion")
         return motion.dot(self)
@@ -189,19 +190,19 @@ class SE3:
 
     @classmethod
     def _of(cls: type[_P], X: _Array) -> _P:
-        """Of a homogeneous matrix that nobody else changes, as it is."""
+        """Creates one from a homogeneous matrix without a copy; the caller must not change it afterwards."""
         x = _new(cls)
         x.rotation, x.translation = X[..., :3, :3], X[..., :3, 3]
         return x
 
     @classmethod
     def identity(cls) -> "SE3":
-        """The pose of a frame in itself."""
+        """Returns the identity."""
         return cls(np.eye(3), np.zeros(3))
 
     @classmethod
     def from_homogeneous(cls, X: ArrayLike) -> "SE3":
-        """Of [R, p; 0, 1], (…, 4, 4), as `forward_kinematics` and `frame_placement` give it."""
+        """Creates one from [R, p; 0, 1], (…, 4, 4), as `forward_kinematics` and `frame_placement` return it."""
         X = np.asarray(X, float)
         if X.shape[-2:] != (4, 4):
             raise ValueError(f"X: expected shape (…, 4, 4), found {X.shape}")
@@ -209,7 +210,7 @@ class SE3:
 
     @property
     def homogeneous(self) -> _Array:
-        """[R, p; 0, 1], (…, 4, 4)."""
+        """The matrix [R, p; 0, 1], (…, 4, 4)."""
         R, p = self._broadcast()
         out = np.zeros((*p.shape[:-1], 4, 4))
         out[..., :3, :3], out[..., :3, 3], out[..., 3, 3] = R, p, 1.0
@@ -217,18 +218,18 @@ class SE3:
 
     @property
     def action(self) -> _Array:
-        """aXb of motions, [R, p̂R; 0, R], (…, 6, 6)."""
+        """The matrix [R, p̂R; 0, R] by which aXb acts on motions, (…, 6, 6)."""
         R, p = self._broadcast()
         return _blocks(R, skew(p) @ R, np.zeros_like(R), R)
 
     @property
     def dual_action(self) -> _Array:
-        """aXb* of forces, [R, 0; p̂R, R], (…, 6, 6)."""
+        """The matrix [R, 0; p̂R, R] by which aXb acts on forces, (…, 6, 6)."""
         R, p = self._broadcast()
         return _blocks(R, np.zeros_like(R), skew(p) @ R, R)
 
     def inverse(self) -> "SE3":
-        """bXa."""
+        """Returns bXa."""
         back = self.rotation.swapaxes(-1, -2)
         return type(self)(back, -_times(back, self.translation))
 
@@ -243,7 +244,7 @@ class SE3:
     @overload
     def act(self, x: ArrayLike) -> _Array: ...
     def act(self, x: Any) -> Any:
-        """What is written in b, in a: a pose, a motion, a force, an inertia, or points (…, 3)."""
+        """Converts from frame b to frame a: a pose, a motion, a force, an inertia, or points (…, 3)."""
         R, p = self.rotation, self.translation
         if isinstance(x, Inertia):
             com = _times(R, x.com) + p
@@ -262,7 +263,7 @@ class SE3:
     __mul__ = act
 
     def act_inv(self, x: Any) -> Any:
-        """What is written in a, in b."""
+        """Converts from frame a to frame b; takes the same types as `act`."""
         return self.inverse().act(x)
 
     def _broadcast(self) -> tuple[_Array, _Array]:
@@ -279,7 +280,7 @@ class SE3:
 
 
 def exp3(w: ArrayLike) -> _Array:
-    """R = exp ŵ = 1 + sinc θ ŵ + ½ sinc² θ/2 ŵ², (…, 3, 3), of rotation vectors (…, 3)."""
+    """Returns R = exp ŵ = 1 + sinc θ ŵ + ½ sinc² θ/2 ŵ², (…, 3, 3), for rotation vectors (…, 3)."""
     w = _shaped(w, "w", 3)
     W, theta = skew(w), np.linalg.norm(w, axis=-1)[..., None, None]
     R: _Array = np.eye(3) + np.sinc(theta / np.pi) * W + 0.5 * np.sinc(theta / (2.0 * np.pi)) ** 2 * (W @ W)
@@ -287,7 +288,7 @@ def exp3(w: ArrayLike) -> _Array:
 
 
 def log3(R: ArrayLike) -> _Array:
-    """The rotation vector w, |w| ≤ π, with exp ŵ = R, by the quaternion of R, which is exact near 0 and near π."""
+    """Returns the rotation vector w, |w| ≤ π, with exp ŵ = R, by R's quaternion, which is exact near 0 and π."""
     q = quaternion(R)
     xyz, w = q[..., :3], q[..., 3:]
     n = np.linalg.norm(xyz, axis=-1, keepdims=True)
@@ -298,20 +299,20 @@ def log3(R: ArrayLike) -> _Array:
 
 
 def exp6(m: ArrayLike | Motion) -> SE3:
-    """exp of motions: (exp ω̂, V v), V = 1 + (1 − cos θ)/θ² ω̂ + (θ − sin θ)/θ³ ω̂²."""
+    """Returns the exponential of motions: (exp ω̂, V v), V = 1 + (1 − cos θ)/θ² ω̂ + (θ − sin θ)/θ³ ω̂²."""
     x = m.vector if isinstance(m, Motion) else _shaped(m, "m", 6)
     return SE3(exp3(x[..., 3:]), _times(Jexp3(-x[..., 3:]), x[..., :3]))
 
 
 def log6(X: SE3 | ArrayLike) -> Motion:
-    """The motion m, |ω| ≤ π, with exp m = X."""
+    """Returns the motion m, |ω| ≤ π, with exp m = X."""
     pose = X if isinstance(X, SE3) else SE3.from_homogeneous(X)
     w = log3(pose.rotation)
     return Motion(_times(Jlog3(-w), pose.translation), w)
 
 
 def Jexp3(w: ArrayLike) -> _Array:
-    """The right Jacobian of exp: exp(w + δ) = exp(w) exp(J δ) + O(δ²), (…, 3, 3)."""
+    """Returns the right Jacobian of exp: exp(w + δ) = exp(w) exp(J δ) + O(δ²), (…, 3, 3)."""
     w = _shaped(w, "w", 3)
     W, theta = skew(w), np.linalg.norm(w, axis=-1)[..., None, None]
     t = theta**2
@@ -323,7 +324,7 @@ def Jexp3(w: ArrayLike) -> _Array:
 
 
 def Jlog3(w: ArrayLike) -> _Array:
-    """The inverse of `Jexp3`, of the rotation vector w with |w| ≤ π: 1 + ½ ŵ + (1 − ½ θ cot ½ θ)/θ² ŵ²."""
+    """Returns the inverse of `Jexp3` for a rotation vector w with |w| ≤ π: 1 + ½ ŵ + (1 − ½ θ cot ½ θ)/θ² ŵ²."""
     w = _shaped(w, "w", 3)
     W, theta = skew(w), np.linalg.norm(w, axis=-1)[..., None, None]
     t = theta**2
@@ -335,7 +336,7 @@ def Jlog3(w: ArrayLike) -> _Array:
 
 
 def Jexp6(m: ArrayLike | Motion) -> _Array:
-    """The right Jacobian of `exp6`, Σ (−m×)ᵏ / (k + 1)!, (…, 6, 6): [J, C; 0, J] with J of `Jexp3`.
+    """Returns the right Jacobian of `exp6`, Σ (−m×)ᵏ / (k + 1)!, (…, 6, 6): [J, C; 0, J] with J of `Jexp3`.
 
     C, the coupling of the linear part to the angular one, is summed in the closed form of Barfoot and Furgale (2014).
     """
@@ -357,19 +358,19 @@ def Jexp6(m: ArrayLike | Motion) -> _Array:
 
 
 def Jlog6(X: SE3 | ArrayLike) -> _Array:
-    """The derivative of log6(X exp δ) by δ at 0, (…, 6, 6): the inverse of `Jexp6` at log6(X)."""
+    """Returns the derivative of log6(X exp δ) with respect to δ at 0, (…, 6, 6): the inverse of `Jexp6` at log6(X)."""
     return np.asarray(np.linalg.inv(Jexp6(log6(X))), float)
 
 
 def quaternion(R: ArrayLike) -> _Array:
-    """The quaternion (x, y, z, w), w ≥ 0, of a rotation, its largest component computed first (Shepperd 1978)."""
+    """Returns the quaternion (x, y, z, w), w ≥ 0, of a rotation, by its largest component (Shepperd 1978)."""
     R = np.asarray(R, float)
     if R.shape[-2:] != (3, 3):
         raise ValueError(f"R: expected shape (…, 3, 3), found {R.shape}")
     a, b, c = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
     x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, xz, yz = R[..., 0, 1] + R[..., 1, 0], R[..., 0, 2] + R[..., 2, 0], R[..., 1, 2] + R[..., 2, 1]
-    # four times the products of one component with all four
+    # per row: four times the products of one component with all four
     by_x, by_y = (1 + a - b - c, xy, xz, x), (xy, 1 - a + b - c, yz, y)
     by_z, by_w = (xz, yz, 1 - a - b + c, z), (x, y, z, 1 + a + b + c)
     products = np.stack([np.stack(row, -1) for row in (by_x, by_y, by_z, by_w)], -2)

@@ -9,27 +9,28 @@ Function(condyle_0:(q[7],v[7],a[7])->(tau[7]) External)
 >>> damping = casadi.jacobian(rnea(q, v, 0), v)  # ∂τ/∂v, in closed form
 
 Each function computes with the library's own code: values, Jacobians with the zeros of the robot's tree, products with
-them, and the Hessian of λᵀf, in closed form for `rnea` and `aba` and by hyper-dual numbers for the others. They may be
-called from several threads at a time (`Function.map` with "thread").
+them, and the Hessian of λᵀf. The Hessian has a closed form for `rnea` and `aba`, and uses hyper-dual numbers for the
+other functions. Functions may be called from several threads at a time (`Function.map` with "thread").
 
-With `states=N` a function is one of N states, with a column for each, as `f.map(N)` is. But it is one call, also for
-the Jacobian and the Hessian, and `rnea` and `aba` compute several states in the lanes of a vector register: the
-functions of direct collocation, which knows the number of its points, take two to four times less time so.
+With `states=N` a function takes N states, with a column for each, like `f.map(N)`. But it is one call, also for the
+Jacobian and the Hessian, and `rnea` and `aba` compute several states in SIMD lanes. Use it for direct collocation,
+where the number of points is known: it takes two to four times less time.
 
 >>> many = condyle.casadi.rnea(arm, states=50)
 >>> many.size_in("q"), many.size_out("tau")
 ((7, 50), (7, 50))
 
-A position q has nq numbers. Quaternions and the points of a circle of continuous joints are divided by their lengths
-first, so that derivatives by all nq numbers exist and are exact; of length 0 they give NaN. An optimisation holds their
-lengths at 1 by a constraint, or by integrating in the tangent space.
+A position q has nq numbers. Quaternions and the points of a circle of continuous joints are first divided by their
+lengths, so exact derivatives with respect to all nq numbers exist; a length of 0 gives NaN. An optimisation must keep
+these lengths at 1 by a constraint, or integrate in the tangent space.
 
-A function lives in the process that made it. One that was saved or pickled, alone or inside another, and is loaded
-raises an error when it is called, with a line on the standard error: make it anew. So does the one that it is a copy
-of, if that is in the same process: CasADi calls both by one name, and neither can be told from the other. There can be
-64 at a time, each used by any number of expressions; the same function of the same robot counts once.
+A function exists only in the process that made it. A function that was saved or pickled, alone or inside another one,
+and is loaded, raises an error when it is called, with a line on the standard error: create it again. If the original is
+in the same process, it then raises the same error, because CasADi calls both by one name and they cannot be
+distinguished. At most 64 functions exist at a time, each used by any number of expressions; the same function of the
+same robot counts once.
 
-CasADi is an extra: `pip install condyle[casadi]`.
+CasADi is an optional dependency: `pip install condyle[casadi]`.
 """
 
 import threading
@@ -79,7 +80,7 @@ def _function(model: Model, function: str, states: int, **options: Any) -> "_cas
 
 
 def _external(name: str) -> "_casadi.Function":
-    """The function of a slot that is held."""
+    """Returns the function of a held slot."""
     try:
         return _casadi.external(name, _condyle.__file__)
     finally:
@@ -87,7 +88,7 @@ def _external(name: str) -> "_casadi.Function":
 
 
 def rnea(model: Model, states: int = 1) -> "_casadi.Function":
-    """The efforts τ = M(q) a + h(q, v) that make a robot accelerate with a: (q, v, a) -> tau.
+    """Returns the efforts τ = M(q) a + h(q, v) that accelerate a robot with a: (q, v, a) -> tau.
 
     >>> tau = condyle.casadi.rnea(condyle.robots.arm7())(0.3, 0, 0)
     >>> bool(abs(tau[0]) < 1e-9)  # gravity does not turn a vertical axis
@@ -97,7 +98,7 @@ def rnea(model: Model, states: int = 1) -> "_casadi.Function":
 
 
 def aba(model: Model, states: int = 1) -> "_casadi.Function":
-    """The accelerations a of a robot under efforts τ: (q, v, tau) -> a.
+    """Returns the accelerations a of a robot under efforts τ: (q, v, tau) -> a.
 
     Raises `ModelError` if the inertia matrix is singular.
     """
@@ -105,12 +106,12 @@ def aba(model: Model, states: int = 1) -> "_casadi.Function":
 
 
 def crba(model: Model, states: int = 1) -> "_casadi.Function":
-    """The inertia matrix: q -> M, (nv, nv), with the zeros of the robot's tree."""
+    """Returns the inertia matrix: q -> M, (nv, nv), with the zeros of the robot's tree."""
     return _function(model, "crba", states)
 
 
 def forward_kinematics(model: Model, frame: str | int, states: int = 1) -> "_casadi.Function":
-    """The placement of a frame in the world's frame: q -> (position, rotation), 3 numbers (m) and (3, 3).
+    """Returns the placement of a frame in the world's frame: q -> (position, rotation), 3 numbers (m) and (3, 3).
 
     >>> tool = condyle.casadi.forward_kinematics(condyle.robots.arm7(), "tool")
     >>> position, rotation = tool(0)
@@ -126,24 +127,24 @@ def frame_velocity(
     reference: Literal["local", "world", "local_world_aligned"] = "local",
     states: int = 1,
 ) -> "_casadi.Function":
-    """The velocity of a frame, linear numbers first: (q, v) -> velocity, 6 numbers (m/s, rad/s)."""
+    """Returns the velocity of a frame, linear numbers first: (q, v) -> velocity, 6 numbers (m/s, rad/s)."""
     return _function(model, "frame_velocity", states, frame=frame, reference=reference)
 
 
 def com(model: Model, states: int = 1) -> "_casadi.Function":
-    """The centre of mass of the moving bodies in the world's frame: q -> com, 3 numbers (m)."""
+    """Returns the centre of mass of the moving bodies in the world's frame: q -> com, 3 numbers (m)."""
     return _function(model, "com", states)
 
 
 def centroidal_momentum(model: Model, states: int = 1) -> "_casadi.Function":
-    """The momentum about the centre of mass, linear numbers first: (q, v) -> momentum, 6 numbers (kg m/s, kg m²/s)."""
+    """Returns the momentum about the centre of mass, linear first: (q, v) -> momentum, 6 numbers (kg m/s, kg m²/s)."""
     return _function(model, "centroidal_momentum", states)
 
 
 def constrained_dynamics(model: Model, constraints: Sequence[ContactConstraint], states: int = 1) -> "_casadi.Function":
-    """The accelerations under constraints and the forces that hold them: (q, v, tau) -> (a, forces).
+    """Returns the accelerations under constraints and the constraint forces: (q, v, tau) -> (a, forces).
 
-    The constraints' targets stay as they are given. Raises `ModelError` as `ConstraintSet` does.
+    The constraints keep their given targets. Raises `ModelError` as `ConstraintSet` does.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> stance = [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")]
@@ -167,23 +168,24 @@ _Knot = (
 
 
 def knot(of: _Knot, t: int | None = 0) -> "_casadi.Function":
-    """The next state and the cost of a knot of an optimal control problem: (x, u) -> (next, cost).
+    """Returns the next state and the cost of a knot of an optimal control problem: (x, u) -> (next, cost).
 
-    of: an action of a robot, an `Lqr`, a `Unicycle`, or a `Problem`. What is written in Python raises `ProblemError`:
-        write it as CasADi's expressions instead.
-    t: the number of the knot, from 0 to N of a problem; of an action, which of its `costs_at` count. None makes it an
-        argument, (x, u, t) -> (next, cost), so that one function serves all knots of an action:
-        `f.map(N)(xs, us, range(N))`.
+    of: an action of a robot, an `Lqr`, a `Unicycle`, or a `Problem`. Parts written in Python raise `ProblemError`:
+        write them as CasADi expressions instead.
+    t: the index of the knot, from 0 to N for a problem; for an action it selects the `costs_at`. None makes it an
+        argument, (x, u, t) -> (next, cost), so that one function serves all knots of an action: `f.map(N)(xs, us,
+        range(N))`.
 
-    A knot without controls, as an impact, is x -> (next, cost); the end is x -> cost. Bounds on controls, limits and
-    the constraints of a `ConstrainedAction` are left to the optimiser. The rotations in x are divided by their lengths
-    as those of q are in the other functions, and in `next` they have the length 1: so multiple shooting,
-    x⁺ = next(x, u), holds the lengths by itself.
+    A knot without controls, such as an impact, is x -> (next, cost); the terminal knot is x -> cost. Bounds on
+    controls, limits and the constraints of a `ConstrainedAction` are left to the optimiser. The rotations in x are
+    divided by their lengths, as in q of the other functions, and in `next` they have length 1. So multiple shooting, x⁺
+    = next(x, u), keeps the lengths at 1.
 
-    First derivatives are exact. Hessians are those that the knot has for `Fddp(second_order=True)`: of the cost of a
-    robot Gauss–Newton's, w (∂r)ᵀ a″ ∂r, exact for an `Lqr` and a `Unicycle`; of the next state exact for these, and for
-    `FreeDynamics` and `InverseDynamics` by 'semi_implicit_euler'. Contacts, impacts and Runge–Kutta rules count as
-    linear along the tangent space of the state. The optimum is the same; an optimiser may take more iterations to it.
+    First derivatives are exact. Hessians are the same as for `Fddp(second_order=True)`. The Hessian of a robot's cost
+    is Gauss–Newton's, w (∂r)ᵀ a″ ∂r; for an `Lqr` and a `Unicycle` it is exact. The Hessian of the next state is exact
+    for these two, and for `FreeDynamics` and `InverseDynamics` with 'semi_implicit_euler'. Contacts, impacts and
+    Runge–Kutta steps are treated as linear in the tangent space of the state. The optimum is the same; an optimiser may
+    need more iterations.
 
     >>> import condyle, condyle.casadi
     >>> from condyle.optimal import Cost, FreeDynamics, Residual
@@ -205,12 +207,13 @@ def action(
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
 ) -> Action:
-    """An `Action` of `condyle.optimal` from expressions, with their exact derivatives, computed for all knots at once.
+    """Returns an `Action` of `condyle.optimal` from expressions, with their exact derivatives, computed for all knots
+    at once.
 
-    x, u: the symbols of the state and of the control; u is None at the end of the horizon.
-    next_state: the next state as an expression of x and u; None at the end.
+    x, u: the symbols of the state and of the control; u is None at the terminal knot.
+    next_state: the next state as an expression of x and u; None at the terminal knot.
     cost: the cost.
-    lower, upper: bounds on the controls, as of `Action`.
+    lower, upper: bounds on the controls, as for `Action`.
 
     >>> import casadi, condyle, condyle.casadi, numpy as np
     >>> x, u = casadi.SX.sym("x"), casadi.SX.sym("u")
@@ -254,7 +257,7 @@ def action(
 
 
 class _Mapped:
-    """A function of rows of arguments, which gives an array (rows, m, n) for each of its results."""
+    """A function whose arguments have a row per call; it returns an array (rows, m, n) for each of its results."""
 
     def __init__(self, kind: Any, arguments: list[Any], results: list[Any]) -> None:
         results = [_casadi.densify(kind(result)) for result in results]
@@ -265,13 +268,13 @@ class _Mapped:
 
     def __call__(self, *arguments: NDArray[np.float64]) -> list[NDArray[np.float64]]:
         rows = len(arguments[0])
-        # column by column, as CasADi has matrices: a row of numbers for each knot
+        # CasADi stores matrices by columns: one row of numbers for each knot
         results = [np.empty((rows, n, m)) for m, n in self._shapes]
         with self._lock:
             if rows not in self._buffers:
                 self._buffers[rows] = self._function.map(rows).buffer()
             buffer, call = self._buffers[rows]
-            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # alive until the call
+            inputs = [np.ascontiguousarray(argument) for argument in arguments]  # kept alive until the call
             for k, argument in enumerate(inputs):
                 buffer.set_arg(k, argument.data)
             for k, result in enumerate(results):

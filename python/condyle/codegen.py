@@ -7,14 +7,14 @@
 >>> bool(np.abs(a - condyle.aba(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7)).max() < 1e-9)
 True
 
-The library's algorithms run once on numbers that remember how they were computed: constants of the robot are folded,
-what is 0 is left out, and each value is computed once. What remains has no loops and no branches. It is a function of
-one robot, and does not change with it.
+The library's algorithms run once on numbers that record how they were computed. Constants of the robot are folded,
+zeros are dropped, and each value is computed once. The result has no loops and no branches. It is a function of one
+robot, and later changes of the model do not affect it.
 
-`functions` names what there is. Arguments and results are those of `condyle`'s functions of the same names, with
-these in addition: 'frames' takes q and v and gives, for each frame, rotation, translation, velocity (of its origin,
-along the axes of the world), Jacobian J and its rate dJ; 'centroidal' gives com, com_velocity, hg, Jcom, Ag and dAg.
-External forces, where they are asked for, are (nbodies − 1, 6), of which the world's is left out.
+`functions` lists the available names. Arguments and results are the same as for the functions of `condyle` with these
+names. There are two additional functions. 'frames' takes q and v and returns, for each frame, rotation, translation,
+velocity (of its origin, in the axes of the world), Jacobian J and its rate dJ. 'centroidal' returns com, com_velocity,
+hg, Jcom, Ag and dAg. External forces, if requested, are (nbodies − 1, 6), without the world's row.
 """
 
 from collections import namedtuple
@@ -52,7 +52,7 @@ functions: tuple[str, ...] = (
     "impulse_dynamics",
     "impulse_dynamics_derivatives",
 )
-"""The functions that can be made."""
+"""The names of the functions that can be generated."""
 
 FLAGS = ("-O2", "-march=native", "-ffp-contract=fast", "-shared", "-fPIC")
 
@@ -68,15 +68,15 @@ def source(
     inputs: Sequence[str] = (),
     shares: int | None = None,
 ) -> dict[str, str]:
-    """The code of functions of a robot: the text of each file, by its name.
+    """Generates the code of functions of a robot: a dictionary from file names to texts.
 
-    language: 'c' or 'c-float'; 'c-4', 'c-8', 'c-float-4' or 'c-float-8' for vectors of states; 'c-casadi' for
-    CasADi's `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: those of the function 'frames';
-    constraints: those of 'constrained_dynamics' and 'impulse_dynamics', and of their derivatives; external_forces:
-    whether dynamics takes them; inputs: what is an argument instead of a constant, of 'inertia', 'armature' and
-    'gravity'. shares: how many threads compute a state in CUDA, as of `condyle.cuda.compile`. In C and CUDA functions
-    begin with the name of their files, which is that of the robot, then '_float' and '_x4' or '_x8' where the language
-    has these.
+    language: 'c' or 'c-float'; 'c-4', 'c-8', 'c-float-4' or 'c-float-8' for vectors of states; 'c-casadi' for CasADi's
+        `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: the frames of the function 'frames';
+        constraints: the constraints of 'constrained_dynamics' and 'impulse_dynamics', and of their derivatives;
+        external_forces: whether dynamics takes external forces; inputs: which of 'inertia', 'armature' and 'gravity'
+        are arguments instead of constants. shares: the number of threads per state in CUDA, as for
+        `condyle.cuda.compile`. Names of C and CUDA functions begin with the name of their files: the robot's name, then
+        '_float' and '_x4' or '_x8' if the language has these.
 
     >>> arm = condyle.robots.arm7()
     >>> list(condyle.codegen.source(arm, "rnea")), list(condyle.codegen.source(arm, "rnea", "rust"))
@@ -99,8 +99,7 @@ def source(
 
 
 class Compiled:
-    """A function of a robot that the C compiler has made. `inputs` and `outputs` are the names and shapes of its
-    arrays.
+    """A compiled function of a robot. `inputs` and `outputs` are the names and shapes of its arrays.
 
     It may be called from several threads at a time.
     """
@@ -121,9 +120,9 @@ class Compiled:
         return f"{self.name}({', '.join(self.inputs)}) -> {', '.join(self.outputs)}"
 
     def __call__(self, *arguments: ArrayLike) -> Any:
-        """The results for one state, or for many if the arguments have one more axis in front.
+        """Computes the results for one state, or for many if the arguments have one more axis in front.
 
-        One result is an array, several are a named tuple.
+        One result is an array; several are a named tuple.
         """
         if len(arguments) != len(self.inputs):
             raise TypeError(f"{self!r}: expected {len(self.inputs)} arguments, found {len(arguments)}")
@@ -160,15 +159,16 @@ def compile(  # noqa: A001
     compiler: str | None = None,
     cache: "str | os.PathLike[str] | None" = None,
 ) -> Compiled:
-    """A function of a robot, made by the system's C compiler, or read from the cache if it was made before.
+    """Compiles a function of a robot with the system's C compiler, or reads it from the cache if it was compiled
+    before.
 
-    name: one of `functions`; frames, constraints, external_forces, inputs: as of `source`. compiler: a command that
-    understands the options of GCC and Clang; by default the environment variable CC, else `cc`. cache: a folder; by
-    default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`. What was made is found again by the
-    robot, the options, the version of condyle, the compiler and the processor.
+    name: one of `functions`; frames, constraints, external_forces, inputs: as for `source`. compiler: a command that
+        understands the options of GCC and Clang; by default the environment variable CC, else `cc`. cache: a folder; by
+        default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`. The key of an entry consists of the
+        robot, the options, the version of condyle, the compiler and the processor.
 
-    Raises `RuntimeError` if there is no compiler or it fails; `ModelError` if the inertia matrix is singular and its
-    inverse is needed, or there is no such frame.
+    Raises `RuntimeError` if the compiler is missing or fails; `ModelError` if the inertia matrix is singular and its
+    inverse is needed, or a frame does not exist.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> feet = condyle.codegen.compile(quadruped, "frames", frames=["LF_foot"])
@@ -208,7 +208,7 @@ def compile(  # noqa: A001
 
 
 def _processor() -> str:
-    """What tells processors apart for which the compiler writes other instructions."""
+    """Returns a text that differs for processors for which the compiler generates different instructions."""
     import platform
 
     try:
@@ -227,7 +227,7 @@ def _build(
     library: Path,
     about: Path,
 ) -> None:
-    """Compiles the files, with a function that goes through many states, into the cache."""
+    """Compiles the files, with a function that loops over many states, into the cache."""
     import json
     import os
     import shlex
@@ -256,4 +256,4 @@ def _build(
         told = Path(folder) / "about.json"
         told.write_text(json.dumps({"inputs": inputs, "outputs": outputs}), encoding="utf-8")
         os.replace(told, about)
-        os.replace(made, library)  # last: what finds it finds all
+        os.replace(made, library)  # last: if the library exists, the other file exists too

@@ -1,8 +1,8 @@
-"""Numbers of other libraries: orders, frames and signs, both ways.
+"""Numbers of other libraries: orders, frames and signs, in both directions.
 
-Condyle's own conventions are Pinocchio's. Spatial vectors have their linear part first, quaternions are x, y, z, w, a
-body's velocity is along its own axes, and an external force acts on a body at its origin, along its axes. Each function
-here takes arrays with any number of axes in front, so that batches go through as they are.
+Condyle's own conventions are the same as Pinocchio's. Spatial vectors have their linear part first, quaternions are x,
+y, z, w, and a body's velocity is in its own axes. An external force acts on a body at its origin, in its axes. Each
+function here takes arrays with any number of axes in front, so batches need no loop.
 
 >>> import condyle, numpy as np
 >>> from condyle import conventions
@@ -11,7 +11,7 @@ array([4., 5., 6., 1., 2., 3.])
 >>> conventions.wxyz([0.0, 0.0, 0.6, 0.8])  # as MuJoCo and Drake have it
 array([0.8, 0. , 0. , 0.6])
 
-A whole state goes to another library's coordinates by `Coordinates`:
+`Coordinates` converts a whole state to another library's coordinates:
 
 >>> quadruped = condyle.robots.quadruped()
 >>> mujoco = conventions.Coordinates(quadruped, "mujoco")
@@ -50,7 +50,7 @@ _Array = NDArray[np.float64]
 
 
 def swap_halves(x: ArrayLike, axis: int = -1) -> _Array:
-    """Spatial vectors with their linear and angular halves exchanged along an axis of length 6: its own inverse.
+    """Exchanges the linear and angular halves of spatial vectors along an axis of length 6; it is its own inverse.
 
     A Jacobian of shape (6, nv) is swapped along axis -2. Raises a ValueError if the axis has another length.
     """
@@ -61,22 +61,22 @@ def swap_halves(x: ArrayLike, axis: int = -1) -> _Array:
 
 
 def swap_blocks(X: ArrayLike) -> _Array:
-    """Matrices (…, 6, 6) between spatial vectors with linear and angular halves exchanged on both sides."""
+    """Exchanges the halves on both sides of matrices (…, 6, 6) that map spatial vectors to spatial vectors."""
     return swap_halves(swap_halves(X, -1), -2)
 
 
 def wxyz(quaternion: ArrayLike) -> _Array:
-    """Quaternions (…, 4), given as x, y, z, w, with w first."""
+    """Converts quaternions (…, 4) from x, y, z, w to w, x, y, z."""
     return np.roll(_last(quaternion, "quaternion", 4), 1, -1)
 
 
 def xyzw(quaternion: ArrayLike) -> _Array:
-    """Quaternions (…, 4), given as w, x, y, z, with w last."""
+    """Converts quaternions (…, 4) from w, x, y, z to x, y, z, w."""
     return np.roll(_last(quaternion, "quaternion", 4), -1, -1)
 
 
 def rotation(quaternion: ArrayLike) -> _Array:
-    """R (…, 3, 3) of unit quaternions x, y, z, w: coordinates in the body to coordinates in its parent."""
+    """Returns R (…, 3, 3) of unit quaternions x, y, z, w; it maps coordinates in the body to those in its parent."""
     Q = _last(quaternion, "quaternion", 4)
     xyz, w = Q[..., :3], Q[..., 3]
     outer = xyz[..., :, None] * xyz[..., None, :]
@@ -86,11 +86,11 @@ def rotation(quaternion: ArrayLike) -> _Array:
 
 
 def wrench_to_body(oXb: ArrayLike, wrench: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0)) -> _Array:
-    """Forces and moments (linear, angular) along the world's axes about `point`, as `f_ext` wants them.
+    """Converts forces and moments (linear, angular), in the world's axes about `point`, to the form of `f_ext`.
 
     f = Rᵀ f_w, n = Rᵀ (n_w + (point − p) × f_w), where (R, p) is the body's pose `oXb`, (…, 4, 4), in the world. For a
-    wrench about the world's origin leave `point` out; Drake's forces and MuJoCo's `xfrc_applied` are about a point of
-    the body, given here in the world.
+    wrench about the world's origin omit `point`. Drake's forces and MuJoCo's `xfrc_applied` are about a point of the
+    body; give its position in the world.
     """
     R, p = _pose(oXb)
     f, n = _halves(wrench, "wrench")
@@ -99,17 +99,17 @@ def wrench_to_body(oXb: ArrayLike, wrench: ArrayLike, point: ArrayLike = (0.0, 0
 
 
 def wrench_to_world(oXb: ArrayLike, wrench: ArrayLike, point: ArrayLike = (0.0, 0.0, 0.0)) -> _Array:
-    """Forces of the kind of `f_ext` along the world's axes about `point`: the inverse of `wrench_to_body`."""
+    """Converts forces in the form of `f_ext` to the world's axes about `point`: the inverse of `wrench_to_body`."""
     R, p = _pose(oXb)
     f, n = (_turn(R, half) for half in _halves(wrench, "wrench"))
     return np.concatenate([f, n + np.cross(p - np.asarray(point, float), f)], -1)
 
 
 def twist_to_body(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = None) -> _Array:
-    """Velocities (linear, angular), given along the world's axes, of the body's point at `point`, in the body's frame.
+    """Converts velocities (linear, angular) of the body's point at `point`, in the world's axes, to the body's frame.
 
-    v = Rᵀ (v_w + ω_w × (p − point)), ω = Rᵀ ω_w. Without a point it is the velocity of the body's origin (Pinocchio's
-    LOCAL_WORLD_ALIGNED); with the world's origin it is Pinocchio's WORLD.
+    v = Rᵀ (v_w + ω_w × (p − point)), ω = Rᵀ ω_w. Without a point the linear part is the velocity of the body's origin
+    (Pinocchio's LOCAL_WORLD_ALIGNED); the world's origin as the point gives Pinocchio's WORLD.
     """
     R, p = _pose(oXb)
     v, omega = _halves(twist, "twist")
@@ -119,7 +119,7 @@ def twist_to_body(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = No
 
 
 def twist_to_world(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = None) -> _Array:
-    """Velocities in the body's frame, along the world's axes, of its point at `point`: inverse of `twist_to_body`."""
+    """Converts velocities in the body's frame to the world's axes at `point`: the inverse of `twist_to_body`."""
     R, p = _pose(oXb)
     v, omega = (_turn(R, half) for half in _halves(twist, "twist"))
     if point is not None:
@@ -128,32 +128,34 @@ def twist_to_world(oXb: ArrayLike, twist: ArrayLike, point: ArrayLike | None = N
 
 
 def classical_acceleration(a: ArrayLike, v: ArrayLike) -> _Array:
-    """r̈ = a + ω × v and ω̇ of a body's origin, from its spatial acceleration a and velocity v, along the same axes."""
+    """Returns r̈ = a + ω × v and ω̇ of a body's origin, from its spatial acceleration a and velocity v, in the same
+    axes.
+    """
     (linear, angular), (velocity, omega) = _halves(a, "a"), _halves(v, "v")
     return np.concatenate([linear + np.cross(omega, velocity), angular + np.zeros_like(omega)], -1)
 
 
 def spatial_acceleration(a: ArrayLike, v: ArrayLike) -> _Array:
-    """The spatial acceleration from r̈, ω̇ and the velocity v: the inverse of `classical_acceleration`."""
+    """Returns the spatial acceleration from r̈, ω̇ and the velocity v: the inverse of `classical_acceleration`."""
     (linear, angular), (velocity, omega) = _halves(a, "a"), _halves(v, "v")
     return np.concatenate([linear - np.cross(omega, velocity), angular + np.zeros_like(omega)], -1)
 
 
 class FreeJoint(NamedTuple):
-    """What a library means by the coordinates of a body that moves freely."""
+    """A library's conventions for the coordinates of a freely moving body."""
 
     position_first: bool
-    """q = [position, quaternion], or [quaternion, position]."""
+    """Whether q = [position, quaternion]; else [quaternion, position]."""
     w_last: bool
-    """Quaternions are x, y, z, w, or w, x, y, z."""
+    """Whether quaternions are x, y, z, w; else w, x, y, z."""
     linear_first: bool
-    """v = [linear, angular], or [angular, linear]."""
+    """Whether v = [linear, angular]; else [angular, linear]."""
     linear: Literal["body", "world"]
-    """Along whose axes the linear velocity is."""
+    """The axes of the linear velocity."""
     angular: Literal["body", "world"]
-    """Along whose axes the angular velocity is."""
+    """The axes of the angular velocity."""
     angle: bool
-    """A revolute joint without limits has its angle for a position, not its cosine and sine."""
+    """Whether a revolute joint without limits has its angle as position, instead of cosine and sine."""
 
 
 LIBRARIES = {
@@ -166,16 +168,16 @@ LIBRARIES = {
 
 
 class Coordinates:
-    """The way from a robot's q, v, a and τ to another library's, and back.
+    """Conversion of a robot's q, v, a and τ to another library's coordinates, and back.
 
-    library: a name in `LIBRARIES`, or a `FreeJoint` that describes one. Joints keep Condyle's order: where the other
-    library numbers them otherwise, permute by names. Spherical joints have their quaternion in the library's order, and
-    angular velocities along the child's axes, as in MuJoCo and RigidBodyDynamics.jl; a joint that the library has in
-    another form (planar and spherical ones in Drake, planar ones in all but Pinocchio) is refused with a ValueError
-    that names it.
+    library: a name in `LIBRARIES`, or a `FreeJoint` that describes one. Joints keep Condyle's order; if the other
+        library numbers them differently, permute by names. Spherical joints have their quaternion in the library's
+        order, and angular velocities in the child's axes, as in MuJoCo and RigidBodyDynamics.jl. A joint that the
+        library represents in another form (planar and spherical ones in Drake, planar ones in all except Pinocchio) is
+        refused with a ValueError that names it.
 
-    Efforts follow from power: τᵀ v is the same number in both. Accelerations are time derivatives of velocities: that
-    of a velocity along the world's axes is a classical acceleration.
+    Efforts follow from power: τᵀ v is the same number in both. Accelerations are time derivatives of velocities; so the
+    derivative of a velocity in the world's axes is a classical acceleration.
     """
 
     def __init__(self, model: Model, library: str | FreeJoint) -> None:
@@ -194,7 +196,7 @@ class Coordinates:
         if any(model.mimics):
             raise ValueError("a robot whose joints follow others has fewer coordinates than there")
         self._joints: list[tuple[str, slice, slice, slice]] = []
-        """Kind, our positions, theirs, and velocities of each joint."""
+        """For each joint: kind, our positions, their positions, and velocities."""
         nq = 0
         columns = zip(model.joint_types, model.idx_qs, model.nqs, model.idx_vs, model.nvs, strict=True)
         for kind, at_q, nq_here, at_v, nv_here in columns:
@@ -205,7 +207,7 @@ class Coordinates:
         """The number of the library's positions."""
 
     def position(self, q: ArrayLike) -> _Array:
-        """The library's positions, (…, nq there), of ours, (…, nq)."""
+        """Returns the library's positions, (…, nq there), from ours, (…, nq)."""
         q = _last(q, "q", self.model.nq)
         theirs = np.empty((*q.shape[:-1], self.nq))
         for kind, mine, its, _ in self._joints:
@@ -222,7 +224,7 @@ class Coordinates:
         return theirs
 
     def position_from(self, q: ArrayLike) -> _Array:
-        """Our positions of the library's."""
+        """Returns our positions from the library's."""
         q = _last(q, "q", self.nq)
         ours = np.empty((*q.shape[:-1], self.model.nq))
         for kind, mine, its, _ in self._joints:
@@ -240,30 +242,30 @@ class Coordinates:
         return ours
 
     def velocity(self, q: ArrayLike, v: ArrayLike) -> _Array:
-        """The library's velocities, of our q and v."""
+        """Returns the library's velocities from our q and v."""
         return self._out(_last(q, "q", self.model.nq), _last(v, "v", self.model.nv))
 
     def velocity_from(self, q: ArrayLike, v: ArrayLike) -> _Array:
-        """Our velocities, of the library's positions and velocities."""
+        """Returns our velocities from the library's positions and velocities."""
         return self._back(self.position_from(q), _last(v, "v", self.model.nv))
 
     def acceleration(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> _Array:
-        """The library's accelerations, of our q, v and a: d(R v)/dt = R (v̇ + ω × v)."""
+        """Returns the library's accelerations from our q, v and a: d(R v)/dt = R (v̇ + ω × v)."""
         q, v, a = _last(q, "q", self.model.nq), _last(v, "v", self.model.nv), _last(a, "a", self.model.nv)
         return self._out(q, self._shifted(v, a, 1.0))
 
     def acceleration_from(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> _Array:
-        """Our accelerations, of the library's positions, velocities and accelerations."""
+        """Returns our accelerations from the library's positions, velocities and accelerations."""
         ours = self.position_from(q)
         v, a = self._back(ours, _last(v, "v", self.model.nv)), self._back(ours, _last(a, "a", self.model.nv))
         return self._shifted(v, a, -1.0)
 
     def effort(self, q: ArrayLike, tau: ArrayLike) -> _Array:
-        """The library's efforts, of our q and τ: τᵀ v is the same in both, and axes are only turned."""
+        """Returns the library's efforts from our q and τ: τᵀ v is the same in both, so only the axes change."""
         return self._out(_last(q, "q", self.model.nq), _last(tau, "tau", self.model.nv))
 
     def effort_from(self, q: ArrayLike, tau: ArrayLike) -> _Array:
-        """Our efforts, of the library's positions and efforts."""
+        """Returns our efforts from the library's positions and efforts."""
         return self._back(self.position_from(q), _last(tau, "tau", self.model.nv))
 
     def _free(self) -> Iterator[tuple[slice, slice]]:
@@ -294,7 +296,7 @@ class Coordinates:
         return out
 
     def _shifted(self, v: _Array, a: _Array, sign: float) -> _Array:
-        """Accelerations with ± ω × v on free joints, if the library has linear velocities along the world's axes."""
+        """Adds ± ω × v to accelerations of free joints if the library has linear velocities in the world's axes."""
         a = np.array(np.broadcast_to(a, np.broadcast_shapes(v.shape, a.shape)))
         for _, at in self._free():
             if self.convention.linear == "world":

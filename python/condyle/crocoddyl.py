@@ -1,17 +1,18 @@
-"""Problems of Crocoddyl, solved here; and our dynamics inside of Crocoddyl.
+"""Solves Crocoddyl's problems here, and provides our dynamics to Crocoddyl.
 
-A `crocoddyl.ShootingProblem` that is there already goes to our solvers in two lines::
+An existing `crocoddyl.ShootingProblem` is solved by our solvers in two lines::
 
     problem = condyle.crocoddyl.problem(shooting_problem)
     solution = condyle.optimal.Fddp(problem, project_warm_start=False).solve(xs, us)
 
-where xs and us are arrays of Crocoddyl's states and controls. Numbers, their order and the iterates are Crocoddyl's;
-gains have the opposite sign: u = ū + α k + K (x ⊖ x̄). `project_warm_start=False` matters where controls are bounded: it
-keeps a warm start outside of the bounds, as Crocoddyl does. The other way round, `differential_action(model)` is a
-`crocoddyl.DifferentialActionModelAbstract` that computes with our dynamics, for Crocoddyl's own solvers.
+where xs and us are arrays of Crocoddyl's states and controls. Numbers, their order and the iterates are the same as in
+Crocoddyl; gains have the opposite sign: u = ū + α k + K (x ⊖ x̄). `project_warm_start=False` matters if controls are
+bounded: it keeps a warm start outside the bounds, as Crocoddyl does. In the other direction,
+`differential_action(model)` is a `crocoddyl.DifferentialActionModelAbstract` that computes with our dynamics, for
+Crocoddyl's own solvers.
 
-The tutorial `python/examples/coming_from_crocoddyl.py` has a table of names. Crocoddyl is not among what is installed
-with this package: it is on PyPI, version 3.2.1 for Pinocchio 4.0.
+The tutorial `python/examples/coming_from_crocoddyl.py` has a table of names. This package does not install Crocoddyl:
+it is on PyPI, version 3.2.1 for Pinocchio 4.0.
 """
 
 import warnings
@@ -55,23 +56,23 @@ _INVERSE = ("DifferentialActionModelFreeInvDynamics", "DifferentialActionModelCo
 
 
 def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -> Problem:
-    """A `crocoddyl.ShootingProblem` as a `Problem` of ours.
+    """Converts a `crocoddyl.ShootingProblem` to a `Problem`.
 
-    Ours are then these knots: Euler and Runge–Kutta steps, with controls as polynomials, of free and contact dynamics,
-    forward and inverse; impulses; LQR; the unicycle. In them may be drives τ = S u of any kind, contacts of 1, 2, 3 and
-    6 dimensions, all residuals but ResidualModelContactControlGrav (which leaves the forces out in version 3.2.1),
-    activations that are quadratic, weighted, smooth or barriers, and constraints of residuals. A knot with anything
-    else in it, for example an action or a cost that is written in Python, is computed by Crocoddyl, called by our
-    solver; a warning names what it is.
+    The following knots are converted: Euler and Runge–Kutta steps, with controls as polynomials, of free and contact
+    dynamics, forward and inverse; impulses; LQR; the unicycle. They may contain: actuation models τ = S u with constant
+    S; contacts of 1, 2, 3 and 6 dimensions; all residuals except ResidualModelContactControlGrav (which ignores the
+    forces in version 3.2.1); quadratic, weighted and smooth activations and barriers; and constraints of residuals. A
+    knot with other contents, such as an action or a cost that is written in Python, is computed by Crocoddyl, called by
+    our solver; a warning names these contents.
 
-    Constraints become limits, which `AugmentedLagrangian` holds; so do the equations of inverse dynamics.
+    Constraints become limits, which `AugmentedLagrangian` enforces; so do the equations of inverse dynamics.
 
-    shooting_problem: the problem; it is read, not kept, but for knots that Crocoddyl computes.
-    bounded: whether bounds of controls count. SolverFDDP and SolverDDP do not look at them, SolverBoxFDDP and
-        SolverBoxDDP do.
-    strict: whether what is not here is an error.
+    shooting_problem: the problem; it is read, and kept only for knots that Crocoddyl computes.
+    bounded: whether to use bounds of controls. SolverFDDP and SolverDDP ignore them, SolverBoxFDDP and SolverBoxDDP use
+        them.
+    strict: whether contents without a counterpart here are an error.
 
-    Raises `ProblemError` for what is not here, if strict.
+    Raises `ProblemError` for contents without a counterpart, if strict.
     """
     reader = _Reader(bounded, strict)
     running: list[_Made] = []
@@ -81,7 +82,7 @@ def problem(shooting_problem: Any, bounded: bool = True, strict: bool = False) -
 
 
 class _Reader:
-    """What turns actions into ours, each robot and each action once."""
+    """Converts actions, each robot and each action once."""
 
     def __init__(self, bounded: bool, strict: bool) -> None:
         self.bounded, self.strict = bounded, strict
@@ -90,7 +91,7 @@ class _Reader:
         self.named: set[str] = set()
 
     def action(self, theirs: Any, end: bool) -> _Made:
-        """An action of ours for theirs, which is kept: an object's number is that of another one after its end."""
+        """Converts an action. Keeps a reference to it, since after its end its id could be reused by another object."""
         key = (id(theirs), end)
         if key not in self.actions:
             try:
@@ -150,7 +151,7 @@ class _Reader:
 
     @staticmethod
     def _at_each_node(bound: _Array | None, nu: int) -> _Array | None:
-        """The bounds that hold at all nodes of a polynomial in time."""
+        """Returns the bounds if they hold at all nodes of a polynomial in time."""
         if bound is None or len(bound) == nu:
             return bound
         first: _Array = bound[:nu]
@@ -159,7 +160,9 @@ class _Reader:
         return first
 
     def of_a_robot(self, theirs: Any, dt: float | None, rest: dict[str, Any]) -> _Made:
-        """The knot of a differential model of a robot, with the rest of its arguments; the terminal one without dt."""
+        """Converts a differential model of a robot to a knot, with further arguments `rest`; a terminal knot if dt is
+        None.
+        """
         name = kind(theirs)
         if name not in _FORWARD + _INVERSE:
             raise NoCounterpartError(name)
@@ -184,7 +187,7 @@ class _Reader:
         return ContactDynamics(robot.model, contacts, dt, costs, theirs.JMinvJt_damping, **rest)
 
     def _limits(self, terms: Terms, theirs: Any, held: list[Any]) -> Any:
-        """The constraints of a model, but those that it has of itself: of efforts, contacts and their forces."""
+        """Returns the constraints of a model, except its built-in ones: for efforts, contacts and their forces."""
         own = {"tau"} | {f"{item.name}_{what}" for item in held for what in ("acc", "force")}
         manager = theirs.constraints
         if manager is None:
@@ -204,7 +207,7 @@ class _Reader:
         return ImpulseDynamics(robot.model, contacts, costs, theirs.r_coeff, theirs.JMinvJt_damping, limits)
 
     def _called(self, theirs: Any, end: bool) -> Action:
-        """An action that Crocoddyl computes."""
+        """Returns an action that Crocoddyl computes."""
         data, state = theirs.createData(), theirs.state
         nu = 0 if end else theirs.nu
 
@@ -230,7 +233,7 @@ class _Reader:
         return Action(state.nx, nu, calc, calc_diff, lower, upper, self._space(state))
 
     def _space(self, state: Any) -> Any:
-        """Where states live, for actions that Crocoddyl computes."""
+        """Returns the space of states, for actions that Crocoddyl computes."""
         if kind(state) == "StateVector":
             return None
         try:
@@ -240,14 +243,14 @@ class _Reader:
 
 
 def differential_action(model: Any) -> Any:
-    """A `crocoddyl.DifferentialActionModelAbstract` that computes what `model` does, with our dynamics and costs.
+    """Returns a `crocoddyl.DifferentialActionModelAbstract` equivalent to `model`, with our dynamics and costs.
 
-    For the solvers and the integrators of Crocoddyl: `IntegratedActionModelEuler(differential_action(model), dt)`. It
-    keeps what `model` was when it was made. Use one thread: Crocoddyl calls it through Python.
+    Use it with the solvers and the integrators of Crocoddyl: `IntegratedActionModelEuler(differential_action(model),
+    dt)`. Later changes of `model` do not affect it. Use one thread: Crocoddyl calls it through Python.
 
     model: a `DifferentialActionModelFreeFwdDynamics` or `DifferentialActionModelContactFwdDynamics`.
 
-    Raises `ProblemError` for what is not here, by its name.
+    Raises `ProblemError` with the names of contents without a counterpart here.
     """
     if kind(model) not in _FORWARD:
         raise ProblemError(f"model: expected one of {' and '.join(_FORWARD)}, found {kind(model)}")
@@ -255,7 +258,7 @@ def differential_action(model: Any) -> Any:
         raise ProblemError(f"{kind(model)} (with constraints) has no counterpart here")
     reader = _Reader(bounded=False, strict=True)
     try:
-        # in a step of one second the change of v is q̈, and that of the cost its rate
+        # in a step of one second the change of v is q̈, and the added cost is the cost rate
         running, end = (reader.of_a_robot(model, dt, {}) for dt in (1.0, None))
     except NoCounterpartError as missing:
         raise ProblemError(f"{missing} has no counterpart here") from None
@@ -263,7 +266,7 @@ def differential_action(model: Any) -> Any:
 
 
 class _OnOurs:
-    """What makes of Crocoddyl's abstract class one that computes with our dynamics."""
+    """Mixin that implements Crocoddyl's abstract differential action with Condyle's dynamics."""
 
     _base: Any
     state: Any
@@ -278,29 +281,29 @@ class _OnOurs:
             self.u_lb, self.u_ub = theirs.u_lb, theirs.u_ub
 
     def calc(self, data: Any, x: _Array, u: _Array | None = None) -> None:
-        """q̈ and the cost, or the cost of an end."""
+        """Computes q̈ and the cost, or the cost of a terminal model."""
         value = self._ours.evaluate(np.array([x, x]), [np.zeros(self.nu) if u is None else u])
         if u is not None:
             data.xout[:] = value.accelerations[0]
         data.cost = value.costs[0 if u is not None else 1]
 
     def calcDiff(self, data: Any, x: _Array, u: _Array | None = None) -> None:
-        """The derivatives of both."""
+        """Computes the derivatives of both."""
         nodes = self._ours.derivatives(np.array([x, x]), [np.zeros(self.nu) if u is None else u])
         node: Any = nodes[0 if u is not None else 1]
         data.Lx[:], data.Lxx[:, :] = node.q, node.Q
         if u is None:
             return
         nv = self.state.nv
-        data.Fx[:, :] = node.A[nv:]  # of v⁺ = v + q̈
+        data.Fx[:, :] = node.A[nv:]  # derivative of v⁺ = v + q̈
         data.Fx[:, nv:] -= np.eye(nv)
-        one = self.nu == 1  # Crocoddyl shows a column as a vector
+        one = self.nu == 1  # Crocoddyl represents a column as a vector
         data.Fu[:] = node.B[nv:, 0] if one else node.B[nv:]
         data.Lxu[:] = node.S[:, 0] if one else node.S
         data.Lu[:], data.Luu[:] = node.r, (node.R[0] if one else node.R)
 
     def quasiStatic(self, data: Any, x: _Array, maxiter: int = 100, tol: float = 1e-9) -> _Array:
-        """The controls that hold the robot still."""
+        """Returns the quasi-static controls."""
         held: _Array = self._running.quasi_static(x)
         return held
 
@@ -309,7 +312,7 @@ _classes: list[Any] = []
 
 
 def _differential_class() -> Any:
-    """The class of what `differential_action` makes, which needs Crocoddyl to be made itself."""
+    """Returns the class for `differential_action`; it is created on first use, since this requires Crocoddyl."""
     if not _classes:
         base: Any = import_module("crocoddyl").DifferentialActionModelAbstract
         _classes.append(type("DifferentialActionModel", (_OnOurs, base), {"_base": base}))

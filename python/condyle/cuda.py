@@ -1,4 +1,4 @@
-"""Robots as kernels on an NVIDIA GPU: compiled while the program runs, and called with arrays of CuPy, PyTorch or JAX.
+"""Robots as kernels on an NVIDIA GPU: compiled at run time, and called with arrays of CuPy, PyTorch or JAX.
 
     import condyle.cuda, torch
 
@@ -8,15 +8,15 @@
     d = aba(q, v, tau)           # a named tuple of tensors; d.da_dq has the shape (7, 7, 100_000)
     aba(q, v, tau, out=d)        # into the same memory
 
-A thread computes one state, or some of its results where it would need more registers than it has and there are few
-states. Numbers of one kind stand side by side: an argument of k numbers for n states is an array
-of shape (k, n) in row order. Its transpose, of shape (n, k) and with strides (1, n), is taken as well, and where the
-first argument is such a one the results have the states along the first axis too. Nothing is copied: other layouts
-are refused, and so are other dtypes. Results are arrays of the library of the first argument.
+A thread computes one state. It computes only a part of its results if all of them need too many registers and there are
+few states. The numbers of all states are contiguous for each entry: an argument of k numbers for n states is an array
+of shape (k, n) in row order. Its transpose, of shape (n, k) and with strides (1, n), is accepted too. If the first
+argument has this form, the results also have the states along the first axis. Nothing is copied: other layouts and
+dtypes are refused. Results are arrays of the library of the first argument.
 
-Nothing of CUDA is needed but where this is used: the driver, which comes with the GPU, and NVIDIA's run-time compiler
-(`pip install 'condyle[cuda]'`, or the system's). The environment variables `CONDYLE_CUDA_LIBRARY` and
-`CONDYLE_NVRTC_LIBRARY` name other files. All is done in the device's primary context, which other libraries use too.
+CUDA itself need not be installed, only at run time two parts: the driver, which comes with the GPU, and NVIDIA's
+run-time compiler (`pip install 'condyle[cuda]'`, or the system's). The environment variables `CONDYLE_CUDA_LIBRARY` and
+`CONDYLE_NVRTC_LIBRARY` can name other files. All work uses the device's primary context, which other libraries use too.
 """
 
 import os
@@ -39,21 +39,21 @@ __all__ = ["DeviceArray", "Kernel", "array", "compile", "devices", "ptx"]
 
 _LANGUAGES = {"float64": "cuda", "float32": "cuda-float"}
 _PLACES = 2**31 - 1
-"""Places in arrays are numbers of 32 bits."""
+"""Maximum number of elements of an array: kernels use indices of 32 bits."""
 
 
 def devices() -> list[str]:
-    """The names of the devices that there are.
+    """Returns the names of the devices.
 
-    Raises `RuntimeError` if there is no driver, or it finds no device.
+    Raises `RuntimeError` if the driver is missing, or finds no device.
     """
     return _cuda_driver.names()
 
 
 def array(numbers: ArrayLike, dtype: Literal["float64", "float32"] | None = None, *, device: int = 0) -> DeviceArray:
-    """A copy of an array in the memory of a device, in row order: of NumPy's or what NumPy understands.
+    """Copies a NumPy array, or anything that NumPy understands, to the memory of a device, in row order.
 
-    Raises `RuntimeError` if there is no driver, or too little memory.
+    Raises `RuntimeError` if the driver is missing, or memory is insufficient.
     """
     host: np.ndarray[Any, Any] = np.ascontiguousarray(numbers, dtype=dtype)
     if host.dtype.name not in _LANGUAGES:
@@ -67,7 +67,7 @@ def array(numbers: ArrayLike, dtype: Literal["float64", "float32"] | None = None
 
 
 class _Array:
-    """An argument or a result: its name, and how many numbers of a state it has."""
+    """An argument or a result: its name, and its shape for one state."""
 
     def __init__(self, name: str, rows: int, columns: int) -> None:
         self.name, self.rows, self.columns = name, rows, columns
@@ -75,17 +75,17 @@ class _Array:
         self.shape: tuple[int, ...] = (rows,) if columns == 1 else (rows, columns)
 
     def in_memory(self, n: int) -> tuple[int, ...]:
-        """The shape in row order as it lies in memory: matrices stand column by column."""
+        """Returns the shape in row order in memory, where matrices are stored by columns."""
         return (*reversed(self.shape), n)
 
     def turned(self, made: Any, states_first: bool) -> Any:
-        """A view in which matrices have rows first, and states stand on the side where they stand in arguments."""
+        """Returns a view in which matrices have rows first, and states have the same axis as in the arguments."""
         if self.columns == 1:
             return made.swapaxes(0, 1) if states_first else made
         return made.swapaxes(0, 2) if states_first else made.swapaxes(0, 1)
 
     def states(self, given: View, dtype: str, n: int | None) -> tuple[int, bool]:
-        """The number of states of an array, and whether they stand along its first axis."""
+        """Returns the number of states of an array, and whether they are along its first axis."""
         if given.dtype != dtype:
             raise ValueError(f"{self.name}: expected {dtype}, found {given.dtype}")
         for shape in dict.fromkeys(((self.size,), self.shape)):
@@ -110,7 +110,8 @@ class _Array:
 
 
 class Kernel:
-    """A function of a robot on a GPU. `inputs` and `outputs` are the names of its arrays and their shapes for a state.
+    """A function of a robot on a GPU. `inputs` and `outputs` are the names of its arrays and their shapes for one
+    state.
 
     It may be called from several threads at a time.
     """
@@ -132,39 +133,39 @@ class Kernel:
 
     @property
     def device(self) -> int:
-        """The number of the device."""
+        """The index of the device."""
         return self._function.device.ordinal
 
     @property
     def shares(self) -> int:
-        """The threads that can compute a state, each some of the results."""
+        """The number of threads that can share a state, each computing some of the results."""
         return self._function.shares
 
     @property
     def registers(self) -> int:
-        """The registers of a thread."""
+        """The number of registers of a thread."""
         return self._function.registers
 
     @property
     def local_bytes(self) -> int:
-        """The memory of a thread, in bytes, for what does not fit into registers."""
+        """The local memory of a thread, in bytes, for values that do not fit into registers."""
         return self._function.local_bytes
 
     def __repr__(self) -> str:
         return f"{self.name}({', '.join(self.inputs)}) -> {', '.join(self.outputs)}"
 
     def __call__(self, *arguments: Any, out: Any = None, stream: Any = None) -> Any:
-        """The results for n states; returns at once, and what uses them waits where that is needed.
+        """Computes the results for n states. Returns at once; users of the results wait if necessary.
 
-        arguments: arrays on the device, of any library that speaks DLPack or has `__cuda_array_interface__`. One result
-        is an array, several are a named tuple, of shape (k, n) or, for matrices, (rows, columns, n); with n in front if
-        that is so in the first argument. They are new memory, which takes time: in a loop give `out`, an array, or a
-        sequence of arrays, of the same shapes, which is filled and returned. Matrices in it may also be
-        (rows × columns, n), column by column.
+        arguments: arrays on the device, of any library that supports DLPack or `__cuda_array_interface__`. One result
+            is an array, several are a named tuple. Their shape is (k, n) or, for matrices, (rows, columns, n); n comes
+            first if it does in the first argument. They are allocated anew, which takes time. In a loop pass `out`, an
+            array, or a sequence of arrays, of the same shapes, which is filled and returned. Matrices in it may also be
+            (rows × columns, n), column by column.
 
-        stream: where the work is put: a stream of PyTorch's or CuPy's, or its address. By default the one on which
-        PyTorch or CuPy works if the first argument is theirs, else the legacy default stream. `out` is to be read on
-        that stream, or on one that waits for it.
+        stream: the stream for the work: a stream of PyTorch or CuPy, or its address. The default is the stream that
+            PyTorch or CuPy currently uses if the first argument is theirs, else the legacy default stream. Read `out`
+            on this stream, or on one that waits for it.
         """
         if len(arguments) != len(self._inputs):
             raise TypeError(f"{self!r}: expected {len(self._inputs)} arguments, found {len(arguments)}")
@@ -194,7 +195,7 @@ class Kernel:
         return results[0] if self._result is None else self._result(*results)
 
     def _room(self, out: list[Any], n: int, stream: int, inputs: list[View]) -> list[View]:
-        """Where results go: arrays that may be written to, and that share no memory with others."""
+        """Checks the arrays for the results: they must be writable, and share no memory with others."""
         if len(out) != len(self._outputs):
             raise TypeError(f"{self!r}: out: expected {len(self._outputs)} arrays, found {len(out)}")
         size = self.dtype.itemsize * n
@@ -214,7 +215,9 @@ class Kernel:
         return views
 
     def _after(self, stream: int, arrays: Sequence[Any], views: list[View]) -> None:
-        """Notes when results are there, and keeps what their libraries might use for something else until then."""
+        """Records when results are ready, and keeps arrays alive until then so that their libraries do not reuse the
+        memory.
+        """
         device = self._function.device
         event = Event(device, stream)
         for result in arrays[len(self._inputs) :]:
@@ -231,7 +234,7 @@ class Kernel:
 def _generated(
     model: Model, name: str, dtype: Literal["float64", "float32"], options: dict[str, Any]
 ) -> tuple[str, str, Any]:
-    """The symbol of a kernel, its text, and what it takes and gives."""
+    """Returns the symbol of a kernel, its text, and its arguments and results."""
     if dtype not in _LANGUAGES:
         raise ValueError(f"dtype: expected 'float64' or 'float32', found {dtype!r}")
     code, files, described = _condyle._generate(model, [name], _LANGUAGES[dtype], **options)
@@ -250,11 +253,13 @@ def ptx(
     inputs: Sequence[str] = (),
     shares: int | None = None,
 ) -> bytes:
-    """A kernel in NVIDIA's intermediate language, for `compile` on a machine without NVIDIA's run-time compiler.
+    """Compiles a kernel to NVIDIA's intermediate language, for `compile` on a machine without NVIDIA's run-time
+    compiler.
 
-    capability: that of the oldest device that shall take it. The rest is as of `compile`. It needs no GPU.
+    capability: the compute capability of the oldest device to support. The other arguments are as for `compile`. No GPU
+        is needed.
 
-    Raises `RuntimeError` if there is no compiler or it fails.
+    Raises `RuntimeError` if the compiler is missing or fails.
     """
     options = _options(frames, constraints, external_forces, inputs, shares)
     symbol, text, _ = _generated(model, name, dtype, options)
@@ -291,17 +296,17 @@ def compile(  # noqa: A001
     ptx: bytes | None = None,
     cache: "str | os.PathLike[str] | None" = None,
 ) -> Kernel:
-    """A function of a robot as a kernel, made by NVIDIA's run-time compiler, or read from the cache if it is there.
+    """Compiles a function of a robot to a kernel with NVIDIA's run-time compiler, or reads it from the cache.
 
-    name: one of `condyle.codegen.functions`, and frames, constraints, external_forces, inputs as there. dtype: the kind
-    of numbers that it computes with. shares: how many threads compute a state, each some of the results, at most one
-    for each limb and one for the trunk; by default as many as pay where one thread would need more registers than it
-    has, and only for so few states that all threads are on the device at a time. ptx: what `ptx` made for the same
-    model, name, dtype and options: the compiler is not needed then. cache: a folder; by default the environment
-    variable CONDYLE_CACHE, else `~/.cache/condyle`.
+    name: one of `condyle.codegen.functions`; frames, constraints, external_forces, inputs: as for these. dtype: the
+        kind of numbers in the computation. shares: the number of threads per state, each computing some of the results,
+        at most one for each limb and one for the trunk. The default is one, or the fastest number under two
+        conditions: one thread would need more registers than it has, and all threads fit on the device at a time. ptx:
+        the result of `ptx` for the same model, name, dtype and options: the compiler is not needed then. cache: a
+        folder; by default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`.
 
-    Raises `RuntimeError` if there is no driver, no device or no compiler, or if it fails; `ValueError` if there is no
-    such device; what `condyle.codegen.source` raises.
+    Raises `RuntimeError` if the driver, a device or the compiler is missing, or if it fails; `ValueError` if the device
+    does not exist; and the exceptions of `condyle.codegen.source`.
     """
     options = _options(frames, constraints, external_forces, inputs, shares)
     symbol, text, (_, given, made, _, rows) = _generated(model, name, dtype, options)
@@ -311,7 +316,7 @@ def compile(  # noqa: A001
 
 
 def _image(symbol: str, text: str, device: Device, cache: "str | os.PathLike[str] | None") -> bytes:
-    """What the compiler makes of a text, kept by the text, the compiler's version and the device's kind."""
+    """Returns the compiled image of a text, cached by the text, the compiler's version and the kind of device."""
     import hashlib
     import tempfile
 

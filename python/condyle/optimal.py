@@ -1,4 +1,4 @@
-"""Optimal control over a horizon: a robot's motion that costs least, by FDDP.
+"""Optimal control over a horizon: finds the motion of a robot with the lowest cost, by FDDP.
 
 >>> import condyle, numpy as np
 >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
@@ -13,15 +13,16 @@
 >>> solution.status, solution.xs.shape
 ('converged', (21, 14))
 
-What must hold exactly is a `Limit`, for `AugmentedLagrangian`: see there. An action for each knot costs no more than
-one for all: `Problem(x0, [action_0, action_1, ...], None, terminal)` computes those together that differ in costs only.
+Hard constraints are `Limit`s, for `AugmentedLagrangian`: see there. An action for each knot is as fast as one for all:
+`Problem(x0, [action_0, action_1, ...], None, terminal)` groups the actions that differ only in costs.
 
-What is one's own: an `Action` (the next state and the cost), a `DifferentialAction` (accelerations) or an `ode_action`
-(ẋ), residuals of a robot (`Residual.own`), constraints (`ConstrainedAction`), or expressions of CasADi
-(`condyle.casadi.action`). Derivatives that are not written are exact all the same, wherever functions can be called
-with numbers that know their derivatives.
+You can define your own: an `Action` (the next state and the cost), a `DifferentialAction` (accelerations) or an
+`ode_action` (ẋ), residuals of a robot (`Residual.own`), constraints (`ConstrainedAction`), or CasADi expressions
+(`condyle.casadi.action`). Derivatives that you do not provide are still exact if your functions accept numbers that
+carry their derivatives.
 
-The feedback is u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K. The iterates are Crocoddyl's.
+The feedback is u = ū + α k + K (x ⊖ x̄); Crocoddyl has the opposite sign of k and K. The iterates are the same as
+Crocoddyl's.
 """
 
 from ._actions import ode_action, thrusters

@@ -1,4 +1,4 @@
-"""Pinocchio's spelling: a thin layer, so that a script that uses it runs with another import.
+"""Pinocchio's API names: a thin layer, so that a script for Pinocchio runs with only its import changed.
 
 >>> import condyle, numpy as np
 >>> import condyle.pinocchio as pin
@@ -8,12 +8,12 @@
 >>> pin.computeABADerivatives(model, data, q, v, tau)[0].shape, data.ddq[2].round(2).item()
 ((18, 18), -9.81)
 
-Functions return what Pinocchio's do in Python, and leave it in `data` under the same name, as arrays that no later call
-changes. `model.ours` is the `condyle.Model`, whose functions take batches too. What differs:
+Functions return the same results as Pinocchio's in Python, and store them in `data` under the same names, as arrays
+that no later call changes. `model.ours` is the `condyle.Model`, whose functions also take batches. The differences are:
 both triangles of M are filled, as in Pinocchio's Python; armature counts in the kinetic energy of all joints; `frames`
-are `universe` and then ours, so frames go by `getFrameId`, not by numbers from elsewhere. Geometry, collisions,
-visualisers, and what else is not here, raise an AttributeError that says so. For code that is written anew use
-`condyle` itself: its page has a table of both spellings.
+are `universe` and then ours, so use `getFrameId` for frames, not indices from elsewhere. Geometry, collisions,
+visualisers and other missing parts raise an AttributeError that explains it. For new code use `condyle` itself: its
+page has a table of both sets of names.
 """
 
 from collections.abc import Sequence
@@ -85,12 +85,12 @@ LOCAL_WORLD_ALIGNED = ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 def neutral(model: Model) -> _Array:
-    """The position in which no joint is moved."""
+    """Returns the position in which all joints are at zero or the identity."""
     return ours.neutral(model.ours)
 
 
 def randomConfiguration(model: Model, lower: ArrayLike | None = None, upper: ArrayLike | None = None) -> _Array:
-    """A random position within the limits, those of the model or others, and within ±3 where there are none."""
+    """Returns a random position within the limits of the model, or within given ones, and within ±3 without limits."""
     q = ours.random_configuration(model.ours)
     low = np.ravel(model.lowerPositionLimit if lower is None else lower)
     high = np.ravel(model.upperPositionLimit if upper is None else upper)
@@ -100,12 +100,12 @@ def randomConfiguration(model: Model, lower: ArrayLike | None = None, upper: Arr
 
 
 def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float) -> _Array:
-    """q₀ ⊕ t (q₁ ⊖ q₀)."""
+    """Returns q₀ ⊕ t (q₁ ⊖ q₀)."""
     return ours.interpolate(model.ours, q0, q1, t)
 
 
 def normalize(model: Model, q: ArrayLike) -> _Array:
-    """q with quaternions, cosines and sines of length 1."""
+    """Returns q with quaternions and pairs (cos, sin) scaled to length 1."""
     return ours.normalize(model.ours, q)
 
 
@@ -114,7 +114,7 @@ def _forces(fext: Sequence[algebra.Force]) -> _Array:
 
 
 def _flat(*states: ArrayLike) -> tuple[_Array, _Array, _Array]:
-    """States, of which some are columns, as vectors; raises what was raised if none is a column."""
+    """Returns states, some of which are columns, as vectors; raises the current exception again if none is a column."""
     q, v, x = (np.asarray(state, float) for state in states)
     if not any(array.ndim == 2 and array.shape[1] == 1 for array in (q, v, x)):
         raise
@@ -124,7 +124,7 @@ def _flat(*states: ArrayLike) -> tuple[_Array, _Array, _Array]:
 def rnea(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> _Array:
-    """τ, also data.tau."""
+    """Computes τ, also stored as data.tau."""
     try:
         data.tau = out = ours.rnea(model.ours, data._ours, q, v, a, None if fext is None else _forces(fext))
     except ValueError:
@@ -135,7 +135,7 @@ def rnea(
 def aba(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, tau: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> _Array:
-    """q̈, also data.ddq."""
+    """Computes q̈, also stored as data.ddq."""
     try:
         data.ddq = out = ours.aba(model.ours, data._ours, q, v, tau, None if fext is None else _forces(fext))
     except ValueError:
@@ -146,7 +146,7 @@ def aba(
 def computeRNEADerivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> tuple[_Array, _Array, _Array]:
-    """∂τ/∂q, ∂τ/∂v, M; also data.dtau_dq, dtau_dv, M."""
+    """Computes ∂τ/∂q, ∂τ/∂v, M; also stored as data.dtau_dq, dtau_dv, M."""
     given = None if fext is None else _forces(fext)
     try:
         data.dtau_dq, data.dtau_dv, data.M = d = ours.rnea_derivatives(model.ours, data._ours, q, v, a, given)
@@ -158,7 +158,7 @@ def computeRNEADerivatives(
 def computeABADerivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, tau: ArrayLike, fext: Sequence[algebra.Force] | None = None
 ) -> tuple[_Array, _Array, _Array]:
-    """∂q̈/∂q, ∂q̈/∂v, M⁻¹; also data.ddq_dq, ddq_dv, Minv, ddq."""
+    """Computes ∂q̈/∂q, ∂q̈/∂v, M⁻¹; also stored as data.ddq_dq, ddq_dv, Minv, ddq."""
     given = None if fext is None else _forces(fext)
     try:
         d = ours.aba_derivatives(model.ours, data._ours, q, v, tau, given)
@@ -169,12 +169,12 @@ def computeABADerivatives(
 
 
 def computeForwardKinematicsDerivatives(model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> None:
-    """What getJointVelocityDerivatives and its like then read."""
+    """Prepares the data for getJointVelocityDerivatives and similar functions."""
     forwardKinematics(model, data, q, v, a)
 
 
 def getJointVelocityDerivatives(model: Model, data: Data, joint: int, frame: ReferenceFrame) -> tuple[_Array, _Array]:
-    """∂v/∂q and ∂v/∂q̇ of a joint's body, (6, nv); in LOCAL_WORLD_ALIGNED at a place that stays."""
+    """Computes ∂v/∂q and ∂v/∂q̇ of a joint's body, (6, nv); for LOCAL_WORLD_ALIGNED at a fixed point."""
     q, v, _ = data._state
     dv_dq = ours.body_velocity_derivative(model.ours, data._ours, q, v, joint, frame._value_)
     J = getJointJacobian(model, data, joint, frame)
@@ -182,7 +182,7 @@ def getJointVelocityDerivatives(model: Model, data: Data, joint: int, frame: Ref
 
 
 def _at_rest(by_q: _Array, motion: Motion, J: _Array, frame: ReferenceFrame) -> _Array:
-    """∂/∂q of a motion as it is seen at a place that stays: without ω × J, by which the frame's origin moves."""
+    """Converts ∂/∂q of a motion to a fixed point: removes ω × J, which is due to the motion of the frame's origin."""
     if frame is LOCAL_WORLD_ALIGNED:
         by_q[:3] -= np.cross(motion.angular, J[:3], axisb=0).T
     return by_q
@@ -191,24 +191,24 @@ def _at_rest(by_q: _Array, motion: Motion, J: _Array, frame: ReferenceFrame) -> 
 def getJointAccelerationDerivatives(
     model: Model, data: Data, joint: int, frame: ReferenceFrame
 ) -> tuple[_Array, _Array, _Array, _Array]:
-    """∂v/∂q, and ∂a/∂q, ∂a/∂q̇, ∂a/∂q̈ of a joint's body, (6, nv)."""
+    """Computes ∂v/∂q, and ∂a/∂q, ∂a/∂q̇, ∂a/∂q̈ of a joint's body, (6, nv)."""
     dv_dq, da_da = getJointVelocityDerivatives(model, data, joint, frame)
     da_dq, da_dv = ours.body_acceleration_derivatives(model.ours, data._ours, *data._state, joint, frame._value_)
     return dv_dq, _at_rest(da_dq, getAcceleration(model, data, joint, frame), da_da, frame), da_dv, da_da
 
 
 def computeJointJacobians(model: Model, data: Data, q: ArrayLike) -> None:
-    """What getJointJacobian and getFrameJacobian then read."""
+    """Prepares the data for getJointJacobian and getFrameJacobian."""
     forwardKinematics(model, data, q)
 
 
 def computeJointJacobian(model: Model, data: Data, q: ArrayLike, joint: int) -> _Array:
-    """The Jacobian of a joint's body in its own frame, (6, nv)."""
+    """Computes the Jacobian of a joint's body in its own frame, (6, nv)."""
     return ours.body_jacobian(model.ours, data._ours, q, joint, "local")
 
 
 def ccrba(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
-    """Ag, (6, nv), also data.Ag; data.hg and data.com."""
+    """Computes Ag, (6, nv), also stored as data.Ag; and data.hg and data.com."""
     Ag, _, com, data.Jcom = ours.centroidal_map(model.ours, data._ours, q)
     data.Ag = Ag
     data._leave(com, Force._of(Ag @ np.asarray(v, float)))
@@ -216,29 +216,29 @@ def ccrba(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> _Array:
 
 
 def computeKineticEnergy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """½ vᵀ M v, also data.kinetic_energy."""
+    """Computes ½ vᵀ M v, also stored as data.kinetic_energy."""
     data.kinetic_energy = energy = ours.kinetic_energy(model.ours, data._ours, q, v)
     return energy
 
 
 def computePotentialEnergy(model: Model, data: Data, q: ArrayLike) -> float:
-    """−Σ m g·c, also data.potential_energy."""
+    """Computes −Σ m g·c, also stored as data.potential_energy."""
     data.potential_energy = energy = ours.potential_energy(model.ours, data._ours, q)
     return energy
 
 
 def computeTotalMass(model: Model) -> float:
-    """The mass of all bodies that move (kg)."""
+    """Returns the mass of all moving bodies (kg)."""
     return model._moving_mass
 
 
 def dIntegrate(model: Model, q: ArrayLike, v: ArrayLike) -> tuple[_Array, _Array]:
-    """The derivatives of q ⊕ v by q and by v."""
+    """Computes the derivatives of q ⊕ v with respect to q and to v."""
     return ours.integrate_jacobian(model.ours, v, "position"), ours.integrate_jacobian(model.ours, v, "velocity")
 
 
 def dDifference(model: Model, q0: ArrayLike, q1: ArrayLike) -> tuple[_Array, _Array]:
-    """The derivatives of q₁ ⊖ q₀ by q₀ and by q₁."""
+    """Computes the derivatives of q₁ ⊖ q₀ with respect to q₀ and to q₁."""
     d = ours.difference(model.ours, q0, q1)
     return ours.difference_jacobian(model.ours, d, "from"), ours.difference_jacobian(model.ours, d, "to")
 

@@ -1,4 +1,4 @@
-"""Robots that are embedded in the package, so that examples and tests need no file.
+"""Built-in robots, so that examples and tests need no files.
 
 `arm7()`, `quadruped()` and `humanoid()` are models; `ARM7`, `QUADRUPED` and `HUMANOID` are their URDF texts.
 """

@@ -1,4 +1,4 @@
-"""Simulations of robots: (q, v) from one instant to the next, on the joints' own groups.
+"""Simulation of robots: advances (q, v) in time, on the groups of the joints.
 
 >>> import condyle, numpy as np
 >>> from condyle.simulation import Simulation
@@ -12,7 +12,7 @@
 >>> bool(abs(after - before) < 0.05)
 True
 
-A `Ground` lets a robot stand, slide, land and lift off:
+With a `Ground` a robot can stand, slide, land and lift off:
 
 >>> quadruped = condyle.robots.quadruped()
 >>> from condyle.simulation import Ground

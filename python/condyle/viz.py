@@ -1,4 +1,4 @@
-"""Pictures: plots of a solution and of a matrix's zeros by matplotlib, playback in the browser by viser.
+"""Pictures: plots of a solution and of a matrix's zeros with matplotlib, playback in the browser with viser.
 
     pip install condyle[viz]
 
@@ -9,9 +9,9 @@ np.True_
 >>> viz.pattern(condyle.robots.quadruped()).sum()  # of 324: the legs do not see each other
 np.int64(180)
 
-`play` shows a motion in the browser, in a notebook too; `plot` and `spy` return figures of matplotlib, which
-`matplotlib.pyplot.show()` puts on the screen and `figure.savefig(path)` into a file. Both packages are imported when
-they are first needed.
+`play` shows a motion in the browser, also in a notebook. `plot` and `spy` return figures of matplotlib:
+`matplotlib.pyplot.show()` displays them, and `figure.savefig(path)` saves one to a file. Both packages are imported on
+first use.
 """
 
 from importlib import import_module
@@ -30,21 +30,21 @@ if TYPE_CHECKING:
 __all__ = ["Player", "pattern", "play", "plot", "spy"]
 
 _Array = NDArray[np.float64]
-_NAMES = 14  # so many lines of a plot can be told apart
+_NAMES = 14  # maximum number of lines that can be distinguished in a plot
 
 
 def pattern(model: Model) -> NDArray[np.bool_]:
-    """The entries of M(q) that the tree lets be other than zero, (nv, nv).
+    """Returns which entries of M(q) may differ from zero by the structure of the tree, (nv, nv).
 
-    M_ij = 0 unless one of the joints i and j carries the other (Featherstone 2008, section 8.5). Where joints follow
-    others, M = Gᵀ M' G with the inertia matrix M' of the tree with all joints free.
+    M_ij = 0 unless one of the joints i and j carries the other (Featherstone 2008, section 8.5). With mimic joints, M =
+    Gᵀ M' G with the inertia matrix M' of the tree with all joints free.
     """
     widths = [joint.nv if joint else 0 for joint in model.joints]
     related = np.eye(model.nbodies, dtype=bool)
     for body, parent in enumerate(model.parents[1:], start=1):
-        related[body] |= related[parent]  # a body and all that carry it
+        related[body] |= related[parent]  # a body and all its ancestors
     related |= related.T
-    G = np.zeros((model.nv, model.nbodies), bool)  # the bodies that a coordinate moves
+    G = np.zeros((model.nv, model.nbodies), bool)  # the bodies that each coordinate moves
     for body in range(1, model.nbodies):
         G[model.idx_vs[body] : model.idx_vs[body] + widths[body], body] = True
     out: NDArray[np.bool_] = G @ related @ G.T
@@ -52,10 +52,11 @@ def pattern(model: Model) -> NDArray[np.bool_]:
 
 
 def spy(M: ArrayLike, model: Model, tolerance: float = 1e-12) -> "Figure":
-    """The entries of M that are not zero, beside those that the tree lets be so.
+    """Plots the entries of M that are not zero, together with the entries that the tree allows to be nonzero.
 
-    M: (nv, nv), as of `crba`, `minv` or a derivative; those of an inverse fill up where joints share a moving base.
-    tolerance: what counts as zero, relative to the largest entry.
+    M: (nv, nv), as returned by `crba`, `minv` or a derivative; an inverse has fewer zeros if joints share a moving
+        base.
+    tolerance: magnitude up to which an entry counts as zero, relative to the largest entry.
     """
     M = np.asarray(M, float)
     if M.shape != (model.nv, model.nv):
@@ -76,9 +77,9 @@ def spy(M: ArrayLike, model: Model, tolerance: float = 1e-12) -> "Figure":
 
 
 def plot(solution: Solution, model: Model, dt: float | None = None) -> "Figure":
-    """The positions, velocities and controls of a solution over time, and how the solver came to it.
+    """Plots the positions, velocities and controls of a solution over time, and the convergence of the solver.
 
-    dt: the time between two knots (s), where all knots have the same one; None numbers the knots.
+    dt: the time between two knots (s), if it is the same for all knots; None plots over the knot's index.
     """
     xs = np.asarray(solution.xs, float)
     if xs.ndim != 2 or xs.shape[1] != model.nq + model.nv:
@@ -119,7 +120,7 @@ def _lines(axes: Any, time: Any, values: _Array, labels: list[str], name: str, s
 
 
 def _labels(model: Model, first: list[int], count: list[int]) -> list[str]:
-    """The joint of each coordinate, with a number where it has several."""
+    """Returns a label for each coordinate: its joint, with a number if the joint has several coordinates."""
     labels = [""] * sum(count)
     for name, at, n in zip(model.names, first, count, strict=True):
         for k in range(n):
@@ -128,7 +129,7 @@ def _labels(model: Model, first: list[int], count: list[int]) -> list[str]:
 
 
 def _positive(numbers: list[float]) -> _Array:
-    """The numbers that a logarithmic axis can have."""
+    """Returns the numbers that a logarithmic axis can show."""
     x = np.array(numbers, float)
     return np.where(x > 0.0, x, np.nan)
 

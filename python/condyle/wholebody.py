@@ -1,7 +1,7 @@
-"""Whole-body control: which joint efforts make a robot in contact do what it is told.
+"""Whole-body control: finds the joint efforts with which a robot in contact fulfils its tasks.
 
-At each tick one cone program gives accelerations, contact forces and efforts that best follow weighted tasks under the
-full dynamics, with true friction cones: see `WholeBodyController`.
+At each tick one cone program finds accelerations, contact forces and efforts that best follow weighted tasks under the
+full dynamics, with exact friction cones: see `WholeBodyController`.
 
 >>> import condyle, numpy as np
 >>> from condyle.wholebody import FrictionContact, Gains, Settings, Task, WholeBodyController
@@ -16,7 +16,7 @@ full dynamics, with true friction cones: see `WholeBodyController`.
 >>> command.status, command.tau.shape, command.forces.shape
 ('solved', (38,), (2, 6))
 
-`plan_of` turns a solution of `condyle.optimal` into a `Plan`, which `WholeBodyController.track` follows.
+`plan_of` converts a solution of `condyle.optimal` to a `Plan`, which `WholeBodyController.track` follows.
 """
 
 import numpy as np
@@ -62,14 +62,14 @@ __all__ = [
 
 
 def plan_of(model: Model, solution: Solution, times: ArrayLike, touches: ArrayLike, fade: float = 0.0) -> Plan:
-    """The plan of a solution of `condyle.optimal`.
+    """Converts a solution of `condyle.optimal` to a plan.
 
     model: the robot.
-    times: of the N + 1 knots (s); an impact's two knots share theirs.
-    touches: whether each of the controller's contacts touches from each knot to the next, (N, contacts).
+    times: the times of the N + 1 knots (s); an impact's two knots have the same time.
+    touches: whether each of the controller's contacts touches between a knot and the next one, (N, contacts).
     fade: the time over which contacts are loaded and unloaded (s).
 
-    Controls and gains are taken over from knots that have one control for each actuated coordinate; impacts have none.
+    Controls and gains are taken from knots that have one control for each actuated coordinate; impacts do not have any.
 
     >>> from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
     >>> from condyle.wholebody import plan_of

@@ -1,6 +1,6 @@
-//! Dynamics and its derivatives: the library's functions one to one.
+//! Dynamics and its derivatives: one Python function for each function of the library.
 //!
-//! A call for one state takes microseconds and keeps the interpreter's lock; one for many releases it.
+//! A call for one state takes microseconds and keeps the interpreter's lock; a call for many states releases it.
 
 use crate::arrays::{Give, Number, Symmetric, give_named};
 use crate::functions::{any, functions, regular};
@@ -25,11 +25,11 @@ impl<S: Number> Give for condyle::derivatives::AbaDerivatives<'_, S> {
 }
 
 functions! {
-/// Inverse dynamics: the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a, nv numbers
-/// (N m, N); O(n).
+/// Computes the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a (inverse dynamics),
+/// nv numbers (N m, N); O(n).
 ///
-/// q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m), acting at the body's origin and
-/// expressed in its frame, row 0 being the world's.
+/// q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m). It acts at the body's origin and
+/// is expressed in the body's frame; row 0 belongs to the world.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
@@ -40,12 +40,13 @@ fn rnea(model, data; q: Position, v: Tangent, a: Tangent, f_ext: Forces = None; 
 }
 batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea(model, q, v, a, f_ext) }
 
-/// Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
+/// Computes the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) (forward dynamics), nv numbers (rad/s², m/s²);
+/// O(n).
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 ///
-/// Raises `ModelError` if M is singular wherever the robot is. At a position at which it happens to be, a point of mass on
-/// the axis about which it turns, the numbers are not finite, or as large as rounding has it.
+/// Raises `ModelError` if M is singular at every position. If M is singular only at this position, as for a point mass
+/// on its own axis of rotation, the result is not finite, or is a large number made of rounding errors.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -58,11 +59,11 @@ fn aba(model, data; q: Position, v: Tangent, tau: Tangent, f_ext: Forces = None;
 }
 batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces) -> One { b.aba(model, q, v, tau, f_ext) }
 
-/// Forward dynamics by a method of choice: the acceleration of `aba`, nv numbers (rad/s², m/s²).
+/// Computes the acceleration of `aba` by a chosen method (forward dynamics), nv numbers (rad/s², m/s²).
 ///
-/// q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', by a
-/// dense factor of M, O(n³); 'sparse', by one with the zeros of the tree, O(n d²) for depth d; None, the fastest:
-/// 'aba', or 'sparse' for a robot with mimic joints. All give the same numbers, up to rounding.
+/// q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', a
+/// dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros of the tree, O(n d²) for depth d; None, the
+/// fastest: 'sparse' for a robot with mimic joints, else 'aba'. All methods give the same numbers, up to rounding.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7
@@ -78,7 +79,8 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; method: M
     b.forward_dynamics(model, q, v, tau, f_ext, method)
 }
 
-/// The joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+/// Computes the joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n
+/// depth).
 ///
 /// q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
 ///
@@ -91,7 +93,7 @@ fn crba(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.crba(model, q) }
 
-/// The inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
+/// Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
 ///
 /// q: nq numbers.
 ///
@@ -105,7 +107,7 @@ fn minv(model, data; q: Position; out) {
 }
 batch b: regular(q: Position) -> One { b.minv(model, q) }
 
-/// The nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
+/// Computes the nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 ///
 /// q: nq numbers; v: nv.
 fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
@@ -113,7 +115,7 @@ fn nonlinear_effects(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.nonlinear_effects(model, q, v) }
 
-/// The gravity efforts g(q), nv numbers, which hold the robot still: the efforts of `rnea` with v = a = 0.
+/// Computes the gravity efforts g(q) that hold the robot still, nv numbers: the efforts of `rnea` with v = a = 0.
 ///
 /// q: nq numbers.
 ///
@@ -126,15 +128,16 @@ fn gravity(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.gravity(model, q) }
 
-/// The efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N); O(n).
+/// Computes the efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N);
+/// O(n).
 ///
-/// q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
+/// q: nq numbers; f_ext: as for `rnea`. The result equals `rnea` with v = a = 0.
 fn static_torque(model, data; q: Position, f_ext: Forces = None; out) {
     condyle::terms::static_torque(model, data, &q, &f_ext)
 }
 batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque(model, q, f_ext) }
 
-/// The Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
+/// Computes the Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
 ///
 /// q: nq numbers; v: nv.
 ///
@@ -148,11 +151,11 @@ fn coriolis_matrix(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.coriolis_matrix(model, q, v) }
 
-/// The derivatives of `rnea` with respect to q, v and a, exact, in O(n depth), as
-/// `RneaDerivatives(dtau_dq, dtau_dv, dtau_da)`, each (nv, nv).
+/// Computes the exact derivatives of `rnea` with respect to q, v and a in O(n depth), as `RneaDerivatives(dtau_dq,
+/// dtau_dv, dtau_da)`, each (nv, nv).
 ///
-/// q: nq numbers; v, a: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
-/// change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
+/// q: nq numbers; v, a: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent space:
+/// the change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> dtau_dq, dtau_dv, dtau_da = condyle.rnea_derivatives(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7)
@@ -165,11 +168,11 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> Named("RneaD
     b.rnea_derivatives(model, q, v, a, f_ext)
 }
 
-/// The acceleration of `aba` and its derivatives with respect to q, v and τ, exact, as
-/// `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
+/// Computes the acceleration of `aba` and its exact derivatives with respect to q, v and τ, as `AbaDerivatives(a,
+/// da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
 ///
-/// q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
-/// change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
+/// q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent
+/// space: the change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data = condyle.Data(arm)

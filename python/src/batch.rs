@@ -1,9 +1,9 @@
-//! Many states in one call: arguments with one axis more, for the states, and results likewise.
+//! Many states in one call: arguments and results with one more axis, for the states.
 //!
-//! An argument without that axis is shared by all states. What the library computes in lanes goes there in parts of some
-//! milliseconds, with the interpreter's lock released, and writes its results to the arrays that the caller gets; what needs
-//! no `Data` is computed state after state, likewise, and all else is called for each. Between parts and states signals are
-//! looked at.
+//! An argument without that axis is shared by all states. Functions that the library computes in SIMD lanes run in
+//! parts of some milliseconds, with the interpreter's lock released, and write to the arrays that the caller gets.
+//! Functions without `Data` are computed state by state, also without the lock. All other functions are called once for
+//! each state. Signals are checked between parts and states.
 
 use crate::arrays::{Expected, Input, check_shape, matrix, members, named, place, writable};
 use crate::hyper_dual;
@@ -18,16 +18,16 @@ use pyo3::types::{PyDict, PyString, PyTuple, PyType};
 use std::iter;
 use std::ops::{Deref, Range};
 
-/// What a call wants to know of an argument before it reads it.
+/// Properties of an argument that a call needs before it reads the argument.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Look {
     /// Whether it contains hyper-dual numbers.
     pub(crate) dual: bool,
-    /// The number of states that it is given for; none if it is given for a single one, or is no part of a state.
+    /// Number of states that it is given for. `None` if it is given for a single state, or does not belong to a state.
     pub(crate) states: Option<usize>,
 }
 
-/// Looks at an argument that has some shape for one state.
+/// Inspects an argument that has the given shape for one state.
 #[inline]
 pub(crate) fn look(name: &str, given: &Bound<'_, PyAny>, shape: &[usize]) -> PyResult<Look> {
     let Ok(array) = given.cast::<PyUntypedArray>() else {
@@ -44,21 +44,22 @@ pub(crate) fn look(name: &str, given: &Bound<'_, PyAny>, shape: &[usize]) -> PyR
     Ok(Look { dual, states: Some(found[0]) })
 }
 
-/// The number of states of an argument that has `axes` of them for a single one: none if it is given for a single one.
+/// Returns the number of states of an argument that has `axes` axes for a single state; `None` if it is given for a
+/// single one.
 fn states(given: &Bound<'_, PyAny>, axes: usize) -> PyResult<Option<usize>> {
     if let Ok(array) = given.cast::<PyUntypedArray>() {
         return Ok((array.ndim() == axes + 1).then(|| array.shape()[0]));
     }
     if given.get_item(0).and_then(|first| first.len()).is_err() {
-        return Ok(None); // numbers
+        return Ok(None); // its elements are numbers
     }
     let shape = given.py().import("numpy")?.call_method1("shape", (given,)).and_then(|shape| shape.extract::<Vec<_>>());
-    // whoever reads it says what is wrong with it
+    // a later reader reports the error
     Ok(shape.ok().filter(|shape| shape.len() == axes + 1).map(|shape| shape[0]))
 }
 
-/// The number of states that a call is for, from what its arguments are given for; none if all are given for a single
-/// one.
+/// Returns the number of states of a call, on which all arguments must agree; `None` if all are given for a single
+/// state.
 pub(crate) fn agreed(arguments: &[(&str, Look)]) -> PyResult<Option<usize>> {
     let mut all = arguments.iter().filter_map(|(name, look)| Some((name, look.states?)));
     let Some((first, n)) = all.next() else { return Ok(None) };
@@ -73,7 +74,7 @@ pub(crate) fn agreed(arguments: &[(&str, Look)]) -> PyResult<Option<usize>> {
     }
 }
 
-/// An argument for one state.
+/// Returns an argument for one state.
 pub(crate) fn at<'py>(given: &Bound<'py, PyAny>, axes: usize, state: Option<usize>) -> PyResult<Bound<'py, PyAny>> {
     match state {
         Some(k) if states(given, axes)?.is_some() => given.get_item(k),
@@ -81,7 +82,7 @@ pub(crate) fn at<'py>(given: &Bound<'py, PyAny>, axes: usize, state: Option<usiz
     }
 }
 
-/// An argument for each of some states, `length` numbers a state.
+/// Reads an argument for each of some states, `length` numbers per state.
 pub(crate) fn all<'py>(
     name: &str,
     given: &Bound<'py, PyAny>,
@@ -102,12 +103,12 @@ pub(crate) fn all<'py>(
     matrix(name, &numpy.call_method1("broadcast_to", (flat, (states, length)))?, [states, length])
 }
 
-/// A force on each body for each state.
+/// Converts numbers, six per body and state, to forces.
 pub(crate) fn forces<S: Scalar>(numbers: &[S]) -> Vec<Force<S>> {
     numbers.as_chunks::<6>().0.iter().map(|&six| six.into()).collect()
 }
 
-/// The results for all states as one array or tuple, from those for each state.
+/// Stacks the results of the states to one array or tuple.
 pub(crate) fn stack<'py>(
     py: Python<'py>,
     results: Vec<Bound<'py, PyAny>>,
@@ -136,11 +137,11 @@ pub(crate) fn stack<'py>(
     }
 }
 
-/// The numbers of an argument for all states, one state after the other.
+/// The numbers of an argument for all states, state by state.
 pub(crate) enum Rows<'py> {
-    /// The numbers as they lie in the caller's array.
+    /// The numbers in the caller's array, without a copy.
     Array(Input<'py, Ix2>),
-    /// Copied, where results may be written over them.
+    /// A copy, because results may be written over the argument.
     Copy(Vec<f64>),
 }
 
@@ -154,21 +155,21 @@ impl Deref for Rows<'_> {
     }
 }
 
-/// What the results of a function that computes in lanes are.
+/// The kind of result of a function that is computed in SIMD lanes.
 #[derive(Clone, Copy)]
 pub(crate) enum Kind {
     /// One array.
     One,
-    /// The derivatives of an acceleration by q and by v.
+    /// Derivatives of an acceleration with respect to q and v.
     Pair,
     /// A named tuple of this class.
     Named(&'static str),
-    /// That of all terms, which has a named tuple within.
+    /// The result of `compute_all_terms`, which contains another named tuple.
     AllTerms,
 }
 
 impl Kind {
-    /// The named tuple of these arrays.
+    /// Makes the result of these arrays.
     fn assembled<'py>(self, py: Python<'py>, mut arrays: Vec<Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         match self {
             Self::One => Ok(arrays.remove(0)),
@@ -182,7 +183,7 @@ impl Kind {
         }
     }
 
-    /// The arrays that the caller gives for the results.
+    /// Returns the arrays that the caller gives for the results.
     fn places<'py>(self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Vec<Option<Bound<'py, PyAny>>>> {
         match self {
             Self::One => Ok(vec![out.cloned()]),
@@ -197,31 +198,31 @@ impl Kind {
     }
 }
 
-/// A class of named tuples.
+/// Returns a class of named tuples.
 fn class_of<'py>(py: Python<'py>, class: &str) -> PyResult<Bound<'py, PyType>> {
     static TYPES: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
     let types = TYPES.get_or_try_init(py, || PyResult::Ok(py.import("condyle._types")?.unbind()))?;
     Ok(types.bind(py).getattr(class)?.cast_into()?)
 }
 
-/// The most states of a part, for each thread.
+/// Maximum number of states of a part, for each thread.
 pub(crate) const MOST_STATES: usize = 2048;
 
-/// The number of states of a part with results of so many numbers a state: a thread takes a millisecond or less for it, so that
-/// its own price, a third of a microsecond, does not show, and has two registers full at least.
+/// Returns the number of states of a part whose results have `numbers` numbers per state. A thread takes up to a
+/// millisecond for a part, so its start, a third of a microsecond, is negligible. A part fills at least two registers.
 fn part_size(numbers: usize) -> usize {
     const NUMBERS: usize = 1 << 18;
     (NUMBERS / numbers.max(1)).next_multiple_of(16).clamp(16, MOST_STATES)
 }
 
-/// An argument's numbers for some of all states.
+/// Returns an argument's numbers for some of the states.
 pub(crate) fn part<'a, T>(of: &'a [T], some: &Range<usize>, states: usize) -> &'a [T] {
     let each = of.len() / states;
     &of[some.start * each..some.end * each]
 }
 
-/// Computes all states part after part, with the interpreter's lock released, to `out` or to new arrays. If a signal ends
-/// it, `out` is written as far as it came.
+/// Computes all states in parts, with the interpreter's lock released, into `out` or new arrays. If a signal stops the
+/// computation, `out` holds the states computed so far.
 pub(crate) fn run<'py>(
     py: Python<'py>,
     batch: &mut Batch,
@@ -230,7 +231,7 @@ pub(crate) fn run<'py>(
     out: Option<&Bound<'py, PyAny>>,
     mut compute: impl FnMut(&mut BatchWriter<'_, '_, f64>, Range<usize>) + Send,
 ) -> PyResult<Bound<'py, PyAny>> {
-    compute(&mut batch.writer(&mut []), 0..0); // for the shapes of the results
+    compute(&mut batch.writer(&mut []), 0..0); // no states: only the shapes of the results are needed
     let shapes: Vec<Vec<usize>> = batch.last_shapes().map(<[_]>::to_vec).collect();
     let mut given = kind.places(py, out)?.into_iter().chain(iter::repeat(None));
     let sizes: Vec<usize> = shapes.iter().map(|shape| shape.iter().product()).collect();
@@ -261,7 +262,7 @@ pub(crate) fn run<'py>(
     }
 }
 
-/// Computes all states one after the other, with the interpreter's lock released, to `out` or to a new array.
+/// Computes all states one by one, with the interpreter's lock released, into `out` or a new array.
 pub(crate) fn each<'py>(
     py: Python<'py>,
     states: usize,

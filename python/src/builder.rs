@@ -1,4 +1,4 @@
-//! Models made body by body.
+//! Models that are built body by body.
 
 use crate::arrays::{numbers, pose, three};
 use crate::exceptions::{exception, wrong_word};
@@ -14,23 +14,23 @@ use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The identity of a body in a builder, as `ModelBuilder.body` and others return it. `WORLD` is always there.
+/// The identity of a body in a builder, as `ModelBuilder.body` and other methods return it. `WORLD` always exists.
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct BodyId {
     inner: condyle::tree::BodyId,
-    /// The number of its builder; none for the world.
+    /// Number of its builder; `None` for the world.
     builder: Option<u64>,
 }
 
 #[pymethods]
 impl BodyId {
-    /// The word for the world, or for any other body.
+    /// Returns `condyle.WORLD` for the world, and the same text for all other bodies.
     fn __repr__(&self) -> &'static str {
         if self.builder.is_none() { "condyle.WORLD" } else { "<condyle.BodyId>" }
     }
 }
 
-/// The world, on which the first joints sit.
+/// Returns the world, which is the parent of the first joints.
 pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
     static WORLD: PyOnceLock<Py<BodyId>> = PyOnceLock::new();
     WORLD.get_or_try_init(py, || Py::new(py, BodyId { inner: condyle::WORLD, builder: None }))
@@ -38,12 +38,12 @@ pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
 
 /// A builder that makes a `Model` body by body, parents first.
 ///
-/// Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
-/// joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
-/// and v are laid out alike, but there is a body without mass for each joint but the last, so `nbodies`, `names` and
-/// the rows of f_ext count them.
+/// Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass. A joint
+/// that is composed of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of
+/// bodies here. Its q and v have the same layout, but each joint except the last adds a body without mass. `nbodies`,
+/// `names` and the rows of f_ext count these bodies.
 ///
-/// name: the robot's.
+/// name: the name of the robot.
 ///
 /// >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
 /// >>> rod = Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.eye(3))
@@ -57,10 +57,10 @@ pub(crate) fn world(py: Python<'_>) -> PyResult<&Py<BodyId>> {
 /// <condyle.Model 'double pendulum': 2 bodies, nq = 2, nv = 2>
 #[pyclass(module = "condyle")]
 pub(crate) struct ModelBuilder {
-    /// The library's builder; none once the model is built.
+    /// The library's builder; `None` once the model is built.
     inner: Option<condyle::ModelBuilder>,
     name: String,
-    /// A number that no other builder has.
+    /// A number that differs from the numbers of all other builders.
     number: u64,
 }
 
@@ -99,7 +99,7 @@ impl ModelBuilder {
         Self { inner: Some(condyle::ModelBuilder::new(name)), name: name.to_owned(), number }
     }
 
-    /// The robot's name, and whether the model is built.
+    /// Returns the robot's name, and whether the model is built.
     fn __repr__(&self) -> String {
         let built = if self.inner.is_none() { ", built" } else { "" };
         format!("<condyle.ModelBuilder '{}'{built}>", self.name)
@@ -107,16 +107,16 @@ impl ModelBuilder {
 
     /// Adds a body and its joint.
     ///
-    /// name: the body's, and the joint's unless it has a `joint_name` of its own.
-    /// parent: the body on which the joint sits.
-    /// placement: the joint's frame at position zero in the parent's frame.
-    /// inertia: in the body's frame, which is the joint's at position zero.
-    /// position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
-    /// velocity: greatest speed (rad/s, m/s); None for no limit.
-    /// effort: greatest effort (N m, N), or the least and the greatest one; None for no limits.
-    /// damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
-    /// damping_polynomial: (d₁, d₂) of damping that grows with the speed, d₀ + d₁|v| + d₂v², with d₀ = damping.
-    /// armature: inertia of the rotor as seen at the joint (kg m², kg).
+    /// name: the body's name, and the joint's unless `joint_name` is given.
+    /// parent: the body to which the joint is attached.
+    /// placement: the joint's frame at position zero, in the parent's frame.
+    /// inertia: in the body's frame, which is the joint's frame at position zero.
+    /// position: (minimum, maximum) position (rad, m), for joints with one coordinate; None for no limits.
+    /// velocity: maximum speed (rad/s, m/s); None for no limit.
+    /// effort: maximum effort (N m, N), or (minimum, maximum); None for no limits.
+    /// damping, friction: viscous (N m s/rad, N s/m) and Coulomb friction (N m, N).
+    /// damping_polynomial: (d₁, d₂) of the damping coefficient d₀ + d₁|v| + d₂v², with d₀ = damping.
+    /// armature: rotor inertia as seen at the joint (kg m², kg).
     #[pyo3(signature = (
         name, parent, joint, placement=None, inertia=None, *, joint_name=None, position=None, velocity=None,
         effort=None, damping=0.0, friction=0.0, armature=0.0, damping_polynomial=(0.0, 0.0)
@@ -148,11 +148,12 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
+    /// Adds a body after several joints in a row: a composite joint. Each joint is placed in the frame of the joint
+    /// before.
     ///
-    /// Its coordinates are those of the joints, one after the other. Between them are bodies without mass, `name#1`,
-    /// `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about unit vectors a and b is
-    /// `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+    /// Its coordinates are the coordinates of the joints, one joint after the other. Between the joints are bodies
+    /// without mass, `name#1`, `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about
+    /// unit vectors a and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
     ///
     /// joints: a list of (joint, placement).
     #[pyo3(signature = (name, parent, joints, inertia=None))]
@@ -176,9 +177,10 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Adds a body on a ball joint that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+    /// Adds a body on a ball joint that turns by q₀ about z, then by q₁ about the new y, then by q₂ about the new x; v
+    /// = q̇.
     ///
-    /// M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
+    /// M is singular where q₁ = ±π/2. `Joint.spherical` has no singular position.
     #[pyo3(signature = (name, parent, placement=None, inertia=None))]
     fn spherical_zyx(
         &mut self,
@@ -193,7 +195,7 @@ impl ModelBuilder {
         Ok(self.added(body))
     }
 
-    /// Adds inertia to a body, given in a frame that is at `placement` in the body's frame.
+    /// Adds an inertia, given in a frame at `placement` in the body's frame, to a body.
     fn merge(
         &mut self,
         body: &Bound<'_, BodyId>,
@@ -206,7 +208,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user', of which each may have the same name.
+    /// Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user'. Frames of different kinds may
+    /// have the same name.
     #[pyo3(signature = (name, body, placement=None, kind="user"))]
     fn frame(
         &mut self,
@@ -226,7 +229,7 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Makes a joint follow another one, instead of having a coordinate of its own: its position is ratio q + offset.
+    /// Makes a joint follow another one: its position is ratio q + offset, and it has no coordinate of its own.
     ///
     /// follower, leader: the bodies that the joints carry.
     #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
@@ -242,7 +245,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds a whole robot, its world at `placement` in the frame of `parent`; `prefix` is put before all its names.
+    /// Adds a whole robot, with its world at `placement` in the frame of `parent`; `prefix` is added before all its
+    /// names.
     ///
     /// >>> from condyle import ModelBuilder, WORLD
     /// >>> two = ModelBuilder("two arms")
@@ -267,8 +271,8 @@ impl ModelBuilder {
 
     /// Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
     ///
-    /// body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the position of the joint at which the
-    /// spring is at rest, as many numbers as q has for the joint.
+    /// body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the joint's position at which the
+    /// spring is at rest, as many numbers as the joint has in q.
     ///
     /// >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
     /// >>> robot = ModelBuilder("door")
@@ -295,10 +299,11 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Carries a part of a body's weight, as MuJoCo's `gravcomp` does: the force −factor m g acts at the part's centre of
-    /// mass.
+    /// Supports a part of a body's weight, as MuJoCo's `gravcomp` does: the force −factor m g acts at the part's centre
+    /// of mass.
     ///
-    /// inertia: the part's, in a frame that is at `placement` in the body's frame. factor: the share that is carried.
+    /// inertia: the part's inertia, in a frame at `placement` in the body's frame. factor: the supported share of its
+    /// weight.
     #[pyo3(signature = (body, inertia, factor=1.0, placement=None))]
     fn compensate_gravity(
         &mut self,
@@ -313,13 +318,13 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. It does not change limits,
-    /// armature and damping: these are the joints'.
+    /// Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. It does not change
+    /// limits, armature and damping, which belong to the joints.
     ///
     /// joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
-    /// tendon: the name of the tendon, if it drives one.
-    /// gear: a number, or up to six; None is 1. gain: the force for each unit of control; None is kp, or kv where kp is 0, or
-    /// 1 for a motor without both. control, force: least and greatest; None for no limits.
+    /// tendon: the tendon's name, if the actuator drives a tendon.
+    /// gear: a number, or up to six; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1
+    /// for a motor, which has neither. control, force: (minimum, maximum); None for no limits.
     #[pyo3(signature = (
         name, joint, *, tendon=None, gear=None, gain=None, bias=0.0, kp=0.0, kv=0.0, control=None, force=None
     ))]
@@ -365,7 +370,7 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Sets the acceleration of free fall, 3 numbers in the world's frame (m/s²). Without this it is (0, 0, −9.81).
+    /// Sets the acceleration of free fall, 3 numbers in the world's frame (m/s²). The default is (0, 0, −9.81).
     fn gravity(&mut self, gravity: &Bound<'_, PyAny>) -> PyResult<()> {
         let gravity = three("gravity", gravity)?;
         self.builder()?.gravity(gravity);
@@ -373,9 +378,10 @@ impl ModelBuilder {
     }
 
     /// Builds the model: checks everything and numbers the bodies depth first, siblings in the order in which they were
-    /// added. The builder cannot be used any more.
+    /// added. The builder cannot be used afterwards.
     ///
-    /// Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
+    /// Raises `ModelError` for invalid names, axes, masses or limits, for numbers that are not finite, and for a mimic
+    /// joint with an invalid leader.
     fn build(&mut self) -> PyResult<Model> {
         self.builder()?;
         let builder = self.inner.take().expect("was just looked at");

@@ -1,10 +1,10 @@
-//! What a model shows of itself, made when it is first asked for: it never changes.
+//! Attributes of a model as Python objects, made on first access and then kept, since a model never changes.
 
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyList, PyTuple};
 
-/// The attributes that are made once.
+/// Attributes that are made once.
 #[derive(Clone, Copy)]
 pub(crate) enum Attribute {
     Names,
@@ -33,7 +33,7 @@ pub(crate) enum Attribute {
     Frames,
 }
 
-/// The attributes that were asked for.
+/// The attributes that were accessed so far.
 pub(crate) struct Cached([PyOnceLock<Py<PyAny>>; Attribute::Frames as usize + 1]);
 
 impl Cached {
@@ -41,7 +41,7 @@ impl Cached {
         Self([const { PyOnceLock::new() }; _])
     }
 
-    /// A value, which nobody can change.
+    /// Returns an immutable value, made on first access.
     pub(crate) fn value<'py>(
         &self,
         py: Python<'py>,
@@ -52,7 +52,7 @@ impl Cached {
         Ok(value.bind(py).clone())
     }
 
-    /// A list of the caller's own, of what is made once.
+    /// Returns a new list, which the caller may change, of items made on first access.
     pub(crate) fn list<'py, T>(
         &self,
         py: Python<'py>,

@@ -1,4 +1,4 @@
-//! The centre of mass, momentum and energies: the library's functions one to one.
+//! Centre of mass, momentum and energies: one Python function for each function of the library.
 
 use crate::arrays::named_tuples;
 use crate::functions::{any, functions};
@@ -11,9 +11,9 @@ named_tuples! {
 }
 
 functions! {
-/// The centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
+/// Computes the centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
 ///
-/// q: nq numbers. Bodies fixed to the world do not count. The result is not a number if no moving body has a mass.
+/// q: nq numbers. Bodies fixed to the world are not included. The result is NaN if no moving body has a mass.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -24,7 +24,7 @@ fn com(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.com(model, q) }
 
-/// The velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
+/// Computes the velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
 ///
 /// q: nq numbers; v: nv.
 fn com_velocity(model, data; q: Position, v: Tangent; out) {
@@ -32,8 +32,8 @@ fn com_velocity(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.com_velocity(model, q, v) }
 
-/// The acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3 numbers
-/// (m/s²); O(n).
+/// Computes the acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3
+/// numbers (m/s²); O(n).
 ///
 /// q: nq numbers; v, a: nv.
 fn com_acceleration(model, data; q: Position, v: Tangent, a: Tangent; out) {
@@ -41,7 +41,7 @@ fn com_acceleration(model, data; q: Position, v: Tangent, a: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.com_acceleration(model, q, v, a) }
 
-/// The Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
+/// Computes the Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 ///
 /// q: nq numbers. It is a part of `centroidal_map`.
 fn com_jacobian(model, data; q: Position; out) {
@@ -49,10 +49,10 @@ fn com_jacobian(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.com_jacobian(model, q) }
 
-/// The centroidal momentum matrix Ag(q), hg = Ag v, and the quantities it is made of, in O(n), as
+/// Computes the centroidal momentum matrix Ag(q), with hg = Ag v, and the quantities from which it is made, in O(n), as
 /// `CentroidalMap(Ag, Ig, com, Jcom)`.
 ///
-/// q: nq numbers. Bodies fixed to the world do not count. The results are not numbers if no moving body has a mass. out:
+/// q: nq numbers. Bodies fixed to the world are not included. The results are NaN if no moving body has a mass. out:
 /// four arrays, such as an earlier result.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
@@ -64,18 +64,18 @@ fn centroidal_map(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> Named("CentroidalMap") { b.centroidal_map(model, q) }
 
-/// The centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
+/// Computes the centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
 /// `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
 ///
-/// q: nq numbers; v: nv. Bodies fixed to the world do not count. The results are not numbers if no moving body has a
-/// mass. out: seven arrays, such as an earlier result.
+/// q: nq numbers; v: nv. Bodies fixed to the world are not included. The results are NaN if no moving body has a mass.
+/// out: seven arrays, such as an earlier result.
 fn centroidal_map_rate(model, data; q: Position, v: Tangent; out) {
     condyle::centroidal::centroidal_map_rate(model, data, &q, &v)
 }
 batch b: any(q: Position, v: Tangent) -> Named("CentroidalMapRate") { b.centroidal_map_rate(model, q, v) }
 
-/// The centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6 numbers
-/// (kg m/s, then kg m²/s); O(n).
+/// Computes the centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6
+/// numbers (kg m/s, then kg m²/s); O(n).
 ///
 /// q: nq numbers; v: nv.
 fn centroidal_momentum(model, data; q: Position, v: Tangent; out) {
@@ -83,8 +83,8 @@ fn centroidal_momentum(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.centroidal_momentum(model, q, v) }
 
-/// The rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m). It equals the weight and
-/// the external forces about the centre of mass; O(n).
+/// Computes the rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m); O(n). It equals
+/// the weight and the external forces, taken about the centre of mass.
 ///
 /// q: nq numbers; v, a: nv.
 fn centroidal_momentum_rate(model, data; q: Position, v: Tangent, a: Tangent; out) {
@@ -92,7 +92,7 @@ fn centroidal_momentum_rate(model, data; q: Position, v: Tangent, a: Tangent; ou
 }
 batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.centroidal_momentum_rate(model, q, v, a) }
 
-/// The kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
+/// Computes the kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
 ///
 /// q: nq numbers; v: nv.
 ///
@@ -105,7 +105,7 @@ fn kinetic_energy(model, data; q: Position, v: Tangent) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy(model, q, v) }
 
-/// The potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
+/// Computes the potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
 ///
 /// q: nq numbers.
 fn potential_energy(model, data; q: Position) {
@@ -113,7 +113,7 @@ fn potential_energy(model, data; q: Position) {
 }
 batch b: any(q: Position) -> One { b.potential_energy(model, q) }
 
-/// The mechanical energy E = T + V (J); O(n).
+/// Computes the mechanical energy E = T + V (J); O(n).
 ///
 /// q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
 fn mechanical_energy(model, data; q: Position, v: Tangent) {
@@ -121,11 +121,11 @@ fn mechanical_energy(model, data; q: Position, v: Tangent) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.mechanical_energy(model, q, v) }
 
-/// All terms of the equations of motion, from one pass to the tips and one back, in O(n depth), as
-/// `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
+/// Computes all terms of the equations of motion in O(n depth), with one pass from the root to the tips and one back,
+/// as `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
 ///
-/// q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,
-/// `kinetic_energy` and `potential_energy`, up to rounding.
+/// q: nq numbers; v: nv. Up to rounding, the numbers equal `crba`, `nonlinear_effects`, `centroidal_map_rate`,
+/// `kinetic_energy` and `potential_energy`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> terms = condyle.compute_all_terms(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7)

@@ -1,4 +1,5 @@
-//! Robots as straight-line code: the text and what its functions take, for `condyle.codegen`.
+//! Robots as straight-line code, for `condyle.codegen`: the text of the code, and arguments and results of its
+//! functions.
 
 use crate::constrained::constraint;
 use crate::exceptions::{exception, wrong_word};
@@ -19,7 +20,8 @@ fn arrays(arrays: &[Array]) -> Arrays {
     arrays.iter().map(|a| (a.name.clone(), a.rows, a.columns)).collect()
 }
 
-/// The code of functions of a robot: its name, its files, and its functions with their arguments and results.
+/// Generates the code of functions of a robot; returns its name, its files, and its functions with their arguments and
+/// results.
 #[pyfunction]
 #[pyo3(
     name = "_generate",

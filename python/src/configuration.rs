@@ -14,23 +14,23 @@ use pyo3::prelude::*;
 use rand::SeedableRng;
 use rand::rngs::{StdRng, SysRng};
 
-/// A random position, nq numbers: uniform between its limits, within ±3 (rad, m) where a coordinate has no limits, and
-/// over the whole group for rotations.
+/// Draws a random position, nq numbers: uniform between the limits, within ±3 (rad, m) for a coordinate without limits,
+/// and uniform over the whole group for rotations.
 ///
-/// seed: a number below 2⁶⁴; the same one gives the same position. None draws afresh.
+/// seed: a number below 2⁶⁴; the same seed gives the same position. None draws a new seed from the system.
 #[pyfunction]
 #[pyo3(signature = (model, seed=None))]
 pub(crate) fn random_configuration<'py>(model: &Bound<'py, Model>, seed: Option<u64>) -> PyResult<Bound<'py, PyAny>> {
     let mut rng = match seed {
         Some(seed) => StdRng::seed_from_u64(seed),
-        // from the system: forked processes would go on with the same numbers of their parent
+        // seeded by the system: otherwise forked processes would continue with the numbers of their parent
         None => StdRng::try_from_rng(&mut SysRng).map_err(|error| PyOSError::new_err(error.to_string()))?,
     };
     condyle::random_configuration(&model.get().inner, &mut rng).give(model.py(), None)
 }
 
 functions! {
-/// The neutral position, nq numbers: zeros, and the identity for rotations.
+/// Returns the neutral position, nq numbers: zeros, and the identity for rotations.
 ///
 /// >>> condyle.neutral(condyle.robots.quadruped())[:7]
 /// array([0., 0., 0., 0., 0., 0., 1.])
@@ -38,7 +38,7 @@ fn neutral(model;) {
     condyle::neutral(model)
 }
 
-/// The position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
+/// Computes the position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
 ///
 /// q: nq numbers; v: nv.
 ///
@@ -52,7 +52,7 @@ fn integrate(model; q: Position, v: Tangent; out) {
 }
 each(q: Position, v: Tangent) -> [nq] |moved| { condyle::integrate(model, q, v, moved); }
 
-/// The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
+/// Computes the tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers. For rotations it is the shortest such vector.
 ///
 /// q0, q1: nq numbers.
 fn difference(model; q0: Position, q1: Position; out) {
@@ -60,9 +60,9 @@ fn difference(model; q0: Position, q1: Position; out) {
 }
 each(q0: Position, q1: Position) -> [nv] |v| { condyle::difference(model, q0, q1, v); }
 
-/// The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.
+/// Computes the position q₀ ⊕ t (q₁ ⊖ q₀) on the path from q₀ (t = 0) to q₁ (t = 1) at constant velocity, nq numbers.
 ///
-/// q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
+/// q0, q1: nq numbers; t: a number, which may be below 0 or above 1.
 ///
 /// >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
 /// array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
@@ -75,7 +75,7 @@ each(q0: Position, q1: Position; t: Real) -> [nq] |q| {
     condyle::configuration::interpolate(model, q0, q1, t, &mut vec![0.0; model.nv()], q)
 }
 
-/// The distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) count alike.
+/// Computes the distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) have equal weight.
 ///
 /// q0, q1: nq numbers.
 fn distance(model; q0: Position, q1: Position) {
@@ -85,8 +85,8 @@ each(q0: Position, q1: Position) -> [] |to| {
     to[0] = condyle::configuration::distance(model, q0, q1, &mut vec![0.0; model.nv()])
 }
 
-/// The position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument itself
-/// stays as it is unless it is `out`.
+/// Returns the position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument
+/// itself does not change unless it is `out`.
 ///
 /// q: nq numbers.
 ///
@@ -107,10 +107,10 @@ each(q: Scalable) -> [nq] |to| {
     condyle::normalize(model, to)
 }
 
-/// The columns of X, tangent vectors at q ⊕ v, moved to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+/// Moves the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 ///
-/// v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
-/// `transport` with −v.
+/// v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q instead: it
+/// equals `transport` with −v.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> v = np.full(18, 0.1)
@@ -123,7 +123,8 @@ fn transport(model; v: Tangent, X: Tangents; out) {
     moved
 }
 
-/// The Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not depend on q.
+/// Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not
+/// depend on q.
 ///
 /// v: nv numbers; argument: 'position' for q or 'velocity' for v.
 fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
@@ -137,8 +138,8 @@ fn integrate_jacobian(model; v: Tangent, argument: Word; out) {
     J
 }
 
-/// The Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. Of the positions it
-/// needs only their difference.
+/// Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. It depends
+/// only on the difference of the positions.
 ///
 /// d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
 fn difference_jacobian(model; d: Tangent, argument: Word; out) {

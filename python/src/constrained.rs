@@ -1,4 +1,4 @@
-//! Dynamics under constraints: the library's types and functions one to one.
+//! Dynamics under constraints: one Python type or function for each type or function of the library.
 
 use crate::arrays::{Give, array, class, found_type, named_tuples, pose, rotation};
 use crate::data::{Holds, Scratch};
@@ -33,7 +33,7 @@ named_tuples! {
     }
 }
 
-/// A `ContactConstraint` of `condyle._types` as the library has it.
+/// Converts a `ContactConstraint` of `condyle._types` to the library's type.
 pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::ContactConstraint> {
     if !given.is_instance(class!(given.py(), "ContactConstraint")?)? {
         let found = found_type(given);
@@ -60,11 +60,11 @@ pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> Py
     Ok(constraint)
 }
 
-/// The constraints of a model by their names: `ContactConstraint`s and `Coupling`s of `condyle._types`.
+/// Returns the constraints of a model by name: `ContactConstraint`s and `Coupling`s of `condyle._types`.
 pub(crate) fn of_model<'py>(py: Python<'py>, model: &condyle::Model) -> PyResult<Bound<'py, PyDict>> {
     let constraints = PyDict::new(py);
     let joint = |body: usize| &*model.bodies()[body].joint_name;
-    // by its number where another frame has the same name
+    // by index if another frame has the same name
     let frame = |index: usize| -> PyResult<Bound<'py, PyAny>> {
         let name = &*model.frames()[index].name;
         if model.frame(name) == Ok(index) { name.into_bound_py_any(py) } else { index.into_bound_py_any(py) }
@@ -86,7 +86,7 @@ pub(crate) fn of_model<'py>(py: Python<'py>, model: &condyle::Model) -> PyResult
     Ok(constraints)
 }
 
-/// Changes those parts of a target that are given.
+/// Changes the given parts of a target.
 fn aim(
     target: &mut Target<f64>,
     placement: Option<&Bound<'_, PyAny>>,
@@ -106,21 +106,23 @@ fn aim(
     Ok(())
 }
 
-/// Constraints of one model: contacts and loops, and the scratch of `constrained_dynamics` and its like.
+/// Constraints of one model, contacts and loops, and the scratch memory of `constrained_dynamics` and similar
+/// functions.
 ///
-/// Make one set for each combination of contacts; the `Data` can be the same for all sets. As a `Data`, a set serves
+/// Make one set for each combination of contacts; all sets may share one `Data`. Like a `Data`, a set may be used by
 /// one thread at a time.
 ///
-/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found, so
-/// that redundant constraints share the smallest forces; μ is small beside J M⁻¹ Jᵀ, as 1e-8. With μ = 0 one iteration
-/// is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
-/// sparse resolution of constrained dynamic equations (2021).
+/// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found.
+/// Redundant constraints then share the smallest forces. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ =
+/// 0 one iteration is exact, and rows that depend on earlier rows get no force. Source: Carpentier, Budhiraja, Mansard,
+/// Proximal and sparse resolution of constrained dynamic equations (2021).
 ///
-/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always, 1 to
-/// 10000.
+/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
+/// to 10000, which is always reached.
 ///
-/// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
-/// 'world', a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
+/// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
+/// the same. Also raises it if a reference frame is 'world', a gain is negative or not finite, a target is not finite,
+/// or its placement is not a homogeneous matrix.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> trot = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
@@ -129,15 +131,15 @@ fn aim(
 #[pyclass(module = "condyle")]
 pub(crate) struct ConstraintSet {
     inner: condyle::ConstraintSet<f64>,
-    /// The set for hyper-dual numbers, made when it is first needed after the targets changed.
+    /// The set for hyper-dual numbers, made when it is first needed after a change of the targets.
     dual: Option<Box<condyle::ConstraintSet<Hyper>>>,
-    /// The sets for the lanes of a batch, made when they are first needed.
+    /// The sets for the SIMD lanes of a batch, made when they are first needed.
     lanes: Option<Box<condyle::batch::BatchConstraints>>,
-    /// The constraints with their present targets.
+    /// The constraints with their current targets.
     constraints: Vec<ContactConstraint>,
     nv: usize,
     made_for: MadeFor,
-    /// The model that it was made for.
+    /// The model for which the set was made.
     robot: Arc<condyle::Model>,
 }
 
@@ -149,7 +151,7 @@ impl ConstraintSet {
         Ok(Self { inner, dual: None, lanes: None, constraints, nv: robot.nv(), made_for, robot })
     }
 
-    /// The same constraints for a batch.
+    /// Returns the same constraints for a batch.
     pub(crate) fn side_by_side(
         &mut self,
         batch: &condyle::Batch,
@@ -211,7 +213,7 @@ impl ConstraintSet {
         Self::make(model, constraints, Proximal { mu, iterations })
     }
 
-    /// The parts of a pickle: the robot, and the constraints with their present targets.
+    /// Returns the parts of a pickle: the robot, and the constraints with their current targets.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let this = slf.borrow();
         let Proximal { mu, iterations } = this.inner.proximal;
@@ -228,33 +230,33 @@ impl ConstraintSet {
         Self::make(model, constraints, Proximal { mu, iterations })
     }
 
-    /// The robot's name, and how many constraints and rows there are.
+    /// Returns the robot's name, and the numbers of constraints and rows.
     fn __repr__(&self) -> String {
         let (robot, n, rows) = (&self.made_for.name, self.inner.len(), self.inner.rows());
         format!("<condyle.ConstraintSet of '{robot}': {n} constraints, {rows} rows>")
     }
 
-    /// The number of constraints.
+    /// Returns the number of constraints.
     fn __len__(&self) -> usize {
         self.inner.len()
     }
 
-    /// The number of rows of J, and of numbers in λ.
+    /// The number of rows of J, which is also the length of λ.
     #[getter]
     fn rows(&self) -> usize {
         self.inner.rows()
     }
 
-    /// The rows of constraint k, as a slice.
+    /// Returns the rows of constraint k, as a slice.
     fn range<'py>(&self, py: Python<'py>, k: usize) -> PyResult<Bound<'py, PySlice>> {
         let range = self.inner.range(self.checked(k)?);
         Ok(PySlice::new(py, range.start as isize, range.end as isize, 1))
     }
 
-    /// Changes the target of constraint k: where its frame should be and how it should move there. What is not given
-    /// stays as it is.
+    /// Changes the target of constraint k: the placement of its frame and its motion there. Parts that are not given do
+    /// not change.
     ///
-    /// Raises `ModelError` for numbers that are not finite and a placement that is none; the old target then stays.
+    /// Raises `ModelError` for numbers that are not finite and for an invalid placement; the old target is kept then.
     #[pyo3(signature = (k, placement=None, velocity=None, acceleration=None))]
     fn set_target(
         &mut self,
@@ -275,7 +277,7 @@ impl ConstraintSet {
         Ok(())
     }
 
-    /// The Jacobian J of the constraints, (rows, nv), at the state of the last call for a single one.
+    /// Returns the Jacobian J of the constraints, (rows, nv), at the state of the last call for a single state.
     #[pyo3(signature = (out=None))]
     fn jacobian<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let mut J = DMatrix::zeros(self.inner.rows(), self.nv);
@@ -285,11 +287,11 @@ impl ConstraintSet {
 }
 
 functions! {
-/// Forward dynamics under constraints: the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that
-/// make J q̈ + γ = 0, as `Constrained(a, lambda_, residual, redundant)`.
+/// Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
+/// dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
 ///
 /// constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
-/// other, or themselves at a singular posture, give finite numbers and a residual.
+/// other, or one that cannot be satisfied at a singular posture, give finite numbers and a residual.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
@@ -307,12 +309,11 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
     b.constrained_dynamics(model, constraints, q, v, tau, f_ext)
 }
 
-/// The result of `constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as
+/// Computes the result of `constrained_dynamics` and its exact derivatives with respect to q, v and τ, as
 /// `ConstrainedDerivatives`.
 ///
-/// constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving
-/// with the bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier
-/// result.
+/// constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces
+/// move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> touch = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -328,14 +329,14 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
     b.constrained_dynamics_derivatives(model, constraints, q, v, tau, f_ext)
 }
 
-/// The result of `constrained_dynamics` and the linear equations between changes of q, v, τ and the changes of q̈ and λ
-/// that follow, as `ConstrainedEquations`:
+/// Computes the result of `constrained_dynamics` and the linear equations that relate changes of q, v and τ to the
+/// changes of q̈ and λ, as `ConstrainedEquations`:
 ///
 ///     M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 ///
-/// These are the equations that `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a
-/// `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
-/// bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
+/// `constrained_dynamics_derivatives` solves these equations; nothing is inverted here. constraints: a `ConstraintSet`,
+/// whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move
+/// with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -351,10 +352,10 @@ batch b, constraints: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forc
     b.constrained_dynamics_equations(model, constraints, q, v, tau, f_ext)
 }
 
-/// The velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as
-/// `Impulse(v, lambda_, residual, redundant)`.
+/// Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
+/// lambda_, residual, redundant)`.
 ///
-/// constraints: a `ConstraintSet`, of which gains, velocities and accelerations do not count; q: nq numbers; v: nv;
+/// constraints: a `ConstraintSet`, whose gains, velocities and accelerations are ignored; q: nq numbers; v: nv;
 /// restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
@@ -372,11 +373,11 @@ batch b, constraints: regular(q: Position, v: Tangent; restitution: Coefficient)
     b.impulse_dynamics(model, constraints, q, v, restitution)
 }
 
-/// The result of `impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
-/// `ImpulseDerivatives`.
+/// Computes the result of `impulse_dynamics` and its exact derivatives with respect to q and the velocity before the
+/// impact, as `ImpulseDerivatives`.
 ///
-/// constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: as many arrays
-/// as there are members, such as an earlier result.
+/// constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: one array for
+/// each member, such as an earlier result.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> hit = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])

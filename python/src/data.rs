@@ -1,4 +1,4 @@
-//! The scratch of the algorithms, and how a call takes it.
+//! The scratch memory of the algorithms, and how a call borrows it.
 
 use crate::batch;
 use crate::exceptions::within;
@@ -11,14 +11,14 @@ use pyo3::prelude::*;
 use pyo3::pyclass::boolean_struct::False;
 use std::sync::Arc;
 
-/// The memory that algorithms compute in, for one model: made once, and used by one thread at a time.
+/// Scratch memory of the algorithms for one model: made once, and used by one thread at a time.
 ///
-/// It serves all models of the same bodies and joints, whatever their gravity, armature or inertias. No algorithm reads
-/// what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
-/// with another robot's model, a `ValueError`.
+/// It serves all models with the same bodies and joints, whatever their gravity, armature or inertias. No algorithm
+/// reads results of an earlier one, so calls may come in any order. Use from two threads at once is a `RuntimeError`;
+/// use with another robot's model is a `ValueError`.
 ///
-/// model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
-/// several states side by side in vector registers, and release the interpreter's lock; at most 1024.
+/// model: the robot; threads: the number of threads for calls with many states (q of shape (N, nq)), at most 1024. Such
+/// calls also compute several states at once in SIMD lanes, and release the interpreter's lock.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.Data(arm)
@@ -27,12 +27,12 @@ use std::sync::Arc;
 pub(crate) struct Data {
     inner: condyle::Data<f64>,
     made_for: MadeFor,
-    /// The model that it was made for.
+    /// The model for which it was made.
     robot: Arc<condyle::Model>,
     threads: usize,
     /// The scratch for hyper-dual numbers, made when it is first needed.
     dual: Option<Box<condyle::Data<Hyper>>>,
-    /// The batch for as many states as a part of a call has had at most.
+    /// The batch, with a capacity for the largest part of a call so far.
     batch: Option<Box<condyle::Batch>>,
 }
 
@@ -47,21 +47,21 @@ impl Data {
         Ok(Self { inner, made_for, robot: model.inner.clone(), threads, dual: None, batch: None })
     }
 
-    /// The parts of a pickle: of another one, as good as this, for the same model.
+    /// Returns the parts of a pickle, which make a new, equivalent `Data` for the same model.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let this = slf.borrow();
         let model = Model::from((*this.robot).clone());
         Ok((slf.get_type(), (model, this.threads)).into_pyobject(slf.py())?.into_any())
     }
 
-    /// The robot's name.
+    /// Returns the robot's name.
     fn __repr__(&self) -> String {
         format!("<condyle.Data of '{}'>", self.made_for.name)
     }
 }
 
 impl Data {
-    /// A batch with room for so many states, or for a part of them.
+    /// Returns a batch with a capacity of `states` states, or of the maximum for a part of a call.
     pub(crate) fn batch(&mut self, model: &condyle::Model, states: usize) -> &mut condyle::Batch {
         let states = states.min(batch::MOST_STATES * self.threads);
         let enough = self.batch.take().filter(|batch| batch.capacity() >= states);
@@ -91,23 +91,23 @@ impl Holds<Hyper> for Data {
     }
 }
 
-/// An argument that a call computes in: made for one model, and used by one call at a time.
+/// A scratch argument: made for one model, and used by one call at a time.
 pub(crate) trait Scratch: PyClass<Frozen = False> {
-    /// The name of the argument.
+    /// Name of the argument.
     const ARGUMENT: &'static str;
-    /// The models that it serves.
+    /// Returns the models that it serves.
     fn made_for(&self) -> &MadeFor;
 }
 
-/// Scratch for one kind of number.
+/// Scratch memory for one type of number.
 pub(crate) trait Holds<S>: Scratch {
-    /// The library's own type of it.
+    /// The library's type of this scratch memory.
     type Held;
-    /// The library's scratch, made now if it is not there yet.
+    /// Returns the library's scratch memory, made now if it does not exist yet.
     fn held(&mut self, model: &condyle::Model) -> PyResult<&mut Self::Held>;
 }
 
-/// Takes scratch for a call, if it is free and of this model.
+/// Borrows scratch memory for a call, if it is free and serves this model.
 pub(crate) fn take<'py, T: Scratch>(model: &Model, scratch: &Bound<'py, T>) -> PyResult<PyRefMut<'py, T>> {
     let scratch = scratch.try_borrow_mut().map_err(|_| {
         let (argument, class) = (T::ARGUMENT, T::NAME);

@@ -1,4 +1,4 @@
-//! Derivatives beyond the first ones of `rnea` and `aba`: the library's functions one to one.
+//! Derivatives besides the first ones of `rnea` and `aba`: one Python function for each function of the library.
 
 use crate::arrays::{Array, Number, named_tuples};
 use crate::functions::{any, functions, regular};
@@ -18,7 +18,7 @@ named_tuples! {
     RneaSecondDerivatives { dqdq, dvdq, dvdv, dadq }
 }
 
-/// Matrices of one shape, as an array with one axis more.
+/// Matrices of one shape as one array, with one more axis in front.
 impl<S: Number> Array for [DMatrix<S>] {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -32,13 +32,13 @@ impl<S: Number> Array for [DMatrix<S>] {
 }
 
 functions! {
-/// The derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at
-/// most O(n) a column.
+/// Computes the derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers other than q, v and a; exact, at
+/// most O(n) per column.
 ///
-/// q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
-/// (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
-/// frame; ('inertia', body), its 10 inertial parameters; or ('friction', smoothing), nv, for the smoothing of
-/// `passive_torque`; f_ext: as for `rnea`.
+/// q: nq numbers; v, a: nv; wrt: the input; f_ext: as for `rnea`. Values of wrt: 'gravity', the acceleration of free
+/// fall, 3 numbers; 'armature', 'damping', nv each (damping counts as if `passive_torque` is added to τ); ('force',
+/// body), the external force on a body, 6, in its frame; ('inertia', body), its 10 inertial parameters; or ('friction',
+/// smoothing), nv, for the smoothing of `passive_torque`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
@@ -54,8 +54,8 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces; wrt: InputOf) -
     b.rnea_input_derivative(model, q, v, a, f_ext, wrt)
 }
 
-/// The derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at
-/// most O(n²) a column.
+/// Computes the derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers other than q, v and τ; exact, at
+/// most O(n²) per column.
 ///
 /// q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
 ///
@@ -74,11 +74,12 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, f_ext: Forces; wrt: Inpu
     b.aba_input_derivative(model, q, v, tau, f_ext, wrt)
 }
 
-/// The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
-/// (nv, nv); the other blocks are zero.
+/// Computes the exact Hessian of λᵀ τ(q, v, a), with τ of `rnea`, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv,
+/// dadq)`, each (nv, nv); the other blocks are zero.
 ///
-/// q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
-/// derivative by v_j and q_k, of dadq by a_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+/// q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is the
+/// derivative with respect to v_j and q_k, entry [j, k] of dadq with respect to a_j and q_k. It is the Hessian with
+/// respect to δ at `integrate(q, δ)`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -92,11 +93,12 @@ batch b: any(q: Position, v: Tangent, a: Tangent, lambda_: Tangent, f_ext: Force
     b.rnea_hessian(model, q, v, a, f_ext, lambda_)
 }
 
-/// The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
-/// other blocks are zero.
+/// Computes the exact Hessian of λᵀ q̈(q, v, τ), with q̈ of `aba`, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv,
+/// nv); the other blocks are zero.
 ///
-/// q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
-/// derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+/// q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is
+/// the derivative with respect to v_j and q_k, entry [j, k] of dtaudq with respect to τ_j and q_k. It is the Hessian
+/// with respect to δ at `integrate(q, δ)`.
 fn aba_hessian(model, data; q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext: Forces = None; out) {
     regular(model)?;
     condyle::derivatives::aba_hessian(model, data, &q, &v, &tau, &f_ext, &lambda_)
@@ -105,11 +107,11 @@ batch b: regular(q: Position, v: Tangent, tau: Tangent, lambda_: Tangent, f_ext:
     b.aba_hessian(model, q, v, tau, f_ext, lambda_)
 }
 
-/// The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
-/// `RneaSecondDerivatives(dqdq, dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
+/// Computes the exact second derivatives of `rnea` as full tensors in O(n² depth), as `RneaSecondDerivatives(dqdq,
+/// dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
 ///
-/// q: nq numbers; v, a: nv; f_ext: as for `rnea`. The order within each is that of `rnea_hessian`, which gives them
-/// contracted with a vector, many times faster.
+/// q: nq numbers; v, a: nv; f_ext: as for `rnea`. Each Hessian has the index order of `rnea_hessian`. That function
+/// returns the tensors contracted with a vector, and is many times faster.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
@@ -128,9 +130,10 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> Named("RneaS
 }
 
 motions! {
-/// The derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. Its derivative by v is the frame's Jacobian.
+/// Computes the derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. The derivative with respect to v is
+/// the frame's Jacobian.
 ///
-/// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+/// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
@@ -138,27 +141,27 @@ motions! {
 /// True
 fn frame_velocity_derivative(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq) -> One;
 
-/// The derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative by
-/// the joint accelerations is the frame's Jacobian.
+/// Computes the derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). The
+/// derivative with respect to the joint accelerations is the frame's Jacobian.
 ///
-/// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+/// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 fn frame_acceleration_derivatives(frame: FrameOf)
     after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv) -> Pair;
 
-/// The derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative
-/// by the joint accelerations is the frame's Jacobian.
+/// Computes the derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). The
+/// derivative with respect to the joint accelerations is the frame's Jacobian.
 ///
-/// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+/// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 fn frame_classical_acceleration_derivatives(frame: FrameOf)
     after forward_accelerations(q: Position, v: Tangent, a: Tangent) fills (da_dq, da_dv) -> Pair;
 
-/// The derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
+/// Computes the derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of the body's own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_velocity_derivative(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dv_dq) -> One;
 
-/// The derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
-/// `frame_acceleration_derivatives` of its own frame.
+/// Computes the derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
+/// `frame_acceleration_derivatives` of the body's own frame.
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_acceleration_derivatives(body: BodyOf)
@@ -166,10 +169,10 @@ fn body_acceleration_derivatives(body: BodyOf)
 }
 
 functions! {
-/// The derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and a, exact, in
-/// O(n), as `CentroidalDerivatives`.
+/// Computes the exact derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and
+/// a in O(n), as `CentroidalDerivatives`.
 ///
-/// q: nq numbers; v, a: nv. Gravity is not among the accelerations.
+/// q: nq numbers; v, a: nv. The accelerations do not include gravity.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
@@ -183,8 +186,8 @@ batch b: any(q: Position, v: Tangent, a: Tangent) -> Named("CentroidalDerivative
     b.centroidal_derivatives(model, q, v, a)
 }
 
-/// The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
-/// `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
+/// Computes the exact derivatives of kinetic energy T and potential energy V in O(n), as `EnergyDerivatives(dT_dq,
+/// dT_dv, dV_dq)`, nv numbers each.
 ///
 /// q: nq numbers; v: nv.
 fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
@@ -192,15 +195,16 @@ fn energy_derivatives(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> Named("EnergyDerivatives") { b.energy_derivatives(model, q, v) }
 
-/// The derivative ∂τ/∂q of `static_torque`, (nv, nv), and without forces that of `gravity`; exact, in O(n depth).
+/// Computes the exact derivative ∂τ/∂q of `static_torque`, (nv, nv), in O(n depth). Without external forces it is also
+/// the derivative of `gravity`.
 ///
-/// q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
+/// q: nq numbers; f_ext: as for `rnea`; the forces move with the bodies.
 fn static_torque_derivative(model, data; q: Position, f_ext: Forces = None; out) {
     condyle::derivatives::static_torque_derivative(model, data, &q, &f_ext)
 }
 batch b: any(q: Position, f_ext: Forces) -> One { b.static_torque_derivative(model, q, f_ext) }
 
-/// The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
+/// Computes the exact derivatives of C(q, v) v, the Coriolis and centrifugal efforts, in O(n depth), as
 /// `CoriolisDerivatives(dq, dv)`, each (nv, nv).
 ///
 /// q: nq numbers; v: nv.

@@ -1,6 +1,7 @@
-//! DLPack, by which libraries lend each other arrays on devices: capsules are read and made, for the module `condyle.cuda`.
+//! DLPack, with which libraries lend each other arrays on devices: reads and makes its capsules for the module
+//! `condyle.cuda`.
 //!
-//! What is lent may be given back by any thread, and after the interpreter has ended.
+//! A lent array may be returned by any thread, and after the interpreter has ended.
 #![allow(unsafe_code)]
 
 use core::ffi::{CStr, c_void};
@@ -43,15 +44,15 @@ const VERSION: (u32, u32) = (1, 0);
 const PLAIN: &CStr = c"dltensor";
 const VERSIONED: &CStr = c"dltensor_versioned";
 
-/// What a capsule says: address, (kind of number, bits, lanes), shape, strides in numbers unless in row order, (kind of device,
-/// its number), flags.
+/// The contents of a capsule: address, (kind of number, bits, lanes), shape, strides in numbers (`None`: C order),
+/// (kind of device, device index), flags.
 type Description = (usize, (u8, u8, u16), Vec<i64>, Option<Vec<i64>>, (i32, i32), u64);
 
-/// The array that a capsule of DLPack lends, for as long as the capsule is there: it is not taken over.
+/// Describes the array that a DLPack capsule lends. It is valid as long as the capsule exists; ownership is not taken.
 #[pyfunction]
 #[pyo3(name = "_borrowed")]
 pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
-    // SAFETY: a capsule of that name has that structure; the later version may have another one behind its flags.
+    // SAFETY: a capsule of that name has that structure; later major versions may differ only after the field `flags`.
     let (tensor, flags) = unsafe {
         if ffi::PyCapsule_IsValid(capsule.as_ptr(), VERSIONED.as_ptr()) != 0 {
             let managed = ffi::PyCapsule_GetPointer(capsule.as_ptr(), VERSIONED.as_ptr()).cast::<Versioned>();
@@ -80,28 +81,28 @@ pub(crate) fn borrowed(capsule: &Bound<'_, PyAny>) -> PyResult<Description> {
     }
 }
 
-/// What is lent, as `M` describes it, with all that the description points to.
+/// A lent array as `M` describes it, with all data to which the description points.
 struct Lent<M> {
     managed: M,
     _numbers: [Vec<i64>; 2],
     owner: Option<Py<PyAny>>,
 }
 
-/// Takes back what was lent.
+/// Takes back a lent array.
 ///
 /// # Safety
-/// `context` is a `Lent<M>` that was boxed, and nobody uses it from now on.
+/// `context` is a `Lent<M>` from a box, and it is not used afterwards.
 unsafe fn take_back<M>(context: *mut c_void) {
-    // SAFETY: the caller's.
+    // SAFETY: the caller's promise.
     let mut lent = unsafe { Box::from_raw(context.cast::<Lent<M>>()) };
     let mut owner = lent.owner.take();
     if Python::try_attach(|_| drop(owner.take())).is_none() {
-        core::mem::forget(owner); // there is no interpreter any more
+        core::mem::forget(owner); // the interpreter has ended
     }
 }
 
 unsafe extern "C" fn delete_plain(managed: *mut Managed) {
-    // SAFETY: this is called once, by whom it was lent to.
+    // SAFETY: the borrower calls this once.
     unsafe { take_back::<Managed>((*managed).context) }
 }
 
@@ -110,9 +111,10 @@ unsafe extern "C" fn delete_versioned(managed: *mut Versioned) {
     unsafe { take_back::<Versioned>((*managed).context) }
 }
 
-/// What happens at the end of a capsule: if nobody has taken over what it lends, and thereby renamed it, it is taken back.
+/// Destroys a capsule. A consumer that takes ownership renames the capsule; if the name is unchanged, the lent array is
+/// taken back.
 unsafe extern "C" fn end(capsule: *mut ffi::PyObject) {
-    // SAFETY: a capsule of that name is one of ours.
+    // SAFETY: a capsule of that name was made here.
     unsafe {
         if ffi::PyCapsule_IsValid(capsule, VERSIONED.as_ptr()) != 0 {
             delete_versioned(ffi::PyCapsule_GetPointer(capsule, VERSIONED.as_ptr()).cast());
@@ -122,7 +124,8 @@ unsafe extern "C" fn end(capsule: *mut ffi::PyObject) {
     }
 }
 
-/// A capsule of DLPack that lends floating-point numbers on a CUDA device, whose owner stays until they are given back.
+/// Makes a DLPack capsule that lends floating-point numbers on a CUDA device; their owner is kept alive until they are
+/// returned.
 #[pyfunction]
 #[pyo3(name = "_lend")]
 pub(crate) fn lend(
@@ -136,14 +139,14 @@ pub(crate) fn lend(
     versioned: bool,
 ) -> PyResult<Py<PyAny>> {
     let (ndim, owner) = (shape.len() as i32, Some(owner));
-    let mut _numbers = [shape, strides]; // they stay where they are when the vectors move
+    let mut _numbers = [shape, strides]; // the numbers keep their addresses when the vectors are moved
     let [shape, strides] = _numbers.each_mut().map(Vec::as_mut_ptr);
     let (data, dtype, context) = (address as *mut c_void, (FLOAT, bits, 1), null_mut());
     let tensor = Tensor { data, device: (CUDA, device), ndim, dtype, shape, strides, byte_offset: 0 };
     let (managed, name): (*mut c_void, _) = if versioned {
         let managed = Versioned { version: VERSION, context, deleter: Some(delete_versioned), flags: 0, tensor };
         let lent = Box::into_raw(Box::new(Lent { managed, _numbers, owner }));
-        // SAFETY: it was made just now.
+        // SAFETY: the pointer comes from the box above.
         unsafe { (*lent).managed.context = lent.cast() };
         // SAFETY: as above.
         (unsafe { &raw mut (*lent).managed }.cast(), VERSIONED)
@@ -155,7 +158,7 @@ pub(crate) fn lend(
         // SAFETY: as above.
         (unsafe { &raw mut (*lent).managed }.cast(), PLAIN)
     };
-    // SAFETY: the name is a constant; the capsule's end takes back what it lends.
+    // SAFETY: the name is a constant; `end` takes back the lent array.
     unsafe { Bound::from_owned_ptr_or_err(py, ffi::PyCapsule_New(managed, name.as_ptr(), Some(end))) }
         .map(Bound::unbind)
 }

@@ -1,4 +1,4 @@
-//! What the package raises.
+//! Exceptions of the package.
 
 use condyle::ModelError as Cause;
 use pyo3::create_exception;
@@ -27,7 +27,7 @@ create_exception!(
 );
 create_exception!(condyle, NotPhysicalError, Error, "An inertia that no body of positive density has.");
 
-/// An error of the library as one of the package's exceptions.
+/// Converts an error of the library to one of the package's exceptions.
 pub(crate) fn exception(error: Cause) -> PyErr {
     match error {
         Cause::File { .. }
@@ -39,12 +39,12 @@ pub(crate) fn exception(error: Cause) -> PyErr {
     }
 }
 
-/// An error of `condyle::optimal` as a `ProblemError`.
+/// Converts an error of `condyle::optimal` to a `ProblemError`.
 pub(crate) fn problem_error(error: condyle::optimal::Error) -> PyErr {
     ProblemError::new_err(error.to_string())
 }
 
-/// An error of `condyle::wholebody` as a `ModelError` or a `ControllerError`.
+/// Converts an error of `condyle::wholebody` to a `ModelError` or a `ControllerError`.
 pub(crate) fn controller_error(error: condyle::wholebody::Error) -> PyErr {
     match error {
         condyle::wholebody::Error::Model(error) => exception(error),
@@ -52,12 +52,12 @@ pub(crate) fn controller_error(error: condyle::wholebody::Error) -> PyErr {
     }
 }
 
-/// The error for a word that is none of those that an argument may be.
+/// Returns the error for a word that is not among the words expected for an argument.
 pub(crate) fn wrong_word(name: &str, expected: &str, found: &str) -> PyErr {
     PyValueError::new_err(format!("{name}: expected {expected}, found '{found}'"))
 }
 
-/// A number that an argument gives, if it is within its limits.
+/// Returns the number of an argument if it is within its limits.
 pub(crate) fn within(name: &str, found: usize, least: usize, most: usize) -> PyResult<usize> {
     if found < least {
         return Err(PyValueError::new_err(format!("{name}: expected at least {least}, found {found}")));

@@ -1,4 +1,5 @@
-//! Factors of the inertia matrix, and forward dynamics by divide and conquer: the library's types one to one.
+//! Factors of the inertia matrix, and forward dynamics by divide and conquer: one Python type for each type of the
+//! library.
 
 use crate::arrays::{Give, class, matrix, vector};
 use crate::exceptions::within;
@@ -10,7 +11,8 @@ use nalgebra::DMatrix;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 
-/// A factor of a matrix: the methods that both kinds have, beside those that make and show it.
+/// Defines a class for a factor of a matrix: the methods that both kinds have, besides their constructors and own
+/// methods.
 macro_rules! factor {
     ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
         $(#[$doc])*
@@ -33,15 +35,16 @@ macro_rules! factor {
         impl $class {
             $($own)*
 
-            /// The size of M.
+            /// Returns the class and the size of M.
             fn __repr__(&self) -> String {
                 format!("<condyle.{} of a matrix ({n}, {n})>", stringify!($class), n = self.size)
             }
 
-            /// Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
+            /// Computes the factor of M, a symmetric positive definite matrix; the docstring of the class has the cost.
             ///
-            /// Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
-            /// signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
+            /// M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception raised
+            /// by a signal handler, such as KeyboardInterrupt, stops the computation between rows; no factor exists
+            /// then.
             fn factorize(&mut self, M: &Bound<'_, PyAny>) -> PyResult<()> {
                 let (py, M) = (M.py(), matrix("M", M, [self.size, self.size])?.to_matrix());
                 self.done = false;
@@ -52,9 +55,9 @@ macro_rules! factor {
                 Ok(())
             }
 
-            /// The solution x of M x = b, as many numbers as M has rows.
+            /// Solves M x = b; returns x, one number for each row of M.
             ///
-            /// b: as many numbers.
+            /// b: one number for each row of M.
             #[pyo3(signature = (b, out=None))]
             fn solve<'py>(
                 &self,
@@ -67,9 +70,9 @@ macro_rules! factor {
                 x.give(b.py(), out)
             }
 
-            /// The solution X of M X = B, column by column.
+            /// Solves M X = B; returns X, column by column.
             ///
-            /// B: a matrix of as many rows as M has.
+            /// B: a matrix with as many rows as M.
             #[pyo3(signature = (B, out=None))]
             fn solve_matrix<'py>(
                 &self,
@@ -90,7 +93,7 @@ macro_rules! factor {
                 X.give(py, out)
             }
 
-            /// The inverse M⁻¹, both triangles filled.
+            /// Returns the inverse M⁻¹, both triangles filled.
             #[pyo3(signature = (out=None))]
             fn inverse<'py>(
                 &self,
@@ -108,14 +111,14 @@ macro_rules! factor {
 }
 
 factor! {
-/// The factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
+/// A factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
 /// diagonal.
 ///
-/// With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
-/// `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
+/// With depth d of the tree (columns on the path to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
+/// `inverse` O(n² d); for a chain d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
 /// matrix for branched kinematic trees (2005).
 ///
-/// model: the robot whose zeros M has.
+/// model: the robot, which defines the zeros of M.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> M = condyle.crba(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -138,7 +141,7 @@ Ltdl {
         self.inner.nonzeros()
     }
 
-    /// The coordinates in their order from the root to the tips: they are eliminated last to first.
+    /// The coordinates in their order from the root to the tips; they are eliminated in reverse order.
     ///
     /// It is 0, 1, 2, … unless joints share coordinates.
     #[getter]
@@ -146,7 +149,8 @@ Ltdl {
         self.inner.order().to_vec()
     }
 
-    /// Row k of L in the `order`, entry by entry from the diagonal's left to the root: (place, value).
+    /// Returns the off-diagonal entries of row k of L, from the diagonal to the root, as (index, value). Both indices
+    /// count in `order`.
     fn row(&self, k: usize) -> PyResult<Vec<(usize, f64)>> {
         if k >= self.size {
             return Err(PyIndexError::new_err(format!("k: expected less than {}, found {k}", self.size)));
@@ -154,7 +158,7 @@ Ltdl {
         Ok(self.factor()?.row(k).collect())
     }
 
-    /// The diagonal D, in the `order` of the places.
+    /// The diagonal D, in the `order` of the coordinates.
     #[getter]
     fn diagonal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.factor()?.diagonal().collect::<Vec<_>>().give(py, None)
@@ -165,10 +169,10 @@ Ltdl {
 factor! {
 /// The factor M = L Lᵀ of any symmetric positive definite matrix.
 ///
-/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
+/// `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same methods
 /// and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
 ///
-/// n: the rows of M, at most 4096.
+/// n: the number of rows of M, at most 4096.
 ///
 /// >>> factor = condyle.Cholesky(2)
 /// >>> factor.factorize([[4.0, 2.0], [2.0, 5.0]])
@@ -191,14 +195,14 @@ Cholesky {
 
 /// Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
 ///
-/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
-/// a join of two pieces costs some six times as much as the elimination of a body. With two threads, and as many runs
-/// as threads, it is faster than `aba` from some 200 bodies on; with one thread it never is. With joints that share
-/// coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
-/// The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
-/// algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
+/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps, but
+/// joining two pieces costs about six times as much as eliminating a body. With two threads, and as many runs as
+/// threads, it is faster than `aba` from about 200 bodies on; with one thread it is always slower. With joints that
+/// share coordinates (mimic), the passes run once for the robot with all joints free, and once more for each of these
+/// joints. The results are bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer
+/// articulated-body algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
 ///
-/// model: the robot; grain: the greatest number of bodies in a run.
+/// model: the robot; grain: the maximum number of bodies in a run.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> divided = condyle.DivideConquer(arm, grain=1)
@@ -224,13 +228,13 @@ impl DivideConquer {
         }
     }
 
-    /// The robot's name, and how many runs of bodies there are.
+    /// Returns the robot's name, and the numbers of bodies and runs.
     fn __repr__(&self) -> String {
         let size = self.inner.size();
         format!("<condyle.DivideConquer of '{}': {} bodies in {} runs>", self.made_for.name, size.bodies, size.runs)
     }
 
-    /// The work of the assembly, and its number of levels that wait for one another, as `AssemblySize`.
+    /// The work of the assembly, and the number of its levels, which run one after the other, as `AssemblySize`.
     #[getter]
     fn size<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let s = self.inner.size();
@@ -238,9 +242,9 @@ impl DivideConquer {
         class!(py, "AssemblySize")?.call1(numbers)
     }
 
-    /// The acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
+    /// Computes the acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
     ///
-    /// model: the one that was planned for, or another one of the same bodies and joints; q: nq numbers; v, tau: nv;
+    /// model: the planned model, or another one with the same bodies and joints; q: nq numbers; v, tau: nv;
     /// f_ext: as for `rnea`.
     #[pyo3(signature = (model, q, v, tau, f_ext=None, out=None))]
     fn aba<'py>(

@@ -1,6 +1,6 @@
-//! How Python calls the library's functions: what an argument may be, and what all calls have in common.
+//! Calls of the library's functions from Python: kinds of arguments, and the parts that all calls have in common.
 //!
-//! `functions!` makes a Python function of a declaration like
+//! `functions!` makes a Python function from a declaration such as
 //!
 //! ```text
 //! /// The docstring.
@@ -9,19 +9,21 @@
 //! }
 //! ```
 //!
-//! Each argument is of a kind, a type below that says how it is read; the last expression is what Python gets, an
-//! array or a tuple of arrays, or with `out` what was given as such. Scratch other than `data` stands after it, with its
-//! type. The call takes its scratch before it looks at any other argument, so that a second use of the same one, from
-//! wherever, is an error; it has done with its inputs before it writes to `out`, which may be one of them. Positions,
-//! tangent vectors and forces may be given for many states, with one axis more: then so are the results, see `batch.rs`. A line
+//! Each argument has a kind, a type below that defines how it is read. The last expression is the result for Python: an
+//! array or a tuple of arrays, or `out` if it is given. Scratch memory other than `data` is declared after it, with its
+//! type. The call borrows its scratch memory before it inspects any other argument, so that nested use of the same
+//! memory is an error. It reads all inputs before it writes to `out`, which may be one of them. Positions, tangent
+//! vectors and forces may be given for many states, with one more axis; the results then have it too, see `batch.rs`. A
+//! line
 //!
 //! ```text
 //! batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea(model, q, v, a, f_ext) }
 //! ```
 //!
-//! says how many states are computed: which check the robot must pass, the arguments, after a semicolon those that all states
-//! share, what kind of results there are, and the call of the library's `Batch`; `batch b, constraints: …` has constraints. A
-//! function without `Data` has a line of `each` instead, with the sizes of its result, and is called state after state.
+//! defines the computation for many states: the check that the robot must pass; the arguments, with those shared by all
+//! states after a semicolon; the kind of result; and the call of the library's `Batch`. `batch b, constraints: …` adds
+//! constraints. A function without `Data` has a line `each` instead, with the shape of its result; it is called state
+//! by state.
 
 use crate::arrays::{self, Number};
 use crate::batch::{self, Look};
@@ -38,33 +40,35 @@ use std::ops::Range;
 
 /// A kind of argument.
 pub(crate) trait Argument<'a, 'py> {
-    /// The value that Python gives.
+    /// The value that Python passes.
     type Given;
     /// The value that the library takes.
     type Read<S: Number>;
     /// The value that the library takes for many states.
     type All;
-    /// Reads the argument if it is of the simplest form for a single state, a double array in C order, or a word, so that nothing
-    /// written in Python runs; none if it is anything else, or wrong.
+    /// Reads the argument if it has the simplest form for a single state: a double array in C order, or a word. Then no
+    /// Python code runs. Returns `None` if it has another form or is invalid.
     fn at_once(_given: &Self::Given, _model: &Model) -> Option<Self::Read<f64>> {
         None
     }
-    /// Reads the argument of this name of a function of this model.
+    /// Reads the argument `name` of a function of this model.
     fn read(name: &str, given: Self::Given, model: &Model) -> PyResult<Self::Read<f64>> {
         Self::read_at(name, &given, model, None)
     }
-    /// Reads the argument for one of many states, if it is given for many, and for any kind of number.
+    /// Reads the argument for a single state, or for state `state` if it is given for many states; for any type of
+    /// number.
     fn read_at<S: Number>(
         name: &str,
         given: &Self::Given,
         model: &Model,
         state: Option<usize>,
     ) -> PyResult<Self::Read<S>>;
-    /// Looks at the argument before anything is read.
+    /// Inspects the argument before anything is read.
     fn look(_name: &str, _given: &Self::Given, _model: &Model) -> PyResult<Look> {
         Ok(Look::default())
     }
-    /// Reads the argument for so many states; as a copy, if results are written where it lies before all are computed.
+    /// Reads the argument for all states. Copies it if results are written to its memory before all states are
+    /// computed.
     fn read_all(
         name: &str,
         given: &Self::Given,
@@ -74,7 +78,7 @@ pub(crate) trait Argument<'a, 'py> {
     ) -> PyResult<Self::All>;
 }
 
-/// An argument of a call, and its numbers if it could be read at once.
+/// An argument of a call, and its numbers if `at_once` could read it.
 pub(crate) struct Given<'a, 'py: 'a, K: Argument<'a, 'py>> {
     pub(crate) given: K::Given,
     read: Option<K::Read<f64>>,
@@ -87,15 +91,16 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
         Self { given, read }
     }
 
-    /// Whether it was read.
+    /// Returns whether `at_once` read it.
     #[inline(always)]
     pub(crate) fn is_read(&self) -> bool {
         self.read.is_some()
     }
 
-    /// The doubles (S) for one of many states, or for the only one; `at_once` if all arguments could be read at once.
+    /// Returns the doubles (S) for one of many states, or for the only one; `at_once` is true if all arguments were
+    /// read at once.
     #[inline(always)]
-    #[allow(clippy::extra_unused_type_parameters)] // it is called as `duals` is
+    #[allow(clippy::extra_unused_type_parameters)] // has the type parameter of `duals`
     pub(crate) fn numbers<S>(
         &mut self,
         name: &str,
@@ -109,7 +114,7 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
         }
     }
 
-    /// The numbers as hyper-dual ones.
+    /// Returns the numbers as hyper-dual numbers.
     pub(crate) fn duals<S: Number>(
         &mut self,
         name: &str,
@@ -121,7 +126,7 @@ impl<'a, 'py: 'a, K: Argument<'a, 'py>> Given<'a, 'py, K> {
     }
 }
 
-/// Kinds of argument that are one vector a state, with the length of the vector.
+/// Defines kinds of argument that are one vector per state, with the length of the vector.
 macro_rules! vectors {
     ($($(#[$doc:meta])* $kind:ident: $length:ident),*) => {$(
         $(#[$doc])*
@@ -243,7 +248,7 @@ impl<'a, 'py: 'a> Argument<'a, 'py> for Forces {
     }
 }
 
-/// Kinds of argument that all states share, with what reads one.
+/// Defines kinds of argument that all states share, with the function that reads one.
 macro_rules! shared {
     ($(
         $(#[$doc:meta])*
@@ -283,19 +288,19 @@ macro_rules! shared {
     )*};
 }
 shared! {
-    /// Tangent vectors side by side: a matrix of nv rows.
+    /// Tangent vectors as columns: a matrix of nv rows.
     Tangents<S>: &'a Bound<'py, PyAny> => DMatrix<S> { |name, given, model| rows(name, given, model.nv()),
         dual if |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
-    /// The name or number of a frame.
+    /// The name or index of a frame.
     FrameOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| frame_index(model, given), at once if is_plain }
 
-    /// The name of a joint or the number of a body.
+    /// The name of a joint or the index of a body.
     BodyOf<S>: &'a Bound<'py, PyAny> => usize { |_, given, model| {
         body_index("body: expected a joint's name", model, given, 0)
     }, at once if is_plain }
 
-    /// The axes and the point of a motion: a word.
+    /// The reference frame (axes and point) of a motion: a word.
     Reference<S>: &'a str => ReferenceFrame { |name, given, _| match *given {
         "local" => Ok(ReferenceFrame::Local),
         "world" => Ok(ReferenceFrame::World),
@@ -312,7 +317,7 @@ shared! {
         Some(other) => Err(wrong_word(name, "None, 'aba', 'dense' or 'sparse'", other)),
     }, at once if |_| true }
 
-    /// An input of the dynamics beside q, v, a and τ: a word, or a word with a body or a number.
+    /// An input of the dynamics other than q, v, a and τ: a word, or a word with a body or a number.
     InputOf<S>: &'a Bound<'py, PyAny> => condyle::derivatives::Input { |name, given, model| {
         use condyle::derivatives::Input;
         if let Ok((word, of)) = given.extract::<(String, Bound<'py, PyAny>)>() {
@@ -339,25 +344,25 @@ shared! {
     Real<S>: &'a Bound<'py, PyAny> => S { |name, given, _| S::read_one(name, given),
         dual if |given: &&Bound<'_, PyAny>| hyper_dual::within(given) }
 
-    /// A point: three numbers that belong to no state.
+    /// A point: three numbers, the same for all states.
     Point<S>: &'a Bound<'py, PyAny> => condyle::Vec3<f64> { |name, given, _| crate::arrays::three(name, given) }
 
-    /// A number that belongs to no state.
+    /// A number, the same for all states.
     Coefficient<S>: f64 => f64 { |_, given, _| Ok(*given), at once if |_| true }
 
     /// A positive speed.
     Speed<S>: f64 => f64 { |name, given, _| positive_speed(name, *given) }
 
-    /// A word, which the function itself understands.
+    /// A word, which the function itself interprets.
     Word<S>: &'a str => &'a str { |_, given, _| Ok(*given), at once if |_| true }
 }
 
-/// Whether a name or a number is one of Python's own, which runs nothing when it is read.
+/// Returns whether a name or an index has exactly Python's own type, so that no Python code runs when it is read.
 fn is_plain(given: &&Bound<'_, PyAny>) -> bool {
     given.is_exact_instance_of::<PyString>() || given.is_exact_instance_of::<PyInt>()
 }
 
-/// A number that is checked to be a positive speed.
+/// Checks that a number is a positive speed, and returns it.
 pub(crate) fn positive_speed(name: &str, found: f64) -> PyResult<f64> {
     if found > 0.0 {
         return Ok(found);
@@ -365,19 +370,19 @@ pub(crate) fn positive_speed(name: &str, found: f64) -> PyResult<f64> {
     Err(PyValueError::new_err(format!("{name}: expected a positive speed, found {found}")))
 }
 
-/// A matrix of so many rows and any number of columns.
+/// Reads a matrix with this number of rows and any number of columns.
 pub(crate) fn rows<S: Number>(name: &str, given: &Bound<'_, PyAny>, rows: usize) -> PyResult<DMatrix<S>> {
     let shape = given.py().import("numpy")?.call_method1("shape", (given,));
-    let columns = shape.and_then(|shape| shape.get_item(1)?.extract()).unwrap_or(1); // `read` says what is wrong
+    let columns = shape.and_then(|shape| shape.get_item(1)?.extract()).unwrap_or(1); // `read` reports the error
     Ok(DMatrix::from_row_slice(rows, columns, &S::read::<Ix2>(name, given, &[rows, columns])?))
 }
 
-/// The check of a function that works for every robot.
+/// Accepts every model: the check of a function that works for all robots.
 pub(crate) fn any(_: &Model) -> PyResult<()> {
     Ok(())
 }
 
-/// The check of a function that needs the inverse of the inertia matrix.
+/// Checks that the inertia matrix is invertible, for functions that need its inverse.
 pub(crate) fn regular(model: &Model) -> PyResult<()> {
     match model.warnings().iter().find(|w| matches!(w, condyle::tree::Warning::Singular { .. })) {
         None => Ok(()),
@@ -385,8 +390,7 @@ pub(crate) fn regular(model: &Model) -> PyResult<()> {
     }
 }
 
-/// Declarations of functions of a model, of a `Data` if `data` stands after it, and of other scratch after that; see
-/// above.
+/// Declares functions of a model, of a `Data` if `data` follows it, and of other scratch memory after that; see above.
 macro_rules! functions {
     ($(
         $(#[$doc:meta])*
@@ -416,7 +420,8 @@ macro_rules! functions {
             let $model = &robot.inner;
             let out: Option<&Bound<'py, PyAny>> = None;
             $(let out = out.or($out);)?
-            // most calls are for one state in arrays of doubles; whatever else there is, is looked at before it is read
+            // fast path: most calls are for one state in arrays of doubles; all other arguments are inspected before
+            // they are read
             $(let mut $arg = kinds::Given::<kinds::$kind>::new($arg, $model);)*
             let at_once = true $(&& $arg.is_read())*;
             let (dual, states) = if at_once { (false, None) } else {
@@ -449,7 +454,7 @@ macro_rules! functions {
                     $one
                 });
             })?
-            // the same source for doubles and for hyper-dual numbers
+            // one body of code for doubles and for hyper-dual numbers
             macro_rules! call {
                 ($S:ty, $read:ident, $state:expr, $to:expr) => {{
                     $(

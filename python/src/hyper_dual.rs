@@ -1,4 +1,4 @@
-//! Hyper-dual numbers as Python objects, which NumPy's arrays of objects calculate with.
+//! Hyper-dual numbers as Python objects, which NumPy stores in arrays of objects.
 
 use crate::arrays::{Give, Number, check_shape};
 use condyle::Scalar;
@@ -10,33 +10,33 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// The hyper-dual number that the library computes with. Its operations are called, not inlined: a model's functions have
-/// thousands of them, and what takes time is Python's making and reading of each number.
+/// A hyper-dual number for the library's computations. Its operations are function calls, not inlined: a model's
+/// functions contain thousands of them, and the time goes into creating and reading the Python objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hyper(HyperDual64);
 
 impl Hyper {
-    /// A number that changes in the first direction at the rate 1.
+    /// Returns a number that changes in the first direction at the rate 1.
     pub(crate) fn first(x: f64) -> Self {
         Self(HyperDual64::new(x, 1.0, 0.0, 0.0))
     }
-    /// A number that changes in the second direction at the rate 1.
+    /// Returns a number that changes in the second direction at the rate 1.
     pub(crate) fn second(x: f64) -> Self {
         Self(HyperDual64::new(x, 0.0, 1.0, 0.0))
     }
-    /// A number that changes in both directions at some rates.
+    /// Returns a number that changes in the two directions at the given rates.
     pub(crate) fn with(x: f64, [first, second]: [f64; 2]) -> Self {
         Self(HyperDual64::new(x, first, second, 0.0))
     }
-    /// The number itself.
+    /// Returns the number without derivatives.
     pub(crate) fn value(self) -> f64 {
         self.0.re
     }
-    /// The second derivative by both directions.
+    /// Returns the mixed second derivative in the two directions.
     pub(crate) fn curvature(self) -> f64 {
         self.0.eps1eps2
     }
-    /// The derivatives in both directions.
+    /// Returns the derivatives in the two directions.
     pub(crate) fn slopes(self) -> [f64; 2] {
         [self.0.eps1, self.0.eps2]
     }
@@ -110,12 +110,12 @@ impl Scalar for Hyper {
     }
 }
 
-/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0: it knows its derivatives in two
-/// directions, and the second derivative by both.
+/// A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. It carries its derivatives in two
+/// directions, and the mixed second derivative.
 ///
-/// Arrays of them are NumPy arrays of objects; arithmetic and NumPy's elementary functions work on these, and so do
-/// all functions of a model and a state, which then return such arrays. Comparisons look at `re`. `condyle.jacobian`,
-/// `gradient` and `hessian` make them and read the derivatives.
+/// Store them in NumPy arrays of objects. Arithmetic and NumPy's elementary functions work on these, and so do all
+/// functions of a model and a state, which then return such arrays. Comparisons use `re`. `condyle.jacobian`,
+/// `gradient` and `hessian` create these numbers and read the derivatives.
 ///
 /// Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
 ///
@@ -126,7 +126,8 @@ impl Scalar for Hyper {
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct HyperDual(HyperDual64);
 
-/// The other number of an operation: hyper-dual or real. It is no array: an array has operations of its own.
+/// The other operand of an operation: a hyper-dual or real number. Arrays are not accepted, since NumPy handles their
+/// operations.
 pub(crate) struct Operand(HyperDual64);
 
 impl<'py> FromPyObject<'_, 'py> for Operand {
@@ -165,7 +166,7 @@ impl HyperDual {
     fn eps2(&self) -> f64 {
         self.0.eps2
     }
-    /// The second derivative by both.
+    /// The mixed second derivative.
     #[getter]
     fn eps1eps2(&self) -> f64 {
         self.0.eps1eps2
@@ -175,7 +176,7 @@ impl HyperDual {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = self.0;
         format!("HyperDual({re}, eps1={eps1}, eps2={eps2}, eps1eps2={eps1eps2})")
     }
-    /// The parts of a pickle.
+    /// Returns the parts of a pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let HyperDual64 { re, eps1, eps2, eps1eps2, .. } = slf.get().0;
         Ok((slf.get_type(), (re, eps1, eps2, eps1eps2)).into_pyobject(slf.py())?.into_any())
@@ -226,115 +227,115 @@ impl HyperDual {
         Self(Scalar::abs(self.0))
     }
     fn __richcmp__(&self, other: Operand, by: CompareOp) -> bool {
-        let order = self.0.re.partial_cmp(&other.0.re); // none beside NaN
+        let order = self.0.re.partial_cmp(&other.0.re); // `None` if one is NaN
         order.map_or(matches!(by, CompareOp::Ne), |order| by.matches(order))
     }
     fn __bool__(&self) -> bool {
         self.0.re != 0.0
     }
 
-    /// The angle of the point (x, self) in the plane.
+    /// Returns the angle of the point (x, self) in the plane.
     fn arctan2(&self, x: Operand) -> Self {
         Self(Scalar::atan2(self.0, x.0))
     }
-    /// The hypotenuse √(self² + other²).
+    /// Returns the hypotenuse √(self² + other²).
     fn hypot(&self, other: Operand) -> Self {
         Self(DualNum::sqrt(&(self.0 * self.0 + other.0 * other.0)))
     }
-    /// The absolute value of self.
+    /// Returns the absolute value of self.
     fn fabs(&self) -> Self {
         self.__abs__()
     }
 
     // elementary functions, by NumPy's names
 
-    /// The square root of self.
+    /// Returns the square root of self.
     fn sqrt(&self) -> Self {
         Self(DualNum::sqrt(&self.0))
     }
-    /// The cubic root of self.
+    /// Returns the cubic root of self.
     fn cbrt(&self) -> Self {
         Self(DualNum::cbrt(&self.0))
     }
-    /// The exponential of self, e to the power of self.
+    /// Returns the exponential of self, e to the power of self.
     fn exp(&self) -> Self {
         Self(DualNum::exp(&self.0))
     }
-    /// The power of 2 with exponent self.
+    /// Returns the power of 2 with exponent self.
     fn exp2(&self) -> Self {
         Self(DualNum::exp2(&self.0))
     }
-    /// The exponential of self, minus 1.
+    /// Returns the exponential of self, minus 1.
     fn expm1(&self) -> Self {
         Self(DualNum::exp_m1(&self.0))
     }
-    /// The natural logarithm of self.
+    /// Returns the natural logarithm of self.
     fn log(&self) -> Self {
         Self(DualNum::ln(&self.0))
     }
-    /// The logarithm of self to the base 2.
+    /// Returns the logarithm of self to the base 2.
     fn log2(&self) -> Self {
         Self(DualNum::log2(&self.0))
     }
-    /// The logarithm of self to the base 10.
+    /// Returns the logarithm of self to the base 10.
     fn log10(&self) -> Self {
         Self(DualNum::log10(&self.0))
     }
-    /// The natural logarithm of 1 + self.
+    /// Returns the natural logarithm of 1 + self.
     fn log1p(&self) -> Self {
         Self(DualNum::ln_1p(&self.0))
     }
-    /// The sine of self.
+    /// Returns the sine of self.
     fn sin(&self) -> Self {
         Self(DualNum::sin(&self.0))
     }
-    /// The cosine of self.
+    /// Returns the cosine of self.
     fn cos(&self) -> Self {
         Self(DualNum::cos(&self.0))
     }
-    /// The tangent of self.
+    /// Returns the tangent of self.
     fn tan(&self) -> Self {
         Self(DualNum::tan(&self.0))
     }
-    /// The angle whose sine is self.
+    /// Returns the angle whose sine is self.
     fn arcsin(&self) -> Self {
         Self(DualNum::asin(&self.0))
     }
-    /// The angle whose cosine is self.
+    /// Returns the angle whose cosine is self.
     fn arccos(&self) -> Self {
         Self(DualNum::acos(&self.0))
     }
-    /// The angle whose tangent is self.
+    /// Returns the angle whose tangent is self.
     fn arctan(&self) -> Self {
         Self(DualNum::atan(&self.0))
     }
-    /// The hyperbolic sine of self.
+    /// Returns the hyperbolic sine of self.
     fn sinh(&self) -> Self {
         Self(DualNum::sinh(&self.0))
     }
-    /// The hyperbolic cosine of self.
+    /// Returns the hyperbolic cosine of self.
     fn cosh(&self) -> Self {
         Self(DualNum::cosh(&self.0))
     }
-    /// The hyperbolic tangent of self.
+    /// Returns the hyperbolic tangent of self.
     fn tanh(&self) -> Self {
         Self(DualNum::tanh(&self.0))
     }
-    /// The number whose hyperbolic sine is self.
+    /// Returns the number whose hyperbolic sine is self.
     fn arcsinh(&self) -> Self {
         Self(DualNum::asinh(&self.0))
     }
-    /// The number whose hyperbolic cosine is self.
+    /// Returns the number whose hyperbolic cosine is self.
     fn arccosh(&self) -> Self {
         Self(DualNum::acosh(&self.0))
     }
-    /// The number whose hyperbolic tangent is self.
+    /// Returns the number whose hyperbolic tangent is self.
     fn arctanh(&self) -> Self {
         Self(DualNum::atanh(&self.0))
     }
 }
 
-/// Whether an argument contains a hyper-dual number.
+/// Returns whether an argument contains a hyper-dual number.
 pub(crate) fn within(given: &Bound<'_, PyAny>) -> bool {
     if given.cast::<PyUntypedArray>().is_ok_and(|array| array.dtype().kind() != b'O') {
         return false;

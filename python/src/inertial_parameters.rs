@@ -1,16 +1,16 @@
-//! The ten inertial parameters of a body as Python sees them: the module `condyle.inertial_parameters`.
+//! The ten inertial parameters of a body in Python: the module `condyle.inertial_parameters`.
 
 use crate::arrays::{Give, array, class, matrix, read_only, three};
 use crate::exceptions::NotPhysicalError;
 use condyle::{Inertia, Sym3, Vec3, regressors::inertial_parameters as rust, spatial::Mat3};
 use pyo3::prelude::*;
 
-/// An inertia as Python sees it.
+/// Converts an inertia to a Python object.
 fn give_inertia<'py>(py: Python<'py>, I: Inertia<f64>) -> PyResult<Bound<'py, PyAny>> {
     inertia_of(py, I, |x| x.give(py, None), |X| X.give(py, None))
 }
 
-/// The inertia of a model's body, in arrays that nobody can write to.
+/// Converts the inertia of a model's body to a Python object with read-only arrays.
 pub(crate) fn model_inertia<'py>(py: Python<'py>, I: Inertia<f64>) -> PyResult<Bound<'py, PyAny>> {
     let instead = "with_inertias";
     inertia_of(py, I, |x| read_only(py, &x, instead), |X| read_only(py, &X, instead))
@@ -23,15 +23,15 @@ fn inertia_of<'py>(
     matrix: impl Fn(Mat3<f64>) -> PyResult<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
-    // Ī = I_c − m [c]ₓ[c]ₓ, so I_c is what is left of Ī when that is taken away
+    // Ī = I_c − m [c]ₓ[c]ₓ, so I_c = Ī − (−m [c]ₓ[c]ₓ)
     let point_mass = Inertia::from_com(I.mass, com, Sym3::zero());
     let about_com = I.rotational - point_mass.rotational;
     let class = class!(py, "condyle._inertia", "Inertia")?;
     class.call1((I.mass, vector(com)?, matrix(about_com.full())?, matrix(I.rotational.full())?))
 }
 
-/// An inertia that Python gives: mass, centre of mass, and the rotational inertia about the origin, of which the lower
-/// triangle is read.
+/// Reads an inertia from Python: mass, centre of mass, and the lower triangle of the rotational inertia about the
+/// origin.
 pub(crate) fn read_inertia(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Inertia<f64>> {
     let get = |name: &str| Ok::<_, PyErr>((format!("{argument}.{name}"), value.getattr(name)?));
     let mass: f64 = value.getattr("mass")?.extract()?;
@@ -45,8 +45,8 @@ fn refused(error: rust::NotPhysical) -> PyErr {
     NotPhysicalError::new_err(error.to_string())
 }
 
-/// The ten parameters π of an `Inertia`: mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
-/// inertia about the origin, 10 numbers.
+/// Returns the ten parameters π of an `Inertia`, 10 numbers: mass, mass times centre of mass, and xx, xy, yy, xz, yz,
+/// zz of the rotational inertia about the origin.
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> I = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
@@ -57,7 +57,7 @@ pub(crate) fn from_inertia<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound<'
     rust::from_inertia(read_inertia("inertia", inertia)?).give(inertia.py(), None)
 }
 
-/// The `Inertia` with the ten parameters π; the inverse of `from_inertia`.
+/// Returns the `Inertia` with the ten parameters π; the inverse of `from_inertia`.
 ///
 /// pi: 10 numbers.
 #[pyfunction]
@@ -65,12 +65,12 @@ pub(crate) fn to_inertia<'py>(pi: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyA
     give_inertia(pi.py(), rust::to_inertia(array("pi", pi)?))
 }
 
-/// The pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and
-/// kg.
+/// Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m²,
+/// kg m and kg.
 ///
-/// Linear in the parameters; positive definite if and only if a body of positive density can have this inertia. Source:
-/// Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter identification
-/// (2018).
+/// J is linear in the parameters. It is positive definite if and only if a body of positive density can have this
+/// inertia. Source: Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter
+/// identification (2018).
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> J = inertial_parameters.pseudo_inertia(condyle.robots.arm7().inertias[3])
@@ -81,9 +81,9 @@ pub(crate) fn pseudo_inertia<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound
     rust::pseudo_inertia(read_inertia("inertia", inertia)?).give(inertia.py(), None)
 }
 
-/// A check that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
+/// Checks that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
 ///
-/// Point masses, rods and plates are at the border, without volume, and are refused.
+/// Point masses, rods and plates have no volume; they lie on the boundary, and are refused.
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
@@ -95,13 +95,13 @@ pub(crate) fn check(inertia: &Bound<'_, PyAny>) -> PyResult<()> {
     rust::check(read_inertia("inertia", inertia)?).map_err(refused)
 }
 
-/// The log-Cholesky parameters θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃) of a physical inertia. Any ten numbers
-/// are those of exactly one physical inertia.
+/// Returns the log-Cholesky parameters θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃) of a physical inertia. Every
+/// vector of ten numbers belongs to exactly one physical inertia.
 ///
-/// α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). With them an identification needs no
-/// constraints. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
+/// α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). They make identification an unconstrained
+/// problem. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
 ///
-/// Raises `NotPhysicalError`.
+/// Raises `NotPhysicalError` for an inertia that is not physical.
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> pi = condyle.robots.arm7().inertial_parameters[:10]
@@ -113,7 +113,8 @@ pub(crate) fn log_cholesky<'py>(inertia: &Bound<'py, PyAny>) -> PyResult<Bound<'
     rust::log_cholesky(read_inertia("inertia", inertia)?).map_err(refused)?.give(inertia.py(), None)
 }
 
-/// The `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of `log_cholesky`.
+/// Returns the `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of
+/// `log_cholesky`.
 ///
 /// theta: 10 numbers; α within ±32 and dᵢ within ±64.
 #[pyfunction]
@@ -121,9 +122,10 @@ pub(crate) fn from_log_cholesky<'py>(theta: &Bound<'py, PyAny>) -> PyResult<Boun
     give_inertia(theta.py(), rust::from_log_cholesky(array("theta", theta)?))
 }
 
-/// The Jacobian ∂π/∂θ of the ten parameters by the log-Cholesky parameters, (10, 10), never singular.
+/// Returns the Jacobian ∂π/∂θ of the ten parameters with respect to the log-Cholesky parameters, (10, 10), never
+/// singular.
 ///
-/// theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the slope of the efforts in θ.
+/// theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the derivative of the efforts with respect to θ.
 ///
 /// >>> from condyle import inertial_parameters
 /// >>> inertial_parameters.log_cholesky_jacobian(np.zeros(10))[0, 0].item()  # m = e²ᵅ

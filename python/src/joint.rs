@@ -1,4 +1,4 @@
-//! Joints as Python sees them, and the words for them.
+//! Joints in Python, and the words for their kinds.
 
 use crate::arrays::{Give, three};
 use crate::exceptions::wrong_word;
@@ -6,7 +6,7 @@ use condyle::Vec3;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// The kind of a joint, with its axis and pitch where it has them.
+/// The kind of a joint, with its axis and pitch if it has them.
 ///
 /// | | q | v |
 /// | --- | --- | --- |
@@ -17,7 +17,7 @@ use pyo3::types::PyTuple;
 /// | `translation` | 3 | 3 |
 /// | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
 ///
-/// An axis is a vector in the body's frame, of any length but 0.
+/// An axis is a vector in the body's frame, of any nonzero length.
 ///
 /// >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
 /// 1
@@ -26,50 +26,50 @@ pub(crate) struct Joint(pub(crate) condyle::Joint);
 
 #[pymethods]
 impl Joint {
-    /// A joint with one angle about an axis: q = [θ], v = [θ̇].
+    /// Returns a joint with one angle about an axis: q = [θ], v = [θ̇].
     #[staticmethod]
     fn revolute(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(condyle::Joint::Revolute { axis: three("axis", axis)? }))
     }
 
-    /// A joint with one angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇].
+    /// Returns a joint with one angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇].
     #[staticmethod]
     fn continuous(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(condyle::Joint::Continuous { axis: three("axis", axis)? }))
     }
 
-    /// A joint with one length along an axis: q = [d], v = [ḋ].
+    /// Returns a joint with one length along an axis: q = [d], v = [ḋ].
     #[staticmethod]
     fn prismatic(axis: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(condyle::Joint::Prismatic { axis: three("axis", axis)? }))
     }
 
-    /// A screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it.
+    /// Returns a screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis per radian about it.
     #[staticmethod]
     fn helical(axis: &Bound<'_, PyAny>, pitch: f64) -> PyResult<Self> {
         Ok(Self(condyle::Joint::Helical { axis: three("axis", axis)?, pitch }))
     }
 
-    /// A ball joint: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
+    /// Returns a ball joint: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
     #[staticmethod]
     fn spherical() -> Self {
         Self(condyle::Joint::Spherical)
     }
 
-    /// A joint that moves in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇].
+    /// Returns a joint that moves in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇].
     #[staticmethod]
     fn planar() -> Self {
         Self(condyle::Joint::Planar)
     }
 
-    /// A joint with three lengths: q = [x, y, z], v = q̇.
+    /// Returns a joint with three lengths: q = [x, y, z], v = q̇.
     #[staticmethod]
     fn translation() -> Self {
         Self(condyle::Joint::Translation)
     }
 
-    /// A joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's
-    /// frame.
+    /// Returns a joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the
+    /// body's frame.
     #[staticmethod]
     fn free_flyer() -> Self {
         Self(condyle::Joint::FreeFlyer)
@@ -81,7 +81,7 @@ impl Joint {
         self.0.nq()
     }
 
-    /// The number of its degrees of freedom: of the numbers in its velocity.
+    /// The number of its degrees of freedom, which is the number of its coordinates in v.
     #[getter]
     fn nv(&self) -> usize {
         self.0.nv()
@@ -93,19 +93,19 @@ impl Joint {
         self.0.axis().map(|axis| axis.give(py, None)).transpose()
     }
 
-    /// The metres along the axis for each radian about it; None if the joint is no screw.
+    /// The metres along the axis per radian about it; None unless the joint is helical.
     #[getter]
     fn pitch(&self) -> Option<f64> {
         if let condyle::Joint::Helical { pitch, .. } = self.0 { Some(pitch) } else { None }
     }
 
-    /// The kind and the axis.
+    /// Returns the kind and the axis as text.
     fn __repr__(&self) -> String {
         let axis = self.0.axis().map_or(String::new(), |a| format!(" about or along {:?}", a.to_array()));
         format!("<condyle.Joint {}{axis}>", kind(self.0))
     }
 
-    /// The parts of a pickle.
+    /// Returns the parts of a pickle.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, joint) = (slf.py(), slf.get().0);
         let axis = joint.axis().map(Vec3::to_array);
@@ -118,7 +118,7 @@ impl Joint {
     }
 }
 
-/// The word for the kind of a joint.
+/// Returns the word for the kind of a joint.
 pub(crate) fn kind(joint: condyle::Joint) -> &'static str {
     match joint {
         condyle::Joint::Revolute { .. } => "revolute",
@@ -133,7 +133,7 @@ pub(crate) fn kind(joint: condyle::Joint) -> &'static str {
     }
 }
 
-/// The joint between the world and a root link.
+/// Returns the joint between the world and a root link.
 pub(crate) fn root(root_joint: Option<&str>) -> PyResult<Option<condyle::Joint>> {
     match root_joint {
         None => Ok(None),

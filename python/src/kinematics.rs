@@ -1,11 +1,11 @@
-//! Places and motions of bodies and frames: the library's functions one to one.
+//! Poses and motions of bodies and frames: one Python function for each function of the library.
 
 use crate::arrays::Computed;
 use crate::functions::{any, functions};
 use pyo3::prelude::*;
 
-/// Declarations of functions of a frame or of a body. Each calls the method of the same name of what a pass gives: the
-/// method returns a motion, or fills matrices of shape (6, nv), and the function returns these.
+/// Declares functions of a frame or of a body. Each calls the method of the same name on the result of a pass. The
+/// method returns a motion, or fills matrices of shape (6, nv), which the function returns.
 macro_rules! motions {
     (@call $model:ident, $motion:expr, $name:ident($of:ident, $reference:ident)) => { $motion.$name($of, $reference) };
     (@call $model:ident, $motion:expr, $name:ident($of:ident, $reference:ident) $($matrix:ident)+) => {{
@@ -33,10 +33,10 @@ macro_rules! motions {
 pub(crate) use motions;
 
 functions! {
-/// The pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
+/// Computes the pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 ///
-/// q: nq numbers. Body i is the one that joint i carries, in the frame that the URDF gives it; body 0 is the world.
-/// A frame's pose is that of its body times its placement: `poses[f.body] @ f.placement`; or see `frame_placement`.
+/// q: nq numbers. Joint i carries body i, whose frame is the one in the URDF; body 0 is the world. The pose of a frame
+/// f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also `frame_placement`.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> data = condyle.Data(quadruped)
@@ -48,10 +48,10 @@ fn forward_kinematics(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.forward_kinematics(model, q) }
 
-/// The pose oXf of a frame in the world: a homogeneous matrix (4, 4) that takes coordinates in the frame to coordinates
-/// in the world; O(n).
+/// Computes the pose oXf of a frame in the world: a homogeneous matrix (4, 4) that maps coordinates in the frame to
+/// coordinates in the world; O(n).
 ///
-/// q: nq numbers; frame: its name or number.
+/// q: nq numbers; frame: its name or index.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
@@ -64,17 +64,17 @@ batch b: any(q: Position; frame: FrameOf) -> One { b.frame_placement(model, q, f
 }
 
 functions! {
-/// The Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
+/// Computes the Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 ///
-/// q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
-/// the body's point at the world's origin, along the world's axes; or 'local_world_aligned', that of the frame's
-/// origin, along the world's axes.
+/// q: nq numbers; frame: its name or index. reference: 'local', the velocity of the frame's origin, along the frame's
+/// axes; 'world', the velocity of the body's point at the world's origin, along the world's axes; or
+/// 'local_world_aligned', the velocity of the frame's origin, along the world's axes.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
 /// (6, 7)
 fn frame_jacobian(model, data; q: Position, frame: FrameOf, reference: Reference = "local"; out) {
-    let _ = data; // only the joints between the frame and the world count
+    let _ = data; // only the joints between the frame and the world are needed
     Computed::new([6, model.nv()], |J| {
         condyle::dynamics::frame_jacobian_strided(model, &q, frame, reference, J, [model.nv(), 1]);
     })
@@ -83,9 +83,9 @@ batch b: any(q: Position; frame: FrameOf, reference: Reference) -> One {
     b.frame_jacobian(model, q, frame, reference)
 }
 
-/// The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
+/// Computes the Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 ///
-/// q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
+/// q: nq numbers; body: its index or its joint's name, 0 being the world; reference: as for `frame_jacobian`, for the
 /// body's own frame.
 ///
 /// >>> arm = condyle.robots.arm7()
@@ -105,10 +105,11 @@ batch b: any(q: Position; body: BodyOf, reference: Reference) -> One {
 }
 
 functions! {
-/// The Jacobian J of a point of a frame, (3, nv): its velocity along the axes of the world is J v (m/s).
+/// Computes the Jacobian J of a point of a frame, (3, nv): the point's velocity along the axes of the world is J v
+/// (m/s).
 ///
-/// q: nq numbers; frame: its name or number; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
-/// the world and S the columns of the joints before it.
+/// q: nq numbers; frame: its name or index; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
+/// the world and S the columns of the joints between the world and the frame.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
@@ -121,7 +122,7 @@ fn frame_point_jacobian(model, data; q: Position, frame: FrameOf, point: Point; 
     J
 }
 
-/// The Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
+/// Computes the Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
 ///
 /// q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
 fn body_point_jacobian(model, data; q: Position, body: BodyOf, point: Point; out) {
@@ -130,15 +131,15 @@ fn body_point_jacobian(model, data; q: Position, body: BodyOf, point: Point; out
     J
 }
 
-/// The velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+/// Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
 ///
-/// q: nq numbers; v: nv; frame: its name or number; point: in the frame, 3 numbers (m).
+/// q: nq numbers; v: nv; frame: its name or index; point: in the frame, 3 numbers (m).
 fn frame_point_velocity(model, data; q: Position, v: Tangent, frame: FrameOf, point: Point; out) {
     condyle::forward_velocities(model, data, &q, &v).frame_point_velocity(frame, point.lift()).to_array()
 }
 
-/// The velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of the body's own
-/// frame.
+/// Computes the velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of
+/// the body's own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
 fn body_point_velocity(model, data; q: Position, v: Tangent, body: BodyOf, point: Point; out) {
@@ -147,10 +148,10 @@ fn body_point_velocity(model, data; q: Position, v: Tangent, body: BodyOf, point
 }
 
 motions! {
-/// The velocity of a frame, 6 numbers: that of the body's point at the origin of the reference (m/s), then the angular
-/// velocity (rad/s); O(n).
+/// Computes the velocity of a frame, 6 numbers: the velocity of the body's point at the origin of the reference (m/s),
+/// then the angular velocity (rad/s); O(n).
 ///
-/// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+/// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
@@ -159,17 +160,17 @@ motions! {
 /// True
 fn frame_velocity(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
-/// The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
-/// velocity as seen from the world, expressed in the reference; O(n).
+/// Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its
+/// spatial velocity as seen from the world, expressed in the reference; O(n).
 ///
-/// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+/// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// The classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the reference
-/// (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the frame's
-/// origin; O(n).
+/// Computes the classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the
+/// reference (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the
+/// frame's origin; O(n).
 ///
-/// q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+/// q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
@@ -180,31 +181,31 @@ fn frame_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v
 /// True
 fn frame_classical_acceleration(frame: FrameOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// The rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
+/// Computes the rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 ///
-/// q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-/// acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
+/// q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`. dJ v + J a is the spatial
+/// acceleration for 'local' and 'world', and the classical one for 'local_world_aligned', whose origin moves with the
 /// frame.
 fn frame_jacobian_rate(frame: FrameOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;
 
-/// The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
+/// Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_velocity(body: BodyOf) after forward_velocities(q: Position, v: Tangent) -> One;
 
-/// The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
-/// own frame; O(n).
+/// Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of
+/// its own frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
-/// frame; O(n).
+/// Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its
+/// own frame; O(n).
 ///
 /// q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_classical_acceleration(body: BodyOf) after forward_accelerations(q: Position, v: Tangent, a: Tangent) -> One;
 
-/// The rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+/// Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
 ///
 /// q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
 fn body_jacobian_rate(body: BodyOf) after forward_velocities(q: Position, v: Tangent) fills (dJ) -> One;

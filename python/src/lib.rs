@@ -1,21 +1,22 @@
 //! The Python package `condyle`: its extension module `condyle._condyle`.
 //!
-//! No module uses one that stands after it here:
-//! - `exceptions`, `signals` and `arrays`: what the package raises, what ends a call that lasts, and NumPy arrays in and
-//!   out; `hyper_dual` numbers;
-//! - `cached`, `joint`, `tree`, `inertial_parameters`, `model`, `robots`, `builder`: robots, what they show of themselves, and how
+//! Each module uses only modules that are listed before it:
+//! - `exceptions`, `signals` and `arrays`: exceptions of the package, interruption of long calls by signals, and NumPy
+//!   arrays as arguments and results; `hyper_dual` numbers;
+//! - `cached`, `joint`, `tree`, `inertial_parameters`, `model`, `robots`, `builder`: robots, their attributes, and how
 //!   they are made;
-//! - `data` and `batch`: what calls compute in, and calls for many states; `functions`: what all calls have in common;
+//! - `data` and `batch`: scratch memory of calls, and calls for many states; `functions`: the parts that all calls have
+//!   in common;
 //! - `algorithms`, `centroidal`, `configuration`, `constrained`, `kinematics`, `derivatives`, `factorisation`,
-//!   `regressors`, `simulation`: the library's functions and types, one to one;
+//!   `regressors`, `simulation`: one Python function or type for each function or type of the library;
 //! - `spelling`: Pinocchio's functions, for the module `condyle.pinocchio`;
 //! - `codegen`: robots as straight-line code, for the module `condyle.codegen`;
 //! - `dlpack`: arrays on devices, for the module `condyle.cuda`;
 //! - `optimal`, `wholebody`: the modules `condyle.optimal` and `condyle.wholebody`.
 //!
-//! The doc comments here are the docstrings that Python sees; `stubs.py` writes them into `condyle/_condyle.pyi`.
+//! The doc comments here are the docstrings in Python; `stubs.py` writes them to `condyle/_condyle.pyi`.
 #![allow(non_snake_case)]
-#![allow(clippy::too_many_arguments)] // a function in Python has as many as it needs
+#![allow(clippy::too_many_arguments)] // Python functions may have many arguments
 
 mod algorithms;
 mod arrays;

@@ -1,15 +1,16 @@
-//! Which robots something may be used with that was made for one.
+//! Checks that an object made for one robot is used only with matching robots.
 
 use crate::model::Model;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// The models that something was made for: one, and all others of the same bodies and joints.
+/// The models with which an object may be used: the model for which it was made, and all models with the same bodies
+/// and joints.
 pub(crate) struct MadeFor {
     structure: u64,
-    /// The hash of the places of joints and frames, where they matter.
+    /// Hash of the placements of joints and frames; `None` if they do not matter.
     geometry: Option<u64>,
-    /// The name of the model that it was made for.
+    /// Name of the model for which the object was made.
     pub(crate) name: String,
 }
 
@@ -18,12 +19,12 @@ impl MadeFor {
         Self { structure: model.structure, geometry: None, name: model.inner.name().to_owned() }
     }
 
-    /// The models of the same bodies and joints whose joints and frames are in the same places.
+    /// Accepts models with the same bodies and joints whose joint and frame placements are also equal.
     pub(crate) fn with_geometry(model: &Model) -> Self {
         Self { geometry: Some(model.inner.geometry_hash()), ..Self::new(model) }
     }
 
-    /// Raises a `ValueError` if the model is another one; `argument` names what was made.
+    /// Raises a `ValueError` if the model does not match; `argument` is the name of the argument with the object.
     pub(crate) fn check(&self, argument: &str, model: &Model) -> PyResult<()> {
         let elsewhere = self.geometry.is_some_and(|geometry| geometry != model.inner.geometry_hash());
         if self.structure == model.structure && !elsewhere {

@@ -1,4 +1,4 @@
-//! A robot as Python sees it: tree, names and frames. Its other methods stand in the children of this module.
+//! A robot in Python: tree, names and frames. The submodules have its other methods.
 
 mod files;
 mod numbers;
@@ -21,9 +21,9 @@ use std::sync::Arc;
 
 /// A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
 ///
-/// Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
-/// Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
-/// pickled.
+/// Body 0 is the world. The other bodies are numbered depth first, parents before children, siblings in the order of
+/// their joints' names, as in Pinocchio. A model is read from a file, built by a `ModelBuilder`, or taken from
+/// `condyle.robots`; it can be pickled.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> arm.nq, arm.nv, arm.names[:3]
@@ -31,7 +31,7 @@ use std::sync::Arc;
 #[pyclass(frozen, module = "condyle")]
 pub(crate) struct Model {
     pub(crate) inner: Arc<condyle::Model>,
-    /// A hash that is equal for models of the same bodies and joints, which can share a `Data`.
+    /// Hash that is equal for models with the same bodies and joints, which can share a `Data`.
     pub(crate) structure: u64,
     cached: Cached,
 }
@@ -46,7 +46,7 @@ impl From<condyle::Model> for Model {
     }
 }
 
-/// The number of a frame that is given by name or by number.
+/// Returns the index of a frame that is given by name or by index.
 pub(crate) fn frame_index(model: &condyle::Model, frame: &Bound<'_, PyAny>) -> PyResult<usize> {
     if let Ok(name) = frame.cast::<PyString>() {
         return model.frame(name.to_str()?).map_err(exception);
@@ -54,7 +54,7 @@ pub(crate) fn frame_index(model: &condyle::Model, frame: &Bound<'_, PyAny>) -> P
     numbered("frame: expected a name", frame, 0, model.frames().len())
 }
 
-/// The number, from `least` on, of a body that is given by its joint's name or by number.
+/// Returns the index, at least `least`, of a body that is given by its joint's name or by index.
 pub(crate) fn body_index(
     expected: &str,
     model: &condyle::Model,
@@ -67,14 +67,14 @@ pub(crate) fn body_index(
     numbered(expected, body, least, model.bodies().len())
 }
 
-/// The members of an argument that is a list of some things.
+/// Returns the items of an argument that is a list; `what` names the items in the error.
 pub(crate) fn members_of<'py>(
     argument: &str,
     what: &str,
     given: &Bound<'py, PyAny>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let wrong = |found: String| PyTypeError::new_err(format!("{argument}: expected a list of {what}, found {found}"));
-    // text is iterable, and so are named tuples such as a single constraint
+    // text is iterable, and so is a named tuple such as a single constraint
     if given.is_instance_of::<PyString>() || given.is_instance_of::<PyBytes>() || given.hasattr("_fields")? {
         let found = given.repr()?;
         return Err(wrong(format!("{found}; write [{found}]")));
@@ -83,7 +83,7 @@ pub(crate) fn members_of<'py>(
     members.collect()
 }
 
-/// An index from `least` to below `count`.
+/// Reads an index from `least` to `count` − 1.
 fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize) -> PyResult<usize> {
     let wrong = |found: String| match count {
         _ if least < count => format!("{expected} or {least} to {}, found {found}", count - 1),
@@ -98,7 +98,7 @@ fn numbered(expected: &str, given: &Bound<'_, PyAny>, least: usize, count: usize
 }
 
 impl Model {
-    /// A number for each joint that has coordinates of its own; 0 for the others.
+    /// Returns a number for each joint that has coordinates of its own, and 0 for the others.
     fn of_joints(&self, get: impl Fn(&condyle::tree::Body) -> usize) -> Vec<usize> {
         let count = |(i, b): (usize, &condyle::tree::Body)| if i > 0 && b.mimic.is_none() { get(b) } else { 0 };
         self.inner.bodies().iter().enumerate().map(count).collect()
@@ -111,10 +111,11 @@ impl Model {
 
 #[pymethods]
 impl Model {
-    /// The warnings about the robot and its file, as `ModelWarning`: text that also has `kind`, `file` and `line`.
+    /// The warnings about the robot and its file, as `ModelWarning`: text with the attributes `kind`, `file` and
+    /// `line`.
     ///
-    /// They tell of inertias and limits that cannot be meant, joints along which the inertia matrix is singular, names in
-    /// the file that are unknown, and what a model cannot hold.
+    /// They report implausible inertias and limits, joints along which the inertia matrix is singular, unknown names in
+    /// the file, and contents that a model cannot represent.
     #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Warnings, || {
@@ -127,7 +128,8 @@ impl Model {
         })
     }
 
-    /// The bodies whose joints make M singular: `aba`, `minv` and `aba_derivatives` raise `ModelError`.
+    /// The bodies whose joints make M singular; for such a model `aba`, `minv` and `aba_derivatives` raise
+    /// `ModelError`.
     #[getter]
     fn singular_joints(&self) -> Vec<usize> {
         self.inner.singular_joints().to_vec()
@@ -145,13 +147,14 @@ impl Model {
         self.inner.nq()
     }
 
-    /// The number of degrees of freedom: of the numbers in v, a, τ and in a tangent vector.
+    /// The number of degrees of freedom, which is the length of v, a, τ and tangent vectors.
     #[getter]
     fn nv(&self) -> usize {
         self.inner.nv()
     }
 
-    /// The number of bodies, the world included: of the rows of f_ext and of the result of `forward_kinematics`.
+    /// The number of bodies, the world included. It is the number of rows of f_ext and of the result of
+    /// `forward_kinematics`.
     #[getter]
     fn nbodies(&self) -> usize {
         self.inner.bodies().len()
@@ -189,19 +192,19 @@ impl Model {
         })
     }
 
-    /// The body on which each joint sits; 0 is the world.
+    /// The parent body of each joint; 0 is the world.
     #[getter]
     fn parents<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Parents, || Ok(self.of_bodies(|b| b.parent)))
     }
 
-    /// The index in q at which each joint's position begins; for a joint that mimics another, that of the other.
+    /// The index in q at which each joint's position begins; for a mimic joint, the index of the joint that it follows.
     #[getter]
     fn idx_qs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::IdxQs, || Ok(self.of_bodies(|b| b.idx_q)))
     }
 
-    /// The index in v at which each joint's velocity begins; for a joint that mimics another, that of the other.
+    /// The index in v at which each joint's velocity begins; for a mimic joint, the index of the joint that it follows.
     #[getter]
     fn idx_vs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::IdxVs, || Ok(self.of_bodies(|b| b.idx_v)))
@@ -220,7 +223,7 @@ impl Model {
         self.cached.list(py, Attribute::Nvs, || Ok(self.of_joints(|b| b.joint.nv())))
     }
 
-    /// The rule by which each joint follows another one, as `Mimic(ratio, offset)`; None for a joint that does not.
+    /// The rule by which each mimic joint follows another one, as `Mimic(ratio, offset)`; None for other joints.
     #[getter]
     fn mimics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Mimics, || {
@@ -230,8 +233,8 @@ impl Model {
         })
     }
 
-    /// The frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the joint's
-    /// and the link's.
+    /// The frames, as `Frame(name, kind, body, placement)`. Each joint of the URDF, also a fixed one, has two: the
+    /// joint's and the link's.
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Frames, || {
@@ -250,22 +253,23 @@ impl Model {
         })
     }
 
-    /// The number of the frame with this name: a link's, else the user's, else a joint's.
+    /// Returns the index of the frame with this name. If frames of several kinds have it, a link's comes first, then
+    /// the user's, then a joint's.
     ///
-    /// Raises `ModelError`, with the nearest name.
+    /// Raises `ModelError`, with the most similar name.
     fn frame(&self, name: &str) -> PyResult<usize> {
         self.inner.frame(name).map_err(exception)
     }
 
-    /// The number of the body that the joint with this name carries.
+    /// Returns the index of the body that the joint with this name carries.
     ///
-    /// Raises `ModelError`, with the nearest name.
+    /// Raises `ModelError`, with the most similar name.
     fn joint(&self, name: &str) -> PyResult<usize> {
         self.inner.joint(name).map_err(exception)
     }
 
-    /// The tree of bodies as text: each joint with its kind and where its coordinates stand in q and v, and the body that it
-    /// carries; frames: whether the names of other frames stand with the bodies.
+    /// Returns the tree of bodies as text: each joint with its kind, its indices in q and v, and the body that it
+    /// carries; frames: whether to add the names of other frames to their bodies.
     ///
     /// >>> print(condyle.robots.quadruped().lock(range(2, 14), condyle.neutral(condyle.robots.quadruped())).tree())
     /// universe
@@ -294,17 +298,17 @@ impl Model {
         format!("<condyle.Model '{}': {} bodies, nq = {}, nv = {}>", m.name(), m.bodies().len() - 1, m.nq(), m.nv())
     }
 
-    /// A table of the joints.
+    /// Returns a table of the joints.
     fn __str__(&self) -> String {
         self.inner.to_string().trim_end().to_owned()
     }
 
-    /// The model itself: it never changes.
+    /// Returns the model itself, since it never changes.
     fn __copy__(slf: Bound<'_, Self>) -> Bound<'_, Self> {
         slf
     }
 
-    /// The model itself: it never changes.
+    /// Returns the model itself, since it never changes.
     fn __deepcopy__<'py>(slf: Bound<'py, Self>, memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
         let _ = memo;
         slf

@@ -1,4 +1,4 @@
-//! Optimal control as Python sees it: the module `condyle.optimal`.
+//! Optimal control in Python: the module `condyle.optimal`.
 
 mod actions;
 mod alone;

@@ -1,5 +1,5 @@
-//! Dynamics and energies as linear functions of the inertial parameters, and passive efforts: the library's functions one to
-//! one.
+//! Dynamics and energies as linear functions of the inertial parameters, and passive efforts: one Python function for
+//! each function of the library.
 
 use crate::arrays::{Give, Number, give_named};
 use crate::functions::{any, functions};
@@ -8,11 +8,11 @@ use nalgebra::DMatrix;
 use pyo3::prelude::*;
 
 functions! {
-/// The joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
+/// Computes the joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
 /// `Model.inertial_parameters`; O(n depth).
 ///
-/// q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a, and for the
-/// linear coordinates of a free joint armature (a + ω × v) in place of armature a.
+/// q: nq numbers; v, a: nv. Each body except the world has ten columns. With rotors τ = Y π + armature a; for the
+/// linear coordinates of a free joint, armature (a + ω × v) replaces armature a.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -24,8 +24,8 @@ fn joint_torque_regressor(model, data; q: Position, v: Tangent, a: Tangent; out)
 }
 batch b: any(q: Position, v: Tangent, a: Tangent) -> One { b.joint_torque_regressor(model, q, v, a) }
 
-/// The kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without the
-/// rotors, as a linear function of `Model.inertial_parameters`; O(n).
+/// Computes the kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without
+/// the rotors, as a linear function of `Model.inertial_parameters`; O(n).
 ///
 /// q: nq numbers; v: nv.
 fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
@@ -33,8 +33,8 @@ fn kinetic_energy_regressor(model, data; q: Position, v: Tangent; out) {
 }
 batch b: any(q: Position, v: Tangent) -> One { b.kinetic_energy_regressor(model, q, v) }
 
-/// The potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a linear
-/// function of `Model.inertial_parameters`; O(n).
+/// Computes the potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a
+/// linear function of `Model.inertial_parameters`; O(n).
 ///
 /// q: nq numbers.
 fn potential_energy_regressor(model, data; q: Position; out) {
@@ -42,12 +42,13 @@ fn potential_energy_regressor(model, data; q: Position; out) {
 }
 batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 
-/// The passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N): damping d, which may be
-/// d₀ + d₁ |v| + d₂ v², smoothed friction f, and what acts by itself in the robot; O(n).
+/// Computes the passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N); O(n). The
+/// damping d may be d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
 ///
 /// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. A spring acts with
-/// −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest (joints of several degrees of freedom: |Δ| in the brackets). The laws are those of MuJoCo's `qfrc_passive`. No other
-/// function adds them: add them to τ where they should act.
+/// −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest position; for joints with several degrees of freedom
+/// the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`. No other function includes
+/// these efforts: add them to τ where needed.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> q, v = np.zeros(7), np.ones(7)
@@ -62,10 +63,10 @@ each(q: Position, v: Tangent; smoothing: Speed) -> [nv] |tau| {
     condyle::terms::passive_torque(model, q, v, smoothing, tau)
 }
 
-/// The derivatives of `passive_torque`, exact, as `PassiveDerivatives(dtau_dq, dtau_dv)`, each (nv, nv).
+/// Computes the exact derivatives of `passive_torque`, as `PassiveDerivatives(dtau_dq, dtau_dv)`, each (nv, nv).
 ///
-/// q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal but for free joints with friction or polynomial
-/// damping; ∂τ/∂q has a block for each spring, and couples joints where gravity is compensated.
+/// q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal, except for free joints with friction or
+/// polynomial damping. ∂τ/∂q has a block for each spring, and couples joints if gravity is compensated.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> d = condyle.passive_torque_derivatives(arm, np.zeros(7), np.ones(7), 1e-3)

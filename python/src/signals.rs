@@ -1,4 +1,4 @@
-//! Signals that come while a call lasts, Ctrl-C above all: Python's handlers run within the call, and what they raise ends it.
+//! Signals during a call, such as Ctrl-C: Python's handlers run within the call, and their exceptions end it.
 
 use crate::arrays::class;
 use condyle::optimal as rust;
@@ -7,30 +7,30 @@ use pyo3::types::PyBool;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-/// How long calls that compute with the interpreter's lock, and batches, go on without looking for signals.
+/// Time between checks for signals, for batches and for calls that keep the interpreter's lock.
 pub(crate) const SHORT: Duration = Duration::from_millis(10);
 
-/// How long solves and simulations go on without looking for signals. To look they must wait for the interpreter's lock,
-/// which another thread that computes in Python gives back after 5 ms.
+/// Time between checks for signals, for solves and simulations. A check must wait for the interpreter's lock, which
+/// another thread that runs Python code releases after 5 ms.
 pub(crate) const LONG: Duration = Duration::from_millis(25);
 
-/// The signals that come while a call lasts.
+/// Checks for signals during a call.
 pub(crate) struct Signals {
     period: Duration,
     looked: Instant,
-    /// Whether the call is on the thread that gets signals; unknown until the first look.
+    /// Whether the call runs on the thread that receives signals; `None` until the first check.
     main: Option<bool>,
-    /// What a handler has raised.
+    /// Exception that a handler has raised.
     raised: Option<PyErr>,
 }
 
 impl Signals {
-    /// A call begins that looks for signals at this period.
+    /// Begins a call that checks for signals at this period.
     pub(crate) fn new(period: Duration) -> Self {
         Self { period, looked: Instant::now(), main: None, raised: None }
     }
 
-    /// Whether it is time to look again.
+    /// Returns whether the next check is due.
     fn is_due(&mut self) -> bool {
         let now = Instant::now();
         let due = self.main != Some(false) && now.duration_since(self.looked) >= self.period;
@@ -40,12 +40,13 @@ impl Signals {
         due
     }
 
-    /// Looks for signals if it is time to; an error is what a handler has raised.
+    /// Checks for signals if a check is due; returns the exception of a handler as an error.
     pub(crate) fn look(&mut self, py: Python<'_>) -> PyResult<()> {
         if self.is_due() { py.check_signals() } else { Ok(()) }
     }
 
-    /// As `look`, in a call that has released the interpreter's lock: says whether to go on, and `finish` what was raised.
+    /// Checks as `look` does, for a call that has released the interpreter's lock. Returns whether to continue;
+    /// `finish` returns the exception.
     pub(crate) fn go_on(&mut self) -> ControlFlow<()> {
         if self.raised.is_some() {
             return ControlFlow::Break(());
@@ -69,20 +70,20 @@ impl Signals {
         }
     }
 
-    /// The call has ended, by itself or because a handler has raised an error.
+    /// Ends the call; returns the exception of a handler, if there is one.
     pub(crate) fn finish(self) -> PyResult<()> {
         self.raised.map_or(Ok(()), Err)
     }
 }
 
-/// What may end a solve: signals, an error of what is written in Python, and who looks at its iterations.
+/// Causes that may end a solve: signals, an error of a Python function, and the observer of its iterations.
 pub(crate) struct Interruptions<'a> {
     pub(crate) signals: Signals,
-    /// Whether there is such an error.
+    /// Returns whether a Python function has failed.
     pub(crate) failed: &'a (dyn Fn() -> bool + Sync),
-    /// A function of each iteration, which ends the solve if it returns False.
+    /// Function called after each iteration; the solve ends if it returns False.
     pub(crate) observer: Option<Py<PyAny>>,
-    /// What it has raised.
+    /// Exception that the observer has raised.
     pub(crate) raised: Option<PyErr>,
 }
 
@@ -110,7 +111,7 @@ impl rust::Observer for &mut Interruptions<'_> {
     }
 }
 
-/// An iteration as Python sees it.
+/// Converts an iteration to a Python object.
 pub(crate) fn record<'py>(py: Python<'py>, i: &rust::Iteration) -> PyResult<Bound<'py, PyAny>> {
     let iteration = class!(py, "Iteration")?;
     iteration.call1((i.iteration, i.cost, i.gap, i.stop, i.step, i.regularisation, i.d1, i.d2, i.feasible, i.accepted))

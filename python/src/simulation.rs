@@ -1,4 +1,4 @@
-//! Robots that move by themselves, as Python sees them: the module `condyle.simulation`.
+//! Forward simulation of robots in Python: the module `condyle.simulation`.
 
 use crate::arrays::{Give, class, found_type, matrix, output, three};
 use crate::exceptions::{exception, wrong_word};
@@ -13,25 +13,26 @@ use pyo3::types::PyTuple;
 use rust::{Ground, Integrator, Settings, State, Status};
 use std::sync::Arc;
 
-/// A simulation of a robot: its state, and the memory to move it on.
+/// A simulation of a robot: its state, and the scratch memory to advance it.
 ///
 /// Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
-/// external forces stay as they are during a step.
+/// external forces are constant during a step.
 ///
-/// model: the robot; it stands still at `neutral`, at time 0.
-/// integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
-///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
-///     is conserved to rounding.
+/// model: the robot; it starts at rest at `neutral`, at time 0.
+/// integrator: 'semi_implicit_euler', order 1, suitable for damped robots and short horizons; 'runge_kutta_4', order 4,
+///     whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, and
+///     momentum is conserved to rounding.
 /// dt: h, the length of a step (s), above 0.
-/// passive: the smoothing ε of `passive_torque` (rad/s, m/s), if damping, friction, springs and gravity compensation are to
-///     act; None for none of these.
-/// tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
-/// max_iterations: Newton's method gives up after this number of iterations.
-/// ground: a `Ground` on which the robot stands, slides and lands, with 'semi_implicit_euler' only; None for none.
+/// passive: the smoothing ε of `passive_torque` (rad/s, m/s), which adds damping, friction, springs and gravity
+///     compensation; None leaves them out.
+/// tolerance: Newton's method ('variational') ends when the imbalance of the momenta is at most this fraction of their
+///     sum.
+/// max_iterations: the maximum number of iterations of Newton's method.
+/// ground: a `Ground` on which the robot stands, slides and lands; None for no ground. Requires 'semi_implicit_euler'.
 ///
-/// A simulation can be copied and pickled, and the copy goes on with the same bits.
+/// A simulation can be copied and pickled; the copy continues with bit-identical results.
 ///
-/// Raises `ModelError` if M is singular or the ground cannot be, `ValueError` if dt is not above 0 or not finite, or
+/// Raises `ModelError` if M is singular or the ground is invalid, `ValueError` if dt is not above 0 or not finite, or
 /// tolerance is negative.
 ///
 /// >>> from condyle.simulation import Simulation
@@ -58,7 +59,7 @@ fn word(status: Status) -> &'static str {
     }
 }
 
-/// The word of an integrator.
+/// Returns the word for an integrator.
 fn name(integrator: Integrator) -> &'static str {
     match integrator {
         Integrator::SemiImplicitEuler => "semi_implicit_euler",
@@ -68,7 +69,7 @@ fn name(integrator: Integrator) -> &'static str {
     }
 }
 
-/// A `Ground` of `condyle._types` as the library has it.
+/// Converts a `Ground` of `condyle._types` to the library's type.
 fn read_ground(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<Ground> {
     if !given.is_instance(class!(given.py(), "Ground")?)? {
         return Err(PyTypeError::new_err(format!("ground: expected a `Ground`, found {}", found_type(given))));
@@ -104,7 +105,7 @@ fn read_ground(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<Gro
     Ok(ground)
 }
 
-/// The library's ground as a `Ground` of `condyle._types`.
+/// Converts the library's ground to a `Ground` of `condyle._types`.
 fn give_ground<'py>(py: Python<'py>, ground: &Ground) -> PyResult<Bound<'py, PyAny>> {
     let point = |point: &rust::GroundPoint| {
         let corner = output(py, None, &[1, 3], |x| x.copy_from_slice(&point.position.to_array()))?;
@@ -158,7 +159,7 @@ impl Simulation {
         Ok(Self { inner, model: model.clone().unbind() })
     }
 
-    /// The robot's name and the time.
+    /// Returns the robot's name and the time.
     fn __repr__(&self) -> String {
         format!("<condyle.simulation.Simulation of '{}' at {} s>", self.inner.model().name(), self.inner.time())
     }
@@ -181,7 +182,7 @@ impl Simulation {
         self.inner.time()
     }
 
-    /// The ground on which the robot stands, as a `Ground` of single points; None if there is none.
+    /// The ground on which the robot stands, as a `Ground` of single points; None without ground.
     #[getter]
     fn ground<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         self.inner.ground().map(|ground| give_ground(py, ground)).transpose()
@@ -203,8 +204,8 @@ impl Simulation {
 
     /// Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
     ///
-    /// Raises `ModelError` if a number of q is not finite or a rotation in it does not have the length 1 (up to 1e-3),
-    /// `ValueError` if one of v is not finite.
+    /// Raises `ModelError` if q is not finite or contains a rotation whose length is not 1 (up to 1e-3), `ValueError`
+    /// if v is not finite.
     fn set_state(&mut self, q: &Bound<'_, PyAny>, v: &Bound<'_, PyAny>) -> PyResult<()> {
         let model = &self.model.get().inner;
         let (q, v) = (Position::read("q", q, model)?, Tangent::read("v", v, model)?);
@@ -215,9 +216,10 @@ impl Simulation {
         self.inner.set_state(&q, &v).map_err(exception)
     }
 
-    /// A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
-    /// tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses break the laws of contact by
-    /// more than the ground's tolerance, and then the step was taken; or 'not_finite', and then it was not.
+    /// Makes a step with constant efforts and forces, and returns its status: 'done'; 'not_converged' if Newton's
+    /// method did not reach the tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses
+    /// violate the laws of contact by more than the ground's tolerance; or 'not_finite'. The step is made for 'done'
+    /// and 'contacts_not_converged'.
     ///
     /// tau: nv numbers (N m, N); f_ext: as for `rnea`.
     #[pyo3(signature = (tau, f_ext=None))]
@@ -231,7 +233,7 @@ impl Simulation {
         visit.call(&self.model)
     }
 
-    /// The parts of a pickle: what the constructor takes, and the state.
+    /// Returns the parts of a pickle: the constructor's arguments, and the state.
     fn __reduce__<'py>(
         slf: &Bound<'py, Self>,
     ) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>, Bound<'py, PyAny>)> {
@@ -243,19 +245,20 @@ impl Simulation {
         Ok((slf.get_type().into_any(), made, (time, q, v, impulses).into_pyobject(py)?.into_any()))
     }
 
-    /// The state of a pickle.
+    /// Restores the state of a pickle.
     fn __setstate__(&mut self, state: (f64, Vec<f64>, Vec<f64>, Vec<f64>)) -> PyResult<()> {
         let (time, q, v, impulses) = state;
         self.inner.restore(&State { time, q, v, impulses }).map_err(exception)
     }
 
-    /// A number of steps, with a control law that is called before each of them. Ends early when a step is not taken, and
-    /// returns its status; else 'contacts_not_converged' if a step had it, or 'done'.
+    /// Makes a number of steps, and calls a control law before each of them. Ends early if a step is not made, and
+    /// returns its status. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
     ///
-    /// control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
-    ///     efforts, then other threads run meanwhile.
+    /// control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place. None means zero
+    ///     efforts; other threads can then run meanwhile.
     ///
-    /// What a handler of a signal raises, as KeyboardInterrupt, ends the run after a step, whose state is kept.
+    /// An exception of a signal handler, such as KeyboardInterrupt, ends the run after a step; the state after this
+    /// step is kept.
     #[pyo3(signature = (steps, control=None))]
     fn run(slf: &Bound<'_, Self>, steps: usize, control: Option<&Bound<'_, PyAny>>) -> PyResult<&'static str> {
         let py = slf.py();

@@ -1,7 +1,8 @@
-//! What `condyle.pinocchio` calls most: Pinocchio's functions that read what the last one has left in `data`.
+//! The functions of `condyle.pinocchio` that are called most: they use results that an earlier call stored in `data`,
+//! as in Pinocchio.
 //!
-//! They stand here, and not in Python, because a call of a small robot takes less time than a function written in Python adds.
-//! The classes of that module derive from those here.
+//! They are written in Rust, because for a small robot a Python wrapper would take longer than the computation. The
+//! classes of that module derive from the classes here.
 
 use crate::algorithms;
 use crate::arrays::{Computed, Give, Number, at_once, class};
@@ -19,7 +20,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
 use pyo3::{ffi, intern};
 
-/// A `condyle.Model` under another spelling.
+/// A `condyle.Model` with Pinocchio's interface.
 #[pyclass(name = "_SpelledModel", module = "condyle.pinocchio", frozen, subclass)]
 pub(crate) struct SpelledModel {
     /// The `condyle.Model`.
@@ -35,14 +36,14 @@ impl SpelledModel {
     }
 }
 
-/// The scratch of a model under another spelling, and the state that the functions of a joint or a frame are for.
+/// The `condyle.Data` with Pinocchio's interface, and the stored state for functions of a joint or a frame.
 #[pyclass(name = "_SpelledData", module = "condyle.pinocchio", subclass)]
 pub(crate) struct SpelledData {
     ours: Py<Data>,
     q: Vec<f64>,
     v: Vec<f64>,
     a: Vec<f64>,
-    /// How many of q, v and a the last `forwardKinematics` was given.
+    /// Number of vectors among q, v and a that the last `forwardKinematics` was given.
     given: usize,
     poses: Option<Py<PyAny>>,
     frame_poses: Option<Py<PyAny>>,
@@ -68,13 +69,13 @@ impl SpelledData {
         self.ours.bind(py).clone()
     }
 
-    /// q, v and a of the last `forwardKinematics`, with zeros for what it was not given.
+    /// q, v and a of the last `forwardKinematics`, zeros for those that were not given.
     #[getter]
     fn _state<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         Ok((self.q.give(py, None)?, self.v.give(py, None)?, self.a.give(py, None)?))
     }
 
-    /// How many of q, v and a the last `forwardKinematics` was given.
+    /// The number of vectors among q, v and a that the last `forwardKinematics` was given.
     #[getter]
     fn _given(&self) -> usize {
         self.given
@@ -86,7 +87,7 @@ impl SpelledData {
         made(py, &self.poses)
     }
 
-    /// The poses of the bodies that frames are seen at: those of the last `updateFramePlacements`, (njoints, 4, 4).
+    /// The poses of the bodies for frames, from the last `updateFramePlacements`, (njoints, 4, 4).
     #[getter]
     fn _frame_poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         made(py, &self.frame_poses)
@@ -104,13 +105,13 @@ impl SpelledData {
         made(py, &self.hg)
     }
 
-    /// Leaves a centre of mass and a centroidal momentum here.
+    /// Stores a centre of mass and a centroidal momentum.
     fn _leave(&mut self, com: Py<PyAny>, hg: Py<PyAny>) {
         (self.com, self.hg) = (Some(com), Some(hg));
     }
 }
 
-/// What a function has left, or an `AttributeError`.
+/// Returns a stored result, or raises an `AttributeError`.
 fn made<'py>(py: Python<'py>, what: &Option<Py<PyAny>>) -> PyResult<Bound<'py, PyAny>> {
     what.as_ref().map(|what| what.bind(py).clone()).ok_or_else(|| PyAttributeError::new_err(()))
 }
@@ -126,7 +127,7 @@ fn copy(name: &str, given: &Bound<'_, PyAny>, to: &mut [f64]) -> PyResult<()> {
     Ok(())
 }
 
-/// The axes and the origin that a `ReferenceFrame` names.
+/// Returns the library's reference frame for a `ReferenceFrame` of Pinocchio.
 fn reference(frame: Option<&Bound<'_, PyAny>>) -> PyResult<ReferenceFrame> {
     use ReferenceFrame::{Local, LocalWorldAligned, World};
     static NAMED: PyOnceLock<[(Py<PyAny>, ReferenceFrame); 3]> = PyOnceLock::new();
@@ -143,7 +144,7 @@ fn reference(frame: Option<&Bound<'_, PyAny>>) -> PyResult<ReferenceFrame> {
     }
 }
 
-/// The number of a frame in a model of ours, which does not count the world.
+/// Returns the library's index of a frame; Pinocchio counts the world as frame 0.
 fn frame_number(model: &condyle::Model, frame_id: isize) -> PyResult<usize> {
     let frames = model.frames().len();
     usize::try_from(frame_id - 1).ok().filter(|frame| *frame < frames).ok_or_else(|| {
@@ -151,22 +152,22 @@ fn frame_number(model: &condyle::Model, frame_id: isize) -> PyResult<usize> {
     })
 }
 
-/// The number of a joint's body.
+/// Returns the index of a joint's body.
 fn joint_number(model: &condyle::Model, joint: &Bound<'_, PyAny>) -> PyResult<usize> {
     body_index("joint: expected a joint's name", model, joint, 0)
 }
 
-/// Six numbers as a `Motion` or a `Force`, without a call of what is written in Python.
+/// Creates a `Motion` or a `Force` of six numbers, without running Python code.
 #[allow(unsafe_code)]
 fn spatial<'py>(class: &Bound<'py, PyType>, numbers: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let (py, none) = (class.py(), std::ptr::null_mut());
-    // SAFETY: the class is one of Python's making that derives from `object`, whose `__new__` this is.
+    // SAFETY: the class is defined in Python and derives from `object`, whose `__new__` this function is.
     let six = unsafe { Bound::from_owned_ptr_or_err(py, ffi::PyType_GenericNew(class.as_type_ptr(), none, none)) }?;
     six.setattr(intern!(py, "vector"), numbers)?;
     Ok(six)
 }
 
-/// data.oMi; with v and a also data.v and data.a, in the bodies' frames.
+/// Computes data.oMi; with v and a also data.v and data.a, in the bodies' frames.
 #[pyfunction]
 #[pyo3(signature = (model, data, q, v=None, a=None))]
 pub(crate) fn forwardKinematics(
@@ -178,7 +179,7 @@ pub(crate) fn forwardKinematics(
 ) -> PyResult<()> {
     let (py, mut data) = (model.py(), data.try_borrow_mut()?);
     let poses = forward_kinematics(model.get().ours.bind(py), data.ours.bind(py), q, None)?;
-    (data.given, data.poses) = (0, None); // until all of it is kept
+    (data.given, data.poses) = (0, None); // reset until all results are stored
     let SpelledData { q: kept_q, v: kept_v, a: kept_a, .. } = &mut *data;
     copy("q", q, kept_q)?;
     for (name, given, kept) in [("v", v, kept_v), ("a", a, kept_a)] {
@@ -192,7 +193,7 @@ pub(crate) fn forwardKinematics(
     Ok(())
 }
 
-/// data.oMf of the last forwardKinematics.
+/// Computes data.oMf of the last forwardKinematics.
 #[pyfunction]
 pub(crate) fn updateFramePlacements(model: &Bound<'_, SpelledModel>, data: &Bound<'_, SpelledData>) -> PyResult<()> {
     let mut data = data.try_borrow_mut()?;
@@ -200,7 +201,7 @@ pub(crate) fn updateFramePlacements(model: &Bound<'_, SpelledModel>, data: &Boun
     Ok(())
 }
 
-/// data.oMi and data.oMf.
+/// Computes data.oMi and data.oMf.
 #[pyfunction]
 pub(crate) fn framesForwardKinematics(
     model: &Bound<'_, SpelledModel>,
@@ -211,7 +212,7 @@ pub(crate) fn framesForwardKinematics(
     updateFramePlacements(model, data)
 }
 
-/// What is kept of the state at the last forwardKinematics.
+/// Returns the data with the state stored by the last forwardKinematics.
 fn kept<'py>(data: &Bound<'py, SpelledData>) -> PyResult<PyRef<'py, SpelledData>> {
     let data = data.try_borrow()?;
     match data.given {
@@ -220,7 +221,7 @@ fn kept<'py>(data: &Bound<'py, SpelledData>) -> PyResult<PyRef<'py, SpelledData>
     }
 }
 
-/// Functions that give a motion of a joint's body or of a frame at the last forwardKinematics.
+/// Defines functions that return a motion of a joint's body or of a frame at the last forwardKinematics.
 macro_rules! motions {
     ($($(#[$doc:meta])* $name:ident($of:ident: $Of:ty, $number:ident): $method:ident of $pass:ident($($kept:ident),*);)*) => {$(
         $(#[$doc])*
@@ -242,26 +243,27 @@ macro_rules! motions {
     )*};
 }
 motions! {
-    /// The velocity of a joint's body at the last forwardKinematics.
+    /// Returns the velocity of a joint's body at the last forwardKinematics.
     getVelocity(joint: &Bound<'py, PyAny>, joint_number): body_velocity of forward_velocities(q, v);
-    /// The spatial acceleration of a joint's body at the last forwardKinematics.
+    /// Returns the spatial acceleration of a joint's body at the last forwardKinematics.
     getAcceleration(joint: &Bound<'py, PyAny>, joint_number): body_acceleration of forward_accelerations(q, v, a);
-    /// r̈ and ω̇ of a joint's body at the last forwardKinematics.
+    /// Returns r̈ and ω̇ of a joint's body at the last forwardKinematics.
     getClassicalAcceleration(joint: &Bound<'py, PyAny>, joint_number):
         body_classical_acceleration of forward_accelerations(q, v, a);
-    /// The velocity of a frame at the last forwardKinematics.
+    /// Returns the velocity of a frame at the last forwardKinematics.
     getFrameVelocity(frame_id: isize, frame_number): frame_velocity of forward_velocities(q, v);
-    /// The spatial acceleration of a frame at the last forwardKinematics.
+    /// Returns the spatial acceleration of a frame at the last forwardKinematics.
     getFrameAcceleration(frame_id: isize, frame_number): frame_acceleration of forward_accelerations(q, v, a);
-    /// r̈ and ω̇ of a frame at the last forwardKinematics.
+    /// Returns r̈ and ω̇ of a frame at the last forwardKinematics.
     getFrameClassicalAcceleration(frame_id: isize, frame_number):
         frame_classical_acceleration of forward_accelerations(q, v, a);
 }
 
-/// `condyle::dynamics::body_jacobian_strided`, or of a frame: model, q, body or frame, reference frame, J and its strides.
+/// Type of `condyle::dynamics::body_jacobian_strided` and its variant for frames: model, q, body or frame, reference
+/// frame, J and its strides.
 type FillJacobian = fn(&condyle::Model, &[f64], usize, ReferenceFrame, &mut [f64], [usize; 2]);
 
-/// The Jacobian of a joint's body or of a frame at the last computeJointJacobians.
+/// Returns the Jacobian of a joint's body or of a frame at the last computeJointJacobians.
 fn kept_jacobian<'py>(
     model: &Bound<'py, SpelledModel>,
     data: &Bound<'py, SpelledData>,
@@ -270,14 +272,14 @@ fn kept_jacobian<'py>(
     fill: FillJacobian,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (data, robot) = (kept(data)?, model.get().ours.get());
-    take(robot, data.ours.bind(model.py()))?; // of this robot, or it raises
+    take(robot, data.ours.bind(model.py()))?; // raises an error if the data belongs to another robot
     let robot = &robot.inner;
     let (number, reference) = (number(robot)?, reference(Some(frame))?);
     let fill = |J: &mut [f64]| fill(robot, &data.q, number, reference, J, [robot.nv(), 1]);
     Computed::new([6, robot.nv()], fill).give(model.py(), None)
 }
 
-/// The Jacobian of a joint's body at the last computeJointJacobians, (6, nv).
+/// Returns the Jacobian of a joint's body at the last computeJointJacobians, (6, nv).
 #[pyfunction]
 pub(crate) fn getJointJacobian<'py>(
     model: &Bound<'py, SpelledModel>,
@@ -288,7 +290,7 @@ pub(crate) fn getJointJacobian<'py>(
     kept_jacobian(model, data, |robot| joint_number(robot, joint), frame, condyle::dynamics::body_jacobian_strided)
 }
 
-/// The Jacobian of a frame at the last computeJointJacobians, (6, nv).
+/// Returns the Jacobian of a frame at the last computeJointJacobians, (6, nv).
 #[pyfunction]
 pub(crate) fn getFrameJacobian<'py>(
     model: &Bound<'py, SpelledModel>,
@@ -299,7 +301,7 @@ pub(crate) fn getFrameJacobian<'py>(
     kept_jacobian(model, data, |robot| frame_number(robot, frame_id), frame, condyle::dynamics::frame_jacobian_strided)
 }
 
-/// The Jacobian of a frame, (6, nv).
+/// Computes the Jacobian of a frame, (6, nv).
 #[pyfunction]
 #[pyo3(signature = (model, data, q, frame_id, frame=None))]
 pub(crate) fn computeFrameJacobian<'py>(
@@ -319,7 +321,7 @@ pub(crate) fn computeFrameJacobian<'py>(
     frame_jacobian(ours.bind(py), data.try_borrow()?.ours.bind(py), q, &number, word, None)
 }
 
-/// c, also data.com[0]; with v and a also data.vcom[0] and data.acom[0].
+/// Computes c, also stored as data.com[0]; with v and a also data.vcom[0] and data.acom[0].
 #[pyfunction]
 #[pyo3(signature = (model, data, q, v=None, a=None))]
 pub(crate) fn centerOfMass<'py>(
@@ -342,7 +344,7 @@ pub(crate) fn centerOfMass<'py>(
     Ok(center)
 }
 
-/// hg, also data.hg.
+/// Computes hg, also stored as data.hg.
 #[pyfunction]
 pub(crate) fn computeCentroidalMomentum<'py>(
     model: &Bound<'py, SpelledModel>,
@@ -365,7 +367,7 @@ pub(crate) fn computeCentroidalMomentum<'py>(
     Ok(hg)
 }
 
-/// Functions whose result is also left in `data`, under a name.
+/// Defines functions whose result is also stored in `data`, under a name.
 macro_rules! left {
     ($($(#[$doc:meta])* $name:literal $function:ident($($arg:ident),*) = $call:path => $left:literal;)*) => {$(
         $(#[$doc])*
@@ -383,21 +385,21 @@ macro_rules! left {
     )*};
 }
 left! {
-    /// M, both triangles, also data.M.
+    /// Computes M, both triangles, also stored as data.M.
     "_spelled_crba" crba(q) = algorithms::crba => "M";
-    /// M⁻¹, also data.Minv.
+    /// Computes M⁻¹, also stored as data.Minv.
     "computeMinverse" computeMinverse(q) = algorithms::minv => "Minv";
-    /// C v + g, also data.nle.
+    /// Computes C v + g, also stored as data.nle.
     "nonLinearEffects" nonLinearEffects(q, v) = algorithms::nonlinear_effects => "nle";
-    /// g, also data.g.
+    /// Computes g, also stored as data.g.
     "computeGeneralizedGravity" computeGeneralizedGravity(q) = algorithms::gravity => "g";
-    /// C with C v + g = h and Ṁ − 2 C skew-symmetric, also data.C.
+    /// Computes C with C v + g = h and Ṁ − 2 C skew-symmetric, also stored as data.C.
     "computeCoriolisMatrix" computeCoriolisMatrix(q, v) = algorithms::coriolis_matrix => "C";
-    /// ∂c/∂q, (3, nv), also data.Jcom.
+    /// Computes ∂c/∂q, (3, nv), also stored as data.Jcom.
     "jacobianCenterOfMass" jacobianCenterOfMass(q) = com_jacobian => "Jcom";
 }
 
-/// q ⊕ v.
+/// Computes q ⊕ v.
 #[pyfunction(name = "_spelled_integrate")]
 pub(crate) fn integrate<'py>(
     model: &Bound<'py, SpelledModel>,
@@ -407,7 +409,7 @@ pub(crate) fn integrate<'py>(
     configuration::integrate(model.get().ours.bind(model.py()), q, v, None)
 }
 
-/// q₁ ⊖ q₀.
+/// Computes q₁ ⊖ q₀.
 #[pyfunction(name = "_spelled_difference")]
 pub(crate) fn difference<'py>(
     model: &Bound<'py, SpelledModel>,

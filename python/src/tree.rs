@@ -4,8 +4,8 @@ use crate::joint::kind;
 use condyle::{Model, tree::FrameKind};
 use std::fmt::Write;
 
-/// The bodies below one another, each with its joint, its coordinates and its mass; and the frames on them, but those of the
-/// bodies and joints themselves.
+/// Returns the tree of bodies as text, each with its joint, its coordinates and its mass. With `frames` it adds the
+/// names of link and user frames, except frames that have the name of their body.
 pub(crate) fn tree(model: &Model, frames: bool) -> String {
     let bodies = model.bodies();
     let mut children = vec![Vec::new(); bodies.len()];
@@ -22,7 +22,7 @@ pub(crate) fn tree(model: &Model, frames: bool) -> String {
             let _ = write!(text, "\n{indent}· {}", names.join(", "));
         }
     };
-    // what is still to be written: a body, what stands before it, and whether it is the last on its parent
+    // stack of bodies still to be written: body, its indentation, and whether it is the last child of its parent
     let begin = |below: &[usize], indent: &str| -> Vec<(usize, String, bool)> {
         below.iter().enumerate().rev().map(|(k, &i)| (i, indent.to_owned(), k + 1 == below.len())).collect()
     };

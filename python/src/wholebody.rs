@@ -1,4 +1,4 @@
-//! Whole-body control as Python sees it: the module `condyle.wholebody`.
+//! Whole-body control in Python: the module `condyle.wholebody`.
 
 mod contacts;
 mod controller;

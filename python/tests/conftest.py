@@ -1,4 +1,4 @@
-"""Robots for all tests, and a GPU that is none."""
+"""Robots for all tests, and a simulated GPU."""
 
 import gc
 import shutil
@@ -16,19 +16,19 @@ from condyle import _cuda_driver
 
 @pytest.fixture(params=["arm7", "quadruped", "humanoid"])
 def robot(request: pytest.FixtureRequest) -> Robot:
-    """Each of our own robots."""
+    """Provides each built-in robot."""
     return make(getattr(condyle.robots, request.param)())
 
 
 @pytest.fixture
 def quadruped() -> Robot:
-    """The quadruped alone."""
+    """Provides the quadruped."""
     return make(condyle.robots.quadruped())
 
 
 @pytest.fixture(scope="module")
 def cuda_libraries(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Path]]:
-    """The driver and the compiler without a GPU in place of NVIDIA's."""
+    """Builds a driver and a compiler without a GPU, which replace NVIDIA's."""
     if sys.platform != "linux" or not (shutil.which("cc") and shutil.which("g++")):
         pytest.skip("there are no compilers of C and C++ for the driver without a GPU")
     driver, compiler = build(tmp_path_factory.mktemp("driver"))
@@ -49,7 +49,9 @@ def shared_gpu(cuda_libraries: tuple[Path, Path]) -> Gpu:
 
 @pytest.fixture
 def gpu(shared_gpu: Gpu) -> Iterator[Gpu]:
-    """Another library's view of the GPU; at the end nothing is left, and the driver has nothing to complain of."""
+    """Provides another library's view of the GPU; checks that all memory is freed, and that the driver reports no
+    errors.
+    """
     yield shared_gpu
     gc.collect()
     held = _cuda_driver.device(0)

@@ -1,6 +1,6 @@
-"""A driver without a GPU, and two libraries of arrays on it: what CuPy, PyTorch, JAX and Numba do, in a few lines.
+"""A driver without a GPU, and two array libraries for it: the behaviour of CuPy, PyTorch, JAX and Numba in a few lines.
 
-The structures of DLPack are written out once more here, and capsules are made and read by Python's C interface.
+The structures of DLPack are defined again here, and capsules are made and read by Python's C interface.
 """
 
 import ctypes
@@ -56,13 +56,13 @@ python.PyCapsule_SetName.argtypes = [ctypes.py_object, ctypes.c_char_p]
 USED = {b"dltensor": b"used_dltensor", b"dltensor_versioned": b"used_dltensor_versioned"}
 
 LENT: dict[int, "Speaker"] = {}
-"""What capsules keep."""
+"""Objects that capsules keep alive."""
 DESCRIPTIONS: list[Any] = []
-"""What they point to, and functions that are called at their end: they stay."""
+"""Objects to which capsules point, and their deleters; they are kept until the end."""
 
 
 def build(folder: Path) -> tuple[Path, Path]:
-    """The driver and the compiler."""
+    """Compiles the driver and the compiler."""
     made = []
     for source, name in (("driver.c", "libcuda.so.1"), ("nvrtc.c", "libnvrtc.so.12")):
         made.append(folder / name)
@@ -72,7 +72,7 @@ def build(folder: Path) -> tuple[Path, Path]:
 
 
 class Gpu:
-    """The driver as another library uses it, on device 0, with two streams that are ordered with no other one."""
+    """The driver as another library uses it, on device 0, with two streams that are not ordered with other streams."""
 
     def __init__(self, library: Path) -> None:
         self.library = ctypes.CDLL(str(library))
@@ -90,7 +90,7 @@ class Gpu:
         self.context = context
 
     def rows(self) -> int:
-        """The rows of blocks of the last launch."""
+        """Returns the number of block rows of the last launch."""
         last = (ctypes.c_uint * 3)()
         self.library.fake_launches(last)
         return last[2]
@@ -106,7 +106,7 @@ class Gpu:
         self.call("cuCtxPopCurrent_v2", None)
 
     def order(self, first: int, then: int) -> None:
-        """Lets the second stream wait for the first one."""
+        """Makes the second stream wait for the first one."""
         event = c_void_p()
         with self:
             self.call("cuEventCreate", byref(event), 2)
@@ -122,7 +122,7 @@ class Gpu:
 
 
 class Speaker:
-    """What speaks DLPack, of a version or of none, and works on its own stream."""
+    """An array that supports DLPack, with or without versions, and works on its own stream."""
 
     gpu: Gpu
     address: int
@@ -151,10 +151,10 @@ class Speaker:
         sizes, steps = ((c_int64 * len(x))(*x) for x in (self.shape, self.strides))
         bits = 8 * self.dtype.itemsize
         code = {"f": 2, "i": 0}[self.dtype.kind]
-        # as if it were a part of a larger array
+        # placed as if it were a part of a larger array
         tensor = Tensor(self.address - 8, *self.device, len(sizes), code, bits, 1, sizes, steps, 8)
 
-        deleter = ctypes.CFUNCTYPE(None, c_void_p)(lambda _: None)  # nobody takes them over here
+        deleter = ctypes.CFUNCTYPE(None, c_void_p)(lambda _: None)  # these capsules have no consumer
         managed: Any = Managed(tensor, None, ctypes.cast(deleter, c_void_p))
         if self.is_versioned:
             managed = Versioned(1, 0, None, ctypes.cast(deleter, c_void_p), self.flags, tensor)
@@ -174,7 +174,7 @@ class Speaker:
 
 
 class Array(Speaker):
-    """An array of another library's: it has been put there by its own stream."""
+    """An array of another library, written by the library's own stream."""
 
     def __init__(self, gpu: Gpu, numbers: Any, *, transposed: bool = False, is_versioned: bool = False) -> None:
         self.gpu, self.is_versioned = gpu, is_versioned
@@ -196,7 +196,7 @@ class Array(Speaker):
 
 
 class Imported(Speaker):
-    """What another library makes of a capsule: it takes it over, and gives it back at its end."""
+    """An array that another library imports from a capsule: it takes ownership, and returns it at its end."""
 
     def __init__(self, gpu: Gpu, array: Any, *, stream: int | None = None, max_version: Any = (1, 0)) -> None:
         self.gpu = gpu
@@ -223,7 +223,7 @@ class Imported(Speaker):
 
 
 class Interface:
-    """An array that has nothing but `__cuda_array_interface__`, as Numba's had."""
+    """An array that has only `__cuda_array_interface__`, as earlier versions of Numba had."""
 
     def __init__(self, array: Array, **changes: Any) -> None:
         size = array.dtype.itemsize
@@ -239,7 +239,7 @@ class Interface:
 
 
 def download(gpu: Gpu, address: int, dtype: Any, shape: Sequence[int], strides: Sequence[int]) -> Any:
-    """The numbers, as the library's own stream sees them."""
+    """Returns the numbers as the library's own stream sees them."""
     memory = np.full(int(np.prod(shape)), np.nan, dtype)
     if memory.size:
         with gpu:

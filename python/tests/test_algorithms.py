@@ -1,4 +1,4 @@
-"""What must hold between the functions, whatever the robot; that the numbers are right is for tests/peers to say."""
+"""Relations between the functions that hold for every robot; tests/peers checks the numbers themselves."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,16 +11,16 @@ from sample import Robot
 import condyle
 
 CLOSE = {"rtol": 1e-10, "atol": 1e-10}
-"""Roundings of double precision."""
+"""Rounding errors of double precision."""
 SOLVED = {"rtol": 1e-8, "atol": 1e-8}
-"""The same after a solve with M, whose condition is up to 1e4."""
+"""Rounding errors after a solve with M, whose condition is up to 1e4."""
 STEP = 1e-5
 DIFFERENCES = {"rtol": 1e-5, "atol": 1e-5}
-"""What central differences with that step leave, of accelerations up to 1e4."""
+"""Errors of central differences with that step, for accelerations up to 1e4."""
 
 
 def central(f: Callable[[NDArray[np.float64]], NDArray[np.float64]], n: int) -> NDArray[np.float64]:
-    """∂f/∂x at x = 0, n columns."""
+    """Returns ∂f/∂x at x = 0, n columns."""
     return np.stack([(f(e) - f(-e)) / (2 * STEP) for e in np.eye(n) * STEP], axis=1)
 
 
@@ -36,7 +36,7 @@ def test_forward_and_inverse_dynamics(robot: Robot) -> None:
 
 
 def test_external_forces_act_on_their_body(robot: Robot) -> None:
-    """τ(f) = τ(0) − Σ Jᵢᵀ fᵢ, with the Jacobian of each body's own frame."""
+    """Checks τ(f) = τ(0) − Σ Jᵢᵀ fᵢ, with the Jacobian of each body's own frame."""
     model, data, q, v, a, _, f_ext = robot
     tau = condyle.rnea(model, data, q, v, a)
     for body in range(1, model.nbodies):
@@ -56,7 +56,7 @@ def test_rnea_derivatives(robot: Robot) -> None:
 
 
 def test_aba_derivatives(robot: Robot) -> None:
-    """By what follows from M q̈ + h = τ."""
+    """Compares with derivatives of M q̈ + h = τ."""
     model, data, q, v, _, tau, f_ext = robot
     d = condyle.aba_derivatives(model, data, q, v, tau, f_ext)
     np.testing.assert_allclose(d.a, condyle.aba(model, data, q, v, tau, f_ext), **SOLVED)
@@ -84,7 +84,7 @@ def test_kinematics(robot: Robot) -> None:
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
 def test_motion_of_frames(robot: Robot, reference: Any) -> None:
-    """V = J v, A = J a + dJ v, and dJ by differences along the motion."""
+    """Checks V = J v, A = J a + dJ v, and dJ by differences along the motion."""
     model, data, q, v, a, *_ = robot
     for frame in range(0, len(model.frames), 5):
 
@@ -105,7 +105,7 @@ def test_motion_of_frames(robot: Robot, reference: Any) -> None:
 
 
 def test_points(robot: Robot) -> None:
-    """A point moves as a frame that is put there; many states give what each gives."""
+    """A point moves like a frame at that point; results for many states equal the results for single states."""
     model, data, q, v, *_ = robot
     point, at = np.array([0.1, -0.2, 0.3]), np.eye(4)
     at[:3, 3] = point
@@ -142,7 +142,7 @@ def test_frames_are_added() -> None:
 
 @pytest.mark.parametrize("reference", ["local", "world", "local_world_aligned"])
 def test_motion_of_bodies(robot: Robot, reference: Any) -> None:
-    """That of the frames that joints have at the bodies' origins; the world stands still."""
+    """Bodies move like the frames of their joints at the bodies' origins; the world is at rest."""
     model, data, q, v, a, *_ = robot
     for body in range(1, model.nbodies):
         name = model.names[body]
@@ -180,7 +180,8 @@ def test_centre_of_mass_and_momentum(robot: Robot) -> None:
     np.testing.assert_allclose(condyle.com_acceleration(model, data, q, v, a), dhg[:3] / mass, **CLOSE)
     np.testing.assert_allclose(still.Ig[:3], mass * np.eye(3, 6), **CLOSE)
     assert np.array_equal(still.Ig, still.Ig.T)
-    if model.joint_types[1] == "free_flyer":  # if all turns as one, hg = Ig times its velocity at the centre of mass
+    # if the robot turns as a whole, hg is Ig times its velocity at the centre of mass
+    if model.joint_types[1] == "free_flyer":
         turn = np.r_[0.0, 0, 0, 1, 2, 3, np.zeros(model.nv - 6)]
         omega = condyle.frame_velocity(model, data, q, turn, "root_joint", "local_world_aligned")[3:]
         np.testing.assert_allclose((still.Ag @ turn)[3:], still.Ig[3:, 3:] @ omega, **CLOSE)
@@ -221,7 +222,7 @@ def test_regressors(robot: Robot) -> None:
     Y = condyle.joint_torque_regressor(model, data, q, v, a)
     rotors = 0.1 * a
     if model.joint_types[1] == "free_flyer":
-        rotors[:3] += 0.1 * np.cross(v[3:6], v[:3])  # a mass along the axes of the world
+        rotors[:3] += 0.1 * np.cross(v[3:6], v[:3])  # a mass in the axes of the world
     np.testing.assert_allclose(Y @ pi + rotors, condyle.rnea(model, data, q, v, a), **CLOSE)
     T = condyle.kinetic_energy_regressor(model, data, q, v) @ pi + 0.05 * v @ v
     assert np.isclose(T, condyle.kinetic_energy(model, data, q, v), **CLOSE)
@@ -240,7 +241,7 @@ def test_passive_torque() -> None:
     slope = central(lambda e: condyle.passive_torque(model, q, v + e, 0.1), 7)
     derivatives = condyle.passive_torque_derivatives(model, q, v, 0.1)
     np.testing.assert_allclose(derivatives.dtau_dv, slope, **DIFFERENCES)
-    assert not derivatives.dtau_dq.any()  # it has no springs
+    assert not derivatives.dtau_dq.any()  # the robot has no springs
     many = condyle.passive_torque_derivatives(model, np.stack([q, -q]), np.stack([v, -v]), 0.1)
     np.testing.assert_allclose(many.dtau_dv[0], derivatives.dtau_dv, **CLOSE)
     both = condyle.passive_torque(model, np.stack([q, -q]), np.stack([v, -v]), 0.1)

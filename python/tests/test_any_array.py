@@ -1,4 +1,4 @@
-"""Arrays of any shape, dtype and layout: the numbers of a plain one, or an error that says what was expected."""
+"""Arrays of any shape, dtype and layout give the same result as a plain array, or an error with the expected shape."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ import condyle
 ARM = condyle.robots.arm7()
 DATA = condyle.Data(ARM)
 BODIES = ARM.nbodies
-# The calls take microseconds, but a machine may stand still for a while.
+# no deadline: the calls take microseconds, but a machine may pause for a while
 quiet = settings(deadline=None, max_examples=200, derandomize=True)
 
 DTYPES = st.sampled_from(
@@ -23,7 +23,7 @@ DTYPES = st.sampled_from(
 
 @st.composite
 def layouts(draw: st.DrawFn, shape: tuple[int, ...]) -> np.ndarray:
-    """An array of this shape that may be a view: turned, reversed, with gaps, unaligned, not writable."""
+    """Draws an array of this shape that may be a view: transposed, reversed, with gaps, unaligned, not writable."""
     dtype = np.dtype(draw(DTYPES))
     plain = draw(hnp.arrays(dtype, shape, elements=st.just(0) | st.just(1)))
     match draw(
@@ -73,7 +73,7 @@ def test_any_layout_of_one_state(q: np.ndarray, v: np.ndarray, a: np.ndarray, f_
 @given(st.integers(1, 20).flatmap(lambda n: st.tuples(layouts((n, 7)), layouts((n, 7)), layouts((n, BODIES, 6)))))
 def test_any_layout_of_many_states(states: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     q, tau, f_ext = states
-    v = np.full(7, 0.5)  # shared
+    v = np.full(7, 0.5)  # one velocity for all states
     found = condyle.aba_derivatives(ARM, DATA, q, v, tau, f_ext)
     again = condyle.aba_derivatives(ARM, DATA, plain(q), v, plain(tau), plain(f_ext))
     one = condyle.aba_derivatives(ARM, DATA, plain(q[-1]), v, plain(tau[-1]), plain(f_ext[-1]))
@@ -88,7 +88,7 @@ SHAPES = hnp.array_shapes(min_dims=0, max_dims=4, min_side=0, max_side=9)
 @quiet
 @given(SHAPES, st.sampled_from([np.float64, np.int32, np.complex128, "U3", "M8[s]", object]))
 def test_any_shape_is_read_or_refused(shape: tuple[int, ...], dtype: Any) -> None:
-    """One state, states side by side, or an error with the argument, the shape that it must have and the one found."""
+    """The array is read as one or many states, or an error has the argument, the expected and the found shape."""
     q, zero = np.zeros(shape, dtype), np.zeros(7)
     if shape == (7,) or (len(shape) == 2 and shape[1] == 7 and shape[0] > 0):
         wanted: tuple[type[Exception], ...] = () if np.dtype(dtype).kind in "fi" else (TypeError,)
@@ -125,7 +125,7 @@ def test_any_out_is_filled_or_refused(shape: tuple[int, ...], dtype: Any, layout
 @quiet
 @given(st.integers(1, 12), st.integers(1, 12))
 def test_matrices_of_any_size_are_turned(rows: int, columns: int) -> None:
-    """Matrices are stored by columns inside, and turned a tile at a time."""
+    """Matrices are stored by columns in Rust, and transposed tile by tile."""
     builder, body = condyle.ModelBuilder("chain"), condyle.WORLD
     inertia = condyle.Inertia.from_com(1.0, [0.1, 0.2, 0.3], np.eye(3))
     for k in range(rows):

@@ -1,4 +1,4 @@
-"""Arrays in and out: shapes, dtypes, strides, `out`, and what is refused."""
+"""Arrays as arguments and results: shapes, dtypes, strides, `out`, and errors."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +13,7 @@ Call = Callable[..., Any]
 
 
 def calls(robot: Robot) -> dict[str, Call]:
-    """Every function that returns one array, as a function of `out`."""
+    """Returns every function that returns one array, as a function of `out`."""
     model, data, q, v, a, tau, f_ext = robot
     tip = [0.1, 0.2, 0.3]
     return {
@@ -63,7 +63,7 @@ def calls(robot: Robot) -> dict[str, Call]:
 
 
 def several(robot: Robot) -> dict[str, Call]:
-    """Those that return more than one."""
+    """Returns the functions that return several arrays."""
     model, data, q, v, a, tau, f_ext = robot
     return {
         "rnea_derivatives": lambda **k: condyle.rnea_derivatives(model, data, q, v, a, f_ext, **k),

@@ -1,4 +1,4 @@
-"""Many states in one call: every function that takes a state, against one call for each."""
+"""Many states in one call: every function that takes a state, compared with one call for each state."""
 
 import inspect
 import threading
@@ -11,13 +11,15 @@ from sample import Robot, make
 import condyle
 
 N = 11
-"""More than a vector holds, and no multiple of it."""
+"""Number of states: larger than a vector register, and not a multiple of it."""
 CLOSE = {"rtol": 1e-9, "atol": 1e-9}
-"""A single call may compute the limbs of a robot side by side and add up in another order; times the condition of M."""
+"""Tolerance: a single call may compute a robot's limbs in parallel lanes, with sums in another order; M's condition
+amplifies the difference.
+"""
 
 
 def argument(name: str, robot: Robot, states: int) -> Any:
-    """A value for each of some states, or for one if there are none."""
+    """Returns a value for each of `states` states, or for a single state if `states` is 0."""
     model, rng = robot.model, np.random.default_rng(len(name))
     shape = (states,) if states else ()
     match name:
@@ -43,7 +45,7 @@ def argument(name: str, robot: Robot, states: int) -> Any:
 
 
 def functions() -> list[str]:
-    """Those of a model, a `Data` and a state."""
+    """Returns the names of functions of a model, a `Data` and a state."""
     names = []
     for name in condyle.__all__:
         function = getattr(condyle, name)
@@ -69,7 +71,7 @@ FIXED = """<robot name="fixed">
 
 @pytest.mark.parametrize("name", functions())
 def test_without_coordinates(name: str) -> None:
-    """A robot of fixed joints only: no function fails, for one state or for many."""
+    """For a robot with only fixed joints no function fails, for one state or for many."""
     test_as_one_by_one(name, make(condyle.Model.from_urdf_str(FIXED)))
 
 
@@ -150,7 +152,7 @@ def test_errors(robot: Robot) -> None:
 
 
 def test_a_batch_keeps_its_data(quadruped: Robot) -> None:
-    """The interpreter's lock is released: another thread that uses the same `Data` meanwhile is told."""
+    """The call releases the interpreter's lock; another thread that uses the same `Data` meanwhile gets an error."""
     model, data = quadruped.model, condyle.Data(quadruped.model)
     q, v, tau = (argument(name, quadruped, 4000) for name in ("q", "v", "tau"))
     condyle.aba_derivatives(model, data, q[:1], v[:1], tau[:1])
@@ -174,15 +176,15 @@ def test_a_batch_keeps_its_data(quadruped: Robot) -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 @pytest.mark.parametrize("shift", [0, 1, 40])
 def test_out_over_an_input(shift: int, threads: int) -> None:
-    """`out` may be an input, or share memory with it: all states are computed from what was given."""
+    """`out` may be an input, or share memory with it: all states are computed from the original numbers."""
     arm = condyle.robots.arm7()
-    states = 30_000  # more than are computed at a time
+    states = 30_000  # more than one part of a call
     data, memory = condyle.Data(arm, threads=threads), np.random.default_rng(0).standard_normal((states + 40, 7))
     q, out = memory[40 - shift : states + 40 - shift], memory[40 : states + 40]
     expected = condyle.rnea(arm, data, q, q, q)
     assert condyle.rnea(arm, data, q, q, q, out=out) is out
     np.testing.assert_array_equal(out, expected)
-    # state after state
+    # functions that compute state by state
     q, out = memory[40 - shift : 140 - shift], memory[40:140]
     expected = condyle.integrate(arm, q, q)
     condyle.integrate(arm, q, q, out=out)
@@ -200,7 +202,7 @@ def test_out_over_forces() -> None:
 
 @pytest.mark.parametrize("states", [(), (20,)])
 def test_one_array_twice(quadruped: Robot, states: tuple[int, ...]) -> None:
-    """Two results in one array are refused before anything is written; one input twice is none of our business."""
+    """Two results in one array are refused before anything is written; an input may be given twice."""
     model, data = quadruped.model, quadruped.data
     q = np.broadcast_to(quadruped.q, (*states, 19)).copy()
     v = np.zeros((*states, 18))
@@ -210,7 +212,7 @@ def test_one_array_twice(quadruped: Robot, states: tuple[int, ...]) -> None:
     overlapping = memory.reshape(-1)[18 : 18 + memory[0].size].reshape(memory[0].shape)
     with pytest.raises(ValueError, match="^out: the arrays for dtau_dv and dtau_da share memory$"):
         condyle.rnea_derivatives(model, data, q, v, v, out=(memory[2], overlapping, memory[0]))
-    with pytest.raises(ValueError, match="share memory$"):  # of these the states are computed one by one
+    with pytest.raises(ValueError, match="share memory$"):  # functions that compute state by state
         condyle.coriolis_derivatives(model, data, q, v, out=(memory[0], memory[0]))
     assert not memory.any()
     condyle.rnea_derivatives(model, data, q, v, v, out=tuple(memory[:3]))

@@ -1,4 +1,4 @@
-"""The book in `docs`: its Python blocks run and print what the pages say, its links lead somewhere."""
+"""The book in `docs`: its Python blocks run and print the output on the pages, and its links are valid."""
 
 import contextlib
 import importlib.util
@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def load(name: str) -> ModuleType:
-    """A program of `docs`, which is no package."""
+    """Loads a program of `docs`, which is not a package."""
     spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -41,7 +41,7 @@ def test_readme() -> None:
 
 
 def test_course_has_code() -> None:
-    """Each chapter of the course but the introduction is a program."""
+    """Each chapter of the course, except the introduction, is a program."""
     course = BOOK.chapters()[1:14]
     assert all(BOOK.blocks((ROOT / "docs" / name).read_text()) for name in course), course
 
@@ -88,7 +88,7 @@ def test_figures_of_the_readme() -> None:
 
 
 def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a block prints is compared, and what is missing is said."""
+    """The output of a block is compared, and missing output is reported."""
     monkeypatch.setattr(BOOK, "BOOK", tmp_path / "docs")
     (tmp_path / "docs").mkdir()
     (tmp_path / "README.md").write_text("# a\n")
@@ -104,22 +104,22 @@ def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_formulas() -> None:
-    """Each formula is LaTeX that becomes MathML; code with dollars stays as it is."""
+    """Each formula is LaTeX that is converted to MathML; code with dollar signs does not change."""
     mathml = load("mathml")
     assert "<math" in mathml.with_mathml("an $x_i$ b") and mathml.with_mathml("`$x$`") == "`$x$`"
     for chapter in BOOK.chapters():
         page = mathml.with_mathml((ROOT / "docs" / chapter).read_text(encoding="utf-8"))
         formulas = re.findall(r"<math.*?</math>", page, re.DOTALL)
-        wrong = [formula for formula in formulas if re.search(r"\\|>&<", formula)]  # what was not understood
+        wrong = [formula for formula in formulas if re.search(r"\\|>&<", formula)]  # parts that were not converted
         assert not wrong, (chapter, wrong)
 
 
 def test_mdbook(tmp_path: Path) -> None:
-    """mdBook builds the book, where it is installed."""
+    """mdBook builds the book, if mdBook is installed."""
     program = shutil.which("mdbook")
     if program is None:
         pytest.skip("mdbook is not installed")
-    python = Path(sys.executable).parent  # which has what turns formulas into MathML
+    python = Path(sys.executable).parent  # this folder contains the converter of formulas to MathML
     environment = {**os.environ, "PATH": f"{python}{os.pathsep}{os.environ['PATH']}"}
     command = [program, "build", "--dest-dir", tmp_path / "book", ROOT / "docs"]
     subprocess.run(command, check=True, env=environment)

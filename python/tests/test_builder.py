@@ -1,4 +1,4 @@
-"""Models made by hand and of other models; that the numbers are right is for tests/peers to say."""
+"""Models that are built by hand or from other models; tests/peers checks the numbers themselves."""
 
 import gc
 from typing import Any
@@ -15,14 +15,14 @@ CLOSE = {"rtol": 1e-12, "atol": 1e-12}
 
 
 def at(x: float, y: float, z: float) -> NDArray[np.float64]:
-    """A place without rotation."""
+    """Returns a placement without rotation."""
     X = np.eye(4)
     X[:3, 3] = x, y, z
     return X
 
 
 def turned(angle: float, axis: int) -> NDArray[np.float64]:
-    """A rotation about an axis of the frame."""
+    """Returns a rotation about an axis of the frame."""
     X, (j, k) = np.eye(4), ((axis + 1) % 3, (axis + 2) % 3)
     X[j, j] = X[k, k] = np.cos(angle)
     X[k, j], X[j, k] = np.sin(angle), -np.sin(angle)

@@ -17,16 +17,16 @@ casadi = pytest.importorskip("casadi")
 
 import condyle.casadi  # noqa: E402
 
-# The same numbers by two ways, of some hundreds.
+# The same numbers, up to some hundreds, computed in two ways.
 ROUNDING = 1e-9
-# Central differences: with the step h = 1e-5 truncation, h² times a third derivative, and rounding, 1e-13 / h, are some
-# 1e-8; second derivatives of accelerations are up to some thousands.
+# Central differences with the step h = 1e-5: truncation, h² times a third derivative, and rounding, 1e-13 / h, are
+# about 1e-8. Second derivatives of accelerations are up to some thousands.
 STEP = 1e-5
 DIFFERENCES = 1e-6
 
 
 def every_joint() -> condyle.Model:
-    """A robot with each kind of joint, one after the other."""
+    """Returns a robot with each kind of joint, one after the other."""
     builder, body = ModelBuilder("every joint"), WORLD
     axis = [0.0, 0.6, 0.8]
     joints = {
@@ -73,7 +73,7 @@ def contacts(robot: str) -> list[condyle.ContactConstraint]:
 
 
 def function(name: str, robot: str, states: int = 1) -> "casadi.Function":
-    """A function of `condyle.casadi`."""
+    """Returns a function of `condyle.casadi`."""
     model, make = MODELS[robot], getattr(condyle.casadi, name)
     if name in ("forward_kinematics", "frame_velocity"):
         return make(model, TIPS[robot][0], states=states)
@@ -83,7 +83,7 @@ def function(name: str, robot: str, states: int = 1) -> "casadi.Function":
 
 
 def direct(name: str, robot: str, x: Arrays) -> Arrays:
-    """The same by the package's own functions."""
+    """Computes the same results by the package's own functions."""
     model, frame = MODELS[robot], TIPS[robot][0]
     data = condyle.Data(model)
     match name:
@@ -100,20 +100,20 @@ def direct(name: str, robot: str, x: Arrays) -> Arrays:
 
 
 def state(name: str, robot: str, seed: int = 0) -> Arrays:
-    """Random arguments, with quaternions of length 1."""
+    """Returns random arguments, with quaternions of length 1."""
     model, rng = MODELS[robot], np.random.default_rng(3 + seed)
     arguments = function(name, robot).n_in()
     return [condyle.random_configuration(model, seed=2 + seed), *rng.standard_normal((2, model.nv))][:arguments]
 
 
 def stretched(name: str, robot: str) -> Arrays:
-    """The same arguments with a position that is off its group, as an optimisation's iterates are."""
+    """Returns the same arguments with a position off its group, like an optimisation's iterates."""
     q, *others = state(name, robot)
     return [q * 1.1, *others]
 
 
 def stacked(f: "casadi.Function") -> "casadi.Function":
-    """The function of one vector, and of the multipliers of its results; the results are one vector too."""
+    """Returns the function of one vector, and of the multipliers of its results; the results are one vector too."""
     sizes = [f.numel_in(k) for k in range(f.n_in())]
     x = casadi.MX.sym("x", sum(sizes))
     parts = casadi.vertsplit(x, np.cumsum([0, *sizes]).tolist())
@@ -195,7 +195,9 @@ def test_zeros_of_the_tree() -> None:
 
 @each
 def test_many_states_are_a_map(name: str) -> None:
-    """The same results, derivatives and zeros as `Function.map`; of more states than are computed at a time."""
+    """Results, derivatives and zeros are the same as with `Function.map`, also for more states than are computed at a
+    time.
+    """
     robot, states = "every joint", 37
     one, many = function(name, robot), function(name, robot, states)
     columns = [state(name, robot, k) for k in range(states)]
@@ -207,7 +209,7 @@ def test_many_states_are_a_map(name: str) -> None:
 
 
 def derived(f: casadi.Function) -> casadi.Function:
-    """The results of a function, their Jacobians, a product with it, and the Hessian of their sum with weights."""
+    """Returns a function's results, their Jacobians, a product with these, and the Hessian of the weighted sum."""
     x = [casadi.MX.sym(f.name_in(k), f.size1_in(k), f.size2_in(k)) for k in range(f.n_in())]
     y = f.call(x)
     stacked = casadi.veccat(*y)
@@ -218,7 +220,7 @@ def derived(f: casadi.Function) -> casadi.Function:
 
 
 def test_where_a_tree_stands_moves_with_nothing_but_gravity() -> None:
-    """∂²/∂q₀∂v and ∂²/∂q₀∂τ are zero, and are no entries: as in a graph of expressions."""
+    """∂²/∂q₀∂v and ∂²/∂q₀∂τ are zero and not in the sparsity, as in a graph of expressions."""
     arm = MODELS["arm"]
     for name in ("rnea", "aba"):
         hessian = function(name, "arm").reverse(1).jacobian()
@@ -274,7 +276,7 @@ def test_loaded_functions_are_refused(tmp_path: Path) -> None:
     function("rnea", "arm").save(str(path))
     load = f"f = casadi.Function.load({str(path)!r}); f(0, 0, 0)"
     another = "import condyle.casadi; held = condyle.casadi.rnea(condyle.robots.arm7().with_gravity([0.0, 0.0, 1.0]))"
-    for before in ("", another):  # the slot is empty, or another robot's
+    for before in ("", another):  # the slot is empty, or has another robot's function
         code = f"import casadi, condyle; {before}\n{load}"
         loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
         assert loaded.returncode != 0
@@ -282,7 +284,7 @@ def test_loaded_functions_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_copy_within_the_process_is_refused_until_it_is_dropped() -> None:
-    """Both then, as they cannot be told apart; one that is made anew computes again."""
+    """Original and copy are refused, since they cannot be distinguished; a newly made one works again."""
     robot = MODELS["arm"].with_gravity([0.0, 1.0, 0.0])
     f = condyle.casadi.rnea(robot)
     expected = np.array(f(0.3, 0, 0))
@@ -310,7 +312,7 @@ def test_examples() -> None:
 
 
 def test_swing_up_by_ipopt() -> None:
-    """A pendulum on a cart swings up: direct transcription with exact Hessians; the motion obeys the dynamics."""
+    """A pendulum on a cart swings up: direct transcription with exact Hessians; the motion satisfies the dynamics."""
     builder = ModelBuilder("cart")
     cart = builder.body(
         "cart", WORLD, Joint.prismatic([1.0, 0.0, 0.0]), None, Inertia.from_com(1.0, np.zeros(3), np.eye(3))
@@ -339,7 +341,7 @@ def test_swing_up_by_ipopt() -> None:
 
 
 def test_actions_of_expressions_are_those_that_are_written() -> None:
-    """A pendulum as expressions and as a function: iterates, derivatives, bounds."""
+    """Compares a pendulum as expressions and as a function: iterates, derivatives, bounds."""
     from condyle.optimal import Action, Fddp, Problem
 
     def step(x, u, sin, cos):

@@ -1,4 +1,4 @@
-"""Optimisations with IPOPT by `condyle.casadi`, beside the same functions written as CasADi expressions."""
+"""Optimisations with IPOPT by `condyle.casadi`, compared with the same functions written as CasADi expressions."""
 
 import sys
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from casadi_expressions import Expressions
 import condyle
 import condyle.casadi
 
-# The same iterates, but for rounding; IPOPT stops at 1e-8 of its scaled equations.
+# The iterates agree up to rounding; IPOPT stops at 1e-8 of its scaled equations.
 SAME = 1e-6
 ROUNDING = 1e-10
 

@@ -1,4 +1,4 @@
-"""Kernels called through a driver without a GPU, against the library; skipped where there are no C compilers."""
+"""Kernels called through a driver without a GPU, compared with the library; skipped without C compilers."""
 
 import gc
 import sys
@@ -17,15 +17,15 @@ import condyle.codegen
 import condyle.cuda
 
 ROUNDING = 1e-11
-"""Of numbers that M⁻¹ may have amplified, relative to the largest one."""
+"""Tolerance relative to the largest number; M⁻¹ may have amplified rounding errors."""
 SINGLE = 1e-5
-"""Of RNEA of an arm in single precision: a hundred roundings of 6e-8."""
+"""Tolerance of RNEA of an arm in single precision: a hundred rounding errors of 6e-8."""
 
 ARM = condyle.robots.arm7()
 
 
 def states(model: condyle.Model, n: int) -> tuple[Any, Any, Any]:
-    """q, v and numbers for a or τ of n states, with the states along the last axis."""
+    """Returns q, v and numbers for a or τ of n states, with the states along the last axis."""
     rng = np.random.default_rng(n)
     q = np.array([condyle.random_configuration(model, seed=k) for k in range(n)]).reshape(n, model.nq)
     v, x = rng.standard_normal((2, n, model.nv))
@@ -33,7 +33,7 @@ def states(model: condyle.Model, n: int) -> tuple[Any, Any, Any]:
 
 
 def expected(model: condyle.Model, name: str, *given: Any) -> list[Any]:
-    """What the library computes, with the states along the last axis."""
+    """Returns the library's results, with the states along the last axis."""
     found = getattr(condyle, name)(model, condyle.Data(model), *(np.ascontiguousarray(x.T) for x in given))
     return [np.moveaxis(x, 0, -1) for x in (found if isinstance(found, tuple) else (found,))]
 
@@ -68,7 +68,7 @@ def test_single_precision(gpu: Gpu) -> None:
 
 
 def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -> None:
-    """As long as all threads are on the device at a time: eight blocks of 256."""
+    """As long as all threads fit on the device at a time: eight blocks of 256."""
     kernel = condyle.cuda.compile(quadruped.model, "rnea_derivatives")
     assert kernel.shares > 2
     assert condyle.cuda.compile(ARM, "rnea_derivatives").shares == 1
@@ -90,7 +90,7 @@ def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -
 @pytest.mark.parametrize("is_versioned", [False, True])
 @pytest.mark.parametrize("transposed", [False, True])
 def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: bool) -> None:
-    """They are used where they are, after their library's work, and results are seen by it: nothing waits otherwise."""
+    """Arrays are used without a copy and after their library's work, and the library sees the results."""
     kernel = condyle.cuda.compile(ARM, "rnea_derivatives")
     given = states(ARM, 50)
     options = {"transposed": transposed, "is_versioned": is_versioned}
@@ -110,9 +110,9 @@ def test_arrays_of_another_library(gpu: Gpu, transposed: bool, is_versioned: boo
 
 
 def test_a_consumer_that_does_not_wait_sees_nothing(gpu: Gpu) -> None:
-    """That is how it is seen in these tests that others wait."""
+    """This proves that the other tests can detect a missing wait."""
     kernel = condyle.cuda.compile(ARM, "gravity")
-    q = condyle.cuda.array(states(ARM, 3)[0])  # it stays: whose memory is given back is waited for
+    q = condyle.cuda.array(states(ARM, 3)[0])  # kept alive: freeing memory waits for work on it
     found = kernel(q)
     assert np.isnan(Imported(gpu, found, stream=-1).numpy()).all()
     near(Imported(gpu, found).numpy(), expected(ARM, "gravity", states(ARM, 3)[0])[0])
@@ -124,7 +124,7 @@ def test_results_go_where_out_says(gpu: Gpu) -> None:
     arrays = [Array(gpu, x) for x in given]
     vector, matrix = np.zeros((7, 20)), np.zeros((49, 20))
     first = condyle.cuda.array(vector)
-    # in memory matrices stand column by column: a library's (7, 7, n) that it has turned, or a flat one
+    # in memory matrices are stored by columns: a transposed (7, 7, n) array of another library, or a flat one
     turned = Array(gpu, np.zeros((7, 7, 20)))
     turned.strides = (20, 140, 1)
     out = [first, turned, Array(gpu, matrix), condyle.cuda.array(np.zeros((7, 7, 20))).swapaxes(0, 1)]
@@ -183,7 +183,7 @@ def test_what_is_lent_is_kept_until_it_was_read(gpu: Gpu) -> None:
     kernel(condyle.cuda.array(states(ARM, 1)[0]))
     assert q.given_back == 1
     kernel(q, stream=gpu.stream).numpy()
-    # a library that says on which stream it works, which the kernel uses, takes care of that itself
+    # if a library reports its stream, the kernel uses that stream, and the library keeps the order itself
     torch: Any = ModuleType("torch")
     torch.cuda = SimpleNamespace(current_stream=lambda device: SimpleNamespace(cuda_stream=gpu.stream))
     torch.from_dlpack = lambda x: Imported(gpu, x)
@@ -238,7 +238,7 @@ def test_capsules_as_the_header_says(gpu: Gpu) -> None:
             assert (imported.managed.major, imported.managed.minor, imported.managed.flags) == (1, 0, 0)
         assert (imported.shape, imported.strides, imported.dtype.name) == ((4, 3), (1, 4), "float32")
         assert np.array_equal(imported.numpy(), np.arange(12.0).reshape(3, 4).T)
-    array.__dlpack__()  # nobody takes it over
+    array.__dlpack__()  # the capsule has no consumer
     del array
     gc.collect()
     assert gpu.live()["memory"] == 1, "what was imported last is still there"
@@ -263,7 +263,7 @@ def test_ptx_the_cache_and_a_newer_device(gpu: Gpu, tmp_path: Path, monkeypatch:
     assert [path.suffix for path in tmp_path.iterdir()] == [".ptx"], "the compiler does not know that device"
     first = condyle.cuda.compile(ARM, "gravity", cache=tmp_path)
     assert sorted(path.suffix for path in tmp_path.iterdir()) == [".cubin", ".ptx"]
-    monkeypatch.setenv("CXX", "false")  # what is there is not made again
+    monkeypatch.setenv("CXX", "false")  # existing files are not compiled again
     for kernel in (
         first,
         condyle.cuda.compile(ARM, "gravity", cache=tmp_path),

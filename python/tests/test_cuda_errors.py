@@ -1,4 +1,4 @@
-"""What `condyle.cuda` says of wrong arguments, and where there is no driver, no device or no compiler."""
+"""Errors of `condyle.cuda` for wrong arguments, and for a missing driver, device or compiler."""
 
 import os
 import subprocess
@@ -74,7 +74,7 @@ capsule = found.__dlpack__()
 
 
 def run(program: str, **environment: str) -> "subprocess.CompletedProcess[str]":
-    """Runs a program with a cache of its own: what the compiler without a GPU makes is gone with its process."""
+    """Runs a program with its own cache: files of the compiler without a GPU are valid only within one process."""
     with TemporaryDirectory() as cache:
         changed = os.environ | {"CONDYLE_CACHE": cache} | environment
         return subprocess.run([sys.executable, "-c", program], env=changed, capture_output=True, text=True, check=False)
@@ -100,7 +100,7 @@ def test_without_a_driver_or_a_device(cuda_libraries: tuple[Path, Path]) -> None
 
 
 def test_nvidias_compiler_takes_the_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where it is installed; it needs no GPU."""
+    """Runs only if it is installed; it needs no GPU."""
     monkeypatch.delenv("CONDYLE_NVRTC_LIBRARY", raising=False)
     try:
         compiler = _cuda_driver.Compiler()

@@ -1,4 +1,4 @@
-"""To whom a `Data` belongs: one robot, and one call at a time."""
+"""A `Data` belongs to one robot, and to one call at a time."""
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -25,7 +25,7 @@ def test_data_of_another_robot(quadruped: Robot) -> None:
 
 
 def test_order_of_calls_does_not_matter(robot: Robot) -> None:
-    """No function reads what another left in the scratch."""
+    """No function reads results that another one left in the scratch memory."""
     model, data, q, v, a, tau, f_ext = robot
     other = condyle.random_configuration(model, seed=9)
     functions = [
@@ -55,7 +55,7 @@ def test_order_of_calls_does_not_matter(robot: Robot) -> None:
 
 
 class Interrupting:
-    """An array that does something when it is read: while a call has begun."""
+    """An array that runs a function when it is read, which is after the call has begun."""
 
     def __init__(self, array: NDArray[np.float64], action: Any) -> None:
         self.array, self.action = array, action
@@ -66,7 +66,7 @@ class Interrupting:
 
 
 def test_two_threads_at_once(quadruped: Robot) -> None:
-    """A second thread that comes while the first one's call has begun is refused; the first one's is right."""
+    """A second thread is refused while the first one's call runs; the first one's result is right."""
     model, data, q, *_ = quadruped
     expected = condyle.gravity(model, data, q)
     errors: list[str] = []
@@ -84,7 +84,7 @@ def test_two_threads_at_once(quadruped: Robot) -> None:
 
     assert np.array_equal(condyle.gravity(model, data, Interrupting(q, in_a_thread)), expected)  # type: ignore[arg-type]
     assert errors == ["data: in use by another call; give each thread a Data of its own"]
-    # the same within one thread; afterwards the scratch is free again
+    # the same within one thread; afterwards the scratch memory is free again
     with pytest.raises(RuntimeError, match="^data: in use by another call"):
         condyle.gravity(model, data, Interrupting(q, lambda: condyle.gravity(model, data, q)))  # type: ignore[arg-type]
     assert np.array_equal(condyle.gravity(model, data, q), expected)

@@ -1,4 +1,4 @@
-"""Hyper-dual numbers: every function of a model and a state takes them, and derivatives of one's own functions."""
+"""Hyper-dual numbers: every function of a model and a state accepts them; derivatives of user functions."""
 
 import math
 from collections.abc import Callable
@@ -14,13 +14,15 @@ from condyle import HyperDual
 
 STEP = 3e-4
 BY_DIFFERENCES = 2e-7
-"""By four points: the fifth derivative times STEP⁴/30, and what M⁻¹ of light bodies rounds, over STEP."""
+"""Four-point differences: the fifth derivative times STEP⁴/30, and rounding errors amplified by M⁻¹ of light bodies,
+over STEP.
+"""
 BY_HAND = 1e-11
 VALUE = 1e-12
-"""Doubles take other ways than hyper-dual numbers, with limbs side by side; M⁻¹ shows the difference."""
+"""Doubles use other code than hyper-dual numbers, with limbs in parallel lanes; M⁻¹ amplifies the difference."""
 
 Case = Callable[[Robot, Any, Any], Any]
-"""A function of a robot, a position and a velocity, the latter also in place of accelerations and efforts."""
+"""A function of a robot, a position and a velocity, which also serves as accelerations and efforts."""
 CASES: dict[str, Case] = {
     "aba": lambda r, q, v: condyle.aba(r.model, r.data, q, v, 2.0 * v, r.f_ext),
     "aba_derivatives": lambda r, q, v: condyle.aba_derivatives(r.model, r.data, q, v, 2.0 * v),
@@ -117,7 +119,7 @@ def held(r: Robot) -> condyle.ConstraintSet:
 
 
 def flat(value: Any) -> NDArray[Any]:
-    """All numbers of a result: of an array, of a number, or of a tuple of these."""
+    """Returns all numbers of a result: an array, a number, or a tuple of these."""
     if isinstance(value, tuple):
         return np.concatenate([flat(member) for member in value])
     return np.atleast_1d(np.asarray(value)).ravel()
@@ -134,21 +136,21 @@ def test_every_function_of_a_state_is_a_case() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_along_a_direction(robot: Robot, name: str) -> None:
-    """The two first derivatives and the second one, against differences of the value and of a derivative."""
+    """Compares the two first derivatives and the second one with differences of the value and of a derivative."""
     model, f = robot.model, CASES[name]
     rng = np.random.default_rng(2)
     along = rng.standard_normal((2, 2 * model.nv))
 
     def at(x: NDArray[Any]) -> NDArray[Any]:
-        """f at (q, v) moved by so much."""
+        """Returns f at (q, v) moved by x."""
         return flat(f(robot, condyle.integrate(model, robot.q, x[: model.nv]), robot.v + x[model.nv :]))
 
     def moved(first: float) -> NDArray[Any]:
-        """f there, with ε₁ in the second direction."""
+        """Returns f there, with ε₁ in the second direction."""
         return at(np.array([HyperDual(first * a, eps1=b) for a, b in zip(*along, strict=True)], dtype=object))
 
     def slope(f: Callable[[float], NDArray[Any]]) -> NDArray[Any]:
-        """df/ds at 0."""
+        """Returns df/ds at 0."""
         near, far = f(STEP) - f(-STEP), f(2.0 * STEP) - f(-2.0 * STEP)
         return (8.0 * near - far) / (12.0 * STEP)
 
@@ -247,7 +249,7 @@ def test_elementary_functions(name: str, x: float) -> None:
     ],
 )
 def test_arithmetic(f: Callable[[Any, Any], Any], slopes: tuple[float, float, float]) -> None:
-    """Against ∂f/∂x, ∂f/∂y and ∂²f/∂x∂y at (0.5, 2), as worked out by hand."""
+    """Compares with ∂f/∂x, ∂f/∂y and ∂²f/∂x∂y at (0.5, 2), derived by hand."""
     z = f(HyperDual(0.5, eps1=1.0), HyperDual(2.0, eps2=1.0))
     np.testing.assert_allclose([z.eps1, z.eps2, z.eps1eps2], slopes, rtol=1e-13, atol=1e-15)
 
@@ -284,5 +286,5 @@ def test_wrong_arguments(quadruped: Robot) -> None:
         condyle.jacobian(r.model, r.v, lambda q: q)
     with pytest.raises(ValueError, match="f: expected a vector"):
         condyle.jacobian(r.model, r.q, lambda q: condyle.crba(r.model, r.data, q))
-    with pytest.raises(ZeroDivisionError):  # what the function raises
+    with pytest.raises(ZeroDivisionError):  # an exception of the function
         condyle.gradient(r.model, r.q, lambda q: 1 / 0)

@@ -1,4 +1,4 @@
-"""Docstrings, whose examples run, and stubs, which are those of the extension module."""
+"""Docstrings, whose examples run, and stubs, which match the extension module."""
 
 import doctest
 import inspect
@@ -20,7 +20,7 @@ GLOBALS = {"condyle": condyle, "np": np}
 
 
 def members() -> Iterator[tuple[str, Any]]:
-    """The package and its modules, each function and class of the extension module, each member of its classes."""
+    """Yields the package and its modules, and the extension module's functions, classes and members of classes."""
     yield "condyle", condyle
     yield from (
         (name, item) for name, item in vars(condyle).items() if name in condyle.__all__ and inspect.ismodule(item)

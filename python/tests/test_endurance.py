@@ -1,6 +1,6 @@
-"""What stays as it is over very many calls, and under eight threads: memory, and the numbers.
+"""Memory and results stay the same over very many calls, and with eight threads.
 
-With `CONDYLE_FULL`, which `./test full` sets, memory must not grow over 10⁷ calls, and without it over 10⁵.
+Memory must not grow over 10⁷ calls with `CONDYLE_FULL`, which `./test full` sets, and over 10⁵ calls without it.
 """
 
 import gc
@@ -16,20 +16,22 @@ import pytest
 import condyle
 
 CALLS = 10**7 if "CONDYLE_FULL" in os.environ else 10**5
-# What allocators keep for later; to lose a pointer in each call is twice as much.
-# Of Python's objects, one call in four of a kind that left one behind would be more.
+# Memory that allocators keep for later; a pointer lost in each call is twice as much. For Python objects, one object
+# lost in every fourth call of a kind exceeds the limit.
 BYTES = 400_000
 BLOCKS = 2000
 
 
 def resident() -> int:
-    """The memory of this process that is in use, in bytes."""
+    """Returns the resident memory of this process, in bytes."""
     pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE")
 
 
 def calls() -> dict[str, Callable[[], object]]:
-    """Calls of every kind: results that are arrays, tuples, numbers; arguments as they lie, converted, refused."""
+    """Returns calls of every kind: results that are arrays, tuples, numbers; arguments used without a copy, converted,
+    refused.
+    """
     robot = condyle.robots.quadruped()
     data, q = condyle.Data(robot), condyle.random_configuration(robot, seed=1)
     v, a = np.random.default_rng(1).standard_normal((2, robot.nv))
@@ -77,7 +79,7 @@ def test_memory_is_flat() -> None:
 
 
 def test_eight_threads_on_one_model() -> None:
-    """Each with a `Data` of its own, in calls of all kinds, while the model's attributes are first made."""
+    """Each thread has its own `Data` and makes calls of all kinds, while the model's attributes are first made."""
     robot, states, rounds = condyle.robots.humanoid(), 40, 25
     rng = np.random.default_rng(2)
     q = np.stack([condyle.random_configuration(robot, seed=k) for k in range(states)])
@@ -86,7 +88,7 @@ def test_eight_threads_on_one_model() -> None:
     expected = condyle.aba_derivatives(robot, reference, q, v, tau)
     torques = np.stack([condyle.rnea(robot, reference, *one) for one in zip(q, v, tau, strict=True)])
     placements = condyle.frame_placement(robot, reference, q, foot)
-    fresh = robot.with_gravity(robot.gravity)  # its attributes were not looked at yet
+    fresh = robot.with_gravity(robot.gravity)  # a model whose attributes were not accessed yet
     failures: list[BaseException] = []
     start = threading.Barrier(8)
 

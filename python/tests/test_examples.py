@@ -1,4 +1,4 @@
-"""The examples of `python/examples` run as they stand."""
+"""The examples of `python/examples` run without changes."""
 
 import os
 import subprocess
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-SHARED = {"gait", "ground"}  # what examples have in common
+SHARED = {"gait", "ground"}  # modules that several examples share
 FOLDER = Path(__file__).parents[1] / "examples"
 EXAMPLES = sorted(path for path in FOLDER.glob("*.py") if path.stem not in SHARED)
 
@@ -25,7 +25,7 @@ def test_example(path: Path, tmp_path: Path) -> None:
     if path.stem == "pictures":
         pytest.importorskip("viser")
     if path.stem == "coming_from_crocoddyl":
-        pytest.importorskip("crocoddyl")  # its own tests run it where it is installed
+        pytest.importorskip("crocoddyl")  # Crocoddyl's own tests run it if it is installed
     environment = {**os.environ, "PYTHONWARNINGS": "error"}
     run = subprocess.run(
         [sys.executable, path], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300

@@ -1,4 +1,4 @@
-"""Factors of M and divide and conquer: what they solve, and when they refuse to."""
+"""Factors of M and divide and conquer: solutions and errors."""
 
 from typing import Any
 
@@ -11,11 +11,11 @@ from test_model import PENDULUM
 import condyle
 
 SOLVED = {"rtol": 1e-8, "atol": 1e-8}
-"""Roundings after a solve with M, whose condition is up to 1e4."""
+"""Rounding errors after a solve with M, whose condition is up to 1e4."""
 
 
 def factors(robot: Robot) -> tuple[list[Any], NDArray[np.float64]]:
-    """Both kinds of factors, ready to solve with, and M."""
+    """Returns both kinds of factors, ready to solve with, and M."""
     M = condyle.crba(robot.model, robot.data, robot.q)
     made: list[Any] = [condyle.Ltdl(robot.model), condyle.Cholesky(robot.model.nv)]
     for factor in made:

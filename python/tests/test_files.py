@@ -1,4 +1,4 @@
-"""Robots from files and into files: warnings with their parts, JSON, and copies of a file with other numbers."""
+"""Robots from and to files: warnings with their parts, JSON, and copies of a file with other numbers."""
 
 import json
 import pickle
@@ -17,7 +17,7 @@ ODD = """<robot name="odd">
 
 
 def sprung() -> Model:
-    """A robot with all that may stand beside a tree."""
+    """Returns a robot with everything that a model can have besides its tree."""
     rod = Inertia.from_cylinder(2.0, 0.05, 0.5)
     builder = ModelBuilder("sprung")
     upper = builder.body(
@@ -98,7 +98,7 @@ def test_strict_allows_kinds() -> None:
         Model.from_urdf_str(ODD, allow=["masless"])
     with pytest.raises(TypeError, match="allow: expected a list of kinds of warnings"):
         Model.from_urdf_str(ODD, allow="massless")  # type: ignore[arg-type]
-    # a warning's own kind may be given back
+    # the kind of a warning can be passed to `allow`
     kinds = [warning.kind for warning in Model.from_urdf_str(ODD).warnings]
     assert Model.from_urdf_str(ODD, strict=True, allow=kinds).nv == 1  # type: ignore[arg-type]
 

@@ -1,4 +1,4 @@
-"""Reference cycles through functions that a user wrote: the collector of garbage finds them."""
+"""Reference cycles through functions of the user: the garbage collector finds them."""
 
 import gc
 import weakref
@@ -12,7 +12,7 @@ from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Fddp
 
 
 class Marker:
-    """What the functions of a cycle hold on to."""
+    """An object that the functions of a cycle reference."""
 
 
 def action(calc: Any, calc_diff: Any = None) -> Action:
@@ -95,7 +95,7 @@ def test_what_is_in_use_is_not_collected() -> None:
 
 
 def test_all_classes_that_hold_objects_are_seen() -> None:
-    """Classes with objects of Python in them take part in the collection."""
+    """Classes that hold Python objects take part in garbage collection."""
     simulation = condyle.simulation.Simulation(condyle.robots.arm7())
     knot = action(step)
     for holder in (knot, constrained(step), problem(knot), Fddp(problem(knot)), simulation):

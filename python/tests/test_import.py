@@ -1,9 +1,9 @@
-"""What an import takes: NumPy, and nothing else that is slow to import."""
+"""Modules loaded by an import: NumPy, and no other module that is slow to import."""
 
 import subprocess
 import sys
 
-# What some functions need, and some users have not; and what takes long.
+# Optional dependencies, and modules that are slow to import.
 LATER = {
     "casadi",
     "tqdm",

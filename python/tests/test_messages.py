@@ -1,4 +1,4 @@
-"""What a user is told: each mistake by its argument, what was expected and what was found; and what help says."""
+"""Messages to the user: each error has the argument, the expected and the found value; and the contents of help."""
 
 import pickle
 import pkgutil
@@ -20,7 +20,7 @@ Q, ZERO = np.full(7, 0.3), np.zeros(7)
 
 
 def told(call: Callable[[], object], error: type[Exception]) -> str:
-    """The message of an error."""
+    """Returns the message of an error."""
     with pytest.raises(error) as raised:
         call()
     return str(raised.value)
@@ -39,7 +39,7 @@ def test_columns_and_batches_in_another_layout() -> None:
 
 @pytest.mark.parametrize("shape", [(5, 6, 8), (5, 48, 1), (5, 8, 7)])
 def test_matrices_of_many_states_in_another_layout(shape: tuple[int, ...]) -> None:
-    """They have as many numbers, or more, and were read in the wrong order."""
+    """These have as many numbers, or more, and were once read in the wrong order."""
     states = np.tile(Q, (5, 1))
     message = told(lambda: condyle.rnea(ARM, DATA, states, ZERO, ZERO, np.zeros(shape)), ValueError)
     assert message == f"f_ext: expected shape (8, 6), or (N, 8, 6) for N states, found {shape}"
@@ -128,7 +128,7 @@ def test_settings_that_are_not_there_are_told_those_that_are() -> None:
         words = {"method": "fddp", "time_budget": 1.0, "second_order": True, "inverse_dynamics_form": True}
         words |= {"project_warm_start": False, "restart": False}
         numbers = {"regularisation_min": 1e-9, "regularisation_factor": 10.0}
-        for name in names:  # each is one
+        for name in names:  # each name is a valid setting
             solver(problem, **{name: (words | numbers).get(name, 1)})
 
 
@@ -146,7 +146,7 @@ def test_a_setting_of_another_type_is_named(name: str, value: object, text: str)
 
 
 def test_functions_are_functions() -> None:
-    """Of actions, residuals and spaces of one's own: said when they are made, not in a solve."""
+    """For user-defined actions, residuals and spaces the error comes at construction, not in a solve."""
     optimal, f = condyle.optimal, len
     for make, name in (
         (lambda: optimal.Action(2, 1, 3), "calc"),
@@ -230,7 +230,7 @@ def test_what_a_model_shows_is_made_once() -> None:
     assert ARM.limits is ARM.limits
     assert ARM.frames[3] is ARM.frames[3]
     own = ARM.frames
-    own.clear()  # a list of the caller's own
+    own.clear()  # a list that belongs to the caller
     ARM.names.clear()
     assert len(ARM.frames) == 17
     assert len(ARM.names) == 8

@@ -1,4 +1,4 @@
-"""Pickles of all public classes: a copy that shows the same, or a refusal of what is a computation under way."""
+"""Pickles of all public classes: an equal copy, or an error for a computation in progress."""
 
 import inspect
 import pickle
@@ -17,7 +17,7 @@ Q, ZERO = np.full(7, 0.3), np.zeros(7)
 STEP = FreeDynamics(ARM, 0.05, [Cost("rest", 1.0, Residual.state(np.zeros(14)))])
 PROBLEM = Problem(np.zeros(14), [STEP], [0] * 3, FreeDynamics(ARM, None, []))
 
-# Computations under way: factors, a robot that is being built.
+# Computations in progress: factors, a robot that is being built.
 UNDER_WAY = {
     "BodyId", "Cholesky", "DivideConquer", "Ltdl", "ModelBuilder", "Sweep",
 }  # fmt: skip
@@ -32,7 +32,7 @@ def cone() -> optimal.FrictionCone:
     return optimal.FrictionCone(0.6, facets=8, inner=True, least=1.0, rotation=[[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
-# An object of each class that has no other test of its pickle.
+# An object of each class whose pickle has no other test.
 OBJECTS: dict[str, Any] = {
     "Simulation": simulation.Simulation(ARM, "runge_kutta_4", dt=0.002, passive=0.1),
     "Ground": simulation.Ground(["tool"], friction=0.3),
@@ -58,7 +58,7 @@ OBJECTS: dict[str, Any] = {
 
 
 def shown(thing: Any) -> list[str]:
-    """What an object shows of itself: its text, its properties, what it computes without an argument."""
+    """Returns the visible contents of an object: its text, its properties, results of methods without arguments."""
     members = [name for name in dir(type(thing)) if not name.startswith("_")]
     values = [getattr(thing, name) for name in members]
     called = [name in ("rows", "bounds") and callable(value) for name, value in zip(members, values, strict=True)]
@@ -81,7 +81,7 @@ def test_a_copy_shows_the_same(name: str, protocol: int) -> None:
 
 @pytest.mark.parametrize(("name", "item"), [pair for pair in classes() if pair[0] not in OBJECTS])
 def test_all_others_pickle_or_are_under_way(name: str, item: type) -> None:
-    """They have a pickle of their own, or are tuples or exceptions, or are refused by name."""
+    """All classes have their own pickle, are tuples or exceptions, or are refused by name."""
     own = any({"__reduce__", "__reduce_ex__", "__getstate__"} & vars(base).keys() for base in item.__mro__[:-1])
     assert own or issubclass(item, tuple | Exception) or item.__init__ is not object.__init__ or name in UNDER_WAY
 
@@ -95,7 +95,7 @@ def swing(t: int, x: np.ndarray, u: np.ndarray) -> float:
 
 
 def test_residuals_of_ones_own_go_with_their_knots() -> None:
-    """In costs, in those of one knot, and in limits, between others: a copy solves to the same bits."""
+    """Residuals in costs, in costs of one knot, and in limits, among others: a copy gives bit-identical solutions."""
     ends, rest = np.full(7, np.inf), Cost("rest", 0.1, Residual.state(np.zeros(14)))
     costs = [Cost("power", 1e-2, Residual.own(7, power)), rest, Cost("swing", 1.0, Residual.own_cost(swing))]
     limits = [optimal.Limit("strong", Residual.own(7, power), -ends, ends)]

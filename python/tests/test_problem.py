@@ -1,4 +1,4 @@
-"""Problems and solvers: an action for each knot, evaluation, callbacks, what is shown, values that pickle."""
+"""Problems and solvers: an action for each knot, evaluation, callbacks, progress output, values that pickle."""
 
 import pickle
 import sys
@@ -92,7 +92,7 @@ def test_an_action_for_each_knot_gives_the_bits_of_one_for_all() -> None:
     one, other = (Fddp(problem, max_iterations=6).solve(xs, us) for problem in (apart, shared))
     assert one.trace[0].accepted and [i.cost for i in one.trace] == [i.cost for i in other.trace]
     np.testing.assert_array_equal(one.xs, other.xs)
-    # what is changed later is the knot's own
+    # later changes affect only this knot
     for problem in (apart, shared):
         problem.set_costs(4, costs(7))
         problem.set_weight("com", 5.0)
@@ -152,7 +152,7 @@ def test_accelerations_efforts_and_forces_of_a_solution() -> None:
     solver.shift(0)
     with pytest.raises(ProblemError, match="the horizon has moved on since this solution"):
         _ = late.forces
-    assert solution.forces[0].keys() == set(FEET)  # known before
+    assert solution.forces[0].keys() == set(FEET)  # computed before the shift
     jump = ImpulseDynamics(QUADRUPED, contacts(("LF_foot",)), [])
     falling = np.array(STANDING)
     falling[21] = -1.0
@@ -262,7 +262,7 @@ def test_a_sweep_is_the_solvers() -> None:
     solution = Fddp(problem, max_iterations=1, inverse_dynamics_form=False).solve(xs, us)
     for t in range(KNOTS):
         np.testing.assert_allclose(found.K[t], solution.K[t], rtol=0, atol=1e-6 * abs(solution.K[t]).max())
-    # the first step of a linear-quadratic problem is its optimum: u + k + K dx, by hand
+    # the first step for a linear-quadratic problem gives its optimum: u + k + K dx, computed by hand
     dx, cost = np.zeros(14) + np.array(nodes[0].f) * 0.0, 0.0
     for node, K, k in zip(nodes, found.K, found.k, strict=False):
         A, B, f, Q, S, R, q, r = (np.array(part) for part in node)

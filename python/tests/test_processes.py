@@ -1,4 +1,4 @@
-"""What a thread, a fork, a signal and the environment may do. Each test runs a program of its own, with a time-out."""
+"""Behaviour with threads, forks, signals and environment variables. Each test runs its own program, with a time-out."""
 
 import os
 import signal
@@ -10,7 +10,7 @@ import time
 import pytest
 
 TIMEOUT = 120.0
-"""Seconds after which a program counts as hanging: many times what it takes, even unoptimised."""
+"""Seconds after which a program counts as hanging: many times its duration, even unoptimised."""
 
 PRELUDE = """
 import gc, multiprocessing, os, signal, sys, threading, time
@@ -39,7 +39,7 @@ def run(source: str, **environment: str) -> tuple[int, str, str]:
 
 
 def check(source: str, **environment: str) -> str:
-    """Runs a program that ends well, and returns its output."""
+    """Runs a program that must succeed, and returns its output."""
     code, output, errors = run(source, **environment)
     assert code == 0, errors
     return output
@@ -86,7 +86,7 @@ CALLS = {
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 @pytest.mark.parametrize("calls", CALLS.values(), ids=CALLS)
 def test_fork_after_threads(calls: str) -> None:
-    """The child of a process that has computed on threads computes the same, and so does its own child."""
+    """The child of a process that has computed with threads computes the same, and so does the child's child."""
     check(
         calls
         + """
@@ -118,7 +118,7 @@ def test_fork_after_threads(calls: str) -> None:
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 def test_random_after_a_fork() -> None:
-    """Forked processes draw positions of their own."""
+    """Forked processes draw different positions."""
     check(
         """
         arm = condyle.robots.arm7()
@@ -137,7 +137,7 @@ def test_random_after_a_fork() -> None:
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork")
 @pytest.mark.parametrize("name", ["batch", "fddp"])
 def test_multiprocessing_by_fork(name: str) -> None:
-    """A pool of forked processes computes what their parent has computed, and ends as it should."""
+    """A pool of forked processes computes the same results as their parent, and ends normally."""
     check(
         CALLS[name]
         + """
@@ -240,7 +240,7 @@ INTERRUPTED = """
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals")
 @pytest.mark.parametrize("call", LONG.values(), ids=LONG)
 def test_signals(call: str) -> None:
-    """A handler runs while a call lasts, and what it raises ends the call; what was computed until then is kept."""
+    """A handler runs during a call, and its exception ends the call; results computed so far are kept."""
     check(
         call
         + INTERRUPTED
@@ -260,10 +260,10 @@ def test_signals(call: str) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")
 @pytest.mark.parametrize("name", ["solve", "augmented lagrangian", "simulation"])
 def test_control_c(name: str) -> None:
-    """Ctrl-C raises KeyboardInterrupt within the call, and that ends the program."""
+    """Ctrl-C raises KeyboardInterrupt within the call, which ends the program."""
     program = PRELUDE + textwrap.dedent(LONG[name] + INTERRUPTED) + "print('begin', flush=True)\n"
     program += "interrupted(KeyboardInterrupt)\nprint('again', flush=True)\ncall()\n"
-    # whoever runs the tests in the background may have told them to ignore Ctrl-C
+    # a shell that runs the tests in the background may ignore Ctrl-C for them
     program = "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n" + program
     command = [sys.executable, "-c", program]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -278,7 +278,7 @@ def test_control_c(name: str) -> None:
 
 
 def test_signals_on_another_thread() -> None:
-    """Only the main thread gets signals: a solve on another one goes on, and leaves the interpreter to others."""
+    """Only the main thread receives signals: a solve on another one continues, and does not block the interpreter."""
     check(
         LONG["simulation"].replace("2**63", "200_000")
         + """
@@ -351,7 +351,7 @@ MEANWHILE = {
 @pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="needs signals")
 @pytest.mark.parametrize("call", MEANWHILE.values(), ids=MEANWHILE)
 def test_handlers_run_meanwhile(call: str) -> None:
-    """Handlers run again and again during a long call, not once when it has ended; and what they raise ends it."""
+    """Handlers run repeatedly during a long call, not once at its end; and their exception ends it."""
     check(
         call
         + """
@@ -379,7 +379,7 @@ def test_handlers_run_meanwhile(call: str) -> None:
 
 @pytest.mark.parametrize("value", ["", "avx3", "AVX2", "neon" if os.uname().machine == "x86_64" else "avx2"])
 def test_refused_level(value: str) -> None:
-    """A level that cannot be used is an error of the import, which names those that can."""
+    """A SIMD level that cannot be used is an error of the import, which names the available ones."""
     code, _, errors = run("", CONDYLE_LEVEL=value)
     assert code == 1
     last = errors.strip().splitlines()[-1]
@@ -388,7 +388,7 @@ def test_refused_level(value: str) -> None:
 
 
 def test_chosen_level() -> None:
-    """A level that every processor has."""
+    """The import accepts a SIMD level that every processor has."""
     check(
         "arm = condyle.robots.arm7()\ncondyle.rnea(arm, condyle.Data(arm), *np.zeros((3, 7)))", CONDYLE_LEVEL="baseline"
     )

@@ -1,4 +1,4 @@
-"""Solvers from Python: horizons that move on, time budgets, bounds and methods."""
+"""Solvers from Python: shifted horizons, time budgets, bounds and methods."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_without_time_a_solve_returns_what_it_has() -> None:
     solution = Fddp(problem, time_budget=0.0).solve(xs, us)
     assert solution.status == "time_limit" and not solution.trace
     np.testing.assert_array_equal(solution.us, us)
-    assert solution.timings.overrun == 0.0  # no iteration was asked for
+    assert solution.timings.overrun == 0.0  # no iteration was requested
     late = Fddp(problem, time_budget=1e-9, tolerance=0.0).solve(xs, us)
     assert late.status == "time_limit" and len(late.trace) == 1
     assert 0.0 < late.timings.overrun <= late.timings.total
@@ -68,7 +68,7 @@ def test_segments_and_threads_change_no_iterate() -> None:
     np.testing.assert_array_equal(threaded.xs, one.xs)
     segments = Fddp(problem, segments=3, threads=2).solve(xs, us)
     assert segments.status == one.status
-    # segments that disagree by more than 1e-9 of their value functions are swept as one
+    # segments that differ by more than 1e-9 of their value functions are swept as one
     np.testing.assert_allclose([i.cost for i in segments.trace], [i.cost for i in one.trace], rtol=1e-8)
     np.testing.assert_allclose(segments.xs, one.xs, atol=1e-9)
     assert (segments.xs != one.xs).any()

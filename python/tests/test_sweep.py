@@ -1,4 +1,4 @@
-"""Sweeps: the rows are those of single solves, in whatever chunks, folders and processes."""
+"""Sweeps: the rows equal single solves, for any chunks, folders and processes."""
 
 import os
 import signal
@@ -74,7 +74,7 @@ def test_chunks_do_not_matter(chunk: int) -> None:
 def test_parameters_of_the_model_and_weights() -> None:
     found = condyle.sweep(reach(), [1, 2, 3], vary=heavier)
     assert (found.status == "converged").all()
-    assert np.all(np.diff(found.cost) > 0.0)  # what is heavier costs more to move
+    assert np.all(np.diff(found.cost) > 0.0)  # a heavier robot costs more to move
     found = condyle.sweep(reach(), [1.0, 10.0, 100.0], vary=aimed, start=(np.tile(REST, (13, 1)), np.zeros((12, 7))))
     assert np.all(np.diff(found.cost) > 0.0)
 
@@ -157,9 +157,9 @@ def test_without_ray_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.fixture(scope="module")
 def ray() -> Iterator[Any]:
-    """Two workers' worth of a cluster on this machine."""
+    """Starts a cluster with two workers on this machine."""
     ray = pytest.importorskip("ray")
-    ray.cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import it
+    ray.cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import this module
     ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
     yield ray
     ray.shutdown()
@@ -171,7 +171,7 @@ def slow(problem: Problem, weight: float) -> None:
 
 
 def once_fatal(problem: Problem, item: tuple[float, str]) -> None:
-    """Ends its process, the first time that this is asked for."""
+    """Ends its process the first time that the variation requests it."""
     weight, mark = item
     if mark and not Path(mark).exists():
         Path(mark).touch()
@@ -202,7 +202,7 @@ def test_all_workers_work(ray: Any) -> None:
 def test_a_lost_workers_share_is_done_again(ray: Any, tmp_path: Path) -> None:
     items = [(float(k + 1), str(tmp_path / "lost") if k == 3 else "") for k in range(6)]
     found = condyle.sweep(reach(), items, vary=once_fatal, cluster=True, chunk=2)
-    assert (tmp_path / "lost").exists()  # a process did end
+    assert (tmp_path / "lost").exists()  # a process has ended
     assert_same(found, condyle.sweep(reach(), [weight for weight, _ in items], vary=aimed))
 
 

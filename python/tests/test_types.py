@@ -1,4 +1,4 @@
-"""The types in the stubs: what functions and properties return is what the stubs say."""
+"""Types in the stubs: results of functions and properties have the types in the stubs."""
 
 import ast
 import pkgutil
@@ -21,7 +21,7 @@ ARM = condyle.robots.arm7()
 Q, V = np.full(7, 0.3), np.full(7, 0.1)
 INERTIA = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
 
-# An argument of each name that functions have, unless it has a default.
+# An argument for each argument name of the functions, unless it has a default.
 ARGUMENTS = {
     "model": ARM,
     "data": condyle.Data(ARM),
@@ -71,7 +71,7 @@ OBJECTS = {
 
 
 def namespace() -> dict[str, Any]:
-    """The names that the types in the stubs are made of."""
+    """Returns the names that occur in the types of the stubs."""
     names: dict[str, Any] = {"np": np, "typing": typing} | vars(_types) | vars(_inertia) | vars(_condyle)
     names |= {name: getattr(_spelling, name) for name in ("Motion", "Force", "ReferenceFrame")}
     for node in STUB.body:
@@ -88,7 +88,7 @@ NAMES = namespace()
 
 
 def conforms(value: Any, kind: Any) -> bool:
-    """Whether a value is of a type."""
+    """Returns whether a value has a type."""
     origin, parts = typing.get_origin(kind), typing.get_args(kind)
     if kind is Any or kind is None:
         return kind is Any or value is None
@@ -118,7 +118,7 @@ def conforms(value: Any, kind: Any) -> bool:
 
 
 def results() -> Iterator[Any]:
-    """Each function of a model, and each property, with its result and the type that it should have."""
+    """Yields each function of a model, and each property, with its result and its expected type."""
     for node in STUB.body:
         if isinstance(node, ast.FunctionDef) and node.returns and not node.name.startswith("_"):
             wanted = node.args.args[: len(node.args.args) - len(node.args.defaults)]

@@ -1,4 +1,4 @@
-"""Pictures: the pattern of the tree, plots, shapes, and what the page of a motion is told."""
+"""Pictures: the pattern of the tree, plots, shapes, and the contents of a motion's page."""
 
 import subprocess
 import sys
@@ -31,7 +31,7 @@ URDF = """<robot name="shapes"><material name="red"><color rgba="1 0 0 1"/></mat
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """The volume inside of triangles that are seen from outside anticlockwise: Σ a·(b × c)/6."""
+    """Returns the volume inside triangles that are anticlockwise when seen from outside: Σ a·(b × c)/6."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return float((a * np.cross(b, c)).sum() / 6.0)
 
@@ -44,7 +44,7 @@ def test_the_pattern_is_that_of_the_inertia_matrix(name: str) -> None:
     predicted = viz.pattern(model)
     assert not M[~predicted].any()
     assert (predicted == predicted.T).all()
-    # few of the entries that may be other than zero are zero, by symmetries of the robot
+    # few of the entries that may be nonzero are zero, by symmetries of the robot
     assert (M[predicted] > 0.0).mean() > 0.9
 
 
@@ -54,7 +54,7 @@ def test_the_pattern_of_joints_that_follow() -> None:
     M = sum(np.abs(condyle.crba(model, data, condyle.random_configuration(model, seed=k))) for k in range(5))
     assert not M[~viz.pattern(model)].any()
     left, right = (model.idx_vs[model.joint(name)] for name in ("LF_KFE", "RF_HFE"))
-    assert viz.pattern(model)[left, right]  # the knee of one leg moves the other leg too
+    assert viz.pattern(model)[left, right]  # the knee of one leg also moves the other leg
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,7 @@ def test_spy(plots: Any) -> None:
     assert np.array_equal(tree.images[0].get_array(), viz.pattern(model))
     assert len(there.lines[0].get_xdata()) == 0
     inverse = viz.spy(condyle.minv(model, data, q), model).axes[0]
-    assert len(inverse.lines[0].get_xdata()) > 0  # legs act on each other through the trunk
+    assert len(inverse.lines[0].get_xdata()) > 0  # legs influence each other through the trunk
     with pytest.raises(ValueError, match=r"M: expected shape \(18, 18\), found \(7, 7\)"):
         viz.spy(np.eye(7), model)
 
@@ -113,7 +113,7 @@ def test_capsules_join_the_joints() -> None:
     long = {body for body in range(1, model.nbodies) if any(np.linalg.norm(end) > thick for end in _ends(model, body))}
     assert len(long) > 15
     assert {shape.body for shape in shapes} == long
-    for shape in shapes:  # its far end is at a joint or a link of the body
+    for shape in shapes:  # the far end of the shape is at a joint or a link of the body
         radius = -shape.vertices[:, 2].min()
         end = shape.placement[:3, 2] * (shape.vertices[:, 2].max() - radius)
         assert min(np.linalg.norm(end - other) for other in _ends(model, shape.body)) < 1e-12
@@ -136,7 +136,7 @@ def test_shapes_of_a_urdf(tmp_path: Path) -> None:
     assert volume(box.vertices, box.faces) == pytest.approx(0.048)
     assert volume(cylinder.vertices, cylinder.faces) == pytest.approx(np.pi * 0.005, rel=0.01)
     assert volume(ball.vertices, ball.faces) == pytest.approx(4e-3 * np.pi / 3.0, rel=0.03)
-    assert {shape.body for shape in others} <= {2}  # its mesh is not there
+    assert {shape.body for shape in others} <= {2}  # the mesh file is missing
     trimesh = pytest.importorskip("trimesh")
     trimesh.creation.box([0.1, 0.1, 0.1]).export(tmp_path / "mesh.stl")
     assert mesh_path("mesh.stl", path, []) == tmp_path / "mesh.stl"
@@ -171,7 +171,7 @@ def test_playback() -> None:
                 assert player.arrows.visible
                 foot = condyle.frame_placement(model, condyle.Data(model), q[3], "LF_foot")[:3, 3]
                 np.testing.assert_allclose(player.arrows.points[0], [foot, foot + np.array([0.0, 0.0, 0.5])], atol=1e-6)
-        assert not player.arrows.visible  # no foot on the ground
+        assert not player.arrows.visible  # no foot is on the ground
         player.slider.value = 0.05
         player.show(round(player.slider.value / 0.01))
         assert player.knot == 5

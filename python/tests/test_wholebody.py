@@ -1,5 +1,6 @@
-"""Whole-body control: forces that carry the weight, efforts that are those of `rnea`, every task and contact, what is
-refused by name, threads."""
+"""Whole-body control: forces carry the weight, efforts agree with `rnea`, every kind of task and contact, errors with
+names, threads.
+"""
 
 import copy
 import pickle
@@ -32,7 +33,7 @@ SOLES = ["left_sole", "right_sole"]
 CHEST = "chest"
 STANDING = np.r_[0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2]
 TASKS = [Task.com(), Task.orientation("trunk"), Task.posture()]
-# Violations are at most 1e-6 of 1 and the weight; efforts and sums of forces then agree to some of these.
+# Violations are at most 1e-6 of 1 and the weight; efforts and sums of forces agree to some of these.
 SOLVED = 1e-3
 
 
@@ -41,7 +42,7 @@ def points(friction: float = 0.7) -> list[FrictionContact]:
 
 
 def upright() -> np.ndarray:
-    """The humanoid with bent knees."""
+    """Returns a position of the humanoid with bent knees."""
     q = condyle.neutral(HUMANOID)
     for name, i in zip(HUMANOID.names, HUMANOID.idx_qs, strict=True):
         for end, angle in ("hip_pitch", -0.4), ("knee", 0.8), ("ankle_pitch", -0.4):
@@ -51,13 +52,13 @@ def upright() -> np.ndarray:
 
 
 def moving(model: condyle.Model, q: np.ndarray, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """A position near q, and a slow velocity."""
+    """Returns a position near q, and a slow velocity."""
     rng = np.random.default_rng(seed)
     return condyle.integrate(model, q, 0.02 * rng.standard_normal(model.nv)), 0.05 * rng.standard_normal(model.nv)
 
 
 def effort(model: condyle.Model, q: np.ndarray, v: np.ndarray, contacts: list[FrictionContact], command: Any) -> Any:
-    """rnea(q, v, q̈) − Σ Jᵀ f."""
+    """Returns rnea(q, v, q̈) − Σ Jᵀ f."""
     data = condyle.Data(model)
     tau = condyle.rnea(model, data, q, v, command.a)
     for contact, force in zip(contacts, command.forces, strict=True):
@@ -102,7 +103,7 @@ CONTACTS: dict[str, list[FrictionContact]] = {
 
 @pytest.mark.parametrize("kind", CONTACTS)
 def test_contacts_of_every_kind(kind: str) -> None:
-    """M q̈ + h = τ + Σ Jᵀ f, m (c̈ − g) = Σ f, and what touches is held."""
+    """Checks M q̈ + h = τ + Σ Jᵀ f, m (c̈ − g) = Σ f, and that contacts are held."""
     contacts = CONTACTS[kind]
     controller = WholeBodyController(HUMANOID, contacts, [Task.com(), Task.posture()])
     q, v = moving(HUMANOID, upright())
@@ -117,7 +118,7 @@ def test_contacts_of_every_kind(kind: str) -> None:
     for contact in contacts:
         held = 3 if contact.corners is None or len(contact.corners) == 2 else 6
         a = condyle.frame_classical_acceleration(HUMANOID, data, q, v, command.a, contact.frame, "local_world_aligned")
-        if contact.corners is not None:  # at their middle: a + ω̇ × r + ω × (ω × r)
+        if contact.corners is not None:  # the acceleration at the corners' middle: a + ω̇ × r + ω × (ω × r)
             w = condyle.frame_velocity(HUMANOID, data, q, v, contact.frame, "local_world_aligned")[3:]
             r = condyle.frame_placement(HUMANOID, data, q, contact.frame)[:3, :3] @ contact.corners.mean(0)
             a[:3] += np.cross(a[3:], r) + np.cross(w, np.cross(w, r))
@@ -134,14 +135,14 @@ def test_a_contact_comes_and_goes() -> None:
     assert loads[0] > 50.0 and 0.0 <= loads[1] <= 0.1 * 9.81 * QUADRUPED.total_mass + 1e-4 and loads[2] == 0.0
 
 
-# By how much the quantity of a task should accelerate, far within what the robot can do.
+# Acceleration requested of a task's quantity, far within the robot's abilities.
 WANTED = 0.2
 
 
 @pytest.mark.parametrize("axes", ["world", "local", ("frame", "right_sole")])
 @pytest.mark.parametrize("kind", ["com", "pose", "position", "orientation", "velocity", "angular_momentum"])
 def test_tasks_of_every_kind(kind: str, axes: Any) -> None:
-    """A task that stands above all others gets what it asks for: J q̈ + J̇ v = a*, along its axes."""
+    """A task of the highest priority is fulfilled: J q̈ + J̇ v = a*, in its axes."""
     q, v = moving(HUMANOID, upright(), 1)
     data = condyle.Data(HUMANOID)
     on_frame = kind not in ("com", "angular_momentum")
@@ -189,7 +190,7 @@ def test_a_task_of_force_and_one_of_posture() -> None:
 
 
 def test_settings_are_the_library_s() -> None:
-    """The defaults that stand in Python are those of the library, and what is given comes back."""
+    """The defaults in Python equal the library's, and given values are returned."""
     assert WholeBodyController(QUADRUPED, [], []).settings == Settings()
     limits = JointLimits(0.1, 50.0, velocity=np.full(18, 3.0))
     given = Settings(1e-4, 1e-3, Gains(1.0, 2.0), 9.0, Pyramid(6, False), np.full(18, 40.0), limits, 3, 0.1, "clarabel")
@@ -205,7 +206,7 @@ def test_settings_are_the_library_s() -> None:
 
 
 def test_limits_of_effort() -> None:
-    """Weak motors cannot carry the robot: the command says so, and is within the limits."""
+    """Weak motors cannot carry the robot: the command reports it, and is within the limits."""
     weak = np.full(18, 5.0)
     controller = WholeBodyController(QUADRUPED, points(), TASKS, Settings(effort=weak))
     command = controller.step(STANDING, np.zeros(18), controller.hold(STANDING))
@@ -315,7 +316,7 @@ def test_plans_from_arrays() -> None:
     x0, v = np.r_[STANDING, np.zeros(18)], np.zeros(18)
     x1 = x0.copy()
     x1[2] -= 0.04
-    x0[21] = x1[21] = -0.4  # m/s, along the trunk's z
+    x0[21] = x1[21] = -0.4  # m/s, in the direction of the trunk's z
     touches = np.array([[True] * 4, [False, True, True, True]])
     controls = np.arange(24.0).reshape(2, 12)
     gains = np.zeros((2, 12, 36))
@@ -349,7 +350,7 @@ def test_plans_from_arrays() -> None:
 
 
 def test_plans_of_solutions() -> None:
-    """A solution with an impact: that knot has no controls, and its two ends share a time."""
+    """For a solution with an impact: the impact's knot has no controls, and its two ends have the same time."""
     feet = {foot: condyle.ContactConstraint(foot, "point", kd=20.0) for foot in FEET}
     x0 = np.r_[STANDING, np.zeros(18)]
     rest = Cost("rest", 1.0, Residual.state(x0))
@@ -390,7 +391,7 @@ def test_values() -> None:
 
 
 def test_two_controllers_in_two_threads() -> None:
-    """Each thread's controller gives what it gives alone."""
+    """Each thread's controller gives the same results as it gives alone."""
 
     def run(seed: int, out: list[np.ndarray]) -> None:
         controller = WholeBodyController(QUADRUPED, points(), TASKS)
@@ -412,7 +413,7 @@ def test_two_controllers_in_two_threads() -> None:
 
 
 def test_one_controller_in_two_threads() -> None:
-    """It is used by one thread at a time: the other is told so, and no command is a mixture."""
+    """A controller serves one thread at a time: the other one gets an error, and no command is a mixture."""
     controller = WholeBodyController(
         HUMANOID, CONTACTS["soles"], [Task.com(), Task.posture()], Settings(warm_start=False)
     )

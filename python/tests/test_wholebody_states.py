@@ -1,5 +1,6 @@
-"""Whole-body control of invalid states and references: a safe command or an error, with the name of the joint or of
-the frame; copies and pickles of controllers."""
+"""Whole-body control with invalid states and references: a safe command or an error, with the name of the joint or of
+the frame; copies and pickles of controllers.
+"""
 
 import copy
 import pickle
@@ -51,14 +52,14 @@ def test_a_quaternion_has_length_1(factor: float) -> None:
         assert command.reason == controller.command.reason
         assert command.reason.startswith("joint `root_joint`: its rotation, q[3..7], has the length ")
         assert np.isfinite(command.tau).all()
-        np.testing.assert_allclose(command.tau, good.tau, atol=2.0)  # it stands
+        np.testing.assert_allclose(command.tau, good.tau, atol=2.0)  # the robot stands
     with pytest.raises(ControllerError, match="joint `root_joint`"):
         command.solved()
     assert controller.step(STANDING, REST, references).status == "solved"
 
 
 def test_references_are_positions_and_poses() -> None:
-    """What is set is checked at once, what is changed in place by the step."""
+    """Values that are set are checked at once; values changed in place are checked by the step."""
     controller = new()
     good = controller.hold(STANDING)
     mirror = np.diag([1.0, 1.0, -1.0, 1.0])
@@ -133,7 +134,7 @@ def test_normalize_needs_a_length() -> None:
         with pytest.raises(condyle.ModelError, match=rf"joint `root_joint`: .* has the length {length} and cannot"):
             condyle.normalize(QUADRUPED, q)
         with pytest.raises(condyle.ModelError, match=rf"joint `root_joint`: .* has the length {length} and cannot"):
-            condyle.normalize(QUADRUPED, np.stack([STANDING, q]))  # one of many
+            condyle.normalize(QUADRUPED, np.stack([STANDING, q]))  # one of many states
         with pytest.raises(condyle.ModelError, match="joint `wheel`: its rotation, q"):
             condyle.normalize(wheel, [0.6 * factor, 0.8 * factor])
     np.testing.assert_allclose(condyle.normalize(QUADRUPED, scaled(3.0)), STANDING)
@@ -142,7 +143,7 @@ def test_normalize_needs_a_length() -> None:
 
 
 def ticks(controller: WholeBodyController, first: int, count: int) -> list[str]:
-    """Commands at states near the stance while contacts come and go, one of them at an invalid state."""
+    """Returns commands at states near the stance while contacts begin and end, one of them at an invalid state."""
     commands = []
     for k in range(first, first + count):
         rng = np.random.default_rng(k)

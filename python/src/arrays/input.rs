@@ -1,4 +1,4 @@
-//! Arrays that Python gives.
+//! Reads arrays that Python passes.
 
 use condyle::{Se3, Vec3, spatial::Mat3};
 use nalgebra::DMatrix;
@@ -16,7 +16,8 @@ use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::ops::Deref;
 
-/// The doubles of an argument, in C order. As long as it is there, NumPy's other users in Rust do not write to the array.
+/// The doubles of an argument, in C order. While this exists, other Rust code that uses NumPy cannot write to the
+/// array.
 pub(crate) struct Input<'py, D: Dimension>(PyReadonlyArray<'py, f64, D>);
 
 impl<D: Dimension> Deref for Input<'_, D> {
@@ -27,19 +28,19 @@ impl<D: Dimension> Deref for Input<'_, D> {
 }
 
 impl Input<'_, Ix2> {
-    /// The matrix, column by column.
+    /// Copies the numbers to a matrix, which is stored by columns.
     pub(crate) fn to_matrix(&self) -> DMatrix<f64> {
         let &[rows, columns] = self.0.shape() else { unreachable!("has two dimensions") };
         DMatrix::from_row_slice(rows, columns, self)
     }
 }
 
-/// The doubles of an argument, in C order, for calls that keep the interpreter's lock: nothing is noted about the array,
-/// which takes as long as a small robot's dynamics.
+/// The doubles of an argument, in C order, for calls that keep the interpreter's lock. The borrow is not registered:
+/// that would take as long as the dynamics of a small robot.
 pub(crate) enum InPlace<'py, D: Dimension> {
-    /// An array that is there as long as this.
+    /// An array, kept alive by this reference.
     Array(Bound<'py, PyArray<f64, D>>),
-    /// The numbers of an argument of a call in which nothing written in Python runs until they have been used.
+    /// The numbers of an argument (address, count), for a call that runs no Python code until it has used them.
     AtOnce(*const f64, usize),
 }
 
@@ -54,8 +55,8 @@ impl<D: Dimension> Deref for InPlace<'_, D> {
     type Target = [f64];
     #[inline(always)]
     fn deref(&self) -> &[f64] {
-        // SAFETY: who looks at the numbers holds the interpreter's lock and calls no Python meanwhile, so nobody writes to
-        // the array or moves it; an argument stays until the call returns.
+        // SAFETY: the reader of the numbers holds the interpreter's lock and calls no Python meanwhile, so no other
+        // code writes to the array or moves it; an argument stays alive until the call returns.
         unsafe {
             match *self {
                 Self::AtOnce(numbers, count) => core::slice::from_raw_parts(numbers, count),
@@ -65,14 +66,15 @@ impl<D: Dimension> Deref for InPlace<'_, D> {
     }
 }
 
-/// The numbers of a plain array of doubles of this shape in C order; none of anything else. Nothing written in Python runs.
+/// Returns the numbers of a plain array of doubles with this shape in C order, and `None` for anything else. Runs no
+/// Python code.
 #[inline(always)]
 #[allow(unsafe_code)]
 pub(crate) fn at_once<'py, D: Dimension>(value: &Bound<'py, PyAny>, shape: &[usize]) -> Option<InPlace<'py, D>> {
     static DOUBLE: PyOnceLock<Py<PyArrayDescr>> = PyOnceLock::new();
     const PLAIN: c_int = NPY_ARRAY_C_CONTIGUOUS | NPY_ARRAY_ALIGNED;
     let double = DOUBLE.get_or_init(value.py(), || f64::get_dtype(value.py()).unbind()).as_ptr();
-    // SAFETY: an object of this very type is an array, whose dimensions are as many as it says.
+    // SAFETY: an object of exactly this type is an array, and has as many dimensions as `nd` states.
     unsafe {
         if ffi::Py_TYPE(value.as_ptr()) != PyUntypedArray::type_object_raw(value.py()) {
             return None;
@@ -95,17 +97,17 @@ pub(crate) fn at_once<'py, D: Dimension>(value: &Bound<'py, PyAny>, shape: &[usi
     }
 }
 
-/// A vector argument of `length` numbers.
+/// Reads a vector argument of `length` numbers.
 pub(crate) fn vector<'py>(argument: &str, value: &Bound<'py, PyAny>, length: usize) -> PyResult<Input<'py, Ix1>> {
     input(argument, value, &[length])
 }
 
-/// A matrix argument.
+/// Reads a matrix argument.
 pub(crate) fn matrix<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 2]) -> PyResult<Input<'py, Ix2>> {
     input(argument, value, &shape)
 }
 
-/// An argument with three indices.
+/// Reads an argument with three axes.
 pub(crate) fn tensor<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: [usize; 3]) -> PyResult<Input<'py, Ix3>> {
     input(argument, value, &shape)
 }
@@ -114,7 +116,7 @@ fn input<'py, D: Dimension>(argument: &str, value: &Bound<'py, PyAny>, shape: &[
     Ok(Input(as_it_lies_or_converted(argument, value, shape)?.try_readonly()?))
 }
 
-/// The array itself, if it is one of doubles in C order, or a new one with its numbers.
+/// Returns the array itself if it is an array of doubles in C order, else a new array with its numbers.
 #[inline]
 fn as_it_lies_or_converted<'py, D: Dimension>(
     argument: &str,
@@ -131,7 +133,7 @@ fn as_it_lies_or_converted<'py, D: Dimension>(
     Ok(convert(argument, value, shape)?.cast_into::<PyArray<f64, D>>()?)
 }
 
-/// A new float64 C-contiguous array with the numbers of anything that NumPy understands as an array of them.
+/// Converts anything that NumPy understands as an array of numbers to a new float64 C-contiguous array.
 #[cold]
 fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> PyResult<Bound<'py, PyAny>> {
     let py = value.py();
@@ -158,11 +160,11 @@ fn convert<'py>(argument: &str, value: &Bound<'py, PyAny>, shape: &[usize]) -> P
     array.call_method1("astype", (f64::get_dtype(py), "C"))
 }
 
-/// The shape that an argument must have, as a message says it.
+/// The shape that an argument must have, to be shown in messages.
 pub(crate) enum Expected<'a> {
     /// One shape.
     Shape(&'a [usize]),
-    /// The shape of one state, or of many with one axis more in front.
+    /// The shape for one state; for many states one axis is added in front.
     States(&'a [usize]),
 }
 
@@ -176,7 +178,7 @@ impl Display for Expected<'_> {
 }
 
 impl Expected<'_> {
-    /// The error for another shape.
+    /// Returns the error for an argument of another shape.
     #[cold]
     pub(crate) fn error(&self, argument: &str, found: &[usize]) -> PyErr {
         let (Self::Shape(shape) | Self::States(shape)) = self;
@@ -190,60 +192,60 @@ pub(crate) fn check_shape(argument: &str, found: &[usize], expected: &[usize]) -
     if found == expected { Ok(()) } else { Err(Expected::Shape(expected).error(argument, found)) }
 }
 
-/// A shape as Python writes it.
+/// Formats a shape as Python does.
 pub(super) fn tuple(shape: &[usize]) -> String {
     if let [n] = shape { format!("({n},)") } else { format!("({})", list(shape)) }
 }
 
-/// The numbers of a shape.
+/// Formats the numbers of a shape.
 fn list(shape: &[usize]) -> String {
     shape.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
 }
 
-/// The name of a value's type.
+/// Returns the name of a value's type.
 pub(crate) fn type_name(value: &Bound<'_, PyAny>) -> String {
     value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string())
 }
 
-/// What an argument is that is none of what was expected, with its article: an int, a float.
+/// Returns the name of an unexpected argument's type with its article: an int, a float.
 pub(crate) fn found_type(value: &Bound<'_, PyAny>) -> String {
     let name = type_name(value);
     let article = if name.starts_with(['a', 'e', 'i', 'o', 'u', 'A', 'E', 'I', 'O']) { "an" } else { "a" };
     format!("{article} {name}")
 }
 
-/// A pose that is given as a homogeneous 4 × 4 matrix.
+/// Reads a pose, given as a homogeneous 4 × 4 matrix.
 pub(crate) fn pose(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Se3<f64>> {
     let m = matrix(argument, value, [4, 4])?;
     let column = |c: usize| [m[c], m[4 + c], m[8 + c]].into();
     Ok(Se3::new(Mat3 { x: column(0), y: column(1), z: column(2) }, column(3)))
 }
 
-/// The numbers of a vector of length N.
+/// Reads a vector of N numbers.
 pub(crate) fn array<const N: usize>(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; N]> {
     let x = vector(argument, value, N)?;
     Ok(core::array::from_fn(|k| x[k]))
 }
 
-/// Three numbers.
+/// Reads a vector of three numbers.
 pub(crate) fn three(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec3<f64>> {
     Ok(array::<3>(argument, value)?.into())
 }
 
-/// A rotation that is given as a 3 × 3 matrix.
+/// Reads a rotation, given as a 3 × 3 matrix.
 pub(crate) fn rotation(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Mat3<f64>> {
     let m = matrix(argument, value, [3, 3])?;
     let column = |c: usize| [m[c], m[3 + c], m[6 + c]].into();
     Ok(Mat3 { x: column(0), y: column(1), z: column(2) })
 }
 
-/// The numbers of a vector of any length.
+/// Reads a vector of any length.
 pub(crate) fn numbers(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let length = value.len().map_err(|_| PyValueError::new_err(format!("{argument}: expected a list of numbers")))?;
     Ok(vector(argument, value, length)?.to_vec())
 }
 
-/// Least and greatest values of some numbers, infinite where none is given; none if neither is given.
+/// Reads lower and upper bounds. If only one is given, the other is infinite; if neither is given, returns `None`.
 pub(crate) fn bounds(
     length: usize,
     lower: Option<&Bound<'_, PyAny>>,

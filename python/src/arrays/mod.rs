@@ -1,9 +1,9 @@
-//! NumPy arrays in and out.
+//! NumPy arrays as arguments and results.
 //!
-//! In (`input`): a float64 C-contiguous array is read where it lies; other dtypes and strides are converted; a wrong shape
-//! is a `ValueError`. Out (`output`): a new array, or the caller's. Matrices are column-major in nalgebra and row-major
-//! here. Arrays of hyper-dual numbers are arrays of objects, see `hyper_dual.rs`. What a model shows of itself is
-//! `read_only`.
+//! Arguments (`input`): a float64 C-contiguous array is read without a copy; other dtypes and strides are converted; a
+//! wrong shape is a `ValueError`. Results (`output`): a new array, or the caller's. Matrices are column-major in
+//! nalgebra and row-major here. Arrays of hyper-dual numbers are arrays of objects, see `hyper_dual.rs`. Arrays that
+//! show a model's numbers are read-only, see `read_only`.
 
 mod input;
 mod output;
@@ -25,29 +25,29 @@ use numpy::ndarray::Dimension;
 use pyo3::prelude::*;
 use std::ops::Deref;
 
-/// A number that functions of the library can be called with.
+/// A type of number that functions of the library accept.
 pub(crate) trait Number: Scalar {
     /// The numbers of an argument, in C order, for a call that keeps the interpreter's lock.
     type Input<'py, D: Dimension>: Deref<Target = [Self]>;
 
-    /// Reads an argument of some shape.
+    /// Reads an argument of the given shape.
     fn read<'py, D: Dimension>(
         argument: &str,
         value: &Bound<'py, PyAny>,
         shape: &[usize],
     ) -> PyResult<Self::Input<'py, D>>;
-    /// The number without its derivatives.
+    /// Returns the number without its derivatives.
     fn real(&self) -> f64;
     /// Reads a number.
     fn read_one(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<Self>;
-    /// Gives an array in C order, the caller's or a new one, when it is filled; `fill` sets all of its numbers.
+    /// Fills an array in C order, the caller's or a new one, and returns it; `fill` sets all of its numbers.
     fn output<'py>(
         py: Python<'py>,
         out: Option<&Bound<'py, PyAny>>,
         shape: &[usize],
         fill: impl FnOnce(&mut [Self]),
     ) -> PyResult<Bound<'py, PyAny>>;
-    /// A new vector of these numbers, where there is a faster way than `output`.
+    /// Returns a new vector of these numbers if there is a faster method than `output`.
     fn new_vector<'py>(_: Python<'py>, _: &[Self]) -> Option<Bound<'py, PyAny>> {
         None
     }

@@ -1,4 +1,4 @@
-//! Arrays that Python gets.
+//! Makes arrays that are returned to Python.
 
 use super::Number;
 use super::input::{check_shape, tuple, type_name};
@@ -31,7 +31,7 @@ pub(crate) fn output<'py>(
     }
 }
 
-/// Fills an array in C order, the caller's or a new one, all of whose numbers `fill` sets, and returns it.
+/// Fills an array in C order, the caller's or a new one, and returns it; `fill` sets all of its numbers.
 pub(super) fn set<'py>(
     py: Python<'py>,
     out: Option<&Bound<'py, PyAny>>,
@@ -41,7 +41,8 @@ pub(super) fn set<'py>(
     if out.is_some() || !is_small(shape) {
         return output(py, out, shape, fill);
     }
-    // SAFETY: whatever is in the memory that NumPy got is a double, and all are set before anybody sees them.
+    // SAFETY: any bit pattern in the memory from NumPy is a valid double, and all numbers are set before the array is
+    // returned.
     #[allow(unsafe_code)]
     let array = unsafe { PyArray::<f64, _>::new(py, shape, false) };
     Ok(filled(array, fill))
@@ -49,22 +50,23 @@ pub(super) fn set<'py>(
 
 /// Fills a new array in C order, and returns it.
 fn filled<'py>(array: Bound<'py, PyArrayDyn<f64>>, fill: impl FnOnce(&mut [f64])) -> Bound<'py, PyAny> {
-    // SAFETY: nobody else has the array yet, which has as many numbers, one after the other.
+    // SAFETY: no other code has a reference to the array yet, and its `len` numbers are contiguous.
     #[allow(unsafe_code)]
     let numbers = unsafe { core::slice::from_raw_parts_mut(array.data(), array.len()) };
     fill(numbers);
     array.into_any()
 }
 
-/// So many numbers and more are asked of NumPy in a way that can fail.
+/// Number of elements from which an array is allocated by a call of NumPy that can report an error.
 const LARGE: usize = 1 << 24;
 
-/// Whether an array of this shape is so small that it can be had.
+/// Returns whether an array of this shape has fewer than `LARGE` elements, so that its allocation is assumed to
+/// succeed.
 fn is_small(shape: &[usize]) -> bool {
     shape.iter().try_fold(1, |size: usize, n| size.checked_mul(*n)).is_some_and(|size| size < LARGE)
 }
 
-/// An array in C order to be filled: the caller's, if it has the shape, or a new one.
+/// Returns the array in C order that is to be filled: the caller's, if it has the shape, or a new one.
 pub(crate) fn place<'py>(
     py: Python<'py>,
     out: Option<&Bound<'py, PyAny>>,
@@ -74,7 +76,8 @@ pub(crate) fn place<'py>(
         if is_small(shape) {
             return Ok(PyArray::<f64, _>::zeros(py, shape, false));
         }
-        return Ok(py.import("numpy")?.call_method1("zeros", (shape.to_vec(),))?.cast_into()?); // or a `MemoryError`
+        // raises `MemoryError` if it is too large
+        return Ok(py.import("numpy")?.call_method1("zeros", (shape.to_vec(),))?.cast_into()?);
     };
     let wanted = || format!("expected a writable C-contiguous float64 array of shape {}", tuple(shape));
     let array = out
@@ -89,7 +92,7 @@ pub(crate) fn place<'py>(
     Ok(double.ok_or_else(other)?.clone())
 }
 
-/// The numbers of an array, to be written.
+/// Borrows the numbers of an array for writing.
 pub(crate) fn writable<'py>(array: &Bound<'py, PyArrayDyn<f64>>) -> PyResult<PyReadwriteArrayDyn<'py, f64>> {
     array.try_readwrite().map_err(|error| {
         PyValueError::new_err(match error {
@@ -99,15 +102,15 @@ pub(crate) fn writable<'py>(array: &Bound<'py, PyArrayDyn<f64>>) -> PyResult<PyR
     })
 }
 
-/// An array, as Python will see it.
+/// An array that is returned to Python.
 pub(crate) trait Array {
-    /// The type of its numbers.
+    /// Type of its numbers.
     type Number: Number;
-    /// Its shape.
+    /// Returns its shape.
     fn shape(&self) -> impl AsRef<[usize]>;
     /// Writes its numbers in C order.
     fn write(&self, x: &mut [Self::Number]);
-    /// Its numbers as they lie, if it is a vector.
+    /// Returns its numbers without a copy, if it is a vector.
     fn vector(&self) -> Option<&[Self::Number]> {
         None
     }
@@ -135,7 +138,7 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
     fn write(&self, x: &mut [N]) {
         let (rows, columns) = self.shape();
         if self.strides() == (1, rows) && !self.is_empty() {
-            // SAFETY: by its strides the matrix is rows × columns numbers, one after the other.
+            // SAFETY: by its strides the matrix is rows × columns contiguous numbers.
             #[allow(unsafe_code)]
             let numbers = unsafe { core::slice::from_raw_parts(self.as_ptr(), rows * columns) };
             return transpose(numbers, rows, columns, x);
@@ -148,7 +151,7 @@ impl<N: Number, R: Dim, C: Dim, S: RawStorage<N, R, C>> Array for Matrix<N, R, C
     }
 }
 
-/// A square matrix that is symmetric up to rounding, so that its columns stand for its rows.
+/// A square matrix that is symmetric up to rounding, so that its columns can be used as rows.
 pub(crate) struct Symmetric<'a, N>(pub(crate) &'a condyle::spatial::Matrix<N>);
 
 impl<N: Number> Array for Symmetric<'_, N> {
@@ -161,20 +164,20 @@ impl<N: Number> Array for Symmetric<'_, N> {
     }
 }
 
-/// Four numbers from a place on.
+/// Returns four numbers from index `at` on.
 #[inline(always)]
 fn four<N: Copy>(from: &[N], at: usize) -> [N; 4] {
     *from[at..].first_chunk().expect("a matrix has as many")
 }
 
-/// Sets four numbers from a place on.
+/// Sets four numbers from index `at` on.
 #[inline(always)]
 fn set_four<N>(to: &mut [N], at: usize, numbers: [N; 4]) {
     *to[at..].first_chunk_mut().expect("a row has as many") = numbers;
 }
 
-/// Writes a matrix, which is stored by columns, by rows: in tiles of 4 × 4, each of which is read and written with a few
-/// instructions. Number by number each would go to a line of memory of its own.
+/// Writes a matrix that is stored by columns in the order of its rows, in tiles of 4 × 4. A tile is read and written
+/// with a few instructions. One number at a time, each write would touch another cache line.
 fn transpose<N: Number>(from: &[N], rows: usize, columns: usize, to: &mut [N]) {
     assert!(from.len() == rows * columns && to.len() == rows * columns, "as many numbers as a matrix has");
     let mut r = 0;
@@ -226,7 +229,7 @@ impl<S: Number> Array for Se3<S> {
     }
 }
 
-/// Rows of one length.
+/// Rows of equal length.
 impl<S: Number, const N: usize> Array for [[S; N]] {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -237,7 +240,7 @@ impl<S: Number, const N: usize> Array for [[S; N]] {
     }
 }
 
-/// A matrix that is stored by columns.
+/// A 3 × 3 matrix, stored by columns.
 impl<S: Number> Array for Mat3<S> {
     type Number = S;
     fn shape(&self) -> impl AsRef<[usize]> {
@@ -277,7 +280,7 @@ impl<S: Number> Array for Inertia<S> {
     }
 }
 
-/// Types that are a row of numbers.
+/// Implements `Array` for types that are one row of numbers.
 macro_rules! rows {
     ($($type:ident: $n:literal),*) => {$(
         impl<S: Number> Array for $type<S> {
@@ -293,9 +296,9 @@ macro_rules! rows {
 }
 rows!(Vec3: 3, Motion: 6, Force: 6);
 
-/// A value that a function can return: an array, a number, or a tuple of them.
+/// A result that a function can return: an array, a number, or a tuple of them.
 pub(crate) trait Give {
-    /// Gives it to Python, in the caller's `out` if there is one.
+    /// Returns it to Python, in the caller's `out` if there is one.
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>>;
 }
 
@@ -310,7 +313,7 @@ impl<T: Array + ?Sized> Give for T {
     }
 }
 
-/// An array that is computed where it goes, in C order.
+/// An array that is computed directly in its destination, in C order.
 pub(crate) struct Computed<S, F, const AXES: usize> {
     shape: [usize; AXES],
     fill: F,
@@ -318,7 +321,7 @@ pub(crate) struct Computed<S, F, const AXES: usize> {
 }
 
 impl<S: Number, F: Fn(&mut [S]), const AXES: usize> Computed<S, F, AXES> {
-    /// An array of this shape, all of whose numbers a function sets.
+    /// Creates an array of this shape, all of whose numbers `fill` sets.
     pub(crate) fn new(shape: [usize; AXES], fill: F) -> Self {
         Self { shape, fill, number: PhantomData }
     }
@@ -329,7 +332,7 @@ impl<S: Number, F: Fn(&mut [S]), const AXES: usize> Give for Computed<S, F, AXES
         if out.is_none() {
             return S::output(py, None, &self.shape, &self.fill);
         }
-        // `out` may be what it is computed from
+        // `out` may be an input of the computation
         let mut numbers = vec![S::zero(); self.shape.iter().product()];
         (self.fill)(&mut numbers);
         S::output(py, out, &self.shape, |x| x.copy_from_slice(&numbers))
@@ -342,7 +345,7 @@ impl Give for f64 {
     }
 }
 
-/// The derivatives of an acceleration by q and by v.
+/// Derivatives of an acceleration with respect to q and v.
 impl<S: Number> Give for (DMatrix<S>, DMatrix<S>) {
     fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
         let mut out = members(out, &["da_dq", "da_dv"])?.into_iter();
@@ -351,7 +354,7 @@ impl<S: Number> Give for (DMatrix<S>, DMatrix<S>) {
     }
 }
 
-/// A class of `condyle._types`, or of another module, looked up once.
+/// Looks up a class of `condyle._types`, or of another module, once.
 macro_rules! class {
     ($py:expr, $name:expr) => {
         $crate::arrays::class!($py, "condyle._types", $name)
@@ -363,7 +366,7 @@ macro_rules! class {
 }
 pub(crate) use class;
 
-/// A named tuple of a class, without a call of the class's own `__new__`, which is written in Python.
+/// Creates a named tuple of a class without a call of the class's `__new__`, which is slower because it is Python code.
 pub(crate) fn named<'py>(class: &Bound<'py, PyType>, members: Bound<'py, PyTuple>) -> PyResult<Bound<'py, PyAny>> {
     static NEW: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = class.py();
@@ -371,7 +374,8 @@ pub(crate) fn named<'py>(class: &Bound<'py, PyType>, members: Bound<'py, PyTuple
     new.bind(py).call1((class, members))
 }
 
-/// A named tuple of `condyle._types`, made of members that are given by name, in those of `out` if there is one.
+/// Creates a named tuple of `condyle._types` from members given by name. They are written to the arrays of `out` if
+/// there is one.
 macro_rules! give_named {
     ($py:ident, $out:ident, $class:expr, { $($name:expr => $member:expr),* }) => {{
         let mut out = $crate::arrays::members($out, &[$($name),*])?.into_iter();
@@ -381,8 +385,8 @@ macro_rules! give_named {
 }
 pub(crate) use give_named;
 
-/// Implementations of `Give` for structs of the library: each becomes the named tuple of the same name, with the
-/// members that stand here, some of them under other names.
+/// Implements `Give` for structs of the library: each becomes the named tuple of the same name. It has the members
+/// listed here, some of them renamed.
 macro_rules! named_tuples {
     (@name $member:ident) => { stringify!($member) };
     (@name $member:ident as $name:ident) => { stringify!($name) };
@@ -398,7 +402,7 @@ macro_rules! named_tuples {
 }
 pub(crate) use named_tuples;
 
-/// The members of `out` of a function that returns several arrays, or none of them.
+/// Returns the arrays in `out` for a function with several results; the list is empty if `out` is not given.
 pub(crate) fn members<'py>(
     out: Option<&Bound<'py, PyAny>>,
     names: &[&str],
@@ -419,7 +423,7 @@ pub(crate) fn members<'py>(
     Ok(members.into_iter().map(Some).collect())
 }
 
-/// The addresses that the results of a batch are written to.
+/// Returns the ranges of addresses that the results of a batch are written to.
 pub(crate) fn destinations(out: Option<&Bound<'_, PyAny>>) -> Vec<Range<usize>> {
     let Some(out) = out else { return Vec::new() };
     if out.is_instance_of::<PyUntypedArray>() {
@@ -428,7 +432,8 @@ pub(crate) fn destinations(out: Option<&Bound<'_, PyAny>>) -> Vec<Range<usize>> 
     out.try_iter().map_or_else(|_| Vec::new(), |members| members.flatten().map(|one| memory(&one)).collect())
 }
 
-/// The addresses of the numbers of a C-contiguous array of doubles; none of anything else, which is refused later.
+/// Returns the range of addresses of a C-contiguous array of doubles. It is empty for anything else, which is refused
+/// later.
 fn memory(array: &Bound<'_, PyAny>) -> Range<usize> {
     let Ok(array) = array.cast::<PyArrayDyn<f64>>() else { return 0..0 };
     let start = array.data().addr();

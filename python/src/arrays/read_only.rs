@@ -3,7 +3,7 @@
 use super::{Give, class};
 use pyo3::prelude::*;
 
-/// An array that nobody can write to, since a model never changes; who tries is told the method by which to make another
+/// Returns a read-only array, since a model never changes. The error on a write names the method that makes a changed
 /// model, if there is one.
 pub(crate) fn read_only<'py, T: Give + ?Sized>(
     py: Python<'py>,

@@ -1,5 +1,5 @@
-//! A function as CasADi describes it: sparsities of its results and derivatives, and their numbers from those by tangent
-//! coordinates.
+//! A function in CasADi's terms: sparsity of its results and derivatives, and their numbers, converted from derivatives
+//! with respect to tangent coordinates.
 
 use super::chart::{Chart, Position};
 use super::computation::{Calls, Computation};
@@ -9,21 +9,22 @@ use nalgebra::DMatrix;
 use std::ffi::CString;
 use std::sync::{Mutex, PoisonError};
 
-/// The functions of a slot, by their numbers.
+/// Indices of a slot's functions.
 pub(super) const VALUE: usize = 0;
 pub(super) const JACOBIAN: usize = 1;
 pub(super) const REVERSE: usize = 2;
 pub(super) const HESSIAN: usize = 3;
 
-/// An argument or a result, as CasADi describes it.
+/// An argument or a result in CasADi's terms.
 pub(super) struct Port {
     pub(super) name: CString,
-    /// Rows, columns, the first entry of each column, the row of each entry.
+    /// Number of rows, number of columns, index of the first entry of each column, row of each entry.
     pub(super) sparsity: Vec<i64>,
 }
 
 impl Port {
-    /// A matrix whose entries are where `present` says, and their places when all entries stand column by column.
+    /// Returns a matrix with entries where `present` is true, and the indices of these entries in the dense matrix,
+    /// column by column.
     fn new(name: &str, rows: usize, columns: usize, present: impl Fn(usize, usize) -> bool) -> (Self, Vec<usize>) {
         let number = |n: usize| i64::try_from(n).expect("robots are smaller");
         let (mut starts, mut entries, mut places) = (vec![0], Vec::new(), Vec::new());
@@ -38,7 +39,8 @@ impl Port {
         (Self { name: CString::new(name).expect("names have no zeros"), sparsity }, places)
     }
 
-    /// The same for so many states: the columns of one after those of the other, in the same rows or each in rows of its own.
+    /// Repeats the matrix for a number of states. The columns of the states follow each other, in the same rows, or in
+    /// rows of their own for each state.
     fn repeat(&mut self, states: usize, own_rows: bool) {
         let number = |n: usize| i64::try_from(n).expect("CasADi counts that far");
         let (rows, columns) = (self.sparsity[0], self.sparsity[1] as usize);
@@ -64,7 +66,7 @@ impl Port {
     }
 }
 
-/// Where a result's numbers come from: entry (i, j) of a matrix of so many rows.
+/// The matrix from which a result's numbers are copied.
 #[derive(Clone, Copy)]
 enum Source {
     Value,
@@ -78,7 +80,7 @@ enum Source {
 pub(super) struct Output {
     pub(super) port: Port,
     source: Source,
-    /// For each entry of a state, its number in the source.
+    /// For each entry of a state, its index in the source.
     from: Vec<usize>,
 }
 
@@ -90,7 +92,7 @@ pub(super) struct Description {
 }
 
 impl Description {
-    /// The same for so many states. Jacobians have them in blocks on the diagonal.
+    /// Repeats inputs and outputs for a number of states. Jacobians become block-diagonal.
     fn of_many(mut self, states: usize, is_jacobian: bool) -> Self {
         self.inputs.iter_mut().for_each(|port| port.repeat(states, false));
         self.outputs.iter_mut().for_each(|output| output.port.repeat(states, is_jacobian));
@@ -101,33 +103,33 @@ impl Description {
 /// A function that is bound to a slot.
 pub(super) struct Bound {
     computation: Box<dyn Computation>,
-    /// What tells it from others.
+    /// Bytes that identify the function.
     pub(super) key: Vec<u8>,
-    /// The number of states of each call, side by side.
+    /// Number of states per call; their columns follow each other.
     states: usize,
     chart: Chart,
-    /// The sizes of the arguments, and how many numbers the results have, for one state.
+    /// Sizes of the arguments and total size of the results, for one state.
     sizes: Vec<usize>,
     ny: usize,
-    /// The results' sizes and places: where each begins among all, and where its entries stand from there.
+    /// For each result, its first index among all results, and the indices of its entries from there.
     results: Vec<(usize, Vec<usize>)>,
     pub(super) descriptions: [Description; 4],
-    /// What calls compute in; each takes one, and there are as many as calls at the same time.
+    /// Free work spaces; each call takes one, so there are as many as simultaneous calls.
     free: Mutex<Vec<Work>>,
 }
 
-/// What a call computes in: for as many states at a time as there are positions and matrices J and H.
+/// Work space of a call. Its positions and matrices J and H are as many as the states that it computes together.
 struct Work {
     calls: Box<dyn Calls>,
     positions: Vec<Position>,
     x: Vec<Vec<f64>>,
     lambda: Vec<f64>,
     y: Vec<f64>,
-    /// By tangent coordinates: J, Jᵀλ and the Hessian of λᵀf.
+    /// With respect to tangent coordinates: J, Jᵀλ and the Hessian of λᵀf.
     J: Vec<DMatrix<f64>>,
     g: Vec<f64>,
     H: Vec<DMatrix<f64>>,
-    /// By the coordinates that CasADi has: J, Jᵀλ, and the Hessian.
+    /// With respect to CasADi's coordinates: J, Jᵀλ, and the Hessian.
     Jx: DMatrix<f64>,
     gx: Vec<f64>,
     Hx: DMatrix<f64>,
@@ -279,14 +281,14 @@ impl Bound {
         let most = work.J.len();
         for first in (0..self.states).step_by(most) {
             let some = first..self.states.min(first + most);
-            // SAFETY: by the caller.
+            // SAFETY: the caller's promise.
             unsafe { self.evaluate_some(function, some, &mut work, arg, res)? };
         }
         self.give_back(work);
         Ok(())
     }
 
-    /// Evaluates some states, as many as one call computes.
+    /// Evaluates some states, at most as many as one call computes.
     ///
     /// # Safety
     /// As for `evaluate`.
@@ -300,7 +302,7 @@ impl Bound {
         res: *const *mut f64,
     ) -> Result<(), Error> {
         let (n, all) = (some.len(), self.states);
-        // SAFETY: by the caller.
+        // SAFETY: the caller's promise.
         let input = |k: usize, count: usize| unsafe {
             let given = *arg.add(k);
             (!given.is_null())
@@ -334,7 +336,7 @@ impl Bound {
                 }
             }
         }
-        // SAFETY: by the caller.
+        // SAFETY: the caller's promise.
         let is_wanted = |k: usize| unsafe { !(*res.add(k)).is_null() };
         let mut outputs = self.descriptions[function].outputs.iter().enumerate();
         let wants_jacobian = outputs.any(|(k, o)| matches!(o.source, Source::TransposedJacobian) && is_wanted(k));
@@ -370,7 +372,7 @@ impl Bound {
             let Hx = if is_flat { H } else { &w.Hx };
             for (k, output) in self.descriptions[function].outputs.iter().enumerate() {
                 let count = output.from.len();
-                // SAFETY: by the caller.
+                // SAFETY: the caller's promise.
                 let to = unsafe {
                     let to = *res.add(k);
                     if to.is_null() {
@@ -391,7 +393,8 @@ impl Bound {
         Ok(())
     }
 
-    /// A matrix with a column for each tangent coordinate, as one with a column for each of CasADi's.
+    /// Converts a matrix with a column for each tangent coordinate to a matrix with a column for each of CasADi's
+    /// coordinates.
     fn by_coordinates(&self, at: &Position, from: &DMatrix<f64>, to: &mut DMatrix<f64>) {
         let Chart { nq, nv, .. } = self.chart;
         self.chart.multiply(at, from, 0, to, 0);

@@ -1,7 +1,8 @@
-//! Positions as CasADi has them: vectors of nq numbers, of which some are quaternions or points of a circle.
+//! Positions as CasADi has them: vectors of nq numbers, some of which are quaternions or points of a circle.
 //!
-//! A function f of a robot's position is defined on the group; for all vectors q it is taken as f(q̂), with quaternions and
-//! points of circles divided by their lengths. Its derivatives by q follow from those by the tangent vector δ = q' ⊖ q̂:
+//! A function f of a robot's position is defined on the group. For an arbitrary vector q it is evaluated at q̂, where
+//! quaternions and points of circles are divided by their lengths. Its derivatives with respect to q follow from its
+//! derivatives with respect to the tangent vector δ = q' ⊖ q̂:
 //!
 //! ```text
 //! δ = T dq + ½ Σ dqᵀ C_k dq e_k + …      ∂f/∂q = ∂f/∂δ T      ∂²f/∂q² = Tᵀ ∂²f/∂δ² T + Σ_k ∂f/∂δ_k C_k
@@ -11,10 +12,10 @@ use condyle::{Joint, Model, Vec3, spatial::Mat3};
 use core::ops::Range;
 use nalgebra::{DMatrix, SMatrix};
 
-/// T of a group, in its leading rows and columns.
+/// T of a group, in the leading rows and columns.
 type Block = SMatrix<f64, 6, 7>;
 
-/// The coordinates of a joint.
+/// The coordinates of a joint: its ranges in q and v.
 #[derive(Clone, Debug)]
 struct Group {
     joint: Joint,
@@ -23,7 +24,7 @@ struct Group {
 }
 
 impl Group {
-    /// The coordinates that are a quaternion or a point of a circle.
+    /// Returns the range of the coordinates that are a quaternion or a point of a circle.
     fn unit(&self) -> Option<Range<usize>> {
         let Range { start, end } = self.q;
         match self.joint {
@@ -35,7 +36,7 @@ impl Group {
     }
 }
 
-/// How the coordinates of a robot's position follow those of its tangent space.
+/// The maps between a robot's position coordinates and its tangent coordinates, joint by joint.
 #[derive(Clone, Debug)]
 pub(super) struct Chart {
     groups: Vec<Group>,
@@ -48,9 +49,9 @@ pub(super) struct Chart {
 pub(super) struct Position {
     /// q̂, nq numbers.
     pub(super) q: Vec<f64>,
-    /// T of each group that is none of numbers.
+    /// T of each group; only set for groups with a quaternion or a point of a circle.
     T: Vec<Block>,
-    /// The lengths of what q̂ has with length 1, for each group.
+    /// For each group, the length by which its quaternion or point of a circle was divided.
     lengths: Vec<f64>,
 }
 
@@ -64,12 +65,12 @@ impl Chart {
         Self { groups: own.map(group).collect(), nq: model.nq(), nv: model.nv() }
     }
 
-    /// That of an argument without a position.
+    /// Returns the chart of an argument that contains no position.
     pub(super) fn none() -> Self {
         Self { groups: Vec::new(), nq: 0, nv: 0 }
     }
 
-    /// Whether there is neither a quaternion nor a point of a circle: then T is the identity, and q̂ is q.
+    /// Returns whether there is neither a quaternion nor a point of a circle: then T is the identity, and q̂ is q.
     pub(super) fn is_flat(&self) -> bool {
         self.curved().next().is_none()
     }
@@ -79,7 +80,7 @@ impl Chart {
         Position { q: vec![0.0; self.nq], T: vec![Block::zeros(); groups], lengths: vec![1.0; groups] }
     }
 
-    /// The tangent coordinates that a coordinate moves: of q, or after it.
+    /// Returns the tangent coordinates that change with coordinate `q`, an index in q or in the numbers after q.
     pub(super) fn moved_by(&self, q: usize) -> Range<usize> {
         if q >= self.nq {
             let own = q - self.nq + self.nv;
@@ -92,7 +93,7 @@ impl Chart {
         }
     }
 
-    /// Fills q̂ and T at q.
+    /// Computes q̂ and T at q.
     pub(super) fn update(&self, q: &[f64], at: &mut Position) {
         at.q.copy_from_slice(q);
         for (k, group) in self.groups.iter().enumerate() {
@@ -105,7 +106,7 @@ impl Chart {
         }
     }
 
-    /// Y = X T, of as many rows, into columns from `first` on; X stands in nv columns from `from` on.
+    /// Computes Y = X T; X is read from nv columns from `from` on, and Y is written from column `first` on.
     pub(super) fn multiply(&self, at: &Position, X: &DMatrix<f64>, from: usize, Y: &mut DMatrix<f64>, first: usize) {
         for (group, T) in self.groups.iter().zip(&at.T) {
             if group.unit().is_none() {
@@ -124,13 +125,13 @@ impl Chart {
         }
     }
 
-    /// H += Σ_k g_k C_k, in nq rows and columns from `first` on.
+    /// Adds Σ_k g_k C_k to H, in nq rows and columns from `first` on.
     pub(super) fn add_curvature(&self, at: &Position, g: &[f64], H: &mut DMatrix<f64>, first: usize) {
         for (k, group) in self.groups.iter().enumerate() {
             let Some(unit) = group.unit() else { continue };
             let (T, q, start) = (&at.T[k], &at.q[unit.clone()], unit.start - group.q.start);
-            let turns = group.v.len() - if q.len() == 4 { 3 } else { 1 }; // the first tangent coordinate that turns
-            // the angles: δ = T dq (1 − q̂ᵀ dq / length), so C = −(q̂ Tᵀ + T q̂ᵀ) / length
+            let turns = group.v.len() - if q.len() == 4 { 3 } else { 1 }; // first tangent coordinate that is a rotation
+            // rotations: δ = T dq (1 − q̂ᵀ dq / length), so C = −(q̂ Tᵀ + T q̂ᵀ) / length
             for i in 0..unit.len() {
                 for j in 0..unit.len() {
                     let mut sum = 0.0;
@@ -141,7 +142,7 @@ impl Chart {
                     H[(first + unit.start + i, first + unit.start + j)] += sum / at.lengths[k];
                 }
             }
-            // the lengths: δ_v = (1 − ½ δ_ω×) Rᵀ dp
+            // translations: δ_v = (1 − ½ δ_ω×) Rᵀ dp
             for a in 0..start {
                 for j in 0..unit.len() {
                     let (p, w) = (T.column(a), T.column(start + j));
@@ -162,12 +163,12 @@ impl Chart {
 }
 
 impl Chart {
-    /// The groups that are none of numbers, with their ranges in q and v.
+    /// Iterates over the groups that have a quaternion or a point of a circle.
     fn curved(&self) -> impl Iterator<Item = &Group> {
         self.groups.iter().filter(|group| group.unit().is_some())
     }
 
-    /// Changes of a position's numbers, those of q ⊕ δ, from δ: E δ with E = ∂(q ⊕ δ)/∂δ at zero.
+    /// Computes the change of the coordinates of q ⊕ δ with δ: E δ with E = ∂(q ⊕ δ)/∂δ at zero.
     pub(super) fn push(&self, q: &[f64], delta: &[f64], out: &mut [f64]) {
         for group in self.groups.iter().filter(|group| group.unit().is_none()) {
             out[group.q.clone()].copy_from_slice(&delta[group.v.clone()]);
@@ -180,7 +181,7 @@ impl Chart {
         }
     }
 
-    /// Eᵀ λ.
+    /// Computes Eᵀ λ.
     pub(super) fn pull(&self, q: &[f64], lambda: &[f64], out: &mut [f64]) {
         for group in self.groups.iter().filter(|group| group.unit().is_none()) {
             out[group.v.clone()].copy_from_slice(&lambda[group.q.clone()]);
@@ -193,7 +194,8 @@ impl Chart {
         }
     }
 
-    /// Shows λᵀ ∂²(q ⊕ δ)/∂δ² of each group that has one: its range in v, and the matrix in the leading rows and columns.
+    /// Passes λᵀ ∂²(q ⊕ δ)/∂δ² of each group where it is not zero: its range in v, and the matrix in the leading rows
+    /// and columns.
     pub(super) fn each_curvature(
         &self,
         q: &[f64],
@@ -207,8 +209,8 @@ impl Chart {
 }
 
 impl Group {
-    /// Eᵀ at a position of length 1, from T E = 1: T of lengths is a rotation, that of a circle has length 1, and that of a
-    /// quaternion length 2.
+    /// Returns Eᵀ at a normalised position, from T E = 1. In T the block of lengths is a rotation, the row of a circle
+    /// has length 1, and the rows of a quaternion have length 2.
     fn retraction(&self, q: &[f64]) -> Block {
         let mut E = tangent_map(self.joint, &q[self.q.clone()], 1.0);
         let turns = self.unit().expect("a group that is none of numbers");
@@ -218,8 +220,8 @@ impl Group {
         E
     }
 
-    /// λᵀ ∂²(q ⊕ δ)/∂δ²: of p ⊕ δ = p + R (δ_v + ½ δ_ω × δ_v + …), and of q ⊕ δ_ω = q (1 − ½ (|δ_ω| / n)²) + E δ_ω + …,
-    /// where n is 1 for a point of a circle and 2 for a quaternion.
+    /// Returns λᵀ ∂²(q ⊕ δ)/∂δ². The expansions are p ⊕ δ = p + R (δ_v + ½ δ_ω × δ_v + …) and q ⊕ δ_ω = q (1 − ½ (|δ_ω|
+    /// / n)²) + E δ_ω + …; n is 1 for a point of a circle and 2 for a quaternion.
     fn curvature(&self, q: &[f64], lambda: &[f64]) -> SMatrix<f64, 6, 6> {
         let mut C = SMatrix::zeros();
         let start = self.unit().map_or(0, |unit| unit.start - self.q.start);
@@ -248,7 +250,7 @@ impl Group {
     }
 }
 
-/// T of a joint at coordinates whose quaternion or point of a circle was divided by its length.
+/// Returns T of a joint at `q`, whose quaternion or point of a circle was divided by `length`.
 fn tangent_map(joint: Joint, q: &[f64], length: f64) -> Block {
     let mut T = Block::zeros();
     match joint {
@@ -276,13 +278,13 @@ fn tangent_map(joint: Joint, q: &[f64], length: f64) -> Block {
     T
 }
 
-/// δθ = (c ds − s dc) / length.
+/// Writes the row of T with δθ = (c ds − s dc) / length.
 fn circle(T: &mut Block, (i, j): (usize, usize), c: f64, s: f64, length: f64) {
     T[(i, j)] = -s / length;
     T[(i, j + 1)] = c / length;
 }
 
-/// δω = 2 vec(q̂* dq) / length.
+/// Writes the rows of T with δω = 2 vec(q̂* dq) / length.
 fn quaternion(T: &mut Block, (i, j): (usize, usize), q: &[f64], length: f64) {
     let [x, y, z, w] = [q[0], q[1], q[2], q[3]].map(|x| 2.0 * x / length);
     let rows = [[w, z, -y, -x], [-z, w, x, -y], [y, -x, w, -z]];

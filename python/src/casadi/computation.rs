@@ -1,11 +1,11 @@
-//! What a slot computes: results of arguments, and their derivatives by tangent vectors, for a state or for several at a time.
-//! Knows nothing of CasADi.
+//! The computation behind a slot: results, and their derivatives with respect to tangent vectors, for one or several
+//! states at a time. This file does not depend on CasADi.
 
 use super::chart::Chart;
 use condyle::ModelError as Error;
 use nalgebra::DMatrix;
 
-/// A result: a matrix.
+/// A result, which is a matrix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Output {
     pub(super) name: &'static str,
@@ -13,49 +13,51 @@ pub(super) struct Output {
     pub(super) columns: usize,
 }
 
-/// A function of vectors. The leading numbers of the first argument may be a position, as the chart says; derivatives are
-/// taken by the tangent vector there and by all other numbers, in the order of the arguments.
+/// A function of vectors. The leading numbers of the first argument may be a position, which `chart` describes.
+/// Derivatives are taken with respect to the tangent vector there and to all other numbers, in the order of the
+/// arguments.
 pub(super) trait Computation: Send + Sync {
-    /// The names and sizes of the arguments.
+    /// Returns the names and sizes of the arguments.
     fn arguments(&self) -> Vec<(&'static str, usize)>;
 
-    /// The results.
+    /// Returns names and shapes of the results.
     fn outputs(&self) -> Vec<Output>;
 
-    /// The position in the first argument.
+    /// Returns the chart of the position in the first argument.
     fn chart(&self) -> Chart;
 
-    /// Whether an entry of result k may differ from zero.
+    /// Returns whether an entry of result k may differ from zero.
     fn present(&self, k: usize, i: usize, j: usize) -> bool {
         let _ = (k, i, j);
         true
     }
 
-    /// Whether a first derivative may differ from zero: of number `row` of all results by tangent coordinate j.
+    /// Returns whether a first derivative may differ from zero: the derivative of number `row` of all results with
+    /// respect to tangent coordinate j.
     fn depends(&self, row: usize, j: usize) -> bool;
 
-    /// Whether a second derivative of λᵀf by two tangent coordinates may differ from zero.
+    /// Returns whether the second derivative of λᵀf with respect to tangent coordinates i and j may differ from zero.
     fn curves(&self, i: usize, j: usize) -> bool;
 
-    /// What a call for so many states computes in; there are as many as calls at the same time.
+    /// Returns a work space for calls with this number of states; simultaneous calls have one each.
     fn calls(&self, states: usize) -> Result<Box<dyn Calls>, Error>;
 }
 
-/// Calls of a function, one after the other, each for a state or for several of them: their arguments and results stand state
-/// after state, and there is a matrix for each.
+/// Work space for calls of a function, each for one or several states. Arguments and results are stored state by state,
+/// and there is one matrix for each state.
 pub(super) trait Calls: Send {
-    /// The most states of a call.
+    /// Returns the maximum number of states of a call.
     fn most(&self) -> usize {
         1
     }
 
-    /// All results, one after the other, each by columns.
+    /// Computes all results, one after the other, each by columns.
     fn value(&mut self, x: &[Vec<f64>], y: &mut [f64]);
 
-    /// The first derivatives of all results by all tangent coordinates.
+    /// Computes the first derivatives of all results with respect to all tangent coordinates.
     fn jacobian(&mut self, x: &[Vec<f64>], J: &mut [DMatrix<f64>]);
 
-    /// The Hessian of λᵀf by all tangent coordinates, and the first derivatives if they are wanted.
+    /// Computes the Hessian of λᵀf with respect to all tangent coordinates, and the first derivatives if J is given.
     fn hessian(
         &mut self,
         x: &[Vec<f64>],

@@ -1,4 +1,4 @@
-//! Functions of a robot and their derivatives by tangent vectors; this file knows nothing of CasADi.
+//! Functions of a robot and their derivatives with respect to tangent vectors; this file does not depend on CasADi.
 
 use super::computation::Output;
 use crate::hyper_dual::Hyper;
@@ -9,7 +9,7 @@ use condyle::{
 };
 use nalgebra::DMatrix;
 
-/// What is computed.
+/// The quantity that is computed.
 #[derive(Clone, Debug)]
 pub(crate) enum Kind {
     /// τ = rnea(q, v, a).
@@ -26,22 +26,22 @@ pub(crate) enum Kind {
     Com,
     /// The centroidal momentum.
     CentroidalMomentum,
-    /// a and λ of the dynamics under constraints.
+    /// Acceleration a and forces λ of the dynamics under constraints.
     ConstrainedDynamics { constraints: Vec<ContactConstraint> },
 }
 
-/// Which second derivatives may differ from zero.
+/// The second derivatives that may differ from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Pattern {
     /// None.
     Zero,
-    /// The entries by coordinates that move a body in common.
+    /// Entries for pairs of coordinates that move a body in common.
     Related,
     /// All.
     Full,
 }
 
-/// What a computation needs, for one kind of scalar.
+/// Work space of a computation, for one type of scalar.
 pub(super) struct Scratch<S> {
     data: Data<S>,
     constraints: Option<ConstraintSet<S>>,
@@ -51,13 +51,13 @@ pub(super) struct Scratch<S> {
     zeros: Vec<S>,
 }
 
-/// Writes the derivative of the results from a row on by one of the arguments.
+/// Writes the derivative of the results from a row on with respect to one argument.
 fn place<S: Scalar>(J: &mut DMatrix<S>, row: usize, argument: usize, block: &DenseMatrix<S, impl Dense<S>>) {
     J.view_mut((row, argument * block.ncols()), block.shape()).copy_from(block);
 }
 
 impl Kind {
-    /// The names of the arguments: q first, then vectors of nv numbers.
+    /// Returns the names of the arguments: q first, then vectors of nv numbers.
     pub(super) fn arguments(&self) -> &'static [&'static str] {
         match self {
             Self::Rnea => &["q", "v", "a"],
@@ -67,7 +67,7 @@ impl Kind {
         }
     }
 
-    /// The results, of which the constraints have so many `rows`.
+    /// Returns names and shapes of the results; `rows` is the number of rows of the constraints.
     pub(super) fn outputs(&self, nv: usize, rows: usize) -> Vec<Output> {
         let output = |name, rows, columns| Output { name, rows, columns };
         match self {
@@ -82,8 +82,8 @@ impl Kind {
         }
     }
 
-    /// Whether a first derivative may differ from zero: of number `row` of all results by tangent coordinate j.
-    /// `related` says whether two coordinates move a body in common.
+    /// Returns whether a first derivative may differ from zero: the derivative of number `row` of all results with
+    /// respect to tangent coordinate j. `related` returns whether two coordinates move a body in common.
     pub(super) fn depends(&self, row: usize, j: usize, nv: usize, related: impl Fn(usize, usize) -> bool) -> bool {
         match self {
             Self::Rnea => related(row, j),
@@ -92,13 +92,14 @@ impl Kind {
         }
     }
 
-    /// The second derivatives of λᵀf by two arguments.
+    /// Returns the pattern of the second derivatives of λᵀf with respect to arguments i and k.
     pub(super) fn second_derivatives(&self, i: usize, k: usize) -> Pattern {
         match (self, i.min(k), i.max(k)) {
             (Self::Rnea, 0, _) | (Self::Rnea, 1, 1) | (Self::Crba, ..) => Pattern::Related,
             (Self::Rnea, ..) => Pattern::Zero,
-            (Self::Aba | Self::ConstrainedDynamics { .. }, 1 | 2, 2) => Pattern::Zero, // it is affine in τ
-            (Self::FrameVelocity { .. } | Self::CentroidalMomentum, 1, 1) => Pattern::Zero, // and these in v
+            (Self::Aba | Self::ConstrainedDynamics { .. }, 1 | 2, 2) => Pattern::Zero, // the result is affine in τ
+            // these results are linear in v
+            (Self::FrameVelocity { .. } | Self::CentroidalMomentum, 1, 1) => Pattern::Zero,
             _ => Pattern::Full,
         }
     }
@@ -114,7 +115,7 @@ impl Kind {
         Ok(Scratch { data, constraints, tensors, J: DMatrix::from_element(6, nv, zero), zeros: vec![zero; nv] })
     }
 
-    /// All results, one after the other, each by columns.
+    /// Computes all results, one after the other, each by columns.
     pub(super) fn value(&self, model: &Model, s: &mut Scratch<f64>, x: &[Vec<f64>], y: &mut [f64]) {
         let data = &mut s.data;
         match self {
@@ -147,7 +148,7 @@ impl Kind {
         }
     }
 
-    /// The first derivatives of all results by all tangent coordinates.
+    /// Computes the first derivatives of all results with respect to all tangent coordinates.
     pub(super) fn jacobian<S: Scalar>(
         &self,
         model: &Model,
@@ -173,7 +174,7 @@ impl Kind {
                 let tensors = tensors.as_mut().expect("made with the scratch");
                 condyle::derivatives::rnea_second_derivatives(model, data, &x[0], zeros, zeros, &[], tensors);
                 for (i, dM_i) in tensors.dadq.iter().enumerate() {
-                    place(J, i * nv, 0, dM_i); // ∂M_ij/∂q_k, of a symmetric matrix
+                    place(J, i * nv, 0, dM_i); // ∂M_ij/∂q_k; M is symmetric
                 }
             }
             Self::FramePlacement { frame } => {
@@ -218,8 +219,8 @@ impl Kind {
         }
     }
 
-    /// The Hessian of λᵀf by all tangent coordinates where the library has it in closed form, and the Jacobian if it is wanted.
-    /// Returns whether it has.
+    /// Computes the Hessian of λᵀf with respect to all tangent coordinates if the library has it in closed form, and
+    /// the Jacobian if it is wanted. Returns whether the library has the closed form.
     pub(super) fn closed_hessian(
         &self,
         model: &Model,
@@ -261,8 +262,9 @@ impl Kind {
         }
     }
 
-    /// The Hessian of λᵀf by all tangent coordinates: the slopes of Jᵀλ, by hyper-dual numbers in two directions at a time.
-    /// Those by q are taken at q ⊕ δ, where the tangent space has moved on: the Hessian is their symmetric part.
+    /// Computes the Hessian of λᵀf with respect to all tangent coordinates: the derivatives of Jᵀλ, with hyper-dual
+    /// numbers in two directions at a time. The derivatives with respect to q are taken at q ⊕ δ, whose tangent space
+    /// differs from the one at q. The Hessian is their symmetric part.
     pub(super) fn hessian(
         &self,
         model: &Model,
@@ -308,7 +310,7 @@ impl Kind {
         }
     }
 
-    /// What [`hessian`](Self::hessian) needs, for so many results.
+    /// Creates the work space of [`hessian`](Self::hessian) for this number of results.
     pub(super) fn dual_scratch(&self, model: &Model, results: usize) -> Result<DualScratch, Error> {
         let zero = Hyper::zero();
         let (nq, nv, arguments) = (model.nq(), model.nv(), self.arguments().len());
@@ -322,7 +324,7 @@ impl Kind {
     }
 }
 
-/// What a Hessian by hyper-dual numbers needs.
+/// Work space of a Hessian by hyper-dual numbers.
 pub(super) struct DualScratch {
     scratch: Scratch<Hyper>,
     x: Vec<Vec<Hyper>>,

@@ -1,10 +1,11 @@
-//! CasADi's C interface to what is bound to numbered slots.
+//! CasADi's C interface to functions that are bound to numbered slots.
 //!
-//! `casadi.external` finds a function by its name among the symbols of a library, and its derivatives by names that follow
-//! from it. A robot is known only when the program runs, so the library has the symbols of [`SLOTS`] functions, which do
-//! what was bound to their slot. CasADi counts its uses of a slot; it is free again when the last one ends.
+//! `casadi.external` finds a function by its name among the symbols of a library, and its derivatives by names that are
+//! derived from it. A robot is known only at run time, so the library exports the symbols of [`SLOTS`] functions. Each
+//! computes the function that is bound to its slot. CasADi counts its uses of a slot; the slot becomes free when the
+//! last use ends.
 //!
-//! Of slot n the library has `condyle_n`, the function; `jac_condyle_n`, its Jacobian; `adj1_condyle_n`, Jᵀλ; and
+//! For slot n the library exports `condyle_n`, the function; `jac_condyle_n`, its Jacobian; `adj1_condyle_n`, Jᵀλ; and
 //! `jac_adj1_condyle_n`, whose blocks are the Hessian of λᵀf and Jᵀ.
 #![allow(unsafe_code)]
 
@@ -18,21 +19,22 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How many functions there may be at a time.
+/// Maximum number of functions at a time.
 pub(super) const SLOTS: usize = 64;
 
-/// How long a function may take from its making to its first question, before it counts as loaded.
+/// Maximum time between the creation of a function and its first query; after that it counts as loaded from a file.
 const DESCRIPTION_TIME: Duration = Duration::from_millis(50);
 
-/// A slot: what is bound to it, and by how many it is used.
+/// A slot: the function bound to it, and the number of its users.
 struct Slot {
     bound: AtomicPtr<Bound>,
     users: Mutex<Users>,
-    /// Of each function, how many CasADi has that never asked for their description: those that it has loaded.
+    /// For each function, the number of CasADi's functions that have not asked for their description: CasADi has loaded
+    /// them from a file.
     loaded: [AtomicUsize; 4],
 }
 
-/// How many functions of CasADi use a slot, by the slot's functions, and how many holds there are.
+/// Number of CasADi's functions that use a slot, for each of the slot's functions, and number of holds.
 #[derive(Clone, Copy)]
 struct Users {
     functions: [usize; 4],
@@ -54,9 +56,9 @@ static SLOT: [Slot; SLOTS] = [const {
 }; SLOTS];
 
 impl Slot {
-    /// What is bound to the slot.
+    /// Returns the function bound to the slot.
     fn get(&self) -> Option<&Bound> {
-        // SAFETY: what is bound stays until the last user leaves, and who asks is one.
+        // SAFETY: the bound function stays until the last user leaves, and the caller is a user.
         unsafe { self.bound.load(Ordering::Acquire).as_ref() }
     }
 
@@ -64,19 +66,19 @@ impl Slot {
         self.users.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// CasADi has one more of a function. One that is made asks for its inputs next; one that is loaded knows them.
+    /// Counts one more function of CasADi. A newly created function asks for its inputs next; a loaded one knows them.
     fn enter(&self, function: usize) {
         self.users().functions[function] += 1;
         self.loaded[function].fetch_add(1, Ordering::AcqRel);
     }
 
-    /// A function asks for its description, so it was not loaded.
+    /// Notes that a function asked for its description, so it was not loaded.
     fn describe(&self, function: usize) {
         let less = |n: usize| n.checked_sub(1);
         let _ = self.loaded[function].fetch_update(Ordering::AcqRel, Ordering::Acquire, less);
     }
 
-    /// CasADi has one less of a function, or a hold ends.
+    /// Counts one function of CasADi less, or one hold less if `function` is `None`.
     fn leave(&self, function: Option<usize>) {
         let mut users = self.users();
         match function {
@@ -92,14 +94,14 @@ impl Slot {
         if !users.any() {
             let bound = self.bound.swap(core::ptr::null_mut(), Ordering::AcqRel);
             if !bound.is_null() {
-                // SAFETY: it was a box, and nobody uses it any more.
+                // SAFETY: the pointer comes from a box, and there are no users any more.
                 drop(unsafe { Box::from_raw(bound) });
             }
         }
     }
 
-    /// Whether a function may be one that was loaded, whose slot may be another robot's by now. One that is being made by
-    /// another thread is waited for.
+    /// Returns whether a function may have been loaded from a file, so that its slot may belong to another robot by
+    /// now. Waits for functions that another thread is creating.
     fn was_loaded(&self, function: usize) -> bool {
         let begin = Instant::now();
         while self.loaded[function].load(Ordering::Acquire) > 0 {
@@ -112,8 +114,8 @@ impl Slot {
     }
 }
 
-/// Holds a slot that computes what has this key, for so many states at a time: one that does so already, or a free one, to which what `make` makes is
-/// bound. There is none if all are taken.
+/// Holds a slot that computes the function with this key, for this number of states at a time. If no slot computes it
+/// yet, binds the result of `make` to a free slot. Returns `None` if all slots are taken.
 pub(super) fn hold(
     key: Vec<u8>,
     states: usize,
@@ -147,7 +149,7 @@ pub(super) fn release(name: &str) {
     }
 }
 
-/// The description of one of a slot's functions.
+/// Returns the description of one of a slot's functions.
 fn description(slot: usize, function: usize) -> Option<&'static Description> {
     SLOT[slot].get().map(|bound| &bound.descriptions[function])
 }
@@ -172,7 +174,7 @@ fn sparsity_of(port: Option<&Port>) -> *const i64 {
     port.map_or(null(), |port| port.sparsity.as_ptr())
 }
 
-/// Evaluates; 0 if it went well.
+/// Evaluates a function; returns 0 on success.
 ///
 /// # Safety
 /// As for `Bound::evaluate`.
@@ -180,19 +182,19 @@ unsafe fn evaluate(slot: usize, function: usize, arg: *const *const f64, res: *c
     let bound = match SLOT[slot].get() {
         Some(bound) if !SLOT[slot].was_loaded(function) => bound,
         _ => {
-            // CasADi takes no message from here
+            // CasADi's interface has no error message
             eprintln!(
                 "condyle_{slot}: a function of condyle.casadi cannot be loaded or unpickled: make it anew, without the copy"
             );
             return 1;
         }
     };
-    // SAFETY: by the caller.
+    // SAFETY: the caller's promise.
     let outcome = catch_unwind(AssertUnwindSafe(|| unsafe { bound.evaluate(function, arg, res) }));
     c_int::from(!matches!(outcome, Ok(Ok(()))))
 }
 
-/// The symbols of one function of a slot.
+/// Exports the symbols of one function of a slot.
 macro_rules! symbols_of {
     ($slot:literal, $function:expr, $name:expr) => {
         const _: () = {
@@ -204,7 +206,7 @@ macro_rules! symbols_of {
                 _: *mut f64,
                 _: c_int,
             ) -> c_int {
-                // SAFETY: CasADi keeps to the sparsities below.
+                // SAFETY: CasADi passes arrays with the sparsities below.
                 unsafe { evaluate($slot, $function, arg, res) }
             }
             #[unsafe(export_name = concat!($name, "_incref"))]
@@ -244,7 +246,7 @@ macro_rules! symbols_of {
     };
 }
 
-/// The symbols of all functions of some slots.
+/// Exports the symbols of all functions of some slots.
 macro_rules! symbols {
     ($($slot:literal)*) => {$(
         symbols_of!($slot, VALUE, concat!("condyle_", $slot));

@@ -1,7 +1,7 @@
-//! A knot of an optimal control problem, as slots compute it: the next state and the cost of a state and controls.
+//! A knot of an optimal control problem, as slots compute it: next state and cost as functions of state and controls.
 //!
-//! With the changes ψ(z) = φ(x ⊕ δx, u + δu) ⊖ φ(x, u) by z = (δx, δu), of which a problem's actions tell ∂ψ = [A B] and
-//! ∂²(μᵀψ), the numbers of the next state are those of φ ⊕ ψ. With E = ∂(φ ⊕ δ)/∂δ
+//! Let ψ(z) = φ(x ⊕ δx, u + δu) ⊖ φ(x, u) be the change of the next state with z = (δx, δu). A problem's actions
+//! provide ∂ψ = [A B] and ∂²(μᵀψ). The numbers of the next state are those in φ ⊕ ψ. With E = ∂(φ ⊕ δ)/∂δ
 //!
 //! ```text
 //! ∂x⁺ = E [A B]      ∂²(λᵀx⁺) = ∂²(μᵀψ) + [A B]ᵀ ∂²(λᵀ(φ ⊕ δ)) [A B],   μ = Eᵀ λ
@@ -16,27 +16,29 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::sync::{Mutex, PoisonError};
 
-/// At how many random states a derivative of the next state is zero if it always is. It is an analytic function there, so
-/// that one would do.
+/// Number of random states at which a derivative of the next state is evaluated. If it is zero at all of them, it is
+/// taken as zero everywhere. The derivative is an analytic function, so one state would suffice.
 const STATES: u64 = 3;
 
 /// A knot.
 pub(super) struct KnotFunction {
-    /// What is copied for calls.
+    /// The action; each call works on a copy.
     action: Mutex<Box<dyn ActionModel>>,
-    /// Its number; none if it is an argument.
+    /// Index of the knot; `None` if the index is an argument.
     t: Option<usize>,
     chart: Chart,
     nx: usize,
     nu: usize,
-    /// Whether there is no next state.
+    /// Whether the knot is the terminal one, which has no next state.
     end: bool,
-    /// Whether a derivative of the next state may differ from zero, nx rows for each tangent coordinate.
+    /// For each tangent coordinate and each of the nx numbers of the next state, whether the derivative may differ from
+    /// zero.
     slopes: Vec<bool>,
 }
 
 impl KnotFunction {
-    /// Knot t of an action, of a robot's if there is one, or all its knots; none if the action cannot be copied.
+    /// Creates knot t of an action, or all knots of it if t is `None`; `robot` is the robot of the action, if it has
+    /// one. Returns `None` if the action cannot be copied.
     pub(super) fn new(
         mut action: Box<dyn ActionModel>,
         robot: Option<&Model>,
@@ -70,7 +72,7 @@ impl KnotFunction {
 }
 
 impl KnotFunction {
-    /// The number of entries of (δx, δu).
+    /// Returns the number of entries of (δx, δu).
     fn tangents(&self) -> usize {
         self.nx - self.chart.nq + self.chart.nv + self.nu
     }
@@ -113,14 +115,14 @@ impl Computation for KnotFunction {
     }
 }
 
-/// What a call of a knot computes in.
+/// Work space for calls of a knot.
 struct KnotCalls {
     action: Box<dyn ActionModel>,
     chart: Chart,
     t: Option<usize>,
     end: bool,
     next: Vec<f64>,
-    /// μ.
+    /// μ = Eᵀ λ.
     mu: Vec<f64>,
     node: LqNode,
     hessian: Hessian,
@@ -135,7 +137,7 @@ impl KnotCalls {
         Self { action, chart, t, end, next, mu, node, hessian }
     }
 
-    /// The knot, its state and its controls, of the arguments.
+    /// Returns index, state and controls of the knot in the arguments.
     fn read<'a>(&self, x: &'a [Vec<f64>]) -> (usize, &'a [f64], &'a [f64]) {
         let last = || x.last().map_or(0.0, |t| t[0]);
         let u: &[f64] = if self.action.nu() > 0 { &x[1] } else { &[] };
@@ -143,7 +145,7 @@ impl KnotCalls {
     }
 }
 
-/// Column j of [A B].
+/// Returns column j of [A B].
 fn slope(node: &LqNode, j: usize) -> &[f64] {
     let n = node.ndx();
     match j.checked_sub(n) {
@@ -153,7 +155,7 @@ fn slope(node: &LqNode, j: usize) -> &[f64] {
 }
 
 impl KnotCalls {
-    /// Fills the next state and the node.
+    /// Computes the next state and the node, which holds the derivatives.
     fn differentiate(&mut self, x: &[Vec<f64>]) {
         let (t, x, u) = self.read(x);
         if !self.end {
@@ -203,7 +205,7 @@ impl Calls for KnotCalls {
         let H = &mut H[0];
         let (t, x, u) = self.read(x);
         let Self { action, chart, end, next, mu, node, hessian, .. } = self;
-        let n = node.ndx() + node.nu(); // after which stands t
+        let n = node.ndx() + node.nu(); // t comes after these
         let (weight, lambda) = lambda.split_last().expect("the cost is there");
         H.fill(0.0);
         add(H, *weight, [&node.Q, &node.S, &node.R]);
@@ -231,7 +233,7 @@ impl Calls for KnotCalls {
     }
 }
 
-/// H += factor [xx xu; xuᵀ uu].
+/// Adds factor [xx xu; xuᵀ uu] to H.
 fn add(H: &mut DMatrix<f64>, factor: f64, [xx, xu, uu]: [&DMatrix<f64>; 3]) {
     let (n, all) = (xx.nrows(), xx.nrows() + uu.nrows());
     for j in 0..all {

@@ -1,27 +1,27 @@
-//! Inverse and forward dynamics with their derivatives for several states at a time, in the lanes of vector registers.
+//! Inverse and forward dynamics with their derivatives for several states at a time, in SIMD lanes.
 
 use super::function::Kind;
 use condyle::{Batch, Model, batch::Matrices};
 use nalgebra::DMatrix;
 
-/// The most states of a call: some registers full, whose matrices stay in the cache.
+/// Maximum number of states of a call: they fill some registers, and their matrices fit in the cache.
 const MOST: usize = 32;
 
-/// What several states are computed in.
+/// Work space for several states.
 pub(super) struct Lanes {
     batch: Batch,
-    /// Whether it is forward dynamics, else it is inverse dynamics.
+    /// Whether the function is forward dynamics; otherwise it is inverse dynamics.
     forward: bool,
 }
 
-/// Writes a matrix of each state into those with a block for each two arguments: to the block from this row and column on.
+/// Writes a block of each state to that state's matrix, from this row and column on.
 fn place(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: Matrices<'_, f64>) {
     for (to, block) in to.iter_mut().zip(blocks.iter()) {
         block.copy_to(&mut to.view_mut((row, column), block.shape()));
     }
 }
 
-/// Writes the transpose of a matrix of each state likewise.
+/// Writes the transpose of a block of each state to that state's matrix, from this row and column on.
 fn place_transposed(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: Matrices<'_, f64>) {
     for (to, block) in to.iter_mut().zip(blocks.iter()) {
         let block = block.transpose();
@@ -30,7 +30,8 @@ fn place_transposed(to: &mut [DMatrix<f64>], row: usize, column: usize, blocks: 
 }
 
 impl Lanes {
-    /// What a function of so many states is computed in: none if it is one state, or another function.
+    /// Creates the work space of a function for this number of states. Returns `None` for a single state, and for
+    /// functions other than inverse and forward dynamics.
     pub(super) fn new(model: &Model, kind: &Kind, states: usize) -> Option<Self> {
         let forward = matches!(kind, Kind::Aba);
         if states < 2 || !(forward || matches!(kind, Kind::Rnea)) {
@@ -39,12 +40,12 @@ impl Lanes {
         Some(Self { batch: Batch::new(model, states.min(MOST), 1), forward })
     }
 
-    /// The most states of a call.
+    /// Returns the maximum number of states of a call.
     pub(super) fn most(&self) -> usize {
         self.batch.capacity()
     }
 
-    /// All results, state after state.
+    /// Computes all results, state by state.
     pub(super) fn value(&mut self, model: &Model, x: &[Vec<f64>], y: &mut [f64]) {
         let (q, v, third) = (&x[0], &x[1], &x[2]);
         y.copy_from_slice(match self.forward {
@@ -53,7 +54,7 @@ impl Lanes {
         });
     }
 
-    /// The first derivatives of each state's results by its tangent coordinates.
+    /// Computes the first derivatives of each state's results with respect to its tangent coordinates.
     pub(super) fn jacobian(&mut self, model: &Model, x: &[Vec<f64>], J: &mut [DMatrix<f64>]) {
         let (q, v, third, n) = (&x[0], &x[1], &x[2], model.nv());
         let blocks = if self.forward {
@@ -66,7 +67,7 @@ impl Lanes {
         blocks.into_iter().enumerate().for_each(|(k, block)| place(J, 0, k * n, block));
     }
 
-    /// The Hessian of each state's λᵀf, and the first derivatives if they are wanted.
+    /// Computes the Hessian of each state's λᵀf, and the first derivatives if they are wanted.
     pub(super) fn hessian(
         &mut self,
         model: &Model,
@@ -86,7 +87,7 @@ impl Lanes {
             let h = self.batch.rnea_hessian(model, q, v, third, &[], lambda);
             [h.dqdq, h.dvdq, h.dvdv, h.dadq]
         };
-        // the other blocks are zero, and nobody writes to them
+        // the other blocks are zero and are never written
         place(H, 0, 0, dqdq);
         place(H, n, 0, dvdq);
         place_transposed(H, 0, n, dvdq);

@@ -1,9 +1,10 @@
 //! Functions of a robot for CasADi's `external`: exact values and derivatives without Python in the loop.
 //!
-//! `chart` has positions as CasADi sees them. `computation` says what a function is that can be computed; `function` and
-//! `robot` have those of a robot, `lanes` some of them for several states, `knot` those of an optimal control problem. `bound` has them by CasADi's numbers, and
-//! `interface` CasADi's C interface: numbered slots, each with the symbols of a function, its Jacobian, its reverse product
-//! and the Jacobian of that.
+//! `chart` handles positions in CasADi's coordinates. `computation` defines the interface of a function. `function` and
+//! `robot` have the functions of a robot, `lanes` has some of them for several states, and `knot` has the knots of
+//! optimal control problems. `bound` converts numbers to CasADi's coordinates. `interface` is CasADi's C interface:
+//! numbered slots, each with the symbols of a function, its Jacobian, its reverse product and the Jacobian of that
+//! product.
 
 mod bound;
 mod chart;
@@ -26,11 +27,11 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use robot::RobotFunction;
 
-/// A slot of CasADi's interface that computes a function of a robot, held for the caller until `_casadi_release`.
+/// Holds a slot of CasADi's interface that computes a function of a robot, until `_casadi_release`.
 ///
 /// function: 'rnea', 'aba', 'crba', 'forward_kinematics', 'frame_velocity', 'com', 'centroidal_momentum' or
-/// 'constrained_dynamics'.
-/// states: how many at a time; arguments and results have the columns of each, one after the other.
+/// 'constrained_dynamics'. states: number of states per call; arguments and results have the columns of all states, one
+/// state after the other.
 ///
 /// Returns the name of its symbols.
 #[pyfunction]
@@ -74,7 +75,7 @@ pub(crate) fn casadi_hold(
     named(interface::hold(key, states, || Ok(Box::new(RobotFunction::new(robot, kind)?))).map_err(exception)?)
 }
 
-/// The number of states of a function, which is checked.
+/// Reads and checks the number of states of a function.
 fn count_of_states(given: &Bound<'_, PyAny>) -> PyResult<usize> {
     const MOST: usize = 1 << 16;
     match given.extract() {
@@ -83,13 +84,13 @@ fn count_of_states(given: &Bound<'_, PyAny>) -> PyResult<usize> {
     }
 }
 
-/// A slot that computes the next state and the cost of knot t of an action or of a problem, likewise; without t, of the knot
-/// whose number is an argument.
+/// Holds a slot that computes the next state and the cost of knot t of an action or of a problem, until
+/// `_casadi_release`. Without t, the index of the knot is an argument of the function.
 #[pyfunction]
 #[pyo3(name = "_casadi_hold_knot", signature = (of, t))]
 pub(crate) fn casadi_hold_knot(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<String> {
     let Alone { action, robot, end, text } = alone(of, t)?;
-    let mut key = format!("{} {end} {text}", t.is_some()).into_bytes(); // the text has the costs of knot t
+    let mut key = format!("{} {end} {text}", t.is_some()).into_bytes(); // the text contains the costs of knot t
     let robot = robot.as_deref();
     key.extend(robot.and_then(|robot| postcard::to_allocvec(robot).ok()).unwrap_or_default());
     let knot: Box<dyn Computation> = match KnotFunction::new(action, robot, t, end) {
@@ -102,7 +103,7 @@ pub(crate) fn casadi_hold_knot(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyRes
     named(interface::hold(key, 1, || Ok(knot)).map_err(exception)?)
 }
 
-/// The name of a slot, if there was one.
+/// Returns the name of a slot, or an error if all slots are taken.
 fn named(slot: Option<String>) -> PyResult<String> {
     slot.ok_or_else(|| {
         let message = format!("all {} functions for CasADi are in use: drop some of them", interface::SLOTS);
@@ -110,7 +111,7 @@ fn named(slot: Option<String>) -> PyResult<String> {
     })
 }
 
-/// The end of a hold: the slot lives on as long as CasADi has functions of it.
+/// Ends a hold; the slot stays in use as long as CasADi has functions of it.
 #[pyfunction]
 #[pyo3(name = "_casadi_release")]
 pub(crate) fn casadi_release(name: &str) {

@@ -11,12 +11,12 @@ use std::sync::Arc;
 /// A function of a robot.
 pub(super) struct RobotFunction {
     of: Arc<(Model, Kind)>,
-    /// The numbers of the constraints' rows, and of all results.
+    /// Number of rows of the constraints, and number of all results.
     rows: usize,
     results: usize,
-    /// For each two coordinates whether they move a body in common, nv × nv.
+    /// For each pair of coordinates, whether they move a body in common; nv × nv.
     relation: Vec<bool>,
-    /// For each coordinate whether it moves whole trees: M and the Coriolis forces do not depend on it. Shape: nv.
+    /// For each of the nv coordinates, whether it moves a whole tree: M and the Coriolis forces do not depend on it.
     moves_a_tree: Vec<bool>,
 }
 
@@ -62,7 +62,7 @@ impl Computation for RobotFunction {
     }
 
     fn present(&self, _: usize, i: usize, j: usize) -> bool {
-        !matches!(self.of.1, Kind::Crba) || self.related(i, j) // the entries of M
+        !matches!(self.of.1, Kind::Crba) || self.related(i, j) // the zeros of M
     }
 
     fn depends(&self, row: usize, j: usize) -> bool {
@@ -73,7 +73,7 @@ impl Computation for RobotFunction {
 
     fn curves(&self, i: usize, j: usize) -> bool {
         let nv = self.of.0.nv();
-        // where a tree stands is nothing to M and c(q, v) v, only to g: τ = M(q) a + c(q, v) v + g(q)
+        // M and c(q, v) v do not depend on where a whole tree is, only g does: τ = M(q) a + c(q, v) v + g(q)
         let stands = |i: usize| i < nv && self.moves_a_tree[i];
         let other_than_gravity = match self.of.1 {
             Kind::Rnea | Kind::Aba => i >= nv || j >= nv,
@@ -98,13 +98,13 @@ impl Computation for RobotFunction {
     }
 }
 
-/// What a call of a robot's function computes in.
+/// Work space for calls of a robot's function.
 struct RobotCalls {
     of: Arc<(Model, Kind)>,
     results: usize,
     scratch: Scratch<f64>,
     dual: Option<Box<DualScratch>>,
-    /// For several states at a time.
+    /// Work space for several states at a time, if the function has one.
     lanes: Option<Lanes>,
 }
 

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict};
 use std::path::PathBuf;
 
-/// The kinds of warnings that a strict reader accepts.
+/// Reads the kinds of warnings that a strict reader accepts.
 fn kinds(allow: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<WarningKind>> {
     let Some(allow) = allow else { return Ok(Vec::new()) };
     let kind = |word: &Bound<'_, PyAny>| {
@@ -20,7 +20,7 @@ fn kinds(allow: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<WarningKind>> {
     members_of("allow", "kinds of warnings", allow)?.iter().map(kind).collect()
 }
 
-/// The values of xacro's arguments, as xacro writes them.
+/// Converts the values of xacro's arguments to text, as xacro writes them.
 fn values(arguments: &Bound<'_, PyDict>) -> PyResult<Vec<(String, String)>> {
     let value = |(name, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         let text = value.str()?.to_str()?.to_owned();
@@ -32,11 +32,11 @@ fn values(arguments: &Bound<'_, PyDict>) -> PyResult<Vec<(String, String)>> {
 
 #[pymethods]
 impl Model {
-    /// A model from a URDF file.
+    /// Reads a model from a URDF file.
     ///
-    /// Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at. A file whose
-    /// name ends in `.xacro` is expanded by the installed program `xacro` or `xacrodoc`, which evaluates expressions of
-    /// the file: expand files of people that you trust only.
+    /// Fixed joints are merged into their parent body and remain as frames. Meshes are never read. A file whose name
+    /// ends in `.xacro` is expanded by the installed program `xacro` or `xacrodoc`. That program evaluates expressions
+    /// of the file, so use it only for files from sources that you trust.
     ///
     /// path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
     /// root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
@@ -44,9 +44,9 @@ impl Model {
     /// mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
     ///     their own.
     /// strict: whether a warning (`warnings`) is an error.
-    /// packages: folders that contain packages, or are packages; before those that the environment names in
-    ///     `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
-    /// allow: kinds of warnings that are no errors, though `strict` is set: 'massless', 'negative', 'triangle',
+    /// packages: folders that contain packages, or are packages; searched before the folders in `ROS_PACKAGE_PATH` and
+    ///     `AMENT_PREFIX_PATH` of the environment.
+    /// allow: kinds of warnings that are not errors even if `strict` is set: 'massless', 'negative', 'triangle',
     ///     'singular', 'unlikely', 'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
     /// arguments: values of xacro's `<xacro:arg>`s by name, for files that end in `.xacro`.
     ///
@@ -68,7 +68,7 @@ impl Model {
         Ok(condyle::Model::from_urdf(path, &options).map_err(exception)?.into())
     }
 
-    /// A model from a URDF in a string; see `from_urdf`.
+    /// Reads a model from a URDF in a string; see `from_urdf`.
     ///
     /// >>> text = condyle.robots.QUADRUPED
     /// >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
@@ -88,19 +88,19 @@ impl Model {
         Ok(condyle::Model::from_urdf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// A model from an MJCF file (MuJoCo) and the files that it includes.
+    /// Reads a model from an MJCF file (MuJoCo) and the files that it includes.
     ///
-    /// q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
-    /// in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
-    /// bodies without mass, `name#1`, `name#2`, …, between them. A thing that a model cannot hold is left out and
-    /// reported in `warnings`.
+    /// q and v have the layout of MuJoCo's `qpos` and `qvel`, with two exceptions: quaternions are x, y, z, w, and a
+    /// free joint's velocity is in the body's frame (MuJoCo: linear velocity in the world's frame). Several joints on
+    /// one body become a chain, with bodies without mass, `name#1`, `name#2`, …, between them. Contents that a model
+    /// cannot represent are left out and reported in `warnings`.
     ///
     /// path: a path, as text or `os.PathLike`.
-    /// mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being a constraint beside the
+    /// mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2, instead of being a constraint outside the
     ///     model; its `polycoef` must be linear.
     /// strict: whether a warning (`warnings`) is an error.
-    /// weightless_meshes: whether a mesh with mass that cannot be read weighs nothing and is reported in `warnings`,
-    ///     instead of being an error.
+    /// weightless_meshes: whether a mesh with mass that cannot be read counts as massless and is reported in
+    ///     `warnings`, instead of being an error.
     /// packages, allow: as for `from_urdf`.
     ///
     /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
@@ -119,7 +119,7 @@ impl Model {
         Ok(condyle::Model::from_mjcf(path, &options).map_err(exception)?.into())
     }
 
-    /// A model from an MJCF in a string, which may not include files; see `from_mjcf`.
+    /// Reads a model from an MJCF in a string, which may not include files; see `from_mjcf`.
     ///
     /// >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
     /// >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
@@ -139,17 +139,17 @@ impl Model {
         Ok(condyle::Model::from_mjcf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// A model from an SDF file (Gazebo), with the models that it includes.
+    /// Reads a model from an SDF file (Gazebo), with the models that it includes.
     ///
-    /// All models of a file, or of its first world, become one robot, whose names then begin with the model's:
-    /// `robot::arm`. Joints are walked breadth first from the root, in the order of the file; one that would give a link a
-    /// second parent closes a loop. Universal joints become two revolute ones.
+    /// All models of a file, or of its first world, become one robot; its names then begin with the model's name:
+    /// `robot::arm`. Joints are visited breadth first from the root, in the order of the file. A joint that would give
+    /// a link a second parent closes a loop. A universal joint becomes two revolute ones.
     ///
     /// path: a path, as text or `os.PathLike`.
     /// root_joint: as for `from_urdf`.
     /// mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
     /// strict: whether a warning (`warnings`) is an error.
-    /// packages, allow: as for `from_urdf`; `model://` addresses are looked for in `packages` too.
+    /// packages, allow: as for `from_urdf`; `model://` addresses are searched in `packages` too.
     /// model: the name of the one model to read; None reads all models of the file.
     ///
     /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
@@ -169,7 +169,7 @@ impl Model {
         Ok(condyle::Model::from_sdf(path, &options).map_err(exception)?.into())
     }
 
-    /// A model from an SDF in a string; see `from_sdf`.
+    /// Reads a model from an SDF in a string; see `from_sdf`.
     ///
     /// >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
     /// >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
@@ -191,11 +191,12 @@ impl Model {
         Ok(condyle::Model::from_sdf_str(text, &options).map_err(exception)?.into())
     }
 
-    /// A model from MuJoCo's, a `mujoco.MjModel`: the robot that MuJoCo has compiled, number for number.
+    /// Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
     ///
-    /// The names, q and v are those of `from_mjcf`. All that MuJoCo's compiler does is done already: meshes, `replicate`,
-    /// `attach`, composites, `settotalmass`. Numbers that were changed after compiling count too. What a model cannot hold
-    /// is reported in `warnings` or refused as by `from_mjcf`. MuJoCo itself is not imported.
+    /// The names, q and v are the same as with `from_mjcf`. All work of MuJoCo's compiler is included: meshes,
+    /// `replicate`, `attach`, composites, `settotalmass`. Numbers that were changed after compilation are used.
+    /// Contents that a model cannot represent are reported in `warnings`, or refused, as by `from_mjcf`. MuJoCo itself
+    /// is not imported.
     ///
     /// mimic, strict, allow: as for `from_mjcf`.
     ///
@@ -214,26 +215,27 @@ impl Model {
         Ok(condyle::Model::from_mjcf_text(&text, "<MjModel>", &options).map_err(exception)?.into())
     }
 
-    /// A model from Pinocchio's, a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that numbers are
-    /// equal; `to_pinocchio` is the way back.
+    /// Converts a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that results are equal.
+    /// `to_pinocchio` is the inverse.
     ///
-    /// Composite, universal and spherical ZYX joints become several ones, with bodies without mass between them. Limits of
-    /// quaternions, cosines and sines are left out, and so are geometry and reference configurations.
+    /// Composite, universal and spherical ZYX joints become several joints, with bodies without mass between them.
+    /// Limits of quaternions, cosines and sines are left out, and so are geometry and reference configurations.
     ///
-    /// Raises `ModelError` if its joints do not stand depth first, as Pinocchio's readers of files number them, or are of a
-    /// kind that is not here.
+    /// Raises `ModelError` if its joints are not in depth-first order, in which Pinocchio's file readers number them,
+    /// or if a joint is of an unsupported kind.
     #[staticmethod]
     fn from_pinocchio<'py>(model: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         model.py().import("condyle._pinocchio_models")?.call_method1("from_pinocchio", (model,))
     }
 
-    /// The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.
+    /// Reads the named positions of an SRDF file, its `<group_state>`s: a dictionary from names to q, nq numbers each.
     ///
-    /// Joints that a state does not mention stay as in `neutral`; a joint that turns without limits may have its angle. States
-    /// of one name, of several groups, are one position. All else in the file is ignored.
+    /// Joints that a state does not mention stay as in `neutral`; for a joint that turns without limits the state may
+    /// give its angle. States with the same name, of several groups, form one position. All other contents of the file
+    /// are ignored.
     ///
     /// path: a path, as text or `os.PathLike`.
-    /// strict: whether joints that the robot does not have are errors; SRDFs are often shared by robots with fewer joints.
+    /// strict: whether joints that the robot lacks are errors; an SRDF is often shared by robots with fewer joints.
     ///
     /// Raises `ParseError`, with file, line and element.
     #[pyo3(signature = (path, strict=false))]
@@ -246,7 +248,7 @@ impl Model {
         positions(py, self.inner.reference_configurations(path, strict))
     }
 
-    /// The named positions of an SRDF in a string; see `reference_configurations`.
+    /// Reads the named positions of an SRDF in a string; see `reference_configurations`.
     ///
     /// >>> joint = '<joint name="joint4" value="-1.2"/>'
     /// >>> srdf = f'<robot name="arm7"><group_state name="bent" group="arm">{joint}</group_state></robot>'
@@ -263,7 +265,7 @@ impl Model {
     }
 }
 
-/// Named positions as Python sees them.
+/// Converts named positions to a Python dictionary.
 fn positions(
     py: Python<'_>,
     read: Result<Vec<(String, Vec<f64>)>, condyle::ModelError>,

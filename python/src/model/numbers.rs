@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 impl Model {
-    /// Numbers of the model, in an array that nobody can write to.
+    /// Returns numbers of the model in a read-only array.
     fn numbers<'py>(
         &self,
         py: Python<'py>,
@@ -21,7 +21,7 @@ impl Model {
         self.cached.value(py, attribute, || read_only(py, &numbers()[..], instead))
     }
 
-    /// Keyframes in a new dictionary, each by one of its parts.
+    /// Returns one part of each keyframe, in a new dictionary by name.
     fn keyframe_parts<'py>(
         &self,
         py: Python<'py>,
@@ -43,7 +43,8 @@ impl Model {
         self.cached.value(py, Attribute::JointPlacements, || read_only(py, &self.of_bodies(|b| b.placement)[..], ""))
     }
 
-    /// The inertia of each body in the body's frame, with all that fixed joints merge into it, as `Inertia`.
+    /// The inertia of each body in the body's frame, as `Inertia`. It includes the links that fixed joints attach to
+    /// the body.
     #[getter]
     fn inertias<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Inertias, || {
@@ -51,7 +52,7 @@ impl Model {
         })
     }
 
-    /// The inertial parameters π, which regressors are multiplied with: ten numbers for each body but the world, 10
+    /// The inertial parameters π, with which regressors are multiplied: ten numbers for each body except the world, 10
     /// (nbodies − 1) in all. They are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
     /// inertia about the origin of the body's frame.
     #[getter]
@@ -61,8 +62,8 @@ impl Model {
         self.numbers(py, Attribute::InertialParameters, "with_inertias", pi)
     }
 
-    /// The limits of position, velocity and effort, as `Limits`; infinite where there are none. `effort` is the greatest
-    /// magnitude of `effort_lower` and `effort_upper`.
+    /// The limits of position, velocity and effort, as `Limits`; infinite where a limit is missing. `effort` is the
+    /// greatest magnitude of `effort_lower` and `effort_upper`.
     #[getter]
     fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.cached.value(py, Attribute::Limits, || {
@@ -74,15 +75,15 @@ impl Model {
         })
     }
 
-    /// The coefficients d₁ and d₂ of damping that grows with the speed, (nv, 2): the damping is d₀ + d₁|v| + d₂v², with
-    /// d₀ in `damping`. It acts where `damping` does.
+    /// The coefficients d₁ and d₂ of speed-dependent damping, (nv, 2): the damping coefficient is d₀ + d₁|v| + d₂v²,
+    /// with d₀ in `damping`. It acts where `damping` acts.
     #[getter]
     fn damping_polynomial<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.cached.value(py, Attribute::DampingPolynomial, || read_only(py, self.inner.damping_polynomial(), ""))
     }
 
-    /// The springs of joints, as `Spring(joint, stiffness, rest)`. They act in `passive_torque` and where a
-    /// `Simulation` is asked for them.
+    /// The springs of joints, as `Spring(joint, stiffness, rest)`. They act only in `passive_torque` and in a
+    /// `Simulation` that includes them.
     #[getter]
     fn springs<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Springs, || {
@@ -95,8 +96,8 @@ impl Model {
         })
     }
 
-    /// The weights that are carried by an unseen hand, as `GravityCompensation(body, mass, mass_com)`: MuJoCo's
-    /// `gravcomp`. They act in `passive_torque` and where a `Simulation` is asked for them.
+    /// The supported weights, as `GravityCompensation(body, mass, mass_com)`: MuJoCo's `gravcomp`. They act only in
+    /// `passive_torque` and in a `Simulation` that includes them.
     #[getter]
     fn gravity_compensation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::GravityCompensation, || {
@@ -109,8 +110,8 @@ impl Model {
         })
     }
 
-    /// The actuators of the file, as `Actuator`, in its order. Their ranges are part of `limits` already, their armature
-    /// and damping of the joints'.
+    /// The actuators of the file, as `Actuator`, in the order of the file. `limits` already includes their ranges, and
+    /// the joints' `armature` and `damping` include theirs.
     #[getter]
     fn actuators<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::Actuators, || {
@@ -136,27 +137,27 @@ impl Model {
         })
     }
 
-    /// The named positions of the file: a dictionary of q by name, nq numbers each.
+    /// The named positions of the file: a dictionary from names to q, nq numbers each.
     #[getter]
     fn keyframes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.keyframe_parts(py, |keyframe| &keyframe.q)
     }
 
-    /// The velocities of the `keyframes`: a dictionary of v by name, nv numbers each.
+    /// The velocities of the `keyframes`: a dictionary from names to v, nv numbers each.
     #[getter]
     fn keyframe_velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         self.keyframe_parts(py, |keyframe| &keyframe.v)
     }
 
     /// The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
-    /// and where a `Simulation` is asked for it.
+    /// and in a `Simulation` that includes it.
     #[getter]
     fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, Attribute::Damping, "", || self.inner.damping().to_vec())
     }
 
-    /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and where
-    /// a `Simulation` is asked for it.
+    /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and in a
+    /// `Simulation` that includes it.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, Attribute::Friction, "", || self.inner.friction().to_vec())
@@ -168,10 +169,10 @@ impl Model {
         self.numbers(py, Attribute::Armature, "with_armature", || self.inner.armature().to_vec())
     }
 
-    /// The constraints of the robot's file beside its tree, by name: loops as `ContactConstraint`, without stabilisation, and
-    /// coupled joints as `Coupling`.
+    /// Returns the constraints of the robot's file outside its tree, by name: loops as `ContactConstraint`, without
+    /// stabilisation, and coupled joints as `Coupling`.
     ///
-    /// The algorithms of a tree leave loops open. `constrained_dynamics` closes those that a `ConstraintSet` has:
+    /// The algorithms for trees ignore loops. `constrained_dynamics` closes the loops in its `ConstraintSet`:
     ///
     /// >>> robot = condyle.robots.quadruped()
     /// >>> loops = [c for c in robot.constraints().values() if isinstance(c, condyle.ContactConstraint)]
@@ -188,7 +189,7 @@ impl Model {
         self.numbers(py, Attribute::Gravity, "with_gravity", || self.inner.gravity().to_array().to_vec())
     }
 
-    /// The mass of all bodies, with that of what is fixed to the world (kg).
+    /// The mass of all bodies, including parts fixed to the world (kg).
     #[getter]
     fn total_mass(&self) -> f64 {
         self.inner.total_mass()

@@ -1,4 +1,4 @@
-//! The same robot with something changed.
+//! Copies of a robot with a change.
 
 use super::{Model, body_index, frame_index, members_of};
 use crate::arrays::{pose, three, vector};
@@ -11,7 +11,7 @@ use pyo3::types::PyString;
 
 #[pymethods]
 impl Model {
-    /// The same robot under another gravity (m/s², 3 numbers, in the world's frame).
+    /// Returns the same robot with another gravity (m/s², 3 numbers, in the world's frame).
     ///
     /// Raises `ModelError` if it is not finite.
     fn with_gravity(&self, gravity: &Bound<'_, PyAny>) -> PyResult<Self> {
@@ -19,7 +19,7 @@ impl Model {
         Ok((*self.inner).clone().with_gravity(gravity).map_err(exception)?.into())
     }
 
-    /// The same robot with another armature, nv numbers (kg m², kg).
+    /// Returns the same robot with another armature, nv numbers (kg m², kg).
     ///
     /// Raises `ModelError` if one is negative or not finite.
     fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
@@ -27,10 +27,10 @@ impl Model {
         Ok((*self.inner).clone().with_armature(&armature).map_err(exception)?.into())
     }
 
-    /// The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
-    /// are, and infinite numbers are none.
+    /// Returns the same robot with other limits of position (nq numbers), velocity and effort (nv each). None keeps a
+    /// limit; an infinite number removes it.
     ///
-    /// effort: greatest magnitude; sets both `effort_lower` and `effort_upper`, and goes with neither of them.
+    /// effort: maximum magnitude; sets both `effort_lower` and `effort_upper`, and cannot be combined with either.
     ///
     /// Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity is negative.
     ///
@@ -70,8 +70,8 @@ impl Model {
         Ok((*self.inner).clone().with_limits(limits).map_err(exception)?.into())
     }
 
-    /// The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
-    /// them is in its `warnings` and `singular_joints`.
+    /// Returns the same robot with other inertias, one for each body in the form of `inertias`, the world's first.
+    /// Implausible values are reported in its `warnings` and `singular_joints`.
     ///
     /// Raises `ModelError` if a mass is negative or a number is not finite.
     ///
@@ -90,13 +90,15 @@ impl Model {
         Ok(self.inner.with_inertias(|body, _| inertias[body]).map_err(exception)?.into())
     }
 
-    /// The same robot with one more frame of the user's, the last one of `frames`. All other numbers stay as they are.
+    /// Returns the same robot with one more frame of the user's, the last one of `frames`. All other numbers stay the
+    /// same.
     ///
-    /// name: the new frame's name; parent: the name or number of the frame on which it is put, or the name of a body; None is
-    /// the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the identity.
+    /// name: the new frame's name; parent: the name or index of the frame to which it is attached, or the name of a
+    /// body; None is the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the
+    /// identity.
     ///
-    /// Raises `ModelError` if the parent does not exist, the placement is no rotation and translation, or the user has a frame
-    /// of this name already.
+    /// Raises `ModelError` if the parent does not exist, the placement is not a homogeneous matrix, or another frame of
+    /// the user's has this name.
     ///
     /// >>> tip = np.eye(4)
     /// >>> tip[2, 3] = 0.1
@@ -123,18 +125,18 @@ impl Model {
         Ok(self.inner.with_frame(name, parent, placement).map_err(exception)?.into())
     }
 
-    /// The same robot with some joints locked where they are at q.
+    /// Returns the same robot with some joints locked at their positions in q.
     ///
-    /// Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
-    /// locked with it.
+    /// Their bodies are merged into their parent bodies and remain as frames. A mimic joint is locked together with the
+    /// joint that it follows.
     ///
-    /// joints: a list of names or numbers of bodies.
+    /// joints: a list of names or indices of bodies.
     /// q: nq numbers.
     ///
     /// >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
     /// ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
     ///
-    /// Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
+    /// Raises `ModelError`, also if `q` is not finite or contains a rotation whose length is not 1 (up to 1e-3).
     fn lock(&self, joints: &Bound<'_, PyAny>, q: &Bound<'_, PyAny>) -> PyResult<Self> {
         let joints = members_of("joints", "names or numbers of bodies", joints)?;
         let joints = joints
@@ -145,21 +147,21 @@ impl Model {
         Ok(self.inner.lock(&joints, &q).map_err(exception)?.into())
     }
 
-    /// This robot with another one on a frame of it, as a new model.
+    /// Returns this robot with another one attached to one of its frames, as a new model.
     ///
-    /// Its bodies are numbered behind all that the body which carries them has carried before, as Pinocchio's `appendModel` does;
-    /// name and gravity are this one's.
+    /// The new bodies are numbered after all existing descendants of the body that carries them, as by Pinocchio's
+    /// `appendModel`. Name and gravity are this robot's.
     ///
-    /// frame: the name or number of a frame; None is the world.
+    /// frame: the name or index of a frame; None is the world.
     /// model: the other robot.
-    /// placement: its world in the frame, a homogeneous (4, 4) matrix; None is the identity.
-    /// prefix: put before all its names.
+    /// placement: the pose of the other robot's world in the frame, a homogeneous (4, 4) matrix; None is the identity.
+    /// prefix: text added before all names of the other robot.
     ///
     /// >>> quadruped, arm = condyle.robots.quadruped(), condyle.robots.arm7()
     /// >>> quadruped.append("trunk", arm, prefix="arm_").names[13:16]
     /// ['RH_KFE', 'arm_joint1', 'arm_joint2']
     ///
-    /// Raises `ModelError`: two bodies, joints or frames of one name.
+    /// Raises `ModelError` if two bodies, joints or frames have the same name.
     #[pyo3(signature = (frame, model, placement=None, prefix=""))]
     fn append(
         &self,
@@ -179,16 +181,17 @@ impl Model {
         Ok(self.inner.append(body, bXf * fXw, &model.get().inner, prefix).map_err(exception)?.into())
     }
 
-    /// The same robot with one more joint that follows another one, its position being ratio q + offset, in place of a
-    /// coordinate of its own. Its limits are those of the one that it follows.
+    /// Returns the same robot with one more mimic joint: its position is ratio q + offset, where q is the leader's, and
+    /// it has no coordinate of its own. The leader's limits then apply to it.
     ///
-    /// follower, leader: the joints' names, or the numbers of their bodies.
+    /// follower, leader: the joints' names, or the indices of their bodies.
     ///
     /// >>> arm = condyle.robots.arm7()
     /// >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
     /// 6
     ///
-    /// Raises `ModelError` if they are not of one degree of freedom, or a joint would follow one that follows.
+    /// Raises `ModelError` if they do not have one degree of freedom each, the leader is itself a mimic joint, or another
+    /// joint follows the follower.
     #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
     fn with_mimic(
         &self,

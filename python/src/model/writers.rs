@@ -1,4 +1,4 @@
-//! Models into files, text, pickles, and other libraries.
+//! Models to files, text, pickles, and other libraries.
 
 use super::Model;
 use crate::exceptions::{ModelError, ParseError, exception};
@@ -8,36 +8,38 @@ use std::path::PathBuf;
 
 #[pymethods]
 impl Model {
-    /// Writes inertias, limits, damping, friction and armature into a copy of the URDF `original`, and all else as it is
-    /// there.
+    /// Writes inertias, limits, damping, friction and armature into a copy of the URDF `original`. All other contents
+    /// stay the same.
     ///
-    /// Only what differs from the original is edited, so an unchanged robot gives the same bytes. Reading the new file
-    /// gives this model back, up to rounding. `original` may be `path`. Of several links that fixed joints merge, the one
-    /// that the joint carries takes the difference. An armature becomes the rotor inertia of a `<transmission>`.
+    /// Only values that differ from the original are edited, so an unchanged robot gives the same bytes. Reading the
+    /// new file gives this model again, up to rounding. `original` may be `path`. If fixed joints merge several links,
+    /// the difference goes to the link that the joint carries. An armature becomes the rotor inertia of a
+    /// `<transmission>`.
     ///
-    /// path: the new file. original: the file that the robot was read from.
+    /// path: the new file. original: the file from which the robot was read.
     ///
-    /// Raises `ParseError` with the thing and both numbers if the file cannot say it, as an infinite limit, or is that of
-    /// another robot.
+    /// Raises `ParseError`, with the item and both numbers, if the format cannot express a value, such as an infinite
+    /// limit, or if the file belongs to another robot.
     fn write_urdf(&self, path: PathBuf, original: PathBuf) -> PyResult<()> {
         self.inner.write_urdf(path, original).map_err(exception)
     }
 
-    /// Writes the same into a copy of the MJCF `original`; see `write_urdf`.
+    /// Writes the same numbers into a copy of the MJCF `original`; see `write_urdf`.
     ///
-    /// Bodies and joints that differ must be in the file itself, not in one that it includes. Limits of effort are written
-    /// as `actuatorfrcrange` of the joint.
+    /// Bodies and joints that differ must be in the file itself, not in an included file. Effort limits are written as
+    /// `actuatorfrcrange` of the joint.
     ///
-    /// path: the new file. original: the file that the robot was read from.
+    /// path: the new file. original: the file from which the robot was read.
     ///
     /// Raises `ParseError` as `write_urdf` does.
     fn write_mjcf(&self, path: PathBuf, original: PathBuf) -> PyResult<()> {
         self.inner.write_mjcf(path, original).map_err(exception)
     }
 
-    /// The model as JSON, with all digits; `from_json` gives an equal one. `null` stands for a limit that is infinite.
+    /// Returns the model as JSON, with all digits; `from_json` returns an equal model. An infinite limit is written as
+    /// `null`.
     ///
-    /// The text may be edited: what it says is checked when it is read.
+    /// The text may be edited; its contents are checked when it is read.
     ///
     /// >>> arm = condyle.robots.arm7()
     /// >>> condyle.Model.from_json(arm.to_json()).to_json() == arm.to_json()
@@ -46,7 +48,7 @@ impl Model {
         serde_json::to_string(&*self.inner).map_err(|e| ModelError::new_err(format!("cannot be written: {e}")))
     }
 
-    /// A model from the JSON that `to_json` gives.
+    /// Reads a model from the JSON that `to_json` returns.
     ///
     /// Raises `ParseError`, with line and column.
     #[staticmethod]
@@ -56,9 +58,9 @@ impl Model {
         Ok(model.into())
     }
 
-    /// The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
+    /// Returns the same robot as a `pinocchio.Model`; requires Pinocchio 3 or later.
     ///
-    /// Joints that follow others do so there too, unless they turn without limits.
+    /// Mimic joints remain mimic joints, unless they turn without limits.
     fn to_pinocchio<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("condyle._pinocchio_models")?;
         module.call_method1("to_pinocchio", (slf,))
@@ -74,16 +76,18 @@ impl Model {
     }
 }
 
-/// The beginning of a pickled model: the library's version, since the form may change from one to the next.
+/// First bytes of a pickled model, with the library's version: the format may change between versions.
 const MAGIC: &str = concat!("condyle ", env!("CARGO_PKG_VERSION"), "\n");
 
-/// The model that a pickle holds.
+/// Reads the model in a pickle.
 #[pyfunction]
 #[pyo3(name = "_model_from_bytes")]
 pub(crate) fn model_from_bytes(data: &[u8]) -> PyResult<Model> {
     let Some(model) = data.strip_prefix(MAGIC.as_bytes()) else {
         let version = env!("CARGO_PKG_VERSION");
-        return Err(ModelError::new_err(format!("the pickle is not of condyle {version}, or of no model")));
+        return Err(ModelError::new_err(format!(
+            "pickle was not written by condyle {version}, or does not contain a Model"
+        )));
     };
     let model: condyle::Model =
         postcard::from_bytes(model).map_err(|e| ModelError::new_err(format!("the pickle is damaged: {e}")))?;

@@ -16,8 +16,8 @@ use rust::robot::{self, Actuation, ControlBounds, ControlPolynomial, Dynamics, K
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// The matrix S if one is given, or none, which drives every joint but a free-flyer at the root; and the number of
-/// controls.
+/// Returns the matrix S, if one is given, and the number of controls. Without S every joint is driven, except a
+/// free-flyer at the root.
 pub(super) fn actuation(
     model: &condyle::Model,
     map: Option<&Bound<'_, PyAny>>,
@@ -37,10 +37,10 @@ pub(super) fn terms(model: &Arc<condyle::Model>, costs: &[PyRef<'_, Cost>]) -> V
 /// Costs, or limits, of single knots.
 pub(super) type At<'py, T> = Option<BTreeMap<usize, Vec<PyRef<'py, T>>>>;
 
-/// Limits of all knots, if there are any.
+/// Limits of all knots; `None` if there are no limits.
 pub(super) type Limits<'py> = Option<Vec<PyRef<'py, Limit>>>;
 
-/// The residuals that are written in Python.
+/// Collects the residuals that are written in Python.
 pub(super) fn kept_at(
     py: Python<'_>,
     costs: &[PyRef<'_, Cost>],
@@ -57,7 +57,7 @@ fn limits(model: &Arc<condyle::Model>, limits: Limits<'_>) -> Vec<robot::Limit> 
     limits.into_iter().flatten().map(|limit| limit.of(model)).collect()
 }
 
-/// Contacts with the names that residuals call them by.
+/// Reads contacts with the names that residuals use for them.
 pub(super) fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> PyResult<Vec<robot::Contact>> {
     let contact = |(name, given): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
         Ok(robot::Contact::new(&name.extract::<String>()?, constraint(model, &given)?))
@@ -65,7 +65,7 @@ pub(super) fn contacts(model: &condyle::Model, contacts: &Bound<'_, PyDict>) -> 
     contacts.iter().map(contact).collect()
 }
 
-/// A knot as data.
+/// Creates the description of a knot.
 pub(super) fn knot(
     model: &Arc<condyle::Model>,
     dynamics: Dynamics,
@@ -83,28 +83,29 @@ pub(super) fn knot(
 
 /// A knot of a robot that moves freely under its joints' efforts.
 ///
-/// q̈ = aba(q, v, S u); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is
-/// x = (q, v).
+/// q̈ = aba(q, v, S u). By semi-implicit Euler v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt Σ w a(r),
+/// and the state is x = (q, v).
 ///
 /// model: the robot.
-/// dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
+/// dt: Δt in seconds, or None for a terminal knot, which has no controls and the cost Σ w a(r).
 /// costs: a list of `Cost`.
-/// costs_at: lists of `Cost` by the number of a knot, for knots with costs of their own; so one action serves a phase.
-/// actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
+/// costs_at: lists of `Cost` by index of the knot, for knots with costs of their own; so one action can serve a phase
+///     of several knots.
+/// actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
-/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-/// limits: a list of `Limit`, or None; `AugmentedLagrangian` holds them.
-/// limits_at: lists of `Limit` by the number of a knot, for knots with limits of their own.
-/// controls: how they go through the knot's time: 'constant', 'linear' or 'quadratic'. The knot then has 1, 2 or 3 times nu
-///     controls, the values u at the times 0 and Δt/2, or at 0, Δt/2 and Δt (by 'runge_kutta_3' 0, Δt/3 and 2 Δt/3);
-///     bounds hold at each of them.
+/// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
+/// limits: a list of `Limit`, or None; `AugmentedLagrangian` enforces them.
+/// limits_at: lists of `Limit` by index of the knot, for knots with limits of their own.
+/// controls: their course in time within a knot: 'constant', 'linear' or 'quadratic'. The knot then has 1, 2 or 3 times
+///     nu controls, the values u at the times 0 and Δt/2, or at 0, Δt/2 and Δt ('runge_kutta_3': 0, Δt/3 and 2 Δt/3).
+///     Bounds apply to each of these values.
 ///
-/// Raises `ProblemError` for a cost, a limit or drives that do not fit.
+/// Raises `ProblemError` for a cost, a limit or an actuation that does not fit the robot.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct FreeDynamics(pub(super) RobotAction<robot::FreeDynamics>);
 
 methods! {
-    /// The efforts that hold the robot still at the state x, nu numbers.
+    /// Returns the efforts that hold the robot still at the state x, nu numbers.
     FreeDynamics::quasi_static;
 
     #[new]
@@ -149,10 +150,10 @@ methods! {
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`.
 /// damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-/// costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as of `FreeDynamics`.
+/// costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`.
 ///
-/// Raises `ProblemError` for a contact, cost, limit or drives that do not fit, and two contacts on one body without
-/// damping.
+/// Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot, and for two contacts on
+/// one body without damping.
 ///
 /// >>> from condyle.optimal import ContactDynamics
 /// >>> quadruped = condyle.robots.quadruped()
@@ -162,7 +163,8 @@ methods! {
 pub(crate) struct ContactDynamics(pub(super) RobotAction<robot::ContactDynamics>);
 
 methods! {
-    /// The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers.
+    /// Returns the controls that hold the robot still at the state x, nu numbers; controls and contact forces together
+    /// have the smallest norm.
     ContactDynamics::quasi_static;
 
     #[new]
@@ -195,23 +197,24 @@ methods! {
     }
 }
 
-/// A knot at which contacts set in: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w a(r).
+/// A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w
+/// a(r).
 ///
 /// There are no controls.
 ///
 /// model: the robot.
 /// contacts: a dict of `ContactConstraint`s by name.
-/// costs: a list of `Cost`; they look at the state before the impact.
+/// costs: a list of `Cost`, which are evaluated at the state before the impact.
 /// restitution: ε, 0 to 1.
 /// damping: μ (1/kg).
-/// limits: a list of `Limit`, or None; they too look at the state before the impact.
+/// limits: a list of `Limit`, or None; they are also evaluated at the state before the impact.
 ///
 /// Raises `ProblemError` as `ContactDynamics` does.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct ImpulseDynamics(pub(super) RobotAction<robot::ImpulseDynamics>);
 
 methods! {
-    /// No controls: an impact has none.
+    /// Returns an empty array, since an impact has no controls.
     ImpulseDynamics::quasi_static;
 
     #[new]

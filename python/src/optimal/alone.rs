@@ -1,4 +1,4 @@
-//! A knot of a problem by itself.
+//! A single knot of a problem.
 
 use super::models::{boxed, residuals};
 use super::own::{Action, ConstrainedAction, DifferentialAction, Fault, Lqr, Unicycle};
@@ -10,17 +10,17 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use std::sync::Arc;
 
-/// A knot by itself, without the limits and the bounds that a solver holds.
+/// A single knot, without the limits and bounds that a solver enforces.
 pub(crate) struct Alone {
     pub(crate) action: Box<dyn rust::ActionModel>,
     pub(crate) robot: Option<Arc<condyle::Model>>,
-    /// Whether there is no next state.
+    /// Whether the knot is terminal, so that it has no next state.
     pub(crate) end: bool,
-    /// The knot as text, which tells it from others of this robot.
+    /// Text that identifies the knot among the knots of this robot.
     pub(crate) text: String,
 }
 
-/// Knot t of an action, or of a problem; or all knots of an action, for each of which it computes.
+/// Returns knot t of an action or of a problem, or an action that computes all of its knots if t is `None`.
 pub(crate) fn alone(of: &Bound<'_, PyAny>, t: Option<usize>) -> PyResult<Alone> {
     let Ok(problem) = of.cast::<Problem>() else { return action_alone(of, t) };
     let (py, problem) = (of.py(), problem.get());

@@ -1,4 +1,4 @@
-//! Cones that residuals look at.
+//! Cones that residuals refer to.
 
 use crate::arrays::{self, Give};
 use crate::exceptions::{ProblemError, problem_error, within};
@@ -8,11 +8,12 @@ use pyo3::prelude::*;
 
 /// Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 ///
-/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
-/// rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
-/// (N), by default 0 and infinite.
+/// mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside the cone;
+/// rotation: the surface's axes (its normal is z) in the contact's axes, (3, 3); least, greatest: bounds on the normal
+/// force (N), by default 0 and infinite.
 ///
-/// Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
+/// Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is not a
+/// rotation matrix.
 ///
 /// >>> condyle.optimal.FrictionCone(0.5).rows()[0]
 /// array([ 1. ,  0. , -0.5])
@@ -51,19 +52,19 @@ impl FrictionCone {
         Ok(Self(cone))
     }
 
-    /// The matrix A, (facets + 1, 3).
+    /// Returns the matrix A, (facets + 1, 3).
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.0.rows().give(py, None)
     }
 
-    /// The least and greatest values of A f.
+    /// Returns the lower and upper bounds of A f.
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         pair(py, self.0.bounds())
     }
 }
 
-/// The wrench cone of a rectangular sole: friction, centre of pressure within the rectangle, and yaw moment, lower ≤ A
-/// w ≤ upper.
+/// The wrench cone of a rectangular sole, lower ≤ A w ≤ upper: friction, centre of pressure within the rectangle, and
+/// yaw moment.
 ///
 /// friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
 ///
@@ -97,18 +98,18 @@ impl WrenchCone {
         Ok(Self(cone))
     }
 
-    /// The matrix A, (facets + 13, 6).
+    /// Returns the matrix A, (facets + 13, 6).
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.0.rows().give(py, None)
     }
 
-    /// The least and greatest values of A w.
+    /// Returns the lower and upper bounds of A w.
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         pair(py, self.0.bounds())
     }
 }
 
-/// Least and greatest values as arrays.
+/// Converts bounds to arrays.
 fn pair<'py>(
     py: Python<'py>,
     (lower, upper): (Vec<f64>, Vec<f64>),
@@ -116,7 +117,7 @@ fn pair<'py>(
     Ok((lower.give(py, None)?, upper.give(py, None)?))
 }
 
-/// The axes of a surface along those of a contact; the same if none are given.
+/// Reads the axes of a surface in a contact's axes; the identity if they are not given.
 pub(super) fn surface(rotation: Option<&Bound<'_, PyAny>>) -> PyResult<Mat3<f64>> {
     rotation.map_or_else(|| Ok(Mat3::identity()), |given| arrays::rotation("rotation", given))
 }

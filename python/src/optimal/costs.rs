@@ -1,4 +1,4 @@
-//! The terms of costs, and limits: a residual with what is wanted of it.
+//! Terms of costs, and limits: a residual with a weight or bounds.
 
 use super::residuals::Residual;
 use crate::arrays::numbers;
@@ -17,26 +17,26 @@ pub(crate) struct Activation(robot::Activation);
 
 #[pymethods]
 impl Activation {
-    /// The quadratic cost ½ Σ rᵢ².
+    /// Returns the quadratic cost ½ Σ rᵢ².
     #[staticmethod]
     fn quadratic() -> Self {
         Self(robot::Activation::Quadratic)
     }
 
-    /// The weighted quadratic cost ½ Σ wᵢ rᵢ².
+    /// Returns the weighted quadratic cost ½ Σ wᵢ rᵢ².
     #[staticmethod]
     fn weighted(w: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self(robot::Activation::Weighted(numbers("w", w)?)))
     }
 
-    /// The quadratic barrier ½ Σ (excess of rᵢ over its bounds)²; an infinite bound is no bound.
+    /// Returns the quadratic barrier ½ Σ (excess of rᵢ over its bounds)²; an infinite bound is ignored.
     #[staticmethod]
     fn barrier(lower: &Bound<'_, PyAny>, upper: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (lower, upper) = (numbers("lower", lower)?, numbers("upper", upper)?);
         Ok(Self(robot::Activation::Barrier { lower, upper }))
     }
 
-    /// The weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl has the square of wᵢ in its
+    /// Returns the weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl squares wᵢ in its
     /// value.
     #[staticmethod]
     fn weighted_barrier(lower: &Bound<'_, PyAny>, upper: &Bound<'_, PyAny>, w: &Bound<'_, PyAny>) -> PyResult<Self> {
@@ -44,21 +44,21 @@ impl Activation {
         Ok(Self(robot::Activation::WeightedBarrier { lower, upper, weights }))
     }
 
-    /// The sum Σ rᵢ, for residuals that are costs by themselves: see `Residual.own_cost`.
+    /// Returns the sum Σ rᵢ, for residuals that are costs themselves: see `Residual.own_cost`.
     #[staticmethod]
     fn sum() -> Self {
         Self(robot::Activation::Sum)
     }
 
-    /// The smooth cost Σ √(ε + rᵢ²), nearly Σ |rᵢ|.
+    /// Returns the smooth cost Σ √(ε + rᵢ²), approximately Σ |rᵢ|.
     #[staticmethod]
     #[pyo3(signature = (epsilon=1.0))]
     fn smooth1(epsilon: f64) -> Self {
         Self(robot::Activation::Smooth1 { epsilon })
     }
 
-    /// The smooth cost √(ε + ‖r‖²), nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least
-    /// eigenvalue of the exact one.
+    /// Returns the smooth cost √(ε + ‖r‖²), approximately ‖r‖. Its Hessian is approximated by ε/a³ times the identity;
+    /// ε/a³ is the least eigenvalue of the exact Hessian.
     #[staticmethod]
     #[pyo3(signature = (epsilon=1.0))]
     fn smooth2(epsilon: f64) -> Self {
@@ -83,10 +83,10 @@ impl Activation {
 
 /// A term of a cost: weight times an activation of a residual.
 ///
-/// name: what `Problem.set_weight` and errors call it.
+/// name: used by `Problem.set_weight` and in errors.
 /// weight: finite and at least 0; a term whose weight is 0 is not computed.
 /// residual: a `Residual`.
-/// activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, the sum for
+/// activation: an `Activation`. None is the barrier of the bounds for a cone or a centre of pressure, the sum for
 ///     `Residual.own_cost`, and quadratic for other residuals.
 ///
 /// >>> from condyle.optimal import Cost, Residual
@@ -101,12 +101,12 @@ pub(crate) struct Cost {
 }
 
 impl Cost {
-    /// The term for a robot.
+    /// Returns the term for a robot.
     pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Cost {
         robot::Cost::new(&self.name, self.weight, self.residual.get().of(model), self.activation.clone())
     }
 
-    /// The residual, if it is written in Python.
+    /// Returns the residual if it is written in Python.
     pub(super) fn own(&self, py: Python<'_>) -> Option<Py<PyAny>> {
         self.residual.get().is_own().then(|| self.residual.clone_ref(py).into_any())
     }
@@ -147,14 +147,14 @@ impl Cost {
     }
 }
 
-/// Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
+/// Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
 ///
-/// Limits hold at the beginning of a knot. To `Fddp` alone they are costs for leaving the bounds.
+/// Limits apply at the beginning of a knot. `Fddp` alone treats them as costs for leaving the bounds.
 ///
-/// name: what errors call it.
+/// name: used in errors.
 /// residual: a `Residual`.
-/// lower, upper: as many numbers as r has, infinite where there is no bound; None is no bound. If both are None, a cone
-///     or a centre of pressure has its own bounds, and any other r is 0. Entries where both are equal are equalities.
+/// lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone or a
+///     centre of pressure has its own bounds, and any other r must be 0. Entries where both are equal are equalities.
 ///
 /// >>> from condyle.optimal import Limit, Residual
 /// >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
@@ -168,12 +168,12 @@ pub(crate) struct Limit {
 }
 
 impl Limit {
-    /// The limit for a robot.
+    /// Returns the limit for a robot.
     pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Limit {
         robot::Limit::new(&self.name, self.residual.get().of(model), self.lower.clone(), self.upper.clone())
     }
 
-    /// The residual, if it is written in Python.
+    /// Returns the residual if it is written in Python.
     pub(super) fn own(&self, py: Python<'_>) -> Option<Py<PyAny>> {
         self.residual.get().is_own().then(|| self.residual.clone_ref(py).into_any())
     }
@@ -195,7 +195,7 @@ impl Limit {
             (Some(lower), Some(upper)) => (lower, upper),
             (Some(lower), None) => (lower.clone(), vec![f64::INFINITY; lower.len()]),
             (None, Some(upper)) => (vec![f64::NEG_INFINITY; upper.len()], upper),
-            (None, None) => residual.get().bounds().unwrap_or_default(), // without any: r = 0
+            (None, None) => residual.get().bounds().unwrap_or_default(), // no bounds: r = 0
         };
         Ok(Self { name, residual: residual.clone().unbind(), lower, upper })
     }
@@ -206,7 +206,7 @@ impl Limit {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, Self { name, residual, lower, upper }) = (slf.py(), slf.get());
-        let (lower, upper) = (!lower.is_empty()).then(|| (lower.clone(), upper.clone())).unzip(); // else r = 0
+        let (lower, upper) = (!lower.is_empty()).then(|| (lower.clone(), upper.clone())).unzip(); // empty: r = 0
         Ok((slf.get_type(), (name.clone(), residual.clone_ref(py), lower, upper)).into_pyobject(py)?.into_any())
     }
 

@@ -1,4 +1,4 @@
-//! What a problem computes along states and controls, as Python sees it.
+//! Evaluations and solutions of a problem, converted to Python.
 
 use super::problem::Problem;
 use crate::arrays::{Array, Give, class, matrix, output, vector};
@@ -8,13 +8,13 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
-/// The number of controls of a knot, if all knots have the same.
+/// Returns the number of controls per knot, if it is the same for all knots.
 fn common_nu(problem: &rust::Problem) -> Option<usize> {
     let nu = problem.nu(0);
     (0..problem.horizon()).all(|t| problem.nu(t) == nu).then_some(nu)
 }
 
-/// The controls of all knots, one after the other, from an array (N, nu) or a list of arrays.
+/// Reads the controls of all knots, knot by knot, from an array (N, nu) or a list of arrays.
 pub(super) fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     if let Some(nu) = common_nu(problem) {
         return Ok(matrix("us", us, [problem.horizon(), nu])?.to_vec());
@@ -30,8 +30,8 @@ pub(super) fn controls(problem: &rust::Problem, us: &Bound<'_, PyAny>) -> PyResu
     Ok(flat)
 }
 
-/// An array for all knots if they have the same number of controls, otherwise a list of arrays; `numbers` writes those
-/// of one knot.
+/// Returns one array for all knots if they have the same number of controls, otherwise a list of arrays; `numbers`
+/// writes the numbers of one knot.
 pub(super) fn by_knot<'py>(
     py: Python<'py>,
     problem: &rust::Problem,
@@ -50,7 +50,7 @@ pub(super) fn by_knot<'py>(
     Ok(PyList::new(py, arrays.collect::<PyResult<Vec<_>>>()?)?.into_any())
 }
 
-/// An `Evaluation` at a trajectory.
+/// Computes an `Evaluation` of a trajectory.
 pub(super) fn evaluate<'py>(
     py: Python<'py>,
     problem: &mut rust::Problem,
@@ -93,7 +93,7 @@ pub(super) fn evaluate<'py>(
     ))
 }
 
-/// x̂₀ ⊖ x₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁; `next` are the φ.
+/// Returns the gaps x̂₀ ⊖ x₀, then φ(xₜ, uₜ) ⊖ xₜ₊₁; `next` contains φ of each knot.
 pub(super) fn gaps(problem: &rust::Problem, xs: &[f64], next: &[f64]) -> Vec<f64> {
     let (nx, ndx) = (problem.nx(), problem.ndx());
     let mut gaps = vec![0.0; (problem.horizon() + 1) * ndx];
@@ -104,7 +104,7 @@ pub(super) fn gaps(problem: &rust::Problem, xs: &[f64], next: &[f64]) -> Vec<f64
     gaps
 }
 
-/// A solution as Python sees it.
+/// Converts a solution to a Python object.
 pub(super) fn solution<'py>(
     py: Python<'py>,
     of: &Py<Problem>,
@@ -128,7 +128,7 @@ pub(super) fn solution<'py>(
         trace,
         timings,
     ))?;
-    // from which it computes accelerations, efforts and forces when it is asked for them
+    // source from which the solution computes accelerations, efforts and forces on request
     solution.setattr("_source", (of.clone_ref(py), of.get().moved()))?;
     Ok(solution)
 }

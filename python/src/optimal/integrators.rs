@@ -1,10 +1,10 @@
-//! Integrators and the course of controls in a knot, by their names.
+//! Integrators and control polynomials, by name.
 
 use crate::exceptions::wrong_word;
 use condyle::optimal::robot::{ControlPolynomial, Integrator};
 use pyo3::prelude::*;
 
-/// How a state goes through the time of a knot.
+/// Reads the integrator of a knot.
 pub(super) fn integrator(name: &str) -> PyResult<Integrator> {
     match name {
         "semi_implicit_euler" => Ok(Integrator::SemiImplicitEuler),
@@ -18,7 +18,7 @@ pub(super) fn integrator(name: &str) -> PyResult<Integrator> {
     }
 }
 
-/// How controls go through the time of a knot.
+/// Reads the polynomial that controls follow within a knot.
 pub(super) fn polynomial(name: &str) -> PyResult<ControlPolynomial> {
     match name {
         "constant" => Ok(ControlPolynomial::Constant),

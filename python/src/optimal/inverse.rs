@@ -1,4 +1,4 @@
-//! Actions of robots whose accelerations are controls.
+//! Actions of robots whose controls include the accelerations.
 
 use super::actions::{At, Limits, actuation, contacts, kept_at, knot};
 use super::costs::{Cost, Limit};
@@ -15,15 +15,15 @@ use pyo3::types::PyDict;
 ///
 /// model: the robot.
 /// dt: Δt in seconds.
-/// costs: a list of `Cost`; `Residual.joint_effort` looks at τ, `Residual.undriven_effort` at its part that nothing drives.
-/// integrator, lower, upper, limits, controls: as of `FreeDynamics`.
+/// costs: a list of `Cost`; `Residual.joint_effort` uses τ, `Residual.undriven_effort` the undriven part of τ.
+/// integrator, lower, upper, limits, controls: as for `FreeDynamics`.
 ///
-/// Raises `ProblemError` for a cost or a limit that does not fit.
+/// Raises `ProblemError` for a cost or a limit that does not fit the robot.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct InverseDynamics(pub(super) RobotAction<robot::InverseDynamics>);
 
 methods! {
-    /// The accelerations that hold the robot still: nv zeros.
+    /// Returns the accelerations that hold the robot still: nv zeros.
     InverseDynamics::quasi_static;
 
     #[new]
@@ -52,19 +52,20 @@ methods! {
 /// A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), τ = M q̈
 /// + h − Jᵀλ; otherwise as `FreeDynamics`.
 ///
-/// Of itself it has a `Limit` to zero on the efforts that nothing drives, Nᵀτ = 0 with Nᵀ S = 0 (`undriven efforts`; of a
-/// floating base the first 6), and on each contact's J q̈ + γ = 0 (`contact …`): `AugmentedLagrangian` holds them, to `Fddp`
-/// alone they are costs. Nothing is inverted: contacts may be redundant. These are the rules of Crocoddyl's
-/// `DifferentialActionModelContactInvDynamics`, and without contacts of `DifferentialActionModelFreeInvDynamics`.
+/// The knot has two kinds of `Limit` to zero by default. One bounds the undriven efforts, Nᵀτ = 0 with Nᵀ S = 0
+/// (`undriven efforts`; for a floating base the first 6). The other bounds each contact's J q̈ + γ = 0 (`contact …`).
+/// `AugmentedLagrangian` enforces them; `Fddp` alone treats them as costs. Nothing is inverted, so contacts may be
+/// redundant. Crocoddyl's `DifferentialActionModelContactInvDynamics` has the same equations, and without contacts
+/// `DifferentialActionModelFreeInvDynamics`.
 ///
 /// model: the robot.
-/// contacts: a dict of `ContactConstraint`s by name, the order of which is that of λ. May be empty.
+/// contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. May be empty.
 /// dt: Δt in seconds.
-/// costs: a list of `Cost`; `Residual.joint_effort` looks at τ, `Residual.contact_force` at λ.
-/// costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as of `FreeDynamics`; the actuation says
-///     which efforts there are, bounds are of all nv + rows controls.
+/// costs: a list of `Cost`; `Residual.joint_effort` uses τ, `Residual.contact_force` uses λ.
+/// costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`. The actuation
+///     defines which efforts are driven; bounds apply to all nv + rows controls.
 ///
-/// Raises `ProblemError` for a contact, cost, limit or drives that do not fit.
+/// Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot.
 ///
 /// >>> from condyle.optimal import ContactInverseDynamics
 /// >>> quadruped = condyle.robots.quadruped()
@@ -75,8 +76,8 @@ methods! {
 pub(crate) struct ContactInverseDynamics(pub(super) RobotAction<robot::ContactInverseDynamics>);
 
 methods! {
-    /// No accelerations, and the forces among the smallest efforts and forces that hold the robot still at the state x:
-    /// nv zeros and λ.
+    /// Returns zero accelerations and the contact forces that hold the robot still at the state x: nv zeros and λ.
+    /// Efforts and forces together have the smallest norm.
     ContactInverseDynamics::quasi_static;
 
     #[new]

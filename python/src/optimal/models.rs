@@ -1,4 +1,4 @@
-//! The models of a problem: actions of any kind.
+//! Models of a problem: actions of any kind.
 
 use super::actions::{ContactDynamics, FreeDynamics, ImpulseDynamics};
 use super::inverse::{ContactInverseDynamics, InverseDynamics};
@@ -8,7 +8,7 @@ use condyle::optimal as rust;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-/// A copy of an action of any kind. Errors of actions and constraints that are written in Python go to `fault`.
+/// Copies an action of any kind. Errors of actions and constraints that are written in Python are stored in `fault`.
 pub(super) fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> PyResult<Boxed> {
     macro_rules! of_a_robot {
         ($($class:ident),*) => {$(
@@ -36,7 +36,7 @@ pub(super) fn boxed(model: &Bound<'_, PyAny>, terminal: bool, fault: &Fault) -> 
     Ok(Boxed { action, described: None })
 }
 
-/// The residuals of a robot's action that are written in Python.
+/// Returns the residuals of a robot's action that are written in Python.
 pub(super) fn residuals(model: &Bound<'_, PyAny>) -> Vec<Py<PyAny>> {
     macro_rules! of_a_robot {
         ($($class:ident),*) => {$(

@@ -21,38 +21,39 @@ use rust::Observer;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The value behind a lock; an error if another call holds it.
+/// Locks a value; returns an error if another call holds the lock.
 pub(crate) fn lock<'a, T>(name: &str, value: &'a Mutex<T>) -> PyResult<MutexGuard<'a, T>> {
     value.try_lock().map_err(|_| PyRuntimeError::new_err(format!("{name}: in use by another call")))
 }
 
-/// An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
+/// An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
 ///
 /// x0: the initial state, nx numbers.
 /// models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
 ///     `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-/// stages: for each knot the index of its model; None for an action for each knot, in their order. Consecutive knots of one
-///     model are computed as a group, and so are those of models of a robot that differ in their costs and limits only.
-/// terminal: the model of the end, without controls.
+/// stages: for each knot the index of its model; None if each model serves one knot, in their order. Consecutive knots
+///     with the same model are computed as a group. So are consecutive knots whose models belong to one robot and
+///     differ only in their costs and limits.
+/// terminal: the model of the terminal knot, without controls.
 ///
-/// Raises `ProblemError` if they do not fit together, if x0 is not finite or a rotation in it has not the length 1 (up to
-/// 1e-3), and for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot, or 2²⁸ in the matrices [A B] of
-/// all knots.
+/// Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
+/// is not 1 (up to 1e-3). Also raises it for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot,
+/// or 2²⁸ numbers in the matrices [A B] of all knots.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Problem {
     pub(super) inner: Mutex<rust::Problem>,
-    /// The models, the terminal one last, as data where they are a robot's.
+    /// Descriptions of the models of robots, the terminal model last; `None` for other models.
     pub(super) described: Mutex<Vec<Option<Arc<Described>>>>,
-    /// The models, the terminal one last, as they were given where they are no robot's: the problem's copies of them compute
-    /// with their functions.
+    /// Objects of the models that are not a robot's, as the user passed them, the terminal model last. The problem's
+    /// copies of these models call their functions.
     pub(super) objects: Vec<Option<Py<PyAny>>>,
-    /// The residuals of robots that are written in Python, likewise.
+    /// Residuals of robots that are written in Python, as the user passed them.
     written: Mutex<Vec<Py<PyAny>>>,
-    /// The first error of the actions.
+    /// First error of the actions.
     fault: Fault,
-    /// The errors of the residuals.
+    /// Errors of the residuals.
     faults: Mutex<Vec<Fault>>,
-    /// How often the horizon has moved on.
+    /// Number of times that the horizon was shifted.
     moved: AtomicUsize,
 }
 
@@ -80,14 +81,14 @@ impl Problem {
 
     fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
         self.objects.iter().try_for_each(|object| visit.call(object))?;
-        let written = self.written.try_lock(); // nothing runs Python while it is held
+        let written = self.written.try_lock(); // no Python code runs while it is locked
         written.map_or(Ok(()), |written| written.iter().try_for_each(|action| visit.call(action)))
     }
 
-    /// A problem of a robot from the text that `to_json` gave.
+    /// Reads a robot's problem from the text that `to_json` returned.
     ///
-    /// Raises `ProblemError` for a text that is none, for what does not fit together in it, and for sizes beyond the limits
-    /// that `Problem` has.
+    /// Raises `ProblemError` for text that is not a problem, for parts that do not fit together, and for sizes beyond
+    /// the limits of `Problem`.
     #[staticmethod]
     fn from_json(text: &str) -> PyResult<Self> {
         let data: rust::robot::RobotProblem =
@@ -99,11 +100,11 @@ impl Problem {
         Self::make(data.x0, all, data.stages, (objects, vec![]), Fault::default())
     }
 
-    /// The problem and its robot as JSON, with the present initial state, weights and stages. An infinite bound is
-    /// null.
+    /// Returns the problem and its robot as JSON, with the current initial state, weights and stages. An infinite bound
+    /// is null.
     ///
-    /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or knots are of different
-    /// robots.
+    /// Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
+    /// different robots.
     fn to_json(&self) -> PyResult<String> {
         let problem = lock("problem", &self.inner)?;
         let described = lock("problem", &self.described)?;
@@ -137,7 +138,7 @@ impl Problem {
         serde_json::to_string(&data).map_err(|error| ProblemError::new_err(error.to_string()))
     }
 
-    /// The parts of a pickle: the knots of robots by way of JSON, others as they were given.
+    /// Returns the parts of a pickle: knots of robots as JSON, other knots as the objects that the user passed.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let (py, this) = (slf.py(), slf.get());
         let described = lock("problem", &this.described)?;
@@ -189,13 +190,13 @@ impl Problem {
         Ok(lock("problem", &self.inner)?.horizon())
     }
 
-    /// The number of numbers of a state.
+    /// The number of entries of a state.
     #[getter]
     fn nx(&self) -> PyResult<usize> {
         Ok(lock("problem", &self.inner)?.nx())
     }
 
-    /// The number of numbers of a change of a state.
+    /// The number of entries of a change of a state.
     #[getter]
     fn ndx(&self) -> PyResult<usize> {
         Ok(lock("problem", &self.inner)?.ndx())
@@ -217,9 +218,9 @@ impl Problem {
         problem.set_x0(&x0).map_err(problem_error)
     }
 
-    /// Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
+    /// Changes the weight of the terms with this name in all knots, the terminal one included. Call it between solves.
     ///
-    /// Raises `KeyError` if there is no such term, `ProblemError` if the weight is negative or not finite.
+    /// Raises `KeyError` if no term has this name, `ProblemError` if the weight is negative or not finite.
     fn set_weight(&self, name: &str, weight: f64) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let mut described = lock("problem", &self.described)?;
@@ -232,12 +233,13 @@ impl Problem {
         if found { Ok(()) } else { Err(PyKeyError::new_err(format!("no knot has a cost '{name}'"))) }
     }
 
-    /// Gives a knot costs of its own, between solves: an MPC's new targets. They move with their knot at a `shift`.
+    /// Sets a knot's own costs, such as an MPC's new targets. They move with their knot in a `shift`. Call it between
+    /// solves.
     ///
-    /// knot: its number, 0 to N; N is the terminal one.
+    /// knot: its index, 0 to N; N is the terminal knot.
     /// costs: a list of `Cost`.
     ///
-    /// Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
+    /// Raises `ProblemError` for a term that does not fit, or if the knot's action does not belong to a robot.
     fn set_costs(&self, py: Python<'_>, knot: usize, costs: Vec<PyRef<'_, Cost>>) -> PyResult<()> {
         let mut problem = lock("problem", &self.inner)?;
         let horizon = problem.horizon();
@@ -266,8 +268,9 @@ impl Problem {
         Ok(())
     }
 
-    /// The controls of all knots that hold their states still, each by itself, as far as they can: (N, nu), or a list of N
-    /// arrays where knots differ in nu. A robot's come from statics, others from steps of Newton.
+    /// Computes the quasi-static controls of all knots, which hold each knot's state still as well as possible: (N,
+    /// nu), or a list of N arrays if knots differ in nu. For a robot they follow from statics, for other actions from
+    /// Newton's method.
     ///
     /// xs: states, (N + 1, nx).
     fn quasi_static<'py>(&self, py: Python<'py>, xs: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
@@ -278,10 +281,10 @@ impl Problem {
         by_knot(py, &problem, &[], |t, out| out.copy_from_slice(&us[problem.control_range(t)]))
     }
 
-    /// The cost of states and controls, and what the dynamics compute there, as an `Evaluation`.
+    /// Computes the cost of states and controls and the results of the dynamics there, as an `Evaluation`.
     ///
     /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
-    /// us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+    /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
@@ -296,7 +299,7 @@ impl Problem {
         Ok(evaluation)
     }
 
-    /// The evaluation of a solution, unless the horizon has moved on since.
+    /// Computes the evaluation of a solution, unless the horizon was shifted since.
     fn _evaluate<'py>(
         &self,
         py: Python<'py>,
@@ -312,9 +315,10 @@ impl Problem {
         self.evaluate(py, xs, us)
     }
 
-    /// The linear-quadratic problem around states and controls, a list of N + 1 `LqNode`s, which a `Sweep` solves.
+    /// Computes the linear-quadratic problem around states and controls: a list of N + 1 `LqNode`s, which a `Sweep`
+    /// solves.
     ///
-    /// xs, us: as of `evaluate`.
+    /// xs, us: as for `evaluate`.
     fn derivatives<'py>(
         &self,
         py: Python<'py>,
@@ -329,7 +333,7 @@ impl Problem {
         problem.calc(&xs, &us, &mut next, &mut costs);
         problem.calc_diff(&xs, &us, &mut nodes);
         self.raise()?;
-        // the gap of a knot stands where its next state does
+        // the gap at the next state is stored in the node of the knot before
         for (node, gap) in nodes.iter_mut().zip(gaps(&problem, &xs, &next)[ndx..].chunks_exact(ndx)) {
             node.f.copy_from_slice(gap);
         }
@@ -346,11 +350,12 @@ impl Problem {
         Ok(format!("<condyle.optimal.Problem{robot}: {horizon} knots, {models} model{plural}, nx {nx}, ndx {ndx}>"))
     }
 
-    /// The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
+    /// Computes the states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
     ///
-    /// us: (N, nu), or a list of N arrays where knots differ in nu.
+    /// us: (N, nu), or a list of N arrays if knots differ in nu.
     ///
-    /// Other threads run meanwhile; what a handler of a signal raises, as KeyboardInterrupt, ends it between knots.
+    /// Other threads can run meanwhile. An exception raised by a signal handler, such as KeyboardInterrupt, stops it
+    /// between knots.
     fn rollout<'py>(&self, py: Python<'py>, us: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut problem = lock("problem", &self.inner)?;
         let us = controls(&problem, us)?;
@@ -368,7 +373,7 @@ impl Problem {
 }
 
 impl Problem {
-    /// A problem of models, the terminal one last.
+    /// Creates a problem from models, the terminal model last.
     fn make(
         x0: Vec<f64>,
         all: Vec<Boxed>,
@@ -386,7 +391,7 @@ impl Problem {
         Ok(Self { inner, described, objects, written, fault, faults, moved: AtomicUsize::new(0) })
     }
 
-    /// Moves the data of the models on by a knot.
+    /// Shifts the descriptions of the models by a knot.
     pub(super) fn describe_shift(&self) -> PyResult<()> {
         let mut described = lock("problem", &self.described)?;
         let models = described.len() - 1;
@@ -396,12 +401,12 @@ impl Problem {
         Ok(())
     }
 
-    /// How often the horizon has moved on.
+    /// Returns the number of times that the horizon was shifted.
     pub(super) fn moved(&self) -> usize {
         self.moved.load(Ordering::Relaxed)
     }
 
-    /// Calls a function with each place of an error.
+    /// Calls a function with each error slot.
     fn each_fault<T>(&self, mut f: impl FnMut(&mut Option<PyErr>) -> Option<T>) -> Option<T> {
         let faults = self.faults.lock().unwrap_or_else(PoisonError::into_inner);
         let mut found = None;
@@ -412,12 +417,12 @@ impl Problem {
         found
     }
 
-    /// Raises the error of what is written in Python, if there is one.
+    /// Raises the stored error of the problem's Python functions, if there is one.
     pub(super) fn raise(&self) -> PyResult<()> {
         self.each_fault(Option::take).map_or(Ok(()), Err)
     }
 
-    /// Whether there is such an error.
+    /// Returns whether such an error is stored.
     pub(super) fn has_failed(&self) -> bool {
         self.each_fault(|error| error.is_some().then_some(())).is_some()
     }

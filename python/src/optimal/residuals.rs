@@ -15,12 +15,11 @@ use serde::{Deserialize, Serialize};
 use std::any::Any;
 use std::sync::Arc;
 
-/// A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
+/// A residual: a vector r(x, u) of a robot, which a `Cost` minimises or a `Limit` bounds.
 ///
-/// A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics`,
-/// `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it
-/// looks at the frame of that name, or is refused.
-/// A target that is not given is zero, a rotation the identity.
+/// A frame is given by its name or index in a model. A contact is given by its name in `ContactDynamics`,
+/// `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot
+/// it uses the frame with that name, or is refused. A target that is not given is zero; a rotation is the identity.
 ///
 /// >>> from condyle.optimal import Residual
 /// >>> Residual.center_of_mass([0.4, 0.2, 0.5])
@@ -32,10 +31,10 @@ pub(crate) struct Residual(Kind);
 #[derive(Clone, PartialEq, Serialize, Deserialize)]
 enum Kind {
     Given(robot::Residual),
-    /// A function, written in Python, with the number of its entries.
+    /// A Python function, with the number of its entries.
     #[serde(skip)]
     Own(usize, Functions),
-    /// A number, a cost by itself, written in Python.
+    /// A scalar cost, written in Python.
     #[serde(skip)]
     Number(Functions),
 }
@@ -55,66 +54,66 @@ impl From<robot::Residual> for Residual {
 
 #[pymethods]
 impl Residual {
-    /// The deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v).
+    /// Returns the deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v).
     #[staticmethod]
     fn state(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self::from(robot::Residual::State { reference: numbers("reference", reference)? }))
     }
 
-    /// The deviation of the controls from a reference, r = u − reference, nu numbers.
+    /// Returns the deviation of the controls from a reference, r = u − reference, nu numbers.
     #[staticmethod]
     fn control(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self::from(robot::Residual::Control { reference: numbers("reference", reference)? }))
     }
 
-    /// The efforts and forces beyond those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers.
+    /// Returns the efforts and forces in excess of those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers.
     #[staticmethod]
     fn control_gravity() -> Self {
         Self::from(robot::Residual::ControlGravity)
     }
 
-    /// The deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers.
+    /// Returns the deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers.
     #[staticmethod]
     fn joint_effort(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self::from(robot::Residual::JointEffort { reference: numbers("reference", reference)? }))
     }
 
-    /// The efforts that inverse dynamics finds where nothing drives the robot, r = Nᵀτ with Nᵀ S = 0; of a floating base the 6
-    /// numbers of the force on it. They are 0 in a motion that is possible.
+    /// Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base
+    /// the 6 numbers of the force on it. They are 0 in a feasible motion.
     #[staticmethod]
     fn undriven_effort() -> Self {
         Self::from(robot::Residual::UndrivenEffort)
     }
 
-    /// The acceleration of a contact where accelerations are controls, r = J q̈ + γ along the axes of its rows: 1, 2, 3 or 6
-    /// numbers, 0 while it holds.
+    /// Returns the acceleration of a contact if accelerations are controls, r = J q̈ + γ along the axes of its rows: 1,
+    /// 2, 3 or 6 numbers. It is 0 while the contact holds.
     #[staticmethod]
     fn contact_acceleration(contact: String) -> Self {
         Self::from(robot::Residual::ContactAcceleration { contact })
     }
 
-    /// The deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers.
+    /// Returns the deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers.
     #[staticmethod]
     fn joint_acceleration(reference: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self::from(robot::Residual::JointAcceleration { reference: numbers("reference", reference)? }))
     }
 
-    /// The deviation of the centre of mass from a target, r = c − target, 3 numbers in the world (m).
+    /// Returns the deviation of the centre of mass from a target, r = c − target, 3 numbers in the world (m).
     #[staticmethod]
     fn center_of_mass(target: &Bound<'_, PyAny>) -> PyResult<Self> {
         Ok(Self::from(robot::Residual::CenterOfMass { target: three("target", target)? }))
     }
 
-    /// The deviation of the momentum about the centre of mass from a target, r = h − target, 6 numbers along the
-    /// world's axes, linear first.
+    /// Returns the deviation of the momentum about the centre of mass from a target, r = h − target, 6 numbers along
+    /// the world's axes, linear first.
     #[staticmethod]
     #[pyo3(signature = (target=None))]
     fn centroidal_momentum(target: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         Ok(Self::from(robot::Residual::CentroidalMomentum { target: Force::from(six(target)?) }))
     }
 
-    /// The deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is a
-    /// homogeneous 4 × 4 matrix.
+    /// Returns the deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is
+    /// a homogeneous 4 × 4 matrix.
     #[staticmethod]
     fn frame_placement(
         model: &Bound<'_, Model>,
@@ -125,7 +124,7 @@ impl Residual {
         Ok(Self::from(robot::Residual::FramePlacement { frame, target }))
     }
 
-    /// The deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m).
+    /// Returns the deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m).
     #[staticmethod]
     fn frame_translation(
         model: &Bound<'_, Model>,
@@ -136,15 +135,15 @@ impl Residual {
         Ok(Self::from(robot::Residual::FrameTranslation { frame, target }))
     }
 
-    /// The deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix.
+    /// Returns the deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix.
     #[staticmethod]
     fn frame_rotation(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>, target: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (frame, target) = (frame_name(model, frame)?, rotation("target", target)?);
         Ok(Self::from(robot::Residual::FrameRotation { frame, target }))
     }
 
-    /// The deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference: 'local',
-    /// 'world' or 'local_world_aligned'.
+    /// Returns the deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference:
+    /// 'local', 'world' or 'local_world_aligned'.
     #[staticmethod]
     #[pyo3(signature = (model, frame, target=None, reference="local"))]
     fn frame_velocity(
@@ -158,29 +157,30 @@ impl Residual {
         Ok(Self::from(robot::Residual::FrameVelocity { frame, target, reference }))
     }
 
-    /// The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 1, 2, 3 or 6
-    /// numbers; target has 6.
+    /// Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows:
+    /// 1, 2, 3 or 6 numbers; target has 6.
     #[staticmethod]
     #[pyo3(signature = (contact, target=None))]
     fn contact_force(contact: String, target: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         Ok(Self::from(robot::Residual::ContactForce { contact, target: Force::from(six(target)?) }))
     }
 
-    /// The rows r = A f of a friction cone, for a contact's force f.
+    /// Returns the rows r = A f of a friction cone, for a contact's force f.
     #[staticmethod]
     fn friction_cone(contact: String, cone: &Bound<'_, FrictionCone>) -> Self {
         Self::from(robot::Residual::FrictionCone { contact, cone: cone.get().0.clone() })
     }
 
-    /// The rows r = A w of a wrench cone, for a rigid contact's wrench w.
+    /// Returns the rows r = A w of a wrench cone, for a rigid contact's wrench w.
     #[staticmethod]
     fn wrench_cone(contact: String, cone: &Bound<'_, WrenchCone>) -> Self {
         Self::from(robot::Residual::WrenchCone { contact, cone: cone.get().0.clone() })
     }
 
-    /// The centre of pressure of a rigid contact in a rectangle: four numbers, none above 0 while it is inside.
+    /// Returns the position of a rigid contact's centre of pressure relative to a rectangle: four numbers, all at most
+    /// 0 while it is inside.
     ///
-    /// size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
+    /// size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes in the contact's axes,
     /// (3, 3).
     #[staticmethod]
     #[pyo3(signature = (contact, size, rotation=None))]
@@ -188,18 +188,18 @@ impl Residual {
         Ok(Self::from(robot::Residual::CenterOfPressure { contact, rotation: surface(rotation)?, size }))
     }
 
-    /// The jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s).
+    /// Returns the jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s).
     #[staticmethod]
     fn impulse_center_of_mass() -> Self {
         Self::from(robot::Residual::ImpulseCenterOfMass)
     }
 
-    /// A residual that is written in Python, r(t, x, u) of a knot t, size numbers.
+    /// Returns a residual that is written in Python, r(t, x, u) at knot t, size numbers.
     ///
     /// size: the number of entries, at most 4096.
-    /// calc: a function of (t, x, u) that returns them; x = (q, v), and at the end u is empty.
-    /// calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the tangent
-    ///     space of the state. Without it, those of calc, as for `Action`.
+    /// calc: a function of (t, x, u) that returns them; x = (q, v); u is empty at the terminal knot.
+    /// calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the
+    ///     tangent space of the state. Without it, calc is differentiated as for `Action`.
     ///
     /// >>> from condyle.optimal import Residual
     /// >>> power = Residual.own(7, lambda t, x, u: x[7:] * u)
@@ -209,14 +209,15 @@ impl Residual {
         Ok(Self(Kind::Own(within("size", size, 0, MOST_SIZE)?, Functions::new(calc, calc_diff)?)))
     }
 
-    /// A cost that is written in Python, a number ℓ(t, x, u) of a knot t with a Hessian of its own, as a residual of one
-    /// entry; a `Cost` of it is weight · ℓ, by `Activation.sum()`, which it has by default.
+    /// Returns a cost that is written in Python: a number ℓ(t, x, u) at knot t with its own Hessian, as a residual of
+    /// one entry. The default activation of its `Cost` is `Activation.sum()`, so the term is weight · ℓ.
     ///
-    /// calc: a function of (t, x, u) that returns ℓ; x = (q, v), and at the end u is empty.
-    /// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among q, r, Q, S, R: the gradient and the
-    ///     Hessian of ℓ by x, in the tangent space of the state, and by u. Without it, those of calc, as for `Action`.
+    /// calc: a function of (t, x, u) that returns ℓ; x = (q, v); u is empty at the terminal knot.
+    /// calc_diff: a function of (t, x, u) that returns a dict of the nonzero parts among q, r, Q, S, R: gradient and
+    ///     Hessian of ℓ with respect to x, in the tangent space of the state, and to u. Without it, calc is
+    ///     differentiated as for `Action`.
     ///
-    /// Knots with such a cost are solved by their controls, not in inverse-dynamics form.
+    /// Knots with such a cost are solved with respect to their controls, not in inverse-dynamics form.
     ///
     /// >>> from condyle.optimal import Cost, Residual
     /// >>> swing = Cost("swing", 2.0, Residual.own_cost(lambda t, x, u: 1.0 - np.cos(x[0])))
@@ -226,7 +227,7 @@ impl Residual {
         Ok(Self(Kind::Number(Functions::new(calc, calc_diff)?)))
     }
 
-    /// The residual as the JSON of a problem has it.
+    /// Returns the residual as JSON, as in the JSON of a problem.
     fn __repr__(&self) -> String {
         match &self.0 {
             Kind::Given(inner) => {
@@ -278,7 +279,7 @@ impl Residual {
 }
 
 impl Residual {
-    /// The residual for a robot.
+    /// Returns the residual for a robot.
     pub(super) fn of(&self, model: &Arc<condyle::Model>) -> robot::Residual {
         let (size, functions, number) = match &self.0 {
             Kind::Given(inner) => return inner.clone(),
@@ -289,17 +290,17 @@ impl Residual {
         robot::Residual::Own(robot::OwnResidual::new(OwnFunction { size, number, functions, space, way, fault }))
     }
 
-    /// Whether it is written in Python.
+    /// Returns whether it is written in Python.
     pub(super) fn is_own(&self) -> bool {
         matches!(self.0, Kind::Own(..) | Kind::Number(_))
     }
 
-    /// Whether it is a cost by itself.
+    /// Returns whether it is a scalar cost.
     pub(super) fn is_number(&self) -> bool {
         matches!(self.0, Kind::Number(_))
     }
 
-    /// The bounds that a residual has of its own: those of a cone, or of a centre of pressure.
+    /// Returns the residual's own bounds, which a cone or a centre of pressure has.
     pub(super) fn bounds(&self) -> Option<(Vec<f64>, Vec<f64>)> {
         let Kind::Given(inner) = &self.0 else { return None };
         match inner {
@@ -311,26 +312,27 @@ impl Residual {
     }
 }
 
-/// The residuals of a knot's costs and limits, always in the same order.
+/// Iterates over the residuals of a knot's costs and limits, always in the same order.
 fn residuals_mut(knot: &mut robot::Knot) -> impl Iterator<Item = &mut robot::Residual> {
     let costs = knot.costs.iter_mut().chain(knot.costs_at.values_mut().flatten());
     let limits = knot.limits.iter_mut().chain(knot.limits_at.values_mut().flatten());
     costs.map(|robot::Cost { residual, .. }| residual).chain(limits.map(|robot::Limit { residual, .. }| residual))
 }
 
-/// Takes those that are written in Python out of a knot, which then can be JSON: each with its place.
+/// Takes the residuals that are written in Python, with their indices, out of a knot, which then can be written as
+/// JSON.
 pub(super) fn take_written(knot: &mut robot::Knot) -> Vec<(usize, Residual)> {
     let take = |(place, residual): (usize, &mut robot::Residual)| {
         let robot::Residual::Own(own) = residual else { return None };
         let own: &dyn Any = &**own;
         let written = Residual::from(own.downcast_ref::<OwnFunction>()?);
-        *residual = robot::Residual::ImpulseCenterOfMass; // until `put_written`
+        *residual = robot::Residual::ImpulseCenterOfMass; // placeholder until `put_written`
         Some((place, written))
     };
     residuals_mut(knot).enumerate().filter_map(take).collect()
 }
 
-/// Puts them back to their places.
+/// Puts these residuals back at their indices.
 pub(super) fn put_written(
     knot: &mut robot::Knot,
     model: &Arc<condyle::Model>,
@@ -344,13 +346,13 @@ pub(super) fn put_written(
     Ok(())
 }
 
-/// A frame, given by its name or number in a model, as a residual keeps it.
+/// Returns the name of a frame, given by name or index in a model, as a residual stores it.
 fn frame_name(model: &Bound<'_, Model>, frame: &Bound<'_, PyAny>) -> PyResult<robot::FrameName> {
     let model = &model.get().inner;
     Ok((&model.frames()[frame_index(model, frame)?]).into())
 }
 
-/// Six numbers, linear first; zeros if there are none.
+/// Reads six numbers, linear first; zeros if they are not given.
 fn six(target: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
     target.map_or(Ok([0.0; 6]), |given| array("target", given))
 }

@@ -1,4 +1,4 @@
-//! A robot's action, and the same as data.
+//! A robot's action, and its serialisable description.
 
 use super::residuals::{Residual, put_written, take_written};
 use crate::arrays::{Give, vector};
@@ -13,20 +13,20 @@ use std::any::Any;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A robot's action as data, which can be put into a file.
+/// A robot's action as data that can be written to a file.
 #[derive(Clone)]
 pub(super) struct Described {
     pub robot: Arc<condyle::Model>,
     pub knot: Knot,
 }
 
-/// A robot's action, ready to be computed and as data. Neither has the memory that computing takes: a problem makes that,
-/// once for all actions that differ in their costs only.
+/// A robot's action and its description. Neither owns the scratch memory for computations: a problem creates this once
+/// for all actions that differ only in their costs.
 pub(super) struct RobotAction<A> {
     action: A,
     pub(super) described: Arc<Described>,
     model: Py<Model>,
-    /// The residuals that are written in Python, of which Python's collector of garbage must know.
+    /// Residuals that are written in Python; Python's garbage collector must know them.
     kept: Vec<Py<PyAny>>,
 }
 
@@ -43,19 +43,19 @@ impl<A: ActionModel + Clone> RobotAction<A> {
         Ok(Self { action, described, model: model.clone().unbind(), kept })
     }
 
-    /// A copy for a problem.
+    /// Copies the action for a problem.
     pub(super) fn boxed(&self) -> Boxed {
         Boxed { action: Box::new(self.action.clone()), described: Some(self.described.clone()) }
     }
 
-    /// The controls that hold the robot still at the state x.
+    /// Returns the controls that hold the robot still at the state x.
     pub(super) fn hold<'py>(&self, x: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let model = &self.described.robot;
         let state = vector("x", x, model.nq() + model.nv())?;
         self.action.clone().hold(0, &state).give(x.py(), None)
     }
 
-    /// The residuals that are written in Python.
+    /// Iterates over the residuals that are written in Python.
     pub(super) fn kept(&self, py: Python<'_>) -> impl Iterator<Item = Py<PyAny>> {
         self.kept.iter().map(move |residual| residual.clone_ref(py))
     }
@@ -64,7 +64,7 @@ impl<A: ActionModel + Clone> RobotAction<A> {
         self.kept.iter().try_for_each(|residual| visit.call(residual))
     }
 
-    /// The action in a few words.
+    /// Returns a short text about the action.
     pub(super) fn repr(&self, class: &str) -> String {
         let Knot { dynamics, costs, limits, .. } = &self.described.knot;
         let duration = match (dynamics.dt(), dynamics) {
@@ -90,26 +90,26 @@ impl<A: ActionModel + Clone> RobotAction<A> {
         format!("<condyle.optimal.{class} of '{robot}', {duration}, nu {}{contacts}{costs}{limits}>", self.action.nu())
     }
 
-    /// The parts of a pickle: the robot, the knot as JSON, and what of it is written in Python.
+    /// Returns the parts of a pickle: the robot, the knot as JSON, and its residuals that are written in Python.
     pub(super) fn reduce<'py>(&self, object: &Bound<'py, PyAny>) -> PyResult<Reduced<'py>> {
         let (text, written) = self.described.knot_parts(object.py())?;
         Ok((object.get_type().getattr("_from_parts")?, (self.model.clone_ref(object.py()), text, written)))
     }
 
-    /// The action of a pickle's parts.
+    /// Creates the action from the parts of a pickle.
     pub(super) fn from_parts(model: &Bound<'_, Model>, text: &str, written: &WrittenAt<'_>) -> PyResult<Self> {
         let kept = written.iter().map(|(_, residual)| residual.clone().into_any().unbind()).collect();
         Self::new(model, kept, |robot| knot_of(robot, text, written))
     }
 }
 
-/// A function that makes an object, and its arguments.
+/// A function that creates an object, and its arguments.
 pub(super) type Reduced<'py> = (Bound<'py, PyAny>, (Py<Model>, String, WrittenAt<'py>));
 
-/// The residuals of a knot that are written in Python, with their places.
+/// Residuals of a knot that are written in Python, with their indices.
 pub(super) type WrittenAt<'py> = Vec<(usize, Bound<'py, Residual>)>;
 
-/// A knot of a pickle's parts.
+/// Creates a knot from the parts of a pickle.
 pub(super) fn knot_of(robot: &Arc<condyle::Model>, text: &str, written: &WrittenAt<'_>) -> PyResult<Knot> {
     let wrong = |error| ProblemError::new_err(format!("no knot: {error}"));
     let mut knot = serde_json::from_str(text).map_err(wrong)?;
@@ -118,7 +118,7 @@ pub(super) fn knot_of(robot: &Arc<condyle::Model>, text: &str, written: &Written
 }
 
 impl Described {
-    /// The knot as a pickle has it: JSON, and what is written in Python.
+    /// Returns the parts of the knot for a pickle: JSON, and the residuals that are written in Python.
     pub(super) fn knot_parts<'py>(&self, py: Python<'py>) -> PyResult<(String, WrittenAt<'py>)> {
         let mut knot = self.knot.clone();
         let written = take_written(&mut knot);
@@ -127,7 +127,7 @@ impl Described {
         Ok((text, objects.collect::<PyResult<_>>()?))
     }
 
-    /// The action that the data describe.
+    /// Creates the described action.
     pub(super) fn boxed(self) -> PyResult<Boxed> {
         Ok(Boxed { action: self.build()?, described: Some(Arc::new(self)) })
     }
@@ -136,7 +136,7 @@ impl Described {
         self.knot.build(&self.robot).map_err(problem_error)
     }
 
-    /// Changes the weights of the terms called `name`, which are checked.
+    /// Changes the weights of the terms with this name; the caller has checked the weight.
     pub(super) fn set_weight(&mut self, name: &str, weight: f64) {
         let all = self.knot.costs.iter_mut().chain(self.knot.costs_at.values_mut().flatten());
         all.filter(|cost| cost.name == name).for_each(|cost| cost.weight = weight);
@@ -151,20 +151,20 @@ impl Described {
         moved(&mut self.knot.limits_at);
     }
 
-    /// Whether a shift changes anything.
+    /// Returns whether a shift changes anything.
     pub(super) fn moves(&self) -> bool {
         !(self.knot.costs_at.is_empty() && self.knot.limits_at.is_empty())
     }
 }
 
-/// An action for a problem, and the same as data if it can be put into a file.
+/// An action for a problem, with its description if it can be written to a file.
 pub(super) struct Boxed {
     pub action: Box<dyn ActionModel>,
     pub described: Option<Arc<Described>>,
 }
 
-/// The action of type A that is model k of a problem, or the terminal model, or that stands inside of constraints
-/// there.
+/// Returns the action of type A in model k of a problem, or in the terminal model if k is `None`; it may be wrapped in
+/// constraints.
 pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
     fn find<A: ActionModel>(problem: &mut rust::Problem, k: Option<usize>) -> Option<&mut A> {
         match k {
@@ -182,7 +182,7 @@ pub(super) fn inside<A: ActionModel>(problem: &mut rust::Problem, k: Option<usiz
     around.action_mut()
 }
 
-/// A change of a robot's action in a problem, see `inside`; none if the action is not of a robot.
+/// Changes a robot's action in a problem, see `inside`; `None` if the action does not belong to a robot.
 macro_rules! change {
     ($problem:expr, $k:expr, |$knot:ident| $change:expr) => {
         change!(
@@ -200,7 +200,8 @@ macro_rules! change {
 }
 pub(super) use change;
 
-/// The methods of a class that is a [`RobotAction`]: what its `quasi_static` gives, its own, and those that all have.
+/// Defines the methods of a class that is a [`RobotAction`]: `quasi_static` with its documentation, the class's own
+/// methods, and the common methods.
 macro_rules! methods {
     ($(#[doc = $gives:literal])+ $class:ident::quasi_static; $($own:tt)*) => {
         #[pymethods]

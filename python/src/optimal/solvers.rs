@@ -1,4 +1,4 @@
-//! The solvers, and what they give back.
+//! Solvers and their solutions.
 
 use super::evaluation::{controls, solution as give};
 use super::problem::{Problem, lock};
@@ -13,7 +13,7 @@ use pyo3::types::PyDict;
 use std::sync::Mutex;
 use std::time::Duration;
 
-/// Sets those fields of a `Settings` that are given by name; some have a function that reads them.
+/// Sets the fields of a `Settings` that are given by name; some fields have their own reader function.
 macro_rules! set {
     ($settings:expr, $given:expr, { $($field:ident $(by $read:ident)?),* }) => {
         for (name, value) in $given.into_iter().flatten() {
@@ -36,7 +36,7 @@ macro_rules! set {
     ($field:expr, $value:ident, $name:expr, $read:ident) => { $field = $read(&$value)? };
 }
 
-/// What the values of a setting are.
+/// A type of setting, with a description of its values.
 trait Setting {
     fn expected(&self) -> &'static str;
 }
@@ -52,13 +52,13 @@ macro_rules! settings {
 }
 settings!(bool: "True or False", usize: "a whole number, 0 or above", f64: "a number");
 
-/// The error of a setting of another type, or of a negative number.
+/// Returns the error for a setting of another type, or for a negative number.
 fn wrong_setting(name: &str, expected: &str, found: &Bound<'_, PyAny>) -> PyErr {
     let found = found.repr().map_or_else(|_| found_type(found), |found| found.to_string());
     PyValueError::new_err(format!("settings: {name}: expected {expected}, found {found}"))
 }
 
-/// Sets the settings of FDDP that are given.
+/// Applies the given settings of FDDP.
 fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()> {
     fn method(given: &Bound<'_, PyAny>) -> PyResult<rust::DdpMethod> {
         match given.extract::<String>()?.as_str() {
@@ -74,7 +74,7 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
                 "time_budget: expected at least 0 seconds (and at most 1.8e19, or inf), found {seconds:e}"
             ))
         };
-        let limit = seconds.filter(|&s| s != f64::INFINITY); // no limit
+        let limit = seconds.filter(|&s| s != f64::INFINITY); // an infinite time is no limit
         limit.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
     }
     set!(s, given, {
@@ -86,7 +86,7 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
     Ok(())
 }
 
-/// The observer of the iterations of a solve.
+/// Output of a solve after each iteration.
 struct Observer<'py> {
     callback: Option<Bound<'py, PyAny>>,
     verbose: bool,
@@ -94,7 +94,7 @@ struct Observer<'py> {
 }
 
 impl Observer<'_> {
-    /// A function of each iteration, if there is anybody to look at them.
+    /// Returns a function to call after each iteration, if any output is wanted.
     fn start(&self, py: Python<'_>) -> PyResult<Option<Py<PyAny>>> {
         let Self { callback, verbose, progress } = self;
         match (callback, verbose | progress) {
@@ -108,7 +108,7 @@ impl Observer<'_> {
     }
 }
 
-/// A solve, from a warm start (xs, us) if one is given. Other threads run meanwhile.
+/// Runs a solve, from a warm start (xs, us) if it is given. Other threads can run meanwhile.
 fn run<'py, S: Send>(
     py: Python<'py>,
     problem: &Py<Problem>,
@@ -135,7 +135,7 @@ fn run<'py, S: Send>(
     let signals = Signals::new(signals::LONG);
     let mut interruptions = Interruptions { signals, failed: &failed, observer: observer.start(py)?, raised: None };
     let result = py.detach(|| solve(solver, inner, [&x, &u], &mut interruptions));
-    let raised = problem.get().raise(); // and forgotten, whatever else there is to be raised
+    let raised = problem.get().raise(); // clears the stored error even if another error is raised below
     let Interruptions { signals, observer, raised: by_observer, .. } = interruptions;
     if let Some(observer) = observer.filter(|_| closes) {
         observer.call_method0(py, "close")?;
@@ -146,7 +146,7 @@ fn run<'py, S: Send>(
     give(py, problem, inner, result.map_err(problem_error)?)
 }
 
-/// A solver: the methods that both kinds have, beside those that make and show it.
+/// Defines a solver class: the methods that both solvers have, besides their constructors and own methods.
 macro_rules! solver {
     ($(#[$doc:meta])* $class:ident { $($own:tt)* }) => {
         $(#[$doc])*
@@ -154,7 +154,7 @@ macro_rules! solver {
         pub(crate) struct $class {
             problem: Py<Problem>,
             solver: Mutex<rust::$class>,
-            /// The settings that were given, also those of the inner solver.
+            /// Settings as the user passed them, and settings of the inner solver.
             settings: Py<PyDict>,
             inner: Option<Py<PyDict>>,
         }
@@ -163,20 +163,20 @@ macro_rules! solver {
         impl $class {
             $($own)*
 
-            /// Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
+            /// Solves the problem from a warm start, and returns a `Solution`, whose status tells how the solve ended.
             ///
-            /// Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
-            /// iteration: what a handler raises, as KeyboardInterrupt, is raised here, and `solution` then is the best
-            /// iterate, from which `resume` goes on.
+            /// Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
+            /// an iteration. An exception of a signal handler, such as KeyboardInterrupt, is raised here. `solution` is
+            /// then the best iterate, from which `resume` continues.
             ///
             /// xs: states, (N + 1, nx); they need not satisfy the dynamics.
-            /// us: controls, (N, nu), or a list of N arrays where knots differ in nu.
-            /// callback: a function that is called with the `Iteration` after each; where it returns False the solve ends
-            ///     ("interrupted"). What it raises is raised here.
+            /// us: controls, (N, nu), or a list of N arrays if knots differ in nu.
+            /// callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
+            ///     solve ends ("interrupted"). Its exceptions are raised here.
             /// verbose: whether to print a line for each iteration.
-            /// progress: whether to show the progress, by tqdm where that is installed, else as lines.
+            /// progress: whether to show the progress, by tqdm if it is installed, else as lines.
             ///
-            /// Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+            /// Raises `ProblemError` for invalid numbers or settings, and exceptions raised by an `Action`.
             #[pyo3(signature = (xs, us, callback=None, verbose=false, progress=false))]
             fn solve<'py>(
                 &self,
@@ -193,13 +193,15 @@ macro_rules! solver {
                 })
             }
 
-            /// Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+            /// Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+            /// `Solution`.
             ///
-            /// With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+            /// With a `time_budget`, a delayed solve does not shorten the following ones: each makes at least one
+            /// iteration.
             ///
-            /// callback, verbose, progress: as of `solve`.
+            /// callback, verbose, progress: as for `solve`.
             ///
-            /// Raises `ProblemError` as `solve`, and if there is no solution yet.
+            /// Raises `ProblemError` as `solve` does, and if there is no solution yet.
             #[pyo3(signature = (callback=None, verbose=false, progress=false))]
             fn resume<'py>(
                 &self,
@@ -214,8 +216,8 @@ macro_rules! solver {
                 })
             }
 
-            /// The `Solution` of the last solve, also of one that a signal or an error of an `Action` has ended
-            /// ("interrupted"); None before the first.
+            /// The `Solution` of the last solve, even if a signal or an error of an `Action` ended it ("interrupted");
+            /// None before the first solve.
             #[getter]
             fn solution<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
                 let problem = lock("problem", &self.problem.get().inner)?;
@@ -235,7 +237,7 @@ macro_rules! solver {
                 Ok(text + ">")
             }
 
-            /// The parts of a pickle: the problem and the settings, without a solution.
+            /// Returns the parts of a pickle: the problem and the settings, without a solution.
             fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
                 let (py, Self { problem, settings, inner, .. }) = (slf.py(), slf.get());
                 let inner = inner.as_ref().map(|inner| inner.clone_ref(py));
@@ -258,17 +260,17 @@ macro_rules! solver {
                 visit.call(&self.inner)
             }
 
-            /// Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
-            /// with it.
+            /// Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
             ///
-            /// `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-            /// last one is served by a model of the problem, with those that it has for all knots. The last state follows
-            /// from the last control, which is repeated. At a second shift without a step of a solve in between the last
-            /// state is repeated too, as a rollout by repeated controls would diverge.
+            /// `resume` then starts from the shifted solution. Knot t becomes knot t − 1, with its own costs and
+            /// limits. A model of the problem serves the new last knot, with the costs and limits that the model has
+            /// for all knots. The last control is repeated, and the last state follows from it. At a second shift
+            /// without a solver step in between, the last state is repeated too, because a rollout with repeated
+            /// controls would diverge.
             ///
             /// last: the index of that model.
             ///
-            /// Raises `ProblemError` if there is no such model.
+            /// Raises `ProblemError` if the model does not exist.
             fn shift(&self, last: usize) -> PyResult<()> {
                 let mut problem = lock("problem", &self.problem.get().inner)?;
                 let mut solver = lock("solver", &self.solver)?;
@@ -282,30 +284,27 @@ macro_rules! solver {
 }
 
 solver! {
-/// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the rules and constants of
-/// Crocoddyl.
+/// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the equations and
+/// constants of Crocoddyl.
 ///
-/// Where controls are bounded, these are the rules of its box solvers.
+/// If controls are bounded, it follows Crocoddyl's box solvers.
 ///
-/// problem: the problem to solve; all memory is made for its shape, once.
-/// settings: any of these, by name.
-///     `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose trials are plain rollouts.
-///     `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
-///     `inverse_dynamics_form`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
-///     (default: yes): the same steps in less time.
-///     `project_warm_start`: whether controls of a warm start that are outside of their bounds are moved into them, in `solve`
-///     and in `resume` (default: yes). Crocoddyl keeps them, so its iterates need False.
-///     `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit". The first iteration
-///     always runs, unless the budget is 0. A later phase runs if the median of its last five durations fits. A solve that
-///     takes longer tells by how much in `timings.overrun`.
-///     `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
-///     there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
-///     `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep beside
-///     them), 1 unless given, at most 1024. The results are the same to the last bit.
-///     `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`, `accept`,
-///     `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
-///     `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of
-///     the method.
+/// problem: the problem to solve; all memory is allocated for its shape, once.
+/// settings: any of these, by name. `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose
+///     trials are plain rollouts. `second_order`: whether to use the curvature of the dynamics if the models provide it
+///     (full DDP). `inverse_dynamics_form`: whether the sweep takes knots of robots as equations of inverse dynamics if
+///     possible (default: yes). The steps are the same and take less time. `project_warm_start`: whether controls of a
+///     warm start outside their bounds are moved into them, in `solve` and in `resume` (default: yes). Crocoddyl keeps
+///     them; its iterates need False. `time_budget` (s): a solve that has used it up returns its current result, with
+///     the status "time_limit". The first iteration always runs, unless the budget is 0. A later phase runs if the
+///     median of its last five durations fits. `timings.overrun` is the excess of a solve that takes longer.
+///     `segments`: the number of parts of the horizon on which a sweep works at the same time, at most 1024, default 1.
+///     It uses as many threads as are available. The results differ by rounding, but not with the number of threads.
+///     `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep in
+///     parallel), at most 1024, default 1. The results are bit-identical. `max_iterations`, `tolerance`,
+///     `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
+///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
+///     `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
 Fddp {
     #[new]
     #[pyo3(signature = (problem, **settings))]
@@ -315,7 +314,7 @@ Fddp {
 }
 }
 
-/// A copy of settings that were given.
+/// Copies the given settings.
 fn kept(py: Python<'_>, settings: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyDict>> {
     Ok(settings.map_or_else(|| Ok(PyDict::new(py)), |settings| settings.copy())?.unbind())
 }
@@ -336,30 +335,30 @@ impl Fddp {
 }
 
 solver! {
-/// The augmented Lagrangian method around `Fddp`, as ProxDDP's: for robots with `Limit`s and for `ConstrainedAction`s.
+/// The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
 ///
-/// It repeats: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
-/// y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
+/// It repeats two steps. First it minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP. Then, if
+/// the limits hold well enough, y ← (z − Π z) / μ, else μ is reduced. It ends when limits and the gradient of ℓ + yᵀg
+/// vanish to the tolerances.
 ///
-/// `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
-/// ended as "not_finite" or with violated limits at the largest penalty; `shift` moves them on. A solution is "converged"
-/// when the residuals of `outcome` are below the tolerances. It is "constraints_violated" if the penalty reached its limit
-/// and the limits do not hold, which proves nothing: another warm start may find a solution. It is "infeasible" if the
-/// initial state itself violates a limit of knot 0 that no control can change. `outcome.worst` names the knot, the limit
-/// and the amount. The cost of the solution contains the terms of the limits, that of `outcome` does not; its trace and
-/// gains are those of the last inner solve, and its timings those of the whole solve. Controls of a warm start that are outside of their bounds are moved into them.
+/// `solve` begins with zero multipliers. `resume` begins with the multipliers and the penalty of the last solve, unless
+/// that solve ended as "not_finite" or with violated limits at the largest penalty. `shift` also shifts the
+/// multipliers. A solution is "converged" when the residuals of `outcome` are below the tolerances. It is
+/// "constraints_violated" if the penalty reached its maximum and the limits do not hold. This proves nothing: another
+/// warm start may find a solution. It is "infeasible" if the initial state itself violates a limit of knot 0 that no
+/// control can change. `outcome.worst` has the knot, the limit and the amount. The cost of the solution includes the
+/// terms of the limits, the cost of `outcome` does not. The solution's trace and gains are from the last inner solve,
+/// its timings from the whole solve. Controls of a warm start outside their bounds are moved into them.
 ///
-/// problem: the problem to solve; all memory is made for its shape, once.
-/// inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
-///     of the whole solve.
-/// settings: any of these, by name.
-///     `tolerance`: the largest distance of a limit from its bounds that is accepted.
-///     `tolerance_dual`: the largest entry of the gradient of the Lagrangian that is accepted.
-///     `max_solves`: the number of inner solves at most.
-///     `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
-///     factor by which it rises.
-///     `restart`: whether a `solve` with limits or bounds that is not finite, or violates limits at the largest penalty, begins
-///     once more, from the initial state held still at all knots (default: yes). The better result counts.
+/// problem: the problem to solve; all memory is allocated for its shape, once.
+/// inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` applies
+///     to the whole solve.
+/// settings: any of these, by name. `tolerance`: the largest accepted distance of a limit from its bounds.
+///     `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the maximum number
+///     of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its maximum,
+///     and the factor by which it increases. `restart`: whether to repeat a failed `solve` of a problem with limits or
+///     bounds once, from the initial state held still at all knots (default: yes). A solve fails if it is not finite,
+///     or violates limits at the largest penalty. The better result is returned.
 ///
 /// >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
 /// >>> arm = condyle.robots.arm7()

@@ -13,7 +13,8 @@ const FIELDS: [&str; 8] = ["A", "B", "f", "Q", "S", "R", "q", "r"];
 
 /// The backward Riccati sweep over a horizon of linear-quadratic knots: a step of `Fddp` without its line search.
 ///
-/// nodes: a list of `LqNode`s, as `Problem.derivatives` gives them; the last is the terminal one, without controls.
+/// nodes: a list of `LqNode`s, as `Problem.derivatives` returns them; the last node is the terminal one, without
+/// controls.
 ///
 /// Raises `ProblemError` if their shapes do not fit together.
 ///
@@ -57,9 +58,9 @@ impl Sweep {
         }
     }
 
-    /// The feedback and the value functions, as a `SweepResult`.
+    /// Computes the feedback and the value functions, as a `SweepResult`.
     ///
-    /// regularisation: what is added to the diagonals of Quu and Vxx, at least 0.
+    /// regularisation: the number added to the diagonals of Quu and Vxx, at least 0.
     ///
     /// Raises `ProblemError` if Quu of a knot is not positive definite.
     #[pyo3(signature = (regularisation=0.0))]
@@ -88,7 +89,7 @@ impl Sweep {
     }
 }
 
-/// Nodes as `LqNode`s.
+/// Converts nodes to `LqNode`s.
 pub(super) fn give<'py>(py: Python<'py>, nodes: &[LqNode]) -> PyResult<Bound<'py, PyList>> {
     let class = class!(py, "LqNode")?;
     let all = PyList::empty(py);

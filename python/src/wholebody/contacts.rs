@@ -1,4 +1,4 @@
-//! Contacts: where a robot may touch its environment.
+//! Contacts between a robot and its environment.
 
 use crate::arrays::{Give, array, matrix, three};
 use crate::exceptions::wrong_word;
@@ -8,15 +8,13 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rust::{Normal, Shape, SurfaceForces};
 
-/// A contact with friction: what touches is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+/// A contact with friction: the touching frame is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
 ///
-/// Whether it touches at a tick, and how strongly, is said by `ContactTarget.activation`. Numbers are checked when a
-/// `WholeBodyController` is made.
+/// `ContactTarget.activation` defines whether the contact touches at a tick, and how strongly. Numbers are checked when
+/// a `WholeBodyController` is made.
 ///
-/// Common arguments:
-/// frame: the name of a frame of the robot.
-/// friction: μ, Coulomb's coefficient; above 0.
-/// min_force, max_force: least and greatest normal force of the whole contact (N).
+/// Common arguments: frame: the name of a frame of the robot. friction: μ, the Coulomb coefficient, above 0. min_force,
+/// max_force: bounds on the normal force of the whole contact (N).
 ///
 /// >>> from condyle.wholebody import FrictionContact
 /// >>> FrictionContact.sole("left_sole", 0.7, [0.2, 0.1]).corners.shape
@@ -25,7 +23,7 @@ use rust::{Normal, Shape, SurfaceForces};
 #[derive(Clone, PartialEq)]
 pub(crate) struct FrictionContact(pub(super) rust::FrictionContact);
 
-/// What describes the force on a surface.
+/// Reads the representation of the force on a surface.
 fn forces(given: &str) -> PyResult<SurfaceForces> {
     match given {
         "wrench" => Ok(SurfaceForces::Wrench),
@@ -40,10 +38,10 @@ fn upwards(normal: Option<&Bound<'_, PyAny>>) -> PyResult<Vec3<f64>> {
 
 #[pymethods]
 impl FrictionContact {
-    /// A point: the frame's origin is held, the frame may turn about it.
+    /// Returns a point contact: the frame's origin is held, the frame may turn about it.
     ///
-    /// normal: the direction in which the environment pushes, 3 numbers of any length but 0; None is z, level ground.
-    /// axes: 'world', along which the normal is given and stays, or 'frame', with which it turns.
+    /// normal: the direction in which the environment pushes, 3 numbers of any nonzero length; None is z, level ground.
+    /// axes: the axes of the normal: 'world', in which it is constant, or 'frame', with which it turns.
     #[staticmethod]
     #[pyo3(signature = (frame, friction, normal=None, axes="world", min_force=0.0, max_force=f64::INFINITY))]
     fn point(
@@ -64,15 +62,16 @@ impl FrictionContact {
         Ok(Self(rust::FrictionContact { frame, shape, normal, friction, yaw_friction: None, min_force, max_force }))
     }
 
-    /// An edge (two corners: the frame may turn about it) or a convex polygon (three or more: the frame is held).
+    /// Returns an edge contact (two corners: the frame may turn about the edge) or a convex polygon (three or more
+    /// corners: the frame is held).
     ///
-    /// corners: in the frame, in their order around the polygon, in one plane across the normal (m), (n, 3).
-    /// forces: 'wrench', a force with one friction cone, a centre of pressure within the polygon and a bounded moment about
-    ///     the normal; or 'corners', a force with a friction cone at each corner.
-    /// normal: the direction in which the environment pushes, along the frame's axes, 3 numbers of any length but 0; None
-    ///     is z.
-    /// yaw_friction: γ (m): the moment about the normal of a wrench is at most γ f_n. None is ⅔ μ r, r being the radius of
-    ///     the greatest disc about the corners' mean within the polygon; ½ μ l on an edge of length 2 l.
+    /// corners: positions in the frame (m), (n, 3), in their order around the polygon, in one plane across the normal.
+    /// forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
+    ///     about the normal; or 'corners', a force with a friction cone at each corner.
+    /// normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
+    ///     None is z.
+    /// yaw_friction: γ (m), with which a wrench's moment about the normal is at most γ f_n. None is ⅔ μ r, with r the
+    ///     radius of the largest circle about the corners' mean within the polygon; ½ μ l for an edge of length 2 l.
     #[staticmethod]
     #[pyo3(signature = (
         frame, friction, corners, forces="wrench", normal=None, yaw_friction=None, min_force=0.0, max_force=f64::INFINITY
@@ -95,9 +94,9 @@ impl FrictionContact {
         Ok(Self(rust::FrictionContact { frame, shape, normal, friction, yaw_friction, min_force, max_force }))
     }
 
-    /// A rectangular sole about the frame's origin, whose normal is the frame's z.
+    /// Returns a contact of a rectangular sole about the frame's origin, whose normal is the frame's z axis.
     ///
-    /// size: its sides along the frame's x and y (m); forces, yaw_friction: as of `surface`.
+    /// size: its sides along the frame's x and y (m); forces, yaw_friction: as for `surface`.
     #[staticmethod]
     #[pyo3(signature = (
         frame, friction, size, forces="wrench", yaw_friction=None, min_force=0.0, max_force=f64::INFINITY
@@ -122,14 +121,14 @@ impl FrictionContact {
         &self.0.frame
     }
 
-    /// The corners of a surface in the frame (m), (n, 3); None of a point.
+    /// The corners of a surface in the frame (m), (n, 3); None for a point.
     #[getter]
     fn corners<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Shape::Surface { corners, .. } = &self.0.shape else { return Ok(None) };
         corners.iter().map(|corner| corner.to_array()).collect::<Vec<_>>().give(py, None).map(Some)
     }
 
-    /// What describes the force on a surface: 'wrench' or 'corners'; None of a point.
+    /// The representation of the force on a surface: 'wrench' or 'corners'; None for a point.
     #[getter]
     fn forces(&self) -> Option<&'static str> {
         match self.0.shape {
@@ -145,37 +144,37 @@ impl FrictionContact {
         self.0.normal.direction().give(py, None)
     }
 
-    /// The axes along which the normal is given: 'world' or 'frame'.
+    /// The axes in which the normal is given: 'world' or 'frame'.
     #[getter]
     fn axes(&self) -> &'static str {
         if matches!(self.0.normal, Normal::World(_)) { "world" } else { "frame" }
     }
 
-    /// μ.
+    /// The friction coefficient μ.
     #[getter]
     fn friction(&self) -> f64 {
         self.0.friction
     }
 
-    /// γ (m); None for the default.
+    /// The bound γ of the yaw moment (m); None for the default.
     #[getter]
     fn yaw_friction(&self) -> Option<f64> {
         self.0.yaw_friction
     }
 
-    /// The least normal force (N).
+    /// The minimum normal force (N).
     #[getter]
     fn min_force(&self) -> f64 {
         self.0.min_force
     }
 
-    /// The greatest normal force (N).
+    /// The maximum normal force (N).
     #[getter]
     fn max_force(&self) -> f64 {
         self.0.max_force
     }
 
-    /// The parts of a pickle: what makes one like it.
+    /// Returns the parts of a pickle: a constructor and its arguments.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
         let rust::FrictionContact { frame, friction, yaw_friction, min_force, max_force, .. } = &this.0;

@@ -16,8 +16,8 @@ use pyo3::types::PyTuple;
 use rust::{CommandSource, Status};
 use std::sync::Mutex;
 
-/// A whole-body controller: at each tick a cone program gives the accelerations, contact forces and joint efforts that best
-/// do what the tasks ask.
+/// A whole-body controller. At each tick it solves a cone program for the accelerations, contact forces and joint
+/// efforts that fulfil the tasks best.
 ///
 ///     x = (q̈, f)
 ///     minimise     ½ Σ w ‖J q̈ + J̇ v − a*‖²  +  ½ w_a ‖q̈‖²  +  ½ w_f ‖f − f_ref‖²
@@ -29,19 +29,19 @@ use std::sync::Mutex;
 ///                  −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
 ///                  bounds on q̈                         from limits of position and velocity: `JointLimits`
 ///
-/// Positions, velocities and accelerations of tasks and contacts are along the world's axes, accelerations classical. Memory
-/// is fixed here.
+/// Positions, velocities and accelerations of tasks and contacts are in the world's axes; accelerations are classical.
+/// All memory is allocated in the constructor.
 ///
 /// model: the robot.
-/// contacts: a list of `FrictionContact`, each of another frame; empty for a robot in free fall.
+/// contacts: a list of `FrictionContact`, each of a different frame; empty for a robot in free fall.
 /// tasks: a list of `Task`.
-/// settings: `Settings`; None for the default ones.
+/// settings: `Settings`; None for the defaults.
 ///
-/// Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
-/// without its contact, for any number outside of its range, and for an effort limit that is 0, of the model or the settings.
+/// Raises `ModelError` for an unknown frame. Raises `ControllerError` for a frame with two contacts, for a force task
+/// without its contact, for a number outside its range, and for an effort limit of 0 in the model or the settings.
 ///
-/// A controller can be copied and pickled: the copy continues with the same bits; with the back end 'clarabel', whose solvers are
-/// built again, with the same solution up to its tolerance.
+/// A controller can be copied and pickled; the copy continues with bit-identical results. With the back end 'clarabel',
+/// whose solvers are built again, results are equal up to its tolerance.
 ///
 /// >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
 /// >>> robot = condyle.robots.quadruped()
@@ -64,7 +64,7 @@ pub(crate) struct WholeBodyController {
 
 struct Inner {
     controller: rust::WholeBodyController,
-    /// Scratch: the references of a call.
+    /// References of a call; scratch memory.
     references: rust::References,
     q: Vec<f64>,
     v: Vec<f64>,
@@ -96,29 +96,31 @@ impl WholeBodyController {
         visit.call(&self.model)
     }
 
-    /// The settings, all of them: `Settings`.
+    /// All settings of the controller: `Settings`.
     #[getter]
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         settings::give(py, &self.settings)
     }
 
-    /// The `References` that keep a position at rest: all tasks where they are, each contact held where it is and touching,
-    /// the weight shared by the contacts in equal parts.
+    /// Returns the `References` that keep the robot at rest at a position: all tasks at their current values, each
+    /// contact held and touching, the weight shared equally by the contacts.
     ///
     /// q: nq numbers.
     ///
-    /// Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
+    /// Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) whose length is
+    /// not 1.
     fn hold<'py>(&self, py: Python<'py>, q: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         let mut inner = lock("controller", &self.inner)?;
         let q = vector("q", q, inner.q.len())?;
         references::give(py, &self.model.get().inner, &inner.controller.hold(&q).map_err(controller_error)?)
     }
 
-    /// Sets references to those of a plan at a time: joints, and where they bring centre of mass, momentum and frames;
-    /// contacts by their activation, held where the plan has them, with shares of the force that the plan's c̈ takes.
+    /// Sets references to a plan at a time: the joints, and the resulting centre of mass, momentum and frames; the
+    /// contacts with their activation, held where the plan has them. The contacts share the force that the plan's c̈
+    /// requires.
     ///
-    /// plan: a `Plan` of the same robot with as many contacts.
-    /// t: the time (s); before the first and after the last knot the plan rests in it.
+    /// plan: a `Plan` of the same robot with the same number of contacts.
+    /// t: the time (s); before the first knot and after the last one, the plan rests at that knot.
     /// references: `References` of this controller, which are changed.
     fn track(&self, plan: &Bound<'_, Plan>, t: f64, references: &Bound<'_, PyAny>) -> PyResult<()> {
         let plan = plan.get();
@@ -134,9 +136,10 @@ impl WholeBodyController {
         references::write(numbers, references)
     }
 
-    /// The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
-    /// A number that is not finite is the status 'not_finite'; a quaternion, a pair (cos, sin) or a reference's rotation that is none
-    /// is 'invalid_state', with the joint or the frame in the reason. Other threads run meanwhile.
+    /// Computes the `Command` at a state. It always returns a command: without a solution, a safe one, whose status
+    /// tells why. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an invalid
+    /// quaternion, pair (cos, sin) or rotation of a reference; the reason names the joint or the frame. Other threads
+    /// can run meanwhile.
     ///
     /// q: nq numbers; v: nv.
     /// references: `References` of this controller.
@@ -157,9 +160,9 @@ impl WholeBodyController {
         give(py, controller)
     }
 
-    /// How far the step at this state, for these references, is from the optimum of its program of the first priority:
-    /// errors of the conditions of Karush, Kuhn and Tucker, below 1e-5 at the default tolerance, as `Optimality`. It must be the
-    /// last step. For tests: it assembles the program anew.
+    /// Returns the distance of the last step from the optimum of its first-priority program, as `Optimality`: the
+    /// errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the same state
+    /// and references as to the last step. For tests: it assembles the program anew.
     ///
     /// q: nq numbers; v: nv.
     /// references: `References` of this controller.
@@ -181,13 +184,14 @@ impl WholeBodyController {
         class!(py, "condyle._wholebody", "Optimality")?.call1((stationarity, primal, dual, complementarity))
     }
 
-    /// The last `Command`; before the first step zeros.
+    /// The last `Command`; zeros before the first step.
     #[getter]
     fn command<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give(py, &lock("controller", &self.inner)?.controller)
     }
 
-    /// The parts of a pickle: what makes one like it, and the numbers that it carries from one tick to the next.
+    /// Returns the parts of a pickle: the constructor's arguments, and the numbers that the controller keeps from one
+    /// tick to the next.
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let contacts: Vec<_> = self.contacts.iter().cloned().map(FrictionContact).collect();
         let tasks: Vec<_> = self.tasks.iter().cloned().map(Task).collect();
@@ -203,7 +207,7 @@ impl WholeBodyController {
     }
 }
 
-/// The controller that a pickle holds. The model, which is one of its parts, checks the version.
+/// Creates the controller of a pickle. The model, which is one of its parts, checks the version.
 #[pyfunction]
 #[pyo3(name = "_controller_from_numbers")]
 pub(crate) fn controller_from_numbers(
@@ -221,7 +225,7 @@ pub(crate) fn controller_from_numbers(
     Ok(made)
 }
 
-/// The command of a controller as Python sees it.
+/// Converts the command of a controller to a Python object.
 fn give<'py>(py: Python<'py>, controller: &rust::WholeBodyController) -> PyResult<Bound<'py, PyAny>> {
     let command = controller.command();
     let status = match command.status {

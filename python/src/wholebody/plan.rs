@@ -12,22 +12,23 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::PlanData;
 
-/// A planned motion with N + 1 knots: states at some times, efforts and gains between them, and which contacts touch when.
+/// A planned motion with N + 1 knots: states at given times, efforts and gains between them, and the contacts that
+/// touch in each interval.
 ///
-/// `WholeBodyController.track` makes references of it. Between knots q runs along the joints' own groups, v and a = Δv / Δt
-/// are interpolated. Knots may share a time: then the velocity jumps there (an impact).
+/// `WholeBodyController.track` converts it to references. Between knots q is interpolated in the joints' groups, and v
+/// is interpolated, with a = Δv / Δt. Two knots may have the same time: then the velocity jumps there (an impact).
 ///
 /// model: the robot.
-/// times: N + 1 times, none smaller than the one before (s).
+/// times: N + 1 times in ascending order (s); two may be equal.
 /// states: (q, v) of the knots, (N + 1, nq + nv).
-/// touches: whether each of the controller's contacts touches from each knot to the next, (N, contacts).
-/// controls: efforts of the actuated coordinates (all but those of free-flyers) from each knot to the next, (N, nu); None
-///     if there are none.
-/// gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None if there are none.
-/// fade: the time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s).
+/// touches: whether each of the controller's contacts touches between a knot and the next one, (N, contacts).
+/// controls: efforts of the actuated coordinates (all coordinates except a free-flyer's) between a knot and the next one, (N,
+///     nu); None for no controls.
+/// gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
+/// fade: the time over which a contact is loaded after it begins to touch, and unloaded before it ends (s).
 ///
-/// Raises `ControllerError` for numbers that are not finite, for times that run backwards, and for states whose quaternions or
-/// pairs (cos, sin) do not have length 1.
+/// Raises `ControllerError` for numbers that are not finite, for times that decrease, and for states whose quaternions
+/// or pairs (cos, sin) do not have length 1.
 ///
 /// >>> from condyle.wholebody import Plan
 /// >>> robot = condyle.robots.quadruped()
@@ -45,7 +46,7 @@ pub(crate) struct Plan {
     model: Py<Model>,
 }
 
-/// The lengths of a list of lists.
+/// Returns the number of columns of a list of lists with `rows` rows.
 fn lengths(argument: &str, given: &Bound<'_, PyAny>, rows: usize) -> PyResult<usize> {
     let shape: Vec<usize> = given.py().import("numpy")?.call_method1("shape", (given,))?.extract()?;
     match shape[..] {
@@ -93,15 +94,15 @@ impl Plan {
         visit.call(&self.model)
     }
 
-    /// The times of the first knot and of the last (s).
+    /// The times of the first and the last knot (s).
     #[getter]
     fn span(&self) -> (f64, f64) {
         let [begin, end] = self.inner.span();
         (begin, end)
     }
 
-    /// The activation of a contact, by its number, at a time: 0 where it does not touch, ramped where it begins and ends
-    /// to, else 1.
+    /// Returns the activation of a contact, given by index, at a time: 0 while it does not touch, a ramp when it begins
+    /// and ends to touch, else 1.
     fn activation(&self, contact: usize, t: f64) -> PyResult<f64> {
         if contact >= self.contacts {
             return Err(PyIndexError::new_err(format!(
@@ -112,7 +113,7 @@ impl Plan {
         Ok(self.inner.activation(contact, t))
     }
 
-    /// The plan's own control at a state, τ = ū + K (x ⊖ x̄), nv numbers, 0 at a free-flyer.
+    /// Computes the plan's own control at a state, τ = ū + K (x ⊖ x̄), nv numbers, 0 at a free-flyer.
     ///
     /// t: the time (s); q: nq numbers; v: nv.
     ///
@@ -137,7 +138,7 @@ impl Plan {
         output(py, out, &[robot.nv()], |tau| tau.copy_from_slice(&efforts))
     }
 
-    /// The parts of a pickle: the arrays that it was made of.
+    /// Returns the parts of a pickle: the arrays from which the plan was made.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
         let PlanData { times, states, controls, gains, touches, fade } = this.inner.data();

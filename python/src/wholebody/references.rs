@@ -1,7 +1,8 @@
-//! References, in and out: `References` of `condyle._wholebody`, whose members are views of one array.
+//! Reads and writes `References` of `condyle._wholebody`, whose members are views of one array.
 //!
-//! The array has the centre of mass (3 × 3 numbers), the angular momentum (2 × 3), the posture (q, v, a), then 28 numbers
-//! for each frame (pose 4 × 4, velocity, acceleration) and 23 for each contact (activation, pose 4 × 4, force).
+//! The array contains the centre of mass (3 × 3 numbers), the angular momentum (2 × 3) and the posture (q, v, a). Then
+//! it has 28 numbers for each frame (pose 4 × 4, velocity, acceleration) and 23 for each contact (activation, pose 4 ×
+//! 4, force).
 
 use crate::arrays::{Array, class, matrix, numbers, output, writable};
 use condyle::dynamics::{ROTATION_ROUNDING, unit_fault};
@@ -13,7 +14,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// nq, nv, and how many frames and contacts there are.
+/// nq, nv, number of frames and number of contacts.
 pub(super) type Sizes = (usize, usize, usize, usize);
 
 pub(super) fn sizes(references: &References) -> Sizes {
@@ -25,7 +26,7 @@ fn count((nq, nv, frames, contacts): Sizes) -> usize {
     15 + nq + 2 * nv + 28 * frames + 23 * contacts
 }
 
-/// Takes numbers from the front of a slice.
+/// Reads numbers from the front of a slice.
 struct Reader<'a>(&'a [f64]);
 
 impl Reader<'_> {
@@ -52,7 +53,7 @@ impl Reader<'_> {
     }
 }
 
-/// Puts numbers at the front of a slice.
+/// Writes numbers to the front of a slice.
 struct Writer<'a>(&'a mut [f64]);
 
 impl<'a> Writer<'a> {
@@ -110,7 +111,7 @@ fn write_numbers(references: &References, numbers: &mut [f64]) {
     }
 }
 
-/// The array of the numbers of `References` that were made for such sizes.
+/// Returns the array of `References`, after a check that they were made for these sizes.
 fn its_numbers<'py>(given: &Bound<'py, PyAny>, expected: Sizes) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     let py = given.py();
     if !given.is_exact_instance(class!(py, "condyle._wholebody", "References")?) {
@@ -124,7 +125,12 @@ fn its_numbers<'py>(given: &Bound<'py, PyAny>, expected: Sizes) -> PyResult<Boun
         return Err(PyValueError::new_err(message));
     }
     let numbers = given.getattr("_numbers")?.cast_into::<PyArrayDyn<f64>>()?;
-    if numbers.len()? == count(expected) { Ok(numbers) } else { Err(PyValueError::new_err("references: are broken")) }
+    let (n, m) = (count(expected), numbers.len()?);
+    if m == n {
+        return Ok(numbers);
+    }
+    let message = format!("references: expected {n} numbers, found {m}; create them with controller.hold(q)");
+    Err(PyValueError::new_err(message))
 }
 
 /// Reads references that were made for the same robot, frames and contacts.
@@ -141,7 +147,7 @@ pub(super) fn write(references: &References, given: &Bound<'_, PyAny>) -> PyResu
     Ok(())
 }
 
-/// References of a robot as Python sees them.
+/// Converts references of a robot to a Python object.
 pub(super) fn give<'py>(py: Python<'py>, model: &Model, references: &References) -> PyResult<Bound<'py, PyAny>> {
     let rotations: Vec<_> = model.rotations().map(|(joint, range)| (joint, range.start, range.end)).collect();
     let rotations = PyTuple::new(py, rotations)?;
@@ -150,7 +156,7 @@ pub(super) fn give<'py>(py: Python<'py>, model: &Model, references: &References)
     class!(py, "condyle._wholebody", "References")?.call1((sizes, numbers, rotations))
 }
 
-/// Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is one.
+/// Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is valid.
 #[pyfunction]
 #[pyo3(name = "_check_pose")]
 pub(crate) fn check_pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -162,7 +168,8 @@ pub(crate) fn check_pose(name: &str, pose: &Bound<'_, PyAny>) -> PyResult<()> {
     Err(PyValueError::new_err(message))
 }
 
-/// Raises `ValueError` unless all rotations of a position have length 1; each is given by its joint and its range.
+/// Raises `ValueError` unless all rotations of a position have length 1; each rotation is given by its joint and its
+/// range in q.
 #[pyfunction]
 #[pyo3(name = "_check_rotations")]
 pub(crate) fn check_rotations(

@@ -1,4 +1,4 @@
-//! The settings of a controller, in and out: `Settings` of `condyle._wholebody`.
+//! Reads and writes the settings of a controller: `Settings` of `condyle._wholebody`.
 
 use crate::arrays::{Give, class, numbers};
 use crate::exceptions::wrong_word;
@@ -7,20 +7,20 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rust::{Backend, Form, Friction, JointLimits, Settings};
 
-/// The gains that are given as a pair.
+/// Reads gains, given as a pair.
 pub(super) fn gains(argument: &str, given: &Bound<'_, PyAny>) -> PyResult<rust::Gains> {
     let wrong = |_| PyValueError::new_err(format!("{argument}: expected Gains(stiffness, damping)"));
     let (stiffness, damping) = given.extract().map_err(wrong)?;
     Ok(rust::Gains { stiffness, damping })
 }
 
-/// The numbers of a member, if it is not None.
+/// Reads the numbers of a member, if it is not None.
 fn list(given: &Bound<'_, PyAny>, prefix: &str, name: &str) -> PyResult<Option<Vec<f64>>> {
     let value = given.getattr(name)?;
     (!value.is_none()).then(|| numbers(&format!("{prefix}{name}"), &value)).transpose()
 }
 
-/// The settings as the library has them.
+/// Converts settings to the library's type.
 pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
     let get = |name: &str| given.getattr(name);
     let friction = get("friction")?;
@@ -72,12 +72,12 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
     })
 }
 
-/// `Gains` as Python sees them.
+/// Converts gains to a Python `Gains`.
 pub(super) fn give_gains(py: Python<'_>, gains: rust::Gains) -> PyResult<Bound<'_, PyAny>> {
     class!(py, "condyle._wholebody", "Gains")?.call1((gains.stiffness, gains.damping))
 }
 
-/// `Settings` as Python sees them.
+/// Converts settings to a Python `Settings`.
 pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, PyAny>> {
     let list = |numbers: &Option<Vec<f64>>| numbers.as_ref().map(|x| x.give(py, None)).transpose();
     let friction = match s.friction {

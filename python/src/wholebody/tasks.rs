@@ -1,4 +1,4 @@
-//! What a whole-body controller is to do.
+//! Tasks of a whole-body controller.
 
 use super::settings::give_gains;
 use crate::arrays::{Give, numbers};
@@ -10,17 +10,15 @@ use rust::{Axes, TaskKind};
 
 /// A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
 ///
-/// What it aims at is in the `References`. Tasks of priority 0 come first; those of priority 1 decide only what they leave
-/// open, and so on. Within a priority the weights decide, and only their ratios matter. Numbers are checked when a
+/// The `References` contain its target. Tasks of priority 0 come first; tasks of priority 1 only use the freedom that
+/// these leave, and so on. Within a priority only the ratios of the weights matter. Numbers are checked when a
 /// `WholeBodyController` is made.
 ///
-/// Common arguments:
-/// weight: w, at least 0; None is the default of the task.
-/// gains: `Gains`, k (1/s²) and d (1/s); None is `Gains.critical(100.0)`.
-/// mask: which of its numbers count, as many as it has; None is all.
-/// axes: along whose axes these numbers are: 'world'; 'local', the frame's own (of tasks that move no frame, the world's);
-///     or ('frame', name), those of another frame.
-/// priority: 0 for the first; at most 2.
+/// Common arguments: weight: w, at least 0; None is the default of the task. gains: `Gains`, k (1/s²) and d (1/s); None
+/// is `Gains.critical(100.0)`. mask: one flag for each number of the task, whether it is controlled; None is all. axes:
+/// the axes of these numbers: 'world'; 'local', the frame's own (for tasks without a frame: the world's); or ('frame',
+/// name), the axes of another frame.
+/// priority: 0 is the first priority; at most 2.
 ///
 /// >>> from condyle.wholebody import Task
 /// >>> Task.orientation("trunk", mask=[True, True, False])  # level, whatever its heading
@@ -30,7 +28,7 @@ use rust::{Axes, TaskKind};
 pub(crate) struct Task(pub(super) rust::Task);
 
 impl Task {
-    /// A task with what is given in place of its defaults; `size` is that of the mask.
+    /// Replaces the defaults of a task by the given arguments; `size` is the length of the mask.
     fn with(
         mut task: rust::Task,
         size: usize,
@@ -57,7 +55,7 @@ impl Task {
         Ok(Self(task))
     }
 
-    /// The name of the frame that it moves, or whose contact's force it sets.
+    /// Returns the name of the frame that the task moves, or of its contact.
     fn its_frame(&self) -> Option<&str> {
         match &self.0.kind {
             TaskKind::Pose(f)
@@ -69,7 +67,7 @@ impl Task {
         }
     }
 
-    /// How many entries its mask has.
+    /// Returns the length of the mask.
     fn size(&self) -> usize {
         match self.0.kind {
             TaskKind::Posture => 0,
@@ -94,7 +92,8 @@ fn axes(given: &Bound<'_, PyAny>) -> PyResult<Axes> {
     }
 }
 
-/// The methods of tasks: the constructors of those whose numbers have a mask and axes, some of a frame; and all others.
+/// Defines the methods of tasks: constructors of tasks with a mask and axes, some of them with a frame; and all other
+/// methods.
 macro_rules! methods {
     ($($(#[$doc:meta])* $name:ident($($frame:ident)?): $size:literal;)* { $($other:tt)* }) => {
         #[pymethods]
@@ -121,23 +120,24 @@ macro_rules! methods {
 }
 
 methods! {
-/// The centre of mass, c̈: 3 numbers; weight 10.
+/// Returns a task for the centre of mass, c̈: 3 numbers; weight 10.
 com(): 3;
-/// A frame's origin and rotation, (p̈, ω̇): 6 numbers, linear first; weight 10.
+/// Returns a task for a frame's origin and rotation, (p̈, ω̇): 6 numbers, linear first; weight 10.
 pose(frame): 6;
-/// A frame's origin, p̈: 3 numbers; weight 10.
+/// Returns a task for a frame's origin, p̈: 3 numbers; weight 10.
 position(frame): 3;
-/// A frame's rotation, ω̇: 3 numbers; weight 10.
+/// Returns a task for a frame's rotation, ω̇: 3 numbers; weight 10.
 orientation(frame): 3;
-/// The velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6 numbers, linear first;
-/// weight 10.
+/// Returns a task for the velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6
+/// numbers, linear first; weight 10.
 velocity(frame): 6;
-/// The rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers; weight 0.1.
+/// Returns a task for the rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers;
+/// weight 0.1.
 angular_momentum(): 3;
 {
-    /// The actuated joints, q̈; weight 0.1.
+    /// Returns a task for the actuated joints, q̈; weight 0.1.
     ///
-    /// joints: factors of the weight, one for each coordinate, nv numbers; None is all 1.
+    /// joints: factors of the weight, one for each coordinate, nv numbers; None is 1 for all.
     #[staticmethod]
     #[pyo3(signature = (weight=None, gains=None, joints=None, priority=0))]
     fn posture(
@@ -150,15 +150,16 @@ angular_momentum(): 3;
         Self::with(rust::Task { joints, ..rust::Task::posture() }, 0, weight, gains, None, None, priority)
     }
 
-    /// The force of the contact of this frame: 6 numbers, force and moment at the contact's centre along its axes (t₁, t₂,
-    /// n), of which a point has 3; weight 1e-3. It has no gains, and does not act while the contact is off.
+    /// Returns a task for the force of this frame's contact: 6 numbers, force and moment at the contact's centre in its
+    /// axes (t₁, t₂, n); a point contact has the first 3; weight 1e-3. It has no gains, and does not act while the
+    /// contact is off.
     #[staticmethod]
     #[pyo3(signature = (frame, weight=None, mask=None, priority=0))]
     fn contact_force(frame: &str, weight: Option<f64>, mask: Option<Vec<bool>>, priority: usize) -> PyResult<Self> {
         Self::with(rust::Task::contact_force(frame), 6, weight, None, mask, None, priority)
     }
 
-    /// The quantity: the name of what made it.
+    /// The controlled quantity: the name of the task's constructor.
     #[getter]
     fn kind(&self) -> &'static str {
         match self.0.kind {
@@ -174,31 +175,31 @@ angular_momentum(): 3;
         }
     }
 
-    /// The name of its frame; None if it has none.
+    /// The name of its frame; None without a frame.
     #[getter]
     fn frame(&self) -> Option<&str> {
         self.its_frame()
     }
 
-    /// w.
+    /// The weight w.
     #[getter]
     fn weight(&self) -> f64 {
         self.0.weight
     }
 
-    /// k and d, `Gains`.
+    /// The gains k and d, `Gains`.
     #[getter]
     fn gains<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         give_gains(py, self.0.gains)
     }
 
-    /// Which of its numbers count.
+    /// The mask: for each of its numbers, whether it is controlled.
     #[getter]
     fn mask(&self) -> Vec<bool> {
         self.0.mask[..self.size()].to_vec()
     }
 
-    /// Along whose axes its numbers are: 'world', 'local' or ('frame', name).
+    /// The axes of its numbers: 'world', 'local' or ('frame', name).
     #[getter]
     fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(match &self.0.axes {
@@ -208,19 +209,19 @@ angular_momentum(): 3;
         })
     }
 
-    /// Its priority: 0 for the first.
+    /// Its priority; 0 is the first.
     #[getter]
     fn priority(&self) -> usize {
         self.0.priority
     }
 
-    /// Factors of the posture's weight, nv numbers; empty for all 1.
+    /// Factors of the posture's weight, nv numbers; empty if all are 1.
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.0.joints.give(py, None)
     }
 
-    /// The parts of a pickle: what makes one like it.
+    /// Returns the parts of a pickle: a constructor and its arguments.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
         let (py, this) = (slf.py(), slf.get());
         let rust::Task { weight, priority, joints, .. } = &this.0;

@@ -19,20 +19,21 @@ use std::sync::Arc;
 
 /// An action written in Python.
 ///
-/// nx, nu: the numbers of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-/// calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
-///     state may be None.
-/// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
-///     q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it calc is called with arrays of numbers
-///     that know their derivatives, exact ones; once for all knots, if it leaves t alone and takes no branch that differs
-///     from knot to knot. So make its results of its arguments (`np.array([...])`, `np.concatenate`), and do not write
-///     them into arrays of floats. What cannot be called so is differentiated by hyper-dual numbers, else by differences.
-/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-/// space: where states live: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate, difference), where
-///     integrate(x, dx) is x ⊕ dx, difference(x0, x1) the dx with x0 ⊕ dx = x1, and dx has ndx numbers. Derivatives are taken
-///     by dx.
-/// batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and arrays with N rows
-///     as results.
+/// nx, nu: the sizes of a state and of a control, at most 4096; nu is 0 at a terminal knot.
+/// calc: a function of (t, x, u) that returns the next state and the cost; only at the terminal knot the next state may
+///     be None.
+/// calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among A = ∂x⁺/∂x, B = ∂x⁺/∂u, q =
+///     ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, calc is called with arrays of numbers that
+///     carry their exact derivatives. One call serves all knots if calc does not use t and has no branches that differ
+///     between knots. So compute its results from its arguments (`np.array([...])`, `np.concatenate`), and do not write
+///     them into arrays of floats. If this fails, calc is differentiated by hyper-dual numbers, and if that fails, by
+///     differences.
+/// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
+/// space: the space of states: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate,
+///     difference). Then integrate(x, dx) is x ⊕ dx, difference(x0, x1) is the dx with x0 ⊕ dx = x1, and dx has ndx
+///     numbers. Derivatives are taken with respect to dx.
+/// batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and results with N
+///     rows.
 ///
 /// >>> from condyle.optimal import Action, Fddp, Problem
 /// >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
@@ -43,7 +44,7 @@ use std::sync::Arc;
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Action(Written);
 
-/// What an `Action` and its copies in problems are made of.
+/// The parts of an `Action`, which its copies in problems share.
 #[derive(Clone)]
 struct Written {
     space: Space,
@@ -107,22 +108,22 @@ impl Action {
 }
 
 impl Action {
-    /// A copy for a problem, at the end of the horizon or before it, whose errors go to `fault`.
+    /// Copies the action for a problem, for the terminal knot or for other knots; its errors are stored in `fault`.
     pub(in crate::optimal) fn boxed(&self, terminal: bool, fault: &Fault) -> Box<dyn ActionModel> {
         Box::new(Own { written: self.0.clone(), terminal, fault: fault.clone() })
     }
 }
 
-/// An `Action` as the solver calls it. An error becomes a cost that is not a number, and is raised after the solve.
+/// An `Action` in the solver's interface. An error becomes a cost of NaN, and is raised after the solve.
 #[derive(Clone)]
 struct Own {
     written: Written,
-    /// Whether it serves the end, after which there is no state.
+    /// Whether it serves the terminal knot, which has no next state.
     terminal: bool,
     fault: Fault,
 }
 
-/// Puts the function, and the knot, before the message of an error of a result that has a wrong type or size.
+/// Adds the function and the knot to the message of an error about a result of wrong type or size.
 pub(super) fn named(py: Python<'_>, function: &str, knots: &[usize], error: PyErr) -> PyErr {
     let knot = match knots {
         [t] => format!("knot {t}"),
@@ -142,7 +143,7 @@ pub(super) fn named(py: Python<'_>, function: &str, knots: &[usize], error: PyEr
 }
 
 impl Own {
-    /// The arguments at some knots.
+    /// Returns the arguments for some knots.
     fn arguments<'py>(&self, py: Python<'py>, knots: &[usize], [xs, us]: [&[f64]; 2]) -> PyResult<Bound<'py, PyTuple>> {
         let (x, u) = (PyArray1::from_slice(py, xs), PyArray1::from_slice(py, us));
         if !self.written.batch {
@@ -211,7 +212,7 @@ impl Own {
         read().map_err(|error| named(py, "calc_diff", knots, error))
     }
 
-    /// Writes the derivatives at some knots, if there are any but differences.
+    /// Writes the derivatives at some knots, unless differences must compute them.
     fn try_derivatives(
         &self,
         py: Python<'_>,
@@ -253,7 +254,7 @@ impl ActionModel for Own {
         self.written.bounds.as_ref().map(|[lower, upper]| (lower.as_slice(), upper.as_slice()))
     }
 
-    /// The same object, given several times.
+    /// Returns whether `other` is a copy of the same action, so that their knots form one group.
     fn merge(&mut self, other: &mut dyn ActionModel) -> bool {
         let other: &mut dyn Any = other;
         let same = |other: &mut Self| {

@@ -1,6 +1,6 @@
-//! Derivatives of a function that is written in Python without derivatives: by one call for all knots with numbers that
-//! know their derivatives; else by a call for each knot; else by hyper-dual numbers, which the functions of a model take
-//! too; else by central differences. What a function cannot be called with is not tried again.
+//! Derivatives of a Python function that does not compute them itself. Four methods are tried in this order: one call
+//! for all knots with numbers that carry their derivatives; one such call for each knot; hyper-dual numbers, which the
+//! functions of a model also accept; and central differences. A method that fails for a function is not tried again.
 
 use super::expansion::{Directions, Expansion, SeveralKnots, objects};
 use super::functions::Functions;
@@ -14,28 +14,28 @@ use pyo3::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// The ways to differentiate, the best one first; 2 is by hyper-dual numbers.
+/// Methods of differentiation, the best one first; 2 is hyper-dual numbers.
 const TOGETHER: u8 = 0;
 const ALONE: u8 = 1;
 const DIFFERENCES: u8 = 3;
 
-/// The best way that may still work for a function.
+/// Best method that may still work for a function.
 #[derive(Clone, Default)]
 pub(in crate::optimal) struct Way(Arc<AtomicU8>);
 
-/// A function of (t, x, u) that is to be differentiated.
+/// A function of (t, x, u) to be differentiated.
 pub(super) struct Differentiated<'a> {
     pub functions: &'a Functions,
     pub space: &'a Space,
     pub nu: usize,
     /// Whether it takes arrays with a row for each knot.
     pub batch: bool,
-    /// Whether it may have no next state.
+    /// Whether it may return no next state.
     pub terminal: bool,
 }
 
 impl Way {
-    /// Calls `each` with ways to differentiate until one works; `Ok(false)` if none but differences is left.
+    /// Calls `each` with one method after the other until one works; returns `Ok(false)` if only differences are left.
     fn descend(&self, py: Python<'_>, mut each: impl FnMut(u8) -> PyResult<()>) -> PyResult<bool> {
         loop {
             let way = self.0.load(Ordering::Relaxed);
@@ -56,7 +56,7 @@ impl Differentiated<'_> {
         Directions { n: self.space.ndx() + self.nu, second }
     }
 
-    /// Writes the derivatives of an action at some knots; says whether it did, and else differences are to do it.
+    /// Writes the derivatives of an action at some knots. Returns whether it did; if not, differences must be used.
     pub(super) fn action(
         &self,
         py: Python<'_>,
@@ -78,8 +78,8 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of accelerations at a knot, nv × n, row after row, and those of the cost to a node; says whether
-    /// it did.
+    /// Writes the derivatives of the accelerations at a knot, nv × n, row by row, and the derivatives of the cost to a
+    /// node; returns whether it did.
     pub(super) fn dynamics(
         &self,
         py: Python<'_>,
@@ -122,7 +122,7 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of m numbers at a knot, m × n, row after row; says whether it did.
+    /// Writes the derivatives of m numbers at a knot, m × n, row by row; returns whether it did.
     pub(super) fn vector(
         &self,
         py: Python<'_>,
@@ -150,7 +150,7 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes gradient and Hessian of a number at a knot; says whether it did.
+    /// Writes gradient and Hessian of a number at a knot; returns whether it did.
     pub(super) fn number(
         &self,
         py: Python<'_>,
@@ -179,8 +179,8 @@ impl Differentiated<'_> {
         })
     }
 
-    /// Writes the derivatives of accelerations at a knot, as `dynamics`, and the second ones of μᵀ a as those of a cost; says
-    /// whether it did.
+    /// Writes the derivatives of the accelerations at a knot, as `dynamics`, and the second derivatives of μᵀ a
+    /// to the node, where the cost's would be; returns whether it did.
     pub(super) fn curvature(
         &self,
         py: Python<'_>,
@@ -218,7 +218,7 @@ impl Differentiated<'_> {
         })
     }
 
-    /// The result at some knots, with its derivatives.
+    /// Computes the result at some knots, with its derivatives.
     fn expand<'py>(
         &self,
         py: Python<'py>,
@@ -263,7 +263,8 @@ impl Differentiated<'_> {
         Ok(())
     }
 
-    /// Calls the function with each pair of directions that is asked for: all of them, or so that each direction comes once.
+    /// Calls the function with pairs of directions: with all pairs, or with enough pairs that each direction occurs
+    /// once.
     fn hyper(
         &self,
         py: Python<'_>,
@@ -300,7 +301,7 @@ impl Differentiated<'_> {
         self.functions.call(py, 0, (t, x, u))
     }
 
-    /// Calls the function with each pair of directions, and shows its two results.
+    /// Calls the function with each pair of directions, and passes on its two results.
     fn hyper_pairs(
         &self,
         py: Python<'_>,
@@ -336,7 +337,7 @@ impl Differentiated<'_> {
     }
 }
 
-/// The next state and the cost that `calc` returns.
+/// Reads the next state and the cost that `calc` returns.
 pub(super) fn next_and_cost<'py>(result: &Bound<'py, PyAny>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyAny>)> {
     result.extract().map_err(|_| {
         let found = result.repr().map_or_else(|_| String::new(), |text| text.to_string());

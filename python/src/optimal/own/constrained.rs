@@ -10,16 +10,16 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use rust::ActionModel;
 
-/// An action of any kind under a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` holds.
+/// An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
 ///
-/// To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
+/// `Fddp` alone treats it as a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
 ///
 /// action: the action.
 /// size: the number of entries of g, at most 4096.
 /// calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
 /// calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
 ///     space of the state. Without it, central differences of calc.
-/// lower, upper: least and greatest values, infinite where there is none; g = 0 if both are None.
+/// lower, upper: bounds of g, infinite for no bound; g = 0 if both are None.
 ///
 /// >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
 /// >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
@@ -75,7 +75,7 @@ impl ConstrainedAction {
 }
 
 impl ConstrainedAction {
-    /// A copy around a copy of its action, whose errors go to `fault`.
+    /// Copies the constraint around a copy of its action; errors are stored in `fault`.
     pub(in crate::optimal) fn boxed(&self, action: Box<dyn ActionModel>, fault: &Fault) -> Box<dyn ActionModel> {
         let (functions, columns) = (self.functions.clone(), [action.ndx(), action.nu()]);
         let constraint = Written { functions, bounds: self.bounds.clone(), columns, fault: fault.clone() };
@@ -83,12 +83,12 @@ impl ConstrainedAction {
     }
 }
 
-/// The constraint of a `ConstrainedAction` as the solver calls it. An error becomes a value that is not a number, and
-/// is raised after the solve.
+/// The constraint of a `ConstrainedAction` in the solver's interface. An error becomes a value of NaN, and is raised
+/// after the solve.
 struct Written {
     functions: Functions,
     bounds: [Vec<f64>; 2],
-    /// The numbers of columns of ∂g/∂x and ∂g/∂u.
+    /// Numbers of columns of ∂g/∂x and ∂g/∂u.
     columns: [usize; 2],
     fault: Fault,
 }

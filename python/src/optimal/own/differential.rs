@@ -1,4 +1,4 @@
-//! Dynamics in continuous time that are written in Python; the integrators are the library's.
+//! Dynamics in continuous time that are written in Python; the library integrates them.
 
 use super::MOST_SIZE;
 use super::action::named;
@@ -19,22 +19,23 @@ use rust::robot::{ContinuousModel, ControlPolynomial, Derivatives, Integrated, I
 use rust::{ActionModel, Hessian, LqNode};
 use std::ops::Range;
 
-/// An action of accelerations and a cost per second that are written in Python, in steps of a time.
+/// An action whose accelerations and cost per second are written in Python; it advances by a time step.
 ///
-/// The state is x = (q, v); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), and the cost is Δt ℓ.
+/// The state is x = (q, v). By semi-implicit Euler v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²), and the cost is Δt ℓ.
 ///
-/// nv, nu: the numbers of a velocity and of a control, at most 4096; nu is 0 at a terminal knot.
-/// calc: a function of (t, x, u) that returns the accelerations, nv numbers, and the cost ℓ; of the terminal knot the
+/// nv, nu: the sizes of a velocity and of a control, at most 4096; nu is 0 at a terminal knot.
+/// calc: a function of (t, x, u) that returns the accelerations, nv numbers, and the cost ℓ; at the terminal knot the
 ///     accelerations may be None.
 /// dt: Δt in seconds, or None for a terminal knot, whose cost is ℓ.
-/// calc_diff: a function of (t, x, u) that returns a dict of what is not zero among da_dq, da_dv, da_du, the derivatives of
-///     the accelerations, and q, r, Q, S, R, those of ℓ as of `Action`. Without it, those of calc as for `Action`. Second
-///     derivatives of the accelerations, for a solver's `second_order`, are always those of calc, and zero where it cannot
-///     be differentiated by numbers; those of ⊕ are zero.
+/// calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among da_dq, da_dv, da_du, the
+///     derivatives of the accelerations, and q, r, Q, S, R, the derivatives of ℓ as for `Action`. Without it, calc is
+///     differentiated as for `Action`. Second derivatives of the accelerations, for a solver's `second_order`, always
+///     come from calc. They are zero if calc cannot be called with numbers that carry derivatives. Second derivatives
+///     of ⊕ are taken as zero.
 /// integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
-/// lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-/// model: a robot whose positions q are, with its ⊕; None for vectors of nv numbers.
-/// controls: 'constant', 'linear' or 'quadratic', as of `FreeDynamics`.
+/// lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
+/// model: the robot to which the positions q and their ⊕ belong; None for vectors of nv numbers.
+/// controls: 'constant', 'linear' or 'quadratic', as for `FreeDynamics`.
 ///
 /// Raises `ProblemError` if dt is not above 0.
 ///
@@ -50,13 +51,13 @@ use std::ops::Range;
 pub(crate) struct DifferentialAction {
     written: Written,
     bounds: Option<[Vec<f64>; 2]>,
-    /// None at the end.
+    /// Integrator and Δt; `None` at the terminal knot.
     step: Option<(Integrator, f64)>,
     controls: ControlPolynomial,
     model: Option<Py<Model>>,
 }
 
-/// What it and its copies in problems are made of.
+/// The parts of a `DifferentialAction`, which its copies in problems share.
 #[derive(Clone)]
 struct Written {
     nv: usize,
@@ -137,7 +138,7 @@ impl DifferentialAction {
 }
 
 impl DifferentialAction {
-    /// A copy for a problem, whose errors go to `fault`.
+    /// Copies the action for a problem; its errors are stored in `fault`.
     pub(in crate::optimal) fn boxed(&self, fault: &Fault) -> PyResult<Box<dyn ActionModel>> {
         let Written { nv, nu, space, .. } = &self.written;
         let groups = match space {
@@ -164,7 +165,7 @@ impl DifferentialAction {
     }
 }
 
-/// A `DifferentialAction` as the integrators call it.
+/// A `DifferentialAction` in the integrators' interface.
 struct OwnDynamics {
     written: Written,
     terminal: bool,
@@ -195,7 +196,8 @@ impl OwnDynamics {
         read().map_err(|error| named(py, "calc", &[t], error))
     }
 
-    /// Writes the derivatives of accelerations and of the cost; says whether it did, and else differences are to do it.
+    /// Writes the derivatives of the accelerations and of the cost. Returns whether it did; if not, differences must be
+    /// used.
     fn try_calc_diff(&mut self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2], node: &mut LqNode) -> PyResult<bool> {
         let Written { nv, nu, functions, space, way } = &self.written;
         if !functions.has(1) {
@@ -233,7 +235,7 @@ impl OwnDynamics {
         read().map_err(|error| named(py, "calc_diff", &[t], error))
     }
 
-    /// Writes the slopes of the accelerations, nv × (2 nv + nu), row after row.
+    /// Writes the derivatives of the accelerations, nv × (2 nv + nu), row by row.
     fn set_slopes(&mut self, slope: impl Fn(usize, usize) -> f64) {
         let (nv, nu) = (self.written.nv, self.written.nu);
         for i in 0..nv {
@@ -242,7 +244,7 @@ impl OwnDynamics {
         }
     }
 
-    /// The derivatives by central differences.
+    /// Computes the derivatives by central differences.
     fn differ(&mut self, t: usize, x: &[f64], u: &[f64], node: &mut LqNode) {
         let Written { nv, nu, .. } = self.written;
         let mut full = LqNode::zeros(2 * nv, nu);
@@ -265,7 +267,7 @@ impl OwnDynamics {
         }
     }
 
-    /// ℓ at a state; the accelerations stand in `a`. All are NaN if the function fails.
+    /// Computes ℓ at a state, and the accelerations in `a`. All are NaN if the function fails.
     fn value(&mut self, t: usize, x: &[f64], u: &[f64]) -> f64 {
         let fault = self.fault.clone();
         unless_failed(&fault, |py| self.try_calc(py, t, x, u)).unwrap_or_else(|| {
@@ -373,7 +375,7 @@ impl ContinuousModel for OwnDynamics {
     }
 }
 
-/// The accelerations as if they were the first numbers of a next state, for differences.
+/// The accelerations as the first numbers of a next state, for differences.
 struct Probe(OwnDynamics);
 
 impl ActionModel for Probe {

@@ -1,5 +1,5 @@
-//! Numbers that know their first and second derivatives in all directions, at several knots at a time: one call of a
-//! function that is written in Python differentiates it at all knots of a horizon.
+//! Numbers that carry their first and second derivatives in all directions, at several knots at a time. So one call of
+//! a Python function differentiates it at all knots of a horizon.
 //!
 //! ```text
 //! f(x):      g = f′ gₓ,                 H = f′ Hₓ + f″ gₓ gₓᵀ
@@ -11,7 +11,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pyclass::CompareOp;
 
-/// How many directions there are, and whether second derivatives are wanted.
+/// Number of directions, and whether second derivatives are wanted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Directions {
     pub n: usize,
@@ -19,12 +19,12 @@ pub(super) struct Directions {
 }
 
 impl Directions {
-    /// The numbers of a knot: the value, the gradient, and the Hessian's lower triangle, row after row.
+    /// Returns the number of values per knot: the value, the gradient, and the Hessian's lower triangle, row by row.
     pub(super) fn stride(self) -> usize {
         1 + self.n + if self.second { self.n * (self.n + 1) / 2 } else { 0 }
     }
 
-    /// The place of ∂²/∂i∂j of a knot.
+    /// Returns the index of ∂²/∂i∂j within a knot.
     pub(super) fn place(self, i: usize, j: usize) -> usize {
         let (i, j) = (i.max(j), i.min(j));
         1 + self.n + i * (i + 1) / 2 + j
@@ -36,11 +36,12 @@ impl Directions {
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(crate) struct Expansion {
     directions: Directions,
-    /// Knot after knot.
+    /// Values knot by knot.
     numbers: Vec<f64>,
 }
 
-/// The number of a knot, when there are several: what depends on it cannot be computed for all of them at once.
+/// Placeholder for the index t when several knots are computed in one call. A function that depends on t cannot be
+/// evaluated for all knots at once.
 #[pyclass(frozen, module = "condyle.optimal")]
 pub(super) struct SeveralKnots;
 
@@ -62,11 +63,11 @@ impl SeveralKnots {
 
 impl SeveralKnots {
     fn refused() -> PyErr {
-        PyTypeError::new_err("the number of the knot is not one number here")
+        PyTypeError::new_err("t: all knots are evaluated in one call here, so t cannot be used as one integer")
     }
 }
 
-/// The other number of an operation.
+/// The other operand of an operation.
 enum Other<'py> {
     Real(f64),
     Expansion(Bound<'py, Expansion>),
@@ -90,7 +91,7 @@ impl Expansion {
         Self { directions, numbers }
     }
 
-    /// A variable that is a direction itself, with these values at the knots.
+    /// Creates a variable that is one of the directions, with these values at the knots.
     pub(super) fn variable(directions: Directions, direction: usize, values: impl Iterator<Item = f64>) -> Self {
         let mut numbers = Vec::new();
         for value in values {
@@ -101,7 +102,7 @@ impl Expansion {
         Self { directions, numbers }
     }
 
-    /// A number that does not change, with these values at the knots.
+    /// Creates a constant, with these values at the knots.
     pub(super) fn constant(directions: Directions, values: impl Iterator<Item = f64>) -> Self {
         let mut numbers = Vec::new();
         for value in values {
@@ -111,7 +112,7 @@ impl Expansion {
         Self { directions, numbers }
     }
 
-    /// The numbers of a result with so many entries at each of some knots.
+    /// Reads a result with this number of entries at each of some knots.
     pub(super) fn read(
         what: &str,
         given: &Bound<'_, PyAny>,
@@ -133,13 +134,13 @@ impl Expansion {
         Ok(all)
     }
 
-    /// The numbers of a knot.
+    /// Returns the values of knot k.
     pub(super) fn knot(&self, k: usize) -> &[f64] {
         let stride = self.directions.stride();
         &self.numbers[k * stride..(k + 1) * stride]
     }
 
-    /// f of each knot, given as f, f′, f″ of a value.
+    /// Applies f at each knot; `f` maps a value to f, f′, f″.
     fn map(&self, f: impl Fn(f64) -> [f64; 3]) -> Self {
         let (d, mut numbers) = (self.directions, self.numbers.clone());
         for knot in numbers.chunks_exact_mut(d.stride()) {
@@ -159,7 +160,7 @@ impl Expansion {
         Self { directions: d, numbers }
     }
 
-    /// f of each knot and another number's, given as f, f_x, f_y, f_xx, f_xy, f_yy of two values.
+    /// Applies f to this and another number at each knot; `f` maps two values to f, f_x, f_y, f_xx, f_xy, f_yy.
     fn combine(&self, other: &Self, f: impl Fn(f64, f64) -> [f64; 6]) -> PyResult<Self> {
         let d = self.directions;
         if d != other.directions || self.numbers.len() != other.numbers.len() {
@@ -183,7 +184,7 @@ impl Expansion {
         Ok(Self { directions: d, numbers })
     }
 
-    /// Whether an order of two numbers holds, if it is the same at all knots.
+    /// Returns whether a comparison of two numbers holds; an error if knots differ in it.
     fn compare(&self, other: &Other<'_>, by: CompareOp) -> PyResult<bool> {
         let stride = self.directions.stride();
         let theirs = |k: usize| match other {
@@ -191,7 +192,7 @@ impl Expansion {
             Other::Expansion(x) => x.get().numbers[k * stride],
         };
         let holds = |(k, x): (usize, &f64)| {
-            let order = x.partial_cmp(&theirs(k)); // none beside NaN
+            let order = x.partial_cmp(&theirs(k)); // `None` if one is NaN
             order.map_or(matches!(by, CompareOp::Ne), |order| by.matches(order))
         };
         if matches!(other, Other::Expansion(x) if x.get().numbers.len() != self.numbers.len()) {
@@ -206,31 +207,31 @@ impl Expansion {
     }
 }
 
-/// x y, with its derivatives.
+/// Returns x y, with its derivatives.
 fn product(x: f64, y: f64) -> [f64; 6] {
     [x * y, y, x, 0.0, 1.0, 0.0]
 }
 
-/// x / y, with its derivatives.
+/// Returns x / y, with its derivatives.
 fn quotient(x: f64, y: f64) -> [f64; 6] {
     let r = 1.0 / y;
     [x / y, r, -x * r * r, 0.0, -r * r, 2.0 * x * r * r * r]
 }
 
-/// xᵖ of a number p, with its derivatives.
+/// Returns xᵖ for a constant p, with its derivatives.
 fn power(x: f64, p: f64) -> [f64; 3] {
     let derivative = |factor: f64, p: f64| if factor == 0.0 { 0.0 } else { factor * x.powf(p) };
     [x.powf(p), derivative(p, p - 1.0), derivative(p * (p - 1.0), p - 2.0)]
 }
 
-/// The angle of the point (x, y), with its derivatives by y and x.
+/// Returns the angle of the point (x, y), with its derivatives with respect to y and x.
 fn angle(y: f64, x: f64) -> [f64; 6] {
     let s = 1.0 / (x * x + y * y);
     let xy = 2.0 * x * y * s * s;
     [y.atan2(x), x * s, -y * s, -xy, (y * y - x * x) * s * s, xy]
 }
 
-/// The methods of a class: elementary functions, given with two derivatives, and others.
+/// Defines the methods of a class: elementary functions, given with two derivatives, and others.
 macro_rules! methods {
     ($class:ident { $($name:ident: $x:ident => $f:expr;)* } { $($others:tt)* }) => {
         #[pymethods]
@@ -325,7 +326,7 @@ Expansion {
             [value, l * value, l * l * value]
         })
     }
-    /// The angle of the point (x, self) in the plane.
+    /// Returns the angle of the point (x, self) in the plane.
     fn arctan2(&self, x: Other<'_>) -> PyResult<Self> {
         match x {
             Other::Real(x) => Ok(self.map(|y| {
@@ -335,7 +336,7 @@ Expansion {
             Other::Expansion(x) => self.combine(x.get(), angle),
         }
     }
-    /// The hypotenuse √(self² + other²).
+    /// Returns the hypotenuse √(self² + other²).
     fn hypot(&self, other: Other<'_>) -> PyResult<Self> {
         let square = match other {
             Other::Real(y) => self.square().map(|x| [x + y * y, 1.0, 0.0]),
@@ -354,7 +355,7 @@ Expansion {
 }
 }
 
-/// An array of objects with these numbers.
+/// Returns an array of objects with these numbers.
 pub(super) fn objects<'py>(py: Python<'py>, numbers: impl Iterator<Item = Expansion>) -> PyResult<Bound<'py, PyAny>> {
     let numbers = numbers.map(|number| Ok(Py::new(py, number)?.into_any())).collect::<PyResult<Vec<_>>>()?;
     Ok(PyArray1::from_vec(py, numbers).into_any())

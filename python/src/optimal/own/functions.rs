@@ -1,4 +1,4 @@
-//! Functions that are written in Python, and the errors that they raise during a solve.
+//! Python functions of the user, and the errors that they raise during a solve.
 
 use numpy::PyArray1;
 use pyo3::call::PyCallArgs;
@@ -7,16 +7,16 @@ use pyo3::gc::{PyTraverseError, PyVisit};
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The first error that the actions and constraints of a problem which are written in Python raised during a solve. From
-/// then on none of them is called.
+/// First error raised during a solve by the problem's actions and constraints that are written in Python. After it none
+/// of them is called.
 pub(in crate::optimal) type Fault = Arc<Mutex<Option<PyErr>>>;
 
-/// Two functions that are written in Python, mostly `calc` and `calc_diff`. Their object and its copies in problems share
-/// them, and only the object shows them to Python's collector of garbage: a problem shows its objects.
+/// Two Python functions, usually `calc` and `calc_diff`. Their object and its copies in problems share them. Only the
+/// object reports them to Python's garbage collector; a problem reports its objects.
 #[derive(Clone)]
 pub(in crate::optimal) struct Functions(Arc<Mutex<[Option<Py<PyAny>>; 2]>>);
 
-/// Two are equal if they are the same.
+/// Two values are equal if they share the same functions.
 impl PartialEq for Functions {
     fn eq(&self, other: &Self) -> bool {
         self.are(other)
@@ -24,12 +24,12 @@ impl PartialEq for Functions {
 }
 
 impl Functions {
-    /// `calc`, and `calc_diff` if there is one.
+    /// Stores `calc`, and `calc_diff` if it is given.
     pub(in crate::optimal) fn new(calc: Py<PyAny>, calc_diff: Option<Py<PyAny>>) -> PyResult<Self> {
         Self::named(["calc", "calc_diff"], calc, calc_diff)
     }
 
-    /// Functions that are arguments of these names.
+    /// Stores functions; `names` are the names of the arguments, for errors.
     pub(in crate::optimal) fn named(names: [&str; 2], first: Py<PyAny>, second: Option<Py<PyAny>>) -> PyResult<Self> {
         Python::attach(|py| {
             for (name, given) in names.into_iter().zip([Some(&first), second.as_ref()]) {
@@ -43,17 +43,17 @@ impl Functions {
         Ok(Self(Arc::new(Mutex::new([Some(first), second]))))
     }
 
-    /// Whether these are the same.
+    /// Returns whether both share the same functions.
     pub(in crate::optimal) fn are(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
-    /// References to them.
+    /// Returns new references to the functions.
     pub(in crate::optimal) fn clones(&self, py: Python<'_>) -> [Option<Py<PyAny>>; 2] {
         self.both().each_ref().map(|function| function.as_ref().map(|function| function.clone_ref(py)))
     }
 
-    /// The functions; the lock is never held while Python runs.
+    /// Locks the functions; the lock is never held while Python code runs.
     fn both(&self) -> MutexGuard<'_, [Option<Py<PyAny>>; 2]> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -62,7 +62,7 @@ impl Functions {
         self.both()[k].is_some()
     }
 
-    /// The result of function k.
+    /// Calls function k.
     pub(super) fn call<'py>(
         &self,
         py: Python<'py>,
@@ -74,7 +74,7 @@ impl Functions {
         function.ok_or_else(gone)?.bind(py).call1(arguments)
     }
 
-    /// The result of function k at (t, x, u).
+    /// Calls function k at (t, x, u).
     pub(super) fn at<'py>(
         &self,
         py: Python<'py>,
@@ -92,11 +92,12 @@ impl Functions {
 
     pub(in crate::optimal) fn clear(&self) {
         let functions = std::mem::take(&mut *self.both());
-        drop(functions); // what they call on their way out must not find the lock held
+        drop(functions); // dropped after the lock is released, since destructors may call Python code
     }
 }
 
-/// What a Python function gives, unless it raises an error, which is kept, or one of the problem's has before.
+/// Returns the result of a Python function. An error is stored instead; after the first error of the problem the
+/// function is not called.
 pub(super) fn unless_failed<T>(fault: &Fault, call: impl FnOnce(Python<'_>) -> PyResult<T>) -> Option<T> {
     let kept = || fault.lock().unwrap_or_else(PoisonError::into_inner);
     if kept().is_some() {

@@ -1,4 +1,4 @@
-//! Actions that are given by numbers: matrices, or a unicycle's.
+//! Actions that are defined by numbers: matrices, or the parameters of a unicycle.
 
 use super::MOST_SIZE;
 use crate::arrays::{Array, matrix, output, vector};
@@ -11,8 +11,8 @@ use rust::{ActionModel, LqNode};
 /// An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
 /// u ≤ upper.
 ///
-/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
-/// bound; without R and B it has no controls, as at a terminal knot. nx and nu are at most 4096.
+/// A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. None is zero, or no bound.
+/// Without R and B the action has no controls, as at a terminal knot. nx and nu are at most 4096.
 ///
 /// >>> from condyle.optimal import Lqr
 /// >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
@@ -70,11 +70,11 @@ impl Lqr {
 
 /// The action of a unicycle: x = (x, y, θ), u = (v, ω), x⁺ = x + Δt (v cos θ, v sin θ, ω).
 ///
-/// The cost is ½ (w₁² ‖x‖² + w₂² ‖u‖²); these are the rules of Crocoddyl's `ActionModelUnicycle`.
+/// The cost is ½ (w₁² ‖x‖² + w₂² ‖u‖²), as in Crocoddyl's `ActionModelUnicycle`.
 ///
 /// dt: Δt (s), above 0.
 /// weights: w₁ and w₂.
-/// terminal: whether it is an action of the end, without controls.
+/// terminal: whether the action is for the terminal knot, without controls.
 ///
 /// >>> from condyle.optimal import Fddp, Problem, Unicycle
 /// >>> problem = Problem([-1.0, -1.0, 1.0], [Unicycle()], [0] * 20, Unicycle(terminal=True))
@@ -107,7 +107,7 @@ impl Unicycle {
     }
 }
 
-/// Writes the part of a node that has this name.
+/// Writes the part `name` of a node.
 pub(in crate::optimal) fn write(node: &mut LqNode, name: &str, given: &Bound<'_, PyAny>) -> PyResult<()> {
     let LqNode { A, B, Q, S, R, f, q, r, lower, upper, .. } = node;
     let vectors = [("f", f), ("q", q), ("r", r), ("lower", lower), ("upper", upper)];

@@ -1,4 +1,4 @@
-//! Actions of one's own: given as matrices, or written in Python.
+//! Actions defined by the user: given as matrices, or written in Python.
 
 mod action;
 mod automatic;
@@ -20,5 +20,5 @@ pub(crate) use lqr::{Lqr, Unicycle};
 pub(super) use residual::{OwnFunction, faults};
 pub(super) use space::Space;
 
-/// The most numbers of a state, a control or a constraint: of their matrices there is one for each knot.
+/// Maximum size of a state, a control or a constraint; their matrices are stored once for each knot.
 pub(super) const MOST_SIZE: usize = condyle::optimal::LqNode::MOST_SIZE;

@@ -1,4 +1,4 @@
-//! Residuals, and costs, that are written in Python.
+//! Residuals and costs that are written in Python.
 
 use super::automatic::{Differentiated, Way, write_curvature};
 use super::functions::{Fault, Functions, unless_failed};
@@ -12,25 +12,25 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::any::Any;
 
-/// The step of central differences, about ε^⅓.
+/// Step of central differences, about ε^⅓.
 const STEP: f64 = 6e-6;
 
-/// The step of central differences of central differences, about ε^¼.
+/// Step of second central differences, about ε^¼.
 const SECOND_STEP: f64 = 1e-4;
 
 /// A residual of a robot that is written in Python.
 pub(in crate::optimal) struct OwnFunction {
     pub size: usize,
-    /// Whether it is a number with a gradient and a Hessian.
+    /// Whether it is a scalar cost with a gradient and a Hessian.
     pub number: bool,
     pub functions: Functions,
     pub space: Space,
     pub way: Way,
-    /// Its first error.
+    /// First error of the function.
     pub fault: Fault,
 }
 
-/// The places where the residuals of a knot that are written in Python leave their errors.
+/// Returns the error slots of a knot's residuals that are written in Python.
 pub(in crate::optimal) fn faults(knot: &Knot) -> Vec<Fault> {
     let costs = knot.costs.iter().chain(knot.costs_at.values().flatten());
     let limits = knot.limits.iter().chain(knot.limits_at.values().flatten());
@@ -89,7 +89,7 @@ impl OwnFunction {
         Ok(())
     }
 
-    /// Gradient and Hessian of a number: q, r, Q, S, R.
+    /// Computes gradient and Hessian of a scalar cost: q, r, Q, S, R.
     fn try_number(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2]) -> PyResult<LqNode> {
         let (ndx, nu) = (self.space.ndx(), u.len());
         let mut node = LqNode::zeros(ndx, nu);
@@ -121,7 +121,7 @@ impl OwnFunction {
         Ok(node)
     }
 
-    /// The Hessian of a number by central differences.
+    /// Computes the Hessian of a scalar cost by central differences.
     fn differ_twice(&self, py: Python<'_>, t: usize, [x, u]: [&[f64]; 2], node: &mut LqNode) -> PyResult<()> {
         let (ndx, n) = (self.space.ndx(), self.space.ndx() + u.len());
         let mut moved = x.to_vec();

@@ -1,4 +1,4 @@
-//! Spaces of states: vectors, a robot's states, or any with ⊕ and ⊖ that are written in Python.
+//! Spaces of states: vectors, a robot's states, or a space whose ⊕ and ⊖ are written in Python.
 
 use super::expansion::{Directions, Expansion, objects};
 use super::functions::{Fault, Functions, unless_failed};
@@ -11,19 +11,19 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
-/// The space in which states live.
+/// A space of states.
 #[derive(Clone)]
 pub(in crate::optimal) enum Space {
-    /// Vectors of so many numbers.
+    /// Vectors with this number of entries.
     Vector(usize),
     /// States (q, v) of a robot.
     Robot(Arc<condyle::Model>),
-    /// Any: the numbers of a state and of its changes, with `integrate` and `difference`.
+    /// User-defined: the sizes of a state and of its changes, with `integrate` and `difference`.
     Own(usize, usize, Functions),
 }
 
 impl Space {
-    /// The space that an argument names: a model, (ndx, integrate, difference), or none.
+    /// Reads the space from an argument: a model, (ndx, integrate, difference), or `None` for vectors.
     pub(super) fn new(nx: usize, given: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let Some(given) = given else { return Ok(Self::Vector(nx)) };
         if let Ok(model) = given.cast::<Model>() {
@@ -47,7 +47,7 @@ impl Space {
         ))
     }
 
-    /// The argument that names the space.
+    /// Returns the argument that defines the space.
     pub(super) fn argument<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         Ok(match self {
             Self::Vector(_) => None,
@@ -59,7 +59,7 @@ impl Space {
         })
     }
 
-    /// The functions that are written in Python.
+    /// Returns the functions that are written in Python, if there are any.
     pub(super) fn functions(&self) -> Option<&Functions> {
         match self {
             Self::Own(.., functions) => Some(functions),
@@ -67,7 +67,7 @@ impl Space {
         }
     }
 
-    /// Whether these are the same.
+    /// Returns whether both are the same space.
     pub(super) fn is(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Vector(a), Self::Vector(b)) => a == b,
@@ -92,7 +92,7 @@ impl Space {
         }
     }
 
-    /// What is wrong with a state that is none.
+    /// Checks a state; the error describes why it is invalid.
     pub(super) fn check(&self, x: &[f64]) -> Result<(), String> {
         match self {
             Self::Robot(model) => model.check_position(&x[..model.nq()]).map_err(|error| error.to_string()),
@@ -100,7 +100,7 @@ impl Space {
         }
     }
 
-    /// x ⊕ δ. Errors of functions that are written in Python go to `fault`, and make NaN.
+    /// Computes x ⊕ δ. Errors of Python functions are stored in `fault`; the result is NaN then.
     pub(super) fn integrate(&self, x: &[f64], dx: &[f64], out: &mut [f64], fault: &Fault) {
         match self {
             Self::Vector(_) => (0..out.len()).for_each(|k| out[k] = x[k] + dx[k]),
@@ -109,7 +109,7 @@ impl Space {
         }
     }
 
-    /// x₁ ⊖ x₀, likewise.
+    /// Computes x₁ ⊖ x₀; errors are handled as by `integrate`.
     pub(super) fn difference(&self, x0: &[f64], x1: &[f64], out: &mut [f64], fault: &Fault) {
         match self {
             Self::Vector(_) => (0..out.len()).for_each(|k| out[k] = x1[k] - x0[k]),
@@ -118,7 +118,8 @@ impl Space {
         }
     }
 
-    /// x ⊕ δ for the first directions δ, at several knots whose states lie one after the other.
+    /// Returns x ⊕ δ with derivatives in the first directions δ, at several knots; `xs` has the states of the knots one
+    /// after the other.
     pub(super) fn expand<'py>(&self, py: Python<'py>, d: Directions, xs: &[f64]) -> PyResult<Bound<'py, PyAny>> {
         let (nx, ndx) = (self.nx(), self.ndx());
         let each = |i: usize| xs.iter().skip(i).step_by(nx).copied();
@@ -140,8 +141,8 @@ impl Space {
         }
     }
 
-    /// The derivatives of x ⊖ x̄ by all directions, ndx × n numbers row after row, at each of several knots, for an x that
-    /// varies about x̄; `next` are its numbers.
+    /// Returns the derivatives of x ⊖ x̄ in all directions at each of several knots, ndx × n numbers row by row. x
+    /// varies about its value x̄; `next` has the numbers of x.
     pub(super) fn slopes(&self, py: Python<'_>, d: Directions, next: &[Expansion], knots: usize) -> PyResult<Vec<f64>> {
         let row = |y: &Expansion, k: usize| y.knot(k)[1..=d.n].to_vec();
         match self {
@@ -165,7 +166,7 @@ impl Space {
     }
 }
 
-/// A function of two vectors that is written in Python.
+/// Calls a Python function of two vectors.
 fn call(functions: &Functions, k: usize, what: &str, [a, b]: [&[f64]; 2], out: &mut [f64], fault: &Fault) {
     let written = unless_failed(fault, |py| {
         let result = functions.call(py, k, (PyArray1::from_slice(py, a), PyArray1::from_slice(py, b)))?;
@@ -189,8 +190,8 @@ fn robot_difference<S: Scalar>(model: &condyle::Model, x0: &[S], x1: &[S], out: 
     (0..nv).for_each(|k| out[nv + k] = x1[nq + k] - x0[nq + k]);
 }
 
-/// Appends q ⊕ δq, v + δv of one knot, by hyper-dual numbers: only pairs of directions of one joint matter, but all of
-/// them are asked, since this knows no joints.
+/// Appends q ⊕ δq, v + δv of one knot, computed by hyper-dual numbers. Only pairs of directions of one joint are
+/// coupled, but all pairs are computed, since the joints are not known here.
 fn expand_robot(model: &condyle::Model, d: Directions, x: &[f64], numbers: &mut [Vec<f64>]) {
     let (ndx, nv) = (2 * model.nv(), model.nv());
     let start = numbers[0].len();
@@ -219,7 +220,7 @@ fn expand_robot(model: &condyle::Model, d: Directions, x: &[f64], numbers: &mut 
     }
 }
 
-/// The derivatives of x ⊖ x̄ of one knot.
+/// Returns the derivatives of x ⊖ x̄ at one knot.
 fn robot_slopes(model: &condyle::Model, d: Directions, next: &[Expansion], k: usize) -> Vec<f64> {
     let ndx = 2 * model.nv();
     let centre: Vec<Hyper> = next.iter().map(|y| Hyper::splat(y.knot(k)[0])).collect();
@@ -239,7 +240,7 @@ fn robot_slopes(model: &condyle::Model, d: Directions, next: &[Expansion], k: us
     slopes
 }
 
-/// x ⊕ δ of a robot's or a vector's state, with δ in two directions.
+/// Returns x ⊕ δ for a state of a robot or a vector, with δ in two directions.
 pub(super) fn hyper_state<'py>(
     py: Python<'py>,
     space: &Space,
@@ -253,7 +254,7 @@ pub(super) fn hyper_state<'py>(
     })
 }
 
-/// The derivatives of x ⊖ x̄ by two directions.
+/// Returns the derivatives of x ⊖ x̄ in two directions.
 pub(super) fn hyper_slopes(space: &Space, next: &[Hyper]) -> Vec<[f64; 2]> {
     let centre: Vec<Hyper> = next.iter().map(|y| Hyper::splat(y.value())).collect();
     let mut change = vec![Hyper::zero(); space.ndx()];
