@@ -150,8 +150,8 @@ def main() -> None:
     cppadcg = dynamics.build_pinocchio(python, "cppadcg", "-O1", "cmeel-cppad==20250000.2", "cmeel-cppadcodegen==2.4.3")
     if not options.json:
         print(f"{compiler()} {' '.join(FLAGS)}, {options.rounds} rounds\n")
-        columns = "robot function operations ours_ns Pinocchio_ns ratio CppADCodeGen_ns ratio KB compiled_s".split()
-        print("| " + " | ".join(column.replace("_", " ") for column in columns) + " |")
+        columns = "robot,function,operations,ours ns,Pinocchio ns,ratio,CppADCodeGen ns,ratio,KB,compiled s"
+        print(f"| {columns.replace(',', ' | ')} |")
         print("| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |")
     files = []
     for robot in options.robots:

@@ -127,7 +127,8 @@ def passages(path: str) -> list[Passage]:
         return []
     text = file.read_text(encoding="utf-8")
     reader = {".rs": rust, ".cpp": rust, ".h": rust, ".py": python, ".md": markdown}[file.suffix]
-    return [passage for passage in reader(path, text) if re.search(r"[a-z]{3}", passage.text)]
+    found = (passage for passage in reader(path, text) if not passage.text.startswith(">>>"))
+    return [passage for passage in found if re.search(r"[a-z]{3}", passage.text)]
 
 
 def sentences(text: str) -> list[str]:
