@@ -173,7 +173,7 @@ impl<S: Scalar> Vec3<S> {
     pub fn norm_squared(self) -> S {
         self.dot(self)
     }
-    /// Returns the matrix [a]ₓ with [a]ₓ b = a × b.
+    /// Returns the matrix `[a]ₓ` with `[a]ₓ b = a × b`.
     #[inline(always)]
     pub fn skew(self) -> Mat3<S> {
         let o = S::zero();

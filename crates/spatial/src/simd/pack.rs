@@ -359,6 +359,7 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
 /// let four = condyle_spatial::moves::sum(condyle_spatial::Scalar::splat(1.0));
 /// ```
 ///
+/// # Safety
 /// The implementer uses vectors only where the processor has their instructions: in kernels that were entered through
 /// `Scalar::enter`, and in functions that were called at the level of the vectors.
 pub unsafe trait Witness: 'static {}
