@@ -1,4 +1,4 @@
-//! Several quadrupeds on their feet in one model: what each costs, beside what one costs alone: `cargo bench --bench islands`,
+//! Several quadrupeds on their feet in one model: what each costs, beside what one costs alone: `cargo bench -p condyle-benches --bench islands`,
 //! in µs. A second table has the same robots as models of their own, one after the other and shared by threads: the most that
 //! islands solved in parallel could gain. `islands.py` runs this under callgrind, which sees the functions by their names, and prints instructions.
 
