@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Runs the Python blocks of the book, and checks its structure.
 
-    python docs/run.py                   # all pages, then the structure
-    python docs/run.py rnea.md           # one page, after its predecessors
-    python docs/run.py --write aba.md    # writes the output into the page
+    python docs/run.py                   # all pages
+    python docs/run.py rnea.md           # one page, with its predecessors
+    python docs/run.py --write aba.md    # one page; writes its output
 
 Each chapter is one program. It may continue other chapters: `<!-- goes on from: trees.md -->` in its first lines. A
 block ```text directly after a block ```python holds the output of that block. Rust blocks are doctests of the crate
