@@ -122,6 +122,14 @@ pub mod tree {
 /// Rust code blocks of the book, run as doctests.
 #[cfg(doctest)]
 mod book {
+    #[doc = include_str!("../docs/inspect.md")]
+    mod inspect {}
+    #[doc = include_str!("../docs/simulate.md")]
+    mod simulate {}
+    #[doc = include_str!("../docs/differentiate.md")]
+    mod differentiate {}
+    #[doc = include_str!("../docs/deploy.md")]
+    mod deploy {}
     #[doc = include_str!("../docs/lanes.md")]
     mod lanes {}
     #[doc = include_str!("../docs/derivatives.md")]
