@@ -1,4 +1,4 @@
-"""Functions of the book: the identities of `factorisation.md` on all robots of example-robot-data; sizes of subtrees."""
+"""Functions of the book: the identities of `factorisation.md` on robots of example-robot-data; sizes of subtrees."""
 
 import importlib.util
 from pathlib import Path
