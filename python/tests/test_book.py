@@ -168,6 +168,17 @@ MISTAKES = {
         ],
     ),
     "exercises.md": ("def rnea(", "arm = planar_arm([0.5, 0.3], [2.0, 1.0])", RNEA),
+    "exercises.md#seven-joints": (
+        "def rnea_with_forces(",
+        'condyle.ModelBuilder("seven joints")',
+        [
+            (" - f_ext[i]", ""),
+            (" - f_ext[i]", " + f_ext[i]"),
+            (" + cross(vel[i]) @ vJ", ""),
+            (" + cross_dual(vel[i]) @ tree.I[i] @ vel[i]", ""),
+            ("        f[tree.parent[i]] += tree.up[i].T @ f[i]\n", ""),
+        ],
+    ),
     "exercises.md#three-ways": (
         "def by_energy(",
         "slopes = [by_energy(",
