@@ -17,6 +17,7 @@
 
 #[cfg(feature = "page")]
 mod dae;
+mod ears;
 #[cfg(feature = "page")]
 mod find;
 mod hull;

@@ -193,6 +193,19 @@ fn files_of_meshes() {
     }
 }
 
+/// `body_mass` and `body_ipos` of MuJoCo 4.0.0. As a fan from its first corner, the face would give 17500 kg.
+#[test]
+fn faces_of_five_corners_that_are_in_no_plane() {
+    let mut obj = "v 3 1 0\nv 5 1 0.5\nv 6 3 0\nv 4 5 1\nv 2 3 -0.5\nv 4 2 -5\nf 1 2 3 4 5\n".to_owned();
+    obj += "f 6 2 1\nf 6 3 2\nf 6 4 3\nf 6 5 4\nf 6 1 5\n";
+    let main = robot("<asset><mesh file='a.obj'/></asset>", "<body><joint/><geom type='mesh' mesh='a'/></body>", "");
+    let files: [(&str, &[u8]); 2] = [("main.xml", main.as_bytes()), ("a.obj", obj.as_bytes())];
+    let found = Folder::new("pentagon", &files).read("main.xml").unwrap();
+    near("mass", &[found.total_mass()], &[18166.666666666668], 1e-12);
+    let com = found.bodies()[1].inertia.mass_com.scale(1.0 / found.total_mass());
+    near("com", &com.to_array(), &[4.033256880733944, 2.561926605504587, -1.0057339449541285], 1e-12);
+}
+
 #[test]
 fn meshes_that_cannot_be() {
     let flat = "<asset><mesh name='m' vertex='0 0 0 1 0 0 0 1 0 1 1 0'/></asset>";
