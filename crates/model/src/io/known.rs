@@ -58,6 +58,7 @@ impl Known {
 
     /// Warns of all that is not known in an element, whose type is its tag, and of what a model cannot hold.
     pub(crate) fn check(&self, root: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
+        warnings.extend(root.outside());
         if let Some((&name, _)) = self.types.get_key_value(root.tag.as_str()) {
             self.check_as(name, root, left_out, warnings);
             if warnings.len() >= MAX_WARNINGS {

@@ -42,6 +42,8 @@ pub(crate) struct Element {
     pub(crate) at: usize,
     /// The index of the file with settings of its own that the element is from; 0 for the main one.
     pub(crate) source: usize,
+    /// Line and description of the first thing outside of a root element, which has no effect.
+    pub(crate) stray: Option<Box<(u32, String)>>,
 }
 
 /// The amount of text that has been read for one robot.
@@ -182,6 +184,13 @@ impl Element {
     /// Returns the warning of an unknown, misspelt or misplaced name in this element.
     pub(crate) fn unknown(&self, what: impl Into<String>) -> Warning {
         Warning::Unknown { place: self.place(), element: self.label(), what: what.into() }
+    }
+
+    /// Returns the warning of what is outside of this root element.
+    pub(crate) fn outside(&self) -> Option<Warning> {
+        let (line, what) = &**self.stray.as_ref()?;
+        let place = Place { line: *line, ..self.place() };
+        Some(Warning::Unknown { place, element: self.label(), what: what.clone() })
     }
 
     /// Returns the warning of something in this element that a model cannot hold.

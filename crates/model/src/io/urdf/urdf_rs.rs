@@ -13,7 +13,7 @@ impl Model {
     /// `urdf_rs::Robot` does not have.
     ///
     /// - A limit that is missing has zeros there. Zeros of a continuous joint are taken as no limit; zeros of a revolute or prismatic
-    ///   joint stay, and warn. A missing effort is no error.
+    ///   joint stay, and warn.
     /// - A planar joint without an axis has 1 0 0, and no warning that says so.
     /// - Versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions, frames and joints of Drake, and all
     ///   that is unknown or left out are not there: they have neither effect nor warning.
@@ -68,6 +68,7 @@ fn element(tag: &str, attributes: &[(&str, &str)], children: Vec<Element>) -> El
         line: 1,
         at: 0,
         source: 0,
+        stray: None,
     }
 }
 
