@@ -102,6 +102,9 @@ impl Description {
         }
         (model.springs, model.gravity_compensation) = (self.springs, self.gravity_compensation);
         (model.actuators, model.keyframes, model.constraints) = (self.actuators, self.keyframes, self.constraints);
+        for keyframe in model.keyframes.iter_mut().filter(|keyframe| keyframe.control.is_empty()) {
+            keyframe.control = vec![0.0; model.actuators.len()]; // of a version that had no controls
+        }
         // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
         let warned: BTreeSet<&str> = warnings
             .iter()
