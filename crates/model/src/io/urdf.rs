@@ -49,8 +49,10 @@ impl Model {
     ///
     /// - A planar joint moves in the plane normal to its axis, 1 0 0 if it is missing, as the format and Drake have it: the z of
     ///   its frame is the axis, by the shortest rotation. Pinocchio's plane is always normal to z.
-    /// - A revolute or prismatic joint needs a limit with effort and velocity. A continuous one may have either. A negative effort
-    ///   or velocity is no limit, and neither are position limits in reverse order; both warn.
+    /// - A revolute or prismatic joint has a limit with effort and velocity. What is missing does not limit, and warns. A continuous
+    ///   joint may have either. A negative effort or velocity is no limit, and neither are position limits in reverse order; both
+    ///   warn.
+    /// - A joint whose parent is `world` is on the world if no link has that name, as Drake has it, and warns.
     /// - A `<transmission>` with a rotor's inertia J (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a reduction n
     ///   (`mechanicalReduction`, `drake:gear_ratio`) gives armature n² J. A reduction alone warns.
     /// - Drake's `<frame>`s are frames, its joints `ball`, `screw` and `planar` are joints.
