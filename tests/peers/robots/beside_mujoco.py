@@ -85,9 +85,9 @@ def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
         joints.append(Joint(i, int(mj.jnt_qposadr[j]), int(mj.jnt_dofadr[j])))
         carried[i] = int(mj.jnt_bodyid[j])
     found.expect("gravity", model.gravity, gravity(mj))
+    friction = np.zeros(mj.nv) if disabled(mj, "FRICTIONLOSS") else mj.dof_frictionloss
     compare(found, mj, joints, carried)
     found.expect("armature", model.armature, mj.dof_armature, found.coordinate)
-    friction = np.zeros(mj.nv) if disabled(mj, "FRICTIONLOSS") else mj.dof_frictionloss
     found.expect("friction", model.friction, friction, found.coordinate)
     ours, theirs = np.stack([model.limits.effort_lower, model.limits.effort_upper], 1), efforts(mj)
     ours[np.isnan(theirs)] = np.nan

@@ -128,7 +128,7 @@ def test_efforts_of_a_plugin() -> None:
 
 @pytest.mark.parametrize(
     "flag",
-    "gravity equality limit frictionloss constraint spring damper passive actuation clampctrl contact".split(),
+    "gravity equality limit frictionloss constraint spring damper actuation clampctrl contact".split(),
 )
 def test_flags(tmp_path: Path, flag: str) -> None:
     """What a flag disables is no part of the model, as in MuJoCo."""
