@@ -52,14 +52,24 @@ pub enum Format {
 }
 
 /// The points of a mesh, and its triangles by the points' indices, counter-clockwise from outside; nothing is made smaller. Of
-/// an OBJ with several objects or groups, triangles of the first one and points of all: as MuJoCo reads it.
+/// an OBJ with several objects or groups, triangles of the first one and points of all: as MuJoCo reads it. As there, faces with
+/// more than 100 corners are left out, and parts of faces that have no ear to cut off.
 ///
 /// # Errors
 /// The fault of the file, with the line if it is an OBJ or an STL of text.
 pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
-    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    cut_triangles(format, bytes).map(|(triangles, _)| triangles)
+}
+
+/// As [`triangles`], with the number of faces of an OBJ of which triangles are left out.
+///
+/// # Errors
+/// As those of [`triangles`].
+#[doc(hidden)]
+pub fn cut_triangles(format: Format, bytes: &[u8]) -> Result<(Triangles, usize), String> {
+    let (mut points, mut triangles, mut lost) = (Vec::new(), Vec::new(), 0);
     if format == Format::Obj {
-        (points, triangles) = obj::first(&text(bytes))?;
+        (points, triangles, lost) = obj::first(&text(bytes))?;
     } else {
         for part in format.read(bytes, &|_| None)? {
             let first = points.len() as u32;
@@ -67,7 +77,7 @@ pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
             triangles.extend(part.triangles.into_iter().map(|t| t.map(|corner| first + corner)));
         }
     }
-    Ok((points, triangles))
+    Ok(((points, triangles), lost))
 }
 
 /// A text without the mark of byte order that some editors put first.

@@ -204,6 +204,17 @@ fn faces_of_five_corners_that_are_in_no_plane() {
     near("mass", &[found.total_mass()], &[18166.666666666668], 1e-12);
     let com = found.bodies()[1].inertia.mass_com.scale(1.0 / found.total_mass());
     near("com", &com.to_array(), &[4.033256880733944, 2.561926605504587, -1.0057339449541285], 1e-12);
+    assert!(found.warnings().is_empty());
+    // a face without an ear
+    let obj = obj.replace(
+        "f 1 2 3 4 5",
+        "v 3 0 -0.5\nv 3 3 -0.5\nv -3 1 0\nv -2 -1 -1\nv 2 2 0.5\nf 1 2 3 4 5\nf 7 8 9 10 11 9",
+    );
+    let files: [(&str, &[u8]); 2] = [("main.xml", main.as_bytes()), ("a.obj", obj.as_bytes())];
+    let found = Folder::new("no-ear", &files).read("main.xml").unwrap();
+    near("mass", &[found.total_mass()], &[18166.666666666668], 1e-12);
+    let said = "mesh `a`: 1 of its faces are not cut into triangles, or in part, as in MuJoCo: its surface has holes";
+    assert!(found.warnings().iter().any(|warning| warning.to_string().ends_with(said)), "{:?}", found.warnings());
 }
 
 #[test]
