@@ -66,7 +66,7 @@ const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default clas
 
 /// An MJCF of several files: the others are [`FILES`].
 const INCLUDES: &str = r#"<mujoco><asset><model name="m" file="child.xml"/><mesh name="o" file="face.obj"/></asset><worldbody>
-<body name="b"><joint/><geom type="mesh" mesh="o"/><include file="part.xml"/><frame pos="0 0 1"><attach model="m" body="c" prefix="x-"/>
+<body name="b"><joint name="i"/><geom type="mesh" mesh="o"/><include file="part.xml"/><frame pos="0 0 1"><attach model="m" body="c" prefix="x-"/>
 </frame></body></worldbody></mujoco></mujoco>"#;
 
 /// An SDF of several files.
@@ -76,7 +76,7 @@ const MODELS: &str = r#"<sdf version="1.9"><world name="w"><include><uri>part.sd
 
 /// Files in the folder of a file that is read, by name.
 const FILES: [(&str, &str); 4] = [
-    ("part.xml", "<mujocoinclude><body name='p'><joint type='slide'/><geom size='1'/></body></mujocoinclude>"),
+    ("part.xml", "<mujocoinclude><body name='p'><joint name='s' type='slide'/><geom size='1'/></body></mujocoinclude>"),
     (
         "child.xml",
         "<mujoco><compiler angle='radian'/><worldbody><body name='c'><joint name='q' range='-1 1'/><geom size='1'/></body></worldbody>

@@ -224,3 +224,10 @@ fn things_outside_of_the_root_element_warn() {
     let said = format!("<string>:1: <sdf>: {text}");
     assert!(model.warnings().iter().any(|warning| warning.to_string() == said), "{:?}", model.warnings());
 }
+
+#[test]
+fn names_that_begin_with_a_colon() {
+    let plain = Model::well_formed("<robot><:a b:c='1' :d='2'/></robot>").unwrap();
+    assert_eq!(plain, "<robot><_a b-c=\"1\" _d=\"2\"></_a></robot>");
+    assert_eq!(Model::well_formed(&plain).unwrap(), plain);
+}
