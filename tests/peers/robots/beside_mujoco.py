@@ -147,12 +147,12 @@ def disabled(mj: mujoco.MjModel, constraint: str) -> bool:
 def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: dict[int, int]) -> None:
     """Compares mass, limits of position, M, bias, poses of bodies, frames of bodies and sites."""
     model, data = found.model, mujoco.MjData(mj)
-    found.expect("total mass", model.total_mass, mj.body_mass.sum())
     positions(found, mj, joints)
     warnings = " ".join(map(str, model.warnings))
     for words, why, quantities in WARNED:
         if words in warnings:
             found.leave_out(why, *quantities)
+    found.expect("total mass", model.total_mass, mj.body_mass.sum())
     if mj.neq and not disabled(mj, "EQUALITY"):
         found.spoken(
             "equality", "follow", "mimic", "connect", "weld", "it is not held", held=bool(found.model.constraints())
