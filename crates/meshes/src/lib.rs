@@ -69,7 +69,7 @@ pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
 pub fn cut_triangles(format: Format, bytes: &[u8]) -> Result<(Triangles, usize), String> {
     let (mut points, mut triangles, mut lost) = (Vec::new(), Vec::new(), 0);
     if format == Format::Obj {
-        (points, triangles, lost) = obj::first(&text(bytes))?;
+        ((points, triangles), lost) = obj::first(&text(bytes))?;
     } else {
         for part in format.read(bytes, &|_| None)? {
             let first = points.len() as u32;

@@ -7,26 +7,30 @@ use std::collections::HashMap;
 /// A colour, and the triangles that have it.
 type Group = (Option<[f64; 3]>, Vec<Triangle>);
 
+/// Contents of an OBJ.
+struct Mesh {
+    points: Vec<[f64; 3]>,
+    /// Triangles by material.
+    groups: Vec<Group>,
+    /// Number of faces of which triangles are left out.
+    lost: usize,
+}
+
 /// The triangles of an OBJ, a part for each material; `library` gives the text of a material file by its name.
 pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
-    let (points, groups, _) = parse(text, library, false)?;
+    let Mesh { points, groups, .. } = parse(text, library, false)?;
     let part = |(color, triangles): Group| Part::of(&points, triangles, color);
     Ok(groups.into_iter().filter(|group| !group.1.is_empty()).map(part).collect())
 }
 
 /// All points of an OBJ, the triangles of its first object or group, and the number of faces of which triangles are left out.
-pub(super) fn first(text: &str) -> Result<(Vec<[f64; 3]>, Vec<Triangle>, usize), String> {
-    let (points, groups, lost) = parse(text, &|_| None, true)?;
-    Ok((points, groups.into_iter().flat_map(|group| group.1).collect(), lost))
+pub(super) fn first(text: &str) -> Result<(super::Triangles, usize), String> {
+    let Mesh { points, groups, lost } = parse(text, &|_| None, true)?;
+    Ok(((points, groups.into_iter().flat_map(|group| group.1).collect()), lost))
 }
 
-/// The points of an OBJ, its triangles by material (all, or only its first object or group), and the number of faces of which
-/// triangles are left out.
-fn parse(
-    text: &str,
-    library: &dyn Fn(&str) -> Option<String>,
-    only_first: bool,
-) -> Result<(Vec<[f64; 3]>, Vec<Group>, usize), String> {
+/// Reads an OBJ: all of it, or its first object or group.
+fn parse(text: &str, library: &dyn Fn(&str) -> Option<String>, only_first: bool) -> Result<Mesh, String> {
     let (mut points, mut colours) = (Vec::new(), HashMap::new());
     let mut groups: Vec<Group> = vec![(None, Vec::new())];
     let (mut of_material, mut group, mut count, mut skipped) = (HashMap::new(), 0, 0, false);
@@ -73,7 +77,7 @@ fn parse(
             _ => {}
         }
     }
-    Ok((points, groups, ears.lost))
+    Ok(Mesh { points, groups, lost: ears.lost })
 }
 
 /// The diffuse colours of a material file, by name.
@@ -109,12 +113,12 @@ mod tests {
     #[test]
     fn first_object_with_the_points_of_all() {
         let text = TEXT.replace("usemtl none", "o second\nv 5 5 5");
-        let (points, triangles, lost) = first(&text).unwrap();
+        let ((points, triangles), lost) = first(&text).unwrap();
         assert_eq!((points.len(), triangles), (5, vec![[0, 1, 3], [1, 2, 3]])); // both diagonals are as long
         assert_eq!(lost, 0);
         let long = first(&TEXT.replace("v 0 1 0", "v -9 9 0")).unwrap();
-        assert_eq!(long.1[..2], [[0, 1, 2], [0, 2, 3]]); // along the shorter diagonal
-        assert_eq!(first(TEXT).unwrap().1.len(), 3); // a material is no object
+        assert_eq!(long.0.1[..2], [[0, 1, 2], [0, 2, 3]]); // along the shorter diagonal
+        assert_eq!(first(TEXT).unwrap().0.1.len(), 3); // a material is no object
     }
 
     #[test]
