@@ -32,8 +32,8 @@ COMMANDS = {
     "casadi": ".venv/pinocchio/bin/python benches/peers/casadi_comparison.py",
     "generated": "CC=clang-19 .venv/pinocchio/bin/python benches/generated.py --cpu 1",
     "slopes": ".venv/pinocchio/bin/python docs/pictures/slopes.py",
-    "factorisation": "cargo bench -p condyle-benches --bench factorisation",
-    "divide_conquer": "cargo bench -p condyle-benches --bench divide_conquer",
+    "factorisation": "cargo bench --profile release -p condyle-benches --bench factorisation",
+    "divide_conquer": "cargo bench --profile release -p condyle-benches --bench divide_conquer",
 }
 """Command that measures each part."""
 WITHOUT_OPTION = ("casadi", "slopes")

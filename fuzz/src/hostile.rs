@@ -14,6 +14,7 @@ use condyle_meshes::{Format, Meshes};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 /// Format in which a robot or a problem comes from outside.
@@ -59,7 +60,35 @@ const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default clas
 <mesh name="s" builtin="supersphere" params="5 0.5 1.5"/></asset><worldbody><replicate count="3" offset="1 0 0" euler="0 0 30" sep="-">
 <body name="b" childclass="c"><joint name="j" range="-9 9"/><geom type="mesh" mesh="m"/><frame name="f" pos="0 0 1"><camera name="v"/>
 <site name="p" type="capsule" size="0.1" fromto="0 0 0 1 1 1"/></frame></body></replicate><body name="o"><freejoint align="true"/>
-<geom type="box" mesh="s"/></body><attach body="b-1" prefix="x"/></worldbody><actuator><motor joint="j" gear="2"/></actuator></mujoco>"#;
+<geom type="box" mesh="s"/></body><attach body="b-1" prefix="x"/></worldbody><actuator><motor joint="j" gear="2"/>
+<intvelocity joint="j" kp="3" actrange="-1 1"/><pid joint="j" kp="1" ki="2"/></actuator><keyframe>
+<key name="k" ctrl="1 2 3" act="0.5"/></keyframe></mujoco>"#;
+
+/// An MJCF of several files: the others are [`FILES`].
+const INCLUDES: &str = r#"<mujoco><asset><model name="m" file="child.xml"/><mesh name="o" file="face.obj"/></asset><worldbody>
+<body name="b"><joint name="i"/><geom type="mesh" mesh="o"/><include file="part.xml"/><frame pos="0 0 1"><attach model="m" body="c" prefix="x-"/>
+</frame></body></worldbody></mujoco></mujoco>"#;
+
+/// An SDF of several files.
+const MODELS: &str = r#"<sdf version="1.9"><world name="w"><include><uri>part.sdf</uri><name>a</name><pose>1 0 0 0 0 0</pose></include>
+<include merge="true"><uri>part.sdf</uri><name>b</name></include><joint name="j" type="ball"><parent>world</parent><child>a::l</child></joint>
+</world></sdf>"#;
+
+/// Files in the folder of a file that is read, by name.
+const FILES: [(&str, &str); 4] = [
+    ("part.xml", "<mujocoinclude><body name='p'><joint name='s' type='slide'/><geom size='1'/></body></mujocoinclude>"),
+    (
+        "child.xml",
+        "<mujoco><compiler angle='radian'/><worldbody><body name='c'><joint name='q' range='-1 1'/><geom size='1'/></body></worldbody>
+        <actuator><motor name='a' joint='q'/></actuator></mujoco>",
+    ),
+    ("part.sdf", "<sdf version='1.7'><model name='m'><link name='l'/><frame name='f'/></model></sdf>"),
+    ("face.obj", POLYGONS),
+];
+
+/// An OBJ with faces of many corners, in no plane and concave.
+const POLYGONS: &str = "v 3 1 0\nv 5 1 0.5\nv 6 3 0\nv 4 5 1\nv 2 3 -0.5\nv 4 2 -5\nf 1 2 3 4 5\nf 6 2 1\nf 6 3 2\nf 6 4 3\nf 6 5 4\n\
+f 6 1 5\nf 5 4 6 3 2 1\n";
 
 impl Kind {
     /// Returns the seeds, which are all valid.
@@ -81,9 +110,9 @@ impl Kind {
                 let defaults = file!("arm_defaults.xml").replace("<mujoco>", "").replace("</mujoco>", "");
                 let arm = file!("arm.xml").replace("<include file=\"arm_defaults.xml\"/>", &defaults);
                 let others = [file!("quadruped.xml"), file!("gripper.xml"), mesh!("boxes.xml")];
-                [arm, COPIES.to_owned()].into_iter().chain(others.map(str::to_owned)).collect()
+                [arm, COPIES.to_owned(), INCLUDES.to_owned()].into_iter().chain(others.map(str::to_owned)).collect()
             }
-            Self::Sdf => vec![file!("linkage.sdf").to_owned()],
+            Self::Sdf => vec![file!("linkage.sdf").to_owned(), MODELS.to_owned()],
             Self::Srdf => vec![file!("quadruped.srdf").to_owned()],
             Self::Model => {
                 models().iter().map(|m| serde_json::to_string(m).expect("is made of numbers and words")).collect()
@@ -92,7 +121,7 @@ impl Kind {
                 problems().iter().map(|p| serde_json::to_string(p).expect("is made of numbers and words")).collect()
             }
             Self::Stl => return vec![mesh!("box.stl").into(), binary_stl()],
-            Self::Obj => vec![mesh!("box.obj").to_owned()],
+            Self::Obj => vec![mesh!("box.obj").to_owned(), POLYGONS.to_owned()],
             Self::Dae => vec![mesh!("box.dae").to_owned()],
             Self::Pickle => return models().iter().map(|m| postcard::to_allocvec(m).expect("has room")).collect(),
         };
@@ -118,17 +147,32 @@ impl Kind {
                     assert_eq!(Model::well_formed(&plain).as_ref(), Ok(&plain), "a text for other parsers");
                 }
                 let options = UrdfOptions { root_joint, mimic: other, ..UrdfOptions::default() };
-                Model::from_urdf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
+                let model = Model::from_urdf_str(&text, &options);
+                if let (Ok(model), true) = (&model, input.len().is_multiple_of(5)) {
+                    write(self, model, &text, |model, new, original| model.write_urdf(new, original));
+                }
+                model.map(|model| use_model(&model)).map_err(|e| e.to_string())
             }
             Self::Mjcf => {
                 let poses = condyle_meshes::mjcf::visuals(&text).into_iter().map(|visual| visual.pose.to_homogeneous());
                 assert!(poses.flat_map(|pose| pose.as_slice().to_vec()).all(f64::is_finite), "a mesh is nowhere");
                 let options = MjcfOptions { mimic: some, weightless_meshes: other, ..MjcfOptions::default() };
-                Model::from_mjcf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
+                let model = match text.contains("file=") {
+                    true => Model::from_mjcf(in_folder(self, &text), &options),
+                    false => Model::from_mjcf_str(&text, &options),
+                };
+                if let (Ok(model), true) = (&model, input.len().is_multiple_of(5)) {
+                    write(self, model, &text, |model, new, original| model.write_mjcf(new, original));
+                }
+                model.map(|model| use_model(&model)).map_err(|e| e.to_string())
             }
             Self::Sdf => {
                 let options = SdfOptions { root_joint, mimic: other, ..SdfOptions::default() };
-                Model::from_sdf_str(&text, &options).map(|model| use_model(&model)).map_err(|e| e.to_string())
+                let model = match text.contains("uri>") {
+                    true => Model::from_sdf(in_folder(self, &text), &options),
+                    false => Model::from_sdf_str(&text, &options),
+                };
+                model.map(|model| use_model(&model)).map_err(|e| e.to_string())
             }
             Self::Srdf => {
                 let positions = robots::quadruped().reference_configurations_str(&text, some);
@@ -229,8 +273,37 @@ fn problems() -> Vec<RobotProblem> {
     ]
 }
 
-/// Checks that inverse dynamics and the inertia matrix at the neutral position are finite. If this matrix is
-/// invertible, also checks forward dynamics at another position (at the neutral position, axes may coincide).
+/// Puts a text into a folder with [`FILES`], and returns its path.
+fn in_folder(kind: Kind, text: &str) -> PathBuf {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    let folder = FOLDER.get_or_init(|| {
+        let folder = std::env::temp_dir().join(format!("condyle-hostile-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).expect("a folder for files");
+        for (name, text) in FILES {
+            std::fs::write(folder.join(name), text).expect("a file");
+        }
+        folder
+    });
+    let path = folder.join(format!("{kind:?}.txt"));
+    std::fs::write(&path, text).expect("a file");
+    path
+}
+
+/// Writes a robot with other armature into a copy of its file: an error, or a file that gives the robot back.
+fn write<E: ToString>(kind: Kind, model: &Model, text: &str, write: impl Fn(&Model, &Path, &Path) -> Result<(), E>) {
+    let original = in_folder(kind, text);
+    let new = original.with_extension("new");
+    let more: Vec<f64> = model.armature().iter().map(|armature| armature + 0.25).collect();
+    let Ok(other) = model.clone().with_armature(&more) else { return };
+    for model in [model, &other] {
+        if let Err(said) = write(model, &new, &original).map_err(|e| e.to_string()) {
+            assert!(!said.is_empty() && !said.contains("Some("), "{said}");
+        }
+    }
+}
+
+/// Inverse dynamics and the inertia matrix at the neutral position are numbers and, where that matrix has an inverse, forward
+/// dynamics somewhere else (at the neutral position, axes may coincide).
 fn use_model(model: &Model) {
     let (mut data, mut q) = (Data::new(model), neutral(model));
     let zeros = vec![0.0; model.nv()];
@@ -260,6 +333,12 @@ fn use_problem(data: &RobotProblem) -> Result<(), String> {
 
 /// Checks a mesh in a page: drawn triangles have valid vertex indices, and boxes are finite.
 fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
+    if let Ok((points, triangles)) = condyle_meshes::triangles(format, bytes) {
+        assert!(
+            triangles.iter().flatten().all(|&corner| (corner as usize) < points.len()),
+            "a corner that is not there"
+        );
+    }
     let mut meshes = Meshes::default();
     let drawn = meshes.add(format, bytes, &|_| Some(mesh!("box.mtl").to_owned()))?;
     assert!(drawn.iter().flat_map(|part| part.color).flatten().all(f64::is_finite));

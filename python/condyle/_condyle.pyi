@@ -2050,6 +2050,10 @@ class Model:
         """The joints, as `Joint`; None for the world."""
 
     @property
+    def keyframe_controls(self) -> dict[str, _Array]:
+        """The controls of the `keyframes`: a dictionary by name, with a number for each of `actuators`."""
+
+    @property
     def keyframe_velocities(self) -> dict[str, _Array]:
         """The velocities of the `keyframes`: a dictionary of v by name, nv numbers each."""
 

@@ -240,7 +240,10 @@ class _Text:
                 "ctrlrange", "ctrllimited", m.actuator_ctrllimited[control], m.actuator_ctrlrange[control]
             )
             attributes |= _range("forcerange", "forcelimited", m.actuator_forcelimited[a], m.actuator_forcerange[a])
-            if m.nplugin and m.actuator_plugin[a] >= 0:
+            is_plugin, dimension = m.nplugin and m.actuator_plugin[a] >= 0, int(_row(m, "actuator_actnum", a))
+            if is_plugin or dimension > 1:
+                attributes["actdim"] = dimension
+            if is_plugin:
                 yield self._plugin(int(m.actuator_plugin[a]), attributes)
                 continue
             attributes |= _range("actrange", "actlimited", m.actuator_actlimited[a], m.actuator_actrange[a])
@@ -260,9 +263,26 @@ class _Text:
         names = self._names("key", self.m.nkey)
         for k, name in enumerate(names):
             q, v = self.m.key_qpos[k], self.m.key_qvel[k]
-            # other keyframes are empty slots that the file reserved
-            if name or np.any(v) or not np.array_equal(q, self.m.qpos0):
-                yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q, "qvel": v})
+            numbers = {"qvel": v, "ctrl": self._controls(self.m.key_ctrl[k]), "act": self.m.key_act[k]}
+            # else room that a file has asked for
+            if name or any(map(np.any, numbers.values())) or not np.array_equal(q, self.m.qpos0):
+                given = {what: x for what, x in numbers.items() if len(x)}
+                yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q} | given)
+
+
+    def _controls(self, numbers: Any) -> list[float]:
+        """Controls, as many for each actuator as the reader of MJCF counts where an element does not name its inputs."""
+        m, found = self.m, []
+        for a in range(len(m.actuator_trntype)):
+            first, count = (
+                int(getattr(m, f"actuator_ctrl{of}", otherwise)[a])
+                for of, otherwise in (("adr", range(m.nu)), ("num", [1] * m.nu))
+            )
+            gain = self._word("mjtGain", "mjGAIN_", m.actuator_gaintype[a], ("fixed", "affine", "muscle"))
+            counted = {"pid": 2, "so3": 3}.get(gain, 1)
+            own = [float(x) for x in numbers[first : first + min(count, counted)]]
+            found += own + [0.0] * (counted - len(own))
+        return found
 
 
 TRANSMISSIONS = {

@@ -40,6 +40,8 @@ struct SpringReport {
 struct KeyframeReport {
     name: String,
     q: Vec<f64>,
+    /// A number for each actuator.
+    control: Vec<f64>,
 }
 
 #[derive(Serialize)]
@@ -76,7 +78,7 @@ impl Additions {
             keyframes: model
                 .keyframes()
                 .iter()
-                .map(|key| KeyframeReport { name: key.name.clone(), q: key.q.clone() })
+                .map(|key| KeyframeReport { name: key.name.clone(), q: key.q.clone(), control: key.control.clone() })
                 .collect(),
             constraints: model
                 .constraints()

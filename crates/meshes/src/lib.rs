@@ -18,6 +18,7 @@
 
 #[cfg(feature = "page")]
 mod dae;
+mod ears;
 #[cfg(feature = "page")]
 mod find;
 mod hull;
@@ -51,16 +52,25 @@ pub enum Format {
     Dae,
 }
 
-/// Returns the points of a mesh, and its triangles as indices of points, counter-clockwise seen from outside. The mesh
-/// is not simplified. For an OBJ with several objects or groups, it returns the triangles of the first one and the
-/// points of all, as MuJoCo does.
+/// The points of a mesh, and its triangles by the points' indices, counter-clockwise from outside; nothing is made smaller. Of
+/// an OBJ with several objects or groups, triangles of the first one and points of all: as MuJoCo reads it. As there, faces with
+/// more than 100 corners are left out, and parts of faces that have no ear to cut off.
 ///
 /// # Errors
 /// The fault of the file, with the line for an OBJ or an STL in text form.
 pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
-    let (mut points, mut triangles) = (Vec::new(), Vec::new());
+    cut_triangles(format, bytes).map(|(triangles, _)| triangles)
+}
+
+/// As [`triangles`], with the number of faces of an OBJ of which triangles are left out.
+///
+/// # Errors
+/// As those of [`triangles`].
+#[doc(hidden)]
+pub fn cut_triangles(format: Format, bytes: &[u8]) -> Result<(Triangles, usize), String> {
+    let (mut points, mut triangles, mut lost) = (Vec::new(), Vec::new(), 0);
     if format == Format::Obj {
-        (points, triangles) = obj::first(&text(bytes))?;
+        ((points, triangles), lost) = obj::first(&text(bytes))?;
     } else {
         for part in format.read(bytes, &|_| None)? {
             let first = points.len() as u32;
@@ -68,7 +78,7 @@ pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
             triangles.extend(part.triangles.into_iter().map(|t| t.map(|corner| first + corner)));
         }
     }
-    Ok((points, triangles))
+    Ok(((points, triangles), lost))
 }
 
 /// Decodes a text without the byte order mark that some editors write at its start.

@@ -1,33 +1,40 @@
 //! OBJ (Wavefront): faces of any number of corners, with the diffuse colours of their material file.
 
+use super::ears::Ears;
 use super::part::{Part, Triangle, Words, full};
 use std::collections::HashMap;
 
 /// A colour, and the triangles that have it.
 type Group = (Option<[f64; 3]>, Vec<Triangle>);
 
+/// Contents of an OBJ.
+struct Mesh {
+    points: Vec<[f64; 3]>,
+    /// Triangles by material.
+    groups: Vec<Group>,
+    /// Number of faces of which triangles are left out.
+    lost: usize,
+}
+
 /// The triangles of an OBJ, a part for each material; `library` gives the text of a material file by its name.
 pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
-    let (points, groups) = parse(text, library, false)?;
+    let Mesh { points, groups, .. } = parse(text, library, false)?;
     let part = |(color, triangles): Group| Part::of(&points, triangles, color);
     Ok(groups.into_iter().filter(|group| !group.1.is_empty()).map(part).collect())
 }
 
-/// All points of an OBJ, and the triangles of its first object or group.
-pub(super) fn first(text: &str) -> Result<(Vec<[f64; 3]>, Vec<Triangle>), String> {
-    let (points, groups) = parse(text, &|_| None, true)?;
-    Ok((points, groups.into_iter().flat_map(|group| group.1).collect()))
+/// All points of an OBJ, the triangles of its first object or group, and the number of faces of which triangles are left out.
+pub(super) fn first(text: &str) -> Result<(super::Triangles, usize), String> {
+    let Mesh { points, groups, lost } = parse(text, &|_| None, true)?;
+    Ok(((points, groups.into_iter().flat_map(|group| group.1).collect()), lost))
 }
 
-/// The points of an OBJ, and its triangles by material: all, or those of its first object or group.
-fn parse(
-    text: &str,
-    library: &dyn Fn(&str) -> Option<String>,
-    only_first: bool,
-) -> Result<(Vec<[f64; 3]>, Vec<Group>), String> {
+/// Reads an OBJ: all of it, or its first object or group.
+fn parse(text: &str, library: &dyn Fn(&str) -> Option<String>, only_first: bool) -> Result<Mesh, String> {
     let (mut points, mut colours) = (Vec::new(), HashMap::new());
     let mut groups: Vec<Group> = vec![(None, Vec::new())];
     let (mut of_material, mut group, mut count, mut skipped) = (HashMap::new(), 0, 0, false);
+    let mut ears = Ears::default();
     for (number, line) in text.lines().enumerate() {
         let wrong = |what: &str| format!("line {}: {what}", number + 1);
         let mut words = Words::new(line);
@@ -59,28 +66,18 @@ fn parse(
                 if corners.len() < 2 {
                     return Err(wrong("a face has at least three corners"));
                 }
-                if only_first && across(&points, &corners) {
-                    corners.rotate_left(1);
-                }
                 count += corners.len() - 2;
                 full(count)?;
-                groups[group].1.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+                if only_first {
+                    groups[group].1.extend(ears.cut(&points, corners).map_err(|what| wrong(&what))?);
+                } else {
+                    groups[group].1.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
+                }
             }
             _ => {}
         }
     }
-    Ok((points, groups))
-}
-
-/// Whether a face has four corners, of which the second and the fourth are not farther apart than the others: tinyobj, by which
-/// MuJoCo reads, cuts it there.
-fn across(points: &[[f64; 3]], corners: &[u32]) -> bool {
-    let &[a, b, c, d] = corners else { return false };
-    let square = |p: u32, q: u32| {
-        let [p, q] = [p, q].map(|k| points[k as usize].map(|x| x as f32));
-        (0..3).map(|k| (q[k] - p[k]) * (q[k] - p[k])).sum::<f32>()
-    };
-    square(a, c) >= square(b, d)
+    Ok(Mesh { points, groups, lost: ears.lost })
 }
 
 /// The diffuse colours of a material file, by name.
@@ -116,11 +113,12 @@ mod tests {
     #[test]
     fn first_object_with_the_points_of_all() {
         let text = TEXT.replace("usemtl none", "o second\nv 5 5 5");
-        let (points, triangles) = first(&text).unwrap();
-        assert_eq!((points.len(), triangles), (5, vec![[1, 2, 3], [1, 3, 0]])); // both diagonals are as long
+        let ((points, triangles), lost) = first(&text).unwrap();
+        assert_eq!((points.len(), triangles), (5, vec![[0, 1, 3], [1, 2, 3]])); // both diagonals are as long
+        assert_eq!(lost, 0);
         let long = first(&TEXT.replace("v 0 1 0", "v -9 9 0")).unwrap();
-        assert_eq!(long.1[..2], [[0, 1, 2], [0, 2, 3]]); // along the shorter diagonal
-        assert_eq!(first(TEXT).unwrap().1.len(), 3); // a material is no object
+        assert_eq!(long.0.1[..2], [[0, 1, 2], [0, 2, 3]]); // along the shorter diagonal
+        assert_eq!(first(TEXT).unwrap().0.1.len(), 3); // a material is no object
     }
 
     #[test]

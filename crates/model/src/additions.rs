@@ -25,7 +25,7 @@ pub(crate) struct Additions {
     springs: Vec<(BodyId, [f64; 3], Vec<f64>)>,
     compensation: Vec<(BodyId, f64, Vec3<f64>)>,
     actuators: Vec<Actuator<BodyId>>,
-    keyframes: Vec<(String, Vec<JointState>)>,
+    keyframes: Vec<(String, Vec<JointState>, Vec<f64>)>,
     constraints: Vec<(String, Draft)>,
 }
 
@@ -65,10 +65,11 @@ impl ModelBuilder {
         self.additions.actuators.push(actuator);
     }
 
-    /// Adds a named state: the positions and velocities of the joints of some bodies. The other joints are at their
-    /// neutral position and at rest.
-    pub fn keyframe(&mut self, name: &str, joints: Vec<(BodyId, Vec<f64>, Vec<f64>)>) {
-        self.additions.keyframes.push((name.to_owned(), joints));
+    /// Adds a named state: for some bodies the position and velocity of their joint. The other joints are at their neutral
+    /// position and at rest. `control` has the control of each actuator, in the order in which they are added; those of later
+    /// actuators are 0.
+    pub fn keyframe(&mut self, name: &str, joints: Vec<(BodyId, Vec<f64>, Vec<f64>)>, control: Vec<f64>) {
+        self.additions.keyframes.push((name.to_owned(), joints, control));
     }
 
     /// Adds a constraint by which a point of one body and a point of another one coincide. Each point is the origin of
@@ -127,10 +128,12 @@ impl ModelBuilder {
             let carried = pXb.act(Inertia { mass, mass_com, rotational: Sym3::zero() });
             self.add_compensation(on, carried.mass, carried.mass_com);
         }
-        for actuator in &model.actuators {
+        let (before, mut kept) = (self.additions.actuators.len(), Vec::new());
+        for (k, actuator) in model.actuators.iter().enumerate() {
             if let Some(mut actuator) = actuator.renamed(body, |frame| first_frame + frame) {
                 actuator.name.insert_str(0, prefix);
                 self.actuator(actuator);
+                kept.push(k);
             }
         }
         for keyframe in &model.keyframes {
@@ -139,7 +142,9 @@ impl ModelBuilder {
                 let (nq, nv) = (b.joint.nq(), b.joint.nv());
                 (place[i].0, keyframe.q[b.idx_q..][..nq].to_vec(), keyframe.v[b.idx_v..][..nv].to_vec())
             });
-            self.keyframe(&format!("{prefix}{}", keyframe.name), joints.collect());
+            let control = kept.iter().map(|&k| keyframe.control[k]);
+            let control = core::iter::repeat_n(0.0, before).chain(control).collect();
+            self.keyframe(&format!("{prefix}{}", keyframe.name), joints.collect(), control);
         }
         for ModelConstraint { name, kind } in &model.constraints {
             let moved = |frames: &[usize; 2]| {
@@ -189,7 +194,12 @@ impl Additions {
             .collect();
         model.actuators =
             actuators.iter().filter_map(|actuator| actuator.renamed(|&b| Some(index(b)), |frame| frame)).collect();
-        for (name, joints) in keyframes {
+        for (name, joints, mut control) in keyframes {
+            if control.len() > model.actuators.len() {
+                let (expected, found) = (model.actuators.len(), control.len());
+                return Err(Error::Length { name: "keyframes.control", expected, found });
+            }
+            control.resize(model.actuators.len(), 0.0);
             let (mut q, mut v) = (neutral(model), vec![0.0; model.tree.nv]);
             for (b, joint_q, joint_v) in joints {
                 let body = &model.bodies[index(b)];
@@ -205,7 +215,7 @@ impl Additions {
                 q[body.idx_q..][..nq].copy_from_slice(&joint_q);
                 v[body.idx_v..][..nv].copy_from_slice(&joint_v);
             }
-            model.keyframes.push(Keyframe { name, q, v });
+            model.keyframes.push(Keyframe { name, q, v, control });
         }
         let constraint = |(name, draft)| {
             let kind = match draft {
@@ -279,10 +289,12 @@ impl Model {
                 Transmission::Frame { frame: i } => drop(frame(*i)?),
             }
         }
-        for Keyframe { q, v, .. } in &self.keyframes {
-            for (name, found, expected) in
-                [("keyframes.q", q.len(), self.tree.nq), ("keyframes.v", v.len(), self.tree.nv)]
-            {
+        for Keyframe { q, v, control, .. } in &self.keyframes {
+            for (name, found, expected) in [
+                ("keyframes.q", q.len(), self.tree.nq),
+                ("keyframes.v", v.len(), self.tree.nv),
+                ("keyframes.control", control.len(), self.actuators.len()),
+            ] {
                 if found != expected {
                     return Err(Error::Length { name, expected, found });
                 }

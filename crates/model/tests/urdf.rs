@@ -52,12 +52,51 @@ fn plain_robots_have_no_warnings() {
     }
 }
 
+/// Drake 1.51.1: a link `world` that no element describes is the world. The mass is that of what moves.
+#[test]
+fn joints_on_the_world() {
+    let joint = "<joint name='j' type='revolute'><parent link='world'/><child link='b'/>";
+    let text = format!("<robot name='r'><link name='b'>{INERTIAL}</link>\n{joint}{LIMIT}</joint></robot>");
+    let said = "3: joint `j`: no link is named `world`: its parent is the world, as Drake reads it";
+    assert_eq!(warnings(&text), [said]);
+    let found = model(&text);
+    let described = model(&text.replace("<link", "<link name='world'/><link"));
+    assert_eq!((found.nv(), found.bodies().len(), found.bodies()[0].inertia.mass), (1, 2, 0.0));
+    assert_eq!((found.bodies(), found.frames()), (described.bodies(), described.frames()));
+    refused(
+        &text.replace("<link", "<link name='c'/><link"),
+        "1: link `c`: has no parent, and neither has link `world`: a robot has one root",
+    );
+    refused(&text.replace("world", "globe"), "3: joint `j`: no link is named `globe`");
+    let turned = text.replace("'b'/>", "'world'/>").replacen("'world'", "'b'", 1);
+    refused(&turned, "3: joint `j`: no link is named `world`");
+}
+
 #[test]
 fn limits_without_a_number() {
     for kind in ["revolute", "prismatic"] {
-        refused(&robot(kind, "\n<limit lower='-1' upper='1' velocity='3'/>", ""), "4: joint `j`: limit has no effort");
-        refused(&robot(kind, "\n<limit lower='-1' upper='1' effort='3'/>", ""), "4: joint `j`: limit has no velocity");
-        refused(&robot(kind, "", ""), "3: joint `j`: is revolute or prismatic and has no <limit>");
+        // as Drake 1.51.1 and MuJoCo 4.0.0 have it: what is missing does not limit
+        let inf = f64::INFINITY;
+        for (limit, said, expected) in [
+            (
+                "<limit lower='-1' upper='1' velocity='3'/>",
+                "limit has no effort: it has no limit",
+                [-1.0, 1.0, 3.0, inf],
+            ),
+            (
+                "<limit lower='-1' upper='1' effort='3'/>",
+                "limit has no velocity: it has no limit",
+                [-1.0, 1.0, inf, 3.0],
+            ),
+            ("", "is revolute or prismatic and has no <limit>: it has no limits", [-inf, inf, inf, inf]),
+        ] {
+            let text = robot(kind, limit, "");
+            assert_eq!(warnings(&text), [format!("3: joint `j`: {said}")]);
+            let model = model(&text);
+            let limits = model.limits();
+            assert_eq!([limits.lower[0], limits.upper[0], limits.velocity[0], limits.effort_upper[0]], expected);
+            assert_eq!(model.warnings()[0].kind(), WarningKind::Assumed);
+        }
     }
     let limits = |limit: &str| {
         let model = model(&robot("continuous", limit, ""));

@@ -173,11 +173,11 @@ fn texts_that_are_no_documents() {
     refuse("<!-- a -->", "there is no element");
     refuse("robot", "text outside of the root element");
     refuse("<robot/>a", "text outside of the root element");
-    refuse("<robot/><robot/>", "<robot> is a second root element");
     refuse("<robot><link>", "<link> of line 1 is never closed");
     refuse("<robot><link></robot>", "</robot> where <link> of line 1 is open");
     refuse("</robot>", "</robot> closes nothing");
-    refuse("<robot/></robot>", "</robot> closes nothing");
+    refuse("<robot/><robot>", "<robot> of line 1 is never closed");
+    refuse("<robot/><a></b>", "</b> where <a> of line 1 is open");
     refuse("<robot", "<robot> of line 1 is never closed");
     refuse("<robot name", "attribute `name` of <robot> has no value in quotation marks");
     refuse("<robot name=r>", "attribute `name` of <robot> has no value in quotation marks");
@@ -187,9 +187,47 @@ fn texts_that_are_no_documents() {
     refuse("<1/>", "`1` where a name is expected");
     refuse("<", "the end, where a name is expected");
     refuse("<!-- a", "a comment is never closed");
-    refuse("<![CDATA[", "text outside of the root element");
+    refuse("<![CDATA[", "<![CDATA[ is never closed");
+    refuse("<![CDATA[a]]>", "there is no element");
     refuse("<robot><![CDATA[ a", "<![CDATA[ is never closed");
     refuse("<? a", "<? is never closed");
     refuse("<!DOCTYPE [", "<! is never closed");
     refuse("</", "</ is never closed");
+}
+
+/// MuJoCo 4.0.0 reads each of these texts, and finds the first root element alone in them (`mj_loadXML`).
+#[test]
+fn things_outside_of_the_root_element_warn() {
+    let mujoco = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>";
+    let text = "text outside of the root element has no effect";
+    let end = "the text of the file ends before a tag that closes nothing: the rest has no effect";
+    let second = "<mujoco> is a second root element, and has no effect";
+    for (before, after, line, what) in [
+        ("", "\n</mujoco>", 2, end),
+        ("", "\n</a> no < xml", 2, end),
+        ("?xml version='1.0'?>\n", "", 1, text),
+        ("\n\na", "b<!-- -->", 3, text),
+        ("", "<![CDATA[a]]>", 1, text),
+        ("", &format!("\n{}", mujoco.replace('1', "2")), 2, second),
+    ] {
+        let model = Model::from_mjcf_str(&format!("{before}{mujoco}{after}"), &MjcfOptions::default());
+        let model = model.unwrap_or_else(|e| panic!("{before} {after}: {e}"));
+        assert_eq!((model.nv(), model.bodies().len()), (1, 2));
+        let warnings: Vec<String> = model.warnings().iter().map(ToString::to_string).collect();
+        assert_eq!(warnings, [format!("<string>:{line}: <mujoco>: {what}")]);
+    }
+    let robot = urdf(&format!("{ROBOT}</robot>")).unwrap();
+    let said = format!("<string>:2: robot `r`: {end}");
+    assert!(robot.warnings().iter().any(|warning| warning.to_string() == said), "{:?}", robot.warnings());
+    let sdf = "?xml?><sdf version='1.7'><model name='m'><link name='a'/></model></sdf>";
+    let model = Model::from_sdf_str(sdf, &SdfOptions::default()).unwrap();
+    let said = format!("<string>:1: <sdf>: {text}");
+    assert!(model.warnings().iter().any(|warning| warning.to_string() == said), "{:?}", model.warnings());
+}
+
+#[test]
+fn names_that_begin_with_a_colon() {
+    let plain = Model::well_formed("<robot><:a b:c='1' :d='2'/></robot>").unwrap();
+    assert_eq!(plain, "<robot><_a b-c=\"1\" _d=\"2\"></_a></robot>");
+    assert_eq!(Model::well_formed(&plain).unwrap(), plain);
 }

@@ -149,6 +149,12 @@ impl Model {
         self.keyframe_parts(py, |keyframe| &keyframe.v)
     }
 
+    /// The controls of the `keyframes`: a dictionary by name, with a number for each of `actuators`.
+    #[getter]
+    fn keyframe_controls<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.keyframe_parts(py, |keyframe| &keyframe.control)
+    }
+
     /// The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
     /// and in a `Simulation` that includes it.
     #[getter]

@@ -81,6 +81,7 @@ def same_robot(ours: condyle.Model, other: condyle.Model, inertia: float = 0.0) 
     for name, q in ours.keyframes.items():
         close(q, other.keyframes[name])
         close(ours.keyframe_velocities[name], other.keyframe_velocities[name])
+        close(ours.keyframe_controls[name], other.keyframe_controls[name])
     assert ours.constraints() == other.constraints()
 
 
@@ -151,7 +152,7 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
       <position name="p" joint="l" kp="100" kv="10" forcerange="-3 3"/>
       <general tendon="f" gear="3" gainprm="2" biastype="affine" biasprm="1 -3 -0.5" armature="0.01" damping="0.1"/>
       <general site="s" refsite="t" gear="1 2 3 4 5 6"/><intvelocity joint="j" kp="2" actrange="-1 1"/></actuator>
-    <keyframe><key name="home" qpos="1 0 1 0 0 0.3"/><key qvel="1 2 3 4 5"/></keyframe>"""
+    <keyframe><key name="home" qpos="1 0 1 0 0 0.3" ctrl="1 2 3 4 5" act="0.5"/><key qvel="1 2 3 4 5"/></keyframe>"""
     flags = '<option density="1.2" wind="1 0 0"><flag damper="disable" gravity="disable"/></option>'
     text = f'<mujoco model="all &amp; more">{flags}<worldbody>{inside}</worldbody>{beside}</mujoco>'
     first = mujoco.MjModel.from_xml_string(text)
@@ -173,6 +174,20 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13, err_msg=field)
         compared += 1
     assert compared > 80
+
+
+def test_controls_of_keyframes() -> None:
+    """One number for each actuator of the model, whatever numbers its inputs and states have in MuJoCo."""
+    text = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
+    <actuator><pid name="a" joint="j" kp="2"/><pid name="b" joint="j" kp="2" input="pos" ki="1" slewmax="1"/>
+    <muscle joint="j" lengthrange="0 1"/><intvelocity name="c" joint="j" kp="2" actrange="-1 1"/>
+    <motor name="d" joint="j"/></actuator>
+    <keyframe><key name="k" ctrl="1 2 3 4 5 6" act="0.1 0.2 0.3 0.4"/></keyframe></mujoco>"""
+    theirs = mujoco.MjModel.from_xml_string(text)
+    assert (theirs.actuator_ctrladr.tolist(), theirs.actuator_actadr.tolist()) == ([0, 2, 3, 4, 5], [-1, 0, 2, 3, -1])
+    for model in (condyle.Model.from_mjcf_str(text), condyle.Model.from_mujoco(theirs)):
+        assert [actuator.name for actuator in model.actuators] == ["a", "b", "c", "d"]
+        close(model.keyframe_controls["k"], np.array([1.0, 3.0, 0.4, 6.0]))
 
 
 def robots_of_packages() -> list[Path]:

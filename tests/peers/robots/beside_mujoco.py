@@ -56,6 +56,8 @@ def read_urdf(path: Path) -> mujoco.MjModel:
         tree = ElementTree.fromstring(path.read_bytes())
     except (ElementTree.ParseError, LookupError, ValueError) as error:
         raise RefusedError(str(error)) from None
+    if any(element.tag.endswith("}joint") for element in tree):
+        raise RefusedError("joints of Drake's own are left out, so that links have no parent")
     for link in tree.iter("link"):
         for part in [*link.findall("visual"), *link.findall("collision")]:
             link.remove(part)
@@ -83,9 +85,10 @@ def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
         joints.append(Joint(i, int(mj.jnt_qposadr[j]), int(mj.jnt_dofadr[j])))
         carried[i] = int(mj.jnt_bodyid[j])
     found.expect("gravity", model.gravity, gravity(mj))
+    friction = np.zeros(mj.nv) if disabled(mj, "FRICTIONLOSS") else mj.dof_frictionloss
     compare(found, mj, joints, carried)
     found.expect("armature", model.armature, mj.dof_armature, found.coordinate)
-    found.expect("friction", model.friction, mj.dof_frictionloss, found.coordinate)
+    found.expect("friction", model.friction, friction, found.coordinate)
     ours, theirs = np.stack([model.limits.effort_lower, model.limits.effort_upper], 1), efforts(mj)
     ours[np.isnan(theirs)] = np.nan
     found.expect("limits: effort", ours, theirs, found.coordinate)
@@ -135,16 +138,22 @@ def gravity(mj: mujoco.MjModel) -> np.ndarray:
     return np.zeros(3) if off else mj.opt.gravity.copy()
 
 
+def disabled(mj: mujoco.MjModel, constraint: str) -> bool:
+    """Returns whether a flag of the file disables a kind of constraint, or all of them."""
+    bits = (int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")) for name in (constraint, "CONSTRAINT"))
+    return any(mj.opt.disableflags & bit for bit in bits)
+
+
 def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: dict[int, int]) -> None:
     """Compares mass, limits of position, M, bias, poses of bodies, frames of bodies and sites."""
     model, data = found.model, mujoco.MjData(mj)
-    found.expect("total mass", model.total_mass, mj.body_mass.sum())
     positions(found, mj, joints)
     warnings = " ".join(map(str, model.warnings))
     for words, why, quantities in WARNED:
         if words in warnings:
             found.leave_out(why, *quantities)
-    if mj.neq:
+    found.expect("total mass", model.total_mass, mj.body_mass.sum())
+    if mj.neq and not disabled(mj, "EQUALITY"):
         found.spoken(
             "equality", "follow", "mimic", "connect", "weld", "it is not held", held=bool(found.model.constraints())
         )
@@ -202,7 +211,8 @@ def positions(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> Non
         if same and not mj.jnt_limited[j]:
             found.left_out["limits: position"] = "MuJoCo takes equal limits for none"
         elif model.nqs[joint.body] == 1:
-            lower, upper = mj.jnt_range[j] if mj.jnt_limited[j] else (-np.inf, np.inf)
+            limited = mj.jnt_limited[j] and not disabled(mj, "LIMIT")
+            lower, upper = mj.jnt_range[j] if limited else (-np.inf, np.inf)
             ours, name = (limits.lower[at], limits.upper[at]), f"joint `{model.names[joint.body]}`"
             found.expect("limits: position", ours, (lower, upper), lambda _, name=name: name)
 
@@ -258,3 +268,13 @@ def keyframes(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> Non
         q = np.asarray(model.keyframes[name], float)
         state = there("mujoco", model, joints, q, np.zeros(model.nv), mj.nq, mj.nv)
         found.expect("keyframes", state.q, mj.key_qpos[i], lambda _, name=name: f"keyframe `{name}`")
+        controls = dict(zip([a.name for a in model.actuators], model.keyframe_controls[name], strict=True))
+        for a in range(mj.nactuator):
+            own = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_ACTUATOR, a)
+            if not own or own not in controls:
+                continue
+            states, inputs = mj.key_act[i, mj.actuator_actadr[a] :], mj.key_ctrl[i, mj.actuator_ctrladr[a] :]
+            integrates = mj.actuator_dyntype[a] == int(mujoco.mjtDyn.mjDYN_INTEGRATOR)
+            where = f"actuator `{own}` of keyframe `{name}`"
+            theirs = (states if integrates else inputs)[0]
+            found.expect("controls of keyframes", controls[own], theirs, lambda _, where=where: where)

@@ -76,7 +76,12 @@ def times(moment: float, force: Range) -> Range:
 
 
 def constant(mj: mujoco.MjModel, i: int) -> Range:
-    """Returns the range of an actuator's force if gain and bias are constant, else no limits."""
+    """Returns the range of an actuator's force if gain and bias are constant, else no limits.
+
+    A plugin computes its own force: gain and bias have no effect.
+    """
+    if mj.nplugin and mj.actuator_plugin[i] >= 0:
+        return ALL
     bias = mj.actuator_biasprm[i] if mj.actuator_biastype[i] == BIAS_AFFINE else np.zeros(3)
     kinds = (BIAS_AFFINE, BIAS_NONE)
     if mj.actuator_gaintype[i] != GAIN_FIXED or mj.actuator_biastype[i] not in kinds or bias[1:3].any():

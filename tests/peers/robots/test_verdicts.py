@@ -118,6 +118,32 @@ def test_efforts() -> None:
     assert found.tolist() == [[-26.0, 8.0], [-1.0, 1.0], [-float("inf"), float("inf")]]
 
 
+def test_efforts_of_a_plugin() -> None:
+    """Its force is within `forcerange`, whatever the control is."""
+    text = """<mujoco><extension><plugin plugin="mujoco.pid"><instance name="p"><config key="kp" value="9"/></instance>
+        </plugin></extension><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody><actuator>
+        <plugin joint="j" plugin="mujoco.pid" instance="p" ctrlrange="-1 1" forcerange="-5 3"/></actuator></mujoco>"""
+    assert efforts(MjModel.from_xml_string(text)).tolist() == [[-5.0, 3.0]]
+
+
+@pytest.mark.parametrize(
+    "flag",
+    "gravity equality limit frictionloss constraint spring damper actuation clampctrl contact".split(),
+)
+def test_flags(tmp_path: Path, flag: str) -> None:
+    """What a flag disables is no part of the model, as in MuJoCo."""
+    joint = "<joint name='{0}' axis='0 1 0' range='-10 20' frictionloss='1' damping='2' stiffness='3' springref='9'/>"
+    bodies = "".join(f"<body pos='{k} 0 0' gravcomp='1'>{joint.format(k)}<geom size='.1'/></body>" for k in (1, 2))
+    text = f"""<mujoco><option><flag {flag}="disable"/></option><worldbody>{bodies}</worldbody>
+        <equality><joint name="e" joint1="1" joint2="2"/></equality>
+        <actuator><motor name="m" joint="1" ctrlrange="-1 2"/></actuator>
+        <keyframe><key name="k" qpos="0.1 0.2" ctrl="0.3"/></keyframe></mujoco>"""
+    verdict = judged(tmp_path, "r.xml", text)
+    assert verdict.verdict == "equal", verdict.differences
+    model = condyle.Model.from_mjcf_str(text)
+    assert bool(model.constraints()) == (flag not in ("equality", "constraint"))
+
+
 def test_section_of_a_file(tmp_path: Path) -> None:
     """The section is put at the end, and replaced where it is."""
     path = tmp_path / "V.md"

@@ -152,11 +152,6 @@ fn joints() {
 
 #[test]
 fn limits() {
-    let limit = r#"<limit lower="-1" upper="1" effort="1" velocity="1"/>"#;
-    let missing = "<string>:6: joint `j`: is revolute or prismatic and has no <limit>";
-    expect(&with(limit, ""), missing);
-    expect(&with(limit, "").replace("revolute", "prismatic"), missing);
-    assert!(load(&with(limit, "").replace("revolute", "continuous"), &UrdfOptions::default()).is_ok());
     let lower = r#"lower="-1""#;
     for value in ["nan", "one", "", "1 2"] {
         let said = format!("<string>:10: joint `j`: limit lower: `{value}` is no number");
@@ -165,7 +160,6 @@ fn limits() {
     let damping = |value: &str| with("<axis", &format!(r#"<dynamics damping="{value}"/><axis"#));
     expect(&damping("nan"), "<string>:9: joint `j`: dynamics damping: `nan` is no finite number");
     expect(&damping("inf"), "<string>:9: joint `j`: dynamics damping: `inf` is no finite number");
-    expect(&with(r#"velocity="1""#, ""), "<string>:10: joint `j`: limit has no velocity");
 }
 
 #[test]

@@ -102,7 +102,10 @@ impl Description {
         }
         (model.springs, model.gravity_compensation) = (self.springs, self.gravity_compensation);
         (model.actuators, model.keyframes, model.constraints) = (self.actuators, self.keyframes, self.constraints);
-        // bodies `name#1`, … without mass are intermediate ones of a chain, unless a warning mentions them
+        for keyframe in model.keyframes.iter_mut().filter(|keyframe| keyframe.control.is_empty()) {
+            keyframe.control = vec![0.0; model.actuators.len()]; // of a version that had no controls
+        }
+        // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
         let warned: BTreeSet<&str> = warnings
             .iter()
             .filter_map(|w| if let Warning::Massless { body } = w { Some(&**body) } else { None })

@@ -60,6 +60,7 @@ impl Known {
     /// Adds warnings about unknown parts of an element, whose type is its tag, and about features that a model cannot
     /// represent.
     pub(crate) fn check(&self, root: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
+        warnings.extend(root.outside());
         if let Some((&name, _)) = self.types.get_key_value(root.tag.as_str()) {
             self.check_as(name, root, left_out, warnings);
             if warnings.len() >= MAX_WARNINGS {

@@ -42,6 +42,8 @@ pub(crate) struct Element {
     pub(crate) at: usize,
     /// Index of the element's file, among the files with their own settings; 0 is the main file.
     pub(crate) source: usize,
+    /// Line and description of the first thing outside of a root element, which has no effect.
+    pub(crate) stray: Option<Box<(u32, String)>>,
 }
 
 /// Amount of text that has been read for one robot.
@@ -184,7 +186,14 @@ impl Element {
         Warning::Unknown { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns a warning about a feature of this element that a model cannot represent.
+    /// Returns the warning of what is outside of this root element.
+    pub(crate) fn outside(&self) -> Option<Warning> {
+        let (line, what) = &**self.stray.as_ref()?;
+        let place = Place { line: *line, ..self.place() };
+        Some(Warning::Unknown { place, element: self.label(), what: what.clone() })
+    }
+
+    /// Returns the warning of something in this element that a model cannot hold.
     pub(crate) fn left_out(&self, what: impl Into<String>) -> Warning {
         Warning::LeftOut { place: self.place(), element: self.label(), what: what.into() }
     }

@@ -137,3 +137,31 @@ fn keyframes() {
     let found = Model::from_mjcf_str(&hinges, &MjcfOptions { mimic: true, ..MjcfOptions::default() }).unwrap();
     assert_eq!((&found.keyframes()[0].q[..], &found.keyframes()[0].v[..]), (&[2.0][..], &[4.0][..]));
 }
+
+/// `key_ctrl` and `key_act`, at `actuator_ctrladr` 0, 1, 2, 4, 5, 6, 8, 9, 12 and `actuator_actadr` 0 and 5 of integrators.
+#[test]
+fn controls_of_keyframes() {
+    let text = |actuators: &str, keys: &str| {
+        let joints = format!("<joint name='j'/>{INERTIAL}</body><body><joint name='o' type='ball'/>");
+        one("", &joints, &format!("<actuator>{actuators}</actuator><keyframe>{keys}</keyframe>"))
+    };
+    let all = "<motor joint='j'/><intvelocity joint='j' kp='2' actrange='-1 1'/><pid joint='j' kp='2'/>
+        <muscle joint='j' lengthrange='0 1'/><position joint='j' timeconst='0.1'/><pid joint='j' ki='1' slewmax='1'/>
+        <general joint='j' dyntype='integrator' actlimited='true' actrange='-1 1'/><orientation joint='o' kp='1'/><motor joint='j'/>";
+    let numbers = "ctrl='1 2 3 4 5 6 7 8 9 10 11 12 13' act='0.1 0.2 0.3 0.4 0.5 0.6'";
+    let found = read(&text(all, &format!("<key {numbers}/><key ctrl='1 2 3'/><key/>"))).unwrap();
+    assert_eq!(found.actuators().len(), 7);
+    close(&found.keyframes()[0].control, &[1.0, 0.1, 3.0, 6.0, 7.0, 0.6, 13.0]);
+    close(&found.keyframes()[1].control, &[1.0, 0.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
+    close(&found.keyframes()[2].control, &[0.0; 7]);
+    let refused = |key: &str, expected: &str| assert_eq!(read(&text(all, key)).unwrap_err().to_string(), expected);
+    let many = numbers.replace("13'", "13 14'");
+    refused(&format!("<key {many}/>"), "<string>:3: <key>: ctrl: expected at most 13 numbers, found 14");
+    refused("<key act='1 2 3 4 5 6 7'/>", "<string>:3: <key>: act: expected at most 6 numbers, found 7");
+    // the activations of a plugin are its own
+    let plugin = format!("<plugin joint='j' plugin='p'/>{all}");
+    let found = read(&text(&plugin, &format!("<key {}/>", numbers.replace("'1 ", "'0 1 ")))).unwrap();
+    close(&found.keyframes()[0].control, &[1.0, 0.0, 3.0, 6.0, 7.0, 0.0, 13.0]);
+    let lost = "act: controls of integrators are left out, for the activations of an actuator before are not counted";
+    assert!(said(&found).iter().any(|warning| warning.ends_with(lost)), "{:?}", said(&found));
+}

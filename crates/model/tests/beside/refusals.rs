@@ -101,13 +101,14 @@ fn models_that_are_changed() {
         "<mujoco><worldbody><body name='a'><joint name='a' stiffness='1'/>{ball}<body name='b' pos='1 0 0' gravcomp='1'>
         <joint name='b' stiffness='2' actuatorfrcrange='-1 2'/>{ball}<site name='tip' pos='1 0 0'/></body></body></worldbody>
         <actuator><motor name='m' joint='a'/><position name='n' joint='b'/></actuator>
-        <equality><connect name='loop' body1='b' anchor='1 0 0'/></equality><keyframe><key name='up' qpos='0.1 0.2'/></keyframe></mujoco>"
+        <equality><connect name='loop' body1='b' anchor='1 0 0'/></equality><keyframe><key name='up' qpos='0.1 0.2' ctrl='3 4'/></keyframe></mujoco>"
     );
     let found = read(&text).unwrap();
     let locked = found.lock(&[1], &neutral(&found)).unwrap();
     assert_eq!((locked.springs().len(), locked.springs()[0].stiffness[0], locked.springs()[0].body), (1, 2.0, 1));
     assert_eq!((locked.actuators().len(), locked.actuators()[0].name.as_str()), (1, "n"));
     assert_eq!((locked.limits().effort_lower[0], locked.keyframes()[0].q[0]), (-1.0, 0.2));
+    assert_eq!((&locked.keyframes()[0].control[..], &found.keyframes()[0].control[..]), (&[4.0][..], &[3.0, 4.0][..]));
     assert_eq!((locked.constraints().len(), locked.gravity_compensation()[0].body), (1, 1));
     let mut two = ModelBuilder::new("two");
     two.append(WORLD, Se3::identity(), &found, "left_");
@@ -115,6 +116,8 @@ fn models_that_are_changed() {
     let two = two.build().unwrap();
     assert_eq!((two.springs().len(), two.actuators().len(), two.constraints().len()), (4, 4, 2));
     assert_eq!(two.actuators()[3].name, "right_n");
+    let controls: Vec<&[f64]> = two.keyframes().iter().map(|keyframe| &keyframe.control[..]).collect();
+    assert_eq!(controls, [[3.0, 4.0, 0.0, 0.0], [0.0, 0.0, 3.0, 4.0]]);
     assert!(matches!(two.actuators()[3].transmission, Transmission::Joint { body: 4 }));
     assert_eq!(two.gravity_compensation()[1].mass_com, found.gravity_compensation()[0].mass_com);
 }

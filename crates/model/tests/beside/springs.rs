@@ -173,6 +173,8 @@ fn switches() {
     assert_eq!(flag(&["frictionloss"]).friction(), [0.0]);
     assert_eq!(flag(&["limit"]).limits().upper, [f64::INFINITY]);
     assert!(flag(&["equality"]).constraints().is_empty());
+    let free = flag(&["constraint"]);
+    assert_eq!((free.constraints().len(), free.friction()[0], free.limits().upper[0]), (0, 0.0, f64::INFINITY));
     for off in [flag(&["actuation"]), with("actuatorgroupdisable='2 3'>")] {
         assert_eq!((effort(&off)[1], off.armature()[0], off.actuators().len()), (f64::INFINITY, 0.1, 0));
         let what = "it is disabled by <option>: it is no actuator, and no limit of effort";

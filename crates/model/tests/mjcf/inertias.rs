@@ -193,6 +193,30 @@ fn files_of_meshes() {
     }
 }
 
+/// `body_mass` and `body_ipos` of MuJoCo 4.0.0. As a fan from its first corner, the face would give 17500 kg.
+#[test]
+fn faces_of_five_corners_that_are_in_no_plane() {
+    let mut obj = "v 3 1 0\nv 5 1 0.5\nv 6 3 0\nv 4 5 1\nv 2 3 -0.5\nv 4 2 -5\nf 1 2 3 4 5\n".to_owned();
+    obj += "f 6 2 1\nf 6 3 2\nf 6 4 3\nf 6 5 4\nf 6 1 5\n";
+    let main = robot("<asset><mesh file='a.obj'/></asset>", "<body><joint/><geom type='mesh' mesh='a'/></body>", "");
+    let files: [(&str, &[u8]); 2] = [("main.xml", main.as_bytes()), ("a.obj", obj.as_bytes())];
+    let found = Folder::new("pentagon", &files).read("main.xml").unwrap();
+    near("mass", &[found.total_mass()], &[18166.666666666668], 1e-12);
+    let com = found.bodies()[1].inertia.mass_com.scale(1.0 / found.total_mass());
+    near("com", &com.to_array(), &[4.033256880733944, 2.561926605504587, -1.0057339449541285], 1e-12);
+    assert!(found.warnings().is_empty());
+    // a face without an ear
+    let obj = obj.replace(
+        "f 1 2 3 4 5",
+        "v 3 0 -0.5\nv 3 3 -0.5\nv -3 1 0\nv -2 -1 -1\nv 2 2 0.5\nf 1 2 3 4 5\nf 7 8 9 10 11 9",
+    );
+    let files: [(&str, &[u8]); 2] = [("main.xml", main.as_bytes()), ("a.obj", obj.as_bytes())];
+    let found = Folder::new("no-ear", &files).read("main.xml").unwrap();
+    near("mass", &[found.total_mass()], &[18166.666666666668], 1e-12);
+    let said = "mesh `a`: 1 of its faces are not cut into triangles, or in part, as in MuJoCo: its surface has holes";
+    assert!(found.warnings().iter().any(|warning| warning.to_string().ends_with(said)), "{:?}", found.warnings());
+}
+
 #[test]
 fn invalid_meshes() {
     let flat = "<asset><mesh name='m' vertex='0 0 0 1 0 0 0 1 0 1 1 0'/></asset>";

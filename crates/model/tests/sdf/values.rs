@@ -139,6 +139,7 @@ fn what_a_model_does_not_hold() {
     for (inside, what) in [
         ("<kinematic>true</kinematic>", "kinematic is left out"),
         ("<velocity_decay><linear>0.1</linear></velocity_decay>", "velocity_decay: linear 0.1 is left out"),
+        ("<velocity_decay><angular>bad</angular></velocity_decay>", "velocity_decay: angular bad is left out"),
         ("<enable_wind>1</enable_wind>", "enable_wind is left out"),
         ("<inertal/>", "unknown element <inertal> in <link>; nearest is `inertial`"),
     ] {

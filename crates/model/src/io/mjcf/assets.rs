@@ -106,10 +106,10 @@ impl Solids {
         if builtin.is_some() && (a.get("file").is_some() || a.get("vertex").is_some()) {
             return Err("builtin goes with neither file nor vertex".to_owned());
         }
-        let (mut points, mut triangles) = match (builtin, a.get("file")) {
-            (Some(kind), _) => super::builtin::shape(kind, &list("params")?)?,
+        let ((mut points, mut triangles), lost) = match (builtin, a.get("file")) {
+            (Some(kind), _) => (super::builtin::shape(kind, &list("params")?)?, 0),
             (None, Some(file)) => self.file(source, &a, file, packages)?,
-            (None, None) => (Vec::new(), Vec::new()),
+            (None, None) => Default::default(),
         };
         if points.is_empty() {
             let numbers = list("vertex")?;
@@ -137,17 +137,17 @@ impl Solids {
         let exact = if source.compiler.exact_meshes { "exact" } else { "legacy" };
         let rule = if builtin == Some("plate") { "shell" } else { a.get("inertia").unwrap_or(exact) };
         let rule = Rule::of(rule).ok_or_else(|| format!("inertia: no rule is named `{rule}`"))?;
-        Solid::new(&points, triangles, rule)
+        Ok(Solid { lost, ..Solid::new(&points, triangles, rule)? })
     }
 
-    /// The points and triangles of a mesh's file.
+    /// The points and triangles of a mesh's file, and the number of faces of which triangles are left out.
     fn file(
         &mut self,
         source: &Source,
         a: &Attributes,
         file: &str,
         packages: &[PathBuf],
-    ) -> Result<condyle_meshes::Triangles, String> {
+    ) -> Result<(condyle_meshes::Triangles, usize), String> {
         let folder = source.folder.ok_or_else(|| format!("a string has no folder to find `{file}` in"))?;
         let name = if source.compiler.strip_path { file.rsplit(['/', '\\']).next().unwrap_or(file) } else { file };
         // as MuJoCo: in the folder of meshes, or else beside the file that has the element
@@ -177,7 +177,11 @@ impl Solids {
                 Some(known.ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?)
             }
         };
-        format.map_or_else(|| msh(&bytes), |format| condyle_meshes::triangles(format, &bytes)).map_err(said)
+        match format {
+            Some(format) => condyle_meshes::cut_triangles(format, &bytes),
+            None => msh(&bytes).map(|triangles| (triangles, 0)),
+        }
+        .map_err(said)
     }
 }
 

@@ -36,7 +36,7 @@ pub(super) fn add<'a>(
     for tendon in &tendons.all {
         tendon.add_to(model, joints, &lines, &on, &mut armature, &mut warnings);
     }
-    model.actuators = {
+    let actuators = {
         let reference = match drives.has_ratios() || joints.all.iter().any(|joint| joint.has_spring_damper()) {
             true => Some(Reference::new(model, poses, &armature)),
             false => None,
@@ -45,6 +45,8 @@ pub(super) fn add<'a>(
         joints.all.iter_mut().for_each(|joint| joint.find_spring(joint.columns(model), &response));
         drives.table(model, (joints, &tendons), &on, reference.as_ref(), &mut warnings)?
     };
+    let driven: Vec<usize> = actuators.iter().map(|(index, _)| *index).collect();
+    model.actuators = actuators.into_iter().map(|(_, actuator)| actuator).collect();
     for (joint, &line) in joints.all.iter().zip(&lines) {
         joint.add_to(model, line, &on, &mut warnings);
     }
@@ -56,6 +58,6 @@ pub(super) fn add<'a>(
     if !on.spring && !on.damper {
         model.gravity_compensation.clear(); // MuJoCo then has no passive forces
     }
-    keyframe::add(model, root, joints, &mut warnings)?;
+    keyframe::add(model, root, joints, (&drives.inputs()?, &driven), &mut warnings)?;
     Ok(warnings)
 }

@@ -262,6 +262,7 @@ fn wrapper(element: &Element, class: Option<&str>) -> Element {
         line,
         at: element.at,
         source,
+        stray: None,
     }
 }
 
@@ -314,5 +315,6 @@ fn copied(element: &Element, rename: &dyn Fn(&str) -> String, level: usize) -> R
     };
     let attributes = element.attributes.iter().map(renamed).collect();
     let (tag, text, file) = (element.tag.clone(), element.text.clone(), element.file.clone());
-    Ok(Element { tag, attributes, text, children, file, line: element.line, at: element.at, source: element.source })
+    let (line, at, source) = (element.line, element.at, element.source);
+    Ok(Element { tag, attributes, text, children, file, line, at, source, stray: None })
 }

@@ -63,7 +63,8 @@ impl Files {
     pub(super) fn parse(&mut self, text: &str, file: &str, folder: Option<&Path>) -> Result<usize, Error> {
         let mut root = Element::parse(text, file, &mut self.amount)?;
         let seen = self.open.last().cloned().into_iter().collect();
-        Includes { top: folder, seen, amount: &mut self.amount }.resolve(&mut root, folder, 1)?;
+        Includes { top: folder, seen, amount: &mut self.amount, warnings: &mut self.warnings }
+            .resolve(&mut root, folder, 1)?;
         if root.tag != "mujoco" {
             return Err(root.wrong("the root element of an MJCF is <mujoco>"));
         }
@@ -93,6 +94,8 @@ struct Includes<'a> {
     /// Files so far, with links resolved.
     seen: HashSet<PathBuf>,
     amount: &'a mut Amount,
+    /// Things outside of the root elements.
+    warnings: &'a mut Vec<Warning>,
 }
 
 impl Includes<'_> {
@@ -119,7 +122,8 @@ impl Includes<'_> {
             }
             let text = self.amount.read(&path).map_err(|e| child.wrong(e.to_string()))?;
             let mut included = Element::parse(&text, &path.display().to_string(), self.amount)?;
-            // its children take the depth of the `<include>`
+            self.warnings.extend(included.outside());
+            // its children come to stand where it was included
             self.resolve(&mut included, Some(path.parent().unwrap_or(Path::new(""))), level)?;
             element.children.append(&mut included.children);
         }

@@ -2,6 +2,7 @@
 
 use super::attributes::Attributes;
 use super::spring::Joints;
+use super::transmission::Inputs;
 use crate::configuration::neutral;
 use crate::error::Error;
 use crate::io::xml::Element;
@@ -15,18 +16,20 @@ use std::collections::HashSet;
 /// Maximum number of coordinates of all keyframes together.
 const MAX_NUMBERS: usize = 1 << 22;
 
-/// Adds the keyframes of a file. As in MuJoCo, joints without numbers in a list keep the initial configuration of the
-/// file and are at rest.
+/// Adds the keyframes of a file. As in MuJoCo, joints for which a list has no numbers are as the file draws them, and at rest,
+/// and controls are 0. `driven` has the index in the file of each of the model's actuators.
 pub(super) fn add(
     model: &mut Model,
     root: &Element,
     joints: &Joints,
+    (inputs, driven): (&[Inputs], &[usize]),
     warnings: &mut Vec<Warning>,
 ) -> Result<(), Error> {
     let [nq, nv] = [Joint::nq, Joint::nv].map(|count| joints.all.iter().map(|j| count(j.joint)).sum::<usize>());
     let keys: Vec<_> = root.all("keyframe").flat_map(|section| section.all("key")).collect();
-    if keys.len() * (nq + nv) > MAX_NUMBERS {
-        let what = format!("{} keyframes of {} numbers: at most {MAX_NUMBERS} are allowed", keys.len(), nq + nv);
+    let numbers = nq + nv + inputs.len();
+    if keys.len() * numbers > MAX_NUMBERS {
+        let what = format!("{} keyframes of {numbers} numbers: at most {MAX_NUMBERS} are allowed", keys.len());
         return Err(root.wrong(what));
     }
     let mut names: HashSet<String> = keys.iter().filter_map(|e| own(e)).map(str::to_owned).collect();
@@ -59,6 +62,7 @@ pub(super) fn add(
         let given = numbers("qpos", nq, Joint::nq)?;
         let mut velocity = numbers("qvel", nv, Joint::nv)?;
         velocity.resize(nv, 0.0);
+        let control = control(e, inputs, driven, warnings)?;
         let at_home = &drawn[given.len()..];
         let (mut positions, mut velocities) = (&[&given[..], at_home].concat()[..], &velocity[..]);
         let mut left = given.len();
@@ -87,12 +91,49 @@ pub(super) fn add(
                 v[body.idx_v..][..velocity.len()].copy_from_slice(&velocity);
             }
         }
-        model.keyframes.push(Keyframe { name, q, v });
+        model.keyframes.push(Keyframe { name, q, v, control });
     }
     Ok(())
 }
 
-/// Returns the name that the file gives to a keyframe.
+/// Returns the control of each of the model's actuators. That of an integrator is its activation.
+fn control(e: &Element, inputs: &[Inputs], driven: &[usize], warnings: &mut Vec<Warning>) -> Result<Vec<f64>, Error> {
+    let list = |attribute: &str, expected: Option<usize>| {
+        let found = Attributes::plain(e).list(attribute)?.unwrap_or_default();
+        match expected.filter(|&expected| found.len() > expected) {
+            Some(expected) => {
+                Err(e.wrong(format!("{attribute}: expected at most {expected} numbers, found {}", found.len())))
+            }
+            None => Ok(found),
+        }
+    };
+    let counts = inputs.iter().map(|input| input.activations);
+    let controls = list("ctrl", Some(inputs.iter().map(|input| input.controls).sum()))?;
+    let activations = list("act", counts.sum::<Option<usize>>())?;
+    let (mut first, mut state, mut starts) = (0, Some(0), Vec::new());
+    for input in inputs {
+        starts.push((first + input.own, state));
+        (first, state) = (first + input.controls, state.zip(input.activations).map(|(start, count)| start + count));
+    }
+    let mut is_lost = false;
+    let number = |&k: &usize| match (inputs[k].is_integrator, starts[k].1) {
+        (false, _) => controls.get(starts[k].0).copied(),
+        (true, Some(state)) => activations.get(state).copied(),
+        (true, None) => {
+            is_lost |= !activations.is_empty();
+            None
+        }
+    };
+    let found = driven.iter().map(number).map(Option::unwrap_or_default).collect();
+    if is_lost {
+        let what =
+            "act: controls of integrators are left out, for the activations of an actuator before are not counted";
+        warnings.push(e.left_out(what));
+    }
+    Ok(found)
+}
+
+/// Returns the name that a keyframe has in its file.
 fn own(e: &Element) -> Option<&str> {
     e.attribute("name").filter(|name| !name.is_empty())
 }

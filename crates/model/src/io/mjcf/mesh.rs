@@ -23,6 +23,8 @@ pub(super) struct Solid {
     pub(super) bounds: [[f64; 3]; 2],
     /// Number of corners, if the mesh is its convex hull.
     pub(super) corners: Option<usize>,
+    /// Number of faces of its file of which triangles are left out.
+    pub(super) lost: usize,
 }
 
 impl Solid {
@@ -129,6 +131,6 @@ impl Solid {
                 (low[k], high[k]) = (low[k].min(p[k]), high[k].max(p[k]));
             }
         }
-        Ok(Self { volume, pose, moments: moments.map(|x| x / volume), bounds: [low, high], corners })
+        Ok(Self { volume, pose, moments: moments.map(|x| x / volume), bounds: [low, high], corners, lost: 0 })
     }
 }

@@ -38,7 +38,8 @@ impl Sections {
             let children = elements.into_iter().flatten().collect();
             let (file, line, source) = (root.file.clone(), root.line, root.source);
             let (attributes, text) = (Vec::new(), String::new());
-            root.children.push(Element { tag: tag.to_owned(), attributes, text, children, file, line, at: 0, source });
+            let (tag, at, stray) = (tag.to_owned(), 0, None);
+            root.children.push(Element { tag, attributes, text, children, file, line, at, source, stray });
         }
     }
 

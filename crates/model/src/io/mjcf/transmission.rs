@@ -2,6 +2,7 @@
 
 use super::Source;
 use super::actuator::{ALL, Classes, Mechanics, clipped, scaled};
+use super::attributes::Attributes;
 use super::law::{KINDS, Law};
 use super::reference::Reference;
 use super::spring::{Joints, Line, Switches};
@@ -97,7 +98,12 @@ impl<'a> Drives<'a> {
         Ok(Self { all })
     }
 
-    /// Adds armature and damping, multiplied by gear², to the driven joints and tendons.
+    /// Returns the numbers that each actuator has in a keyframe.
+    pub(super) fn inputs(&self) -> Result<Vec<Inputs>, Error> {
+        self.all.iter().map(|drive| drive.law.inputs(drive.element)).collect()
+    }
+
+    /// Adds armature and damping, which count gear² times at what is driven.
     pub(super) fn load(
         &self,
         model: &mut Model,
@@ -144,7 +150,7 @@ impl<'a> Drives<'a> {
         counts
     }
 
-    /// Returns the list of actuators, and adds warnings about features that are left out.
+    /// Returns the table of actuators, each with its index in the file, and says what is left out.
     pub(super) fn table(
         &self,
         model: &Model,
@@ -152,7 +158,7 @@ impl<'a> Drives<'a> {
         on: &Switches,
         reference: Option<&Reference>,
         warnings: &mut Vec<Warning>,
-    ) -> Result<Vec<Actuator>, Error> {
+    ) -> Result<Vec<(usize, Actuator)>, Error> {
         let user = model.frames.iter().enumerate().filter(|(_, frame)| frame.kind == FrameKind::User);
         let sites: HashMap<&str, usize> = user.map(|(i, frame)| (&*frame.name, i)).collect();
         let (mut table, mut ratios, counts) = (Vec::new(), 0, self.on_tendons(tendons, on));
@@ -160,7 +166,7 @@ impl<'a> Drives<'a> {
             let what = "actuatorfrcrange: it is no limit of effort, for several actuators share the tendon";
             warnings.push(tendon.element.left_out(what));
         }
-        for drive in &self.all {
+        for (index, drive) in self.all.iter().enumerate() {
             let Drive { element: e, mechanics: Mechanics { gear, delay, .. }, law, .. } = drive;
             let mut warn = |what: String| warnings.push(e.left_out(what));
             let transmission = match drive.target {
@@ -221,7 +227,7 @@ impl<'a> Drives<'a> {
             if let Some(x) = [gain, bias, kp, kv].iter().chain(gear).find(|x| !x.is_finite()) {
                 return Err(e.wrong(format!("its gain, bias or gear is {x}, which is not finite")));
             }
-            table.push(Actuator {
+            let actuator = Actuator {
                 name: e.attribute("name").unwrap_or_default().to_owned(),
                 transmission,
                 gear: *gear,
@@ -231,7 +237,8 @@ impl<'a> Drives<'a> {
                 kv,
                 control: law.activation(drive.control, drive.activation).into(),
                 force: drive.force.into(),
-            });
+            };
+            table.push((index, actuator));
         }
         Ok(table)
     }
@@ -304,8 +311,40 @@ impl Drive<'_> {
     }
 }
 
+/// Numbers of an actuator in a keyframe.
+pub(super) struct Inputs {
+    /// Number of controls.
+    pub(super) controls: usize,
+    /// Index of the control that a model has, among these.
+    pub(super) own: usize,
+    /// Number of activations, if it is known.
+    pub(super) activations: Option<usize>,
+    /// Whether a model's control is the activation.
+    pub(super) is_integrator: bool,
+}
+
 impl Law<'_> {
-    /// Returns whether the velocity gain of a servo is specified by a damping ratio.
+    /// Returns the numbers that an actuator of this law has in a keyframe.
+    fn inputs(&self, e: &Element) -> Result<Inputs, Error> {
+        let (default, own) = if self.gain == "pid" { ("pos vel", "pos") } else { ("voltage", "voltage") };
+        let several = matches!(self.gain, "pid" | "dcmotor");
+        let words: Vec<&str> = self.input.filter(|_| several).unwrap_or(default).split_whitespace().collect();
+        let dimension = Attributes::plain(e).number("actdim")?.filter(|n| *n >= 0.0).map(|n| n.min(1e6) as usize);
+        Ok(Inputs {
+            controls: if self.gain == "so3" { 3 } else { words.len() },
+            own: words.iter().position(|word| *word == own).unwrap_or(0),
+            activations: match (self.gain, self.dynamics) {
+                ("plugin", _) => dimension,
+                ("dcmotor", _) if !self.extra.is_empty() => None,
+                (_, "none") => Some(0),
+                (_, "pid") => Some(usize::from(self.gainprm[0] != 0.0) + usize::from(self.dynprm[1] != 0.0)),
+                _ => Some(dimension.unwrap_or(1)),
+            },
+            is_integrator: self.dynamics == "integrator",
+        })
+    }
+
+    /// Returns whether the gain of velocity of a servo is given by a damping ratio.
     fn has_ratio(&self) -> bool {
         matches!(self.affine(), Ok([gain, _, kp, kv]) if gain == kp && kv < 0.0)
     }

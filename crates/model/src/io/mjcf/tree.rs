@@ -273,6 +273,13 @@ impl<'a> Reader<'a> {
                         format!("maxhullvert of mesh `{name}`: its hull has all its {found} corners, not {most}");
                     self.warnings.push(a.element.left_out(what));
                 }
+                if solid.lost > 0 && solid.corners.is_none() {
+                    let (name, lost) = (a.get("mesh").unwrap_or_default(), solid.lost);
+                    let what = format!(
+                        "mesh `{name}`: {lost} of its faces are not cut into triangles, or in part, as in MuJoCo"
+                    );
+                    self.warnings.push(a.element.left_out(format!("{what}: its surface has holes")));
+                }
                 geometry::geom(&source.compiler, a, Some(&solid), field)
             }
             Err(why) => {

@@ -183,6 +183,7 @@ impl Element {
             line: self.line,
             at: self.at,
             source: self.source,
+            stray: None,
         }
     }
 }

@@ -168,10 +168,10 @@ pub(super) fn flags(element: &Element, warnings: &mut Vec<Warning>) -> Result<()
     }
     let decay = element.child("velocity_decay");
     for tag in ["linear", "angular"] {
-        let x = number(element, decay, tag, 0.0)?;
-        if x != 0.0 {
-            warnings
-                .push(element.left_out(format!("velocity_decay: {tag} {x} is left out: its velocity does not decay")));
+        let text = decay.and_then(|decay| decay.child(tag)).map_or("", |e| e.text.trim());
+        if !text.is_empty() && text.parse() != Ok(0.0) {
+            let what = format!("velocity_decay: {tag} {text} is left out: its velocity does not decay");
+            warnings.push(element.left_out(what));
         }
     }
     Ok(())

@@ -94,15 +94,18 @@ pub(super) fn options(joint: &Element, kind: Joint, warnings: &mut Vec<Warning>)
         let [lower, upper, effort, velocity] = ["lower", "upper", "effort", "velocity"].map(number);
         let (lower, upper, effort, velocity) = (lower?.unwrap_or(0.0), upper?.unwrap_or(0.0), effort?, velocity?);
         let mut bound = |name, found: Option<f64>| match found {
-            None if is_limited => Err(joint.wrong_inside(limit, format!("limit has no {name}"))),
+            None if is_limited => {
+                warnings.push(joint.assumed(format!("limit has no {name}: it has no limit")));
+                None
+            }
             Some(x) if x < 0.0 => {
                 warnings.push(joint.assumed(format!("limit {name} is {x}, below 0: it has no limit")));
-                Ok(None)
+                None
             }
-            _ => Ok(found),
+            _ => found,
         };
-        let effort = bound("effort", effort)?;
-        options.velocity = bound("velocity", velocity)?;
+        let effort = bound("effort", effort);
+        options.velocity = bound("velocity", velocity);
         options.effort = effort.map(|effort| (-effort, effort));
         if is_limited && lower > upper {
             let what = format!("lower limit {lower} is above upper limit {upper}: its position has no limits");
@@ -116,7 +119,7 @@ pub(super) fn options(joint: &Element, kind: Joint, warnings: &mut Vec<Warning>)
             }
         }
     } else if is_limited {
-        return Err(joint.wrong("is revolute or prismatic and has no <limit>"));
+        warnings.push(joint.assumed("is revolute or prismatic and has no <limit>: it has no limits"));
     }
     if let Some(dynamics) = dynamics {
         let number = |name| Ok(array(joint, dynamics, name)?.map_or(0.0, |[x]| x));

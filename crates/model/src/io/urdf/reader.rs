@@ -17,6 +17,9 @@ use crate::warning::Warning;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use std::collections::{HashMap, HashSet};
 
+/// The link that a joint may have as its parent without being in the file.
+const WORLD_LINK: &str = "world";
+
 /// A joint, and the links that it connects.
 struct Edge<'a> {
     element: &'a Element,
@@ -34,7 +37,9 @@ pub(super) struct Reader<'a> {
     joints: HashMap<&'a str, Edge<'a>>,
     /// Name of the root link.
     root: &'a str,
-    /// Joints that each link carries, sorted by name.
+    /// The first joint on a link `world` that the file does not have.
+    on_world: Option<&'a Element>,
+    /// The joints on each link, in the order of their names.
     children: HashMap<&'a str, Vec<&'a str>>,
 }
 
@@ -46,7 +51,7 @@ impl<'a> Reader<'a> {
         }
         let (links, joints, children) = (HashMap::new(), HashMap::new(), HashMap::new());
         let origins = Origins::of(robot)?;
-        let mut reader = Self { robot, origins, links, order: Vec::new(), joints, root: "", children };
+        let mut reader = Self { robot, origins, links, order: Vec::new(), joints, root: "", on_world: None, children };
         for element in robot.children.iter().filter(|c| matches!(&*c.tag, "link" | "joint" | "drake:joint")) {
             let Some(name) = element.attribute("name").filter(|n| !n.is_empty()) else {
                 return Err(element.wrong("has no name"));
@@ -70,14 +75,16 @@ impl<'a> Reader<'a> {
     /// Finds root and children. Every link except the root must be the child of exactly one joint, and all links must
     /// be connected.
     fn find_tree(&mut self) -> Result<(), Error> {
-        let links: Vec<&str> = self.robot.all("link").filter_map(|l| l.attribute("name")).collect();
+        let mut links: Vec<&str> = self.robot.all("link").filter_map(|l| l.attribute("name")).collect();
         let mut parent: HashMap<&str, &str> = HashMap::new();
         let mut names = self.order.clone();
         names.sort_unstable();
         for &name in &names {
             let Edge { element, parent: on, child } = self.joints[name];
             for link in [on, child] {
-                if !self.links.contains_key(link) {
+                if !self.links.contains_key(link) && (on, link) == (WORLD_LINK, WORLD_LINK) {
+                    self.on_world = self.on_world.or(Some(element));
+                } else if !self.links.contains_key(link) {
                     let near = near(&nearest(link, links.iter().copied()));
                     return Err(element.wrong(format!("no link is named `{link}`{near}")));
                 }
@@ -86,6 +93,9 @@ impl<'a> Reader<'a> {
                 return Err(element.wrong(format!("link `{child}` is already the child of joint `{other}`")));
             }
             self.children.entry(on).or_default().push(name);
+        }
+        if self.on_world.is_some() {
+            links.insert(0, WORLD_LINK);
         }
         let roots: Vec<&str> = links.iter().copied().filter(|l| !parent.contains_key(l)).collect();
         self.root = match roots[..] {
@@ -113,9 +123,12 @@ impl<'a> Reader<'a> {
     pub(super) fn model(&self, options: &UrdfOptions) -> Result<Model, Error> {
         let mut warnings = Vec::new();
         known::check(self.robot, &mut warnings);
+        if let Some(joint) = self.on_world {
+            warnings.push(joint.assumed("no link is named `world`: its parent is the world, as Drake reads it"));
+        }
         let mut armatures = armatures(self.robot, &mut warnings);
         let mut builder = ModelBuilder::new(self.robot.attribute("name").unwrap_or_default());
-        let own = self.inertia(self.links[self.root], &mut warnings)?;
+        let own = self.inertia(self.root, &mut warnings)?;
         let root = match options.root_joint {
             None => {
                 builder.merge(WORLD, Se3::identity(), own);
@@ -140,8 +153,8 @@ impl<'a> Reader<'a> {
         wait(&mut waiting, self.root, root, Se3::identity());
         while let Some((name, parent, pXl)) = waiting.pop() {
             let Edge { element, child: link, .. } = self.joints[name];
-            let pXl = pXl * self.origins.pose(element, element)?; // now the placement of the child
-            let inertia = self.inertia(self.links[link], &mut warnings)?;
+            let pXl = pXl * self.origins.pose(element, element)?; // the child's
+            let inertia = self.inertia(link, &mut warnings)?;
             let (body, bXl) = match joints::kind(element, &mut warnings)? {
                 None => {
                     builder.merge(parent, pXl, inertia);
@@ -197,7 +210,7 @@ impl<'a> Reader<'a> {
             let (name, link) = (text(frame, frame, "name")?, text(frame, frame, "link")?);
             let (body, bXl) = match links.get(link) {
                 Some(&link) => link,
-                None if link == "world" => (WORLD, Se3::identity()),
+                None if link == WORLD_LINK => (WORLD, Se3::identity()),
                 None => {
                     let near = near(&nearest(link, links.keys().copied()));
                     return Err(frame.wrong(format!("no link is named `{link}`{near}")));
@@ -235,8 +248,9 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Returns the link's inertia in the link's frame. Missing numbers are 0, as in Drake, with a warning.
-    fn inertia(&self, link: &Element, warnings: &mut Vec<Warning>) -> Result<Inertia<f64>, Error> {
+    /// Returns the link's inertia in the link's frame. Parts that are missing are 0, as Drake has it, with a warning.
+    fn inertia(&self, link: &str, warnings: &mut Vec<Warning>) -> Result<Inertia<f64>, Error> {
+        let Some(&link) = self.links.get(link) else { return Ok(Inertia::zero()) };
         let Some(inertial) = link.child("inertial") else { return Ok(Inertia::zero()) };
         let mut missing = Vec::new();
         let (mass, inertia) = (inertial.child("mass"), inertial.child("inertia"));

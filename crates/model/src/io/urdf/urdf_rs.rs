@@ -12,11 +12,11 @@ impl Model {
     /// Converts a robot that urdf-rs has read. The result is the model that [`from_urdf`](Self::from_urdf) reads from
     /// the same file, except for information that `urdf_rs::Robot` lacks.
     ///
-    /// - A missing limit is represented by zeros. Zeros of a continuous joint mean that it has no limit. Zeros of a
-    ///   revolute or prismatic joint are limits and cause a warning. A missing effort is not an error.
-    /// - A planar joint without an axis has the axis 1 0 0, without a warning about it.
-    /// - Some elements are missing, and have neither effect nor warning: versions and quaternions (`quat_xyzw`), limits
-    ///   of acceleration and jerk, transmissions, frames and joints of Drake, and all unknown names.
+    /// - A limit that is missing has zeros there. Zeros of a continuous joint are taken as no limit; zeros of a revolute or prismatic
+    ///   joint stay, and warn.
+    /// - A planar joint without an axis has 1 0 0, and no warning that says so.
+    /// - Versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions, frames and joints of Drake, and all
+    ///   that is unknown or left out are not there: they have neither effect nor warning.
     ///
     /// Needs the feature `urdf-rs`.
     ///
@@ -68,6 +68,7 @@ fn element(tag: &str, attributes: &[(&str, &str)], children: Vec<Element>) -> El
         line: 1,
         at: 0,
         source: 0,
+        stray: None,
     }
 }
 

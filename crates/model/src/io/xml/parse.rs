@@ -25,7 +25,9 @@ struct Parser<'a> {
     /// Open elements, at most [`MAX_DEPTH`].
     open: Vec<Element>,
     root: Option<Element>,
-    /// First element below the maximum depth, and the depth of nesting.
+    /// Line and description of the first thing outside of the root element.
+    stray: Option<Box<(u32, String)>>,
+    /// First element below the deepest level, and the number of levels.
     too_deep: Option<(Element, usize)>,
     /// Prefixes of xacro macros.
     macros: Vec<&'a str>,
@@ -45,6 +47,7 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Element, Error> {
         tags: Vec::new(),
         open: Vec::new(),
         root: None,
+        stray: None,
         too_deep: None,
         macros: vec!["xacro"],
         is_damaged: text.contains(INVALID),
@@ -57,7 +60,7 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Element, Error> {
     match (parser.tags.last(), parser.root.take()) {
         (Some(&(tag, line)), _) => Err(parser.wrong(format!("<{tag}> of line {line} is never closed"))),
         (None, None) => Err(parser.wrong("there is no element")),
-        (None, Some(root)) => Ok(root),
+        (None, Some(root)) => Ok(Element { stray: parser.stray, ..root }),
     }
 }
 
@@ -71,7 +74,11 @@ impl<'a> Parser<'a> {
             let blank = text.len() - text.trim_start().len();
             if blank < text.len() {
                 self.at += blank;
-                return Err(self.wrong("text outside of the root element"));
+                if length == rest.len() {
+                    return Err(self.wrong("text outside of the root element"));
+                }
+                self.stray("text outside of the root element has no effect".to_owned());
+                self.at -= blank;
             }
         } else if self.open.last().is_some_and(|open| !open.text.is_empty()) || !text.trim_start().is_empty() {
             let text = self.decoded(text, false)?;
@@ -83,7 +90,7 @@ impl<'a> Parser<'a> {
             self.skip(4, comment, "-->", "a comment")?;
         } else if let Some(text) = tag.strip_prefix("<![CDATA[") {
             if self.tags.is_empty() {
-                return Err(self.wrong("text outside of the root element"));
+                self.stray("text outside of the root element has no effect".to_owned());
             }
             let text = self.skip(9, text, "]]>", "<![CDATA[")?;
             self.check_encoding(text)?;
@@ -94,6 +101,12 @@ impl<'a> Parser<'a> {
             let Some(length) = end_of_type(document_type) else { return Err(self.wrong("<! is never closed")) };
             self.at += 2 + length;
         } else if let Some(tag) = tag.strip_prefix("</") {
+            if self.tags.is_empty() && self.root.is_some() {
+                self.stray(
+                    "the text of the file ends before a tag that closes nothing: the rest has no effect".to_owned(),
+                );
+                return Ok(false);
+            }
             let name = self.skip(2, tag, ">", "</")?.trim_end();
             self.close(name)?;
         } else {
@@ -116,8 +129,8 @@ impl<'a> Parser<'a> {
     /// Reads a tag that opens an element; `rest` begins with its name.
     fn open(&mut self, rest: &'a str) -> Result<(), Error> {
         let name = self.name(rest)?;
-        if self.root.is_some() {
-            return Err(self.wrong(format!("<{name}> is a second root element")));
+        if self.root.is_some() && self.tags.is_empty() {
+            self.stray(format!("<{name}> is a second root element, and has no effect"));
         }
         let line = self.count_lines();
         let mut element = Element {
@@ -129,6 +142,7 @@ impl<'a> Parser<'a> {
             line,
             at: self.at - 1,
             source: 0,
+            stray: None,
         };
         self.at += name.len();
         let is_empty = self.attributes(name, &mut element)?;
@@ -212,10 +226,17 @@ impl<'a> Parser<'a> {
             let element = self.open.pop();
             match self.open.last_mut() {
                 Some(parent) => parent.children.extend(element),
-                None => self.root = element,
+                None => self.root = self.root.take().or(element),
             }
         }
         Ok(())
+    }
+
+    /// Notes a thing outside of the root element, as the readers that robots are written for accept it.
+    fn stray(&mut self, what: String) {
+        if self.stray.is_none() {
+            self.stray = Some(Box::new((self.count_lines(), what)));
+        }
     }
 
     fn add_text(&mut self, text: &str) {

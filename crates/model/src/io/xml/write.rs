@@ -29,7 +29,10 @@ struct Written {
 impl Written {
     /// Writes an element on its line, or on the first free line after it.
     fn element(&mut self, element: &Element) {
-        let name = |name: &str| name.replace(':', "-");
+        let name = |name: &str| match name.strip_prefix(':') {
+            Some(rest) => format!("_{}", rest.replace(':', "-")), // no name begins with a dash
+            None => name.replace(':', "-"),
+        };
         while self.line < element.line {
             self.text.push('\n');
             self.line += 1;
