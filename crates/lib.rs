@@ -25,7 +25,7 @@
 //! | positions | [`integrate`], [`difference`], [`neutral`], [`random_configuration`], [`configuration`] |
 //! | dynamics | [`rnea`], [`aba`], [`crba`], [`minv`], [`nonlinear_effects`], [`terms`], [`factors`] |
 //! | frames | [`forward_kinematics`], [`Placements`], [`frame_jacobian`], [`kinematics`], [`centroidal`] |
-//! | derivatives | [`rnea_derivatives`], [`aba_derivatives`], [`gradient`], [`hessian`], [`jacobian`], [`derivatives`] |
+//! | derivatives | [`rnea_derivatives`], [`aba_derivatives`], [`gradient`], [`hessian`], [`mod@derivatives`] |
 //! | contacts, loops, impacts | [`ConstraintSet`], [`ContactConstraint`], [`constrained_dynamics`], [`constraints`] |
 //! | many states | [`Batch`], [`batch`], [`level`] |
 //! | simulation, identification | [`simulation`], [`regressors`] |

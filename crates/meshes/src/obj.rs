@@ -72,8 +72,8 @@ fn parse(
     Ok((points, groups))
 }
 
-/// Whether a face has four corners, of which the second and the fourth are not farther apart than the others: tinyobj, by which
-/// MuJoCo reads, cuts it there.
+/// Whether a face has four corners, of which the second and the fourth are not farther apart than the others: tinyobj,
+/// by which MuJoCo reads, cuts it there.
 fn across(points: &[[f64; 3]], corners: &[u32]) -> bool {
     let &[a, b, c, d] = corners else { return false };
     let square = |p: u32, q: u32| {

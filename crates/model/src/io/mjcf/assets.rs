@@ -181,7 +181,8 @@ impl Solids {
     }
 }
 
-/// The points and triangles of MuJoCo's own format: numbers of points, normals, coordinates of textures and triangles, then they.
+/// The points and triangles of MuJoCo's own format: numbers of points, normals, coordinates of textures and triangles,
+/// then they.
 #[cfg(feature = "meshes")]
 fn msh(bytes: &[u8]) -> Result<condyle_meshes::Triangles, String> {
     let words: Vec<[u8; 4]> = bytes.chunks_exact(4).map(|w| [w[0], w[1], w[2], w[3]]).collect();
