@@ -125,7 +125,7 @@ def tracked(*patterns: str) -> list[str]:
 
 
 def wide_lines() -> Iterator[str]:
-    """Yields lines of Rust that are too wide without their strings, which rustfmt does not break (ruff checks Python)."""
+    """Yields lines of Rust that are too wide without their strings, which rustfmt does not break (ruff: Python)."""
     for path in tracked("*.rs"):
         if path.startswith(TO_DO):
             continue
