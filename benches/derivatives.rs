@@ -1,5 +1,5 @@
 //! Growth of the analytic derivatives with the size and shape of a tree, compared with dual numbers and central
-//! differences: `cargo bench --bench derivatives`.
+//! differences: `cargo bench -p condyle-benches --bench derivatives`.
 //!
 //! The throughput is in pairs of a joint and one of its ancestors or itself. There are n · depth such pairs, where
 //! depth is the mean number of joints on the path to the world. Constant throughput means that the cost grows as O(n ·
@@ -26,12 +26,11 @@
 //! ∂τ and λᵀ∂²τ grow as O(n · depth), until n² zeros have to be written. ∂q̈ grows in the same way on chains, where it
 //! is solved for. On other trees it is a product, as is the additional part of λᵀ∂²q̈ on all trees, and grows faster.
 use condyle::{
-    Data, Inertia, Joint, Model, ModelBuilder, Scalar, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives,
+    Data, Model, Scalar, aba, aba_derivatives,
     derivatives::{LaneJacobian, StateFunction, aba_hessian, rnea_hessian},
     integrate, random_configuration, rnea, rnea_derivatives,
-    spatial::Mat3,
-    tree::BodyId,
 };
+use condyle_benches::tree;
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use num_dual::Dual64;
@@ -41,21 +40,6 @@ use std::hint::black_box;
 use std::time::Duration;
 
 const SIZES: [usize; 5] = [8, 16, 32, 64, 128];
-
-/// Builds n hinges; the parent of each body is given by `parent`.
-fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
-    let mut rng = StdRng::seed_from_u64(7);
-    let mut builder = ModelBuilder::new("tree");
-    let mut ids: Vec<BodyId> = vec![WORLD];
-    for i in 1..=n {
-        let mut r = || 0.2 * rng.random::<f64>() - 0.1;
-        let inertia = Inertia::from_com(1.0, Vec3::new(r(), r(), r()), Sym3::diagonal(0.01));
-        let placement = Se3::new(Mat3::identity(), Vec3::new(r(), r(), 0.2));
-        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
-        ids.push(builder.body(&format!("b{i}"), ids[parent(i)], Joint::Revolute { axis }, placement, inertia));
-    }
-    builder.build().expect("a tree is well-formed")
-}
 
 /// Returns the number of pairs of a joint and one of its ancestors or itself.
 fn pairs(model: &Model) -> u64 {

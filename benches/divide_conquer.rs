@@ -1,11 +1,9 @@
-//! Size from which divide and conquer is faster, on one thread and on two: `cargo bench --bench divide_conquer`.
+//! Size from which divide and conquer is faster, on one thread and on two: `cargo bench -p condyle-benches --bench divide_conquer`.
 //!
 //! `docs/lanes.md` has the table of runs of n/2 bodies. Runs of one body take 8 times as long as ABA on one thread.
 
-use condyle::{
-    Data, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, aba, divide_conquer::DivideConquer,
-    random_configuration, robots, spatial::Mat3, tree::BodyId,
-};
+use condyle::{Data, aba, divide_conquer::DivideConquer, random_configuration, robots};
+use condyle_benches::tree;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
@@ -14,21 +12,6 @@ use std::time::Duration;
 
 const SIZES: [usize; 5] = [10, 30, 100, 300, 1000];
 const THREADS: [usize; 2] = [1, 2];
-
-/// Builds n hinges; the parent of each body is given by `parent`.
-fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
-    let mut rng = StdRng::seed_from_u64(7);
-    let mut builder = ModelBuilder::new("tree");
-    let mut ids: Vec<BodyId> = vec![WORLD];
-    for i in 1..=n {
-        let mut r = || 0.2 * rng.random::<f64>() - 0.1;
-        let inertia = Inertia::from_com(1.0, Vec3::new(r(), r(), r()), Sym3::diagonal(0.01));
-        let placement = Se3::new(Mat3::identity(), Vec3::new(r(), r(), 0.2));
-        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
-        ids.push(builder.body(&format!("b{i}"), ids[parent(i)], Joint::Revolute { axis }, placement, inertia));
-    }
-    builder.build().expect("a tree is well-formed")
-}
 
 fn divide_conquer(c: &mut Criterion) {
     let pools = THREADS

@@ -1,5 +1,5 @@
 //! The rigid-body algorithms, their derivatives, and the terms of the equations of motion, one call on one state:
-//! `cargo bench --bench dynamics`.
+//! `cargo bench -p condyle-benches --bench dynamics`.
 
 use condyle::{
     Data, Model, aba, aba_derivatives,

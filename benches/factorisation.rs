@@ -1,16 +1,15 @@
 //! Which way of forward dynamics and of M⁻¹ is fastest, for which size and shape of a tree:
-//! `cargo bench --bench factorisation`. The rule in `ForwardDynamicsMethod::fastest` rests on its figures.
-//! `docs/performance.md` has the table. The factor inverts faster than the recursion while its rows have at most about
-//! 12 entries in the mean.
+//! `cargo bench -p condyle-benches --bench factorisation`. The rule in `ForwardDynamicsMethod::fastest` rests on its
+//! figures. `docs/performance.md` has the table. The factor inverts faster than the recursion while its rows have at
+//! most about 12 entries in the mean.
 #![allow(non_snake_case)]
 
 use condyle::{
-    Data, Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, crba,
+    Data, Model, ModelBuilder, Se3, WORLD, crba,
     factors::{Cholesky, ForwardDynamicsMethod, Ltdl, forward_dynamics},
     minv, random_configuration, robots,
-    spatial::Mat3,
-    tree::BodyId,
 };
+use condyle_benches::tree;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::DMatrix;
 use rand::rngs::StdRng;
@@ -19,21 +18,6 @@ use std::hint::black_box;
 use std::time::Duration;
 
 const SIZES: [usize; 6] = [6, 12, 25, 50, 100, 200];
-
-/// Builds n hinges; the parent of each body is given by `parent`.
-fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
-    let mut rng = StdRng::seed_from_u64(7);
-    let mut builder = ModelBuilder::new("tree");
-    let mut ids: Vec<BodyId> = vec![WORLD];
-    for i in 1..=n {
-        let mut r = || 0.2 * rng.random::<f64>() - 0.1;
-        let inertia = Inertia::from_com(1.0, Vec3::new(r(), r(), r()), Sym3::diagonal(0.01));
-        let placement = Se3::new(Mat3::identity(), Vec3::new(r(), r(), 0.2));
-        let axis = Vec3::from(core::array::from_fn(|k| if k == i % 3 { 1.0 } else { 0.0 }));
-        ids.push(builder.body(&format!("b{i}"), ids[parent(i)], Joint::Revolute { axis }, placement, inertia));
-    }
-    builder.build().expect("a tree is well-formed")
-}
 
 fn models() -> Vec<(String, Model)> {
     let mut models = vec![

@@ -32,8 +32,8 @@ COMMANDS = {
     "casadi": ".venv/pinocchio/bin/python benches/peers/casadi_comparison.py",
     "generated": "CC=clang-19 .venv/pinocchio/bin/python benches/generated.py --cpu 1",
     "slopes": ".venv/pinocchio/bin/python docs/pictures/slopes.py",
-    "factorisation": "cargo bench --bench factorisation",
-    "divide_conquer": "cargo bench --bench divide_conquer",
+    "factorisation": "cargo bench -p condyle-benches --bench factorisation",
+    "divide_conquer": "cargo bench -p condyle-benches --bench divide_conquer",
 }
 """Command that measures each part."""
 WITHOUT_OPTION = ("casadi", "slopes")
@@ -314,7 +314,7 @@ def columns_to_crba(f: Figures, robot: str, n: int) -> str:
 
 
 def differences(f: Figures, calls: int) -> str:
-    """Returns the time of so many differences of RNEA as a multiple of its derivatives, on TALOS."""
+    """Returns the time of `calls` calls of RNEA as a multiple of its derivatives, on TALOS."""
     return f"{calls * f.us('rnea', 'talos') / f.us('rnea_derivatives', 'talos'):.0f}"
 
 
@@ -346,7 +346,7 @@ QUOTES: list[tuple[str, str, Callable[[Figures], list[str]]]] = [
     ("README.md", "An iteration of FDDP takes {} to {} of Crocoddyl's.", fddp_spread),
     (
         "DESIGN.md",
-        "On trees of 6 joints and more, the faster factor takes {} to {} times the time of ABA.",
+        "On trees of 6 joints and more, the faster factor takes {} to {} times the time of ABA",
         lambda f: [*share_of_sum(f, "forward dynamics/")],
     ),
     (
@@ -454,6 +454,12 @@ QUOTES: list[tuple[str, str, Callable[[Figures], list[str]]]] = [
 """Sentences of pages: the page, the sentence with {} for each figure, and the figures."""
 
 
+def quote(sentence: str) -> re.Pattern[str]:
+    """Returns the pattern of a sentence with a group for each figure; it may be broken into lines."""
+    parts = (re.sub(r"(?:\\ )+", r"\\s+", re.escape(part)) for part in sentence.split("{}"))
+    return re.compile(r"(\d+(?:\.\d+)?)".join(parts))
+
+
 def filled(path: Path, text: str, figures: Figures) -> str:
     """A page with the figures of the JSON."""
     for name, table in TABLES.items():
@@ -464,10 +470,7 @@ def filled(path: Path, text: str, figures: Figures) -> str:
             text = pattern.sub(lambda _, new=new: new, text)
     for page, sentence, values in QUOTES:
         if path == ROOT / page:
-            # words may stand on two lines; figures are numbers
-            parts = [re.sub(r"(?:\\ )+", r"\\s+", re.escape(part)) for part in sentence.split("{}")]
-            pattern = re.compile(r"([\d.]+)".join(parts).replace(r"([\d.]+)", r"([\d]+(?:\.\d+)?)"))
-            found = pattern.search(text)
+            found = quote(sentence).search(text)
             if found is None:
                 raise SystemExit(f"{page}: no sentence `{sentence}`")
             new, start = list(text), len(text)

@@ -1,5 +1,5 @@
 //! Budgets of a horizon, by criterion: what a solver asks of the dynamics at N knots, and one iteration of FDDP.
-//! `cargo bench --bench horizon`
+//! `cargo bench -p condyle-benches --bench horizon`
 //!
 //! At each knot RNEA, ABA and the derivatives of both are computed: one call at a time, as a batch on one thread (knots
 //! in the lanes of vectors), and as a batch on all threads. An iteration of FDDP goes on from the last solution with a

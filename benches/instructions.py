@@ -33,7 +33,8 @@ def run(*command: str | Path, **options: object) -> str:
 
 
 def build(bench: str = "instructions", profile: str = "release") -> Path:
-    command = ("cargo", "build", "--profile", profile, "--bench", bench, "--message-format=json", "--locked")
+    command = ["cargo", "build", "--profile", profile, "--package", "condyle-benches", "--bench", bench]
+    command += ["--message-format=json", "--locked"]
     for line in run(*command, cwd=ROOT).splitlines():
         message = json.loads(line)
         if message.get("target", {}).get("name") == bench and message.get("executable"):

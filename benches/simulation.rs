@@ -1,4 +1,4 @@
-//! One step of each integrator: `cargo bench --bench simulation`. For the accuracy of the steps, see
+//! One step of each integrator: `cargo bench -p condyle-benches --bench simulation`. For the accuracy of the steps, see
 //! `examples/energy_drift.rs`.
 
 use condyle::simulation::{Ground, Integrator, Settings, Simulation};

@@ -1,4 +1,4 @@
-//! Dense products in registers, compared with the processor's peak: `cargo bench --bench tiles`.
+//! Dense products in registers, compared with the processor's peak: `cargo bench -p condyle-benches --bench tiles`.
 //!
 //! The peak is the rate of independent products and sums. It is measured before and after each product, since a
 //! machine's clock and its other guests change. The program prints the best of many short rounds.

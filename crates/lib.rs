@@ -165,6 +165,14 @@ pub mod tree {
 mod book {
     #[doc = include_str!("../README.md")]
     mod readme {}
+    #[doc = include_str!("../docs/inspect.md")]
+    mod inspect {}
+    #[doc = include_str!("../docs/simulate.md")]
+    mod simulate {}
+    #[doc = include_str!("../docs/differentiate.md")]
+    mod differentiate {}
+    #[doc = include_str!("../docs/deploy.md")]
+    mod deploy {}
     #[doc = include_str!("../docs/lanes.md")]
     mod lanes {}
     #[doc = include_str!("../docs/derivatives.md")]

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Turns the formulas of the book, LaTeX between dollars, into MathML, which browsers show without help.
+"""Converts the formulas of the book, LaTeX between dollar signs, to MathML, which browsers show without scripts.
 
-A preprocessor of mdBook, which calls it with the book on its standard input (`[preprocessor.mathml]` in book.toml).
+This is a preprocessor of mdBook, which passes the book on standard input (`[preprocessor.mathml]` in book.toml).
 Needs the package latex2mathml (`pip install latex2mathml`).
 """
 
@@ -13,18 +13,18 @@ from typing import Any
 from latex2mathml.converter import convert
 
 SPECIAL = str.maketrans({"*": "&#42;", "_": "&#95;", "|": "&#124;"})
-"""What Markdown would take for its own."""
+"""Characters with a meaning in Markdown, and their escapes."""
 PARTS = re.compile(r"(?P<code>^```.*?^```$|`[^`\n]*`)|\$\$(?P<display>[^$]+)\$\$|\$(?P<inline>[^$\n]+)\$", re.M | re.S)
 
 
 def with_mathml(text: str) -> str:
-    """A page with its formulas as MathML; code stays as it is."""
+    """Converts the formulas of a page; code does not change."""
 
     def replace(part: re.Match[str]) -> str:
         if part["code"] is not None:
             return part[0]
         if part["display"] is not None:
-            formula = part["display"].strip().replace("{aligned}", "{split}")  # the converter knows one of the two
+            formula = part["display"].strip().replace("{aligned}", "{split}")  # the converter knows only `split`
             return convert(formula, display="block").translate(SPECIAL)
         return convert(part["inline"]).translate(SPECIAL)
 

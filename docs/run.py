@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
 """Runs the Python blocks of the book, and checks its structure.
 
-    python docs/run.py                   # everything
-    python docs/run.py rnea.md           # one chapter, after those that it goes on from
-    python docs/run.py --write aba.md    # puts what is printed into the chapter
+    python docs/run.py                   # all pages
+    python docs/run.py rnea.md           # one page, with its predecessors
+    python docs/run.py --write aba.md    # one page; writes its output
 
-Each chapter is one program. It may go on from another one: `<!-- goes on from: trees.md -->` in its first lines. A
-block ```text right after a block ```python is what it prints. Rust blocks are doctests of the crate `condyle`.
+Each chapter is one program. It may continue other chapters: `<!-- goes on from: trees.md -->` in its first lines. A
+block ```text directly after a block ```python holds the output of that block. Rust blocks are doctests of the crate
+`condyle`.
 """
 
 import argparse
@@ -24,17 +25,19 @@ MATHS = re.compile(r"\$[^$\n]*\$|`[^`\n]*`")
 
 
 class Block(NamedTuple):
-    """A block of Python: its first line, its text, and what it should print."""
+    """A block of Python."""
 
     line: int
+    """Line number of its first line."""
     code: str
     expected: str | None
+    """Expected output; None if the page has none."""
     where: tuple[int, int]
-    """Where the expected text is in the file."""
+    """Range of the expected output in the text of the page."""
 
 
 def blocks(text: str) -> list[Block]:
-    """The Python blocks of a page."""
+    """Returns the Python blocks of a page."""
     found, fences = [], list(FENCE.finditer(text))
     for k, fence in enumerate(fences):
         if fence[1] != "python":
@@ -49,13 +52,13 @@ def blocks(text: str) -> list[Block]:
 
 
 def before(text: str) -> list[str]:
-    """The chapters that a chapter goes on from."""
+    """Returns the chapters that a chapter continues."""
     said = re.search(r"<!-- goes on from: (.*?) -->", text)
     return said[1].split(", ") if said else []
 
 
 def run(chapter: str, write: bool = False, namespace: dict[str, Any] | None = None) -> dict[str, Any]:
-    """What a chapter's blocks leave behind. Raises AssertionError where they print what the page does not say."""
+    """Runs the blocks of a chapter and returns its names. Raises AssertionError if their output is not the page's."""
     path = BOOK / chapter
     text = path.read_text(encoding="utf-8")
     names: dict[str, Any] = {"__name__": chapter} if namespace is None else namespace
@@ -71,7 +74,7 @@ def run(chapter: str, write: bool = False, namespace: dict[str, Any] | None = No
             exec(compile("\n" * (block.line - 1) + block.code, str(path), "exec"), names)
         if block.expected is None:
             if printed.getvalue():
-                raise AssertionError(f"{path}:{block.line}: prints what the page does not show")
+                raise AssertionError(f"{path}:{block.line}: prints text, but the page shows no output")
         elif write:
             replaced.append((block.where, printed.getvalue()))
         elif printed.getvalue() != block.expected:
@@ -85,20 +88,23 @@ def run(chapter: str, write: bool = False, namespace: dict[str, Any] | None = No
     return names
 
 
-def chapters() -> list[str]:
-    """The pages in the order of the table of contents."""
-    return re.findall(r"\]\(([\w.]+\.md)\)", (BOOK / "SUMMARY.md").read_text(encoding="utf-8"))
+def chapters(part: str | None = None) -> list[str]:
+    """Returns the pages of the book, or of one of its parts, in the order of the table of contents."""
+    contents = (BOOK / "SUMMARY.md").read_text(encoding="utf-8")
+    if part is not None:
+        contents = contents.partition(f"\n# {part}\n")[2].partition("\n# ")[0]
+    return re.findall(r"\]\(([\w.]+\.md)\)", contents)
 
 
 def anchors(path: Path) -> set[str]:
-    """The headings of a page, as addresses."""
+    """Returns the anchors of the headings of a page."""
     text = FENCE.sub("", path.read_text(encoding="utf-8"))
     titles = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
 
 
 def faults() -> list[str]:
-    """What is wrong: pages outside of the contents, links that lead nowhere, blocks without a language."""
+    """Returns the errors: pages that SUMMARY.md does not list, broken links, blocks without a language."""
     listed = chapters()
     wrong = [
         f"{page.name}: not in SUMMARY.md" for page in BOOK.glob("*.md") if page.name not in [*listed, "SUMMARY.md"]
@@ -106,7 +112,7 @@ def faults() -> list[str]:
     wrong += [f"SUMMARY.md: {name} twice" for name in {n for n in listed if listed.count(n) > 1}]
     for page in [*(BOOK / name for name in listed), BOOK.parent / "README.md", BOOK.parent / "DESIGN.md"]:
         if not page.is_file():
-            wrong.append(f"{page.name}: is not there")
+            wrong.append(f"{page.name}: file is missing")
             continue
         text = page.read_text(encoding="utf-8")
         wrong += [f"{page.name}: a block without a language" for fence in FENCE.finditer(text) if not fence[1]]
@@ -125,7 +131,7 @@ def faults() -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("chapters", nargs="*")
-    parser.add_argument("--write", action="store_true", help="put what is printed into the pages")
+    parser.add_argument("--write", action="store_true", help="write the printed output into the pages")
     arguments = parser.parse_args()
     for chapter in arguments.chapters or chapters():
         run(chapter, arguments.write)

@@ -12,19 +12,19 @@
 //! is written for clarabel and solved by it. The same tick by `WholeBodyController` is compared.
 //!
 //! ```text
-//! cargo run --release --example wholebody_clarabel
+//! cargo run --release --features clarabel --example wholebody_clarabel
 //! ```
 #![allow(non_snake_case)]
 
 #[path = "support/ground.rs"]
 mod ground;
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT, ZeroConeT};
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 use condyle::ReferenceFrame::LocalWorldAligned;
 use condyle::dynamics::{Quaternion, forward_accelerations, lie};
 use condyle::nalgebra::{DMatrix, DVector};
+use condyle::wholebody::clarabel::algebra::CscMatrix;
+use condyle::wholebody::clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT, ZeroConeT};
+use condyle::wholebody::clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 use condyle::wholebody::{FrictionContact, Gains, Settings, Task, WholeBodyController};
 use condyle::{ContactConstraint, Data, Force, Model, Se3, Vec3};
 use condyle::{crba, difference, frame_jacobian, nonlinear_effects, robots};

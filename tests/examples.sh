@@ -11,7 +11,8 @@ diff <(printf '%s\n' "${short[@]}" "${long[@]}" | sort) <(basename --suffix .rs 
 
 run=("${short[@]}")
 [ "${1:-}" = full ] && run+=("${long[@]}")
-cargo build --locked --quiet "${run[@]/#/--example=}"
+# features as in `cargo test --workspace`, whose build is reused
+cargo build --locked --quiet --workspace "${run[@]/#/--example=}"
 built=$(realpath "${CARGO_TARGET_DIR:-target}")/debug/examples
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT

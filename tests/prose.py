@@ -95,14 +95,15 @@ def python(path: str, text: str) -> Iterator[Passage]:
 
 
 def markdown(path: str, text: str) -> Iterator[Passage]:
-    """Yields the paragraphs of a page, without code, tables and headings."""
-    lines, code = [], False
+    """Yields the paragraphs of a page, without code, formulas, tables and headings."""
+    lines, code, formula = [], False, False
     for line in text.splitlines():
         if line.lstrip().startswith("```"):
             code = not code
             lines.append("")
         else:
-            skipped = code or re.match(r"\s*(?:\||#|<|!\[|\$\$)", line)
+            skipped = code or formula or re.match(r"\s*(?:\||#|<|!\[|\$\$)", line)
+            formula ^= not code and line.count("$$") == 1
             lines.append("" if skipped else re.sub(r"^\s*(?:[-*>]|\d+\.)\s+", "\0", line).strip())
     yield from (Passage(path, 1 + at, "paragraph", part) for at, part in paragraphs(lines))
 

@@ -94,7 +94,8 @@ def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *
 
 def build_ours() -> Path:
     """Builds benches/peers/ours.rs as `cargo bench` does; returns its path."""
-    command = ("cargo", "build", "--release", "--bench", "peers", "--message-format=json", "--locked")
+    command = ["cargo", "build", "--release", "--package", "condyle-benches", "--bench", "peers"]
+    command += ["--message-format=json", "--locked"]
     for line in run(*command, cwd=ROOT).splitlines():
         message = json.loads(line)
         if message.get("target", {}).get("name") == "peers" and message.get("executable"):

@@ -33,7 +33,8 @@ DOCUMENT = ROOT / "crates" / "wholebody" / "README.md"
 
 def build_ours() -> Path:
     """Builds benches/peers/wholebody.rs as `cargo bench` does; returns its path."""
-    command = ("cargo", "build", "--release", "--bench", "wholebody_peers", "--message-format=json", "--locked")
+    command = ["cargo", "build", "--release", "--package", "condyle-benches", "--bench", "wholebody_peers"]
+    command += ["--message-format=json", "--locked"]
     for line in run(*command, cwd=ROOT).splitlines():
         message = json.loads(line)
         if message.get("target", {}).get("name") == "wholebody_peers" and message.get("executable"):

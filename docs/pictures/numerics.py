@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Makes docs/pictures/numerics.png: errors of forward dynamics over a mass ratio, over armature, and of small angles.
+"""Makes docs/pictures/numerics.png: errors of forward dynamics over mass ratio and armature, and for small angles.
 
 .venv/pinocchio/bin/python docs/pictures/numerics.py
 
-The functions are those of docs/numerics.md. Nothing is timed: the picture is the same on any machine, up to rounding.
+The functions come from docs/numerics.md. Nothing is timed: the picture is the same on each machine, up to rounding.
 """
 
 import importlib.util
@@ -25,7 +25,7 @@ STYLES = {
 
 
 def page() -> dict[str, Any]:
-    """What the page defines."""
+    """Returns the names that the page defines."""
     spec = importlib.util.spec_from_file_location("run", Path(__file__).parents[1] / "run.py")
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -42,7 +42,7 @@ def main() -> None:
         ("A light gripper holds 1 kg", "armature (kg m²)", np.logspace(-7, 0, 15), book["gripper"]),
     )
     for axis, (title, label, values, model) in zip(axes, sweeps, strict=False):
-        with np.errstate(all="ignore"):  # pivots that vanish in single precision
+        with np.errstate(all="ignore"):  # pivots may vanish in single precision
             found = np.array([book["errors"](model(x))[:4] for x in values])
         for (name, (colour, line)), error in zip(STYLES.items(), found.T, strict=True):
             axis.loglog(values, np.maximum(error, 1e-17), line, color=colour, label=name)

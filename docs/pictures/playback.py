@@ -3,7 +3,7 @@
 
 .venv/pinocchio/bin/python docs/pictures/playback.py
 
-Needs Node.js, and the browser that tests/page/run.sh installs. Without a GPU it takes some minutes.
+Needs Node.js and the browser that tests/page/run.sh installs. Without a GPU it takes a few minutes.
 """
 
 import subprocess
@@ -19,7 +19,7 @@ sys.path.insert(0, str(HERE.parents[1] / "python" / "examples"))
 
 FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
 SECONDS = 60
-"""So long the page has time to draw."""
+"""Time for the page to draw (s)."""
 
 
 def main() -> None:

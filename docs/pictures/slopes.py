@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Makes docs/pictures/slopes.png: time against the number of joints, and times of three ways of forward dynamics.
+"""Makes docs/pictures/slopes.png: time over the number of joints, and times of three methods of forward dynamics.
 
 .venv/pinocchio/bin/python docs/pictures/slopes.py [FILE.json] [--quick]
 
-Prints the numbers of the picture, and writes them to FILE.json. Takes about a minute on an idle core.
+Prints the numbers of the picture and writes them to FILE.json. Takes about a minute on an idle core.
 """
 
 import argparse
@@ -24,12 +24,12 @@ import condyle
 
 SIZES = (4, 8, 16, 32, 64, 128, 256)
 STATES = 8
-"""States of a batch: a vector of eight, or two of four."""
+"""Number of states of a batch: one vector of eight, or two of four."""
 METHODS = {"aba": "ABA", "dense": "M, dense factor", "sparse": "M, sparse factor"}
 
 
 def chain(n: int) -> condyle.Model:
-    """A chain of n hinges about changing axes."""
+    """Returns a chain of n hinges about changing axes."""
     rng, builder, body = np.random.default_rng(7), condyle.ModelBuilder("chain"), condyle.WORLD
     for i in range(n):
         place = np.eye(4)
@@ -40,7 +40,7 @@ def chain(n: int) -> condyle.Model:
 
 
 def least(call: Callable[[], object], seconds: float) -> float:
-    """The least time of a call (s), of those that fit into some seconds, and of 20 at least."""
+    """Returns the shortest time of a call (s), over a number of seconds and at least 20 calls."""
     times: list[float] = []
     end = time.perf_counter() + seconds
     while len(times) < 20 or time.perf_counter() < end:
@@ -51,7 +51,7 @@ def least(call: Callable[[], object], seconds: float) -> float:
 
 
 def calls_of(model: condyle.Model) -> dict[str, Callable[[], object]]:
-    """Each algorithm on a batch of states."""
+    """Returns a call of each algorithm on a batch of states."""
     n, data = model.nv, condyle.Data(model)
     q, v, a = np.random.default_rng(1).uniform(-1, 1, (3, STATES, n))
     M, x = np.zeros((STATES, n, n)), np.zeros((STATES, n))
@@ -64,7 +64,7 @@ def calls_of(model: condyle.Model) -> dict[str, Callable[[], object]]:
 
 
 def growth(seconds: float) -> dict[str, dict[str, Any]]:
-    """µs for one state of a batch at each size, and the slope of the logarithms over the upper half of the sizes."""
+    """Returns the time per state of a batch at each size (µs), and the log-log slope over the upper half of sizes."""
     times: dict[str, list[float]] = {}
     for n in SIZES:
         for name, call in calls_of(chain(n)).items():
@@ -75,9 +75,10 @@ def growth(seconds: float) -> dict[str, dict[str, Any]]:
 
 
 def spread(model: condyle.Model, calls: int) -> dict[str, dict[str, Any]]:
-    """Mean, standard deviation, median and 95th percentile (µs) of single calls at random states, methods in turn.
+    """Returns mean, standard deviation, median and 95th percentile (µs) of single calls at random states.
 
-    The first tenth of the calls is left out, and the slowest of a thousand: there the system did something else.
+    The methods take turns. The first tenth of the calls is left out, and so is the slowest thousandth, which the
+    operating system has interrupted.
     """
     rng, data, out = np.random.default_rng(2), condyle.Data(model), np.zeros(model.nv)
     q = [condyle.random_configuration(model, seed=k) for k in range(256)]
@@ -116,8 +117,8 @@ def draw(slopes: dict[str, dict[str, Any]], spreads: dict[str, dict[str, dict[st
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    parser.add_argument("file", nargs="?", type=Path, help="where the numbers go, as JSON")
-    parser.add_argument("--quick", action="store_true", help="few calls, for a test")
+    parser.add_argument("file", nargs="?", type=Path, help="JSON file for the numbers")
+    parser.add_argument("--quick", action="store_true", help="few calls, for tests")
     parser.add_argument("--picture", type=Path, default=Path(__file__).with_name("slopes.png"))
     wanted = parser.parse_args()
     os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Makes docs/pictures/spy.png: the entries of M of real robots, and where the tree says that they are zero.
+"""Makes docs/pictures/spy.png: the entries of M of real robots, and the entries that are zero because of the tree.
 
 .venv/pinocchio/bin/python docs/pictures/spy.py
 """
@@ -17,7 +17,7 @@ from example_robot_data.robots_loader import ROBOTS, getModelPath
 import condyle
 
 ROUNDING = 1e-14
-"""Entries below this part of the largest are zero by the robot's geometry, and rounding remains."""
+"""Maximum size, relative to the largest entry, of entries that are zero by geometry; they consist of rounding."""
 SHOWN = {"panda": "Panda, an arm", "anymal": "ANYmal", "talos": "TALOS", "allegro_right_hand": "Allegro hand"}
 
 

@@ -3,6 +3,7 @@
 import contextlib
 import importlib.util
 import io
+import json
 import os
 import re
 import shutil
@@ -17,16 +18,16 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-def load(name: str) -> ModuleType:
-    """Loads a program of `docs`, which is not a package."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+def load(path: Path) -> ModuleType:
+    """Loads a program that is not part of a package."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
-BOOK = load("run")
+BOOK = load(ROOT / "docs" / "run.py")
 
 
 @pytest.mark.parametrize(
@@ -40,51 +41,30 @@ def test_readme() -> None:
     BOOK.run("../README.md")
 
 
-def test_course_has_code() -> None:
-    """Each chapter of the course, except the introduction, is a program."""
-    course = BOOK.chapters()[1:14]
-    assert all(BOOK.blocks((ROOT / "docs" / name).read_text()) for name in course), course
+@pytest.mark.parametrize("part", ["Using Condyle", "The course"])
+def test_parts_are_programs(part: str) -> None:
+    """Each page of the first two parts is a program whose results are checked, by assertions or by its output."""
+    pages = BOOK.chapters(part)
+    assert len(pages) >= 7
+    for name in pages:
+        blocks = BOOK.blocks((ROOT / "docs" / name).read_text())
+        assert any("assert " in block.code or block.expected for block in blocks), name
 
 
 def test_structure() -> None:
     assert BOOK.faults() == []
 
 
-def test_figures_of_the_readme() -> None:
-    """Chapters that quote the tables of the README have the same figures."""
-    pages = {name: " ".join((ROOT / "docs" / name).read_text().split()) for name in BOOK.chapters()}
-    one_call, batch = ({}, {})
-    for heading, table in (("one call: ratio (ours in µs)", one_call), ("per state of a batch", batch)):
-        for line in (ROOT / "README.md").read_text().partition(f"| {heading}")[2].splitlines()[2:]:
-            if not line.startswith("|"):
-                break
-            name, *robots = (cell.strip() for cell in line.strip("|").split("|"))
-            ratios, ours = zip(*(cell.rstrip(")").split(" (") for cell in robots), strict=True)
-            table[name] = dict(zip(("panda", "anymal", "talos"), zip(ratios, ours, strict=True), strict=True))
-    ours = {name: robots["talos"][1] for name, robots in one_call.items()}
-    rnea, derivatives = ours["rnea"], ours["rnea_derivatives"]
-    many = batch["rnea"]["talos"][1]
-    panda = [one_call[name]["panda"][1] for name in ("rnea", "crba")]
-    quoted = {
-        "derivatives.md": [
-            f"RNEA takes {rnea} µs, its derivatives by hand {derivatives} µs. "
-            f"That is {float(derivatives) / float(rnea):.1f} times RNEA",
-        ],
-        "exercises.md": [
-            f"RNEA takes {rnea} µs a call, so 38 calls take {38 * float(rnea):.0f} µs",
-            f"In a batch RNEA takes {many} µs, so 38 states take {38 * float(many):.0f} µs",
-            f"CRBA takes {ours['crba']} µs",
-            f"7 calls of {panda[0]} µs against {panda[1]} µs, a factor of {7 * float(panda[0]) / float(panda[1]):.0f}",
-        ],
-        "lanes.md": [
-            "costs {} to {} of Pinocchio's single call for RNEA, and our own single call costs {} to {}.".format(
-                *(f(of["rnea"][robot][0] for robot in of["rnea"]) for of in (batch, one_call) for f in (min, max))
-            ),
-        ],
-    }
-    for name, sentences in quoted.items():
-        for sentence in sentences:
-            assert sentence in pages[name], f"{name}: the README's tables give: {sentence}"
+def test_figures() -> None:
+    """Each sentence with measured figures is on its page. If the JSON exists, all figures are taken from it."""
+    figures = load(ROOT / "benches" / "figures.py")
+    for page, sentence, _ in figures.QUOTES:
+        assert figures.quote(sentence).search((ROOT / page).read_text()), f"{page}: no sentence `{sentence}`"
+    if figures.RESULTS.is_file():
+        results = figures.Figures(json.loads(figures.RESULTS.read_text()))
+        for page in figures.pages():
+            text = page.read_text()
+            assert figures.filled(page, text, results) == text, f"{page.name}: `python3 benches/figures.py write`"
 
 
 def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,7 +77,7 @@ def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     (tmp_path / "docs" / "a.md").write_text("```python\nprint(1 + 1)\n```\n```text\n3\n```\n[gone](c.md)\n")
     with pytest.raises(AssertionError, match=r"a.md:2: prints\n2\nwhere the page has\n3"):
         BOOK.run("a.md")
-    faults = ["b.md: is not there", "a.md: no c.md", "DESIGN.md: no heading for README.md#b"]
+    faults = ["b.md: file is missing", "a.md: no c.md", "DESIGN.md: no heading for README.md#b"]
     assert sorted(BOOK.faults()) == sorted(faults)
     BOOK.run("a.md", write=True)
     BOOK.run("a.md")
@@ -105,7 +85,7 @@ def test_a_wrong_page_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 def test_formulas() -> None:
     """Each formula is LaTeX that is converted to MathML; code with dollar signs does not change."""
-    mathml = load("mathml")
+    mathml = load(ROOT / "docs" / "mathml.py")
     assert "<math" in mathml.with_mathml("an $x_i$ b") and mathml.with_mathml("`$x$`") == "`$x$`"
     for chapter in BOOK.chapters():
         page = mathml.with_mathml((ROOT / "docs" / chapter).read_text(encoding="utf-8"))
@@ -126,8 +106,8 @@ def test_mdbook(tmp_path: Path) -> None:
     assert "<math" in (tmp_path / "book" / "rnea.html").read_text(encoding="utf-8")
 
 
-# For each worked example: the block that defines the algorithm (of the chapter or of rnea.md), that of the example,
-# and mistakes in the former, each as (right, wrong).
+# For each worked example: the block that defines the algorithm (of the chapter or of rnea.md), the example's block,
+# and mistakes in the definition, each as (right, wrong).
 RNEA = [
     (" + cross(vel[i]) @ vJ", ""),
     (" + cross_dual(vel[i]) @ I[i] @ vel[i]", ""),
@@ -168,6 +148,17 @@ MISTAKES = {
         ],
     ),
     "exercises.md": ("def rnea(", "arm = planar_arm([0.5, 0.3], [2.0, 1.0])", RNEA),
+    "exercises.md#seven-joints": (
+        "def rnea_with_forces(",
+        'condyle.ModelBuilder("seven joints")',
+        [
+            (" - f_ext[i]", ""),
+            (" - f_ext[i]", " + f_ext[i]"),
+            (" + cross(vel[i]) @ vJ", ""),
+            (" + cross_dual(vel[i]) @ tree.I[i] @ vel[i]", ""),
+            ("        f[tree.parent[i]] += tree.up[i].T @ f[i]\n", ""),
+        ],
+    ),
     "exercises.md#three-ways": (
         "def by_energy(",
         "slopes = [by_energy(",

@@ -68,6 +68,9 @@ mod safety;
 mod settings;
 mod task;
 
+/// Solver behind [`Backend::Clarabel`], for programs that also call it directly.
+#[cfg(feature = "clarabel")]
+pub use clarabel;
 pub use command::{Command, CommandSource};
 pub use contact::{FrictionContact, Normal, Shape, SurfaceForces};
 pub use controller::WholeBodyController;

@@ -1,10 +1,11 @@
-"""The identities of the book's chapter `factorisation.md`, on every robot of example-robot-data."""
+"""Functions of the book: the identities of `factorisation.md` on robots of example-robot-data; sizes of subtrees."""
 
 import importlib.util
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio
 import pytest
 from test_robots import NO_URDF, ROBOTS, SINGULAR, root_joint, urdf_path
 
@@ -20,16 +21,20 @@ NOT_PHYSICAL = {"icub", "icub_reduced"}
 """Robots with physically impossible inertias: pivots lose 11 digits."""
 
 
-@pytest.fixture(scope="module")
-def book() -> dict[str, Any]:
-    """Returns the functions that the chapter defines."""
+def chapter(name: str) -> dict[str, Any]:
+    """Returns the functions that a chapter defines."""
     path = Path(__file__).parents[3] / "docs" / "run.py"
     spec = importlib.util.spec_from_file_location("run", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    names: dict[str, Any] = module.run("factorisation.md")
+    names: dict[str, Any] = module.run(name)
     return names
+
+
+@pytest.fixture(scope="module")
+def book() -> dict[str, Any]:
+    return chapter("factorisation.md")
 
 
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name not in NO_URDF and name not in SINGULAR])
@@ -49,3 +54,12 @@ def test_one_factorisation(book: dict[str, Any], name: str) -> None:
             assert value < (1e-4 if name in NOT_PHYSICAL else INVERSE), identity
         else:
             assert value < EXACT, identity
+
+
+def test_sizes_of_subtrees() -> None:
+    nv_subtree = chapter("conversions.md")["nv_subtree"]
+    for build in (pinocchio.buildSampleModelHumanoid, pinocchio.buildSampleModelManipulator):
+        theirs = build()
+        model = condyle.Model.from_pinocchio(theirs)
+        assert model.parents[1:] == list(theirs.parents)[1:]
+        assert nv_subtree(model)[1:] == list(theirs.createData().nvSubtree)[1:]

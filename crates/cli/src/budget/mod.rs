@@ -27,7 +27,7 @@ use std::time::Duration;
   condyle budget anymal.urdf --root free --contacts LF_FOOT,RF_FOOT,LH_FOOT,RH_FOOT --knots 60 --rate 50
   condyle budget talos.urdf --root free --rigid-contacts left_sole_link,right_sole_link --json > budget.json
 
-`cargo bench --bench horizon` measures the same for the embedded robots with criterion.
+`cargo bench -p condyle-benches --bench horizon` measures the same for the embedded robots with criterion.
 
 With --rate the exit status is 1 if an iteration, or as many as --iterations says, does not fit into the period; what
 counts is p99, and the faster of one thread and all of them. In contact where contacts are given, else free.")]
