@@ -21,7 +21,7 @@ use std::time::Duration;
 const KNOTS: [usize; 5] = [20, 60, 100, 115, 200];
 /// Seconds from knot to knot.
 const DT: f64 = 0.01;
-/// How far a new initial state is from the last one (rad, m, and per s).
+/// Distance of a new initial state from the last one (rad, m, and per s).
 const DISTURBANCE: f64 = 1e-3;
 
 /// Positions, velocities, accelerations and efforts of knots, one knot after the other.

@@ -19,7 +19,7 @@ pub(super) fn first(text: &str) -> Result<(Vec<[f64; 3]>, Vec<Triangle>), String
     Ok((points, groups.into_iter().flat_map(|group| group.1).collect()))
 }
 
-/// The points of an OBJ, and its triangles by material: all, or those of its first object or group.
+/// The points of an OBJ, and its triangles by material: all of the file, or only its first object or group.
 fn parse(
     text: &str,
     library: &dyn Fn(&str) -> Option<String>,

@@ -1,5 +1,5 @@
-//! Inverse dynamics, the inertia matrix and forward dynamics in the form of the book, beside the formulation that the
-//! library uses.
+//! Inverse dynamics, the inertia matrix and forward dynamics in the form of the book, compared with the formulation in
+//! the library.
 
 use crate::common;
 

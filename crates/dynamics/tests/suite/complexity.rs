@@ -1,4 +1,4 @@
-//! How the work of the recursions grows: operations counted, not timed.
+//! Growth of the work of the recursions: operations counted, not timed.
 
 use crate::common;
 use crate::counted::{Counted, Operations, counted};
