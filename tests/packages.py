@@ -72,7 +72,17 @@ def main() -> None:
     parser.add_argument("--verify", action="store_true", help="compile each package from what is in it")
     verify = parser.parse_args().verify
     with TemporaryDirectory() as folder:
-        command = ["cargo", "package", "--quiet", "--locked", "--workspace", "--exclude", "condyle-python"]
+        command = [
+            "cargo",
+            "package",
+            "--quiet",
+            "--locked",
+            "--workspace",
+            "--exclude",
+            "condyle-python",
+            "--exclude",
+            "condyle-benches",
+        ]
         command += ["--allow-dirty", "--target-dir", folder, *([] if verify else ["--no-verify", "--offline"])]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         if done.returncode != 0:
