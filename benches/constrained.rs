@@ -1,4 +1,5 @@
-//! Dynamics under contacts and its derivatives, one call on one state: `cargo bench -p condyle-benches --bench constrained`.
+//! Dynamics under contacts and its derivatives, one call on one state:
+//! `cargo bench -p condyle-benches --bench constrained`.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, constrained_dynamics, constrained_dynamics_derivatives,

@@ -5,15 +5,23 @@
 //! depth is the mean number of joints on the path to the world. Constant throughput means that the cost grows as O(n ·
 //! depth).
 //!
-//! Analytic derivatives at n = 8, 32, 128, on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`: µs (ns per pair),
+//! Analytic derivatives on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`: µs (ns per pair),
 //! factor of time with dual numbers, factor of time with differences:
 //!
-//! | | chain | binary tree | star |
-//! | --- | --- | --- | --- |
-//! | ∂τ | 1.2, 8.1, 103 (32, 15, 13) 19–56, 17–46 | 1.1, 4.9, 30 (51, 36, 38) 21–196, 17–147 | 1.0, 4.2, 23 (69, 66, 88) 21–245, 17–182 |
-//! | ∂q̈ | 2.4, 17, 273 (67, 32, 33) 22–59, 22–39 | 2.3, 15, 106 (108, 111, 136) 24–153, 24–90 | 2.2, 9.1, 66 (147, 144, 260) 24–232, 20–157 |
-//! | λᵀ∂²τ | 2.6, 19, 253 (72, 36, 31) 22–271, 15–176 | 2.2, 11, 91 (107, 80, 117) 23–218, 16–193 | 2.3, 8.8, 48 (152, 139, 190) 25–325, 15–243 |
-//! | λᵀ∂²q̈ | 4.3, 52, 1227 (120, 98, 149) 27–233, 19–110 | 4.1, 26, 360 (196, 189, 464) 25–315, 18–143 | 4.0, 20, 259 (264, 323, 1017) 23–233, 17–132 |
+//! | | shape | n = 8, 32, 128 |
+//! | --- | --- | --- |
+//! | ∂τ | chain | 1.2, 8.1, 103 (32, 15, 13) 19–56, 17–46 |
+//! | ∂τ | binary tree | 1.1, 4.9, 30 (51, 36, 38) 21–196, 17–147 |
+//! | ∂τ | star | 1.0, 4.2, 23 (69, 66, 88) 21–245, 17–182 |
+//! | ∂q̈ | chain | 2.4, 17, 273 (67, 32, 33) 22–59, 22–39 |
+//! | ∂q̈ | binary tree | 2.3, 15, 106 (108, 111, 136) 24–153, 24–90 |
+//! | ∂q̈ | star | 2.2, 9.1, 66 (147, 144, 260) 24–232, 20–157 |
+//! | λᵀ∂²τ | chain | 2.6, 19, 253 (72, 36, 31) 22–271, 15–176 |
+//! | λᵀ∂²τ | binary tree | 2.2, 11, 91 (107, 80, 117) 23–218, 16–193 |
+//! | λᵀ∂²τ | star | 2.3, 8.8, 48 (152, 139, 190) 25–325, 15–243 |
+//! | λᵀ∂²q̈ | chain | 4.3, 52, 1227 (120, 98, 149) 27–233, 19–110 |
+//! | λᵀ∂²q̈ | binary tree | 4.1, 26, 360 (196, 189, 464) 25–315, 18–143 |
+//! | λᵀ∂²q̈ | star | 4.0, 20, 259 (264, 323, 1017) 23–233, 17–132 |
 //!
 //! ∂τ and λᵀ∂²τ grow as O(n · depth), until n² zeros have to be written. ∂q̈ grows in the same way on chains, where it
 //! is solved for. On other trees it is a product, as is the additional part of λᵀ∂²q̈ on all trees, and grows faster.

@@ -1,4 +1,5 @@
-//! Size from which divide and conquer is faster, on one thread and on two: `cargo bench -p condyle-benches --bench divide_conquer`.
+//! Size from which divide and conquer is faster, on one thread and on two:
+//! `cargo bench -p condyle-benches --bench divide_conquer`.
 //!
 //! `docs/lanes.md` has the table of runs of n/2 bodies. Runs of one body take 8 times as long as ABA on one thread.
 

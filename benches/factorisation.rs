@@ -1,7 +1,7 @@
 //! Which way of forward dynamics and of M⁻¹ is fastest, for which size and shape of a tree:
-//! `cargo bench -p condyle-benches --bench factorisation`. The rule in `ForwardDynamicsMethod::fastest` rests on its figures.
-//! `docs/performance.md` has the table. The factor inverts faster than the recursion while its rows have at most about 12 entries
-//! in the mean.
+//! `cargo bench -p condyle-benches --bench factorisation`. The rule in `ForwardDynamicsMethod::fastest` rests on its
+//! figures. `docs/performance.md` has the table. The factor inverts faster than the recursion while its rows have at
+//! most about 12 entries in the mean.
 #![allow(non_snake_case)]
 
 use condyle::{

@@ -8,8 +8,8 @@ benches/peers/dynamics.py builds (some ten minutes the first time). Pinocchio's 
 makes of its recursions (benches/peers/cppadcg.cpp, some ten minutes more), compiled by the same compiler with the same
 options. One program calls it and ours in turn: their ratio is the median over the rounds. A time is the shortest, as
 the rest is what else the machine does. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`:
-limbs one after the other, and side by side; then batches beside vectors of eight states. --json prints a record a line
-instead of tables, without our passes. Needs Linux, Rust, compilers of C and C++, and the package condyle.
+limbs one after the other, and in parallel lanes; then batches, compared with vectors of eight states. --json prints a
+record a line instead of tables, without our passes. Needs Linux, Rust, compilers of C and C++, and the package condyle.
 """
 
 import argparse

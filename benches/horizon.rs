@@ -1,8 +1,8 @@
 //! Budgets of a horizon, by criterion: what a solver asks of the dynamics at N knots, and one iteration of FDDP.
 //! `cargo bench -p condyle-benches --bench horizon`
 //!
-//! At each knot RNEA, ABA and the derivatives of both are computed: one call at a time, as a batch on one thread (knots in
-//! the lanes of vectors), and as a batch on all threads. An iteration of FDDP goes on from the last solution with a
+//! At each knot RNEA, ABA and the derivatives of both are computed: one call at a time, as a batch on one thread (knots
+//! in the lanes of vectors), and as a batch on all threads. An iteration of FDDP goes on from the last solution with a
 //! disturbed initial state, as an MPC asks for it. `condyle budget` measures a robot of yours.
 
 use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residual};
@@ -21,7 +21,7 @@ use std::time::Duration;
 const KNOTS: [usize; 5] = [20, 60, 100, 115, 200];
 /// Seconds from knot to knot.
 const DT: f64 = 0.01;
-/// How far a new initial state is from the last one (rad, m, and per s).
+/// Distance of a new initial state from the last one (rad, m, and per s).
 const DISTURBANCE: f64 = 1e-3;
 
 /// Positions, velocities, accelerations and efforts of knots, one knot after the other.

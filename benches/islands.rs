@@ -1,6 +1,7 @@
-//! Several quadrupeds on their feet in one model: what each costs, beside what one costs alone: `cargo bench -p condyle-benches --bench islands`,
-//! in µs. A second table has the same robots as models of their own, one after the other and shared by threads: the most that
-//! islands solved in parallel could gain. `islands.py` runs this under callgrind, which sees the functions by their names, and prints instructions.
+//! Several quadrupeds on their feet in one model: the time of each, compared with the time of one quadruped alone:
+//! `cargo bench -p condyle-benches --bench islands`, in µs. A second table has the same robots as separate models, one
+//! after the other and shared by threads: the maximum gain of islands solved in parallel. `islands.py` runs this under
+//! callgrind, which identifies the functions by name, and prints instructions.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Se3, WORLD, constrained_dynamics,

@@ -1,4 +1,5 @@
-//! The backward sweep, per knot, with and without the structure of Euler steps: `cargo bench -p condyle-benches --bench riccati`.
+//! The backward sweep, per knot, with and without the structure of Euler steps:
+//! `cargo bench -p condyle-benches --bench riccati`.
 //!
 //! µs per knot on a Xeon at 2.5 GHz, default build, smallest of many sweeps of 50 knots, for (ndx, nu) = (76, 32) /
 //! (36, 12) / (18, 9) / (14, 7): AVX-512 with the structure 46 / 8.4 / 2.6 / 1.7, dense 65 / 9.1 / 2.7 / 1.6 · AVX2 63
@@ -99,7 +100,10 @@ fn segments(c: &mut Criterion) {
 
 criterion_group! {
     name = benches;
-    config = Criterion::default().sample_size(30).warm_up_time(Duration::from_millis(300)).measurement_time(Duration::from_secs(2));
+    config = Criterion::default()
+        .sample_size(30)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(2));
     targets = sweep, segments
 }
 criterion_main!(benches);

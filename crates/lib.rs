@@ -1,5 +1,46 @@
-#![doc = include_str!("../README.md")]
+//! Rigid-body dynamics of robots with exact derivatives, optimal control and whole-body control.
+//!
+//! # Where to begin
+//!
+//! A [`Model`] is a robot: it is read from a file or built, and never changes. A [`Data`] is the memory in which one
+//! thread computes. Every algorithm is a function of both and of the state:
+//!
+//! ```
+//! use condyle::{Data, aba, aba_derivatives, robots};
+//!
+//! let arm = robots::arm7(); // or Model::from_urdf, from_mjcf, from_sdf
+//! let mut data = Data::new(&arm);
+//! let (q, v, tau) = ([0.3; 7], [0.1; 7], [0.0; 7]);
+//! let a = aba(&arm, &mut data, &q, &v, &tau, &[]).to_vec(); // q̈
+//! let d = aba_derivatives(&arm, &mut data, &q, &v, &tau, &[]);
+//! assert_eq!((a.len(), d.da_dq.shape()), (7, (7, 7))); // ∂q̈/∂q, and ∂q̈/∂v, ∂q̈/∂τ
+//! ```
+//!
+//! The names used most are at the top of this crate; the others are in modules by theme. [`dynamics`] has all names of
+//! models and algorithms in one module.
+//!
+//! | theme | names |
+//! | --- | --- |
+//! | robots | [`Model`], [`ModelBuilder`], [`Joint`], [`Inertia`], [`Limits`], [`mod@tree`] |
+//! | positions | [`integrate`], [`difference`], [`neutral`], [`random_configuration`], [`configuration`] |
+//! | dynamics | [`rnea`], [`aba`], [`crba`], [`minv`], [`nonlinear_effects`], [`terms`], [`factors`] |
+//! | frames | [`forward_kinematics`], [`Placements`], [`frame_jacobian`], [`kinematics`], [`centroidal`] |
+//! | derivatives | [`rnea_derivatives`], [`aba_derivatives`], [`gradient`], [`hessian`], [`mod@derivatives`] |
+//! | contacts, loops, impacts | [`ConstraintSet`], [`ContactConstraint`], [`constrained_dynamics`], [`constraints`] |
+//! | many states | [`Batch`], [`batch`], [`level`] |
+//! | simulation, identification | [`simulation`], [`regressors`] |
+//! | algebra and numbers | [`Scalar`], [`Se3`], [`Motion`], [`Force`], [`spatial`], [`conventions`] |
+#![cfg_attr(
+    feature = "optimal",
+    doc = "| optimal control | [`optimal`]: `Fddp`, `AugmentedLagrangian`, `Problem`, `robot` |"
+)]
+#![cfg_attr(
+    feature = "wholebody",
+    doc = "| whole-body control | [`wholebody`]: `WholeBodyController`, `Task`, `Plan` |"
+)]
+//!
 #![cfg_attr(all(feature = "optimal", feature = "wholebody"), doc = include_str!("guide.md"))]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod conventions;
 mod error;
@@ -119,9 +160,11 @@ pub mod tree {
     };
 }
 
-/// Rust code blocks of the book, run as doctests.
+/// Rust code blocks of the README and of the book, run as doctests.
 #[cfg(doctest)]
 mod book {
+    #[doc = include_str!("../README.md")]
+    mod readme {}
     #[doc = include_str!("../docs/inspect.md")]
     mod inspect {}
     #[doc = include_str!("../docs/simulate.md")]

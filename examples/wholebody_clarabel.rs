@@ -52,7 +52,7 @@ fn sparse(A: &DMatrix<f64>, upper_triangle: bool) -> CscMatrix<f64> {
     CscMatrix::new_from_triplets(A.nrows(), A.ncols(), I, J, values)
 }
 
-/// What the program is made from: the posture and the trunk's pose to hold.
+/// Data of the program: the posture and the trunk's pose to hold.
 struct Standing<'a> {
     model: &'a Model,
     q: &'a [f64],

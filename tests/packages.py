@@ -72,8 +72,9 @@ def main() -> None:
     parser.add_argument("--verify", action="store_true", help="compile each package from what is in it")
     verify = parser.parse_args().verify
     with TemporaryDirectory() as folder:
-        command = ["cargo", "package", "--quiet", "--locked", "--workspace", "--exclude", "condyle-python"]
-        command += ["--allow-dirty", "--target-dir", folder, *([] if verify else ["--no-verify", "--offline"])]
+        command = ["cargo", "package", "--quiet", "--locked", "--workspace", "--allow-dirty", "--target-dir", folder]
+        command += ["--exclude", "condyle-python", "--exclude", "condyle-benches"]
+        command += [] if verify else ["--no-verify", "--offline"]
         done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             sys.exit(done.stderr)

@@ -11,6 +11,7 @@ Files below TO_DO are not checked unless they are named. Exit status 1: there ar
 
 import argparse
 import ast
+import inspect
 import io
 import random
 import re
@@ -73,25 +74,36 @@ def rust(path: str, text: str) -> Iterator[Passage]:
             elif code:
                 block.append("")
             else:
-                block.append(re.sub(r"^# .*", "", match[2].strip()))
+                block.append(re.sub(r"^ # .*", "", match[2]))
             continue
         if block:
+            block = without_literals([line.removeprefix(" ") for line in block])
             kind = "comment" if marker == "//" else "doc"
             yield from (Passage(path, start + at, kind, part) for at, part in paragraphs(block))
             block = []
         if match:
-            start, marker, block, code = number, match[1], [match[2].strip()], False
+            start, marker, block, code = number, match[1], [match[2]], False
 
 
 def python(path: str, text: str) -> Iterator[Passage]:
     """Yields the docstrings and comments of a file of Python."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
-            lines = [line.strip() for line in node.value.value.splitlines()]
+            lines = without_literals(inspect.cleandoc(node.value.value).splitlines())
             yield from (Passage(path, node.lineno + at, "doc", part) for at, part in paragraphs(lines))
     for token in tokenize.generate_tokens(io.StringIO(text).readline):
         if token.type == tokenize.COMMENT and not token.string.startswith("#!"):
             yield Passage(path, token.start[0], "comment", token.string.lstrip("# "))
+
+
+def without_literals(lines: list[str]) -> list[str]:
+    """Empties the lines of literal blocks, such as commands and formulas: indented, after an empty line."""
+    found: list[str] = []
+    literal = False
+    for line in lines:
+        literal = line.startswith("    ") and (literal or not found or not found[-1])
+        found.append("" if literal else line.strip())
+    return found
 
 
 def markdown(path: str, text: str) -> Iterator[Passage]:

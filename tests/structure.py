@@ -3,7 +3,8 @@
 
     python3 tests/structure.py [--sizes]
 
-Fails if a cycle has more than three modules. With --sizes it also fails if the program has more than 5.7 MB of code or
+Fails if a cycle has more than three modules, if a line of Rust is wider than 120 characters, or if PROMISES.md
+names a file or test that does not exist. With --sizes it also fails if the program has more than 5.7 MB of code or
 one of its functions more than 64 KB. A module and its children count as one if the child uses only its parent. --sizes
 builds the program from scratch in a separate folder (some minutes) and needs `nm` and `size`.
 """
@@ -13,13 +14,20 @@ import re
 import subprocess
 import sys
 import time
+import unicodedata
+from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
+
+from prose import TO_DO
 
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST_CIRCLE = 3
 LARGEST_FUNCTION = 64 * 1024
 LARGEST_PROGRAM = 5_700_000
+WIDEST = 120
+LITERALS = re.compile(r"//[^\n]*|\br(#*)\".*?\"\1|\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^\\'])'", re.DOTALL)
+"""Comments, strings and characters of Rust."""
 
 Module = tuple[str, ...]
 
@@ -110,6 +118,42 @@ def circles(uses: dict[Module, set[Module]]) -> list[list[Module]]:
     return found
 
 
+def tracked(*patterns: str) -> list[str]:
+    """Returns the paths of tracked files that still exist."""
+    listed = subprocess.run(["git", "ls-files", *patterns], cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    return [path for path in listed.splitlines() if (ROOT / path).is_file()]
+
+
+def wide_lines() -> Iterator[str]:
+    """Yields lines of Rust that are too wide without their strings, which rustfmt does not break (ruff: Python)."""
+    for path in tracked("*.rs"):
+        if path.startswith(TO_DO):
+            continue
+        text = (ROOT / path).read_text(encoding="utf-8")
+        text = LITERALS.sub(lambda found: found[0] if found[0][0] in "/'" else "\n" * found[0].count("\n"), text)
+        for number, line in enumerate(text.splitlines(), 1):
+            width = sum(not unicodedata.combining(character) for character in line)
+            if width > WIDEST:
+                yield f"{path}:{number}: {width} characters"
+
+
+def broken_promises() -> Iterator[str]:
+    """Yields the files and tests that PROMISES.md names and that do not exist."""
+    files = tracked()
+    sources = "".join((ROOT / path).read_text(encoding="utf-8") for path in files if path.endswith((".rs", ".py")))
+    names = set(re.findall(r"\b(?:fn|def|mod) (\w+)", sources))
+    for row in (ROOT / "PROMISES.md").read_text(encoding="utf-8").splitlines():
+        for word in re.findall(r"`([^`]+)`", "|".join(row.split("|")[2:])):
+            if re.fullmatch(r"[\w/.]+(?:/|\.\w+)", word):
+                found = any(f"/{word}" in f"/{path}" for path in files)
+            elif re.fullmatch(r"[a-z]+(?:_[a-z0-9]+)+_?…?", word):
+                found = word in names or (word[-1] == "…" and any(name.startswith(word[:-1]) for name in names))
+            else:
+                continue
+            if not found:
+                yield f"PROMISES.md: `{word}` does not exist"
+
+
 def sizes() -> bool:
     """Prints build time, code size and the largest functions of the program; returns whether they are small enough."""
     with TemporaryDirectory() as target:
@@ -151,6 +195,9 @@ def main() -> None:
         print(f"{name:10} {lines:6} lines of code, {len(found)} circles, the largest of {largest} modules")
         for circle in found:
             print("    " + ", ".join("::".join(module) or "lib" for module in circle))
+    faults = [*wide_lines(), *broken_promises()]
+    print(*faults, sep="\n", end="\n" if faults else "")
+    failed |= bool(faults)
     if wanted.sizes:
         failed |= not sizes()
     sys.exit(failed)

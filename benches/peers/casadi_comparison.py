@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Compares with CasADi in one run: functions, derivatives, and a motion by IPOPT beside one by FDDP. Writes JSON.
+"""Compares with CasADi in one run: functions, derivatives, and a motion by IPOPT and by FDDP. Writes JSON.
 
     .venv/pinocchio/bin/python benches/peers/casadi_comparison.py [FILE.json] [--quick]
 
@@ -7,7 +7,7 @@ Functions: RNEA and ABA, their Jacobian, and the Hessian of λᵀf, of the embed
 our own call from Python, our function in CasADi, and the same recursion built of CasADi's expressions.
 
 The motion: an arm goes to a point and comes to rest there. FDDP solves the problem as it is. IPOPT solves it by
-multiple shooting with exact Hessians, once with our ABA and once with that of expressions. All three must find the
+multiple shooting with exact Hessians, once with our ABA and once with an ABA of expressions. All three must find the
 same cost.
 """
 

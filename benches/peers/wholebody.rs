@@ -2,7 +2,8 @@
 //! and runs this program, together with other solvers.
 //!
 //! ```text
-//! cargo bench -p condyle-benches --bench wholebody_peers -- [--ticks N] [--replays N] [--export FOLDER --window N] [ROBOT[=URDF] …]
+//! cargo bench -p condyle-benches --bench wholebody_peers -- \
+//!     [--ticks N] [--replays N] [--export FOLDER --window N] [ROBOT[=URDF] …]
 //! ```
 //!
 //! A new controller replays each recording, with each tick starting from the solution of its previous tick; the time of

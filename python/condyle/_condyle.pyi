@@ -879,7 +879,8 @@ class ConstraintSet:
     'world', a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
 
     >>> quadruped = condyle.robots.quadruped()
-    >>> trot = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
+    >>> feet = [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")]
+    >>> trot = condyle.ConstraintSet(quadruped, feet)
     >>> len(trot), trot.rows, trot.range(1)
     (2, 6, slice(3, 6, 1))
     """

@@ -1,10 +1,10 @@
-"""CasADi: a quadruped jumps. Contacts that are given: four feet on the ground, none, and four again.
+"""CasADi: a quadruped jumps, with given phases of contact: four feet on the ground, none, and four again.
 
     python python/examples/casadi_jump.py        needs CasADi: pip install 'condyle[casadi]'
 
-On the ground the accelerations and the feet's forces are those of `constrained_dynamics`, in the air those of `aba`.
-The forces must push and stay in their friction cones; the feet must be on the ground, at rest, when they land. IPOPT
-gets exact second derivatives of all of it.
+On the ground, `constrained_dynamics` gives the accelerations and the forces of the feet; in the air, `aba` gives the
+accelerations. The forces must push and stay in their friction cones. When the feet land, they must be on the ground
+and at rest. IPOPT receives exact second derivatives of all functions.
 """
 
 import casadi
@@ -19,12 +19,12 @@ HEIGHT, FORWARD, FRICTION = 0.1, 0.2, 0.6  # m, m
 
 
 def contacts() -> list[condyle.ContactConstraint]:
-    """Feet on the ground, along the world's axes; velocities that rounding brings in die down."""
+    """Returns contacts of the feet along the world's axes; velocities from rounding errors decay."""
     return [condyle.ContactConstraint(foot, "point", reference="local_world_aligned", kd=20.0) for foot in FEET]
 
 
 def integrate(q: casadi.MX, v: casadi.MX) -> casadi.MX:
-    """The position q ⊕ v for a small v: a base (position, quaternion x, y, z, w) and joints."""
+    """Returns q ⊕ v for a small v: a base (position, quaternion x, y, z, w) and joints."""
     u, w, turn = q[3:6], q[6], v[3:6] / 2
     forward = v[:3] + 2 * casadi.cross(u, casadi.cross(u, v[:3]) + w * v[:3])  # the base's velocity in the world
     quaternion = q[3:7] + casadi.vertcat(w * turn + casadi.cross(u, turn), -casadi.dot(u, turn))
@@ -32,7 +32,7 @@ def integrate(q: casadi.MX, v: casadi.MX) -> casadi.MX:
 
 
 def hold(model: condyle.Model, standing: np.ndarray) -> np.ndarray:
-    """The efforts of the joints that hold the robot still on its four feet."""
+    """Returns the efforts of the joints that hold the robot still on its four feet."""
     data, tau = condyle.Data(model), np.zeros(model.nv)
     tau += condyle.gravity(model, data, standing)
     for foot in FEET:
@@ -48,7 +48,7 @@ def transcribe(
     flight: casadi.Function,
     feet: list[tuple[casadi.Function, casadi.Function]],
 ) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
-    """The jump: semi-implicit Euler on knots of 20 ms.
+    """Builds the optimisation of the jump: semi-implicit Euler on knots of 20 ms.
 
     stance: (q, v, τ) -> (a, forces of the feet). flight: (q, v, τ) -> a. feet: for each
     q -> (position, …) and (q, v) -> velocity, linear numbers first.
@@ -78,7 +78,7 @@ def transcribe(
             opti.subject_to(opti.bounded(-np.inf, -tangent - FRICTION / np.sqrt(2) * normal, 0))
     opti.subject_to(q[:, 0] == standing)
     opti.subject_to(v[:, 0] == 0)
-    opti.subject_to(v[:6, -1] == 0)  # the base's: the feet do not move either, so nor do the joints
+    opti.subject_to(v[:6, -1] == 0)  # the base is at rest; as the feet do not move, the joints do not either
     touchdown = PUSH + FLIGHT
     for place, velocity in feet:
         there = np.array(place(standing)[0]).ravel() + np.array([FORWARD, 0.0, 0.0])
@@ -89,7 +89,7 @@ def transcribe(
     opti.subject_to(q[2, PUSH + FLIGHT // 2] >= standing[2] + HEIGHT)
     opti.subject_to(opti.bounded(-150, casadi.vec(u), 150))
     opti.minimize(DT * (1e-3 * casadi.sumsqr(u) + casadi.sumsqr(v)))
-    # the guess: it moves ahead, rises in the air, and the feet carry a quarter of the weight each while it stands
+    # the guess: the base moves ahead and rises in the air; on the ground, each foot carries a quarter of the weight
     path = np.tile(standing[:, None], knots + 1)
     path[0] += np.linspace(0, FORWARD, knots + 1)
     path[2, PUSH : PUSH + FLIGHT + 1] += HEIGHT * np.sin(np.linspace(0, np.pi, FLIGHT + 1))
@@ -100,7 +100,7 @@ def transcribe(
 
 
 def standing_on_the_ground(model: condyle.Model) -> np.ndarray:
-    """A position with bent knees, the feet at height 0."""
+    """Returns a position with bent knees and the feet at height 0."""
     q = condyle.neutral(model)
     q[7:] = np.tile([0.0, 0.7, -1.4], 4)
     q[2] -= condyle.frame_placement(model, condyle.Data(model), q, FEET[0])[2, 3]

@@ -2,8 +2,8 @@
 
     python python/examples/casadi_reach.py        needs CasADi: pip install 'condyle[casadi]'
 
-The duration is a variable too. Accelerations are the controls, and efforts follow from them by inverse dynamics,
-which is cheaper than forward dynamics and needs no M⁻¹: limits of effort become constraints on `rnea`.
+The duration is a variable too. Accelerations are the controls, and inverse dynamics computes the efforts. This is
+cheaper than forward dynamics and needs no M⁻¹. Limits of efforts become constraints on `rnea`.
 """
 
 import casadi
@@ -22,7 +22,7 @@ def transcribe(
     start: np.ndarray,
     target: np.ndarray,
 ) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
-    """The motion from `start`, at rest, to rest with a frame at `target`.
+    """Builds the optimisation of a motion from `start`, at rest, to rest with a frame at `target`.
 
     inverse_dynamics: (q, v, a) -> τ of all knots. placement: q -> (position of the frame, …).
     """
@@ -45,7 +45,7 @@ def transcribe(
     opti.subject_to(casadi.horzcat(v[:, 0], v[:, -1]) == 0)
     opti.subject_to(placement(q[:, -1])[0] == target)
     opti.subject_to(opti.bounded(0.1, duration, 5.0))
-    # fast, and of the fast motions a smooth one
+    # the fastest motion, and among fast motions a smooth one
     opti.minimize(duration + 1e-4 * h * casadi.sumsqr(a))
     opti.set_initial(q, np.tile(start[:, None], KNOTS))
     opti.set_initial(duration, 1.0)

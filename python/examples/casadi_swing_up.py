@@ -2,9 +2,9 @@
 
     python python/examples/casadi_swing_up.py        needs CasADi: pip install 'condyle[casadi]'
 
-The shoulder cannot lift the arm, so it has to swing. Between two knots the motion is a cubic polynomial that
-satisfies the equation of motion at both ends and in the middle (Hermite and Simpson); position, velocity and effort
-at each of these points are variables, and what the polynomial asks for are constraints.
+The shoulder cannot lift the arm, so the arm has to swing. Between two knots the motion is a cubic polynomial that
+satisfies the equation of motion at both ends and in the middle (Hermite and Simpson). Variables are the position,
+velocity and effort at each of these points. The conditions of the polynomial are constraints.
 """
 
 import casadi
@@ -15,11 +15,11 @@ import condyle.casadi
 
 INTERVALS, DURATION = 40, 3.0
 POINTS = 2 * INTERVALS + 1
-EFFORT = np.array([8.0, 4.0])  # N m; to hold the arm level takes 15 and 5
+EFFORT = np.array([8.0, 4.0])  # N m; holding the arm level needs 15 and 5
 
 
 def two_links() -> condyle.Model:
-    """An arm of two links that hangs down at q = 0, and stands upright at q = (π, 0)."""
+    """Returns an arm of two links that hangs down at q = 0 and stands upright at q = (π, 0)."""
     link = condyle.Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.diag([1.0, 1.0, 0.01]))
     elbow, hinge = np.eye(4), condyle.Joint.revolute([0.0, 1.0, 0.0])
     elbow[2, 3] = -1.0
@@ -30,7 +30,7 @@ def two_links() -> condyle.Model:
 
 
 def transcribe(dynamics: casadi.Function) -> tuple[casadi.Opti, dict[str, casadi.MX]]:
-    """The motion as an optimisation, by dynamics (q, v, τ) -> a of all points; variables have a column for each."""
+    """Builds the optimisation of the motion from dynamics (q, v, τ) -> a; variables have a column for each point."""
     opti, h = casadi.Opti(), DURATION / INTERVALS
     q, v, tau = (opti.variable(2, POINTS) for _ in range(3))
     a = dynamics(q, v, tau)
@@ -59,7 +59,7 @@ def main() -> None:
     solution = opti.solve()
     q, v, tau = (solution.value(motion[name]) for name in ("q", "v", "tau"))
 
-    # condyle's own functions say the same of the motion that was found: the efforts that its accelerations take
+    # condyle's own functions confirm the result: inverse dynamics of its accelerations gives its efforts
     data = condyle.Data(arm)
     lift = np.abs(condyle.gravity(arm, data, [np.pi / 2, 0.0]))
     print(f"the shoulder has {EFFORT[0]:.0f} N m, and {lift[0]:.1f} N m would hold the arm level")

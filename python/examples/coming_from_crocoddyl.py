@@ -1,11 +1,12 @@
-"""Coming from Crocoddyl: a problem that is there already, solved here; then the same problem written here.
+"""Coming from Crocoddyl: an existing problem is solved here; then the same problem is written here.
 
     python python/examples/coming_from_crocoddyl.py
 
-It needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names there, and here (of `condyle.optimal`, unless said otherwise):
+It needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names of Crocoddyl, and names here
+(in `condyle.optimal` unless another module is given):
 
     StateMultibody(model)                           the model: a state is x = (q, v), in the same order
-    ActuationModelFull, FloatingBase                actuation=None, which is τ = S u with what is usual
+    ActuationModelFull, FloatingBase                actuation=None: τ = S u, all joints except a free base
     ActuationModelFloatingBaseThrusters             actuation=thrusters(model, placements, torques)
     CostModelSum, addCost(name, cost, weight)       a list of Cost(name, weight, residual, activation)
     ResidualModelState, …Control, …CoMPosition      Residual.state, control, center_of_mass
@@ -24,7 +25,7 @@ It needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names there, and here (of `c
     ContactModel6D, 3D, 2D, 1D                      condyle.ContactConstraint(frame, "rigid", "point", "plane", "line")
     gains [kp, kd]                                  kp=, kd=
     ConstraintModelResidual                         Limit(name, residual, lower, upper)
-    DifferentialActionModelAbstract of one's own    DifferentialAction; ActionModelAbstract: Action
+    DifferentialActionModelAbstract (your own)      DifferentialAction; ActionModelAbstract: Action
     ShootingProblem(x0, running, terminal)          Problem(x0, running, None, terminal)
     problem.quasiStatic(xs)                         problem.quasi_static(xs), of all N + 1 states
     SolverFDDP, SolverDDP, with Box or without      Fddp(problem, method="fddp" or "ddp"); bounds are the knots'
@@ -32,11 +33,11 @@ It needs `pip install crocoddyl==3.2.1 pin==4.0.0`. Names there, and here (of `c
     th_stop, maxiter, regInit                       tolerance=, max_iterations=, regularisation_start=
     setCallbacks([CallbackVerbose()])               solve(xs, us, verbose=True), solve(xs, us, callback=f)
 
-Signs and axes: the feedback here is u = ū + α k + K (x ⊖ x̄), with the opposite sign of Crocoddyl's k and K. Forces are
-those on the robot, along the axes of the contact, in both. Contacts in the frame WORLD are "local_world_aligned" here.
-Bounds of a knot count in Fddp, where SolverFDDP does not look at them. Fddp moves a warm start into the bounds, unless
-project_warm_start=False, which SolverBoxFDDP corresponds to. Costs of controls at the end, which are zero
-there, are refused here. Everything else has the same sign, order and unit.
+Signs and axes: the feedback here is u = ū + α k + K (x ⊖ x̄); Crocoddyl's k and K have the opposite sign. In both
+libraries, forces act on the robot, along the axes of the contact. Contacts in the frame WORLD are
+"local_world_aligned" here. Fddp enforces the bounds of a knot; SolverFDDP ignores them. Fddp projects a warm start onto
+the bounds, unless project_warm_start=False, as SolverBoxFDDP does. Costs of controls in the terminal knot, which are
+zero there, are refused here. Everything else has the same sign, order and unit.
 """
 
 import time
@@ -54,7 +55,7 @@ DT, HORIZON = 0.05, 40
 GOAL, REST = np.array([0.35, 0.2, 0.6]), np.array([0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0])
 x0 = np.r_[REST, np.zeros(7)]
 
-# 1. An arm reaches for a point, as a script for Crocoddyl has it.
+# 1. An arm reaches for a point, written for Crocoddyl.
 robot = pinocchio.buildModelFromXML(condyle.robots.ARM7)
 state = crocoddyl.StateMultibody(robot)
 drives = crocoddyl.ActuationModelFull(state)
@@ -75,7 +76,7 @@ xs, us = [x0] * (HORIZON + 1), list(shooting_problem.quasiStatic([x0] * HORIZON)
 
 
 def quickest(solve: Callable[[], object]) -> float:
-    """The milliseconds of the quickest of some solves."""
+    """Returns the time of the quickest of several solves (ms)."""
     times = []
     for _ in range(5):
         begin = time.perf_counter()
@@ -88,7 +89,7 @@ theirs = crocoddyl.SolverFDDP(shooting_problem)
 took = quickest(lambda: theirs.solve(xs, us))
 print(f"Crocoddyl: cost {theirs.cost:.9f} after {theirs.iter + 1} iterations, {took:.2f} ms")
 
-# 2. The same problem here, in two lines. SolverFDDP does not look at bounds; those of this arm are its efforts' limits.
+# 2. The same problem here, in two lines. SolverFDDP ignores bounds; the bounds of this arm are its effort limits.
 problem = condyle.crocoddyl.problem(shooting_problem, bounded=False)
 ours = Fddp(problem, tolerance=theirs.th_stop, project_warm_start=False).solve(np.array(xs), np.array(us))
 
@@ -112,7 +113,7 @@ again = Fddp(written, tolerance=theirs.th_stop).solve(np.array(xs), np.array(us)
 print(f"written here: cost {again.cost:.9f} after {len(again.trace)} iterations")
 assert np.allclose(again.xs, ours.xs, rtol=0.0, atol=1e-9)
 
-# 4. Our dynamics in Crocoddyl's solver: for a script that keeps its solver, or its integrators.
+# 4. Our dynamics in Crocoddyl's solver, for scripts that keep Crocoddyl's solver or integrators.
 dynamics = condyle.crocoddyl.differential_action(knot.differential)
 mixed = crocoddyl.ShootingProblem(x0, [crocoddyl.IntegratedActionModelEuler(dynamics, DT)] * HORIZON, end)
 on_ours = crocoddyl.SolverFDDP(mixed)

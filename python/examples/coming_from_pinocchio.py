@@ -1,8 +1,8 @@
-"""Coming from Pinocchio: a script that runs with another import, then the same script written here.
+"""Coming from Pinocchio: a script runs with another import; then the same script is written here.
 
     python python/examples/coming_from_pinocchio.py
 
-It needs nothing but condyle; where Pinocchio is installed, the numbers of both are compared. Names there, and here:
+It needs only condyle. If Pinocchio is installed, the numbers of both are compared. Names of Pinocchio, and names here:
 
     buildModelFromUrdf(path, JointModelFreeFlyer())     Model.from_urdf(path, root_joint="free_flyer")
     buildModelFromMJCF(path)                            Model.from_mjcf(path)
@@ -10,7 +10,7 @@ It needs nothing but condyle; where Pinocchio is installed, the numbers of both 
     appendModel(A, B, frame, aMb)                       A.append(frame, B, aMb)
     transformJointIntoMimic(model, i, j, ratio, offset) model.with_mimic(j, i, ratio, offset)
     loadReferenceConfigurations(model, path)            model.reference_configurations(path), a dictionary
-    model that is there already, a pinocchio.Model      Model.from_pinocchio(model), and model.to_pinocchio()
+    an existing pinocchio.Model                         Model.from_pinocchio(model), and model.to_pinocchio()
     example_robot_data.load("talos").model              load("talos")
     model.createData()                                  Data(model); Data(model, threads=4) for batches
     rnea(model, data, q, v, a, fext)                    rnea(model, data, q, v, a, f_ext), an array (nbodies, 6)
@@ -36,10 +36,9 @@ It needs nothing but condyle; where Pinocchio is installed, the numbers of both 
     rneaInParallel(n, pool, q, v, a), columns           rnea with q (N, nq), v and a (N, nv), rows
     MeshcatVisualizer                                   condyle.viz.play(model, q, dt, urdf=path)
 
-What is equal: units, signs, the order of q, v and six numbers (linear first), quaternions (x, y, z, w), the numbers of
-joints. What differs: results are returned, and arrays that no later call changes; frames have no `universe` before
-them, and are given by name; both triangles of M are filled; gravity and limits are changed by `with_gravity` and
-`with_limits`, which return new models.
+Equal are units, signs, the order of q, v and spatial vectors (linear first), quaternions (x, y, z, w), and the numbers
+of joints. Different: results are returned as arrays that no later call changes. Frames are given by name, and there is
+no frame `universe` before them. Both triangles of M are filled. `with_gravity` and `with_limits` return new models.
 """
 
 from importlib.util import find_spec
@@ -54,7 +53,7 @@ GOAL, PRECISION, STEP, DAMPING = np.array([0.35, 0.2, 0.6]), 1e-10, 0.5, 1e-9
 
 
 def reach(pin: Any) -> tuple[np.ndarray, int]:
-    """Inverse kinematics by Newton's method with damping, as a script for Pinocchio has it."""
+    """Solves inverse kinematics by Newton's method with damping, written for Pinocchio."""
     model = pin.buildModelFromXML(condyle.robots.ARM7)
     data = model.createData()
     tool = model.getFrameId("tool")
@@ -89,14 +88,14 @@ v, tau = np.linspace(-1.0, 1.0, 7), np.ones(7)
 d = condyle.aba_derivatives(arm, data, q, v, tau)
 print(f"the first joint accelerates by {d.a[0]:.4f} rad/s², and by {d.da_dtau[0, 0]:.4f} more for each N m")
 
-# 4. Many states at once, in rows: there is no loop, and no threads to be looked after.
+# 4. Many states at once, in rows: without a loop, and without threads to manage.
 many = np.tile(q, (1000, 1))
 many[:, 0] += np.linspace(-1.0, 1.0, 1000)
 efforts = condyle.gravity(arm, condyle.Data(arm, threads=2), many)
 assert efforts.shape == (1000, 7)
 print(f"holding the arm still takes at most {np.abs(efforts).max():.2f} N m, all around")
 
-# 5. Beside Pinocchio, where it is installed: the same numbers, and its models are ours in one call.
+# 5. Comparison with Pinocchio, if it is installed: the same numbers; one call converts its models.
 if find_spec("pinocchio"):
     import pinocchio
 

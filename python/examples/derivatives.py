@@ -1,9 +1,9 @@
-"""Exact derivatives: of the dynamics, in closed form, and of whatever is built on them.
+"""Exact derivatives of the dynamics, in closed form, and of functions built on them.
 
     python python/examples/derivatives.py
 
-A derivative by q is taken in the tangent space: by what v moves, so it has nv columns, also where q has more numbers
-than v.
+A derivative with respect to q is taken in the tangent space, along velocities. It has nv columns, also if q has more
+numbers than v.
 """
 
 import numpy as np
@@ -20,29 +20,28 @@ v, tau = rng.standard_normal((2, robot.nv))
 d = condyle.aba_derivatives(robot, data, q, v, tau)
 print("∂q̈/∂q, ∂q̈/∂v, ∂q̈/∂τ:", d.da_dq.shape, d.da_dv.shape, d.da_dtau.shape)
 
-# They are exact: differences come near to them, as near as differences can. q moves by `integrate`.
+# They are exact: finite differences agree within their own error. `integrate` moves q.
 step, direction = 1e-6, rng.standard_normal(robot.nv)
 ahead = condyle.aba(robot, data, condyle.integrate(robot, q, step * direction), v, tau)
 behind = condyle.aba(robot, data, condyle.integrate(robot, q, -step * direction), v, tau)
 print("differences are off by", abs((ahead - behind) / (2 * step) - d.da_dq @ direction).max())
 
-# Second derivatives of a number λᵀ q̈, as a solver of optimal control asks for: four blocks.
+# Second derivatives of a number λᵀ q̈, as solvers for optimal control need: four blocks.
 hessian = condyle.aba_hessian(robot, data, q, v, tau, np.ones(robot.nv))
 assert np.allclose(hessian.dqdq, hessian.dqdq.T)
 
-# The derivatives of a function of one's own: it is called with hyper-dual numbers, and all of condyle's functions
-# take them.
+# Derivatives of your own function: it is called with hyper-dual numbers, which all functions of condyle accept.
 arm = condyle.robots.arm7()
 arm_data, at = condyle.Data(arm), np.full(7, 0.3)
 
 
 def reach_and_effort(q: np.ndarray) -> np.ndarray:
-    """How far the tool is from a point, squared, and what gravity costs there."""
+    """Returns the squared distance of the tool from a point, plus a cost of gravity's torques."""
     tool = condyle.frame_placement(arm, arm_data, q, "tool")[:3, 3]
     return 100.0 * ((tool - [0.4, 0.2, 0.5]) ** 2).sum() + 0.01 * (condyle.gravity(arm, arm_data, q) ** 2).sum()
 
 
-# The Gauss-Newton matrix would do; with the exact Hessian, Newton's method needs no more than a handful of steps.
+# The Gauss-Newton matrix would work too; with the exact Hessian, Newton's method needs only a few steps.
 steps = 0
 while True:
     value, gradient = condyle.gradient(arm, at, reach_and_effort)
@@ -51,7 +50,7 @@ while True:
     curvature, vectors = np.linalg.eigh(condyle.hessian(arm, at, reach_and_effort)[2])
     step = vectors @ (
         (vectors.T @ gradient) / np.maximum(np.abs(curvature), 1e-3)
-    )  # downhill also where it is not convex
+    )  # a descent direction also if the function is not convex
     length = 1.0
     while reach_and_effort(at - length * step) > value:
         length *= 0.5

@@ -2,8 +2,8 @@
 
     python python/examples/dynamics.py
 
-A model is the robot and never changes; a data is the memory that calls compute in. Everything else is a function of
-both and of the state: position q, velocity v, and what the function asks for beside them.
+A model is the robot and never changes. A data is the memory in which calls compute. Everything else is a function of
+both, of the state (position q, velocity v), and of further arguments such as accelerations or efforts.
 """
 
 import numpy as np
@@ -12,14 +12,13 @@ import condyle
 
 robot = condyle.robots.quadruped()  # or condyle.Model.from_urdf("robot.urdf", root_joint="free_flyer")
 data = condyle.Data(robot)
-print(robot)  # its joints; print(robot.tree()) shows which body stands on which
+print(robot)  # its joints; print(robot.tree()) shows the tree of bodies
 
 # q has nq numbers: the base's position and quaternion (x, y, z, w), then a number for each joint. v has nv.
 q, v = condyle.neutral(robot), np.zeros(robot.nv)
 q[2], q[7:] = 0.5, np.tile([0.0, 0.7, -1.4], 4)  # half a metre up, the knees bent
 
-# Inverse dynamics: the efforts τ = M a + h that hold the robot still. Nothing can hold its base, which carries its
-# weight.
+# Inverse dynamics: the efforts τ = M a + h that hold the robot still. The base has no motor; its entry is the weight.
 tau = condyle.rnea(robot, data, q, v, np.zeros(robot.nv))
 print(f"the ground must carry {tau[2]:.1f} N, and {robot.total_mass * 9.81:.1f} N is the robot's weight")
 
@@ -27,16 +26,16 @@ print(f"the ground must carry {tau[2]:.1f} N, and {robot.total_mass * 9.81:.1f} 
 a = condyle.aba(robot, data, q, v, np.zeros(robot.nv))
 print(f"the base falls with {a[2]:.2f} m/s²")
 
-# Both say the same as the equation of motion M a + h = τ.
+# Both agree with the equation of motion M a + h = τ.
 M, h = condyle.crba(robot, data, q), condyle.nonlinear_effects(robot, data, q, v)
 assert np.allclose(M @ a + h, 0.0)
 
-# Kinematics: where a foot is, and how it moves when the joints do.
+# Kinematics: the position of a foot, and its velocity for given joint velocities.
 foot = condyle.frame_placement(robot, data, q, "LF_foot")[:3, 3]
 J = condyle.frame_jacobian(robot, data, q, "LF_foot", "local_world_aligned")
 print(f"a foot is at {foot.round(3)}, and its Jacobian has the shape {J.shape}")
 
-# Contacts: forces λ hold the feet where they are. With a quarter of the weight on each foot the joints need g − Jᵀ λ.
+# Contacts: forces λ hold the feet. With a quarter of the weight on each foot, the joints need g − Jᵀ λ.
 feet = ("LF_foot", "RF_foot", "LH_foot", "RH_foot")
 stance = condyle.ConstraintSet(
     robot, [condyle.ContactConstraint(foot, "point", reference="local_world_aligned") for foot in feet]
@@ -45,11 +44,11 @@ weight = np.tile([0.0, 0.0, robot.total_mass * 9.81 / 4], 4)
 tau = condyle.gravity(robot, data, q)
 for foot, force in zip(feet, weight.reshape(4, 3), strict=True):
     tau -= condyle.frame_jacobian(robot, data, q, foot, "local_world_aligned")[:3].T @ force
-tau[:6] = 0.0  # there are no motors at the base
+tau[:6] = 0.0  # the base has no motors
 contact = condyle.constrained_dynamics(robot, data, stance, q, v, tau)
 print(f"on its feet it falls with {abs(contact.a[2]):.2f} m/s²; they are pushed by {contact.lambda_[2::3].round(1)} N")
 
-# Many states in one call: arrays with one more axis in front, computed side by side in vector registers.
+# Many states in one call: arrays with one more axis in front, computed several at a time in SIMD registers.
 states = np.stack([condyle.random_configuration(robot, seed=k) for k in range(1000)])
 masses = condyle.crba(robot, data, states)
 print(f"{len(masses)} inertia matrices: {masses.shape}")

@@ -17,11 +17,11 @@ from condyle.optimal import (
 )
 
 FRICTION = 0.7
-HOLD = 40.0  # how fast a foot's slip decays (1/s)
+HOLD = 40.0  # decay rate of a foot's slip (1/s)
 
 
 class Gait:
-    """A gait in the making: its knots so far, and where feet and centre of mass are at their end."""
+    """Gait under construction: its knots so far, and the positions of feet and centre of mass after the last knot."""
 
     def __init__(self, model, q, feet, dt):
         data = condyle.Data(model)
@@ -30,7 +30,7 @@ class Gait:
         ground = self.places[0, 2]
         self.com, self.x0 = condyle.com(model, data, q), np.r_[q, np.zeros(model.nv)]
         for height in self.places[:, 2], self.com[2:], self.x0[2:3]:
-            height -= ground  # it stands at height 0
+            height -= ground  # the feet are at height 0
         self.models, self.stages, self.us, self.times, self.touches = [], [], [], [0.0], []
 
     def _contacts(self, feet, kd):
@@ -38,7 +38,7 @@ class Gait:
         return {name: ContactConstraint(name, "point", None, "local_world_aligned", kd=kd) for name in names}
 
     def _rest(self, *weights):
-        """Back to the posture, with weights of the trunk's position and rotation, the joints, and their velocities."""
+        """Returns a cost towards the posture, with weights of the trunk's position and rotation and of the joints."""
         w = np.repeat(weights, [3, 3, self.model.nv - 6] * 2)
         return Cost("rest", 1e1, Residual.state(self.x0), Activation.weighted(w))
 
@@ -63,14 +63,14 @@ class Gait:
         self.times += [self.times[-1] + (k + 1) * self.dt for k in range(knots)]
 
     def stand(self, knots):
-        """Stands on all feet for some knots."""
+        """Adds knots with all feet on the ground."""
         feet = range(len(self.feet))
         self._phase(feet, knots, lambda k: self._costs(feet, [], self.com))
 
     def step(self, swinging, length, height, knots):
-        """Swings the feet with these numbers ahead by `length` in an arc of some height, and sets them down.
+        """Moves the given feet ahead by `length` in an arc of the given height, and sets them down.
 
-        They leave the ground and meet it nearly at rest: a robot can follow that.
+        They leave the ground and meet it nearly at rest, so that a robot can follow.
         """
         support = [k for k in range(len(self.feet)) if k not in swinging]
         com, places, ahead = self.com.copy(), self.places.copy(), np.array([length, 0.0, 0.0])
@@ -95,7 +95,7 @@ class Gait:
         self.times.append(self.times[-1])  # an impact takes no time
 
     def solve(self):
-        """Solves it; returns the solution."""
+        """Solves the problem and returns the solution."""
         end = FreeDynamics(self.model, None, [self._rest(0.0, 1e3, 1e-1, 1e2, 1e2, 1e2)])
         problem = Problem(self.x0, self.models, self.stages, end)
         return Fddp(problem, tolerance=1e-4).solve(np.tile(self.x0, (len(self.stages) + 1, 1)), self.us)

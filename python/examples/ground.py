@@ -1,16 +1,18 @@
-"""A robot on level ground, by constrained dynamics: what touches is held as long as the ground pushes, what comes down
-is stopped by an impact. Friction has no bound here: who uses it looks at the forces."""
+"""Simulation of a robot on level ground by constrained dynamics.
+
+A foot that touches is held as long as the ground pushes; a foot that comes down is stopped by an impact. Friction is
+unlimited here: users check the forces."""
 
 import numpy as np
 
 import condyle
 from condyle import ConstraintSet, ContactConstraint
 
-HOLD = 50.0  # how fast a held foot's drift decays (1/s)
+HOLD = 50.0  # decay rate of a held foot's drift (1/s)
 
 
 class Ground:
-    """The robot's state, and which of its feet stand. All stand at first, where they are."""
+    """State of the robot, and the set of standing feet. At first all feet stand at their present positions."""
 
     def __init__(self, model, q, feet, kind="point"):
         self.model, self.data, self.kind = model, condyle.Data(model), kind
@@ -19,7 +21,7 @@ class Ground:
         self.sets = {}
 
     def step(self, tau, dt, f_ext=None):
-        """One step of dt under efforts τ and forces on the bodies. Returns the force on each foot in the world (N)."""
+        """Makes a step of dt under efforts τ and forces on bodies; returns the force on each foot in the world (N)."""
         forces = np.zeros((len(self.feet), 3))
         while True:
             held, contacts = self._contacts()
@@ -44,7 +46,7 @@ class Ground:
         return held, self.sets[held]
 
     def _land(self):
-        """Stops what has come down by an impact: J v⁺ = 0."""
+        """Stops the feet that have come down by an impact: J v⁺ = 0."""
         height = [condyle.frame_placement(self.model, self.data, self.q, foot)[2, 3] for foot in self.feet]
         landed = [not standing and z < 0.0 for standing, z in zip(self.standing, height, strict=True)]
         if any(landed):

@@ -2,9 +2,9 @@
 
     python python/examples/motion_library.py [COUNT]
 
-Each start has its own plan with its own feedback, found from the nominal one. With Ray (`pip install condyle[ray]`) the
-plans are shared among the processors of this machine, or of a cluster whose address is given to `sweep` as `cluster`:
-the problem travels to each worker once, and a worker that is lost does no harm. In both ways the bits are the same.
+Each start has its own plan with its own feedback, computed from the nominal plan. With Ray (`pip install condyle[ray]`)
+the processors of this machine share the work, or of a cluster whose address is the argument `cluster` of `sweep`.
+The problem is sent to each worker once, and the share of a lost worker is computed again. The bits are the same.
 """
 
 import importlib.util
@@ -29,10 +29,10 @@ problem = Problem(
     rest, [FreeDynamics(arm, 0.02, [stay, effort])] * HORIZON, None, FreeDynamics(arm, None, [stay, reach])
 )
 
-# Starts around the nominal one: a tenth of a radian, a tenth of a radian per second.
+# Starts around the nominal one: standard deviations of 0.1 rad and 0.1 rad/s.
 starts = np.random.default_rng(1).normal(rest, 0.1, (COUNT, 14))
 
-# What one would write by hand, for comparison: one solver, a loop.
+# For comparison, the same by hand: one solver in a loop.
 xs = np.tile(rest, (HORIZON + 1, 1))
 nominal = Fddp(problem).solve(xs, problem.quasi_static(xs))
 solver, by_hand = Fddp(problem), []
@@ -43,7 +43,7 @@ for x0 in starts:
 loop = COUNT / (time.perf_counter() - begin)
 print(f"a plain loop: {loop:.0f} plans a second")
 
-# The same as a sweep, kept on disk as it goes on.
+# The same as a sweep, whose results are written to disk as they are found.
 problem.set_x0(rest)
 with tempfile.TemporaryDirectory() as folder:
     begin = time.perf_counter()
@@ -54,11 +54,11 @@ with tempfile.TemporaryDirectory() as folder:
 print(f"{(library.status == 'converged').sum()} of {COUNT} converged, after {library.iterations.mean():.1f} iterations")
 assert np.array_equal(library.cost, by_hand)
 
-# Who stands near one of the starts takes its plan.
+# From a state near one of the starts, the robot uses the plan of that start.
 near = int(np.argmin(np.linalg.norm(starts - rest, axis=1)))
 print(f"start {near} is nearest to rest; its plan costs {library.cost[near]:.3f}, that from rest {nominal.cost:.3f}")
 
-# The same on all processors, where there are enough plans to pay for the start of the workers.
+# The same on all processors, if there are enough plans to justify the start of the workers.
 if importlib.util.find_spec("ray") and COUNT >= 1000:
     import ray
 

@@ -2,9 +2,8 @@
 
     python python/examples/mpc.py
 
-Every 10 ms the controller applies the first control of its plan, moves the horizon on by a knot, and improves the
-plan by one iteration of FDDP, from the last plan. Between plans it corrects with the solver's own gains: u = ū + K (x
-⊖ x̄).
+Every 10 ms the controller applies the first control of its plan, moves the horizon by one knot, and improves the last
+plan by one iteration of FDDP. Between plans it corrects with the solver's gains: u = ū + K (x ⊖ x̄).
 """
 
 import numpy as np
@@ -20,13 +19,13 @@ rest = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]  # a state: q, then
 
 
 def target(step: int) -> np.ndarray:
-    """Where the tool should be: once around a circle in 2.5 s."""
+    """Returns the target of the tool, which moves once around a circle in 2.5 s."""
     angle = 2.0 * np.pi * step * DT / 2.5
     return np.array([0.45, 0.15 * np.cos(angle), 0.45 + 0.15 * np.sin(angle)])
 
 
 def costs(step: int, controls: int) -> list[Cost]:
-    """What a knot costs whose time is so many steps from the beginning."""
+    """Returns the costs of a knot, a given number of steps after the beginning."""
     return [
         Cost("follow", 1e3, Residual.frame_translation(arm, "tool", target(step))),
         Cost("rest", 1e-1, Residual.state(rest)),
@@ -34,12 +33,12 @@ def costs(step: int, controls: int) -> list[Cost]:
     ]
 
 
-# One action serves all knots; each has costs of its own, which it keeps while it moves to the front.
+# One action serves all knots. Each knot has its own costs and keeps them while it moves to the front.
 knot = FreeDynamics(arm, DT, [], costs_at={t: costs(t, 7) for t in range(HORIZON)})
 end = FreeDynamics(arm, None, costs(HORIZON, 0))
 problem = Problem(rest, [knot], [0] * HORIZON, end)
 
-# The first plan takes as long as it takes; then each step has one iteration.
+# The first plan is solved completely; then each step makes one iteration.
 plan = Fddp(problem).solve(np.tile(rest, (HORIZON + 1, 1)), np.tile(knot.quasi_static(rest), (HORIZON, 1)))
 print(f"the first plan: {plan.status} after {len(plan.trace)} iterations")
 solver = Fddp(problem, max_iterations=1, tolerance=0.0)
@@ -51,13 +50,13 @@ for step in range(STEPS):
     off_plan = np.r_[condyle.difference(arm, plan.xs[0, :7], x[:7]), x[7:] - plan.xs[0, 7:]]
     u = plan.us[0] + plan.K[0] @ off_plan
 
-    # the world: the arm moves; once, something hits its elbow
+    # the simulation: the arm moves; once, something hits its elbow
     v = x[7:] + DT * condyle.aba(arm, data, x[:7], x[7:], u)
     if step == STEPS // 2:
         v[3] += 1.0
     x = np.r_[condyle.integrate(arm, x[:7], DT * v), v]
 
-    # the plan: the horizon moves on, its last knot and its end have new targets, and one iteration improves it
+    # the plan: the horizon moves on, its last knot and its terminal knot get new targets, and one iteration improves it
     solver.shift(0)
     problem.set_costs(HORIZON - 1, costs(step + HORIZON, 7))
     problem.set_costs(HORIZON, costs(step + 1 + HORIZON, 0))

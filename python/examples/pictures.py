@@ -2,7 +2,7 @@
 
     python python/examples/pictures.py [--stay]
 
-Needs `pip install condyle[viz]`. It leaves plot.png and spy.png in the folder where it runs; with --stay the page stays
+Needs `pip install condyle[viz]`. It writes plot.png and spy.png to the current folder. With --stay, the page stays open
 until Enter is pressed.
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-mpl.use("Agg")  # pictures go into files; without this line `matplotlib.pyplot.show()` puts them on the screen
+mpl.use("Agg")  # pictures are written to files; without this line, `matplotlib.pyplot.show()` shows them on the screen
 
 import numpy as np
 from gait import Gait
@@ -34,10 +34,10 @@ gait.stand(20)
 solution = gait.solve()
 print(f"FDDP: {solution.status} after {len(solution.trace)} iterations, {len(gait.stages)} knots")
 
-# Positions, velocities, controls, and the way of the solver.
+# Positions, velocities, controls, and the iterations of the solver.
 viz.plot(solution, robot, DT).savefig("plot.png", dpi=110)
 
-# The inertia matrix has zeros where the legs do not see each other; its inverse has not, since the trunk moves.
+# The inertia matrix has zeros between different legs. Its inverse does not have zeros, because the trunk moves.
 M, Minv = (f(robot, condyle.Data(robot), q) for f in (condyle.crba, condyle.minv))
 viz.spy(M, robot).savefig("spy.png", dpi=110)
 print(f"zeros: {(M == 0.0).sum()} of M, {(abs(Minv) < 1e-12).sum()} of its inverse, {M.size} entries each")

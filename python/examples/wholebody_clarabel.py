@@ -1,4 +1,4 @@
-"""Whole-body control on clarabel alone: the program of `condyle.wholebody`, put together in a hundred lines.
+"""Whole-body control on clarabel alone: the program of `condyle.wholebody` in a hundred lines.
 
 A quadruped stands on four point feet and is pushed. Each millisecond the program
 
@@ -7,7 +7,7 @@ A quadruped stands on four point feet and is pushed. Each millisecond the progra
     J_c q̈ + J̇_c v = 0                              the feet stay
     ‖f_t‖ ≤ μ f_n                                  each foot in its cone
 
-is written for clarabel and solved by it. The same tick by `WholeBodyController` is compared.
+is written for clarabel and solved by it. `WholeBodyController` computes the same tick for comparison.
 
     pip install clarabel
     python python/examples/wholebody_clarabel.py
@@ -27,14 +27,16 @@ FRICTION = 0.4
 EFFORT = 60.0  # N m
 STIFFNESS, DAMPING = 60.0, 15.5  # 1/s², 1/s
 TRUNK, POSTURE, SMALL_A, SMALL_F = 10.0, 0.1, 1e-6, 1e-4  # w, w_p, ε_a, ε_f
-TOLERANCE = 1e-11  # of both solvers: where a foot just reaches its cone, the torques depend on its root
+TOLERANCE = (
+    1e-11  # of both solvers: if a foot just reaches its cone, torques depend on the square root of the tolerance
+)
 DT = 1e-3  # s
 PUSH = 60.0  # N, to the left, from 0.1 s to 0.3 s
 ALIGNED = "local_world_aligned"
 
 
 class Standing:
-    """A posture to hold, as a cone program at each state."""
+    """Posture to hold, as a cone program at each state."""
 
     def __init__(self, model, q_ref, trunk):
         self.model, self.data, self.q_ref, self.trunk = model, condyle.Data(model), q_ref, trunk
@@ -43,7 +45,7 @@ class Standing:
         self.settings.tol_gap_abs = self.settings.tol_gap_rel = self.settings.tol_feas = TOLERANCE
 
     def solve(self, q, v):
-        """q̈, f and τ at a state."""
+        """Returns q̈, f and τ at a state."""
         model, data, nv, nf = self.model, self.data, self.model.nv, 3 * len(FEET)
         M, h, rest = condyle.crba(model, data, q), condyle.nonlinear_effects(model, data, q, v), np.zeros(model.nv)
         J = condyle.frame_jacobian(model, data, q, "trunk", ALIGNED)

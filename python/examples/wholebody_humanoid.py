@@ -1,6 +1,6 @@
 """A humanoid stands on two soles, shifts its weight to one of them, lifts the other foot, and sets it down.
 
-The lifted foot's contact fades: its force is ramped down before it leaves the ground, and up after it is back.
+The contact of the lifted foot fades: its force limit is ramped down before lift-off, and up after touch-down.
 
     python python/examples/wholebody_humanoid.py
 """
@@ -17,7 +17,7 @@ LIFT = 0.1  # m
 
 
 def ramp(t: float, begin: float, end: float) -> np.ndarray:
-    """From 0 at one time to 1 at another one, smoothly: value, rate, and rate of the rate."""
+    """Returns a smooth step from 0 at one time to 1 at another time: value, rate and acceleration."""
     s, w = np.clip((t - begin) / (end - begin), 0.0, 1.0), 1.0 / (end - begin)
     value = s**3 * (10.0 + s * (6.0 * s - 15.0))
     return np.array([value, 30.0 * w * (s * (1.0 - s)) ** 2, 60.0 * w**2 * s * (1.0 - s) * (1.0 - 2.0 * s)])
@@ -38,7 +38,7 @@ def main() -> None:
         Task.posture(),
     ]
     controller = WholeBodyController(model, contacts, tasks, Settings(contact_gains=Gains(0.0, 40.0)))
-    q[2] -= controller.hold(q).contacts[0].pose[2, 3]  # it stands at height 0
+    q[2] -= controller.hold(q).contacts[0].pose[2, 3]  # the soles are at height 0
     start = controller.hold(q)
     aside = start.contacts[0].pose[1, 3] - start.com.position[1]
     ahead = start.contacts[0].pose[0, 3] - start.com.position[0]

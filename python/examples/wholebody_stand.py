@@ -1,8 +1,8 @@
 """A quadruped stands on four point feet, is pushed, sways and comes back.
 
-Each millisecond one cone program gives the torques: whole-body control with true friction cones. The controller knows
-nothing of the push, it sees only the state. The ground holds what touches, as long as it has to push; it knows no
-friction, so the example looks at each force and says how close the worst one came to its cone.
+Each millisecond one cone program gives the torques: whole-body control with true friction cones. The controller does
+not know the push; it measures only the state. The ground holds each touching foot as long as the force pushes. Its
+friction is unlimited, so the example checks each force and reports how close the worst one came to its cone.
 
     python python/examples/wholebody_stand.py
 """
@@ -42,7 +42,7 @@ def main() -> None:
         times.append(1e6 * (time.perf_counter() - clock))
         error = max(error, *controller.optimality(world.q, world.v, references))
 
-        f_ext[1, 1] = PUSH if 200 <= tick < 600 else 0.0  # along the trunk's axes, which hardly turn
+        f_ext[1, 1] = PUSH if 200 <= tick < 600 else 0.0  # along the trunk's axes, which rotate only little
         forces = world.step(command.tau, DT, f_ext)
         used = np.max(np.hypot(forces[:, 0], forces[:, 1]) / (FRICTION * forces[:, 2]))
         assert used < 1.0 and forces[:, 2].min() > 0.0, f"a foot slips or lifts at tick {tick}"

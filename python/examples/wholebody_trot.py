@@ -1,4 +1,4 @@
-"""A quadruped trots a plan: FDDP finds it, whole-body control tracks it at 1 kHz on ground that only pushes.
+"""A quadruped trots: FDDP finds the plan, and whole-body control tracks it at 1 kHz on ground that only pushes.
 
 python python/examples/wholebody_trot.py
 """
@@ -39,7 +39,7 @@ def main() -> None:
     x0 = solution.xs[0][: robot.nq]
     references, world = controller.hold(x0), Ground(robot, x0, FEET)
 
-    # The ground of this example knows no friction, so forces are looked at.
+    # Friction is unlimited in this example, so the forces are checked.
     unsolved = loaded = slips = 0
     error = 0.0
     for tick in range(round((plan.span[1] + 0.3) / DT)):

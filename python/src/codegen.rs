@@ -13,7 +13,8 @@ use std::num::NonZero;
 /// Names and shapes of arrays.
 type Arrays = Vec<(String, usize, usize)>;
 
-/// The name of the code, its files as (name, text), and its functions as (name, arguments, results, operations, shares).
+/// The name of the code, its files as (name, text), and its functions as (name, arguments, results, operations,
+/// shares).
 type Generated = (String, Vec<(String, String)>, Vec<(String, Arrays, Arrays, usize, usize)>);
 
 fn arrays(arrays: &[Array]) -> Arrays {
@@ -25,7 +26,9 @@ fn arrays(arrays: &[Array]) -> Arrays {
 #[pyfunction]
 #[pyo3(
     name = "_generate",
-    signature = (model, names, language, *, frames=vec![], constraints=vec![], external_forces=false, inputs=vec![], shares=None)
+    signature = (
+        model, names, language, *, frames=vec![], constraints=vec![], external_forces=false, inputs=vec![], shares=None
+    )
 )]
 pub(crate) fn generate(
     py: Python<'_>,

@@ -125,7 +125,8 @@ fn aim(
 /// or its placement is not a homogeneous matrix.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
-/// >>> trot = condyle.ConstraintSet(quadruped, [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")])
+/// >>> feet = [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")]
+/// >>> trot = condyle.ConstraintSet(quadruped, feet)
 /// >>> len(trot), trot.rows, trot.range(1)
 /// (2, 6, slice(3, 6, 1))
 #[pyclass(module = "condyle")]

@@ -434,9 +434,13 @@ macro_rules! functions {
             $(if let (Some(states), false) = (states, dual) {
                 $check($model)?;
                 let written = &$crate::arrays::destinations(out);
-                $(let $all = <kinds::$all_kind as Argument>::read_all(stringify!($all), &$all.given, $model, states, written)?;)*
+                $(let $all = <kinds::$all_kind as Argument>::read_all(
+                    stringify!($all), &$all.given, $model, states, written
+                )?;)*
                 $(let $all = &$all[..];)*
-                $($(let $shared = <kinds::$shared_kind as Argument>::read(stringify!($shared), $shared.given, $model)?;)*)?
+                $($(let $shared = <kinds::$shared_kind as Argument>::read(
+                    stringify!($shared), $shared.given, $model
+                )?;)*)?
                 let lanes = data.batch($model, states);
                 $(let $set = scratch.side_by_side(lanes, $model)?;)?
                 return batch::run(py, lanes, batch::Kind::$kind_of $(($class))?, states, out, |$batch, some| {
@@ -446,7 +450,9 @@ macro_rules! functions {
             })?
             $(if let (Some(states), false) = (states, dual) {
                 let written = &$crate::arrays::destinations(out);
-                $(let $of = <kinds::$of_kind as Argument>::read_all(stringify!($of), &$of.given, $model, states, written)?;)*
+                $(let $of = <kinds::$of_kind as Argument>::read_all(
+                    stringify!($of), &$of.given, $model, states, written
+                )?;)*
                 $(let $of = &$of[..];)*
                 $($(let $same = <kinds::$same_kind as Argument>::read(stringify!($same), $same.given, $model)?;)*)?
                 return batch::each(py, states, &[$($model.$size()),*], out, |k, $place| {

@@ -223,7 +223,10 @@ fn kept<'py>(data: &Bound<'py, SpelledData>) -> PyResult<PyRef<'py, SpelledData>
 
 /// Defines functions that return a motion of a joint's body or of a frame at the last forwardKinematics.
 macro_rules! motions {
-    ($($(#[$doc:meta])* $name:ident($of:ident: $Of:ty, $number:ident): $method:ident of $pass:ident($($kept:ident),*);)*) => {$(
+    ($(
+        $(#[$doc:meta])*
+        $name:ident($of:ident: $Of:ty, $number:ident): $method:ident of $pass:ident($($kept:ident),*);
+    )*) => {$(
         $(#[$doc])*
         #[pyfunction]
         #[pyo3(signature = (model, data, $of, frame=None))]

@@ -5,7 +5,7 @@
 URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, SDFs with Drake, which may be missing. Each file
 is read in a process of its own with a time limit, so that a crash of a library is a row of the table.
 
-A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER, or beside it, names commits: a
+A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER, or next to it, names commits: a
 line has `owner/repository`, a tab and the commit. `--table VALIDATION.md` replaces the section on public robots in that
 file; `pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest and keeps the section.
 

@@ -17,6 +17,7 @@
 //! algorithms of a robot, [`Language`] writes the graph as C, Rust or CUDA, and [`generate`] writes files. Values that
 //! do not depend on the robot's position are not computed at run time. The code has neither branches nor memory of its
 //! own, and its only loops compute entries of a result with the same structure.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![allow(non_snake_case)]
 
 #[cfg(feature = "cuda")]
@@ -50,3 +51,8 @@ pub use generate::generate;
 pub use identifiers::identifier;
 pub use robot::{FUNCTIONS, Settings, functions};
 pub use text::{Language, SourceFile};
+
+/// Code block of the README, run as a doctest.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -17,7 +17,10 @@ use condyle_spatial::{Scalar, alike};
 /// Defines [`Data`] from its workspaces and their arguments: the struct, its construction and cloning, and the check
 /// that it may be read under both names of `f64` ([`alike!`]).
 macro_rules! data {
-    ($(#[$doc:meta])* ($size:ident, $model:ident) $($name:ident: $Workspace:ident $(:: $Inner:ident)? = ($($from:ident),*),)*) => {
+    (
+        $(#[$doc:meta])* ($size:ident, $model:ident)
+        $($name:ident: $Workspace:ident $(:: $Inner:ident)? = ($($from:ident),*),)*
+    ) => {
         $(#[$doc])*
         #[derive(Debug)]
         #[repr(C)]

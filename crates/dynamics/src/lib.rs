@@ -28,6 +28,7 @@
 //! Without `std` the crate needs `alloc`, and the feature `libm` for floating-point functions. So it runs without an
 //! operating system (`examples/embedded` in the repository).
 #![doc = include_str!("../CONVENTIONS.md")]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
 
@@ -131,3 +132,8 @@ pub use passes::frames::{Accelerations, Placements, ReferenceFrame, Velocities};
 #[doc(hidden)]
 pub use passes::free_armature::{add_armature_bias, subtract_armature_bias};
 pub use passes::passive::{passive_torque, passive_torque_derivatives};
+
+/// Code block of the README, run as a doctest.
+#[cfg(all(doctest, feature = "loaders", feature = "threads"))]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -31,7 +31,8 @@ pub fn inverse_by_factor<R>(model: &Model<R>, nonzeros: usize) -> bool {
 /// a 7-joint arm the sparse factor takes five times the instructions.
 pub const SHORT_CHAIN: usize = 8;
 
-/// Returns whether a robot is a chain of at most [`SHORT_CHAIN`] coordinates. Its M has no zeros, so no factor of M is needed.
+/// Returns whether a robot is a chain of at most [`SHORT_CHAIN`] coordinates. Its M has no zeros, so no factor of M is
+/// needed.
 pub fn is_short_chain<R>(model: &Model<R>) -> bool {
     let chain = model.columns().iter().enumerate().all(|(k, column)| column.depth == k);
     chain && !model.has_mimic() && model.nv() <= SHORT_CHAIN
@@ -50,11 +51,12 @@ pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
     is::<S, Fused>() && !model.has_mimic() && model.support_len() > LONG_SUPPORT * model.columns().len()
 }
 
-/// Returns the fastest method of forward dynamics: ABA, unless joints share a coordinate, for which ABA's recursion does not close.
+/// Returns the fastest method of forward dynamics: ABA, unless joints share a coordinate, for which ABA's recursion
+/// does not close.
 ///
-/// Measured by `benches/factorisation.rs` on the embedded robots, and on chains, binary trees and stars of 6 to 200 joints. A factor
-/// of M never wins: h and M together take nearly as long as ABA on an arm of 7 and up to 3 times as long on the others.
-/// `docs/performance.md` has the table.
+/// Measured by `benches/factorisation.rs` on the embedded robots, and on chains, binary trees and stars of 6 to 200
+/// joints. A factor of M never wins: h and M together take nearly as long as ABA on an arm of 7 and up to 3 times as
+/// long on the others. `docs/performance.md` has the table.
 pub(crate) fn forward_dynamics<R>(model: &Model<R>) -> ForwardDynamicsMethod {
     if model.has_mimic() { ForwardDynamicsMethod::Sparse } else { ForwardDynamicsMethod::ArticulatedBody }
 }

@@ -69,7 +69,8 @@ impl EliminationTree {
                 (0..n).map(|c| (columns.row(c), columns.parent(c).unwrap_or(NONE))).unzip();
             return Self::depth_first(&order, &parent, step);
         }
-        let mut coupled = vec![BTreeSet::new(); n]; // for each row, the rows with which it shares an entry of the matrix
+        // for each row, the rows with which it shares an entry of the matrix
+        let mut coupled = vec![BTreeSet::new(); n];
         for c in 0..columns.columns() {
             let k = columns.row(c);
             for ancestor in successors(columns.parent(c), |&c| columns.parent(c)) {

@@ -10,6 +10,7 @@
 //!
 //! # Features
 //! `threads` and `std` are on by default; without `std` the crate needs `alloc` and the feature `libm`.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(feature = "std"), no_std)]
 #![allow(non_snake_case)]
 
@@ -99,3 +100,8 @@ fn wrong_index(argument: &str, found: usize, count: usize, things: &str) -> ! {
 fn wrong_length(argument: &str, found: usize, expected: usize) -> ! {
     panic!("{argument}: expected {expected} numbers, found {found}");
 }
+
+/// Code block of the README, run as a doctest.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

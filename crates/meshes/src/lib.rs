@@ -15,6 +15,7 @@
 //! assert!(drawn.is_empty() && meshes.note().unwrap().starts_with("1 of 1 meshes are left out: no `package://"));
 //! assert!(meshes.written().is_empty()); // what goes into a page, by the parts' numbers
 //! ```
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 #[cfg(feature = "page")]
 mod dae;
@@ -115,3 +116,8 @@ impl Format {
         }
     }
 }
+
+/// Code block of the README, run as a doctest.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -45,6 +45,7 @@
 //! inertias of meshes in MJCF. `serde`: serialization of models. `threads`: the threads of rayon. `std`: the standard
 //! library, which all features except `serde` need. Without `std` the crate needs `alloc` and, for floating-point
 //! functions, the feature `libm`. `urdf-rs`: models from `urdf_rs::Robot`.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
 
@@ -105,3 +106,8 @@ pub use passive::{GravityCompensation, Spring};
 #[doc(hidden)]
 pub use position::{PositionFault, ROTATION_ROUNDING, unit_fault};
 pub use warning::{Place, Warning, WarningKind};
+
+/// Code block of the README, run as a doctest.
+#[cfg(all(doctest, feature = "loaders"))]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -69,6 +69,7 @@
 //! assert!((solution.x(40)[0] - std::f64::consts::PI).abs() < 0.05);
 //! # Ok::<(), condyle_optimal::Error>(())
 //! ```
+#![cfg_attr(docsrs, feature(doc_cfg))]
 
 mod constrained;
 mod ddp;
@@ -91,3 +92,8 @@ pub use nalgebra;
 pub use problem::{ActionModel, AutoDiff, GenericAction, Lqr, NumDiff, Problem, Unicycle};
 #[cfg(all(target_arch = "wasm32", target_os = "unknown"))]
 pub use time::set_clock;
+
+/// Code block of the README, run as a doctest.
+#[cfg(all(doctest, feature = "loaders"))]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -22,6 +22,7 @@
 //! the crate needs `alloc` and the feature `libm` for floating-point functions.
 //!
 //! `serde` (on by default): serialization of all types that are stored in files.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]
 
@@ -52,3 +53,8 @@ pub use simd::level;
 #[doc(hidden)]
 pub use simd::{gate, lanes::moves, pack as block};
 pub use storage::{Array, Dense, DenseMatrix, Matrix, MatrixStorage, matrix};
+
+/// Code block of the README, run as a doctest.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+mod readme {}

@@ -5,7 +5,9 @@
 //! are left out. The program over z, with n_B = number of basic unknowns:
 //!
 //! ```text
-//! ½ ‖(R_N − R_B T) z − (b − R_B p)‖² + …     l − G_B p ≤ (G_N − G_B T) z ≤ u − G_B p     h + F_B p + (F_N − F_B T) z ∈ Q
+//! minimise     ½ ‖(R_N − R_B T) z − (b − R_B p)‖² + …
+//! subject to   l − G_B p ≤ (G_N − G_B T) z ≤ u − G_B p
+//!              h + F_B p + (F_N − F_B T) z ∈ Q
 //! ```
 //!
 //! Source: Nocedal and Wright, *Numerical Optimization* (2006), section 15.3 (elimination of variables).

@@ -131,7 +131,8 @@ impl WholeBodyController {
     /// q: nq numbers.
     ///
     /// # Errors
-    /// [`Error::Model`] for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
+    /// [`Error::Model`] for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have
+    /// length 1.
     ///
     /// # Panics
     /// If `q` does not have nq numbers.

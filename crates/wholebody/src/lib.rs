@@ -36,6 +36,7 @@
 //! Sources: Sentis and Khatib (2005), operational tasks under contact; Herzog et al. (2016), inverse dynamics as a
 //! program in (q̈, f); Lobo et al. (1998), friction as a second-order cone; Baumgarte (1972), drift; Caron, Pham and
 //! Nakamura (2015), the wrench of a sole.
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![allow(non_snake_case)]
 
 mod basis;
@@ -79,3 +80,8 @@ pub use plan::{Plan, PlanData};
 pub use references::{ComTarget, ContactTarget, FrameTarget, MomentumTarget, PostureTarget, References};
 pub use settings::{Backend, Form, Friction, JointLimits, Settings};
 pub use task::{Axes, Gains, Task, TaskKind};
+
+/// Code block of the README, run as a doctest.
+#[cfg(all(doctest, feature = "loaders"))]
+#[doc = include_str!("../README.md")]
+mod readme {}

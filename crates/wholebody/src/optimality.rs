@@ -43,7 +43,8 @@ impl WholeBodyController {
     /// # let feet = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"].map(|foot| FrictionContact::point(foot, 0.7));
     /// # let mut q = vec![0.0, 0.0, 0.535, 0.0, 0.0, 0.0, 1.0];
     /// # q.extend([0.0, 0.7, -1.4, 0.0, -0.7, 1.4, 0.0, 0.7, -1.4, 0.0, -0.7, 1.4]);
-    /// let mut controller = WholeBodyController::new(&robot, &feet, &[Task::com(), Task::posture()], Settings::default())?;
+    /// let tasks = [Task::com(), Task::posture()];
+    /// let mut controller = WholeBodyController::new(&robot, &feet, &tasks, Settings::default())?;
     /// let references = controller.hold(&q)?;
     /// controller.step(&q, &[0.0; 18], &references).solved().unwrap();
     /// assert!(controller.optimality(&q, &[0.0; 18], &references).worst() < 1e-6);

@@ -56,8 +56,9 @@ pub enum Form {
 /// Limits of the joints' position and velocity, as bounds on their acceleration.
 ///
 /// ```text
-/// (v_min − v) / T ≤ q̈ ≤ (v_max − v) / T                        velocity
-/// (q_min − q) / T² − 2 v / T ≤ q̈ ≤ (q_max − q) / T² − 2 v / T    position: the distance d obeys d̈ ≥ −(2 / T) ḋ − d / T²
+/// velocity   (v_min − v) / T ≤ q̈ ≤ (v_max − v) / T
+/// position   (q_min − q) / T² − 2 v / T ≤ q̈ ≤ (q_max − q) / T² − 2 v / T
+///            (the distance d obeys d̈ ≥ −(2 / T) ḋ − d / T²)
 /// ```
 ///
 /// A lower bound is at most a_max, and an upper bound is at least −a_max. A joint beyond its limit, or too fast towards

@@ -391,7 +391,9 @@ macro_rules! named_tuples {
     (@name $member:ident) => { stringify!($member) };
     (@name $member:ident as $name:ident) => { stringify!($name) };
     ($($type:ident $(<$life:lifetime>)? { $($member:ident $(as $name:ident)?),* })*) => {$(
-        impl<S: $crate::arrays::Number + $crate::arrays::Give> $crate::arrays::Give for condyle::dynamics::$type<$($life,)? S> {
+        impl<S: $crate::arrays::Number + $crate::arrays::Give> $crate::arrays::Give
+            for condyle::dynamics::$type<$($life,)? S>
+        {
             fn give<'py>(&self, py: Python<'py>, out: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyAny>> {
                 $crate::arrays::give_named!(py, out, stringify!($type), {
                     $($crate::arrays::named_tuples!(@name $member $(as $name)?) => self.$member),*

@@ -52,7 +52,9 @@ impl Model {
     ///
     /// Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
     #[staticmethod]
-    #[pyo3(signature = (path, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None, arguments=None))]
+    #[pyo3(signature = (
+        path, root_joint=None, mimic=false, strict=false, packages=None, *, allow=None, arguments=None
+    ))]
     fn from_urdf(
         path: PathBuf,
         root_joint: Option<&str>,

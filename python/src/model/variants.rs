@@ -190,8 +190,8 @@ impl Model {
     /// >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
     /// 6
     ///
-    /// Raises `ModelError` if they do not have one degree of freedom each, the leader is itself a mimic joint, or another
-    /// joint follows the follower.
+    /// Raises `ModelError` if they do not have one degree of freedom each, the leader is itself a mimic joint, or
+    /// another joint follows the follower.
     #[pyo3(signature = (follower, leader, ratio=1.0, offset=0.0))]
     fn with_mimic(
         &self,

@@ -49,8 +49,8 @@ methods! {
     }
 }
 
-/// A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), τ = M q̈
-/// + h − Jᵀλ; otherwise as `FreeDynamics`.
+/// A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), and
+/// τ = M q̈ + h − Jᵀλ; otherwise as `FreeDynamics`.
 ///
 /// The knot has two kinds of `Limit` to zero by default. One bounds the undriven efforts, Nᵀτ = 0 with Nᵀ S = 0
 /// (`undriven efforts`; for a floating base the first 6). The other bounds each contact's J q̈ + γ = 0 (`contact …`).

@@ -78,7 +78,8 @@ fn set(s: &mut rust::Settings, given: Option<&Bound<'_, PyDict>>) -> PyResult<()
         limit.map(|s| Duration::try_from_secs_f64(s).map_err(|_| wrong(s))).transpose()
     }
     set!(s, given, {
-        method by method, second_order, inverse_dynamics_form, project_warm_start, max_iterations, time_budget by duration, segments, threads,
+        method by method, second_order, inverse_dynamics_form, project_warm_start,
+        max_iterations, time_budget by duration, segments, threads,
         tolerance, tolerance_bounded, step_lengths, accept, accept_ascent, flat,
         regularisation_start, regularisation_min, regularisation_max, regularisation_factor,
         regularisation_decrease_above, regularisation_increase_below
@@ -188,7 +189,8 @@ macro_rules! solver {
                 progress: bool,
             ) -> PyResult<Bound<'py, PyAny>> {
                 let observer = Observer { callback, verbose, progress };
-                run(py, &self.problem, &self.solver, Some([xs, us]), observer, |solver, problem, [xs, us], interruptions| {
+                let start = Some([xs, us]);
+                run(py, &self.problem, &self.solver, start, observer, |solver, problem, [xs, us], interruptions| {
                     solver.solve_with(problem, xs, us, interruptions)
                 })
             }

@@ -22,8 +22,8 @@ use rust::PlanData;
 /// times: N + 1 times in ascending order (s); two may be equal.
 /// states: (q, v) of the knots, (N + 1, nq + nv).
 /// touches: whether each of the controller's contacts touches between a knot and the next one, (N, contacts).
-/// controls: efforts of the actuated coordinates (all coordinates except a free-flyer's) between a knot and the next one, (N,
-///     nu); None for no controls.
+/// controls: efforts of the actuated coordinates (all coordinates except a free-flyer's) between a knot and the next
+///     one, (N, nu); None for no controls.
 /// gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
 /// fade: the time over which a contact is loaded after it begins to touch, and unloaded before it ends (s).
 ///
@@ -117,8 +117,8 @@ impl Plan {
     ///
     /// t: the time (s); q: nq numbers; v: nv.
     ///
-    /// Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose quaternions or pairs
-    /// (cos, sin) do not have length 1.
+    /// Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose
+    /// quaternions or pairs (cos, sin) do not have length 1.
     #[pyo3(signature = (t, q, v, out=None))]
     fn feedback<'py>(
         &self,

@@ -1,4 +1,4 @@
-"""Robots beside Drake: SDF, URDF, and MJCF that MuJoCo does not read."""
+"""Comparison of robots with Drake: SDF, URDF, and MJCF that MuJoCo does not read."""
 
 import atexit
 import logging
@@ -37,7 +37,7 @@ logger = logging.getLogger("drake")
 logger.addHandler(warnings)
 logger.propagate = False
 REPLACED = ("While parsing inertia matrix", "While re-expressing as central inertia")
-"""Warnings after which Drake takes another inertia than that of the file."""
+"""Warnings after which Drake takes another inertia than the file's."""
 TOLERANCE = 1e-10
 CONVERTED = 1e-8
 """Tolerance of SDFs before 1.7, which Drake converts to later ones with rounded numbers."""
@@ -196,7 +196,7 @@ class Names:
 
 
 def matched(found: Quantities, plant: MultibodyPlant) -> list[Joint] | None:
-    """Returns the joints that move, ours beside theirs by names; the floating ones by the body that they carry."""
+    """Returns the joints that move, ours with theirs by names; floating joints by the body that they carry."""
     model, theirs, carriers = found.model, Names(), Names()
     for i in range(plant.num_joints()):
         joint = plant.get_joint(JointIndex(i))

@@ -1,4 +1,4 @@
-"""Robots beside MuJoCo: MJCF, whose coordinates are in the same order, and URDF, whose joints are found by name."""
+"""Comparison of robots with MuJoCo: MJCF, with coordinates in the same order, and URDF, with joints found by name."""
 
 from pathlib import Path
 from xml.etree import ElementTree
@@ -177,7 +177,7 @@ def pose(found: Quantities, what: str, name: str, ours: np.ndarray, p: np.ndarra
 
 
 def frames(found: Quantities, mj: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, bodies: dict[int, int]) -> None:
-    """Compares frames: those of bodies that a joint carries, with or without a name, and bodies and sites by name."""
+    """Compares frames: bodies that a joint carries, with or without a name, and bodies and sites by name."""
     own = {(frame.name, frame.body): i for i, frame in enumerate(found.model.frames) if frame.kind == "link"}
     for i, body in bodies.items():
         name = found.model.body_names[i]

@@ -1,4 +1,4 @@
-"""Robots beside Pinocchio: URDF, whose joints have the same names, order and coordinates."""
+"""Comparison of robots with Pinocchio: URDF, whose joints have the same names, order and coordinates."""
 
 import os
 import tempfile
@@ -101,7 +101,7 @@ def kind_of(kind: pin.FrameType) -> str:
 
 
 def limits(found: Quantities, theirs: pin.Model) -> None:
-    """Compares limits; those of quaternions, cosines and sines are no limits."""
+    """Compares limits, except the limits of quaternions, cosines and sines."""
     if any("is above upper limit" in str(warning) for warning in found.model.warnings):
         found.leave_out("a lower limit above the upper one is none here, as a warning says", "limits: position")
     ours = found.model.limits

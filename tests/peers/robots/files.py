@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 SUFFIXES = {".xml", ".urdf", ".sdf", ".world", ".mjcf"}
 ROOTS = {"robot": "urdf", "sdf": "sdf", "gazebo": "sdf", "mujoco": "mjcf", "mujocoinclude": "mjcf"}
-"""Format of each root element; `gazebo` is that of SDF 1.0 to 1.2."""
+"""Format of each root element; `gazebo` is the root of SDF 1.0 to 1.2."""
 XACRO = re.compile(r"<xacro:|\$\((?:find|arg|optenv|env|dirname|eval) |\$\{")
 COMMENTS = re.compile(r"<!--.*?-->", re.DOTALL)
 ROOT = re.compile(r"<(?![?!])\s*([\w:.-]+)")

@@ -1,4 +1,4 @@
-"""Verdict on one file: Condyle beside every peer that reads it."""
+"""Verdict on one file: Condyle compared with every peer that reads it."""
 
 import re
 from collections.abc import Callable

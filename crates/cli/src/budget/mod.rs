@@ -35,7 +35,8 @@ pub(crate) struct Arguments {
     #[command(flatten)]
     robot: RobotArguments,
     /// Horizon lengths to measure, in knots
-    #[arg(long, value_delimiter = ',', value_name = "N,…", default_value = "20,60,100,200", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_delimiter = ',', value_name = "N,…", default_value = "20,60,100,200")]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..=100_000))]
     knots: Vec<u32>,
     /// Control rate (Hz); the iterations should fit into its period
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]

@@ -159,7 +159,8 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         if floats && mass > 0.0 {
             let R = forward_kinematics(model, &mut data, q).body(1).rotation;
             let mut fall = zero.clone();
-            fall[..3].copy_from_slice(&R.transpose_mul(g0).to_array()); // the acceleration of free fall, in the base's axes
+            // the acceleration of free fall, in the base's axes
+            fall[..3].copy_from_slice(&R.transpose_mul(g0).to_array());
             falling.compare(
                 rnea(model, &mut data, q, &zero, &fall, &[]),
                 &zero,

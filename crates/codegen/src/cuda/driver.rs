@@ -42,7 +42,9 @@ library_functions! { DriverTable:
     cuModuleGetFunction(*mut Handle, Handle, *const c_char);
     cuFuncGetAttribute(*mut c_int, c_int, Handle);
     cuOccupancyMaxPotentialBlockSize(*mut c_int, *mut c_int, Handle, *const c_void, usize, c_int);
-    cuLaunchKernel(Handle, c_uint, c_uint, c_uint, c_uint, c_uint, c_uint, c_uint, Handle, *const *mut c_void, *const *mut c_void);
+    cuLaunchKernel(
+        Handle, c_uint, c_uint, c_uint, c_uint, c_uint, c_uint, c_uint, Handle, *const *mut c_void, *const *mut c_void
+    );
 }
 
 /// Calls a function of the driver; returns `Ok(())`, or its name with CUDA's message. The caller guarantees that the

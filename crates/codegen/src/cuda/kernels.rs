@@ -215,8 +215,8 @@ impl<T: Real> Kernel<T> {
     /// writes all numbers of all outputs.
     ///
     /// # Errors
-    /// [`Error::Arrays`], [`Error::Length`], [`Error::States`] and [`Error::OtherDevice`] for wrong arguments; [`Error::Call`] if
-    /// the kernel cannot be launched.
+    /// [`Error::Arrays`], [`Error::Length`], [`Error::States`] and [`Error::OtherDevice`] for wrong arguments;
+    /// [`Error::Call`] if the kernel cannot be launched.
     pub fn call(
         &self,
         stream: &Stream,

@@ -54,7 +54,10 @@ macro_rules! library_functions {
         }
 
         impl $table {
-            pub(super) fn load(named: &$crate::cuda::library::Named, file: Option<&std::path::Path>) -> Result<Self, $crate::cuda::Error> {
+            pub(super) fn load(
+                named: &$crate::cuda::library::Named,
+                file: Option<&std::path::Path>,
+            ) -> Result<Self, $crate::cuda::Error> {
                 let library = named.load(file)?;
                 let table = Self {
                     $($function: {

@@ -5,7 +5,8 @@
 //! use condyle_codegen::{Settings, functions};
 //! let arm = condyle_dynamics::robots::arm7();
 //! let device = Device::new(0)?;
-//! let kernels = device.compile::<f64>(&Compiler::new()?, "arm7", &functions(&arm, &["aba"], &Settings::default()).unwrap())?;
+//! let aba = functions(&arm, &["aba"], &Settings::default()).unwrap();
+//! let kernels = device.compile::<f64>(&Compiler::new()?, "arm7", &aba)?;
 //!
 //! let n = 100_000;                                      // states: number k of state i stands at [k * n + i]
 //! let stream = device.stream()?;

@@ -112,7 +112,8 @@ pub fn aba_derivatives<S: Scalar, R: Constant<S>>(
     let d = rnea_derivatives(model, data, q, v, &a, f_ext);
     let floating = floating::<S, R>(model);
     let known = |numbers: usize| floating.iter().flat_map(|&(_, first)| first..first + numbers).collect::<Vec<_>>();
-    let [mut da_dq, mut da_dv] = inverse.minus_products(model, [(d.dtau_dq, known(6)), (d.dtau_dv, known(3))]); // ∂q̈ = −M⁻¹ ∂τ
+    // ∂q̈ = −M⁻¹ ∂τ
+    let [mut da_dq, mut da_dv] = inverse.minus_products(model, [(d.dtau_dq, known(6)), (d.dtau_dv, known(3))]);
     for (body, first) in floating {
         let turned = forward_kinematics(model, data, q).body(body).rotation.transpose_mul(model.gravity().lift());
         let omega = Vec3::new(v[first + 3], v[first + 4], v[first + 5]);

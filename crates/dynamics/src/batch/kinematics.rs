@@ -226,7 +226,7 @@ batched! {
     }
 
     /// Computes
-    /// [`Accelerations::frame_classical_acceleration_derivatives`](crate::Accelerations::frame_classical_acceleration_derivatives)
+    /// [`frame_classical_acceleration_derivatives`](crate::Accelerations::frame_classical_acceleration_derivatives)
     /// for each state, 6 × nv.
     ///
     /// q: nq numbers per state; v, a: nv.
@@ -236,7 +236,8 @@ batched! {
     fn frame_classical_acceleration_derivatives(model, data; q, v, a; frame: usize, reference: ReferenceFrame)
     with six -> BatchAccelerationDerivatives<'_, T> {
         let [da_dq, da_dv] = six;
-        forward_accelerations(model, data, q, v, a).frame_classical_acceleration_derivatives(frame, reference, da_dq, da_dv);
+        let placed = forward_accelerations(model, data, q, v, a);
+        placed.frame_classical_acceleration_derivatives(frame, reference, da_dq, da_dv);
         AccelerationDerivatives { da_dq, da_dv }
     }
 }

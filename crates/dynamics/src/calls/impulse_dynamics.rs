@@ -129,7 +129,8 @@ pub struct ImpulseDerivatives<'d, S> {
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, impulse_dynamics_derivatives, robots};
 /// let arm = robots::arm7();
-/// let (mut hit, mut data) = (ConstraintSet::new(&arm, &[ContactConstraint::point(arm.frame("tool")?)])?, Data::new(&arm));
+/// let mut hit = ConstraintSet::new(&arm, &[ContactConstraint::point(arm.frame("tool")?)])?;
+/// let mut data = Data::new(&arm);
 /// let d = impulse_dynamics_derivatives(&arm, &mut data, &mut hit, &[0.3; 7], &[0.1; 7], 0.0);
 /// let again = d.dv_dv * d.dv_dv; // an impact that sticks is a projection
 /// assert!((again - d.dv_dv).amax() < 1e-9);

@@ -46,7 +46,9 @@ pub struct RneaHessian<'d, S, R = f64> {
 /// // φ is quadratic in v: λᵀ (τ(v) + τ(−v) − 2 τ(0)) = vᵀ ∂²φ/∂v² v
 /// let v = nalgebra::DVector::from_row_slice(&v);
 /// let quadratic = v.dot(&(hessian.dvdv * &v));
-/// let mut effort = |s: f64| condyle_dynamics::rnea(&arm, &mut data, &q, (&v * s).as_slice(), &a, &[]).iter().sum::<f64>();
+/// let mut effort = |s: f64| -> f64 {
+///     condyle_dynamics::rnea(&arm, &mut data, &q, (&v * s).as_slice(), &a, &[]).iter().sum()
+/// };
 /// assert!((effort(1.0) + effort(-1.0) - 2.0 * effort(0.0) - quadratic).abs() < 1e-12);
 /// ```
 ///

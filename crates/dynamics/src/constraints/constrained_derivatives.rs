@@ -129,7 +129,8 @@ kernel! {
         for island in islands {
             let columns = &island.coordinates;
             island.clear_beside(da.as_mut_slice(), n, S::zero());
-            minus_block_product(P.as_slice(), r.as_slice(), da.as_mut_slice(), nonzero_rows, columns.clone()); // −P r − J̄ c
+            // −P r − J̄ c
+            minus_block_product(P.as_slice(), r.as_slice(), da.as_mut_slice(), nonzero_rows, columns.clone());
             if island.rows.is_empty() {
                 continue;
             }

@@ -8,8 +8,8 @@
 //! [ J   0  ] [ −λ ] = [ −γ    ],        q̈ = M⁻¹ (τ − h + Jᵀ λ)
 //! ```
 //!
-//! Source: Udwadia and Kalaba, *A new perspective on constrained motion* (1992); Carpentier, Budhiraja, Mansard, *Proximal
-//! and sparse resolution of constrained dynamic equations* (2021).
+//! Source: Udwadia and Kalaba, *A new perspective on constrained motion* (1992); Carpentier, Budhiraja, Mansard,
+//! *Proximal and sparse resolution of constrained dynamic equations* (2021).
 
 use crate::constraints::constraint::ConstraintKind;
 use crate::constraints::constraint_motion::FramePair;

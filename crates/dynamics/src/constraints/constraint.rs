@@ -171,9 +171,9 @@ impl ContactConstraint {
     /// of the initial state, decays with the gains kp and kd.
     ///
     /// ```
-    /// use condyle_dynamics::{ConstraintSet, ContactConstraint, Data, Inertia, Joint, ModelBuilder, Proximal, Se3, Sym3};
-    /// use condyle_dynamics::{Vec3, WORLD, constrained_dynamics, forward_kinematics, integrate};
-    /// // a four-bar linkage: two cranks on the world, and a coupler on the first one that a pin holds to the second one
+    /// use condyle_dynamics::{ConstraintSet, ContactConstraint, Data, Inertia, Joint, ModelBuilder, Proximal, Se3};
+    /// use condyle_dynamics::{Sym3, Vec3, WORLD, constrained_dynamics, forward_kinematics, integrate};
+    /// // a four-bar linkage: two cranks on the world, and a coupler on the first one, which a pin holds to the second
     /// let at = |x, z| Se3 { translation: Vec3::new(x, 0.0, z), ..Se3::identity() };
     /// let hinge = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
     /// let bar = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, 0.5), Sym3::diagonal(0.1));

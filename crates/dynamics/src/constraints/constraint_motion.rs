@@ -4,8 +4,8 @@
 //! following acceleration must vanish:
 //!
 //! ```text
-//! rigid   ₀X₁⁻¹ (a₁ − a₂ + Δv × v₂ + kd Δv) + kp log(₂X₁) − (a* + kd v*)       (without Δv × v₂ along the world's axes)
-//! point   R₁ᵀ (α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂)) − (a* + kd v*)            u, α: velocity, acceleration of points
+//! rigid   ₀X₁⁻¹ (a₁ − a₂ + Δv × v₂ + kd Δv) + kp log(₂X₁) − (a* + kd v*)     (no Δv × v₂ along the world's axes)
+//! point   R₁ᵀ (α₁ − α₂ + kd (u₁ − u₂) + kp (p₁ − p₂)) − (a* + kd v*)          u, α: velocity, acceleration of points
 //! ```
 //!
 //! For a line or a plane it is the part of a point's acceleration along some axes, e₃ᵀ (…) or [e₁ e₃]ᵀ (…).

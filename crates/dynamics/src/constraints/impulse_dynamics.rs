@@ -43,7 +43,13 @@ workspace! {
 
 kernel! {
     /// Computes J and γ = (1 + ε) J v, for bodies whose placements are known.
-    pub(crate) fn approach<S>(world: &World<S>, set: &mut ConstraintSet<S>, d: &mut Workspace<S>, v: &[S], restitution: S) {
+    pub(crate) fn approach<S>(
+        world: &World<S>,
+        set: &mut ConstraintSet<S>,
+        d: &mut Workspace<S>,
+        v: &[S],
+        restitution: S,
+    ) {
         for (i, plan) in set.plans.iter().enumerate() {
             FramePair::at_rest(plan, &set.targets[i], world).jacobian(plan, &world.S, &mut set.J);
         }

@@ -135,7 +135,11 @@ kernel! {
 
 kernel! {
     /// Computes c_q and c_v, for bodies whose motion is known.
-    pub(crate) fn differentiate_motion<S>(set: &mut ConstraintSet<S>, world: &World<S>, bodies: &rnea_derivatives::Bodies<S>) {
+    pub(crate) fn differentiate_motion<S>(
+        set: &mut ConstraintSet<S>,
+        world: &World<S>,
+        bodies: &rnea_derivatives::Bodies<S>,
+    ) {
         let rnea_derivatives::Bodies { v, a, Psid, Psidd, PsidSd, .. } = bodies;
         let columns = Columns { S: &world.S, Psid, Psidd, PsidSd };
         let ConstraintSet { plans, islands, targets, error, dgamma_dq, dgamma_dv, .. } = set;

@@ -11,7 +11,8 @@
 //! Shifted to the centre of mass, f becomes [f; n − c × f], and its derivative gains −∂c × f. The linear rows divided
 //! by the mass are the derivatives of ċ and c̈.
 //!
-//! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the root.
+//! Source: Carpentier and Mansard, *Analytical derivatives of rigid body dynamics algorithms* (2018), applied to the
+//! root.
 
 use crate::passes::centroidal::{about, add};
 use crate::passes::coriolis::Coriolis;

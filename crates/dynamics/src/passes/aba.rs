@@ -159,7 +159,14 @@ pub(crate) fn outward<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::S>
 
 kernel! {
     /// Runs the algorithm body by body, for bodies whose placements are known.
-    pub(crate) fn run<S, R>(model: &Model<R>, world: &World<S>, d: &mut Workspace<S>, v: &[S], tau: &[S], f_ext: &[Force<S>]) {
+    pub(crate) fn run<S, R>(
+        model: &Model<R>,
+        world: &World<S>,
+        d: &mut Workspace<S>,
+        v: &[S],
+        tau: &[S],
+        f_ext: &[Force<S>],
+    ) {
         pass(&Single::new(model), world, d, v, tau, f_ext);
     }
 }

@@ -138,7 +138,8 @@ answers! {
     /// classical acceleration.
     ///
     /// ```
-    /// use condyle_dynamics::{Data, ReferenceFrame::LocalWorldAligned, compute_all_terms, forward_accelerations, robots};
+    /// use condyle_dynamics::ReferenceFrame::LocalWorldAligned;
+    /// use condyle_dynamics::{Data, compute_all_terms, forward_accelerations, robots};
     /// let arm = robots::arm7();
     /// let (tool, mut data, q, v) = (arm.frame("tool")?, Data::new(&arm), [0.3; 7], [0.5; 7]);
     /// let drift = compute_all_terms(&arm, &mut data, &q, &v).frame_drift(tool);

@@ -4,8 +4,8 @@
 //! joint k carries. So column k of the map is Iᶜ S, and its rate is İᶜ S + Iᶜ Ṡ. Finally everything is shifted to the
 //! centre of mass.
 //!
-//! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved computation
-//! of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
+//! Source: Orin, Goswami, Lee, *Centroidal dynamics of a humanoid robot* (2013); Wensing and Orin, *Improved
+//! computation of the humanoid centroidal dynamics* (2016). The axes are the world's; linear rows come first.
 
 use crate::passes::answers::answers;
 use crate::passes::coriolis::Coriolis;

@@ -102,7 +102,8 @@ fn derivatives<L: Layout>(l: &L, World { oX, S, .. }: &World<L::S>, m: &Moving<L
             let S = S[l.column(i) + k];
             l.add_joint_effort(dT_dq, i, k, v_parent.cross(S).dot(h[i])); // ∂T/∂q = Ψ̇ᵀ hᶜ, Ψ̇ = v_λ × S
             l.add_joint_effort(dT_dv, i, k, S.dot(h[i])); // ∂T/∂v = Sᵀ hᶜ
-            let dmoment = S.linear.scale_add(IC[i].mass, S.angular.cross(IC[i].mass_com)); // ∂(m c)/∂q = m S_v + S_ω × m c
+            // ∂(m c)/∂q = m S_v + S_ω × m c
+            let dmoment = S.linear.scale_add(IC[i].mass, S.angular.cross(IC[i].mass_com));
             l.add_joint_effort(dV_dq, i, k, l.minus_gravity().dot(dmoment)); // ∂V/∂q = −gᵀ ∂(m c)/∂q
         }
         let (IC_i, h_i) = (IC[i], h[i]);

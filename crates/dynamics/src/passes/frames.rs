@@ -226,7 +226,9 @@ answers! {
     ///
     /// # Panics
     /// If there is no such body.
-    fn body_classical_acceleration(of: Accelerations, body: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
+    fn body_classical_acceleration(
+        of: Accelerations, body: usize, reference: ReferenceFrame
+    ) -> Motion = Motion::zero(); {
         classical(of.body_acceleration(body, reference), of.body_velocity(body, reference))
     }
 
@@ -236,7 +238,9 @@ answers! {
     ///
     /// # Panics
     /// If there is no such frame.
-    fn frame_classical_acceleration(of: Accelerations, frame: usize, reference: ReferenceFrame) -> Motion = Motion::zero(); {
+    fn frame_classical_acceleration(
+        of: Accelerations, frame: usize, reference: ReferenceFrame
+    ) -> Motion = Motion::zero(); {
         classical(of.frame_acceleration(frame, reference), of.frame_velocity(frame, reference))
     }
 }

@@ -101,7 +101,8 @@ fn accelerate<L: Layout>(l: &L, World { S, .. }: &World<L::S>, m: &mut Moving<L:
         let mut a_i = l.parent(a, i);
         for k in 0..l.joint(i).nv() {
             let c = l.column(i) + k;
-            a_i = S[c].scale_add(l.joint_velocity(qdd, i, k), dS[c].scale_add(l.joint_velocity(qd, i, k), a_i)); // a_i = a_λ + S q̈ + Ṡ q̇
+            // a_i = a_λ + S q̈ + Ṡ q̇
+            a_i = S[c].scale_add(l.joint_velocity(qdd, i, k), dS[c].scale_add(l.joint_velocity(qd, i, k), a_i));
         }
         a[i] = a_i;
     }

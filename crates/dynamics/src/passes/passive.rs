@@ -212,7 +212,14 @@ kernel! {
 
 kernel! {
     /// Computes all slopes as matrices stored by columns.
-    pub(crate) fn slopes<S, R>(model: &Model<R>, q: &[S], v: &[S], smoothing: f64, dtau_dq: &mut [S], dtau_dv: &mut [S]) {
+    pub(crate) fn slopes<S, R>(
+        model: &Model<R>,
+        q: &[S],
+        v: &[S],
+        smoothing: f64,
+        dtau_dq: &mut [S],
+        dtau_dv: &mut [S],
+    ) {
         let nv = model.nv();
         dtau_dq.fill(S::zero());
         dtau_dv.fill(S::zero());

@@ -85,7 +85,8 @@ kernel! {
                 let S_b = oXb.act_inv(world.S[c]).scale(S::splat(column.ratio));
                 let y = effort(S_b, v_b, a_b);
                 for k in 0..PARAMETERS {
-                    Y[column.coordinate + model.nv() * (PARAMETERS * (i - 1) + k)] += y[k]; // τ_S = (y(S, a) − y(v × S, v)) · π_i
+                    // τ_S = (y(S, a) − y(v × S, v)) · π_i
+                    Y[column.coordinate + model.nv() * (PARAMETERS * (i - 1) + k)] += y[k];
                 }
             }
         }

@@ -12,11 +12,11 @@
 //! λ_n ← max(0, λ_n − u_n/g_n)        λ_t ← P(λ_t − u_t/g_t),  P the projection on the disc of radius μ λ_n
 //! ```
 //!
-//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the distance from the fixed point times g, a velocity. Two
-//! methods take turns:
+//! for any g_n, g_t > 0 (Alart and Curnier 1991). The residual is the distance from the fixed point times g, a
+//! velocity. Two methods take turns:
 //!
-//! - Newton's method on the fixed point. It squares the error once it knows which points stick, slide and are open. A few
-//!   steps are discarded if they do not reduce the residual.
+//! - Newton's method on the fixed point. It squares the error once it knows which points stick, slide and are open. A
+//!   few steps are discarded if they do not reduce the residual.
 //! - Gauss–Seidel sweeps over the points (Jourdan, Alart and Jean 1998). They find these sets from any first guess.
 //!
 //! Where contacts are redundant, G is singular and the impulses are not unique. Newton's method then adds ε to the
@@ -35,8 +35,8 @@ const PROXIMAL: [f64; 2] = [1e-8, 1.0];
 const LEAST: f64 = 1e-12;
 /// Factor by which ε grows after discarded steps, and shrinks after accepted ones.
 const DAMPING: f64 = 30.0;
-/// Number of steps of Newton's method within which the residual must shrink; chosen because the sets of points settle in two or
-/// three steps, during which the residual may grow (random contacts: 4 fails four times less often than 1).
+/// Number of steps of Newton's method within which the residual must shrink; chosen because the sets of points settle
+/// in two or three steps, during which the residual may grow (random contacts: 4 fails four times less often than 1).
 const BURST: usize = 4;
 /// Maximum share of the residual that may remain after accepted steps.
 const PROGRESS: f64 = 0.7;
@@ -44,8 +44,8 @@ const PROGRESS: f64 = 0.7;
 const SWEEPS: usize = 12;
 /// Number of projections per sweep for a point that slides.
 const ALONE: usize = 4;
-/// Share of the tolerance below which the first guess is kept. A worse guess is improved even if it meets the tolerance:
-/// otherwise the error of one step makes the forces of the next one ripple.
+/// Share of the tolerance below which the first guess is kept. A worse guess is improved even if it meets the
+/// tolerance: otherwise the error of one step makes the forces of the next one ripple.
 const POLISHED: f64 = 1e-4;
 
 /// Outcome of a solve.

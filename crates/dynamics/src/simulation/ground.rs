@@ -87,8 +87,8 @@ pub struct Ground {
     /// Maximum error in the laws of contact (m/s): a point at rest moves no faster. Most steps end far below it, since
     /// the last step of Newton's method squares the error.
     pub tolerance: f64,
-    /// Maximum number of iterations of the contact solver in a step; each is a step of Newton's method or a few sweeps of
-    /// Gauss–Seidel.
+    /// Maximum number of iterations of the contact solver in a step; each is a step of Newton's method or a few sweeps
+    /// of Gauss–Seidel.
     pub max_iterations: usize,
 }
 

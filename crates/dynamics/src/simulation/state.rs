@@ -16,7 +16,8 @@ pub struct State<S = f64> {
     pub q: Vec<S>,
     /// Velocity, nv numbers.
     pub v: Vec<S>,
-    /// Impulses of the ground in the last step, 3 numbers for each of its points (N s): the contact solver's first guess.
+    /// Impulses of the ground in the last step, 3 numbers for each of its points (N s): the contact solver's first
+    /// guess.
     pub impulses: Vec<f64>,
 }
 

@@ -13,7 +13,8 @@
 //! its slope is
 //!
 //! ```text
-//! M + h/2 ∂p/∂q J(y/2) − h ∂(J(−y)ᵀ p)/∂y − h²/4 ∂(J(−x)ᵀ f)/∂x − h/2 J(−y/2)ᵀ (h/2 ∂²L/∂q∂q J(y/2) + (∂p/∂q)ᵀ + ∂τ/∂v)
+//! M + h/2 ∂p/∂q J(y/2) − h ∂(J(−y)ᵀ p)/∂y − h²/4 ∂(J(−x)ᵀ f)/∂x
+//!   − h/2 J(−y/2)ᵀ (h/2 ∂²L/∂q∂q J(y/2) + (∂p/∂q)ᵀ + ∂τ/∂v)
 //! ```
 //!
 //! Passive efforts also depend on q, and add ∂τ/∂q to ∂²L/∂q∂q.

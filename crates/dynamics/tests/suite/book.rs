@@ -1,5 +1,5 @@
-//! Inverse dynamics, the inertia matrix and forward dynamics in the form of the book, beside the formulation that the
-//! library uses.
+//! Inverse dynamics, the inertia matrix and forward dynamics in the form of the book, compared with the formulation in
+//! the library.
 
 use crate::common;
 
@@ -90,7 +90,8 @@ impl<'a> Book<'a> {
         let mut f = vec![Force::zero()];
         for i in 1..self.X.len() {
             let own = motion((&self.S[i] * &qdd).as_slice());
-            acc.push(self.X[i].act_inv(acc[self.parent(i)]) + own + vel[i].cross(vJ[i])); // a_i = iXλ a_λ + S q̈ + v_i × v_J
+            // a_i = iXλ a_λ + S q̈ + v_i × v_J
+            acc.push(self.X[i].act_inv(acc[self.parent(i)]) + own + vel[i].cross(vJ[i]));
             let I = model.bodies()[i].inertia;
             f.push(I * acc[i] + vel[i].cross(I * vel[i])); // f_i = I a_i + v_i ×* I v_i − f_x
             if let Some(external) = f_ext.get(i) {

@@ -1,4 +1,4 @@
-//! How the work of the recursions grows: operations counted, not timed.
+//! Growth of the work of the recursions: operations counted, not timed.
 
 use crate::common;
 use crate::counted::{Counted, Operations, counted};
@@ -84,8 +84,8 @@ fn work_of_rnea_and_aba_is_linear() {
     }
 }
 
-/// CRBA takes a + b n + c Σ depth operations, with the same a, b and c for all shapes: n² on a chain, n log n on a balanced
-/// tree, n on a star.
+/// CRBA takes a + b n + c Σ depth operations, with the same a, b and c for all shapes: n² on a chain, n log n on a
+/// balanced tree, n on a star.
 #[test]
 fn work_of_crba_is_the_sum_of_depths() {
     let seen: Vec<(f64, f64, f64)> = SHAPES

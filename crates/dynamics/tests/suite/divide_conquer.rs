@@ -258,7 +258,7 @@ fn levels() {
     }
 }
 
-/// What was computed, not what was planned: each doubling of a chain adds the same number of steps, where the
+/// The steps computed, not the steps planned: each doubling of a chain adds the same number of steps, where the
 /// articulated-body algorithm doubles them, for a fixed multiple of its work.
 #[test]
 fn steps_grow_with_the_logarithm() {

@@ -60,8 +60,9 @@ fn operations(model: &Model, method: ForwardDynamicsMethod) -> f64 {
     counted(|| forward_dynamics(model, &mut data, &q, &v, &tau, &[], Some(method))).0.flops() as f64
 }
 
-/// The method that is chosen takes few operations: at most a quarter more than the method that takes the fewest, on robots,
-/// random trees, and chains, binary trees and stars of 1 to 60 joints. Times are measured by `benches/factorisation.rs`.
+/// The method that is chosen takes few operations: at most a quarter more than the method that takes the fewest, on
+/// robots, random trees, and chains, binary trees and stars of 1 to 60 joints. Times are measured by
+/// `benches/factorisation.rs`.
 #[test]
 fn the_choice_takes_few_operations() {
     let shapes: [fn(usize) -> usize; 3] = [|i| i - 1, |i| i / 2, |i| usize::from(i > 1)];

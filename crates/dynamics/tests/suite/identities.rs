@@ -83,10 +83,10 @@ fn random_trees_with_mimics() {
     }
 }
 
-/// h = rnea(q, v, 0), g = rnea(q, 0, 0) and M = Mᵀ, to the bit. They hold by construction, as the first two are the same
-/// passes and the triangle below the diagonal is copied: this keeps them so, and checks no physics. h, g and M themselves are
-/// checked by `book` (another formulation), `energy` (g and M as derivatives of energies), `closed_forms`, and in the peers'
-/// tests against Pinocchio.
+/// h = rnea(q, v, 0), g = rnea(q, 0, 0) and M = Mᵀ, to the bit. They hold by construction, as the first two are the
+/// same passes and the triangle below the diagonal is copied: this keeps them so, and checks no physics. h, g and M
+/// themselves are checked by `book` (another formulation), `energy` (g and M as derivatives of energies),
+/// `closed_forms`, and in the peers' tests against Pinocchio.
 #[test]
 fn by_construction() {
     for (seed, model) in all_models(TREES).iter().enumerate() {

@@ -303,7 +303,8 @@ fn every_function_without_coordinates() {
                 (row.one)(model, &mut data, &mut set, input, &mut expected);
             }
             (row.many)(model, &mut batch, &mut constraints, &States::of(&inputs), &mut found);
-            let bits = |of: &Found<f64>| of.results.iter().flatten().map(|x| x.to_bits() << 1).collect::<Vec<_>>(); // ignores the sign of NaN
+            // ignores the sign of NaN
+            let bits = |of: &Found<f64>| of.results.iter().flatten().map(|x| x.to_bits() << 1).collect::<Vec<_>>();
             assert_eq!(bits(&found), bits(&expected), "{}, {level}", row.name);
         }
     });

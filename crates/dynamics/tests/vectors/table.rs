@@ -200,7 +200,10 @@ macro_rules! questions {
     (@one $T:ident, $m:ident, $motion:ident, $name:ident, $of:ident, $reference:ident, $to:ident) => {
         $motion.$name($of($m), $reference).put($to)
     };
-    (@one $T:ident, $m:ident, $motion:ident, $name:ident, $of:ident, $reference:ident, $to:ident, [$($member:ident),+]) => {
+    (
+        @one $T:ident, $m:ident, $motion:ident, $name:ident, $of:ident, $reference:ident, $to:ident,
+        [$($member:ident),+]
+    ) => {
         $(let mut $member = DMatrix::from_element(6, $m.nv(), $T::zero());)+
         $motion.$name($of($m), $reference, $(&mut $member),+);
         $((&$member).put($to);)+

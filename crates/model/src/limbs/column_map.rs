@@ -145,7 +145,8 @@ impl ColumnMap {
         let sizes = Sizes::new(tree);
         let (support, pairs, copies, predecessors) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut map = Self { support, pairs, copies, predecessors, blocks: blocks(tree), sizes };
-        let first = schedule.bodies.get(1).map_or(0, |bodies| bodies[0]); // its last column is set last, in the first lane
+        // its last column is set last, in the first lane
+        let first = schedule.bodies.get(1).map_or(0, |bodies| bodies[0]);
         let last = tree.nodes[first].idx_v + tree.nodes[first].joint.nv().saturating_sub(1);
         let unused = (last * (tree.nv + 1)) as u32;
         let mut drafts: Vec<Vec<Draft>> = vec![Vec::new()];

@@ -45,7 +45,8 @@ fn loops_and_couplings() {
     let [first, second] = placed(2, ["a", "world"]);
     close(&place(first), &[0.1, 0.2, 0.3]);
     close(&place(second), &[0.3, 0.2, 0.1]);
-    assert!(matches!(found.constraints()[2].kind, ModelConstraintKind::Point { .. })); // torquescale 0 leaves rotation free
+    // torquescale 0 leaves rotation free
+    assert!(matches!(found.constraints()[2].kind, ModelConstraintKind::Point { .. }));
     for X in placed(4, ["u", "v"]) {
         close(&place(X), &[0.0; 3]);
     }

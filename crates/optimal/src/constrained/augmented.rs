@@ -148,7 +148,8 @@ impl AugmentedLagrangian {
         }
     }
 
-    /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, and multipliers of zero.
+    /// Solves `problem` from the warm start `xs` ((N + 1)·nx, gaps allowed) and `us`, both flat, and multipliers of
+    /// zero.
     ///
     /// The status is [`Status::Converged`] when the residuals of [`outcome`](Self::outcome) are below the tolerances.
     /// It is [`Status::ConstraintsViolated`] if the penalty reached its limit and the inner solve found a minimum, but

@@ -97,7 +97,9 @@ macro_rules! impl_components {
     };
 }
 impl_components!(Vec3, 3: 0 => x, 1 => y, 2 => z);
-impl_components!(Motion, 6: 0 => linear.x, 1 => linear.y, 2 => linear.z, 3 => angular.x, 4 => angular.y, 5 => angular.z);
+impl_components!(
+    Motion, 6: 0 => linear.x, 1 => linear.y, 2 => linear.z, 3 => angular.x, 4 => angular.y, 5 => angular.z
+);
 impl_components!(Force, 6: 0 => linear.x, 1 => linear.y, 2 => linear.z, 3 => angular.x, 4 => angular.y, 5 => angular.z);
 
 /// Panics because of an index that is too large.

@@ -39,7 +39,8 @@ macro_rules! impl_dual {
             fn atan2(self, x: Self) -> Self {
                 // Uses the smaller coordinate divided by the larger. num-dual's own `atan2` divides by x even if x is
                 // 0.
-                let mut angle = if Scalar::abs(x.re).lt(Scalar::abs(self.re)) { -(x / self).atan() } else { (self / x).atan() };
+                let steep = Scalar::abs(x.re).lt(Scalar::abs(self.re));
+                let mut angle = if steep { -(x / self).atan() } else { (self / x).atan() };
                 angle.re = Scalar::atan2(self.re, x.re);
                 angle
             }

@@ -28,7 +28,8 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 ///     x.mul_add(x, y * y).sqrt()
 /// }
 /// assert_eq!(hypot(3.0, 4.0), 5.0);
-/// assert!((hypot(num_dual::Dual64::new(3.0, 1.0), 4.0.into()).eps - 0.6).abs() < 1e-15); // ∂√(x² + y²)/∂x = x/√(x² + y²)
+/// let slope = hypot(num_dual::Dual64::new(3.0, 1.0), 4.0.into()).eps;
+/// assert!((slope - 0.6).abs() < 1e-15); // ∂√(x² + y²)/∂x = x/√(x² + y²)
 /// ```
 pub trait Scalar:
     Copy

@@ -65,7 +65,9 @@ macro_rules! if_vectors {
 #[macro_export]
 #[doc(hidden)]
 macro_rules! kernel {
-    ($(#[$doc:meta])* $vis:vis fn $name:ident<$S:ident $(, $R:ident)?>($($arg:ident: $type:ty),* $(,)?) $body:block) => {
+    (
+        $(#[$doc:meta])* $vis:vis fn $name:ident<$S:ident $(, $R:ident)?>($($arg:ident: $type:ty),* $(,)?) $body:block
+    ) => {
         $(#[$doc])*
         #[inline]
         #[allow(unsafe_code, clippy::too_many_arguments)]
@@ -106,7 +108,10 @@ macro_rules! kernel {
     };
     // the function compiled for one scalar, called if `$S` is this scalar; with `numbers if`, also for `f64` if the
     // condition holds
-    (@call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*) $(, numbers if $fused:expr)?) => {
+    (
+        @call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*)
+        $(, numbers if $fused:expr)?
+    ) => {
         let chosen = $chosen;
         {
             type $S = $scalar;

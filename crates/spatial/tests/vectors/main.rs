@@ -40,7 +40,8 @@ macro_rules! number {
             fn some() -> Vec<Self> {
                 let special = [0.0, 1.0, $float::MIN_POSITIVE / 8.0, $float::MAX, $float::INFINITY, $float::NAN];
                 let special = special.into_iter().flat_map(|x| [x, -x]);
-                special.chain((0..52).map(|k| (3.7 * k as $float).sin() * (9.0 * (1.3 * k as $float).cos()).exp2())).collect()
+                let others = (0..52).map(|k| (3.7 * k as $float).sin() * (9.0 * (1.3 * k as $float).cos()).exp2());
+                special.chain(others).collect()
             }
         }
     )*};

@@ -28,7 +28,7 @@ pub(super) struct Assets<'a> {
 }
 
 impl<'a> Assets<'a> {
-    /// Finds the assets of a file. One without a name has that of its file, without folder and extension.
+    /// Finds the assets of a file. An asset without a name has its file's name, without folder and extension.
     pub(super) fn read(root: &'a Element) -> Self {
         let of = |tag: &'static str| {
             let all = root.all("asset").flat_map(move |section| section.all(tag));
@@ -150,7 +150,7 @@ impl Solids {
     ) -> Result<(condyle_meshes::Triangles, usize), String> {
         let folder = source.folder.ok_or_else(|| format!("a string has no folder to find `{file}` in"))?;
         let name = if source.compiler.strip_path { file.rsplit(['/', '\\']).next().unwrap_or(file) } else { file };
-        // as MuJoCo: in the folder of meshes, or else beside the file that has the element
+        // as MuJoCo: in the folder of meshes, or else in the folder of the file with the element
         let beside = Path::new(&*a.element.file).parent().unwrap_or(folder);
         let meshes = &source.compiler.mesh_folder;
         let mut paths = Vec::new();
@@ -185,7 +185,8 @@ impl Solids {
     }
 }
 
-/// The points and triangles of MuJoCo's own format: numbers of points, normals, coordinates of textures and triangles, then they.
+/// The points and triangles of MuJoCo's own format: numbers of points, normals, coordinates of textures and triangles,
+/// then they.
 #[cfg(feature = "meshes")]
 fn msh(bytes: &[u8]) -> Result<condyle_meshes::Triangles, String> {
     let words: Vec<[u8; 4]> = bytes.chunks_exact(4).map(|w| [w[0], w[1], w[2], w[3]]).collect();

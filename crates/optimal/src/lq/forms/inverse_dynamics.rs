@@ -6,7 +6,9 @@
 //! Δt a, as the unknown,
 //!
 //! ```text
-//! δu = U (w, δv, δq),     y_c = δv_c + w_k  (a coordinate that is an unknown),     y_d = δv_d + D_d (w, δv, δq)  (one that is not)
+//! δu = U (w, δv, δq)
+//! y_c = δv_c + w_k                for a coordinate c that is an unknown
+//! y_d = δv_d + D_d (w, δv, δq)    for a coordinate d that is not
 //! δq⁺ = T δq + Δt E y,    δv⁺ = y:        ½ δx⁺ᵀ P δx⁺ = ½ yᵀ Π y + yᵀ N δq + ½ δqᵀ Tᵀ P₁₁ T δq
 //! ```
 //!

@@ -15,7 +15,8 @@ pub(crate) type LongF32 = Lanes<f32, 8>;
 macro_rules! pair {
     (
         $pair:ident of $n:literal $float:ident, $mask:ident:
-        $load:ident $store:ident $splat:ident $add:ident $sub:ident $mul:ident $div:ident $fma:ident $sqrt:ident $neg:ident
+        $load:ident $store:ident $splat:ident $add:ident $sub:ident $mul:ident $div:ident $fma:ident $sqrt:ident
+        $neg:ident
         $abs:ident $lt:ident $select:ident $and:ident $or:ident $max:ident;
         $($transpose:tt)*
     ) => {
@@ -45,7 +46,9 @@ macro_rules! pair {
                 fn neg(a: Self) -> Self { $pair($neg(a.0), $neg(a.1)) }
                 fn abs(a: Self) -> Self { $pair($abs(a.0), $abs(a.1)) }
                 fn lt(a: Self, b: Self) -> $mask { $mask($lt(a.0, b.0), $lt(a.1, b.1)) }
-                fn select(mask: $mask, a: Self, b: Self) -> Self { $pair($select(mask.0, a.0, b.0), $select(mask.1, a.1, b.1)) }
+                fn select(mask: $mask, a: Self, b: Self) -> Self {
+                    $pair($select(mask.0, a.0, b.0), $select(mask.1, a.1, b.1))
+                }
                 fn and(a: $mask, b: $mask) -> $mask { $mask($and(a.0, b.0), $and(a.1, b.1)) }
                 fn or(a: $mask, b: $mask) -> $mask { $mask($or(a.0, b.0), $or(a.1, b.1)) }
                 fn any(mask: $mask) -> bool { $max($or(mask.0, mask.1)) != 0 }

@@ -33,7 +33,9 @@ macro_rules! pair {
 
             instructions! {
                 fn enter(kernel: impl Kernel) { short(kernel) }
-                fn load(x: [$float; $n]) -> Self { $pair(v128_load(x.as_ptr().cast()), v128_load(x[$n / 2..].as_ptr().cast())) }
+                fn load(x: [$float; $n]) -> Self {
+                    $pair(v128_load(x.as_ptr().cast()), v128_load(x[$n / 2..].as_ptr().cast()))
+                }
                 fn store(a: Self) -> [$float; $n] {{
                     let mut x = [0.0; $n];
                     v128_store(x.as_mut_ptr().cast(), a.0);

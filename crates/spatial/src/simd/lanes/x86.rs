@@ -105,8 +105,8 @@ macro_rules! avx512 {
 
 avx2! {
     __m256d of 4 f64:
-    _mm256_loadu_pd _mm256_storeu_pd _mm256_set1_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd _mm256_fmadd_pd
-    _mm256_sqrt_pd _mm256_andnot_pd;
+    _mm256_loadu_pd _mm256_storeu_pd _mm256_set1_pd _mm256_add_pd _mm256_sub_pd _mm256_mul_pd _mm256_div_pd
+    _mm256_fmadd_pd _mm256_sqrt_pd _mm256_andnot_pd;
     _mm256_cmp_pd _mm256_blendv_pd _mm256_and_pd _mm256_or_pd _mm256_movemask_pd;
     fn transpose(rows: &mut [Self; 4]) {{
         let [a, b, c, d] = *rows;
@@ -122,27 +122,37 @@ avx2! {
 }
 avx2! {
     __m256 of 8 f32:
-    _mm256_loadu_ps _mm256_storeu_ps _mm256_set1_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps _mm256_fmadd_ps
-    _mm256_sqrt_ps _mm256_andnot_ps;
+    _mm256_loadu_ps _mm256_storeu_ps _mm256_set1_ps _mm256_add_ps _mm256_sub_ps _mm256_mul_ps _mm256_div_ps
+    _mm256_fmadd_ps _mm256_sqrt_ps _mm256_andnot_ps;
     _mm256_cmp_ps _mm256_blendv_ps _mm256_and_ps _mm256_or_ps _mm256_movemask_ps;
 }
 avx512! {
     __m512d of 8 f64, __mmask8:
-    _mm512_loadu_pd _mm512_storeu_pd _mm512_set1_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd _mm512_fmadd_pd
-    _mm512_sqrt_pd _mm512_andnot_pd;
+    _mm512_loadu_pd _mm512_storeu_pd _mm512_set1_pd _mm512_add_pd _mm512_sub_pd _mm512_mul_pd _mm512_div_pd
+    _mm512_fmadd_pd _mm512_sqrt_pd _mm512_andnot_pd;
     _mm512_cmp_pd_mask _mm512_mask_blend_pd;
     fn transpose(rows: &mut [Self; 8]) {{
         let [a, b, c, d, e, f, g, h] = *rows;
-        let even = [_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d), _mm512_unpacklo_pd(e, f), _mm512_unpacklo_pd(g, h)];
-        let odd = [_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d), _mm512_unpackhi_pd(e, f), _mm512_unpackhi_pd(g, h)];
+        let even = [
+            _mm512_unpacklo_pd(a, b),
+            _mm512_unpacklo_pd(c, d),
+            _mm512_unpacklo_pd(e, f),
+            _mm512_unpacklo_pd(g, h),
+        ];
+        let odd = [
+            _mm512_unpackhi_pd(a, b),
+            _mm512_unpackhi_pd(c, d),
+            _mm512_unpackhi_pd(e, f),
+            _mm512_unpackhi_pd(g, h),
+        ];
         let ([a, c, e, g], [b, d, f, h]) = (columns(even), columns(odd));
         *rows = [a, b, c, d, e, f, g, h];
     }}
 }
 avx512! {
     __m512 of 16 f32, __mmask16:
-    _mm512_loadu_ps _mm512_storeu_ps _mm512_set1_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps _mm512_fmadd_ps
-    _mm512_sqrt_ps _mm512_andnot_ps;
+    _mm512_loadu_ps _mm512_storeu_ps _mm512_set1_ps _mm512_add_ps _mm512_sub_ps _mm512_mul_ps _mm512_div_ps
+    _mm512_fmadd_ps _mm512_sqrt_ps _mm512_andnot_ps;
     _mm512_cmp_ps_mask _mm512_mask_blend_ps;
 }
 

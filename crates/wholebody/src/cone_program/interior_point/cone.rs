@@ -8,8 +8,8 @@
 //!        w₁  I + w₁ w₁ᵀ / (1 + w₀)]               −w₁  I + w₁ w₁ᵀ / (1 + w₀)]
 //! ```
 //!
-//! Sources: Nesterov and Todd (1997); Vandenberghe, *The CVXOPT linear and quadratic cone program solvers* (2010), sections
-//! 4 and 5; Domahidi, Chu and Boyd (2013), section III.
+//! Sources: Nesterov and Todd (1997); Vandenberghe, *The CVXOPT linear and quadratic cone program solvers* (2010),
+//! sections 4 and 5; Domahidi, Chu and Boyd (2013), section III.
 
 /// Returns x₀ − ‖x₁‖, which is not negative in the cone.
 #[inline(always)]
