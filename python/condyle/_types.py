@@ -441,6 +441,10 @@ class GravityCompensation(NamedTuple):
     """The mass whose weight is supported (kg)."""
     mass_com: _Array
     """This mass times its centre, in the body's frame (kg m), 3 numbers."""
+    ratio: float
+    """The supported ratio of the body's weight, except parts with another ratio. The mass follows by it when the inertia of
+    the body changes.
+    """
 
 
 class Actuator(NamedTuple):

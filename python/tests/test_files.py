@@ -26,7 +26,7 @@ def sprung() -> Model:
     lower = builder.body("lower", upper, Joint.prismatic([0, 0, 1]), inertia=rod)
     builder.spring(upper, [1.0, 2.0, 3.0], rest=[0.1])
     builder.spring(lower, 4.0, rest=-0.5)
-    builder.compensate_gravity(upper, rod, 0.5)
+    builder.compensate_gravity(upper, 0.5)
     builder.actuator("motor", upper, gear=50.0, force=(-3.0, 3.0))
     builder.actuator("servo", [(upper, 1.0), (lower, -2.0)], tendon="cord", kp=100.0, kv=10.0, control=(-1.0, 1.0))
     return builder.build()
@@ -41,7 +41,9 @@ def test_additions_of_a_builder() -> None:
     assert (first.joint, first.stiffness.tolist(), first.rest.tolist()) == ("upper", [1.0, 2.0, 3.0], [0.1])
     assert (second.joint, second.stiffness.tolist(), second.rest.tolist()) == ("lower", [4.0, 0.0, 0.0], [-0.5])
     (carried,) = model.gravity_compensation
-    assert (carried.body, carried.mass) == ("upper", 1.0)
+    assert (carried.body, carried.mass, carried.ratio) == ("upper", 1.0, 0.5)
+    twice = [I._replace(mass=2.0 * I.mass) for I in model.inertias]
+    assert model.with_inertias(twice).gravity_compensation[0].mass == 2.0
     motor, servo = model.actuators
     assert (motor.joint, motor.tendon, motor.gear.tolist()) == ("upper", None, [50.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert (motor.force, motor.control, motor.gain, motor.bias) == ((-3.0, 3.0), (-np.inf, np.inf), 1.0, 0.0)

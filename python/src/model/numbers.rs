@@ -96,15 +96,16 @@ impl Model {
         })
     }
 
-    /// The supported weights, as `GravityCompensation(body, mass, mass_com)`: MuJoCo's `gravcomp`. They act only in
-    /// `passive_torque` and in a `Simulation` that includes them.
+    /// The supported weights, as `GravityCompensation(body, mass, mass_com, ratio)`: MuJoCo's `gravcomp`. They act only
+    /// in `passive_torque` and in a `Simulation` that includes them.
     #[getter]
     fn gravity_compensation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::GravityCompensation, || {
             let class = class!(py, "GravityCompensation")?;
             let carried = |c: &condyle::tree::GravityCompensation| {
-                let body = &*self.inner.bodies()[c.body].name;
-                class.call1((body, c.mass, read_only(py, &c.mass_com.to_array()[..], "")?))
+                let body = &self.inner.bodies()[c.body];
+                let carried = c.carried(body.inertia);
+                class.call1((&*body.name, carried.mass, read_only(py, &carried.mass_com.to_array()[..], "")?, c.ratio))
             };
             self.inner.gravity_compensation().iter().map(carried).collect()
         })

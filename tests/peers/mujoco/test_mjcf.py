@@ -289,5 +289,6 @@ def test_carried_weights(read: list[Robot]) -> None:
     for robot in read:
         m = robot.theirs
         moves = m.body_weldid != 0
-        carried = sum(c["mass"] for c in robot.ours["gravity_compensation"])
+        masses = [body["inertia"]["mass"] for body in robot.ours["bodies"]]
+        carried = sum(c["ratio"] * masses[c["body"]] + c["added_mass"] for c in robot.ours["gravity_compensation"])
         close(carried, (m.body_mass * m.body_gravcomp)[moves].sum())
