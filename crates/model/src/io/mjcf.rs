@@ -156,6 +156,15 @@ impl Model {
     }
 }
 
+/// Returns the function that computes the pose of a `<frame>` in its surroundings, by the settings of its file.
+///
+/// # Errors
+/// The errors of [`Model::from_mjcf`].
+pub(super) fn frame_poses(root: &Element) -> Result<impl Fn(&Element) -> Result<Se3<f64>, Error>, Error> {
+    let compiler = Compiler::read(root)?;
+    Ok(move |frame: &Element| compiler.pose(&Attributes::plain(frame)))
+}
+
 /// A file with its own settings.
 struct Source<'a> {
     root: &'a Element,
