@@ -11,6 +11,7 @@ use crate::joint::Joint;
 use crate::keyframe::Keyframe;
 use crate::model::Model;
 use crate::passive::{GravityCompensation, Spring};
+use crate::warning::Warning;
 use alloc::borrow::ToOwned;
 use alloc::collections::BTreeMap;
 use alloc::string::String;
@@ -30,6 +31,8 @@ pub(crate) struct Additions {
     actuators: Vec<Actuator<BodyId>>,
     keyframes: Vec<(String, Vec<JointState>)>,
     constraints: Vec<(String, Draft)>,
+    /// Warnings about the sources of appended models.
+    warnings: Vec<Warning>,
 }
 
 /// Part of a body whose weight is compensated with another ratio than the rest of the body.
@@ -135,6 +138,7 @@ impl ModelBuilder {
         q: &[f64],
     ) {
         let body = |i: &usize| (!locked.contains(i)).then(|| place[*i].0);
+        self.additions.warnings.extend(model.warnings.iter().filter(|w| w.is_about_source()).cloned());
         for Spring { body: i, stiffness, rest } in &model.springs {
             if let Some(id) = body(i) {
                 self.spring(id, *stiffness, rest);
@@ -156,9 +160,14 @@ impl ModelBuilder {
                 self.compensate_gravity(on, ratio);
             }
         }
-        for actuator in &model.actuators {
-            if let Some(mut actuator) = actuator.renamed(body, |frame| first_frame + frame) {
+        for old in &model.actuators {
+            if let Some(mut actuator) = old.renamed(body, |frame| first_frame + frame) {
                 actuator.name.insert_str(0, prefix);
+                if let Transmission::Tendon { joints, .. } = &old.transmission {
+                    let held = joints.iter().filter(|(i, _)| locked.contains(i));
+                    let length: f64 = held.map(|&(i, coefficient)| coefficient * model.joint_position(i, q)).sum();
+                    actuator.bias -= actuator.kp * actuator.gear[0] * length; // the locked part of −kp l
+                }
                 self.actuator(actuator);
             }
         }
@@ -179,14 +188,27 @@ impl ModelBuilder {
                 ModelConstraintKind::Point { frames } => moved(frames).map(Draft::Point),
                 ModelConstraintKind::Rigid { frames } => moved(frames).map(Draft::Rigid),
                 ModelConstraintKind::Coupling { follower, leader, coefficients: c } => {
-                    body(follower).map(|id| match leader {
-                        Some(i) if locked.contains(i) => {
+                    let held = |id, at| Some(Draft::Coupling(id, None, [at, 0.0, 0.0, 0.0, 0.0]));
+                    match (body(follower), leader) {
+                        (Some(id), Some(i)) if locked.contains(i) => {
                             let at = model.joint_position(*i, q);
-                            let value = c.iter().rev().fold(0.0, |sum, c| sum * at + c); // Σ cᵢ qⁱ
-                            Draft::Coupling(id, None, [value, 0.0, 0.0, 0.0, 0.0])
+                            held(id, c.iter().rev().fold(0.0, |sum, c| sum * at + c)) // Σ cᵢ qⁱ
                         }
-                        leader => Draft::Coupling(id, leader.as_ref().and_then(body), *c),
-                    })
+                        (Some(id), leader) => Some(Draft::Coupling(id, leader.as_ref().and_then(body), *c)),
+                        // q_l = (q_f − c₀) / c₁
+                        (None, Some(i)) if c[1] != 0.0 && c[2..] == [0.0; 3] => {
+                            body(i).and_then(|id| held(id, (model.joint_position(*follower, q) - c[0]) / c[1]))
+                        }
+                        (None, Some(i)) if c[1..] != [0.0; 4] && !locked.contains(i) => {
+                            let [follower, leader] = [*follower, *i].map(|i| &model.bodies[i].joint_name);
+                            let why = format!("joint `{follower}` is locked, and its polynomial is not linear");
+                            let what = format!("{why}: joint `{leader}`, which it follows, is left free");
+                            let element = format!("constraint `{prefix}{name}`");
+                            self.additions.warnings.push(Warning::LeftOut { place: None, element, what });
+                            None
+                        }
+                        (None, _) => None,
+                    }
                 }
             };
             if let Some(draft) = draft {
@@ -207,7 +229,8 @@ impl Additions {
 
     /// Moves the additions into the built model; `number` maps each body of the builder to its index in the model.
     pub(crate) fn add_to(self, model: &mut Model, number: &[usize]) -> Result<(), Error> {
-        let Self { springs, compensation, compensated_parts, actuators, keyframes, constraints } = self;
+        let Self { springs, compensation, compensated_parts, actuators, keyframes, constraints, warnings } = self;
+        model.warnings = warnings;
         let index = |id: BodyId| number[id.0];
         model.springs =
             springs.into_iter().map(|(b, stiffness, rest)| Spring { body: index(b), stiffness, rest }).collect();

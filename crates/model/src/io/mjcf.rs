@@ -144,6 +144,18 @@ impl Model {
         model(&files, options)
     }
 
+    /// Reads a text that describes a compiled model of MuJoCo. Errors and warnings have no line, because the user does
+    /// not see the text.
+    ///
+    /// # Errors
+    /// The errors of [`from_mjcf`](Self::from_mjcf).
+    #[doc(hidden)]
+    pub fn from_compiled_mjcf(text: &str, options: &MjcfOptions) -> Result<Self, Error> {
+        let mut files = Files::new(Known::new(ELEMENTS));
+        files.parse_without_lines(text, "<MjModel>")?;
+        model(&files, options)
+    }
+
     /// Reads a text instead of a file: the path names it in errors, and its folder is searched for included files.
     ///
     /// # Errors
