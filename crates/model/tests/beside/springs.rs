@@ -151,7 +151,8 @@ fn weight_is_compensated() {
     close(&[carried(&scaled).mass], &[10.0]);
     let acting = "<joint name='j' axis='0 1 0' actuatorgravcomp='true' actuatorfrcrange='-1 1'/>";
     let found = read(&text.replace(HINGE, acting)).unwrap();
-    let what = "actuatorgravcomp: the compensation of gravity acts beside the limits of effort, as a passive force";
+    let what = "actuatorgravcomp: the compensation of gravity acts as a passive force, outside the limits of effort; MuJoCo \
+                adds it to the efforts of the actuators";
     assert_eq!(said(&found), [format!("<string>:1: joint `j`: {what}")]);
 }
 
@@ -159,7 +160,7 @@ fn weight_is_compensated() {
 #[test]
 fn switches() {
     let joint = "<joint name='j' axis='0 1 0' stiffness='1' damping='2' frictionloss='3' range='-10 10'/>";
-    let after = "<equality><joint joint1='j'/></equality><actuator><motor joint='j' ctrlrange='-1 1' group='3' armature='0.1'/></actuator>";
+    let after = "<equality><weld body1='b'/></equality><actuator><motor joint='j' ctrlrange='-1 1' group='3' armature='0.1'/></actuator>";
     let with = |flags: &str| {
         read(&one(&format!("<option {flags}</option>"), joint, after).replace("name='b'", "name='b' gravcomp='1'"))
             .unwrap()
