@@ -317,7 +317,9 @@ class ContactConstraint(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """Two coupled joints of a robot's file: the follower's position is Σ cᵢ qⁱ, with q the position of the leader."""
+    """Two coupled joints of a robot's file: the follower's position is Σ cᵢ qⁱ, with q the position of the leader. No
+    function enforces it; if it is linear, the readers' `mimic=True` lets the follower follow in the tree.
+    """
 
     follower: str
     """The joint that follows."""

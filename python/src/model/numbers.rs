@@ -79,7 +79,8 @@ impl Model {
     /// with d₀ in `damping`. It acts where `damping` acts.
     #[getter]
     fn damping_polynomial<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.cached.value(py, Attribute::DampingPolynomial, || read_only(py, self.inner.damping_polynomial(), ""))
+        let polynomial = || read_only(py, self.inner.damping_polynomial(), "with_damping");
+        self.cached.value(py, Attribute::DampingPolynomial, polynomial)
     }
 
     /// The springs of joints, as `Spring(joint, stiffness, rest)`. They act only in `passive_torque` and in a
@@ -154,14 +155,14 @@ impl Model {
     /// and in a `Simulation` that includes it.
     #[getter]
     fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.numbers(py, Attribute::Damping, "", || self.inner.damping().to_vec())
+        self.numbers(py, Attribute::Damping, "with_damping", || self.inner.damping().to_vec())
     }
 
     /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and in a
     /// `Simulation` that includes it.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.numbers(py, Attribute::Friction, "", || self.inner.friction().to_vec())
+        self.numbers(py, Attribute::Friction, "with_friction", || self.inner.friction().to_vec())
     }
 
     /// The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm.
@@ -171,9 +172,10 @@ impl Model {
     }
 
     /// Returns the constraints of the robot's file outside its tree, by name: loops as `ContactConstraint`, without
-    /// stabilisation, and coupled joints as `Coupling`.
+    /// stabilisation, and coupled joints as `Coupling`. Inactive ones, and the `<mimic>` of a URDF or SDF, are left out.
     ///
-    /// The algorithms for trees ignore loops. `constrained_dynamics` closes the loops in its `ConstraintSet`:
+    /// The algorithms for trees ignore both. `constrained_dynamics` closes the loops in its `ConstraintSet`. No function
+    /// enforces a coupling; if it is linear, the readers' `mimic=True` puts it into the tree instead.
     ///
     /// >>> robot = condyle.robots.quadruped()
     /// >>> loops = [c for c in robot.constraints().values() if isinstance(c, condyle.ContactConstraint)]
