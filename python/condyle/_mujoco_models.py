@@ -64,7 +64,9 @@ class _Text:
         lines = [
             f"<mujoco model={quoteattr(self._name(0))}>",
             _element("compiler", compiler),
-            _element("option", {k: v for k, v in option.items() if k == "gravity" or np.any(v)} | groups, self._flags()),
+            _element(
+                "option", {k: v for k, v in option.items() if k == "gravity" or np.any(v)} | groups, self._flags()
+            ),
             "<worldbody>",
             *self._inside(0),
         ]

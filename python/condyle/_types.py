@@ -444,8 +444,8 @@ class GravityCompensation(NamedTuple):
     mass_com: _Array
     """This mass times its centre, in the body's frame (kg m), 3 numbers."""
     ratio: float
-    """The supported ratio of the body's weight, except parts with another ratio. The mass follows by it when the inertia of
-    the body changes.
+    """The supported ratio of the body's weight, except for parts with another ratio. The mass follows by this ratio
+    when the inertia of the body changes.
     """
 
 

@@ -156,7 +156,8 @@ impl Model {
     /// Returns the same robot with some joints locked at their positions in q.
     ///
     /// Their bodies are merged into their parent bodies and remain as frames. A mimic joint is locked together with the
-    /// joint that it follows.
+    /// joint that it follows. A locked joint keeps its part of the length of a tendon, and holds the other joint of a
+    /// coupling if that is linear. Warnings about the file are kept.
     ///
     /// joints: a list of names or indices of bodies.
     /// q: nq numbers.
