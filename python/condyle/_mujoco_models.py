@@ -21,8 +21,8 @@ JOINT_WRAP, SITE_WRAP = 1, 3
 SITE_OBJECT = 6
 """The value of sites in MuJoCo's enumeration of object types."""
 FLAGS = {
-    "equality": 1 << 1, "frictionloss": 1 << 2, "limit": 1 << 3, "spring": 1 << 5, "damper": 1 << 6, "gravity": 1 << 7,
-    "clampctrl": 1 << 8, "actuation": 1 << 11,
+    "constraint": 1 << 0, "equality": 1 << 1, "frictionloss": 1 << 2, "limit": 1 << 3, "spring": 1 << 5,
+    "damper": 1 << 6, "gravity": 1 << 7, "clampctrl": 1 << 8, "actuation": 1 << 11,
 }  # fmt: skip
 """Features that can be disabled, with their bits in MuJoCo 4; other versions are asked for their own bits."""
 

@@ -280,6 +280,17 @@ def test_actuators_that_are_disabled() -> None:
     assert [actuator.name for actuator in condyle.Model.from_mujoco(theirs).actuators] == ["off"]
 
 
+def test_constraints_that_are_disabled() -> None:
+    """The flag disables limits, friction and equalities of the compiled model, as in its file."""
+    joint = '<joint name="j" axis="0 1 0" range="-10 10" frictionloss="1"/>'
+    tree = f'<worldbody><body name="b">{joint}<geom size="0.1"/></body></worldbody>'
+    loop = '<equality><connect body1="b" anchor="1 0 0"/></equality>'
+    theirs = mujoco.MjModel.from_xml_string(f"<mujoco>{tree}{loop}</mujoco>")
+    theirs.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    ours = condyle.Model.from_mujoco(theirs)
+    assert (ours.limits.upper[0], ours.friction[0], ours.constraints()) == (np.inf, 0.0, {})
+
+
 def test_range_of_a_tendon() -> None:
     """The force in the table of actuators is clipped as `actuator_force` is."""
     theirs = mujoco.MjModel.from_xml_string(DRIVEN)
