@@ -80,6 +80,7 @@ SPELLED = [  # the first two do not take `data`
 # The type of an argument, by its name, `Class.name` or `function.name`. Arguments with default None may be None.
 ARGUMENTS = {
     "ArrayLike": """
+        Model.with_damping.damping Model.with_damping.polynomial Model.with_friction.friction
         A B M Q R S X a acceleration actuation armature axis b d effort_lower effort_upper f f_ext gear gravity lambda_
         lower pi placement point rest stiffness
         q q0 q1 r rotation target tau theta upper v velocity w x x0 xs Residual.reference Model.effort
@@ -111,7 +112,7 @@ ARGUMENTS = {
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
         Plan.contact _generate.shares _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
-        bias damping dt eps1 eps1eps2 eps2 epsilon factor gain greatest kp kv least mu offset passive pitch ratio re
+        bias damping dt eps1 eps1eps2 eps2 epsilon gain greatest kp kv least mu offset passive pitch ratio re
         regularisation
         restitution smoothing t tolerance weight AugmentedLagrangian.settings ModelBuilder.armature
         ModelBuilder.friction ModelBuilder.velocity
@@ -140,7 +141,7 @@ ARGUMENTS = {
     "Joint": "joint",
     "_Joints": "ModelBuilder.joints",
     "Sequence[str | int]": "Model.joints",
-    "Inertia": "inertia",
+    "Inertia": "inertia part",
     "Sequence[Inertia]": "inertias",
     "tuple[float, float]": """
         damping_polynomial position Unicycle.weights ModelBuilder.actuator.control ModelBuilder.actuator.force""",
@@ -275,7 +276,8 @@ RESULTS = {
     "HyperDual": "HyperDual",
     "Model": """
         _SpelledModel.ours Model.__copy__ Model.__deepcopy__ Model.append Model.from_pinocchio Model.lock
-        Model.with_armature Model.with_frame Model.with_gravity Model.with_inertias Model.with_limits Model.with_mimic
+        Model.with_armature Model.with_damping Model.with_frame Model.with_friction Model.with_gravity
+        Model.with_inertias Model.with_limits Model.with_mimic
         ModelBuilder.build _model_from_bytes arm7 humanoid quadruped""",
     "Limits": "Model.limits",
     "Any": "Model.to_pinocchio _lend",

@@ -292,12 +292,13 @@ def aba(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """Forward dynamics: the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i), nv numbers (rad/s², m/s²); O(n).
+    """Computes the acceleration q̈ = M(q)⁻¹ (τ − h(q, v) + Σ Jᵢᵀ f_ext,i) (forward dynamics), nv numbers (rad/s², m/s²);
+    O(n).
 
     q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 
-    Raises `ModelError` if M is singular wherever the robot is. At a position at which it happens to be, a point of mass on
-    the axis about which it turns, the numbers are not finite, or as large as rounding has it.
+    Raises `ModelError` if M is singular at every position. If M is singular only at this position, as for a point mass
+    on its own axis of rotation, the result is not finite, or is a large number made of rounding errors.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> q, zero = condyle.neutral(quadruped), [0.0] * 18
@@ -315,11 +316,11 @@ def aba_derivatives(
     f_ext: ArrayLike | None = None,
     out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> AbaDerivatives:
-    """The acceleration of `aba` and its derivatives with respect to q, v and τ, exact, as
-    `AbaDerivatives(a, da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
+    """Computes the acceleration of `aba` and its exact derivatives with respect to q, v and τ, as `AbaDerivatives(a,
+    da_dq, da_dv, da_dtau)`: nv numbers and three matrices (nv, nv).
 
-    q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
-    change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
+    q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent
+    space: the change of q̈ when q moves to `integrate(q, δ)`, per δ. out: four arrays, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> data = condyle.Data(arm)
@@ -329,7 +330,7 @@ def aba_derivatives(
     """
 
 def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """The Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
+    """Computes the Coriolis matrix C(q, v) by Christoffel symbols: (nv, nv), with C v = h − g and Ṁ = C + Cᵀ; O(n depth).
 
     q: nq numbers; v: nv.
 
@@ -341,7 +342,8 @@ def coriolis_matrix(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _
     """
 
 def crba(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """The joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n depth).
+    """Computes the joint-space inertia matrix M(q): (nv, nv), symmetric, both triangles filled, armature included; O(n
+    depth).
 
     q: nq numbers. τ = M a + h; the kinetic energy is ½ vᵀ M v.
 
@@ -361,11 +363,11 @@ def forward_dynamics(
     method: _Method | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """Forward dynamics by a method of choice: the acceleration of `aba`, nv numbers (rad/s², m/s²).
+    """Computes the acceleration of `aba` by a chosen method (forward dynamics), nv numbers (rad/s², m/s²).
 
-    q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', by a
-    dense factor of M, O(n³); 'sparse', by one with the zeros of the tree, O(n d²) for depth d; None, the fastest:
-    'aba', or 'sparse' for a robot with mimic joints. All give the same numbers, up to rounding.
+    q: nq numbers; v, tau: nv; f_ext: as for `rnea`. method: 'aba', the articulated-body algorithm, O(n); 'dense', a
+    dense factor of M, O(n³); 'sparse', a factor of M that keeps the zeros of the tree, O(n d²) for depth d; None, the
+    fastest: 'sparse' for a robot with mimic joints, else 'aba'. All methods give the same numbers, up to rounding.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, tau = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [1.0] * 7
@@ -375,7 +377,7 @@ def forward_dynamics(
     """
 
 def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """The gravity efforts g(q), nv numbers, which hold the robot still: the efforts of `rnea` with v = a = 0.
+    """Computes the gravity efforts g(q) that hold the robot still, nv numbers: the efforts of `rnea` with v = a = 0.
 
     q: nq numbers.
 
@@ -386,7 +388,7 @@ def gravity(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -
     """
 
 def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """The inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
+    """Computes the inverse M(q)⁻¹ of the inertia matrix: (nv, nv), symmetric, both triangles filled; computed without M.
 
     q: nq numbers.
 
@@ -397,7 +399,7 @@ def minv(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _
     """
 
 def nonlinear_effects(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """The nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
+    """Computes the nonlinear effects h(q, v) = C(q, v) v + g(q), nv numbers: the efforts of `rnea` with a = 0.
 
     q: nq numbers; v: nv.
     """
@@ -411,11 +413,11 @@ def rnea(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """Inverse dynamics: the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a, nv numbers
-    (N m, N); O(n).
+    """Computes the joint efforts τ = M(q) a + h(q, v) − Σ Jᵢᵀ f_ext,i that produce the acceleration a (inverse dynamics),
+    nv numbers (N m, N); O(n).
 
-    q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m), acting at the body's origin and
-    expressed in its frame, row 0 being the world's.
+    q: nq numbers; v, a: nv; f_ext: (nbodies, 6), a force on each body (N, then N m). It acts at the body's origin and
+    is expressed in the body's frame; row 0 belongs to the world.
 
     >>> arm = condyle.robots.arm7()
     >>> tau = condyle.rnea(arm, condyle.Data(arm), [0.3] * 7, [0.0] * 7, [0.0] * 7)
@@ -432,11 +434,11 @@ def rnea_derivatives(
     f_ext: ArrayLike | None = None,
     out: tuple[_Array, _Array, _Array] | list[_Array] | None = None,
 ) -> RneaDerivatives:
-    """The derivatives of `rnea` with respect to q, v and a, exact, in O(n depth), as
-    `RneaDerivatives(dtau_dq, dtau_dv, dtau_da)`, each (nv, nv).
+    """Computes the exact derivatives of `rnea` with respect to q, v and a in O(n depth), as `RneaDerivatives(dtau_dq,
+    dtau_dv, dtau_da)`, each (nv, nv).
 
-    q: nq numbers; v, a: nv; f_ext: as for `rnea`, moving with the bodies. ∂/∂q is taken in the tangent space: the
-    change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
+    q: nq numbers; v, a: nv; f_ext: as for `rnea`; the forces move with the bodies. ∂/∂q is taken in the tangent space:
+    the change of τ when q moves to `integrate(q, δ)`, per δ. out: three arrays, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> dtau_dq, dtau_dv, dtau_da = condyle.rnea_derivatives(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7)
@@ -447,25 +449,26 @@ def rnea_derivatives(
 def static_torque(
     model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
 ) -> _Array:
-    """The efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N); O(n).
+    """Computes the efforts τ = g(q) − Σ Jᵢᵀ f_ext,i that hold the robot still under external forces, nv numbers (N m, N);
+    O(n).
 
-    q: nq numbers; f_ext: as for `rnea`. It is `rnea` with v = a = 0.
+    q: nq numbers; f_ext: as for `rnea`. The result equals `rnea` with v = a = 0.
     """
 
 @final
 class BodyId:
-    """The identity of a body in a builder, as `ModelBuilder.body` and others return it. `WORLD` is always there."""
+    """The identity of a body in a builder, as `ModelBuilder.body` and other methods return it. `WORLD` always exists."""
 
 @final
 class ModelBuilder:
     """A builder that makes a `Model` body by body, parents first.
 
-    Placements are homogeneous (4, 4) matrices, None being the identity; inertias are `Inertia`, None being no mass. A
-    joint of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of bodies here: q
-    and v are laid out alike, but there is a body without mass for each joint but the last, so `nbodies`, `names` and
-    the rows of f_ext count them.
+    Placements are homogeneous (4, 4) matrices; None is the identity. Inertias are `Inertia`; None is no mass. A joint
+    that is composed of several, such as Pinocchio's composite, universal and spherical ZYX joints, is a `chain` of
+    bodies here. Its q and v have the same layout, but each joint except the last adds a body without mass. `nbodies`,
+    `names` and the rows of f_ext count these bodies.
 
-    name: the robot's.
+    name: the name of the robot.
 
     >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
     >>> rod = Inertia.from_com(1.0, [0.0, 0.0, -0.5], 0.08 * np.eye(3))
@@ -494,17 +497,18 @@ class ModelBuilder:
         control: tuple[float, float] | None = None,
         force: tuple[float, float] | None = None,
     ) -> None:
-        """Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. It does not change limits,
-        armature and damping: these are the joints'.
+        """Adds an actuator that drives a joint, or a tendon over several joints; see `Actuator`. It does not change
+        limits, armature and damping, which belong to the joints.
 
         joint: the body that the joint carries; or, for a tendon, a list of (body, coefficient).
-        tendon: the name of the tendon, if it drives one.
-        gear: a number, or up to six; None is 1. gain: the force for each unit of control; None is kp, or kv where kp is 0, or
-        1 for a motor without both. control, force: least and greatest; None for no limits.
+        tendon: the tendon's name, if the actuator drives a tendon.
+        gear: a number, or up to six; None is 1. gain: the force per unit of control; None is kp, or kv if kp is 0, or 1
+        for a motor, which has neither. control, force: (minimum, maximum); None for no limits.
         """
 
     def append(self, parent: BodyId, placement: ArrayLike | None, model: Model, prefix: str = "") -> None:
-        """Adds a whole robot, its world at `placement` in the frame of `parent`; `prefix` is put before all its names.
+        """Adds a whole robot, with its world at `placement` in the frame of `parent`; `prefix` is added before all its
+        names.
 
         >>> from condyle import ModelBuilder, WORLD
         >>> two = ModelBuilder("two arms")
@@ -535,42 +539,46 @@ class ModelBuilder:
     ) -> BodyId:
         """Adds a body and its joint.
 
-        name: the body's, and the joint's unless it has a `joint_name` of its own.
-        parent: the body on which the joint sits.
-        placement: the joint's frame at position zero in the parent's frame.
-        inertia: in the body's frame, which is the joint's at position zero.
-        position: (least, greatest) position (rad, m), for joints with one coordinate; None for no limits.
-        velocity: greatest speed (rad/s, m/s); None for no limit.
-        effort: greatest effort (N m, N), or the least and the greatest one; None for no limits.
-        damping, friction: viscous (N m s/rad, N s/m) and Coulomb (N m, N).
-        damping_polynomial: (d₁, d₂) of damping that grows with the speed, d₀ + d₁|v| + d₂v², with d₀ = damping.
-        armature: inertia of the rotor as seen at the joint (kg m², kg).
+        name: the body's name, and the joint's unless `joint_name` is given.
+        parent: the body to which the joint is attached.
+        placement: the joint's frame at position zero, in the parent's frame.
+        inertia: in the body's frame, which is the joint's frame at position zero.
+        position: (minimum, maximum) position (rad, m), for joints with one coordinate; None for no limits.
+        velocity: maximum speed (rad/s, m/s); None for no limit.
+        effort: maximum effort (N m, N), or (minimum, maximum); None for no limits.
+        damping, friction: viscous (N m s/rad, N s/m) and Coulomb friction (N m, N).
+        damping_polynomial: (d₁, d₂) of the damping coefficient d₀ + d₁|v| + d₂v², with d₀ = damping.
+        armature: rotor inertia as seen at the joint (kg m², kg).
         """
 
     def build(self) -> Model:
         """Builds the model: checks everything and numbers the bodies depth first, siblings in the order in which they were
-        added. The builder cannot be used any more.
+        added. The builder cannot be used afterwards.
 
-        Raises `ModelError`: names, axes, masses, limits, numbers that are not finite, what a mimic joint follows.
+        Raises `ModelError` for invalid names, axes, masses or limits, for numbers that are not finite, and for a mimic
+        joint with an invalid leader.
         """
 
     def chain(self, name: str, parent: BodyId, joints: _Joints, inertia: Inertia | None = None) -> BodyId:
-        """Adds a body behind several joints, each at a placement in the frame of the one before: a composite joint.
+        """Adds a body after several joints in a row: a composite joint. Each joint is placed in the frame of the joint
+        before.
 
-        Its coordinates are those of the joints, one after the other. Between them are bodies without mass, `name#1`,
-        `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about unit vectors a and b is
-        `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
+        Its coordinates are the coordinates of the joints, one joint after the other. Between the joints are bodies
+        without mass, `name#1`, `name#2`, …. Returns the last body, which carries `inertia`. A universal joint about
+        unit vectors a and b is `[(Joint.revolute(a), placement), (Joint.revolute(b), None)]`.
 
         joints: a list of (joint, placement).
         """
 
     def compensate_gravity(
-        self, body: BodyId, inertia: Inertia, factor: float = 1.0, placement: ArrayLike | None = None
+        self, body: BodyId, ratio: float = 1.0, part: Inertia | None = None, placement: ArrayLike | None = None
     ) -> None:
-        """Carries a part of a body's weight, as MuJoCo's `gravcomp` does: the force −factor m g acts at the part's centre of
-        mass.
+        """Supports a ratio of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
+        mass. The supported weight follows when the inertia of the body changes.
 
-        inertia: the part's, in a frame that is at `placement` in the body's frame. factor: the share that is carried.
+        ratio: the supported ratio of the weight; 1 supports all of it.
+        part: None for the whole body, or the inertia of a part of the body that has this ratio instead. It is included
+            in the inertia of the body, and is in a frame at `placement` in the body's frame.
         """
 
     def frame(
@@ -580,16 +588,18 @@ class ModelBuilder:
         placement: ArrayLike | None = None,
         kind: Literal["link", "joint", "user"] = "user",
     ) -> None:
-        """Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user', of which each may have the same name."""
+        """Adds a frame at `placement` in the body's frame; kind: 'link', 'joint' or 'user'. Frames of different kinds may
+        have the same name.
+        """
 
     def gravity(self, gravity: ArrayLike) -> None:
-        """Sets the acceleration of free fall, 3 numbers in the world's frame (m/s²). Without this it is (0, 0, −9.81)."""
+        """Sets the acceleration of free fall, 3 numbers in the world's frame (m/s²). The default is (0, 0, −9.81)."""
 
     def merge(self, body: BodyId, placement: ArrayLike | None, inertia: Inertia) -> None:
-        """Adds inertia to a body, given in a frame that is at `placement` in the body's frame."""
+        """Adds an inertia, given in a frame at `placement` in the body's frame, to a body."""
 
     def mimic(self, follower: BodyId, leader: BodyId, ratio: float = 1.0, offset: float = 0.0) -> None:
-        """Makes a joint follow another one, instead of having a coordinate of its own: its position is ratio q + offset.
+        """Makes a joint follow another one: its position is ratio q + offset, and it has no coordinate of its own.
 
         follower, leader: the bodies that the joints carry.
         """
@@ -597,16 +607,17 @@ class ModelBuilder:
     def spherical_zyx(
         self, name: str, parent: BodyId, placement: ArrayLike | None = None, inertia: Inertia | None = None
     ) -> BodyId:
-        """Adds a body on a ball joint that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+        """Adds a body on a ball joint that turns by q₀ about z, then by q₁ about the new y, then by q₂ about the new x; v
+        = q̇.
 
-        M is singular where q₁ = ±π/2. `Joint.spherical` has no such place.
+        M is singular where q₁ = ±π/2. `Joint.spherical` has no singular position.
         """
 
     def spring(self, body: BodyId, stiffness: ArrayLike, rest: ArrayLike) -> None:
         """Adds a spring to a joint: τ = −(k₀ + k₁ |Δ| + k₂ |Δ|²) Δ with the displacement Δ = q ⊖ rest.
 
-        body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the position of the joint at which the
-        spring is at rest, as many numbers as q has for the joint.
+        body: the body that the joint carries. stiffness: k₀, or k₀, k₁ and k₂. rest: the joint's position at which the
+        spring is at rest, as many numbers as the joint has in q.
 
         >>> from condyle import Inertia, Joint, ModelBuilder, WORLD
         >>> robot = ModelBuilder("door")
@@ -625,30 +636,30 @@ def _casadi_hold(
     reference: _Reference | None = None,
     constraints: Sequence[ContactConstraint] | None = None,
 ) -> str:
-    """A slot of CasADi's interface that computes a function of a robot, held for the caller until `_casadi_release`.
+    """Holds a slot of CasADi's interface that computes a function of a robot, until `_casadi_release`.
 
     function: 'rnea', 'aba', 'crba', 'forward_kinematics', 'frame_velocity', 'com', 'centroidal_momentum' or
-    'constrained_dynamics'.
-    states: how many at a time; arguments and results have the columns of each, one after the other.
+    'constrained_dynamics'. states: number of states per call; arguments and results have the columns of all states, one
+    state after the other.
 
     Returns the name of its symbols.
     """
 
 def _casadi_hold_knot(of: Any, t: int | None) -> str:
-    """A slot that computes the next state and the cost of knot t of an action or of a problem, likewise; without t, of the knot
-    whose number is an argument.
+    """Holds a slot that computes the next state and the cost of knot t of an action or of a problem, until
+    `_casadi_release`. Without t, the index of the knot is an argument of the function.
     """
 
 def _casadi_release(name: str) -> None:
-    """The end of a hold: the slot lives on as long as CasADi has functions of it."""
+    """Ends a hold; the slot stays in use as long as CasADi has functions of it."""
 
 def centroidal_map(
     model: Model, data: Data, q: ArrayLike, out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None
 ) -> CentroidalMap:
-    """The centroidal momentum matrix Ag(q), hg = Ag v, and the quantities it is made of, in O(n), as
+    """Computes the centroidal momentum matrix Ag(q), with hg = Ag v, and the quantities from which it is made, in O(n), as
     `CentroidalMap(Ag, Ig, com, Jcom)`.
 
-    q: nq numbers. Bodies fixed to the world do not count. The results are not numbers if no moving body has a mass. out:
+    q: nq numbers. Bodies fixed to the world are not included. The results are NaN if no moving body has a mass. out:
     four arrays, such as an earlier result.
 
     >>> quadruped = condyle.robots.quadruped()
@@ -664,16 +675,16 @@ def centroidal_map_rate(
     v: ArrayLike,
     out: tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> CentroidalMapRate:
-    """The centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
+    """Computes the centroidal momentum matrix Ag(q), its rate along v, and the momentum hg = Ag v, in O(n), as
     `CentroidalMapRate(Ag, dAg, hg, Ig, com, com_velocity, Jcom)`. The rate of hg is Ag a + dAg v.
 
-    q: nq numbers; v: nv. Bodies fixed to the world do not count. The results are not numbers if no moving body has a
-    mass. out: seven arrays, such as an earlier result.
+    q: nq numbers; v: nv. Bodies fixed to the world are not included. The results are NaN if no moving body has a mass.
+    out: seven arrays, such as an earlier result.
     """
 
 def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """The centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6 numbers
-    (kg m/s, then kg m²/s); O(n).
+    """Computes the centroidal momentum hg of the moving bodies, about their centre of mass and along the world's axes: 6
+    numbers (kg m/s, then kg m²/s); O(n).
 
     q: nq numbers; v: nv.
     """
@@ -681,16 +692,16 @@ def centroidal_momentum(model: Model, data: Data, q: ArrayLike, v: ArrayLike, ou
 def centroidal_momentum_rate(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """The rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m). It equals the weight and
-    the external forces about the centre of mass; O(n).
+    """Computes the rate of the centroidal momentum hg, along the world's axes: 6 numbers (N, then N m); O(n). It equals
+    the weight and the external forces, taken about the centre of mass.
 
     q: nq numbers; v, a: nv.
     """
 
 def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """The centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
+    """Computes the centre of mass c of the moving bodies in the world's frame, 3 numbers (m); O(n).
 
-    q: nq numbers. Bodies fixed to the world do not count. The result is not a number if no moving body has a mass.
+    q: nq numbers. Bodies fixed to the world are not included. The result is NaN if no moving body has a mass.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> com = condyle.com(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -701,30 +712,30 @@ def com(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _A
 def com_acceleration(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """The acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3 numbers
-    (m/s²); O(n).
+    """Computes the acceleration c̈ of the centre of mass of the moving bodies in the world's frame, without gravity, 3
+    numbers (m/s²); O(n).
 
     q: nq numbers; v, a: nv.
     """
 
 def com_jacobian(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """The Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
+    """Computes the Jacobian Jcom(q) of the centre of mass, (3, nv), with ċ = Jcom v; O(n).
 
     q: nq numbers. It is a part of `centroidal_map`.
     """
 
 def com_velocity(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """The velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
+    """Computes the velocity ċ of the centre of mass of the moving bodies in the world's frame, 3 numbers (m/s); O(n).
 
     q: nq numbers; v: nv.
     """
 
 def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> AllTerms:
-    """All terms of the equations of motion, from one pass to the tips and one back, in O(n depth), as
-    `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
+    """Computes all terms of the equations of motion in O(n depth), with one pass from the root to the tips and one back,
+    as `AllTerms(M, h, centroidal, kinetic_energy, potential_energy)`.
 
-    q: nq numbers; v: nv. The numbers are those of `crba`, `nonlinear_effects`, `centroidal_map_rate`,
-    `kinetic_energy` and `potential_energy`, up to rounding.
+    q: nq numbers; v: nv. Up to rounding, the numbers equal `crba`, `nonlinear_effects`, `centroidal_map_rate`,
+    `kinetic_energy` and `potential_energy`.
 
     >>> arm = condyle.robots.arm7()
     >>> terms = condyle.compute_all_terms(arm, condyle.Data(arm), [0.3] * 7, [0.1] * 7)
@@ -733,7 +744,7 @@ def compute_all_terms(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> A
     """
 
 def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """The kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
+    """Computes the kinetic energy T = ½ vᵀ M(q) v of the moving bodies and the rotors (J); O(n).
 
     q: nq numbers; v: nv.
 
@@ -744,13 +755,13 @@ def kinetic_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> floa
     """
 
 def mechanical_energy(model: Model, data: Data, q: ArrayLike, v: ArrayLike) -> float:
-    """The mechanical energy E = T + V (J); O(n).
+    """Computes the mechanical energy E = T + V (J); O(n).
 
     q: nq numbers; v: nv. Its rate is the power of the efforts and the external forces.
     """
 
 def potential_energy(model: Model, data: Data, q: ArrayLike) -> float:
-    """The potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
+    """Computes the potential energy V = −m gᵀ c(q) of the moving bodies under gravity (J), 0 at the world's origin; O(n).
 
     q: nq numbers.
     """
@@ -766,10 +777,12 @@ def _generate(
     inputs: list[str] = ...,
     shares: int | None = None,
 ) -> tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]:
-    """The code of functions of a robot: its name, its files, and its functions with their arguments and results."""
+    """Generates the code of functions of a robot; returns its name, its files, and its functions with their arguments and
+    results.
+    """
 
 def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = None) -> _Array:
-    """The tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers; of rotations the shortest one.
+    """Computes the tangent vector v = q₁ ⊖ q₀ with q₀ ⊕ v = q₁, nv numbers. For rotations it is the shortest such vector.
 
     q0, q1: nq numbers.
     """
@@ -777,20 +790,20 @@ def difference(model: Model, q0: ArrayLike, q1: ArrayLike, out: _Array | None = 
 def difference_jacobian(
     model: Model, d: ArrayLike, argument: Literal["from", "to"], out: _Array | None = None
 ) -> _Array:
-    """The Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. Of the positions it
-    needs only their difference.
+    """Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces: (nv, nv), block-diagonal. It depends
+    only on the difference of the positions.
 
     d: q₁ ⊖ q₀, nv numbers; argument: 'from' for q₀ or 'to' for q₁.
     """
 
 def distance(model: Model, q0: ArrayLike, q1: ArrayLike) -> float:
-    """The distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) count alike.
+    """Computes the distance ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) have equal weight.
 
     q0, q1: nq numbers.
     """
 
 def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """The position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
+    """Computes the position q ⊕ v that is reached from q with the velocity v after one unit of time, nq numbers.
 
     q: nq numbers; v: nv.
 
@@ -804,30 +817,31 @@ def integrate(model: Model, q: ArrayLike, v: ArrayLike, out: _Array | None = Non
 def integrate_jacobian(
     model: Model, v: ArrayLike, argument: Literal["position", "velocity"], out: _Array | None = None
 ) -> _Array:
-    """The Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not depend on q.
+    """Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces: (nv, nv), block-diagonal. It does not
+    depend on q.
 
     v: nv numbers; argument: 'position' for q or 'velocity' for v.
     """
 
 def interpolate(model: Model, q0: ArrayLike, q1: ArrayLike, t: float, out: _Array | None = None) -> _Array:
-    """The position q₀ ⊕ t (q₁ ⊖ q₀) on the way from q₀ (t = 0) to q₁ (t = 1) at a constant velocity, nq numbers.
+    """Computes the position q₀ ⊕ t (q₁ ⊖ q₀) on the path from q₀ (t = 0) to q₁ (t = 1) at constant velocity, nq numbers.
 
-    q0, q1: nq numbers; t: a number, beyond 0 and 1 too.
+    q0, q1: nq numbers; t: a number, which may be below 0 or above 1.
 
     >>> condyle.interpolate(condyle.robots.arm7(), [0.0] * 7, [1.0] * 7, 0.25)
     array([0.25, 0.25, 0.25, 0.25, 0.25, 0.25, 0.25])
     """
 
 def neutral(model: Model) -> _Array:
-    """The neutral position, nq numbers: zeros, and the identity for rotations.
+    """Returns the neutral position, nq numbers: zeros, and the identity for rotations.
 
     >>> condyle.neutral(condyle.robots.quadruped())[:7]
     array([0., 0., 0., 0., 0., 0., 1.])
     """
 
 def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """The position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument itself
-    stays as it is unless it is `out`.
+    """Returns the position q with its quaternions and its pairs (cos, sin) scaled to length 1, nq numbers. The argument
+    itself does not change unless it is `out`.
 
     q: nq numbers.
 
@@ -841,17 +855,17 @@ def normalize(model: Model, q: ArrayLike, out: _Array | None = None) -> _Array:
     """
 
 def random_configuration(model: Model, seed: int | None = None) -> _Array:
-    """A random position, nq numbers: uniform between its limits, within ±3 (rad, m) where a coordinate has no limits, and
-    over the whole group for rotations.
+    """Draws a random position, nq numbers: uniform between the limits, within ±3 (rad, m) for a coordinate without limits,
+    and uniform over the whole group for rotations.
 
-    seed: a number below 2⁶⁴; the same one gives the same position. None draws afresh.
+    seed: a number below 2⁶⁴; the same seed gives the same position. None draws a new seed from the system.
     """
 
 def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = None) -> _Array:
-    """The columns of X, tangent vectors at q ⊕ v, moved to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
+    """Moves the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: (∂(q ⊕ v)/∂q)⁻¹ X.
 
-    v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q itself: it is
-    `transport` with −v.
+    v: nv numbers; X: a matrix of nv rows. Pinocchio's `dIntegrateTransport` multiplies with ∂(q ⊕ v)/∂q instead: it
+    equals `transport` with −v.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> v = np.full(18, 0.1)
@@ -862,21 +876,23 @@ def transport(model: Model, v: ArrayLike, X: ArrayLike, out: _Array | None = Non
 
 @final
 class ConstraintSet:
-    """Constraints of one model: contacts and loops, and the scratch of `constrained_dynamics` and its like.
+    """Constraints of one model, contacts and loops, and the scratch memory of `constrained_dynamics` and similar
+    functions.
 
-    Make one set for each combination of contacts; the `Data` can be the same for all sets. As a `Data`, a set serves
+    Make one set for each combination of contacts; all sets may share one `Data`. Like a `Data`, a set may be used by
     one thread at a time.
 
-    With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found, so
-    that redundant constraints share the smallest forces; μ is small beside J M⁻¹ Jᵀ, as 1e-8. With μ = 0 one iteration
-    is exact, and rows that depend on earlier ones get no force. Source: Carpentier, Budhiraja, Mansard, Proximal and
-    sparse resolution of constrained dynamic equations (2021).
+    With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then again with the λ just found.
+    Redundant constraints then share the smallest forces. Choose μ small compared with J M⁻¹ Jᵀ, such as 1e-8. With μ =
+    0 one iteration is exact, and rows that depend on earlier rows get no force. Source: Carpentier, Budhiraja, Mansard,
+    Proximal and sparse resolution of constrained dynamic equations (2021).
 
-    model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: how many there are, always, 1 to
-    10000.
+    model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
+    to 10000, which is always reached.
 
-    Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, a reference frame is
-    'world', a gain is negative or not finite, a target is not finite or no placement, or two constraints are the same.
+    Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
+    the same. Also raises it if a reference frame is 'world', a gain is negative or not finite, a target is not finite,
+    or its placement is not a homogeneous matrix.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> feet = [condyle.ContactConstraint(foot, "point") for foot in ("LF_foot", "RH_foot")]
@@ -890,16 +906,16 @@ class ConstraintSet:
     ) -> ConstraintSet: ...
     @property
     def rows(self) -> int:
-        """The number of rows of J, and of numbers in λ."""
+        """The number of rows of J, which is also the length of λ."""
 
     def __len__(self, /) -> int: ...
     @staticmethod
     def _from_json(model: Model, text: str, mu: float, iterations: int) -> ConstraintSet: ...
     def jacobian(self, out: _Array | None = None) -> _Array:
-        """The Jacobian J of the constraints, (rows, nv), at the state of the last call for a single one."""
+        """Returns the Jacobian J of the constraints, (rows, nv), at the state of the last call for a single state."""
 
     def range(self, k: int) -> slice:
-        """The rows of constraint k, as a slice."""
+        """Returns the rows of constraint k, as a slice."""
 
     def set_target(
         self,
@@ -908,10 +924,10 @@ class ConstraintSet:
         velocity: ArrayLike | None = None,
         acceleration: ArrayLike | None = None,
     ) -> None:
-        """Changes the target of constraint k: where its frame should be and how it should move there. What is not given
-        stays as it is.
+        """Changes the target of constraint k: the placement of its frame and its motion there. Parts that are not given do
+        not change.
 
-        Raises `ModelError` for numbers that are not finite and a placement that is none; the old target then stays.
+        Raises `ModelError` for numbers that are not finite and for an invalid placement; the old target is kept then.
         """
 
 def constrained_dynamics(
@@ -924,11 +940,11 @@ def constrained_dynamics(
     f_ext: ArrayLike | None = None,
     out: Constrained | Sequence[_Array] | None = None,
 ) -> Constrained:
-    """Forward dynamics under constraints: the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) with the forces λ that
-    make J q̈ + γ = 0, as `Constrained(a, lambda_, residual, redundant)`.
+    """Computes the acceleration q̈ = M⁻¹ (τ − h + Jᵀ λ + Σ Jᵢᵀ f_ext,i) and the forces λ that make J q̈ + γ = 0 (forward
+    dynamics under constraints), as `Constrained(a, lambda_, residual, redundant)`.
 
     constraints: a `ConstraintSet`; q: nq numbers; v, tau: nv; f_ext: as for `rnea`. Constraints that contradict each
-    other, or themselves at a singular posture, give finite numbers and a residual.
+    other, or one that cannot be satisfied at a singular posture, give finite numbers and a residual.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), np.zeros(18)
@@ -949,12 +965,11 @@ def constrained_dynamics_derivatives(
     f_ext: ArrayLike | None = None,
     out: ConstrainedDerivatives | Sequence[_Array] | None = None,
 ) -> ConstrainedDerivatives:
-    """The result of `constrained_dynamics` and its derivatives with respect to q, v and τ, exact, as
+    """Computes the result of `constrained_dynamics` and its exact derivatives with respect to q, v and τ, as
     `ConstrainedDerivatives`.
 
-    constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving
-    with the bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier
-    result.
+    constraints: a `ConstraintSet`, whose targets are fixed; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces
+    move with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> touch = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -973,14 +988,14 @@ def constrained_dynamics_equations(
     f_ext: ArrayLike | None = None,
     out: ConstrainedEquations | Sequence[_Array] | None = None,
 ) -> ConstrainedEquations:
-    """The result of `constrained_dynamics` and the linear equations between changes of q, v, τ and the changes of q̈ and λ
-    that follow, as `ConstrainedEquations`:
+    """Computes the result of `constrained_dynamics` and the linear equations that relate changes of q, v and τ to the
+    changes of q̈ and λ, as `ConstrainedEquations`:
 
         M δq̈ − Jᵀ δλ + ∂τ/∂q δq + ∂τ/∂v δv = δτ,    J δq̈ + ∂γ/∂q δq + ∂γ/∂v δv = 0
 
-    These are the equations that `constrained_dynamics_derivatives` solves; nothing is inverted here. constraints: a
-    `ConstraintSet`, whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`, moving with the
-    bodies. ∂/∂q is taken in the tangent space. out: as many arrays as there are members, such as an earlier result.
+    `constrained_dynamics_derivatives` solves these equations; nothing is inverted here. constraints: a `ConstraintSet`,
+    whose targets are fixed and whose `jacobian` is J; q: nq numbers; v, tau: nv; f_ext: as for `rnea`; the forces move
+    with the bodies. ∂/∂q is taken in the tangent space. out: one array for each member, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> data, touch = condyle.Data(arm), condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -998,10 +1013,10 @@ def impulse_dynamics(
     restitution: float = 0.0,
     out: Impulse | Sequence[_Array] | None = None,
 ) -> Impulse:
-    """The velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as
-    `Impulse(v, lambda_, residual, redundant)`.
+    """Computes the velocity v⁺ = v + M⁻¹ Jᵀ Λ after an impact, with the impulses Λ that make J v⁺ = −ε J v, as `Impulse(v,
+    lambda_, residual, redundant)`.
 
-    constraints: a `ConstraintSet`, of which gains, velocities and accelerations do not count; q: nq numbers; v: nv;
+    constraints: a `ConstraintSet`, whose gains, velocities and accelerations are ignored; q: nq numbers; v: nv;
     restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy.
 
     >>> quadruped = condyle.robots.quadruped()
@@ -1021,11 +1036,11 @@ def impulse_dynamics_derivatives(
     restitution: float = 0.0,
     out: ImpulseDerivatives | Sequence[_Array] | None = None,
 ) -> ImpulseDerivatives:
-    """The result of `impulse_dynamics` and its derivatives with respect to q and the velocity before the impact, exact, as
-    `ImpulseDerivatives`.
+    """Computes the result of `impulse_dynamics` and its exact derivatives with respect to q and the velocity before the
+    impact, as `ImpulseDerivatives`.
 
-    constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: as many arrays
-    as there are members, such as an earlier result.
+    constraints, q, v, restitution: as for `impulse_dynamics`. ∂/∂q is taken in the tangent space. out: one array for
+    each member, such as an earlier result.
 
     >>> arm = condyle.robots.arm7()
     >>> hit = condyle.ConstraintSet(arm, [condyle.ContactConstraint("tool", "point")])
@@ -1036,14 +1051,14 @@ def impulse_dynamics_derivatives(
 
 @final
 class Data:
-    """The memory that algorithms compute in, for one model: made once, and used by one thread at a time.
+    """Scratch memory of the algorithms for one model: made once, and used by one thread at a time.
 
-    It serves all models of the same bodies and joints, whatever their gravity, armature or inertias. No algorithm reads
-    what another left behind, so calls may come in any order. To use one from two threads at once is a `RuntimeError`;
-    with another robot's model, a `ValueError`.
+    It serves all models with the same bodies and joints, whatever their gravity, armature or inertias. No algorithm
+    reads results of an earlier one, so calls may come in any order. Use from two threads at once is a `RuntimeError`;
+    use with another robot's model is a `ValueError`.
 
-    model: the robot; threads: the number of threads for calls with many states, q of shape (N, nq), which also compute
-    several states side by side in vector registers, and release the interpreter's lock; at most 1024.
+    model: the robot; threads: the number of threads for calls with many states (q of shape (N, nq)), at most 1024. Such
+    calls also compute several states at once in SIMD lanes, and release the interpreter's lock.
 
     >>> arm = condyle.robots.arm7()
     >>> condyle.Data(arm)
@@ -1062,11 +1077,12 @@ def aba_hessian(
     f_ext: ArrayLike | None = None,
     out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> AbaHessian:
-    """The Hessian of λᵀ q̈(q, v, τ), q̈ of `aba`, exact, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv, nv); the
-    other blocks are zero.
+    """Computes the exact Hessian of λᵀ q̈(q, v, τ), with q̈ of `aba`, as `AbaHessian(dqdq, dvdq, dvdv, dtaudq)`, each (nv,
+    nv); the other blocks are zero.
 
-    q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
-    derivative by v_j and q_k, of dtaudq by τ_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+    q: nq numbers; v, tau, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is
+    the derivative with respect to v_j and q_k, entry [j, k] of dtaudq with respect to τ_j and q_k. It is the Hessian
+    with respect to δ at `integrate(q, δ)`.
     """
 
 def aba_input_derivative(
@@ -1079,8 +1095,8 @@ def aba_input_derivative(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """The derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers that is neither q nor v nor τ; exact, at
-    most O(n²) a column.
+    """Computes the derivative ∂q̈/∂(input) of `aba`, (nv, k), for an input of k numbers other than q, v and τ; exact, at
+    most O(n²) per column.
 
     q: nq numbers; v, tau: nv; wrt: as for `rnea_input_derivative`; f_ext: as for `rnea`.
 
@@ -1101,8 +1117,8 @@ def body_acceleration_derivatives(
     reference: _Reference = "local",
     out: tuple[_Array, _Array] | list[_Array] | None = None,
 ) -> tuple[_Array, _Array]:
-    """The derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
-    `frame_acceleration_derivatives` of its own frame.
+    """Computes the derivatives ∂a/∂q and ∂a/∂v of a body's spatial acceleration, `(da_dq, da_dv)`, each (6, nv):
+    `frame_acceleration_derivatives` of the body's own frame.
 
     q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1116,7 +1132,7 @@ def body_velocity_derivative(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of its own frame.
+    """Computes the derivative ∂v/∂q of a body's velocity, (6, nv): `frame_velocity_derivative` of the body's own frame.
 
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1129,10 +1145,10 @@ def centroidal_derivatives(
     a: ArrayLike,
     out: tuple[_Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> CentroidalDerivatives:
-    """The derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and a, exact, in
-    O(n), as `CentroidalDerivatives`.
+    """Computes the exact derivatives of the centroidal momentum, its rate and the centre of mass with respect to q, v and
+    a in O(n), as `CentroidalDerivatives`.
 
-    q: nq numbers; v, a: nv. Gravity is not among the accelerations.
+    q: nq numbers; v, a: nv. The accelerations do not include gravity.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data, q, zero = condyle.Data(quadruped), condyle.neutral(quadruped), [0.0] * 18
@@ -1144,7 +1160,7 @@ def centroidal_derivatives(
 def coriolis_derivatives(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: tuple[_Array, _Array] | list[_Array] | None = None
 ) -> CoriolisDerivatives:
-    """The derivatives of C(q, v) v, the Coriolis and centrifugal efforts, exact, in O(n depth), as
+    """Computes the exact derivatives of C(q, v) v, the Coriolis and centrifugal efforts, in O(n depth), as
     `CoriolisDerivatives(dq, dv)`, each (nv, nv).
 
     q: nq numbers; v: nv.
@@ -1163,8 +1179,8 @@ def energy_derivatives(
     v: ArrayLike,
     out: tuple[_Array, _Array, _Array] | list[_Array] | None = None,
 ) -> EnergyDerivatives:
-    """The derivatives of kinetic energy T and potential energy V, exact, in O(n), as
-    `EnergyDerivatives(dT_dq, dT_dv, dV_dq)`, nv numbers each.
+    """Computes the exact derivatives of kinetic energy T and potential energy V in O(n), as `EnergyDerivatives(dT_dq,
+    dT_dv, dV_dq)`, nv numbers each.
 
     q: nq numbers; v: nv.
     """
@@ -1179,10 +1195,10 @@ def frame_acceleration_derivatives(
     reference: _Reference = "local",
     out: tuple[_Array, _Array] | list[_Array] | None = None,
 ) -> tuple[_Array, _Array]:
-    """The derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative by
-    the joint accelerations is the frame's Jacobian.
+    """Computes the derivatives ∂a/∂q and ∂a/∂v of a frame's spatial acceleration, `(da_dq, da_dv)`, each (6, nv). The
+    derivative with respect to the joint accelerations is the frame's Jacobian.
 
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
     """
 
 def frame_classical_acceleration_derivatives(
@@ -1195,10 +1211,10 @@ def frame_classical_acceleration_derivatives(
     reference: _Reference = "local",
     out: tuple[_Array, _Array] | list[_Array] | None = None,
 ) -> tuple[_Array, _Array]:
-    """The derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). Its derivative
-    by the joint accelerations is the frame's Jacobian.
+    """Computes the derivatives ∂a/∂q and ∂a/∂v of a frame's classical acceleration, `(da_dq, da_dv)`, each (6, nv). The
+    derivative with respect to the joint accelerations is the frame's Jacobian.
 
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
     """
 
 def frame_velocity_derivative(
@@ -1210,9 +1226,10 @@ def frame_velocity_derivative(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. Its derivative by v is the frame's Jacobian.
+    """Computes the derivative ∂v/∂q of a frame's velocity, (6, nv), linear rows first. The derivative with respect to v is
+    the frame's Jacobian.
 
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`.
 
     >>> arm = condyle.robots.arm7()
     >>> dv_dq = condyle.frame_velocity_derivative(arm, condyle.Data(arm), [0.3] * 7, [0.5] * 7, "tool")
@@ -1230,11 +1247,12 @@ def rnea_hessian(
     f_ext: ArrayLike | None = None,
     out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> RneaHessian:
-    """The Hessian of λᵀ τ(q, v, a), τ of `rnea`, exact, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv, dadq)`, each
-    (nv, nv); the other blocks are zero.
+    """Computes the exact Hessian of λᵀ τ(q, v, a), with τ of `rnea`, in O(n depth), as `RneaHessian(dqdq, dvdq, dvdv,
+    dadq)`, each (nv, nv); the other blocks are zero.
 
-    q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`, moving with the bodies. Entry [j, k] of dvdq is the
-    derivative by v_j and q_k, of dadq by a_j and q_k. It is the Hessian with respect to δ at `integrate(q, δ)`.
+    q: nq numbers; v, a, lambda_: nv; f_ext: as for `rnea`; the forces move with the bodies. Entry [j, k] of dvdq is the
+    derivative with respect to v_j and q_k, entry [j, k] of dadq with respect to a_j and q_k. It is the Hessian with
+    respect to δ at `integrate(q, δ)`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -1253,13 +1271,13 @@ def rnea_input_derivative(
     f_ext: ArrayLike | None = None,
     out: _Array | None = None,
 ) -> _Array:
-    """The derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers that is neither q nor v nor a; exact, at
-    most O(n) a column.
+    """Computes the derivative ∂τ/∂(input) of `rnea`, (nv, k), for an input of k numbers other than q, v and a; exact, at
+    most O(n) per column.
 
-    q: nq numbers; v, a: nv; wrt: 'gravity', the acceleration of free fall, 3 numbers; 'armature', 'damping', nv each
-    (the latter as where `passive_torque` is added to τ); ('force', body), the external force on a body, 6, in its
-    frame; ('inertia', body), its 10 inertial parameters; or ('friction', smoothing), nv, for the smoothing of
-    `passive_torque`; f_ext: as for `rnea`.
+    q: nq numbers; v, a: nv; wrt: the input; f_ext: as for `rnea`. Values of wrt: 'gravity', the acceleration of free
+    fall, 3 numbers; 'armature', 'damping', nv each (damping counts as if `passive_torque` is added to τ); ('force',
+    body), the external force on a body, 6, in its frame; ('inertia', body), its 10 inertial parameters; or ('friction',
+    smoothing), nv, for the smoothing of `passive_torque`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, zero = condyle.Data(arm), [0.3] * 7, [0.0] * 7
@@ -1277,11 +1295,11 @@ def rnea_second_derivatives(
     f_ext: ArrayLike | None = None,
     out: tuple[_Array, _Array, _Array, _Array] | list[_Array] | None = None,
 ) -> RneaSecondDerivatives:
-    """The second derivatives of `rnea` as full tensors, exact, in O(n² depth), as
-    `RneaSecondDerivatives(dqdq, dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
+    """Computes the exact second derivatives of `rnea` as full tensors in O(n² depth), as `RneaSecondDerivatives(dqdq,
+    dvdq, dvdv, dadq)`, each (nv, nv, nv): member[i] is the Hessian of τ_i.
 
-    q: nq numbers; v, a: nv; f_ext: as for `rnea`. The order within each is that of `rnea_hessian`, which gives them
-    contracted with a vector, many times faster.
+    q: nq numbers; v, a: nv; f_ext: as for `rnea`. Each Hessian has the index order of `rnea_hessian`. That function
+    returns the tensors contracted with a vector, and is many times faster.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a, weights = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7, np.arange(7.0)
@@ -1294,27 +1312,30 @@ def rnea_second_derivatives(
 def static_torque_derivative(
     model: Model, data: Data, q: ArrayLike, f_ext: ArrayLike | None = None, out: _Array | None = None
 ) -> _Array:
-    """The derivative ∂τ/∂q of `static_torque`, (nv, nv), and without forces that of `gravity`; exact, in O(n depth).
+    """Computes the exact derivative ∂τ/∂q of `static_torque`, (nv, nv), in O(n depth). Without external forces it is also
+    the derivative of `gravity`.
 
-    q: nq numbers; f_ext: as for `rnea`, moving with the bodies.
+    q: nq numbers; f_ext: as for `rnea`; the forces move with the bodies.
     """
 
 def _borrowed(capsule: Any) -> tuple[int, tuple[int, int, int], list[int], list[int] | None, tuple[int, int], int]:
-    """The array that a capsule of DLPack lends, for as long as the capsule is there: it is not taken over."""
+    """Describes the array that a DLPack capsule lends. It is valid as long as the capsule exists; ownership is not taken."""
 
 def _lend(
     owner: Any, address: int, bits: int, shape: list[int], strides: list[int], device: int, versioned: bool
 ) -> Any:
-    """A capsule of DLPack that lends floating-point numbers on a CUDA device, whose owner stays until they are given back."""
+    """Makes a DLPack capsule that lends floating-point numbers on a CUDA device; their owner is kept alive until they are
+    returned.
+    """
 
 @final
 class Cholesky:
     """The factor M = L Lᵀ of any symmetric positive definite matrix.
 
-    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same verbs
+    `factorize` and `inverse` cost O(n³), `solve` O(n²). For the inertia matrix of a robot, `Ltdl` has the same methods
     and uses the zeros. Source: Golub and Van Loan, Matrix Computations (4th edition), algorithm 4.2.1.
 
-    n: the rows of M, at most 4096.
+    n: the number of rows of M, at most 4096.
 
     >>> factor = condyle.Cholesky(2)
     >>> factor.factorize([[4.0, 2.0], [2.0, 5.0]])
@@ -1328,39 +1349,40 @@ class Cholesky:
         """The factor L, lower triangular."""
 
     def factorize(self, M: ArrayLike) -> None:
-        """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
+        """Computes the factor of M, a symmetric positive definite matrix; the docstring of the class has the cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
-        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
+        M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception raised
+        by a signal handler, such as KeyboardInterrupt, stops the computation between rows; no factor exists
+        then.
         """
 
     def inverse(self, out: _Array | None = None) -> _Array:
-        """The inverse M⁻¹, both triangles filled."""
+        """Returns the inverse M⁻¹, both triangles filled."""
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
-        """The solution x of M x = b, as many numbers as M has rows.
+        """Solves M x = b; returns x, one number for each row of M.
 
-        b: as many numbers.
+        b: one number for each row of M.
         """
 
     def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
-        """The solution X of M X = B, column by column.
+        """Solves M X = B; returns X, column by column.
 
-        B: a matrix of as many rows as M has.
+        B: a matrix with as many rows as M.
         """
 
 @final
 class DivideConquer:
     """Forward dynamics by the divide-and-conquer articulated-body algorithm: the plan for one model, and its memory.
 
-    The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps; but
-    a join of two pieces costs some six times as much as the elimination of a body. With two threads, and as many runs
-    as threads, it is faster than `aba` from some 200 bodies on; with one thread it never is. With joints that share
-    coordinates (mimic) the passes run once for the robot with all joints free, and once more for each of those joints.
-    The bits are the same for any number of threads. Source: Featherstone, A divide-and-conquer articulated-body
-    algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
+    The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps, but
+    joining two pieces costs about six times as much as eliminating a body. With two threads, and as many runs as
+    threads, it is faster than `aba` from about 200 bodies on; with one thread it is always slower. With joints that
+    share coordinates (mimic), the passes run once for the robot with all joints free, and once more for each of these
+    joints. The results are bit-identical for any number of threads. Source: Featherstone, A divide-and-conquer
+    articulated-body algorithm for parallel O(log(n)) calculation of rigid-body dynamics (1999).
 
-    model: the robot; grain: the greatest number of bodies in a run.
+    model: the robot; grain: the maximum number of bodies in a run.
 
     >>> arm = condyle.robots.arm7()
     >>> divided = condyle.DivideConquer(arm, grain=1)
@@ -1374,7 +1396,7 @@ class DivideConquer:
     def __new__(cls, model: Model, grain: int) -> DivideConquer: ...
     @property
     def size(self) -> AssemblySize:
-        """The work of the assembly, and its number of levels that wait for one another, as `AssemblySize`."""
+        """The work of the assembly, and the number of its levels, which run one after the other, as `AssemblySize`."""
 
     def aba(
         self,
@@ -1385,22 +1407,22 @@ class DivideConquer:
         f_ext: ArrayLike | None = None,
         out: _Array | None = None,
     ) -> _Array:
-        """The acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
+        """Computes the acceleration q̈ of `aba`, up to rounding, nv numbers, in O(n) work and O(log n + grain) steps.
 
-        model: the one that was planned for, or another one of the same bodies and joints; q: nq numbers; v, tau: nv;
+        model: the planned model, or another one with the same bodies and joints; q: nq numbers; v, tau: nv;
         f_ext: as for `rnea`.
         """
 
 @final
 class Ltdl:
-    """The factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
+    """A factor M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
     diagonal.
 
-    With depth d of the tree (columns on the way to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
-    `inverse` O(n² d); a chain has d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
+    With depth d of the tree (columns on the path to the root) and n = nv, `factorize` costs O(n d²), `solve` O(n d),
+    `inverse` O(n² d); for a chain d = n. Source: Featherstone, Efficient factorization of the joint-space inertia
     matrix for branched kinematic trees (2005).
 
-    model: the robot whose zeros M has.
+    model: the robot, which defines the zeros of M.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> M = condyle.crba(quadruped, condyle.Data(quadruped), condyle.neutral(quadruped))
@@ -1415,7 +1437,7 @@ class Ltdl:
     def __new__(cls, model: Model) -> Ltdl: ...
     @property
     def diagonal(self) -> _Array:
-        """The diagonal D, in the `order` of the places."""
+        """The diagonal D, in the `order` of the coordinates."""
 
     @property
     def nonzeros(self) -> int:
@@ -1423,44 +1445,47 @@ class Ltdl:
 
     @property
     def order(self) -> list[int]:
-        """The coordinates in their order from the root to the tips: they are eliminated last to first.
+        """The coordinates in their order from the root to the tips; they are eliminated in reverse order.
 
         It is 0, 1, 2, … unless joints share coordinates.
         """
 
     def factorize(self, M: ArrayLike) -> None:
-        """Computes the factor of M, a symmetric positive definite matrix; the class says at which cost.
+        """Computes the factor of M, a symmetric positive definite matrix; the docstring of the class has the cost.
 
-        Nothing is checked: if M is not positive definite, solutions are wrong or not finite. What a handler of a
-        signal raises, as KeyboardInterrupt, ends it between rows; there is then no factor.
+        M is not checked: if it is not positive definite, solutions are wrong or not finite. An exception raised
+        by a signal handler, such as KeyboardInterrupt, stops the computation between rows; no factor exists
+        then.
         """
 
     def inverse(self, out: _Array | None = None) -> _Array:
-        """The inverse M⁻¹, both triangles filled."""
+        """Returns the inverse M⁻¹, both triangles filled."""
 
     def row(self, k: int) -> list[tuple[int, float]]:
-        """Row k of L in the `order`, entry by entry from the diagonal's left to the root: (place, value)."""
+        """Returns the off-diagonal entries of row k of L, from the diagonal to the root, as (index, value). Both indices
+        count in `order`.
+        """
 
     def solve(self, b: ArrayLike, out: _Array | None = None) -> _Array:
-        """The solution x of M x = b, as many numbers as M has rows.
+        """Solves M x = b; returns x, one number for each row of M.
 
-        b: as many numbers.
+        b: one number for each row of M.
         """
 
     def solve_matrix(self, B: ArrayLike, out: _Array | None = None) -> _Array:
-        """The solution X of M X = B, column by column.
+        """Solves M X = B; returns X, column by column.
 
-        B: a matrix of as many rows as M has.
+        B: a matrix with as many rows as M.
         """
 
 @final
 class HyperDual:
-    """A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0: it knows its derivatives in two
-    directions, and the second derivative by both.
+    """A hyper-dual number re + eps1 ε₁ + eps2 ε₂ + eps1eps2 ε₁ε₂ with ε₁² = ε₂² = 0. It carries its derivatives in two
+    directions, and the mixed second derivative.
 
-    Arrays of them are NumPy arrays of objects; arithmetic and NumPy's elementary functions work on these, and so do
-    all functions of a model and a state, which then return such arrays. Comparisons look at `re`. `condyle.jacobian`,
-    `gradient` and `hessian` make them and read the derivatives.
+    Store them in NumPy arrays of objects. Arithmetic and NumPy's elementary functions work on these, and so do all
+    functions of a model and a state, which then return such arrays. Comparisons use `re`. `condyle.jacobian`,
+    `gradient` and `hessian` create these numbers and read the derivatives.
 
     Source: Fike and Alonso, The development of hyper-dual numbers for exact second-derivative calculations (2011).
 
@@ -1477,7 +1502,7 @@ class HyperDual:
 
     @property
     def eps1eps2(self) -> float:
-        """The second derivative by both."""
+        """The mixed second derivative."""
 
     @property
     def eps2(self) -> float:
@@ -1502,7 +1527,7 @@ class HyperDual:
     def __pow__(self, value: _Number, mod: None = None, /) -> HyperDual: ...
     def __radd__(self, value: _Number, /) -> HyperDual: ...
     def __reduce__(self) -> tuple[Any, ...]:
-        """The parts of a pickle."""
+        """Returns the parts of a pickle."""
 
     def __rmul__(self, value: _Number, /) -> HyperDual: ...
     def __rpow__(self, value: _Number, mod: None = None, /) -> HyperDual: ...
@@ -1511,81 +1536,81 @@ class HyperDual:
     def __sub__(self, value: _Number, /) -> HyperDual: ...
     def __truediv__(self, value: _Number, /) -> HyperDual: ...
     def arccos(self) -> HyperDual:
-        """The angle whose cosine is self."""
+        """Returns the angle whose cosine is self."""
 
     def arccosh(self) -> HyperDual:
-        """The number whose hyperbolic cosine is self."""
+        """Returns the number whose hyperbolic cosine is self."""
 
     def arcsin(self) -> HyperDual:
-        """The angle whose sine is self."""
+        """Returns the angle whose sine is self."""
 
     def arcsinh(self) -> HyperDual:
-        """The number whose hyperbolic sine is self."""
+        """Returns the number whose hyperbolic sine is self."""
 
     def arctan(self) -> HyperDual:
-        """The angle whose tangent is self."""
+        """Returns the angle whose tangent is self."""
 
     def arctan2(self, x: _Number) -> HyperDual:
-        """The angle of the point (x, self) in the plane."""
+        """Returns the angle of the point (x, self) in the plane."""
 
     def arctanh(self) -> HyperDual:
-        """The number whose hyperbolic tangent is self."""
+        """Returns the number whose hyperbolic tangent is self."""
 
     def cbrt(self) -> HyperDual:
-        """The cubic root of self."""
+        """Returns the cubic root of self."""
 
     def cos(self) -> HyperDual:
-        """The cosine of self."""
+        """Returns the cosine of self."""
 
     def cosh(self) -> HyperDual:
-        """The hyperbolic cosine of self."""
+        """Returns the hyperbolic cosine of self."""
 
     def exp(self) -> HyperDual:
-        """The exponential of self, e to the power of self."""
+        """Returns the exponential of self, e to the power of self."""
 
     def exp2(self) -> HyperDual:
-        """The power of 2 with exponent self."""
+        """Returns the power of 2 with exponent self."""
 
     def expm1(self) -> HyperDual:
-        """The exponential of self, minus 1."""
+        """Returns the exponential of self, minus 1."""
 
     def fabs(self) -> HyperDual:
-        """The absolute value of self."""
+        """Returns the absolute value of self."""
 
     def hypot(self, other: _Number) -> HyperDual:
-        """The hypotenuse √(self² + other²)."""
+        """Returns the hypotenuse √(self² + other²)."""
 
     def log(self) -> HyperDual:
-        """The natural logarithm of self."""
+        """Returns the natural logarithm of self."""
 
     def log10(self) -> HyperDual:
-        """The logarithm of self to the base 10."""
+        """Returns the logarithm of self to the base 10."""
 
     def log1p(self) -> HyperDual:
-        """The natural logarithm of 1 + self."""
+        """Returns the natural logarithm of 1 + self."""
 
     def log2(self) -> HyperDual:
-        """The logarithm of self to the base 2."""
+        """Returns the logarithm of self to the base 2."""
 
     def sin(self) -> HyperDual:
-        """The sine of self."""
+        """Returns the sine of self."""
 
     def sinh(self) -> HyperDual:
-        """The hyperbolic sine of self."""
+        """Returns the hyperbolic sine of self."""
 
     def sqrt(self) -> HyperDual:
-        """The square root of self."""
+        """Returns the square root of self."""
 
     def tan(self) -> HyperDual:
-        """The tangent of self."""
+        """Returns the tangent of self."""
 
     def tanh(self) -> HyperDual:
-        """The hyperbolic tangent of self."""
+        """Returns the hyperbolic tangent of self."""
 
 def check(inertia: Inertia) -> None:
-    """A check that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
+    """Checks that a body of positive density can have this inertia, J ≻ 0; raises `NotPhysicalError` otherwise.
 
-    Point masses, rods and plates are at the border, without volume, and are refused.
+    Point masses, rods and plates have no volume; they lie on the boundary, and are refused.
 
     >>> from condyle import inertial_parameters
     >>> inertial_parameters.check(condyle.Inertia.from_com(0.0, np.zeros(3), np.eye(3)))
@@ -1595,8 +1620,8 @@ def check(inertia: Inertia) -> None:
     """
 
 def from_inertia(inertia: Inertia) -> _Array:
-    """The ten parameters π of an `Inertia`: mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
-    inertia about the origin, 10 numbers.
+    """Returns the ten parameters π of an `Inertia`, 10 numbers: mass, mass times centre of mass, and xx, xy, yy, xz, yz,
+    zz of the rotational inertia about the origin.
 
     >>> from condyle import inertial_parameters
     >>> I = condyle.Inertia.from_com(2.0, [0.0, 0.0, 0.5], 0.1 * np.eye(3))
@@ -1605,19 +1630,20 @@ def from_inertia(inertia: Inertia) -> _Array:
     """
 
 def from_log_cholesky(theta: ArrayLike) -> Inertia:
-    """The `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of `log_cholesky`.
+    """Returns the `Inertia` with the log-Cholesky parameters θ, physical for all values of θ; the inverse of
+    `log_cholesky`.
 
     theta: 10 numbers; α within ±32 and dᵢ within ±64.
     """
 
 def log_cholesky(inertia: Inertia) -> _Array:
-    """The log-Cholesky parameters θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃) of a physical inertia. Any ten numbers
-    are those of exactly one physical inertia.
+    """Returns the log-Cholesky parameters θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃) of a physical inertia. Every
+    vector of ten numbers belongs to exactly one physical inertia.
 
-    α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). With them an identification needs no
-    constraints. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
+    α = ½ ln m; dᵢ: logarithms (of m); s: m; t: the centre of mass (m). They make identification an unconstrained
+    problem. Source: Rucker and Wensing, Smooth parameterization of rigid-body inertia (2022).
 
-    Raises `NotPhysicalError`.
+    Raises `NotPhysicalError` for an inertia that is not physical.
 
     >>> from condyle import inertial_parameters
     >>> pi = condyle.robots.arm7().inertial_parameters[:10]
@@ -1627,9 +1653,10 @@ def log_cholesky(inertia: Inertia) -> _Array:
     """
 
 def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
-    """The Jacobian ∂π/∂θ of the ten parameters by the log-Cholesky parameters, (10, 10), never singular.
+    """Returns the Jacobian ∂π/∂θ of the ten parameters with respect to the log-Cholesky parameters, (10, 10), never
+    singular.
 
-    theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the slope of the efforts in θ.
+    theta: 10 numbers. With a regressor Y, Y ∂π/∂θ is the derivative of the efforts with respect to θ.
 
     >>> from condyle import inertial_parameters
     >>> inertial_parameters.log_cholesky_jacobian(np.zeros(10))[0, 0].item()  # m = e²ᵅ
@@ -1637,12 +1664,12 @@ def log_cholesky_jacobian(theta: ArrayLike) -> _Array:
     """
 
 def pseudo_inertia(inertia: Inertia) -> _Array:
-    """The pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m², kg m and
-    kg.
+    """Returns the pseudo-inertia J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): (4, 4), in kg m²,
+    kg m and kg.
 
-    Linear in the parameters; positive definite if and only if a body of positive density can have this inertia. Source:
-    Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter identification
-    (2018).
+    J is linear in the parameters. It is positive definite if and only if a body of positive density can have this
+    inertia. Source: Wensing, Kim, Slotine, Linear matrix inequalities for physically consistent inertial parameter
+    identification (2018).
 
     >>> from condyle import inertial_parameters
     >>> J = inertial_parameters.pseudo_inertia(condyle.robots.arm7().inertias[3])
@@ -1651,14 +1678,14 @@ def pseudo_inertia(inertia: Inertia) -> _Array:
     """
 
 def to_inertia(pi: ArrayLike) -> Inertia:
-    """The `Inertia` with the ten parameters π; the inverse of `from_inertia`.
+    """Returns the `Inertia` with the ten parameters π; the inverse of `from_inertia`.
 
     pi: 10 numbers.
     """
 
 @final
 class Joint:
-    """The kind of a joint, with its axis and pitch where it has them.
+    """The kind of a joint, with its axis and pitch if it has them.
 
     | | q | v |
     | --- | --- | --- |
@@ -1669,7 +1696,7 @@ class Joint:
     | `translation` | 3 | 3 |
     | `free_flyer` | 7: position, quaternion | 6: linear, angular, in the body |
 
-    An axis is a vector in the body's frame, of any length but 0.
+    An axis is a vector in the body's frame, of any nonzero length.
 
     >>> condyle.Joint.helical([0.0, 0.0, 1.0], pitch=0.1).nv
     1
@@ -1685,45 +1712,45 @@ class Joint:
 
     @property
     def nv(self) -> int:
-        """The number of its degrees of freedom: of the numbers in its velocity."""
+        """The number of its degrees of freedom, which is the number of its coordinates in v."""
 
     @property
     def pitch(self) -> float | None:
-        """The metres along the axis for each radian about it; None if the joint is no screw."""
+        """The metres along the axis per radian about it; None unless the joint is helical."""
 
     @staticmethod
     def continuous(axis: ArrayLike) -> Joint:
-        """A joint with one angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
+        """Returns a joint with one angle about an axis, without limits: q = [cos θ, sin θ], v = [θ̇]."""
 
     @staticmethod
     def free_flyer() -> Joint:
-        """A joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's
-        frame.
+        """Returns a joint that leaves its body free: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the
+        body's frame.
         """
 
     @staticmethod
     def helical(axis: ArrayLike, pitch: float) -> Joint:
-        """A screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis for each radian about it."""
+        """Returns a screw joint: q = [θ], v = [θ̇], with `pitch` metres along the axis per radian about it."""
 
     @staticmethod
     def planar() -> Joint:
-        """A joint that moves in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
+        """Returns a joint that moves in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇]."""
 
     @staticmethod
     def prismatic(axis: ArrayLike) -> Joint:
-        """A joint with one length along an axis: q = [d], v = [ḋ]."""
+        """Returns a joint with one length along an axis: q = [d], v = [ḋ]."""
 
     @staticmethod
     def revolute(axis: ArrayLike) -> Joint:
-        """A joint with one angle about an axis: q = [θ], v = [θ̇]."""
+        """Returns a joint with one angle about an axis: q = [θ], v = [θ̇]."""
 
     @staticmethod
     def spherical() -> Joint:
-        """A ball joint: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
+        """Returns a ball joint: q = quaternion (x, y, z, w), v = angular velocity in the body's frame."""
 
     @staticmethod
     def translation() -> Joint:
-        """A joint with three lengths: q = [x, y, z], v = q̇."""
+        """Returns a joint with three lengths: q = [x, y, z], v = q̇."""
 
 def body_acceleration(
     model: Model,
@@ -1735,8 +1762,8 @@ def body_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of its
-    own frame; O(n).
+    """Computes the spatial acceleration of a body, 6 numbers (m/s², then rad/s²), without gravity: `frame_acceleration` of
+    its own frame; O(n).
 
     q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1751,8 +1778,8 @@ def body_classical_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its own
-    frame; O(n).
+    """Computes the classical acceleration of a body, 6 numbers (m/s², then rad/s²): `frame_classical_acceleration` of its
+    own frame; O(n).
 
     q: nq numbers; v, a: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1760,9 +1787,9 @@ def body_classical_acceleration(
 def body_jacobian(
     model: Model, data: Data, q: ArrayLike, body: str | int, reference: _Reference = "local", out: _Array | None = None
 ) -> _Array:
-    """The Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
+    """Computes the Jacobian J of a body, (6, nv), linear rows first: the velocity of the body is J v.
 
-    q: nq numbers; body: its number or its joint's name, 0 being the world; reference: as for `frame_jacobian`, of the
+    q: nq numbers; body: its index or its joint's name, 0 being the world; reference: as for `frame_jacobian`, for the
     body's own frame.
 
     >>> arm = condyle.robots.arm7()
@@ -1781,7 +1808,7 @@ def body_jacobian_rate(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
+    """Computes the rate dJ/dt of a body's Jacobian along v, (6, nv): `frame_jacobian_rate` of its own frame.
 
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
@@ -1789,7 +1816,7 @@ def body_jacobian_rate(
 def body_point_jacobian(
     model: Model, data: Data, q: ArrayLike, body: str | int, point: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """The Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
+    """Computes the Jacobian J of a point of a body, (3, nv): `frame_point_jacobian` of the body's own frame.
 
     q: nq numbers; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
     """
@@ -1797,8 +1824,8 @@ def body_point_jacobian(
 def body_point_velocity(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, body: str | int, point: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """The velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of the body's own
-    frame.
+    """Computes the velocity of a point of a body along the axes of the world, 3 numbers (m/s): `frame_point_velocity` of
+    the body's own frame.
 
     q: nq numbers; v: nv; body: as for `body_jacobian`; point: in the frame of the body, 3 numbers (m).
     """
@@ -1812,16 +1839,16 @@ def body_velocity(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
+    """Computes the velocity of a body, 6 numbers (m/s, then rad/s): `frame_velocity` of its own frame; O(n).
 
     q: nq numbers; v: nv; body: as for `body_jacobian`; reference: as for `frame_jacobian`.
     """
 
 def forward_kinematics(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """The pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
+    """Computes the pose of each body in the world as a homogeneous matrix: (nbodies, 4, 4); O(n).
 
-    q: nq numbers. Body i is the one that joint i carries, in the frame that the URDF gives it; body 0 is the world.
-    A frame's pose is that of its body times its placement: `poses[f.body] @ f.placement`; or see `frame_placement`.
+    q: nq numbers. Joint i carries body i, whose frame is the one in the URDF; body 0 is the world. The pose of a frame
+    f is its body's pose times its placement: `poses[f.body] @ f.placement`. See also `frame_placement`.
 
     >>> quadruped = condyle.robots.quadruped()
     >>> data = condyle.Data(quadruped)
@@ -1839,10 +1866,10 @@ def frame_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its spatial
-    velocity as seen from the world, expressed in the reference; O(n).
+    """Computes the spatial acceleration of a frame, 6 numbers (m/s², then rad/s²), without gravity: the rate of its
+    spatial velocity as seen from the world, expressed in the reference; O(n).
 
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
     """
 
 def frame_classical_acceleration(
@@ -1855,11 +1882,11 @@ def frame_classical_acceleration(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the reference
-    (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the frame's
-    origin; O(n).
+    """Computes the classical acceleration of a frame, 6 numbers: v̇ + ω × v of the body's point at the origin of the
+    reference (m/s²), then the angular acceleration (rad/s²). In 'local_world_aligned' its linear part is p̈ of the
+    frame's origin; O(n).
 
-    q: nq numbers; v, a: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    q: nq numbers; v, a: nv; frame: its name or index; reference: as for `frame_jacobian`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.2] * 7
@@ -1873,11 +1900,11 @@ def frame_classical_acceleration(
 def frame_jacobian(
     model: Model, data: Data, q: ArrayLike, frame: str | int, reference: _Reference = "local", out: _Array | None = None
 ) -> _Array:
-    """The Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
+    """Computes the Jacobian J of a frame, (6, nv), linear rows first: the velocity of the frame is J v.
 
-    q: nq numbers; frame: its name or number. reference: 'local', the velocity in the frame itself; 'world', that of
-    the body's point at the world's origin, along the world's axes; or 'local_world_aligned', that of the frame's
-    origin, along the world's axes.
+    q: nq numbers; frame: its name or index. reference: 'local', the velocity of the frame's origin, along the frame's
+    axes; 'world', the velocity of the body's point at the world's origin, along the world's axes; or
+    'local_world_aligned', the velocity of the frame's origin, along the world's axes.
 
     >>> arm = condyle.robots.arm7()
     >>> condyle.frame_jacobian(arm, condyle.Data(arm), [0.0] * 7, "tool", "local_world_aligned").shape
@@ -1893,18 +1920,18 @@ def frame_jacobian_rate(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
+    """Computes the rate dJ/dt of a frame's Jacobian along v, (6, nv), linear rows first.
 
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`. dJ v + J a is the spatial
-    acceleration in 'local' and 'world', and the classical one in 'local_world_aligned', whose origin moves with the
+    q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`. dJ v + J a is the spatial
+    acceleration for 'local' and 'world', and the classical one for 'local_world_aligned', whose origin moves with the
     frame.
     """
 
 def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, out: _Array | None = None) -> _Array:
-    """The pose oXf of a frame in the world: a homogeneous matrix (4, 4) that takes coordinates in the frame to coordinates
-    in the world; O(n).
+    """Computes the pose oXf of a frame in the world: a homogeneous matrix (4, 4) that maps coordinates in the frame to
+    coordinates in the world; O(n).
 
-    q: nq numbers; frame: its name or number.
+    q: nq numbers; frame: its name or index.
 
     >>> arm = condyle.robots.arm7()
     >>> tool = condyle.frame_placement(arm, condyle.Data(arm), [0.0] * 7, "tool")
@@ -1915,10 +1942,11 @@ def frame_placement(model: Model, data: Data, q: ArrayLike, frame: str | int, ou
 def frame_point_jacobian(
     model: Model, data: Data, q: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """The Jacobian J of a point of a frame, (3, nv): its velocity along the axes of the world is J v (m/s).
+    """Computes the Jacobian J of a point of a frame, (3, nv): the point's velocity along the axes of the world is J v
+    (m/s).
 
-    q: nq numbers; frame: its name or number; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
-    the world and S the columns of the joints before it.
+    q: nq numbers; frame: its name or index; point: in the frame, 3 numbers (m). J = S_v + S_ω × p, with the point p in
+    the world and S the columns of the joints between the world and the frame.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, tip = condyle.Data(arm), [0.3] * 7, [0.5] * 7, [0.0, 0.02, 0.1]
@@ -1930,9 +1958,9 @@ def frame_point_jacobian(
 def frame_point_velocity(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, frame: str | int, point: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """The velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
+    """Computes the velocity of a point of a frame along the axes of the world, 3 numbers (m/s): v + ω × p.
 
-    q: nq numbers; v: nv; frame: its name or number; point: in the frame, 3 numbers (m).
+    q: nq numbers; v: nv; frame: its name or index; point: in the frame, 3 numbers (m).
     """
 
 def frame_velocity(
@@ -1944,10 +1972,10 @@ def frame_velocity(
     reference: _Reference = "local",
     out: _Array | None = None,
 ) -> _Array:
-    """The velocity of a frame, 6 numbers: that of the body's point at the origin of the reference (m/s), then the angular
-    velocity (rad/s); O(n).
+    """Computes the velocity of a frame, 6 numbers: the velocity of the body's point at the origin of the reference (m/s),
+    then the angular velocity (rad/s); O(n).
 
-    q: nq numbers; v: nv; frame: its name or number; reference: as for `frame_jacobian`.
+    q: nq numbers; v: nv; frame: its name or index; reference: as for `frame_jacobian`.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v = condyle.Data(arm), [0.3] * 7, [0.5] * 7
@@ -1960,9 +1988,9 @@ def frame_velocity(
 class Model:
     """A robot: bodies, joints, frames, inertias, limits. It never changes and may be shared between threads.
 
-    Body 0 is the world. The others stand parents first, depth first, siblings in the order of their joints' names, as
-    Pinocchio numbers them. A model is read from a file, made by a `ModelBuilder`, or one of `condyle.robots`; it can be
-    pickled.
+    Body 0 is the world. The other bodies are numbered depth first, parents before children, siblings in the order of
+    their joints' names, as in Pinocchio. A model is read from a file, built by a `ModelBuilder`, or taken from
+    `condyle.robots`; it can be pickled.
 
     >>> arm = condyle.robots.arm7()
     >>> arm.nq, arm.nv, arm.names[:3]
@@ -1971,8 +1999,8 @@ class Model:
 
     @property
     def actuators(self) -> list[Actuator]:
-        """The actuators of the file, as `Actuator`, in its order. Their ranges are part of `limits` already, their armature
-        and damping of the joints'.
+        """The actuators of the file, as `Actuator`, in the order of the file. `limits` already includes their ranges, and
+        the joints' `armature` and `damping` include theirs.
         """
 
     @property
@@ -1986,25 +2014,25 @@ class Model:
     @property
     def damping(self) -> _Array:
         """The viscous damping of each degree of freedom, nv numbers (N m s/rad, N s/m). It acts only in `passive_torque`
-        and where a `Simulation` is asked for it.
+        and in a `Simulation` that includes it.
         """
 
     @property
     def damping_polynomial(self) -> _Array:
-        """The coefficients d₁ and d₂ of damping that grows with the speed, (nv, 2): the damping is d₀ + d₁|v| + d₂v², with
-        d₀ in `damping`. It acts where `damping` does.
+        """The coefficients d₁ and d₂ of speed-dependent damping, (nv, 2): the damping coefficient is d₀ + d₁|v| + d₂v²,
+        with d₀ in `damping`. It acts where `damping` acts.
         """
 
     @property
     def frames(self) -> list[Frame]:
-        """The frames, as `Frame(name, kind, body, placement)`: two for each joint of the URDF, fixed ones too, the joint's
-        and the link's.
+        """The frames, as `Frame(name, kind, body, placement)`. Each joint of the URDF, also a fixed one, has two: the
+        joint's and the link's.
         """
 
     @property
     def friction(self) -> _Array:
-        """The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and where
-        a `Simulation` is asked for it.
+        """The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and in a
+        `Simulation` that includes it.
         """
 
     @property
@@ -2013,28 +2041,30 @@ class Model:
 
     @property
     def gravity_compensation(self) -> list[GravityCompensation]:
-        """The weights that are carried by an unseen hand, as `GravityCompensation(body, mass, mass_com)`: MuJoCo's
-        `gravcomp`. They act in `passive_torque` and where a `Simulation` is asked for them.
+        """The supported weights, as `GravityCompensation(body, mass, mass_com, ratio)`: MuJoCo's `gravcomp`. They act only
+        in `passive_torque` and in a `Simulation` that includes them.
         """
 
     @property
     def idx_qs(self) -> list[int]:
-        """The index in q at which each joint's position begins; for a joint that mimics another, that of the other."""
+        """The index in q at which each joint's position begins; for a mimic joint, the index of the joint that it follows."""
 
     @property
     def idx_vs(self) -> list[int]:
-        """The index in v at which each joint's velocity begins; for a joint that mimics another, that of the other."""
+        """The index in v at which each joint's velocity begins; for a mimic joint, the index of the joint that it follows."""
 
     @property
     def inertial_parameters(self) -> _Array:
-        """The inertial parameters π, which regressors are multiplied with: ten numbers for each body but the world, 10
+        """The inertial parameters π, with which regressors are multiplied: ten numbers for each body except the world, 10
         (nbodies − 1) in all. They are mass, mass times centre of mass, and xx, xy, yy, xz, yz, zz of the rotational
         inertia about the origin of the body's frame.
         """
 
     @property
     def inertias(self) -> list[Inertia]:
-        """The inertia of each body in the body's frame, with all that fixed joints merge into it, as `Inertia`."""
+        """The inertia of each body in the body's frame, as `Inertia`. It includes the links that fixed joints attach to
+        the body.
+        """
 
     @property
     def joint_placements(self) -> _Array:
@@ -2056,21 +2086,21 @@ class Model:
 
     @property
     def keyframe_velocities(self) -> dict[str, _Array]:
-        """The velocities of the `keyframes`: a dictionary of v by name, nv numbers each."""
+        """The velocities of the `keyframes`: a dictionary from names to v, nv numbers each."""
 
     @property
     def keyframes(self) -> dict[str, _Array]:
-        """The named positions of the file: a dictionary of q by name, nq numbers each."""
+        """The named positions of the file: a dictionary from names to q, nq numbers each."""
 
     @property
     def limits(self) -> Limits:
-        """The limits of position, velocity and effort, as `Limits`; infinite where there are none. `effort` is the greatest
-        magnitude of `effort_lower` and `effort_upper`.
+        """The limits of position, velocity and effort, as `Limits`; infinite where a limit is missing. `effort` is the
+        greatest magnitude of `effort_lower` and `effort_upper`.
         """
 
     @property
     def mimics(self) -> list[Mimic | None]:
-        """The rule by which each joint follows another one, as `Mimic(ratio, offset)`; None for a joint that does not."""
+        """The rule by which each mimic joint follows another one, as `Mimic(ratio, offset)`; None for other joints."""
 
     @property
     def name(self) -> str:
@@ -2082,7 +2112,9 @@ class Model:
 
     @property
     def nbodies(self) -> int:
-        """The number of bodies, the world included: of the rows of f_ext and of the result of `forward_kinematics`."""
+        """The number of bodies, the world included. It is the number of rows of f_ext and of the result of
+        `forward_kinematics`.
+        """
 
     @property
     def nq(self) -> int:
@@ -2094,7 +2126,7 @@ class Model:
 
     @property
     def nv(self) -> int:
-        """The number of degrees of freedom: of the numbers in v, a, τ and in a tangent vector."""
+        """The number of degrees of freedom, which is the length of v, a, τ and tangent vectors."""
 
     @property
     def nvs(self) -> list[int]:
@@ -2104,35 +2136,38 @@ class Model:
 
     @property
     def parents(self) -> list[int]:
-        """The body on which each joint sits; 0 is the world."""
+        """The parent body of each joint; 0 is the world."""
 
     @property
     def singular_joints(self) -> list[int]:
-        """The bodies whose joints make M singular: `aba`, `minv` and `aba_derivatives` raise `ModelError`."""
+        """The bodies whose joints make M singular; for such a model `aba`, `minv` and `aba_derivatives` raise
+        `ModelError`.
+        """
 
     @property
     def springs(self) -> list[Spring]:
-        """The springs of joints, as `Spring(joint, stiffness, rest)`. They act in `passive_torque` and where a
-        `Simulation` is asked for them.
+        """The springs of joints, as `Spring(joint, stiffness, rest)`. They act only in `passive_torque` and in a
+        `Simulation` that includes them.
         """
 
     @property
     def total_mass(self) -> float:
-        """The mass of all bodies, with that of what is fixed to the world (kg)."""
+        """The mass of all bodies, including parts fixed to the world (kg)."""
 
     @property
     def warnings(self) -> list[ModelWarning]:
-        """The warnings about the robot and its file, as `ModelWarning`: text that also has `kind`, `file` and `line`.
+        """The warnings about the robot and its file, as `ModelWarning`: text with the attributes `kind`, `file` and
+        `line`.
 
-        They tell of inertias and limits that cannot be meant, joints along which the inertia matrix is singular, names in
-        the file that are unknown, and what a model cannot hold.
+        They report implausible inertias and limits, joints along which the inertia matrix is singular, unknown names in
+        the file, and contents that a model cannot represent.
         """
 
     def __copy__(self) -> Model:
-        """The model itself: it never changes."""
+        """Returns the model itself, since it never changes."""
 
     def __deepcopy__(self, memo: object) -> Model:
-        """The model itself: it never changes."""
+        """Returns the model itself, since it never changes."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Returns the parts of a pickle."""
@@ -2140,28 +2175,29 @@ class Model:
     def append(
         self, frame: str | int | None, model: Model, placement: ArrayLike | None | None = None, prefix: str = ""
     ) -> Model:
-        """This robot with another one on a frame of it, as a new model.
+        """Returns this robot with another one attached to one of its frames, as a new model.
 
-        Its bodies are numbered behind all that the body which carries them has carried before, as Pinocchio's `appendModel` does;
-        name and gravity are this one's.
+        The new bodies are numbered after all existing descendants of the body that carries them, as by Pinocchio's
+        `appendModel`. Name and gravity are this robot's.
 
-        frame: the name or number of a frame; None is the world.
+        frame: the name or index of a frame; None is the world.
         model: the other robot.
-        placement: its world in the frame, a homogeneous (4, 4) matrix; None is the identity.
-        prefix: put before all its names.
+        placement: the pose of the other robot's world in the frame, a homogeneous (4, 4) matrix; None is the identity.
+        prefix: text added before all names of the other robot.
 
         >>> quadruped, arm = condyle.robots.quadruped(), condyle.robots.arm7()
         >>> quadruped.append("trunk", arm, prefix="arm_").names[13:16]
         ['RH_KFE', 'arm_joint1', 'arm_joint2']
 
-        Raises `ModelError`: two bodies, joints or frames of one name.
+        Raises `ModelError` if two bodies, joints or frames have the same name.
         """
 
     def constraints(self) -> dict[str, ContactConstraint | Coupling]:
-        """The constraints of the robot's file beside its tree, by name: loops as `ContactConstraint`, without stabilisation, and
-        coupled joints as `Coupling`.
+        """Returns the constraints of the robot's file outside its tree, by name: loops as `ContactConstraint`, without
+        stabilisation, and coupled joints as `Coupling`. Inactive ones, and the `<mimic>` of a URDF or SDF, are left out.
 
-        The algorithms of a tree leave loops open. `constrained_dynamics` closes those that a `ConstraintSet` has:
+        The algorithms for trees ignore both. `constrained_dynamics` closes the loops in its `ConstraintSet`. No function
+        enforces a coupling; if it is linear, the readers' `mimic=True` puts it into the tree instead.
 
         >>> robot = condyle.robots.quadruped()
         >>> loops = [c for c in robot.constraints().values() if isinstance(c, condyle.ContactConstraint)]
@@ -2171,14 +2207,15 @@ class Model:
         """
 
     def frame(self, name: str) -> int:
-        """The number of the frame with this name: a link's, else the user's, else a joint's.
+        """Returns the index of the frame with this name. If frames of several kinds have it, a link's comes first, then
+        the user's, then a joint's.
 
-        Raises `ModelError`, with the nearest name.
+        Raises `ModelError`, with the most similar name.
         """
 
     @staticmethod
     def from_json(text: str) -> Model:
-        """A model from the JSON that `to_json` gives.
+        """Reads a model from the JSON that `to_json` returns.
 
         Raises `ParseError`, with line and column.
         """
@@ -2193,19 +2230,19 @@ class Model:
         *,
         allow: Sequence[_Kind] | None = None,
     ) -> Model:
-        """A model from an MJCF file (MuJoCo) and the files that it includes.
+        """Reads a model from an MJCF file (MuJoCo) and the files that it includes.
 
-        q and v read as MuJoCo's `qpos` and `qvel`, but that quaternions are x, y, z, w and a free joint's velocity is
-        in the body's frame (MuJoCo: linear velocity in the world's). Several joints on one body become a chain, with
-        bodies without mass, `name#1`, `name#2`, …, between them. A thing that a model cannot hold is left out and
-        reported in `warnings`.
+        q and v have the layout of MuJoCo's `qpos` and `qvel`, with two exceptions: quaternions are x, y, z, w, and a
+        free joint's velocity is in the body's frame (MuJoCo: linear velocity in the world's frame). Several joints on
+        one body become a chain, with bodies without mass, `name#1`, `name#2`, …, between them. Contents that a model
+        cannot represent are left out and reported in `warnings`.
 
         path: a path, as text or `os.PathLike`.
-        mimic: whether a `<joint>` of `<equality>` lets joint1 follow joint2, instead of being a constraint beside the
+        mimic: whether a `<joint>` of `<equality>` makes joint1 follow joint2, instead of being a constraint outside the
             model; its `polycoef` must be linear.
         strict: whether a warning (`warnings`) is an error.
-        weightless_meshes: whether a mesh with mass that cannot be read weighs nothing and is reported in `warnings`,
-            instead of being an error.
+        weightless_meshes: whether a mesh with mass that cannot be read counts as massless and is reported in
+            `warnings`, instead of being an error.
         packages, allow: as for `from_urdf`.
 
         Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
@@ -2221,7 +2258,7 @@ class Model:
         *,
         allow: Sequence[_Kind] | None = None,
     ) -> Model:
-        """A model from an MJCF in a string, which may not include files; see `from_mjcf`.
+        """Reads a model from an MJCF in a string, which may not include files; see `from_mjcf`.
 
         >>> body = '<body><joint axis="0 1 0"/><geom type="capsule" fromto="0 0 0 0 0 -1" size="0.02" mass="2"/></body>'
         >>> condyle.Model.from_mjcf_str(f"<mujoco><worldbody>{body}</worldbody></mujoco>").total_mass
@@ -2232,27 +2269,28 @@ class Model:
     def from_mujoco(
         model: Any, mimic: bool = False, strict: bool = False, *, allow: Sequence[_Kind] | None = None
     ) -> Model:
-        """A model from MuJoCo's, a `mujoco.MjModel`: the robot that MuJoCo has compiled, number for number.
+        """Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
 
-        The names, q and v are those of `from_mjcf`. All that MuJoCo's compiler does is done already: meshes, `replicate`,
-        `attach`, composites, `settotalmass`. Numbers that were changed after compiling count too. What a model cannot hold
-        is reported in `warnings` or refused as by `from_mjcf`. MuJoCo itself is not imported.
+        The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. All work of MuJoCo's compiler is included: meshes,
+        `replicate`, `attach`, composites, `settotalmass`. Numbers that were changed after compilation are used.
+        Contents that a model cannot represent are reported in `warnings`, or refused, as by `from_mjcf`. MuJoCo itself
+        is not imported.
 
         mimic, strict, allow: as for `from_mjcf`.
 
-        Raises `ParseError` or `ModelError`; `ValueError` for an unknown kind.
+        Raises `TypeError` for anything but an `MjModel`, `ParseError` or `ModelError`; `ValueError` for an unknown kind.
         """
 
     @staticmethod
     def from_pinocchio(model: Any) -> Model:
-        """A model from Pinocchio's, a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that numbers are
-        equal; `to_pinocchio` is the way back.
+        """Converts a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that results are equal.
+        `to_pinocchio` is the inverse.
 
-        Composite, universal and spherical ZYX joints become several ones, with bodies without mass between them. Limits of
-        quaternions, cosines and sines are left out, and so are geometry and reference configurations.
+        Composite, universal and spherical ZYX joints become several joints, with bodies without mass between them.
+        Limits of quaternions, cosines and sines are left out, and so are geometry and reference configurations.
 
-        Raises `ModelError` if its joints do not stand depth first, as Pinocchio's readers of files number them, or are of a
-        kind that is not here.
+        Raises `ModelError` if its joints are not in depth-first order, in which Pinocchio's file readers number them,
+        or if a joint is of an unsupported kind.
         """
 
     @staticmethod
@@ -2266,17 +2304,17 @@ class Model:
         allow: Sequence[_Kind] | None = None,
         model: str | None = None,
     ) -> Model:
-        """A model from an SDF file (Gazebo), with the models that it includes.
+        """Reads a model from an SDF file (Gazebo), with the models that it includes.
 
-        All models of a file, or of its first world, become one robot, whose names then begin with the model's:
-        `robot::arm`. Joints are walked breadth first from the root, in the order of the file; one that would give a link a
-        second parent closes a loop. Universal joints become two revolute ones.
+        All models of a file, or of its first world, become one robot; its names then begin with the model's name:
+        `robot::arm`. Joints are visited breadth first from the root, in the order of the file. A joint that would give
+        a link a second parent closes a loop. A universal joint becomes two revolute ones.
 
         path: a path, as text or `os.PathLike`.
         root_joint: as for `from_urdf`.
         mimic: whether an axis with a `<mimic>` follows another one, instead of being free.
         strict: whether a warning (`warnings`) is an error.
-        packages, allow: as for `from_urdf`; `model://` addresses are looked for in `packages` too.
+        packages, allow: as for `from_urdf`; `model://` addresses are searched in `packages` too.
         model: the name of the one model to read; None reads all models of the file.
 
         Raises `ParseError`, with file, line and element, or `ModelError`; `ValueError` for an unknown kind.
@@ -2293,7 +2331,7 @@ class Model:
         allow: Sequence[_Kind] | None = None,
         model: str | None = None,
     ) -> Model:
-        """A model from an SDF in a string; see `from_sdf`.
+        """Reads a model from an SDF in a string; see `from_sdf`.
 
         >>> link = '<link name="ball"><inertial><mass>2</mass></inertial></link>'
         >>> text = f'<sdf version="1.7"><model name="ball">{link}</model></sdf>'
@@ -2312,11 +2350,11 @@ class Model:
         allow: Sequence[_Kind] | None = None,
         arguments: dict[str, str | float | bool] | None = None,
     ) -> Model:
-        """A model from a URDF file.
+        """Reads a model from a URDF file.
 
-        Fixed joints are merged into the body that they sit on and stay as frames. Meshes are never looked at. A file whose
-        name ends in `.xacro` is expanded by the installed program `xacro` or `xacrodoc`, which evaluates expressions of
-        the file: expand files of people that you trust only.
+        Fixed joints are merged into their parent body and remain as frames. Meshes are never read. A file whose name
+        ends in `.xacro` is expanded by the installed program `xacro` or `xacrodoc`. That program evaluates expressions
+        of the file, so use it only for files from sources that you trust.
 
         path: a path, as text or `os.PathLike`, or `package://name/path/in/the/package`.
         root_joint: the joint between the world and the root link, named `root_joint`: 'free_flyer', 'planar',
@@ -2324,9 +2362,9 @@ class Model:
         mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow, instead of having
             their own.
         strict: whether a warning (`warnings`) is an error.
-        packages: folders that contain packages, or are packages; before those that the environment names in
-            `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
-        allow: kinds of warnings that are no errors, though `strict` is set: 'massless', 'negative', 'triangle',
+        packages: folders that contain packages, or are packages; searched before the folders in `ROS_PACKAGE_PATH` and
+            `AMENT_PREFIX_PATH` of the environment.
+        allow: kinds of warnings that are not errors even if `strict` is set: 'massless', 'negative', 'triangle',
             'singular', 'unlikely', 'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
         arguments: values of xacro's `<xacro:arg>`s by name, for files that end in `.xacro`.
 
@@ -2343,7 +2381,7 @@ class Model:
         *,
         allow: Sequence[_Kind] | None = None,
     ) -> Model:
-        """A model from a URDF in a string; see `from_urdf`.
+        """Reads a model from a URDF in a string; see `from_urdf`.
 
         >>> text = condyle.robots.QUADRUPED
         >>> condyle.Model.from_urdf_str(text, root_joint="free_flyer").nv
@@ -2351,40 +2389,42 @@ class Model:
         """
 
     def joint(self, name: str) -> int:
-        """The number of the body that the joint with this name carries.
+        """Returns the index of the body that the joint with this name carries.
 
-        Raises `ModelError`, with the nearest name.
+        Raises `ModelError`, with the most similar name.
         """
 
     def lock(self, joints: Sequence[str | int], q: ArrayLike) -> Model:
-        """The same robot with some joints locked where they are at q.
+        """Returns the same robot with some joints locked at their positions in q.
 
-        Their bodies are merged into those that carry them and stay as frames. A joint that follows a locked one is
-        locked with it.
+        Their bodies are merged into their parent bodies and remain as frames. A mimic joint is locked together with the
+        joint that it follows. A locked joint keeps its part of the length of a tendon, and holds the other joint of a
+        coupling if that is linear. Warnings about the file are kept.
 
-        joints: a list of names or numbers of bodies.
+        joints: a list of names or indices of bodies.
         q: nq numbers.
 
         >>> condyle.robots.arm7().lock(["joint4", 6], [0.0] * 7).names
         ['universe', 'joint1', 'joint2', 'joint3', 'joint5', 'joint7']
 
-        Raises `ModelError`, also for a `q` that is not finite or in which a rotation has not the length 1 (up to 1e-3).
+        Raises `ModelError`, also if `q` is not finite or contains a rotation whose length is not 1 (up to 1e-3).
         """
 
     def reference_configurations(self, path: _Path, strict: bool = False) -> dict[str, _Array]:
-        """The named positions of an SRDF file, its `<group_state>`s: a dictionary of q by name, nq numbers each.
+        """Reads the named positions of an SRDF file, its `<group_state>`s: a dictionary from names to q, nq numbers each.
 
-        Joints that a state does not mention stay as in `neutral`; a joint that turns without limits may have its angle. States
-        of one name, of several groups, are one position. All else in the file is ignored.
+        Joints that a state does not mention stay as in `neutral`; for a joint that turns without limits the state may
+        give its angle. States with the same name, of several groups, form one position. All other contents of the file
+        are ignored.
 
         path: a path, as text or `os.PathLike`.
-        strict: whether joints that the robot does not have are errors; SRDFs are often shared by robots with fewer joints.
+        strict: whether joints that the robot lacks are errors; an SRDF is often shared by robots with fewer joints.
 
         Raises `ParseError`, with file, line and element.
         """
 
     def reference_configurations_str(self, text: str, strict: bool = False) -> dict[str, _Array]:
-        """The named positions of an SRDF in a string; see `reference_configurations`.
+        """Reads the named positions of an SRDF in a string; see `reference_configurations`.
 
         >>> joint = '<joint name="joint4" value="-1.2"/>'
         >>> srdf = f'<robot name="arm7"><group_state name="bent" group="arm">{joint}</group_state></robot>'
@@ -2393,9 +2433,10 @@ class Model:
         """
 
     def to_json(self) -> str:
-        """The model as JSON, with all digits; `from_json` gives an equal one. `null` stands for a limit that is infinite.
+        """Returns the model as JSON, with all digits; `from_json` returns an equal model. An infinite limit is written as
+        `null`.
 
-        The text may be edited: what it says is checked when it is read.
+        The text may be edited; its contents are checked when it is read.
 
         >>> arm = condyle.robots.arm7()
         >>> condyle.Model.from_json(arm.to_json()).to_json() == arm.to_json()
@@ -2403,14 +2444,16 @@ class Model:
         """
 
     def to_pinocchio(self) -> Any:
-        """The same robot as a `pinocchio.Model`, which needs Pinocchio 3 or later.
+        """Returns the same robot as a `pinocchio.Model`; requires Pinocchio 3 or later.
 
-        Joints that follow others do so there too, unless they turn without limits.
+        Mimic joints remain mimic joints; it is an error if one turns without limits. Springs, damping that depends on the
+        speed, gravity compensation, actuators, keyframes and constraints are left out, each with a `UserWarning` whose
+        argument is a `ModelWarning`.
         """
 
     def tree(self, frames: bool = False) -> str:
-        """The tree of bodies as text: each joint with its kind and where its coordinates stand in q and v, and the body that it
-        carries; frames: whether the names of other frames stand with the bodies.
+        """Returns the tree of bodies as text: each joint with its kind, its indices in q and v, and the body that it
+        carries; frames: whether to add the names of other frames to their bodies.
 
         >>> print(condyle.robots.quadruped().lock(range(2, 14), condyle.neutral(condyle.robots.quadruped())).tree())
         universe
@@ -2418,19 +2461,33 @@ class Model:
         """
 
     def with_armature(self, armature: ArrayLike) -> Model:
-        """The same robot with another armature, nv numbers (kg m², kg).
+        """Returns the same robot with another armature, nv numbers (kg m², kg).
 
         Raises `ModelError` if one is negative or not finite.
         """
 
+    def with_damping(self, damping: ArrayLike, polynomial: ArrayLike | None = None) -> Model:
+        """Returns the same robot with another viscous damping, nv numbers (N m s/rad, N s/m).
+
+        polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2); None keeps them.
+
+        Raises `ModelError` if a number is not finite, or a damping is negative.
+
+        >>> arm = condyle.robots.arm7()
+        >>> arm.with_damping([0.1] * 7).damping[0].item()
+        0.1
+        """
+
     def with_frame(self, name: str, parent: str | int | None, placement: ArrayLike | None = None) -> Model:
-        """The same robot with one more frame of the user's, the last one of `frames`. All other numbers stay as they are.
+        """Returns the same robot with one more frame of the user's, the last one of `frames`. All other numbers stay the
+        same.
 
-        name: the new frame's name; parent: the name or number of the frame on which it is put, or the name of a body; None is
-        the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the identity.
+        name: the new frame's name; parent: the name or index of the frame to which it is attached, or the name of a
+        body; None is the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the
+        identity.
 
-        Raises `ModelError` if the parent does not exist, the placement is no rotation and translation, or the user has a frame
-        of this name already.
+        Raises `ModelError` if the parent does not exist, the placement is not a homogeneous matrix, or another frame of
+        the user's has this name.
 
         >>> tip = np.eye(4)
         >>> tip[2, 3] = 0.1
@@ -2439,15 +2496,21 @@ class Model:
         (6, 7)
         """
 
+    def with_friction(self, friction: ArrayLike) -> Model:
+        """Returns the same robot with another Coulomb friction, nv numbers (N m, N).
+
+        Raises `ModelError` if one is negative or not finite.
+        """
+
     def with_gravity(self, gravity: ArrayLike) -> Model:
-        """The same robot under another gravity (m/s², 3 numbers, in the world's frame).
+        """Returns the same robot with another gravity (m/s², 3 numbers, in the world's frame).
 
         Raises `ModelError` if it is not finite.
         """
 
     def with_inertias(self, inertias: Sequence[Inertia]) -> Model:
-        """The same robot with other inertias, one for each body as `inertias` gives them, the world's first. What is odd about
-        them is in its `warnings` and `singular_joints`.
+        """Returns the same robot with other inertias, one for each body in the form of `inertias`, the world's first.
+        Implausible values are reported in its `warnings` and `singular_joints`.
 
         Raises `ModelError` if a mass is negative or a number is not finite.
 
@@ -2468,10 +2531,10 @@ class Model:
         effort_lower: ArrayLike | None = None,
         effort_upper: ArrayLike | None = None,
     ) -> Model:
-        """The same robot with other limits of position (nq numbers), velocity and effort (nv each); None leaves them as they
-        are, and infinite numbers are none.
+        """Returns the same robot with other limits of position (nq numbers), velocity and effort (nv each). None keeps a
+        limit; an infinite number removes it.
 
-        effort: greatest magnitude; sets both `effort_lower` and `effort_upper`, and goes with neither of them.
+        effort: maximum magnitude; sets both `effort_lower` and `effort_upper`, and cannot be combined with either.
 
         Raises `ModelError` if a lower limit is above an upper one, or a limit of velocity is negative.
 
@@ -2481,64 +2544,67 @@ class Model:
         """
 
     def with_mimic(self, follower: str | int, leader: str | int, ratio: float = 1.0, offset: float = 0.0) -> Model:
-        """The same robot with one more joint that follows another one, its position being ratio q + offset, in place of a
-        coordinate of its own. Its limits are those of the one that it follows.
+        """Returns the same robot with one more mimic joint: its position is ratio q + offset, where q is the leader's, and
+        it has no coordinate of its own. The leader's limits then apply to it.
 
-        follower, leader: the joints' names, or the numbers of their bodies.
+        follower, leader: the joints' names, or the indices of their bodies.
 
         >>> arm = condyle.robots.arm7()
         >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
         6
 
-        Raises `ModelError` if they are not of one degree of freedom, or a joint would follow one that follows.
+        Raises `ModelError` if they do not have one degree of freedom each, the leader is itself a mimic joint, or another
+        joint follows the follower.
         """
 
     def write_mjcf(self, path: _Path, original: _Path) -> None:
-        """Writes the same into a copy of the MJCF `original`; see `write_urdf`.
+        """Writes the same numbers into a copy of the MJCF `original`; see `write_urdf`.
 
-        Bodies and joints that differ must be in the file itself, not in one that it includes. Limits of effort are written
-        as `actuatorfrcrange` of the joint.
+        Bodies and joints that differ must be in the file itself, not in an included file. Effort limits are written as
+        `actuatorfrcrange` of the joint.
 
-        path: the new file. original: the file that the robot was read from.
+        path: the new file. original: the file from which the robot was read.
 
         Raises `ParseError` as `write_urdf` does.
         """
 
     def write_urdf(self, path: _Path, original: _Path) -> None:
-        """Writes inertias, limits, damping, friction and armature into a copy of the URDF `original`, and all else as it is
-        there.
+        """Writes inertias, limits, damping, friction and armature into a copy of the URDF `original`. All other contents
+        stay the same.
 
-        Only what differs from the original is edited, so an unchanged robot gives the same bytes. Reading the new file
-        gives this model back, up to rounding. `original` may be `path`. Of several links that fixed joints merge, the one
-        that the joint carries takes the difference. An armature becomes the rotor inertia of a `<transmission>`.
+        Only values that differ from the original are edited, so an unchanged robot gives the same bytes. Reading the
+        new file gives this model again, up to rounding. `original` may be `path`. If fixed joints merge several links,
+        the difference goes to the link that the joint carries. An armature becomes the rotor inertia of a
+        `<transmission>`.
 
-        path: the new file. original: the file that the robot was read from.
+        path: the new file. original: the file from which the robot was read.
 
-        Raises `ParseError` with the thing and both numbers if the file cannot say it, as an infinite limit, or is that of
-        another robot.
+        Raises `ParseError`, with the item and both numbers, if the format cannot express a value, such as an infinite
+        limit, or if the file belongs to another robot.
         """
 
 def _model_from_bytes(data: bytes) -> Model:
-    """The model that a pickle holds."""
+    """Reads the model in a pickle."""
 
 @final
 class Action:
     """An action written in Python.
 
-    nx, nu: the numbers of a state and of a control, at most 4096; nu is 0 at a terminal knot.
-    calc: a function of (t, x, u) that returns the next state and the cost; of the terminal knot, and of no other, the next
-        state may be None.
-    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among A = ∂x⁺/∂x, B = ∂x⁺/∂u,
-        q = ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it calc is called with arrays of numbers
-        that know their derivatives, exact ones; once for all knots, if it leaves t alone and takes no branch that differs
-        from knot to knot. So make its results of its arguments (`np.array([...])`, `np.concatenate`), and do not write
-        them into arrays of floats. What cannot be called so is differentiated by hyper-dual numbers, else by differences.
-    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-    space: where states live: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate, difference), where
-        integrate(x, dx) is x ⊕ dx, difference(x0, x1) the dx with x0 ⊕ dx = x1, and dx has ndx numbers. Derivatives are taken
-        by dx.
-    batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and arrays with N rows
-        as results.
+    nx, nu: the sizes of a state and of a control, at most 4096; nu is 0 at a terminal knot.
+    calc: a function of (t, x, u) that returns the next state and the cost; only at the terminal knot the next state may
+        be None.
+    calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among A = ∂x⁺/∂x, B = ∂x⁺/∂u, q =
+        ∂ℓ/∂x, r = ∂ℓ/∂u, Q = ∂²ℓ/∂x², S = ∂²ℓ/∂x∂u, R = ∂²ℓ/∂u². Without it, calc is called with arrays of numbers that
+        carry their exact derivatives. One call serves all knots if calc does not use t and has no branches that differ
+        between knots. So compute its results from its arguments (`np.array([...])`, `np.concatenate`), and do not write
+        them into arrays of floats. If this fails, calc is differentiated by hyper-dual numbers, and if that fails, by
+        differences.
+    lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
+    space: the space of states: None for vectors; a model, for its states (q, v); or a tuple (ndx, integrate,
+        difference). Then integrate(x, dx) is x ⊕ dx, difference(x0, x1) is the dx with x0 ⊕ dx = x1, and dx has ndx
+        numbers. Derivatives are taken with respect to dx.
+    batch: whether calc and calc_diff take all knots at once: t of shape (N,), x (N, nx), u (N, nu), and results with N
+        rows.
 
     >>> from condyle.optimal import Action, Fddp, Problem
     >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * (x @ x + u @ u)))
@@ -2572,62 +2638,62 @@ class Activation:
     def _from_json(text: str) -> Activation: ...
     @staticmethod
     def barrier(lower: ArrayLike, upper: ArrayLike) -> Activation:
-        """The quadratic barrier ½ Σ (excess of rᵢ over its bounds)²; an infinite bound is no bound."""
+        """Returns the quadratic barrier ½ Σ (excess of rᵢ over its bounds)²; an infinite bound is ignored."""
 
     @staticmethod
     def quadratic() -> Activation:
-        """The quadratic cost ½ Σ rᵢ²."""
+        """Returns the quadratic cost ½ Σ rᵢ²."""
 
     @staticmethod
     def smooth1(epsilon: float = 1.0) -> Activation:
-        """The smooth cost Σ √(ε + rᵢ²), nearly Σ |rᵢ|."""
+        """Returns the smooth cost Σ √(ε + rᵢ²), approximately Σ |rᵢ|."""
 
     @staticmethod
     def smooth2(epsilon: float = 1.0) -> Activation:
-        """The smooth cost √(ε + ‖r‖²), nearly ‖r‖. Its Hessian is taken to be ε/a³ times the identity, the least
-        eigenvalue of the exact one.
+        """Returns the smooth cost √(ε + ‖r‖²), approximately ‖r‖. Its Hessian is approximated by ε/a³ times the identity;
+        ε/a³ is the least eigenvalue of the exact Hessian.
         """
 
     @staticmethod
     def sum() -> Activation:
-        """The sum Σ rᵢ, for residuals that are costs by themselves: see `Residual.own_cost`."""
+        """Returns the sum Σ rᵢ, for residuals that are costs themselves: see `Residual.own_cost`."""
 
     @staticmethod
     def weighted(w: ArrayLike) -> Activation:
-        """The weighted quadratic cost ½ Σ wᵢ rᵢ²."""
+        """Returns the weighted quadratic cost ½ Σ wᵢ rᵢ²."""
 
     @staticmethod
     def weighted_barrier(lower: ArrayLike, upper: ArrayLike, w: ArrayLike) -> Activation:
-        """The weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl has the square of wᵢ in its
+        """Returns the weighted quadratic barrier ½ Σ wᵢ (excess of rᵢ over its bounds)². Crocoddyl squares wᵢ in its
         value.
         """
 
 @final
 class AugmentedLagrangian:
-    """The augmented Lagrangian method around `Fddp`, as ProxDDP's: for robots with `Limit`s and for `ConstrainedAction`s.
+    """The augmented Lagrangian method around `Fddp`, as in ProxDDP: for robots with `Limit`s and for `ConstrainedAction`s.
 
-    It repeats: minimise Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP; if the limits hold well enough,
-    y ← (z − Π z) / μ, else μ falls; until limits and the gradient of ℓ + yᵀg vanish to the tolerances.
+    It repeats two steps. First it minimises Σ ℓ + (1 / 2μ) ‖z − Π z‖² − (μ / 2) ‖y‖², z = g + μ y, by FDDP. Then, if
+    the limits hold well enough, y ← (z − Π z) / μ, else μ is reduced. It ends when limits and the gradient of ℓ + yᵀg
+    vanish to the tolerances.
 
-    `solve` begins with multipliers of zero. `resume` begins with those of the last solve and its penalty, unless that
-    ended as "not_finite" or with violated limits at the largest penalty; `shift` moves them on. A solution is "converged"
-    when the residuals of `outcome` are below the tolerances. It is "constraints_violated" if the penalty reached its limit
-    and the limits do not hold, which proves nothing: another warm start may find a solution. It is "infeasible" if the
-    initial state itself violates a limit of knot 0 that no control can change. `outcome.worst` names the knot, the limit
-    and the amount. The cost of the solution contains the terms of the limits, that of `outcome` does not; its trace and
-    gains are those of the last inner solve, and its timings those of the whole solve. Controls of a warm start that are outside of their bounds are moved into them.
+    `solve` begins with zero multipliers. `resume` begins with the multipliers and the penalty of the last solve, unless
+    that solve ended as "not_finite" or with violated limits at the largest penalty. `shift` also shifts the
+    multipliers. A solution is "converged" when the residuals of `outcome` are below the tolerances. It is
+    "constraints_violated" if the penalty reached its maximum and the limits do not hold. This proves nothing: another
+    warm start may find a solution. It is "infeasible" if the initial state itself violates a limit of knot 0 that no
+    control can change. `outcome.worst` has the knot, the limit and the amount. The cost of the solution includes the
+    terms of the limits, the cost of `outcome` does not. The solution's trace and gains are from the last inner solve,
+    its timings from the whole solve. Controls of a warm start outside their bounds are moved into them.
 
-    problem: the problem to solve; all memory is made for its shape, once.
-    inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` is that
-        of the whole solve.
-    settings: any of these, by name.
-        `tolerance`: the largest distance of a limit from its bounds that is accepted.
-        `tolerance_dual`: the largest entry of the gradient of the Lagrangian that is accepted.
-        `max_solves`: the number of inner solves at most.
-        `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its greatest value, and the
-        factor by which it rises.
-        `restart`: whether a `solve` with limits or bounds that is not finite, or violates limits at the largest penalty, begins
-        once more, from the initial state held still at all knots (default: yes). The better result counts.
+    problem: the problem to solve; all memory is allocated for its shape, once.
+    inner: a dict of settings of `Fddp` for the inner solves. The solver chooses their tolerances; `time_budget` applies
+        to the whole solve.
+    settings: any of these, by name. `tolerance`: the largest accepted distance of a limit from its bounds.
+        `tolerance_dual`: the largest accepted entry of the gradient of the Lagrangian. `max_solves`: the maximum number
+        of inner solves. `penalty_start`, `penalty_max`, `penalty_factor`: 1/μ of the first inner solve, its maximum,
+        and the factor by which it increases. `restart`: whether to repeat a failed `solve` of a problem with limits or
+        bounds once, from the initial state held still at all knots (default: yes). A solve fails if it is not finite,
+        or violates limits at the largest penalty. The better result is returned.
 
     >>> from condyle.optimal import AugmentedLagrangian, Cost, FreeDynamics, Limit, Problem, Residual
     >>> arm = condyle.robots.arm7()
@@ -2652,8 +2718,8 @@ class AugmentedLagrangian:
 
     @property
     def solution(self) -> Solution | None:
-        """The `Solution` of the last solve, also of one that a signal or an error of an `Action` has ended
-        ("interrupted"); None before the first.
+        """The `Solution` of the last solve, even if a signal or an error of an `Action` ended it ("interrupted");
+        None before the first solve.
         """
 
     @staticmethod
@@ -2661,27 +2727,29 @@ class AugmentedLagrangian:
     def resume(
         self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
     ) -> Solution:
-        """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+        """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+        `Solution`.
 
-        With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+        With a `time_budget`, a delayed solve does not shorten the following ones: each makes at least one
+        iteration.
 
-        callback, verbose, progress: as of `solve`.
+        callback, verbose, progress: as for `solve`.
 
-        Raises `ProblemError` as `solve`, and if there is no solution yet.
+        Raises `ProblemError` as `solve` does, and if there is no solution yet.
         """
 
     def shift(self, last: int) -> None:
-        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
-        with it.
+        """Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
 
-        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-        last one is served by a model of the problem, with those that it has for all knots. The last state follows
-        from the last control, which is repeated. At a second shift without a step of a solve in between the last
-        state is repeated too, as a rollout by repeated controls would diverge.
+        `resume` then starts from the shifted solution. Knot t becomes knot t − 1, with its own costs and
+        limits. A model of the problem serves the new last knot, with the costs and limits that the model has
+        for all knots. The last control is repeated, and the last state follows from it. At a second shift
+        without a solver step in between, the last state is repeated too, because a rollout with repeated
+        controls would diverge.
 
         last: the index of that model.
 
-        Raises `ProblemError` if there is no such model.
+        Raises `ProblemError` if the model does not exist.
         """
 
     def solve(
@@ -2692,34 +2760,34 @@ class AugmentedLagrangian:
         verbose: bool = False,
         progress: bool = False,
     ) -> Solution:
-        """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
+        """Solves the problem from a warm start, and returns a `Solution`, whose status tells how the solve ended.
 
-        Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
-        iteration: what a handler raises, as KeyboardInterrupt, is raised here, and `solution` then is the best
-        iterate, from which `resume` goes on.
+        Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
+        an iteration. An exception of a signal handler, such as KeyboardInterrupt, is raised here. `solution` is
+        then the best iterate, from which `resume` continues.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
-        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
-        callback: a function that is called with the `Iteration` after each; where it returns False the solve ends
-            ("interrupted"). What it raises is raised here.
+        us: controls, (N, nu), or a list of N arrays if knots differ in nu.
+        callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
+            solve ends ("interrupted"). Its exceptions are raised here.
         verbose: whether to print a line for each iteration.
-        progress: whether to show the progress, by tqdm where that is installed, else as lines.
+        progress: whether to show the progress, by tqdm if it is installed, else as lines.
 
-        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+        Raises `ProblemError` for invalid numbers or settings, and exceptions raised by an `Action`.
         """
 
 @final
 class ConstrainedAction:
-    """An action of any kind under a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` holds.
+    """An action of any kind with a constraint lower ≤ g(x, u) ≤ upper, which `AugmentedLagrangian` enforces.
 
-    To `Fddp` alone it is a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
+    `Fddp` alone treats it as a cost for leaving the bounds. For a robot's residuals see `Limit`, which is faster.
 
     action: the action.
     size: the number of entries of g, at most 4096.
     calc: a function of (t, x, u) that returns g; at a terminal knot u is empty.
     calc_diff: a function of (t, x, u) that returns (∂g/∂x, ∂g/∂u) of shapes (size, ndx) and (size, nu), in the tangent
         space of the state. Without it, central differences of calc.
-    lower, upper: least and greatest values, infinite where there is none; g = 0 if both are None.
+    lower, upper: bounds of g, infinite for no bound; g = 0 if both are None.
 
     >>> from condyle.optimal import Action, AugmentedLagrangian, ConstrainedAction, Problem
     >>> knot = Action(1, 1, lambda t, x, u: (x + u, 0.5 * u @ u))
@@ -2749,10 +2817,10 @@ class ContactDynamics:
     dt: Δt in seconds.
     costs: a list of `Cost`.
     damping: μ of J M⁻¹ Jᵀ + μ 1 (1/kg), for redundant contacts.
-    costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as of `FreeDynamics`.
+    costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`.
 
-    Raises `ProblemError` for a contact, cost, limit or drives that do not fit, and two contacts on one body without
-    damping.
+    Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot, and for two contacts on
+    one body without damping.
 
     >>> from condyle.optimal import ContactDynamics
     >>> quadruped = condyle.robots.quadruped()
@@ -2779,26 +2847,29 @@ class ContactDynamics:
     @staticmethod
     def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ContactDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
-        """The controls among the smallest controls and forces that hold the robot still at the state x, nu numbers."""
+        """Returns the controls that hold the robot still at the state x, nu numbers; controls and contact forces together
+        have the smallest norm.
+        """
 
 @final
 class ContactInverseDynamics:
     """A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), τ = M q̈
     + h − Jᵀλ; otherwise as `FreeDynamics`.
 
-    Of itself it has a `Limit` to zero on the efforts that nothing drives, Nᵀτ = 0 with Nᵀ S = 0 (`undriven efforts`; of a
-    floating base the first 6), and on each contact's J q̈ + γ = 0 (`contact …`): `AugmentedLagrangian` holds them, to `Fddp`
-    alone they are costs. Nothing is inverted: contacts may be redundant. These are the rules of Crocoddyl's
-    `DifferentialActionModelContactInvDynamics`, and without contacts of `DifferentialActionModelFreeInvDynamics`.
+    The knot has two kinds of `Limit` to zero by default. One bounds the undriven efforts, Nᵀτ = 0 with Nᵀ S = 0
+    (`undriven efforts`; for a floating base the first 6). The other bounds each contact's J q̈ + γ = 0 (`contact …`).
+    `AugmentedLagrangian` enforces them; `Fddp` alone treats them as costs. Nothing is inverted, so contacts may be
+    redundant. Crocoddyl's `DifferentialActionModelContactInvDynamics` has the same equations, and without contacts
+    `DifferentialActionModelFreeInvDynamics`.
 
     model: the robot.
-    contacts: a dict of `ContactConstraint`s by name, the order of which is that of λ. May be empty.
+    contacts: a dict of `ContactConstraint`s by name, which also defines the order of λ. May be empty.
     dt: Δt in seconds.
-    costs: a list of `Cost`; `Residual.joint_effort` looks at τ, `Residual.contact_force` at λ.
-    costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as of `FreeDynamics`; the actuation says
-        which efforts there are, bounds are of all nv + rows controls.
+    costs: a list of `Cost`; `Residual.joint_effort` uses τ, `Residual.contact_force` uses λ.
+    costs_at, actuation, integrator, lower, upper, limits, limits_at, controls: as for `FreeDynamics`. The actuation
+        defines which efforts are driven; bounds apply to all nv + rows controls.
 
-    Raises `ProblemError` for a contact, cost, limit or drives that do not fit.
+    Raises `ProblemError` for a contact, cost, limit or actuation that does not fit the robot.
 
     >>> from condyle.optimal import ContactInverseDynamics
     >>> quadruped = condyle.robots.quadruped()
@@ -2825,18 +2896,18 @@ class ContactInverseDynamics:
     @staticmethod
     def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ContactInverseDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
-        """No accelerations, and the forces among the smallest efforts and forces that hold the robot still at the state x:
-        nv zeros and λ.
+        """Returns zero accelerations and the contact forces that hold the robot still at the state x: nv zeros and λ.
+        Efforts and forces together have the smallest norm.
         """
 
 @final
 class Cost:
     """A term of a cost: weight times an activation of a residual.
 
-    name: what `Problem.set_weight` and errors call it.
+    name: used by `Problem.set_weight` and in errors.
     weight: finite and at least 0; a term whose weight is 0 is not computed.
     residual: a `Residual`.
-    activation: an `Activation`; None is the barrier of the bounds of a cone or of a centre of pressure, the sum for
+    activation: an `Activation`. None is the barrier of the bounds for a cone or a centre of pressure, the sum for
         `Residual.own_cost`, and quadratic for other residuals.
 
     >>> from condyle.optimal import Cost, Residual
@@ -2848,22 +2919,23 @@ class Cost:
 
 @final
 class DifferentialAction:
-    """An action of accelerations and a cost per second that are written in Python, in steps of a time.
+    """An action whose accelerations and cost per second are written in Python; it advances by a time step.
 
-    The state is x = (q, v); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), and the cost is Δt ℓ.
+    The state is x = (q, v). By semi-implicit Euler v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²), and the cost is Δt ℓ.
 
-    nv, nu: the numbers of a velocity and of a control, at most 4096; nu is 0 at a terminal knot.
-    calc: a function of (t, x, u) that returns the accelerations, nv numbers, and the cost ℓ; of the terminal knot the
+    nv, nu: the sizes of a velocity and of a control, at most 4096; nu is 0 at a terminal knot.
+    calc: a function of (t, x, u) that returns the accelerations, nv numbers, and the cost ℓ; at the terminal knot the
         accelerations may be None.
     dt: Δt in seconds, or None for a terminal knot, whose cost is ℓ.
-    calc_diff: a function of (t, x, u) that returns a dict of what is not zero among da_dq, da_dv, da_du, the derivatives of
-        the accelerations, and q, r, Q, S, R, those of ℓ as of `Action`. Without it, those of calc as for `Action`. Second
-        derivatives of the accelerations, for a solver's `second_order`, are always those of calc, and zero where it cannot
-        be differentiated by numbers; those of ⊕ are zero.
+    calc_diff: a function of (t, x, u) that returns a dict of the nonzero matrices among da_dq, da_dv, da_du, the
+        derivatives of the accelerations, and q, r, Q, S, R, the derivatives of ℓ as for `Action`. Without it, calc is
+        differentiated as for `Action`. Second derivatives of the accelerations, for a solver's `second_order`, always
+        come from calc. They are zero if calc cannot be called with numbers that carry derivatives. Second derivatives
+        of ⊕ are taken as zero.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
-    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-    model: a robot whose positions q are, with its ⊕; None for vectors of nv numbers.
-    controls: 'constant', 'linear' or 'quadratic', as of `FreeDynamics`.
+    lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
+    model: the robot to which the positions q and their ⊕ belong; None for vectors of nv numbers.
+    controls: 'constant', 'linear' or 'quadratic', as for `FreeDynamics`.
 
     Raises `ProblemError` if dt is not above 0.
 
@@ -2893,37 +2965,34 @@ class DifferentialAction:
 
 @final
 class Fddp:
-    """The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the rules and constants of
-    Crocoddyl.
+    """The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the equations and
+    constants of Crocoddyl.
 
-    Where controls are bounded, these are the rules of its box solvers.
+    If controls are bounded, it follows Crocoddyl's box solvers.
 
-    problem: the problem to solve; all memory is made for its shape, once.
-    settings: any of these, by name.
-        `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose trials are plain rollouts.
-        `second_order`: whether the curvature of the dynamics counts, where the models give it (full DDP).
-        `inverse_dynamics_form`: whether knots of robots come to the sweep as equations of inverse dynamics where that is possible
-        (default: yes): the same steps in less time.
-        `project_warm_start`: whether controls of a warm start that are outside of their bounds are moved into them, in `solve`
-        and in `resume` (default: yes). Crocoddyl keeps them, so its iterates need False.
-        `time_budget` (s): a solve that has used it up returns what it has, with the status "time_limit". The first iteration
-        always runs, unless the budget is 0. A later phase runs if the median of its last five durations fits. A solve that
-        takes longer tells by how much in `timings.overrun`.
-        `segments`: the number of parts of the horizon on which a sweep works at the same time, on as many threads as
-        there are; 1 unless given, at most 1024. The results differ by rounding, and not at all with the number of threads.
-        `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep beside
-        them), 1 unless given, at most 1024. The results are the same to the last bit.
-        `max_iterations`, `tolerance`, `tolerance_bounded` (where controls are bounded), `step_lengths`, `accept`,
-        `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`, `regularisation_max`,
-        `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of
-        the method.
+    problem: the problem to solve; all memory is allocated for its shape, once.
+    settings: any of these, by name. `method`: "fddp" (default), whose trials keep a part of the gaps, or "ddp", whose
+        trials are plain rollouts. `second_order`: whether to use the curvature of the dynamics if the models provide it
+        (full DDP). `inverse_dynamics_form`: whether the sweep takes knots of robots as equations of inverse dynamics if
+        possible (default: yes). The steps are the same and take less time. `project_warm_start`: whether controls of a
+        warm start outside their bounds are moved into them, in `solve` and in `resume` (default: yes). Crocoddyl keeps
+        them; its iterates need False. `time_budget` (s): a solve that has used it up returns its current result, with
+        the status "time_limit". The first iteration always runs, unless the budget is 0. A later phase runs if the
+        median of its last five durations fits. `timings.overrun` is the excess of a solve that takes longer.
+        `segments`: the number of parts of the horizon on which a sweep works at the same time, at most 1024, default 1.
+        It uses as many threads as are available. The results differ by rounding, but not with the number of threads.
+        `threads`: the number of threads that share an iteration on a robot (derivatives and gains, with the sweep in
+        parallel), at most 1024, default 1. The results are bit-identical. `max_iterations`, `tolerance`,
+        `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
+        `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
+        `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
     """
 
     def __new__(cls, problem: Problem, **settings: float | str | None) -> Fddp: ...
     @property
     def solution(self) -> Solution | None:
-        """The `Solution` of the last solve, also of one that a signal or an error of an `Action` has ended
-        ("interrupted"); None before the first.
+        """The `Solution` of the last solve, even if a signal or an error of an `Action` ended it ("interrupted");
+        None before the first solve.
         """
 
     @staticmethod
@@ -2931,27 +3000,29 @@ class Fddp:
     def resume(
         self, callback: Callable[[Iteration], object] | None = None, verbose: bool = False, progress: bool = False
     ) -> Solution:
-        """Solves the problem from the last solution: with a new initial state, or shifted. Returns a `Solution`.
+        """Solves the problem from the last solution, with a new initial state or a shifted horizon. Returns a
+        `Solution`.
 
-        With a `time_budget`, one delayed solve does not shorten those after it: each makes an iteration at least.
+        With a `time_budget`, a delayed solve does not shorten the following ones: each makes at least one
+        iteration.
 
-        callback, verbose, progress: as of `solve`.
+        callback, verbose, progress: as for `solve`.
 
-        Raises `ProblemError` as `solve`, and if there is no solution yet.
+        Raises `ProblemError` as `solve` does, and if there is no solution yet.
         """
 
     def shift(self, last: int) -> None:
-        """Moves the horizon of the problem on by a knot, as an MPC does after each step, and the last solution
-        with it.
+        """Shifts the horizon of the problem and the last solution by a knot, as an MPC does after each step.
 
-        `resume` then starts from there. Knot t becomes knot t − 1, with the costs and limits of its own; the
-        last one is served by a model of the problem, with those that it has for all knots. The last state follows
-        from the last control, which is repeated. At a second shift without a step of a solve in between the last
-        state is repeated too, as a rollout by repeated controls would diverge.
+        `resume` then starts from the shifted solution. Knot t becomes knot t − 1, with its own costs and
+        limits. A model of the problem serves the new last knot, with the costs and limits that the model has
+        for all knots. The last control is repeated, and the last state follows from it. At a second shift
+        without a solver step in between, the last state is repeated too, because a rollout with repeated
+        controls would diverge.
 
         last: the index of that model.
 
-        Raises `ProblemError` if there is no such model.
+        Raises `ProblemError` if the model does not exist.
         """
 
     def solve(
@@ -2962,43 +3033,44 @@ class Fddp:
         verbose: bool = False,
         progress: bool = False,
     ) -> Solution:
-        """Solves the problem from a warm start, and returns a `Solution`, whose status says how the solve ended.
+        """Solves the problem from a warm start, and returns a `Solution`, whose status tells how the solve ended.
 
-        Other threads run meanwhile. Signals are looked at some forty times a second, between the phases of an
-        iteration: what a handler raises, as KeyboardInterrupt, is raised here, and `solution` then is the best
-        iterate, from which `resume` goes on.
+        Other threads can run meanwhile. Signals are checked about forty times a second, between the phases of
+        an iteration. An exception of a signal handler, such as KeyboardInterrupt, is raised here. `solution` is
+        then the best iterate, from which `resume` continues.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
-        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
-        callback: a function that is called with the `Iteration` after each; where it returns False the solve ends
-            ("interrupted"). What it raises is raised here.
+        us: controls, (N, nu), or a list of N arrays if knots differ in nu.
+        callback: a function that is called with the `Iteration` after each iteration. If it returns False, the
+            solve ends ("interrupted"). Its exceptions are raised here.
         verbose: whether to print a line for each iteration.
-        progress: whether to show the progress, by tqdm where that is installed, else as lines.
+        progress: whether to show the progress, by tqdm if it is installed, else as lines.
 
-        Raises `ProblemError` for numbers or settings that make no sense, and what an `Action` raises.
+        Raises `ProblemError` for invalid numbers or settings, and exceptions raised by an `Action`.
         """
 
 @final
 class FreeDynamics:
     """A knot of a robot that moves freely under its joints' efforts.
 
-    q̈ = aba(q, v, S u); by semi-implicit Euler v⁺ = v + q̈ Δt, q⁺ = q ⊕ (v Δt + q̈ Δt²), cost Δt Σ w a(r); the state is
-    x = (q, v).
+    q̈ = aba(q, v, S u). By semi-implicit Euler v⁺ = v + q̈ Δt and q⁺ = q ⊕ (v Δt + q̈ Δt²). The cost is Δt Σ w a(r),
+    and the state is x = (q, v).
 
     model: the robot.
-    dt: Δt in seconds, or None for a terminal knot: no controls, cost Σ w a(r).
+    dt: Δt in seconds, or None for a terminal knot, which has no controls and the cost Σ w a(r).
     costs: a list of `Cost`.
-    costs_at: lists of `Cost` by the number of a knot, for knots with costs of their own; so one action serves a phase.
-    actuation: S, (nv, nu); by default each joint but a free-flyer at the root has a control.
+    costs_at: lists of `Cost` by index of the knot, for knots with costs of their own; so one action can serve a phase
+        of several knots.
+    actuation: S, (nv, nu); by default each joint has a control, except a free-flyer at the root.
     integrator: 'semi_implicit_euler', 'runge_kutta_2', 'runge_kutta_3' or 'runge_kutta_4'.
-    lower, upper: bounds on the controls, nu numbers each, infinite where there is none; or None.
-    limits: a list of `Limit`, or None; `AugmentedLagrangian` holds them.
-    limits_at: lists of `Limit` by the number of a knot, for knots with limits of their own.
-    controls: how they go through the knot's time: 'constant', 'linear' or 'quadratic'. The knot then has 1, 2 or 3 times nu
-        controls, the values u at the times 0 and Δt/2, or at 0, Δt/2 and Δt (by 'runge_kutta_3' 0, Δt/3 and 2 Δt/3);
-        bounds hold at each of them.
+    lower, upper: bounds on the controls, nu numbers each, infinite for no bound; or None.
+    limits: a list of `Limit`, or None; `AugmentedLagrangian` enforces them.
+    limits_at: lists of `Limit` by index of the knot, for knots with limits of their own.
+    controls: their course in time within a knot: 'constant', 'linear' or 'quadratic'. The knot then has 1, 2 or 3 times
+        nu controls, the values u at the times 0 and Δt/2, or at 0, Δt/2 and Δt ('runge_kutta_3': 0, Δt/3 and 2 Δt/3).
+        Bounds apply to each of these values.
 
-    Raises `ProblemError` for a cost, a limit or drives that do not fit.
+    Raises `ProblemError` for a cost, a limit or an actuation that does not fit the robot.
     """
 
     def __new__(
@@ -3018,17 +3090,18 @@ class FreeDynamics:
     @staticmethod
     def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> FreeDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
-        """The efforts that hold the robot still at the state x, nu numbers."""
+        """Returns the efforts that hold the robot still at the state x, nu numbers."""
 
 @final
 class FrictionCone:
     """Coulomb's friction cone ‖f_t‖ ≤ μ f_n as a pyramid, with bounds on the normal force: lower ≤ A f ≤ upper.
 
-    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside of the cone;
-    rotation: the surface's axes (its normal is z) along the contact's, (3, 3); least, greatest: bounds on the normal force
-    (N), by default 0 and infinite.
+    mu: μ; facets: the number of the pyramid's sides, even, 4 to 1000; inner: whether the pyramid lies inside the cone;
+    rotation: the surface's axes (its normal is z) in the contact's axes, (3, 3); least, greatest: bounds on the normal
+    force (N), by default 0 and infinite.
 
-    Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is none.
+    Raises `ProblemError` if μ is negative or not finite, facets is odd or not from 4 to 1000, or rotation is not a
+    rotation matrix.
 
     >>> condyle.optimal.FrictionCone(0.5).rows()[0]
     array([ 1. ,  0. , -0.5])
@@ -3046,23 +3119,24 @@ class FrictionCone:
     @staticmethod
     def _from_json(text: str) -> FrictionCone: ...
     def bounds(self) -> tuple[_Array, _Array]:
-        """The least and greatest values of A f."""
+        """Returns the lower and upper bounds of A f."""
 
     def rows(self) -> _Array:
-        """The matrix A, (facets + 1, 3)."""
+        """Returns the matrix A, (facets + 1, 3)."""
 
 @final
 class ImpulseDynamics:
-    """A knot at which contacts set in: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w a(r).
+    """A knot at which contacts begin with an impact: q⁺ = q, v⁺ = v − M⁻¹ Jᵀ (J M⁻¹ Jᵀ + μ 1)⁻¹ (1 + ε) J v, cost Σ w
+    a(r).
 
     There are no controls.
 
     model: the robot.
     contacts: a dict of `ContactConstraint`s by name.
-    costs: a list of `Cost`; they look at the state before the impact.
+    costs: a list of `Cost`, which are evaluated at the state before the impact.
     restitution: ε, 0 to 1.
     damping: μ (1/kg).
-    limits: a list of `Limit`, or None; they too look at the state before the impact.
+    limits: a list of `Limit`, or None; they are also evaluated at the state before the impact.
 
     Raises `ProblemError` as `ContactDynamics` does.
     """
@@ -3079,7 +3153,7 @@ class ImpulseDynamics:
     @staticmethod
     def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> ImpulseDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
-        """No controls: an impact has none."""
+        """Returns an empty array, since an impact has no controls."""
 
 @final
 class InverseDynamics:
@@ -3087,10 +3161,10 @@ class InverseDynamics:
 
     model: the robot.
     dt: Δt in seconds.
-    costs: a list of `Cost`; `Residual.joint_effort` looks at τ, `Residual.undriven_effort` at its part that nothing drives.
-    integrator, lower, upper, limits, controls: as of `FreeDynamics`.
+    costs: a list of `Cost`; `Residual.joint_effort` uses τ, `Residual.undriven_effort` the undriven part of τ.
+    integrator, lower, upper, limits, controls: as for `FreeDynamics`.
 
-    Raises `ProblemError` for a cost or a limit that does not fit.
+    Raises `ProblemError` for a cost or a limit that does not fit the robot.
     """
 
     def __new__(
@@ -3107,18 +3181,18 @@ class InverseDynamics:
     @staticmethod
     def _from_parts(model: Model, text: str, written: list[tuple[int, Residual]]) -> InverseDynamics: ...
     def quasi_static(self, x: ArrayLike) -> _Array:
-        """The accelerations that hold the robot still: nv zeros."""
+        """Returns the accelerations that hold the robot still: nv zeros."""
 
 @final
 class Limit:
-    """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` holds.
+    """Bounds on a residual r of a robot, lower ≤ r ≤ upper, which `AugmentedLagrangian` enforces.
 
-    Limits hold at the beginning of a knot. To `Fddp` alone they are costs for leaving the bounds.
+    Limits apply at the beginning of a knot. `Fddp` alone treats them as costs for leaving the bounds.
 
-    name: what errors call it.
+    name: used in errors.
     residual: a `Residual`.
-    lower, upper: as many numbers as r has, infinite where there is no bound; None is no bound. If both are None, a cone
-        or a centre of pressure has its own bounds, and any other r is 0. Entries where both are equal are equalities.
+    lower, upper: as many numbers as r has, infinite for no bound; None is no bound. If both are None, a cone or a
+        centre of pressure has its own bounds, and any other r must be 0. Entries where both are equal are equalities.
 
     >>> from condyle.optimal import Limit, Residual
     >>> Limit("effort", Residual.control([0.0] * 7), lower=[-30.0] * 7, upper=[30.0] * 7)
@@ -3134,8 +3208,8 @@ class Lqr:
     """An action with linear dynamics and a quadratic cost: x⁺ = A x + B u + f, ½ xᵀQx + xᵀSu + ½ uᵀRu + qᵀx + rᵀu, lower ≤
     u ≤ upper.
 
-    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. What is None is zero, or no
-    bound; without R and B it has no controls, as at a terminal knot. nx and nu are at most 4096.
+    A, Q: (nx, nx); B, S: (nx, nu); R: (nu, nu); f, q: nx numbers; r, lower, upper: nu. None is zero, or no bound.
+    Without R and B the action has no controls, as at a terminal knot. nx and nu are at most 4096.
 
     >>> from condyle.optimal import Lqr
     >>> knot, end = Lqr([[1.0]], B=[[1.0]], Q=[[1.0]], R=[[1.0]]), Lqr([[1.0]], Q=[[1.0]])
@@ -3157,18 +3231,19 @@ class Lqr:
 
 @final
 class Problem:
-    """An optimal control problem: knots from x0, each served by one of some models, and a terminal one.
+    """An optimal control problem: a sequence of knots from x0, each with one of the models, and a terminal knot.
 
     x0: the initial state, nx numbers.
     models: a list of `FreeDynamics`, `ContactDynamics`, `ImpulseDynamics`, `InverseDynamics`, `ContactInverseDynamics`,
         `Action`, `DifferentialAction`, `ConstrainedAction`, `Lqr`, `Unicycle`.
-    stages: for each knot the index of its model; None for an action for each knot, in their order. Consecutive knots of one
-        model are computed as a group, and so are those of models of a robot that differ in their costs and limits only.
-    terminal: the model of the end, without controls.
+    stages: for each knot the index of its model; None if each model serves one knot, in their order. Consecutive knots
+        with the same model are computed as a group. So are consecutive knots whose models belong to one robot and
+        differ only in their costs and limits.
+    terminal: the model of the terminal knot, without controls.
 
-    Raises `ProblemError` if they do not fit together, if x0 is not finite or a rotation in it has not the length 1 (up to
-    1e-3), and for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot, or 2²⁸ in the matrices [A B] of
-    all knots.
+    Raises `ProblemError` if the models do not fit together, or if x0 is not finite or contains a rotation whose length
+    is not 1 (up to 1e-3). Also raises it for more than 2²⁰ knots, 4096 numbers in a state or in the controls of a knot,
+    or 2²⁸ numbers in the matrices [A B] of all knots.
     """
 
     def __new__(
@@ -3180,70 +3255,74 @@ class Problem:
 
     @property
     def ndx(self) -> int:
-        """The number of numbers of a change of a state."""
+        """The number of entries of a change of a state."""
 
     @property
     def nx(self) -> int:
-        """The number of numbers of a state."""
+        """The number of entries of a state."""
 
     @property
     def x0(self) -> _Array:
         """The initial state, nx numbers; `set_x0` sets it."""
 
     def _evaluate(self, xs: ArrayLike, us: _Controls, moved: int) -> Evaluation:
-        """The evaluation of a solution, unless the horizon has moved on since."""
+        """Computes the evaluation of a solution, unless the horizon was shifted since."""
 
     @staticmethod
     def _from_parts(x0: ArrayLike, parts: Sequence[Any], stages: Sequence[int] | None) -> Problem: ...
     def derivatives(self, xs: ArrayLike, us: _Controls) -> list[LqNode]:
-        """The linear-quadratic problem around states and controls, a list of N + 1 `LqNode`s, which a `Sweep` solves.
+        """Computes the linear-quadratic problem around states and controls: a list of N + 1 `LqNode`s, which a `Sweep`
+        solves.
 
-        xs, us: as of `evaluate`.
+        xs, us: as for `evaluate`.
         """
 
     def evaluate(self, xs: ArrayLike, us: _Controls) -> Evaluation:
-        """The cost of states and controls, and what the dynamics compute there, as an `Evaluation`.
+        """Computes the cost of states and controls and the results of the dynamics there, as an `Evaluation`.
 
         xs: states, (N + 1, nx); they need not satisfy the dynamics.
-        us: controls, (N, nu), or a list of N arrays where knots differ in nu.
+        us: controls, (N, nu), or a list of N arrays if knots differ in nu.
         """
 
     @staticmethod
     def from_json(text: str) -> Problem:
-        """A problem of a robot from the text that `to_json` gave.
+        """Reads a robot's problem from the text that `to_json` returned.
 
-        Raises `ProblemError` for a text that is none, for what does not fit together in it, and for sizes beyond the limits
-        that `Problem` has.
+        Raises `ProblemError` for text that is not a problem, for parts that do not fit together, and for sizes beyond
+        the limits of `Problem`.
         """
 
     def quasi_static(self, xs: ArrayLike) -> _Array | list[_Array]:
-        """The controls of all knots that hold their states still, each by itself, as far as they can: (N, nu), or a list of N
-        arrays where knots differ in nu. A robot's come from statics, others from steps of Newton.
+        """Computes the quasi-static controls of all knots, which hold each knot's state still as well as possible: (N,
+        nu), or a list of N arrays if knots differ in nu. For a robot they follow from statics, for other actions from
+        Newton's method.
 
         xs: states, (N + 1, nx).
         """
 
     def rollout(self, us: _Controls) -> _Array:
-        """The states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
+        """Computes the states x₀ … x_N that follow from the initial state under controls us, (N + 1, nx).
 
-        us: (N, nu), or a list of N arrays where knots differ in nu.
+        us: (N, nu), or a list of N arrays if knots differ in nu.
 
-        Other threads run meanwhile; what a handler of a signal raises, as KeyboardInterrupt, ends it between knots.
+        Other threads can run meanwhile. An exception raised by a signal handler, such as KeyboardInterrupt, stops it
+        between knots.
         """
 
     def set_costs(self, knot: int, costs: Sequence[Cost]) -> None:
-        """Gives a knot costs of its own, between solves: an MPC's new targets. They move with their knot at a `shift`.
+        """Sets a knot's own costs, such as an MPC's new targets. They move with their knot in a `shift`. Call it between
+        solves.
 
-        knot: its number, 0 to N; N is the terminal one.
+        knot: its index, 0 to N; N is the terminal knot.
         costs: a list of `Cost`.
 
-        Raises `ProblemError` for a term that does not fit, and if the knot's action is not of a robot.
+        Raises `ProblemError` for a term that does not fit, or if the knot's action does not belong to a robot.
         """
 
     def set_weight(self, name: str, weight: float) -> None:
-        """Changes the weight of the terms called `name`, between solves: of all knots, the terminal one included.
+        """Changes the weight of the terms with this name in all knots, the terminal one included. Call it between solves.
 
-        Raises `KeyError` if there is no such term, `ProblemError` if the weight is negative or not finite.
+        Raises `KeyError` if no term has this name, `ProblemError` if the weight is negative or not finite.
         """
 
     def set_x0(self, x0: ArrayLike) -> None:
@@ -3253,21 +3332,20 @@ class Problem:
         """
 
     def to_json(self) -> str:
-        """The problem and its robot as JSON, with the present initial state, weights and stages. An infinite bound is
-        null.
+        """Returns the problem and its robot as JSON, with the current initial state, weights and stages. An infinite bound
+        is null.
 
-        Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or knots are of different
-        robots.
+        Raises `ProblemError` if an action is an `Lqr`, an `Action` or a `ConstrainedAction`, or if knots belong to
+        different robots.
         """
 
 @final
 class Residual:
-    """A residual: a vector r(x, u) of a robot, which a `Cost` makes small or a `Limit` bounds.
+    """A residual: a vector r(x, u) of a robot, which a `Cost` minimises or a `Limit` bounds.
 
-    A frame is given by its name or number in a model, a contact by the name that it has in `ContactDynamics`,
-    `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot it
-    looks at the frame of that name, or is refused.
-    A target that is not given is zero, a rotation the identity.
+    A frame is given by its name or index in a model. A contact is given by its name in `ContactDynamics`,
+    `ContactInverseDynamics` or `ImpulseDynamics`. A residual keeps the name of its frame: in a problem of another robot
+    it uses the frame with that name, or is refused. A target that is not given is zero; a rotation is the identity.
 
     >>> from condyle.optimal import Residual
     >>> Residual.center_of_mass([0.4, 0.2, 0.5])
@@ -3278,79 +3356,80 @@ class Residual:
     def _from_json(text: str) -> Residual: ...
     @staticmethod
     def center_of_mass(target: ArrayLike) -> Residual:
-        """The deviation of the centre of mass from a target, r = c − target, 3 numbers in the world (m)."""
+        """Returns the deviation of the centre of mass from a target, r = c − target, 3 numbers in the world (m)."""
 
     @staticmethod
     def center_of_pressure(contact: str, size: _Size, rotation: ArrayLike | None = None) -> Residual:
-        """The centre of pressure of a rigid contact in a rectangle: four numbers, none above 0 while it is inside.
+        """Returns the position of a rigid contact's centre of pressure relative to a rectangle: four numbers, all at most
+        0 while it is inside.
 
-        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes along the contact's,
+        size: the rectangle's sides along the surface's x and y (m); rotation: the surface's axes in the contact's axes,
         (3, 3).
         """
 
     @staticmethod
     def centroidal_momentum(target: ArrayLike | None = None) -> Residual:
-        """The deviation of the momentum about the centre of mass from a target, r = h − target, 6 numbers along the
-        world's axes, linear first.
+        """Returns the deviation of the momentum about the centre of mass from a target, r = h − target, 6 numbers along
+        the world's axes, linear first.
         """
 
     @staticmethod
     def contact_acceleration(contact: str) -> Residual:
-        """The acceleration of a contact where accelerations are controls, r = J q̈ + γ along the axes of its rows: 1, 2, 3 or 6
-        numbers, 0 while it holds.
+        """Returns the acceleration of a contact if accelerations are controls, r = J q̈ + γ along the axes of its rows: 1,
+        2, 3 or 6 numbers. It is 0 while the contact holds.
         """
 
     @staticmethod
     def contact_force(contact: str, target: ArrayLike | None = None) -> Residual:
-        """The deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows: 1, 2, 3 or 6
-        numbers; target has 6.
+        """Returns the deviation of a contact's force or impulse from a target, r = λ − target, along the axes of its rows:
+        1, 2, 3 or 6 numbers; target has 6.
         """
 
     @staticmethod
     def control(reference: ArrayLike) -> Residual:
-        """The deviation of the controls from a reference, r = u − reference, nu numbers."""
+        """Returns the deviation of the controls from a reference, r = u − reference, nu numbers."""
 
     @staticmethod
     def control_gravity() -> Residual:
-        """The efforts and forces beyond those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers."""
+        """Returns the efforts and forces in excess of those that hold the robot still, r = τ − g(q) + Jᵀλ, nv numbers."""
 
     @staticmethod
     def frame_placement(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """The deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is a
-        homogeneous 4 × 4 matrix.
+        """Returns the deviation of a frame's pose from a target, r = log(target⁻¹ oMf), 6 numbers, linear first; target is
+        a homogeneous 4 × 4 matrix.
         """
 
     @staticmethod
     def frame_rotation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """The deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix."""
+        """Returns the deviation of a frame's axes from a target, r = log(targetᵀ R), 3 numbers; target is a 3 × 3 matrix."""
 
     @staticmethod
     def frame_translation(model: Model, frame: str | int, target: ArrayLike) -> Residual:
-        """The deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m)."""
+        """Returns the deviation of a frame's origin from a target, r = p − target, 3 numbers in the world (m)."""
 
     @staticmethod
     def frame_velocity(
         model: Model, frame: str | int, target: ArrayLike | None = None, reference: ArrayLike = "local"
     ) -> Residual:
-        """The deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference: 'local',
-        'world' or 'local_world_aligned'.
+        """Returns the deviation of a frame's velocity from a target, r = v − target, 6 numbers, linear first; reference:
+        'local', 'world' or 'local_world_aligned'.
         """
 
     @staticmethod
     def friction_cone(contact: str, cone: FrictionCone) -> Residual:
-        """The rows r = A f of a friction cone, for a contact's force f."""
+        """Returns the rows r = A f of a friction cone, for a contact's force f."""
 
     @staticmethod
     def impulse_center_of_mass() -> Residual:
-        """The jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s)."""
+        """Returns the jump of the centre of mass's velocity at an impact, r = J_c (v⁺ − v), 3 numbers (m/s)."""
 
     @staticmethod
     def joint_acceleration(reference: ArrayLike) -> Residual:
-        """The deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers."""
+        """Returns the deviation of the joint accelerations from a reference, r = q̈ − reference, nv numbers."""
 
     @staticmethod
     def joint_effort(reference: ArrayLike) -> Residual:
-        """The deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers."""
+        """Returns the deviation of the efforts of all joints from a reference, r = τ − reference, nv numbers."""
 
     @staticmethod
     def own(
@@ -3358,12 +3437,12 @@ class Residual:
         calc: Callable[[Any, NDArray[Any], NDArray[Any]], Any],
         calc_diff: Callable[[int, _Array, _Array], tuple[ArrayLike, ArrayLike]] | None = None,
     ) -> Residual:
-        """A residual that is written in Python, r(t, x, u) of a knot t, size numbers.
+        """Returns a residual that is written in Python, r(t, x, u) at knot t, size numbers.
 
         size: the number of entries, at most 4096.
-        calc: a function of (t, x, u) that returns them; x = (q, v), and at the end u is empty.
-        calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the tangent
-            space of the state. Without it, those of calc, as for `Action`.
+        calc: a function of (t, x, u) that returns them; x = (q, v); u is empty at the terminal knot.
+        calc_diff: a function of (t, x, u) that returns (∂r/∂x, ∂r/∂u) of shapes (size, 2 nv) and (size, nu), in the
+            tangent space of the state. Without it, calc is differentiated as for `Action`.
 
         >>> from condyle.optimal import Residual
         >>> power = Residual.own(7, lambda t, x, u: x[7:] * u)
@@ -3374,14 +3453,15 @@ class Residual:
         calc: Callable[[Any, NDArray[Any], NDArray[Any]], Any],
         calc_diff: Callable[[Any, _Array, _Array], dict[str, ArrayLike]] | None = None,
     ) -> Residual:
-        """A cost that is written in Python, a number ℓ(t, x, u) of a knot t with a Hessian of its own, as a residual of one
-        entry; a `Cost` of it is weight · ℓ, by `Activation.sum()`, which it has by default.
+        """Returns a cost that is written in Python: a number ℓ(t, x, u) at knot t with its own Hessian, as a residual of
+        one entry. The default activation of its `Cost` is `Activation.sum()`, so the term is weight · ℓ.
 
-        calc: a function of (t, x, u) that returns ℓ; x = (q, v), and at the end u is empty.
-        calc_diff: a function of (t, x, u) that returns a dict of what is not zero among q, r, Q, S, R: the gradient and the
-            Hessian of ℓ by x, in the tangent space of the state, and by u. Without it, those of calc, as for `Action`.
+        calc: a function of (t, x, u) that returns ℓ; x = (q, v); u is empty at the terminal knot.
+        calc_diff: a function of (t, x, u) that returns a dict of the nonzero parts among q, r, Q, S, R: gradient and
+            Hessian of ℓ with respect to x, in the tangent space of the state, and to u. Without it, calc is
+            differentiated as for `Action`.
 
-        Knots with such a cost are solved by their controls, not in inverse-dynamics form.
+        Knots with such a cost are solved with respect to their controls, not in inverse-dynamics form.
 
         >>> from condyle.optimal import Cost, Residual
         >>> swing = Cost("swing", 2.0, Residual.own_cost(lambda t, x, u: 1.0 - np.cos(x[0])))
@@ -3389,23 +3469,24 @@ class Residual:
 
     @staticmethod
     def state(reference: ArrayLike) -> Residual:
-        """The deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
+        """Returns the deviation of the state from a reference, r = x ⊖ reference, 2 nv numbers; reference = (q, v)."""
 
     @staticmethod
     def undriven_effort() -> Residual:
-        """The efforts that inverse dynamics finds where nothing drives the robot, r = Nᵀτ with Nᵀ S = 0; of a floating base the 6
-        numbers of the force on it. They are 0 in a motion that is possible.
+        """Returns the efforts of inverse dynamics in the undriven directions, r = Nᵀτ with Nᵀ S = 0; for a floating base
+        the 6 numbers of the force on it. They are 0 in a feasible motion.
         """
 
     @staticmethod
     def wrench_cone(contact: str, cone: WrenchCone) -> Residual:
-        """The rows r = A w of a wrench cone, for a rigid contact's wrench w."""
+        """Returns the rows r = A w of a wrench cone, for a rigid contact's wrench w."""
 
 @final
 class Sweep:
     """The backward Riccati sweep over a horizon of linear-quadratic knots: a step of `Fddp` without its line search.
 
-    nodes: a list of `LqNode`s, as `Problem.derivatives` gives them; the last is the terminal one, without controls.
+    nodes: a list of `LqNode`s, as `Problem.derivatives` returns them; the last node is the terminal one, without
+    controls.
 
     Raises `ProblemError` if their shapes do not fit together.
 
@@ -3419,9 +3500,9 @@ class Sweep:
 
     def __new__(cls, nodes: Sequence[LqNode]) -> Sweep: ...
     def run(self, regularisation: float = 0.0) -> SweepResult:
-        """The feedback and the value functions, as a `SweepResult`.
+        """Computes the feedback and the value functions, as a `SweepResult`.
 
-        regularisation: what is added to the diagonals of Quu and Vxx, at least 0.
+        regularisation: the number added to the diagonals of Quu and Vxx, at least 0.
 
         Raises `ProblemError` if Quu of a knot is not positive definite.
         """
@@ -3430,11 +3511,11 @@ class Sweep:
 class Unicycle:
     """The action of a unicycle: x = (x, y, θ), u = (v, ω), x⁺ = x + Δt (v cos θ, v sin θ, ω).
 
-    The cost is ½ (w₁² ‖x‖² + w₂² ‖u‖²); these are the rules of Crocoddyl's `ActionModelUnicycle`.
+    The cost is ½ (w₁² ‖x‖² + w₂² ‖u‖²), as in Crocoddyl's `ActionModelUnicycle`.
 
     dt: Δt (s), above 0.
     weights: w₁ and w₂.
-    terminal: whether it is an action of the end, without controls.
+    terminal: whether the action is for the terminal knot, without controls.
 
     >>> from condyle.optimal import Fddp, Problem, Unicycle
     >>> problem = Problem([-1.0, -1.0, 1.0], [Unicycle()], [0] * 20, Unicycle(terminal=True))
@@ -3446,8 +3527,8 @@ class Unicycle:
 
 @final
 class WrenchCone:
-    """The wrench cone of a rectangular sole: friction, centre of pressure within the rectangle, and yaw moment, lower ≤ A
-    w ≤ upper.
+    """The wrench cone of a rectangular sole, lower ≤ A w ≤ upper: friction, centre of pressure within the rectangle, and
+    yaw moment.
 
     friction: a `FrictionCone`; size: the rectangle's sides along the surface's x and y (m).
 
@@ -3462,19 +3543,19 @@ class WrenchCone:
     @staticmethod
     def _from_json(text: str) -> WrenchCone: ...
     def bounds(self) -> tuple[_Array, _Array]:
-        """The least and greatest values of A w."""
+        """Returns the lower and upper bounds of A w."""
 
     def rows(self) -> _Array:
-        """The matrix A, (facets + 13, 6)."""
+        """Returns the matrix A, (facets + 13, 6)."""
 
 def joint_torque_regressor(
     model: Model, data: Data, q: ArrayLike, v: ArrayLike, a: ArrayLike, out: _Array | None = None
 ) -> _Array:
-    """The joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
+    """Computes the joint torque regressor Y(q, v, a), (nv, 10 (nbodies − 1)), with τ = Y π: `rnea` as a linear function of
     `Model.inertial_parameters`; O(n depth).
 
-    q: nq numbers; v, a: nv. Ten columns for each body but the world. With the rotors τ = Y π + armature a, and for the
-    linear coordinates of a free joint armature (a + ω × v) in place of armature a.
+    q: nq numbers; v, a: nv. Each body except the world has ten columns. With rotors τ = Y π + armature a; for the
+    linear coordinates of a free joint, armature (a + ω × v) replaces armature a.
 
     >>> arm = condyle.robots.arm7()
     >>> data, q, v, a = condyle.Data(arm), [0.3] * 7, [0.1] * 7, [0.2] * 7
@@ -3484,19 +3565,21 @@ def joint_torque_regressor(
     """
 
 def kinetic_energy_regressor(model: Model, data: Data, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-    """The kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without the
-    rotors, as a linear function of `Model.inertial_parameters`; O(n).
+    """Computes the kinetic energy regressor y(q, v), 10 (nbodies − 1) numbers, with T = y · π: `kinetic_energy`, without
+    the rotors, as a linear function of `Model.inertial_parameters`; O(n).
 
     q: nq numbers; v: nv.
     """
 
 def passive_torque(model: Model, q: ArrayLike, v: ArrayLike, smoothing: float, out: _Array | None = None) -> _Array:
-    """The passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N): damping d, which may be
-    d₀ + d₁ |v| + d₂ v², smoothed friction f, and what acts by itself in the robot; O(n).
+    """Computes the passive torque τ = −d v − f tanh(v/ε) + springs + gravity compensation, nv numbers (N m, N); O(n). The
+    damping d may be d₀ + d₁ |v| + d₂ v²; f is the friction, smoothed by ε.
 
     q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. A spring acts with
-    −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest (joints of several degrees of freedom: |Δ| in the brackets). The laws are those of MuJoCo's `qfrc_passive`. No other
-    function adds them: add them to τ where they should act.
+    −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest position; for joints with several degrees of freedom
+    the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`, except for joints with
+    `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of actuators. No other function
+    includes these efforts: add them to τ where needed.
 
     >>> arm = condyle.robots.arm7()
     >>> q, v = np.zeros(7), np.ones(7)
@@ -3507,10 +3590,10 @@ def passive_torque(model: Model, q: ArrayLike, v: ArrayLike, smoothing: float, o
 def passive_torque_derivatives(
     model: Model, q: ArrayLike, v: ArrayLike, smoothing: float, out: tuple[_Array, _Array] | list[_Array] | None = None
 ) -> PassiveDerivatives:
-    """The derivatives of `passive_torque`, exact, as `PassiveDerivatives(dtau_dq, dtau_dv)`, each (nv, nv).
+    """Computes the exact derivatives of `passive_torque`, as `PassiveDerivatives(dtau_dq, dtau_dv)`, each (nv, nv).
 
-    q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal but for free joints with friction or polynomial
-    damping; ∂τ/∂q has a block for each spring, and couples joints where gravity is compensated.
+    q: nq numbers; v: nv; smoothing: ε > 0 (rad/s, m/s). ∂τ/∂v is diagonal, except for free joints with friction or
+    polynomial damping. ∂τ/∂q has a block for each spring, and couples joints if gravity is compensated.
 
     >>> arm = condyle.robots.arm7()
     >>> d = condyle.passive_torque_derivatives(arm, np.zeros(7), np.ones(7), 1e-3)
@@ -3519,29 +3602,29 @@ def passive_torque_derivatives(
     """
 
 def potential_energy_regressor(model: Model, data: Data, q: ArrayLike, out: _Array | None = None) -> _Array:
-    """The potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a linear
-    function of `Model.inertial_parameters`; O(n).
+    """Computes the potential energy regressor y(q), 10 (nbodies − 1) numbers, with V = y · π: `potential_energy` as a
+    linear function of `Model.inertial_parameters`; O(n).
 
     q: nq numbers.
     """
 
 def arm7() -> Model:
-    """A seven-axis arm with a fixed base, nq = nv = 7; its last frame is `tool`.
+    """Returns a seven-axis arm with a fixed base, nq = nv = 7; its last frame is `tool`.
 
     >>> condyle.robots.arm7()
     <condyle.Model 'arm7': 7 bodies, nq = 7, nv = 7>
     """
 
 def humanoid() -> Model:
-    """A humanoid of thirty-two joints on a free-flyer, nq = 39, nv = 38, with soles `left_sole`, `right_sole`.
+    """Returns a humanoid with thirty-two joints on a free-flyer, nq = 39, nv = 38, with soles `left_sole`, `right_sole`.
 
     >>> condyle.robots.humanoid()
     <condyle.Model 'humanoid': 33 bodies, nq = 39, nv = 38>
     """
 
 def quadruped() -> Model:
-    """A quadruped of twelve joints on a free-flyer, nq = 19, nv = 18, with point feet `LF_foot`, `LH_foot`, `RF_foot`,
-    `RH_foot`.
+    """Returns a quadruped with twelve joints on a free-flyer, nq = 19, nv = 18, with point feet `LF_foot`, `LH_foot`,
+    `RF_foot`, `RH_foot`.
 
     >>> condyle.robots.quadruped()
     <condyle.Model 'quadruped': 13 bodies, nq = 19, nv = 18>
@@ -3549,25 +3632,26 @@ def quadruped() -> Model:
 
 @final
 class Simulation:
-    """A simulation of a robot: its state, and the memory to move it on.
+    """A simulation of a robot: its state, and the scratch memory to advance it.
 
     Along q(t) = q₀ ⊕ ξ(t) the equations of motion are q̇ = v (in the body's frame) and v̇ = aba(q, v, τ). τ and the
-    external forces stay as they are during a step.
+    external forces are constant during a step.
 
-    model: the robot; it stands still at `neutral`, at time 0.
-    integrator: 'semi_implicit_euler', order 1: fit for damped robots and short horizons; 'runge_kutta_4', order 4,
-        whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, momentum
-        is conserved to rounding.
+    model: the robot; it starts at rest at `neutral`, at time 0.
+    integrator: 'semi_implicit_euler', order 1, suitable for damped robots and short horizons; 'runge_kutta_4', order 4,
+        whose energy drifts by O(h⁴) per second; 'variational', order 2, symplectic: the energy does not drift, and
+        momentum is conserved to rounding.
     dt: h, the length of a step (s), above 0.
-    passive: the smoothing ε of `passive_torque` (rad/s, m/s), if damping, friction, springs and gravity compensation are to
-        act; None for none of these.
-    tolerance: Newton's method ('variational') ends once the momenta balance to within this part of their sum.
-    max_iterations: Newton's method gives up after this number of iterations.
-    ground: a `Ground` on which the robot stands, slides and lands, with 'semi_implicit_euler' only; None for none.
+    passive: the smoothing ε of `passive_torque` (rad/s, m/s), which adds damping, friction, springs and gravity
+        compensation; None leaves them out.
+    tolerance: Newton's method ('variational') ends when the imbalance of the momenta is at most this fraction of their
+        sum.
+    max_iterations: the maximum number of iterations of Newton's method.
+    ground: a `Ground` on which the robot stands, slides and lands; None for no ground. Requires 'semi_implicit_euler'.
 
-    A simulation can be copied and pickled, and the copy goes on with the same bits.
+    A simulation can be copied and pickled; the copy continues with bit-identical results.
 
-    Raises `ModelError` if M is singular or the ground cannot be, `ValueError` if dt is not above 0 or not finite, or
+    Raises `ModelError` if M is singular or the ground is invalid, `ValueError` if dt is not above 0 or not finite, or
     tolerance is negative.
 
     >>> from condyle.simulation import Simulation
@@ -3597,7 +3681,7 @@ class Simulation:
 
     @property
     def ground(self) -> Ground | None:
-        """The ground on which the robot stands, as a `Ground` of single points; None if there is none."""
+        """The ground on which the robot stands, as a `Ground` of single points; None without ground."""
 
     @property
     def q(self) -> _Array:
@@ -3612,48 +3696,50 @@ class Simulation:
         """The velocity, nv numbers."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """The parts of a pickle: what the constructor takes, and the state."""
+        """Returns the parts of a pickle: the constructor's arguments, and the state."""
 
     def __setstate__(self, state: tuple[float, list[float], list[float], list[float]]) -> None:
-        """The state of a pickle."""
+        """Restores the state of a pickle."""
 
     def run(self, steps: int, control: Callable[[Control], None] | None = None) -> _Status:
-        """A number of steps, with a control law that is called before each of them. Ends early when a step is not taken, and
-        returns its status; else 'contacts_not_converged' if a step had it, or 'done'.
+        """Makes a number of steps, and calls a control law before each of them. Ends early if a step is not made, and
+        returns its status. Otherwise returns 'contacts_not_converged' if a step had this status, else 'done'.
 
-        control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place; None for no
-            efforts, then other threads run meanwhile.
+        control: a function of a `Control`, which sets the numbers of its `tau` and `f_ext` in place. None means zero
+            efforts; other threads can then run meanwhile.
 
-        What a handler of a signal raises, as KeyboardInterrupt, ends the run after a step, whose state is kept.
+        An exception of a signal handler, such as KeyboardInterrupt, ends the run after a step; the state after this
+        step is kept.
         """
 
     def set_state(self, q: ArrayLike, v: ArrayLike) -> None:
         """Sets the position q (nq numbers) and the velocity v (nv numbers), and the time to 0.
 
-        Raises `ModelError` if a number of q is not finite or a rotation in it does not have the length 1 (up to 1e-3),
-        `ValueError` if one of v is not finite.
+        Raises `ModelError` if q is not finite or contains a rotation whose length is not 1 (up to 1e-3), `ValueError`
+        if v is not finite.
         """
 
     def step(self, tau: ArrayLike, f_ext: ArrayLike | None = None) -> _Status:
-        """A step under constant efforts and forces. Returns 'done'; 'not_converged' if Newton's method did not reach the
-        tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses break the laws of contact by
-        more than the ground's tolerance, and then the step was taken; or 'not_finite', and then it was not.
+        """Makes a step with constant efforts and forces, and returns its status: 'done'; 'not_converged' if Newton's
+        method did not reach the tolerance (a shorter step helps); 'contacts_not_converged' if the ground's impulses
+        violate the laws of contact by more than the ground's tolerance; or 'not_finite'. The step is made for 'done'
+        and 'contacts_not_converged'.
 
         tau: nv numbers (N m, N); f_ext: as for `rnea`.
         """
 
 @disjoint_base
 class _SpelledData:
-    """The scratch of a model under another spelling, and the state that the functions of a joint or a frame are for."""
+    """The `condyle.Data` with Pinocchio's interface, and the stored state for functions of a joint or a frame."""
 
     def __new__(cls, model: _SpelledModel) -> _SpelledData: ...
     @property
     def _frame_poses(self) -> _Array:
-        """The poses of the bodies that frames are seen at: those of the last `updateFramePlacements`, (njoints, 4, 4)."""
+        """The poses of the bodies for frames, from the last `updateFramePlacements`, (njoints, 4, 4)."""
 
     @property
     def _given(self) -> int:
-        """How many of q, v and a the last `forwardKinematics` was given."""
+        """The number of vectors among q, v and a that the last `forwardKinematics` was given."""
 
     @property
     def _ours(self) -> Data:
@@ -3665,7 +3751,7 @@ class _SpelledData:
 
     @property
     def _state(self) -> tuple[_Array, _Array, _Array]:
-        """q, v and a of the last `forwardKinematics`, with zeros for what it was not given."""
+        """q, v and a of the last `forwardKinematics`, zeros for those that were not given."""
 
     @property
     def com(self) -> list[_Array]:
@@ -3676,11 +3762,11 @@ class _SpelledData:
         """The centroidal momentum."""
 
     def _leave(self, com: _Array, hg: Force) -> None:
-        """Leaves a centre of mass and a centroidal momentum here."""
+        """Stores a centre of mass and a centroidal momentum."""
 
 @disjoint_base
 class _SpelledModel:
-    """A `condyle.Model` under another spelling."""
+    """A `condyle.Model` with Pinocchio's interface."""
 
     def __new__(cls, model: Model) -> _SpelledModel: ...
     @property
@@ -3690,98 +3776,96 @@ class _SpelledModel:
 def centerOfMass(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
 ) -> _Array:
-    """c, also data.com[0]; with v and a also data.vcom[0] and data.acom[0]."""
+    """Computes c, also stored as data.com[0]; with v and a also data.vcom[0] and data.acom[0]."""
 
 def computeCentroidalMomentum(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> Force:
-    """hg, also data.hg."""
+    """Computes hg, also stored as data.hg."""
 
 def computeCoriolisMatrix(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> _Array:
-    """C with C v + g = h and Ṁ − 2 C skew-symmetric, also data.C."""
+    """Computes C with C v + g = h and Ṁ − 2 C skew-symmetric, also stored as data.C."""
 
 def computeFrameJacobian(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, frame_id: int, frame: ReferenceFrame | None = None
 ) -> _Array:
-    """The Jacobian of a frame, (6, nv)."""
+    """Computes the Jacobian of a frame, (6, nv)."""
 
 def computeGeneralizedGravity(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """g, also data.g."""
+    """Computes g, also stored as data.g."""
 
 def computeMinverse(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """M⁻¹, also data.Minv."""
+    """Computes M⁻¹, also stored as data.Minv."""
 
 def _spelled_crba(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """M, both triangles, also data.M."""
+    """Computes M, both triangles, also stored as data.M."""
 
 def _spelled_difference(model: _SpelledModel, q0: ArrayLike, q1: ArrayLike) -> _Array:
-    """q₁ ⊖ q₀."""
+    """Computes q₁ ⊖ q₀."""
 
 def forwardKinematics(
     model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike | None = None, a: ArrayLike | None = None
 ) -> None:
-    """data.oMi; with v and a also data.v and data.a, in the bodies' frames."""
+    """Computes data.oMi; with v and a also data.v and data.a, in the bodies' frames."""
 
 def framesForwardKinematics(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> None:
-    """data.oMi and data.oMf."""
+    """Computes data.oMi and data.oMf."""
 
 def getAcceleration(
     model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame | None = None
 ) -> Motion:
-    """The spatial acceleration of a joint's body at the last forwardKinematics."""
+    """Returns the spatial acceleration of a joint's body at the last forwardKinematics."""
 
 def getClassicalAcceleration(
     model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame | None = None
 ) -> Motion:
-    """r̈ and ω̇ of a joint's body at the last forwardKinematics."""
+    """Returns r̈ and ω̇ of a joint's body at the last forwardKinematics."""
 
 def getFrameAcceleration(
     model: _SpelledModel, data: _SpelledData, frame_id: int, frame: ReferenceFrame | None = None
 ) -> Motion:
-    """The spatial acceleration of a frame at the last forwardKinematics."""
+    """Returns the spatial acceleration of a frame at the last forwardKinematics."""
 
 def getFrameClassicalAcceleration(
     model: _SpelledModel, data: _SpelledData, frame_id: int, frame: ReferenceFrame | None = None
 ) -> Motion:
-    """r̈ and ω̇ of a frame at the last forwardKinematics."""
+    """Returns r̈ and ω̇ of a frame at the last forwardKinematics."""
 
 def getFrameJacobian(model: _SpelledModel, data: _SpelledData, frame_id: int, frame: ReferenceFrame) -> _Array:
-    """The Jacobian of a frame at the last computeJointJacobians, (6, nv)."""
+    """Returns the Jacobian of a frame at the last computeJointJacobians, (6, nv)."""
 
 def getFrameVelocity(
     model: _SpelledModel, data: _SpelledData, frame_id: int, frame: ReferenceFrame | None = None
 ) -> Motion:
-    """The velocity of a frame at the last forwardKinematics."""
+    """Returns the velocity of a frame at the last forwardKinematics."""
 
 def getJointJacobian(model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame) -> _Array:
-    """The Jacobian of a joint's body at the last computeJointJacobians, (6, nv)."""
+    """Returns the Jacobian of a joint's body at the last computeJointJacobians, (6, nv)."""
 
 def getVelocity(
     model: _SpelledModel, data: _SpelledData, joint: str | int, frame: ReferenceFrame | None = None
 ) -> Motion:
-    """The velocity of a joint's body at the last forwardKinematics."""
+    """Returns the velocity of a joint's body at the last forwardKinematics."""
 
 def _spelled_integrate(model: _SpelledModel, q: ArrayLike, v: ArrayLike) -> _Array:
-    """q ⊕ v."""
+    """Computes q ⊕ v."""
 
 def jacobianCenterOfMass(model: _SpelledModel, data: _SpelledData, q: ArrayLike) -> _Array:
-    """∂c/∂q, (3, nv), also data.Jcom."""
+    """Computes ∂c/∂q, (3, nv), also stored as data.Jcom."""
 
 def nonLinearEffects(model: _SpelledModel, data: _SpelledData, q: ArrayLike, v: ArrayLike) -> _Array:
-    """C v + g, also data.nle."""
+    """Computes C v + g, also stored as data.nle."""
 
 def updateFramePlacements(model: _SpelledModel, data: _SpelledData) -> None:
-    """data.oMf of the last forwardKinematics."""
+    """Computes data.oMf of the last forwardKinematics."""
 
 @final
 class FrictionContact:
-    """A contact with friction: what touches is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+    """A contact with friction: the touching frame is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
 
-    Whether it touches at a tick, and how strongly, is said by `ContactTarget.activation`. Numbers are checked when a
-    `WholeBodyController` is made.
+    `ContactTarget.activation` defines whether the contact touches at a tick, and how strongly. Numbers are checked when
+    a `WholeBodyController` is made.
 
-    Common arguments:
-    frame: the name of a frame of the robot.
-    friction: μ, Coulomb's coefficient; above 0.
-    min_force, max_force: least and greatest normal force of the whole contact (N).
+    Common arguments: frame: the name of a frame of the robot. friction: μ, the Coulomb coefficient, above 0. min_force,
+    max_force: bounds on the normal force of the whole contact (N).
 
     >>> from condyle.wholebody import FrictionContact
     >>> FrictionContact.sole("left_sole", 0.7, [0.2, 0.1]).corners.shape
@@ -3790,15 +3874,15 @@ class FrictionContact:
 
     @property
     def axes(self) -> Literal["world", "frame"]:
-        """The axes along which the normal is given: 'world' or 'frame'."""
+        """The axes in which the normal is given: 'world' or 'frame'."""
 
     @property
     def corners(self) -> _Array | None:
-        """The corners of a surface in the frame (m), (n, 3); None of a point."""
+        """The corners of a surface in the frame (m), (n, 3); None for a point."""
 
     @property
     def forces(self) -> Literal["wrench", "corners"] | None:
-        """What describes the force on a surface: 'wrench' or 'corners'; None of a point."""
+        """The representation of the force on a surface: 'wrench' or 'corners'; None for a point."""
 
     @property
     def frame(self) -> str:
@@ -3806,15 +3890,15 @@ class FrictionContact:
 
     @property
     def friction(self) -> float:
-        """μ."""
+        """The friction coefficient μ."""
 
     @property
     def max_force(self) -> float:
-        """The greatest normal force (N)."""
+        """The maximum normal force (N)."""
 
     @property
     def min_force(self) -> float:
-        """The least normal force (N)."""
+        """The minimum normal force (N)."""
 
     @property
     def normal(self) -> _Array:
@@ -3822,7 +3906,7 @@ class FrictionContact:
 
     @property
     def yaw_friction(self) -> float | None:
-        """γ (m); None for the default."""
+        """The bound γ of the yaw moment (m); None for the default."""
 
     @staticmethod
     def point(
@@ -3833,10 +3917,10 @@ class FrictionContact:
         min_force: float = 0.0,
         max_force: float = ...,
     ) -> FrictionContact:
-        """A point: the frame's origin is held, the frame may turn about it.
+        """Returns a point contact: the frame's origin is held, the frame may turn about it.
 
-        normal: the direction in which the environment pushes, 3 numbers of any length but 0; None is z, level ground.
-        axes: 'world', along which the normal is given and stays, or 'frame', with which it turns.
+        normal: the direction in which the environment pushes, 3 numbers of any nonzero length; None is z, level ground.
+        axes: the axes of the normal: 'world', in which it is constant, or 'frame', with which it turns.
         """
 
     @staticmethod
@@ -3849,9 +3933,9 @@ class FrictionContact:
         min_force: float = 0.0,
         max_force: float = ...,
     ) -> FrictionContact:
-        """A rectangular sole about the frame's origin, whose normal is the frame's z.
+        """Returns a contact of a rectangular sole about the frame's origin, whose normal is the frame's z axis.
 
-        size: its sides along the frame's x and y (m); forces, yaw_friction: as of `surface`.
+        size: its sides along the frame's x and y (m); forces, yaw_friction: as for `surface`.
         """
 
     @staticmethod
@@ -3865,35 +3949,37 @@ class FrictionContact:
         min_force: float = 0.0,
         max_force: float = ...,
     ) -> FrictionContact:
-        """An edge (two corners: the frame may turn about it) or a convex polygon (three or more: the frame is held).
+        """Returns an edge contact (two corners: the frame may turn about the edge) or a convex polygon (three or more
+        corners: the frame is held).
 
-        corners: in the frame, in their order around the polygon, in one plane across the normal (m), (n, 3).
-        forces: 'wrench', a force with one friction cone, a centre of pressure within the polygon and a bounded moment about
-            the normal; or 'corners', a force with a friction cone at each corner.
-        normal: the direction in which the environment pushes, along the frame's axes, 3 numbers of any length but 0; None
-            is z.
-        yaw_friction: γ (m): the moment about the normal of a wrench is at most γ f_n. None is ⅔ μ r, r being the radius of
-            the greatest disc about the corners' mean within the polygon; ½ μ l on an edge of length 2 l.
+        corners: positions in the frame (m), (n, 3), in their order around the polygon, in one plane across the normal.
+        forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
+            about the normal; or 'corners', a force with a friction cone at each corner.
+        normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
+            None is z.
+        yaw_friction: γ (m), with which a wrench's moment about the normal is at most γ f_n. None is ⅔ μ r, with r the
+            radius of the largest circle about the corners' mean within the polygon; ½ μ l for an edge of length 2 l.
         """
 
 @final
 class Plan:
-    """A planned motion with N + 1 knots: states at some times, efforts and gains between them, and which contacts touch when.
+    """A planned motion with N + 1 knots: states at given times, efforts and gains between them, and the contacts that
+    touch in each interval.
 
-    `WholeBodyController.track` makes references of it. Between knots q runs along the joints' own groups, v and a = Δv / Δt
-    are interpolated. Knots may share a time: then the velocity jumps there (an impact).
+    `WholeBodyController.track` converts it to references. Between knots q is interpolated in the joints' groups, and v
+    is interpolated, with a = Δv / Δt. Two knots may have the same time: then the velocity jumps there (an impact).
 
     model: the robot.
-    times: N + 1 times, none smaller than the one before (s).
+    times: N + 1 times in ascending order (s); two may be equal.
     states: (q, v) of the knots, (N + 1, nq + nv).
-    touches: whether each of the controller's contacts touches from each knot to the next, (N, contacts).
-    controls: efforts of the actuated coordinates (all but those of free-flyers) from each knot to the next, (N, nu); None
-        if there are none.
-    gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None if there are none.
-    fade: the time over which a contact is loaded after it has begun to touch, and unloaded before it ends (s).
+    touches: whether each of the controller's contacts touches between a knot and the next one, (N, contacts).
+    controls: efforts of the actuated coordinates (all coordinates except a free-flyer's) between a knot and the next one, (N,
+        nu); None for no controls.
+    gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
+    fade: the time over which a contact is loaded after it begins to touch, and unloaded before it ends (s).
 
-    Raises `ControllerError` for numbers that are not finite, for times that run backwards, and for states whose quaternions or
-    pairs (cos, sin) do not have length 1.
+    Raises `ControllerError` for numbers that are not finite, for times that decrease, and for states whose quaternions
+    or pairs (cos, sin) do not have length 1.
 
     >>> from condyle.wholebody import Plan
     >>> robot = condyle.robots.quadruped()
@@ -3915,15 +4001,15 @@ class Plan:
     ) -> Plan: ...
     @property
     def span(self) -> tuple[float, float]:
-        """The times of the first knot and of the last (s)."""
+        """The times of the first and the last knot (s)."""
 
     def activation(self, contact: int, t: float) -> float:
-        """The activation of a contact, by its number, at a time: 0 where it does not touch, ramped where it begins and ends
-        to, else 1.
+        """Returns the activation of a contact, given by index, at a time: 0 while it does not touch, a ramp when it begins
+        and ends to touch, else 1.
         """
 
     def feedback(self, t: float, q: ArrayLike, v: ArrayLike, out: _Array | None = None) -> _Array:
-        """The plan's own control at a state, τ = ū + K (x ⊖ x̄), nv numbers, 0 at a free-flyer.
+        """Computes the plan's own control at a state, τ = ū + K (x ⊖ x̄), nv numbers, 0 at a free-flyer.
 
         t: the time (s); q: nq numbers; v: nv.
 
@@ -3935,17 +4021,15 @@ class Plan:
 class Task:
     """A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖² with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v).
 
-    What it aims at is in the `References`. Tasks of priority 0 come first; those of priority 1 decide only what they leave
-    open, and so on. Within a priority the weights decide, and only their ratios matter. Numbers are checked when a
+    The `References` contain its target. Tasks of priority 0 come first; tasks of priority 1 only use the freedom that
+    these leave, and so on. Within a priority only the ratios of the weights matter. Numbers are checked when a
     `WholeBodyController` is made.
 
-    Common arguments:
-    weight: w, at least 0; None is the default of the task.
-    gains: `Gains`, k (1/s²) and d (1/s); None is `Gains.critical(100.0)`.
-    mask: which of its numbers count, as many as it has; None is all.
-    axes: along whose axes these numbers are: 'world'; 'local', the frame's own (of tasks that move no frame, the world's);
-        or ('frame', name), those of another frame.
-    priority: 0 for the first; at most 2.
+    Common arguments: weight: w, at least 0; None is the default of the task. gains: `Gains`, k (1/s²) and d (1/s); None
+    is `Gains.critical(100.0)`. mask: one flag for each number of the task, whether it is controlled; None is all. axes:
+    the axes of these numbers: 'world'; 'local', the frame's own (for tasks without a frame: the world's); or ('frame',
+    name), the axes of another frame.
+    priority: 0 is the first priority; at most 2.
 
     >>> from condyle.wholebody import Task
     >>> Task.orientation("trunk", mask=[True, True, False])  # level, whatever its heading
@@ -3954,35 +4038,35 @@ class Task:
 
     @property
     def axes(self) -> _Axes:
-        """Along whose axes its numbers are: 'world', 'local' or ('frame', name)."""
+        """The axes of its numbers: 'world', 'local' or ('frame', name)."""
 
     @property
     def frame(self) -> str | None:
-        """The name of its frame; None if it has none."""
+        """The name of its frame; None without a frame."""
 
     @property
     def gains(self) -> Gains:
-        """k and d, `Gains`."""
+        """The gains k and d, `Gains`."""
 
     @property
     def joints(self) -> _Array:
-        """Factors of the posture's weight, nv numbers; empty for all 1."""
+        """Factors of the posture's weight, nv numbers; empty if all are 1."""
 
     @property
     def kind(self) -> str:
-        """The quantity: the name of what made it."""
+        """The controlled quantity: the name of the task's constructor."""
 
     @property
     def mask(self) -> list[bool]:
-        """Which of its numbers count."""
+        """The mask: for each of its numbers, whether it is controlled."""
 
     @property
     def priority(self) -> int:
-        """Its priority: 0 for the first."""
+        """Its priority; 0 is the first."""
 
     @property
     def weight(self) -> float:
-        """w."""
+        """The weight w."""
 
     @staticmethod
     def angular_momentum(
@@ -3992,7 +4076,9 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """The rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers; weight 0.1."""
+        """Returns a task for the rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers;
+        weight 0.1.
+        """
 
     @staticmethod
     def com(
@@ -4002,14 +4088,15 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """The centre of mass, c̈: 3 numbers; weight 10."""
+        """Returns a task for the centre of mass, c̈: 3 numbers; weight 10."""
 
     @staticmethod
     def contact_force(
         frame: str, weight: float | None = None, mask: Sequence[bool] | None = None, priority: int = 0
     ) -> Task:
-        """The force of the contact of this frame: 6 numbers, force and moment at the contact's centre along its axes (t₁, t₂,
-        n), of which a point has 3; weight 1e-3. It has no gains, and does not act while the contact is off.
+        """Returns a task for the force of this frame's contact: 6 numbers, force and moment at the contact's centre in its
+        axes (t₁, t₂, n); a point contact has the first 3; weight 1e-3. It has no gains, and does not act while the
+        contact is off.
         """
 
     @staticmethod
@@ -4021,7 +4108,7 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """A frame's rotation, ω̇: 3 numbers; weight 10."""
+        """Returns a task for a frame's rotation, ω̇: 3 numbers; weight 10."""
 
     @staticmethod
     def pose(
@@ -4032,7 +4119,7 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """A frame's origin and rotation, (p̈, ω̇): 6 numbers, linear first; weight 10."""
+        """Returns a task for a frame's origin and rotation, (p̈, ω̇): 6 numbers, linear first; weight 10."""
 
     @staticmethod
     def position(
@@ -4043,15 +4130,15 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """A frame's origin, p̈: 3 numbers; weight 10."""
+        """Returns a task for a frame's origin, p̈: 3 numbers; weight 10."""
 
     @staticmethod
     def posture(
         weight: float | None = None, gains: Gains | None = None, joints: ArrayLike | None = None, priority: int = 0
     ) -> Task:
-        """The actuated joints, q̈; weight 0.1.
+        """Returns a task for the actuated joints, q̈; weight 0.1.
 
-        joints: factors of the weight, one for each coordinate, nv numbers; None is all 1.
+        joints: factors of the weight, one for each coordinate, nv numbers; None is 1 for all.
         """
 
     @staticmethod
@@ -4063,14 +4150,14 @@ class Task:
         axes: _Axes | None | None = None,
         priority: int = 0,
     ) -> Task:
-        """The velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6 numbers, linear first;
-        weight 10.
+        """Returns a task for the velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6
+        numbers, linear first; weight 10.
         """
 
 @final
 class WholeBodyController:
-    """A whole-body controller: at each tick a cone program gives the accelerations, contact forces and joint efforts that best
-    do what the tasks ask.
+    """A whole-body controller. At each tick it solves a cone program for the accelerations, contact forces and joint
+    efforts that fulfil the tasks best.
 
         x = (q̈, f)
         minimise     ½ Σ w ‖J q̈ + J̇ v − a*‖²  +  ½ w_a ‖q̈‖²  +  ½ w_f ‖f − f_ref‖²
@@ -4082,19 +4169,19 @@ class WholeBodyController:
                      −τ̄ ≤ τ ≤ τ̄  with  τ = S (M q̈ + h − Jᵀ f)
                      bounds on q̈                         from limits of position and velocity: `JointLimits`
 
-    Positions, velocities and accelerations of tasks and contacts are along the world's axes, accelerations classical. Memory
-    is fixed here.
+    Positions, velocities and accelerations of tasks and contacts are in the world's axes; accelerations are classical.
+    All memory is allocated in the constructor.
 
     model: the robot.
-    contacts: a list of `FrictionContact`, each of another frame; empty for a robot in free fall.
+    contacts: a list of `FrictionContact`, each of a different frame; empty for a robot in free fall.
     tasks: a list of `Task`.
-    settings: `Settings`; None for the default ones.
+    settings: `Settings`; None for the defaults.
 
-    Raises `ModelError` for an unknown frame, and `ControllerError` for a frame that is a contact twice, for a force task
-    without its contact, for any number outside of its range, and for an effort limit that is 0, of the model or the settings.
+    Raises `ModelError` for an unknown frame. Raises `ControllerError` for a frame with two contacts, for a force task
+    without its contact, for a number outside its range, and for an effort limit of 0 in the model or the settings.
 
-    A controller can be copied and pickled: the copy continues with the same bits; with the back end 'clarabel', whose solvers are
-    built again, with the same solution up to its tolerance.
+    A controller can be copied and pickled; the copy continues with bit-identical results. With the back end 'clarabel',
+    whose solvers are built again, results are equal up to its tolerance.
 
     >>> from condyle.wholebody import FrictionContact, Task, WholeBodyController
     >>> robot = condyle.robots.quadruped()
@@ -4113,55 +4200,60 @@ class WholeBodyController:
     ) -> WholeBodyController: ...
     @property
     def command(self) -> Command:
-        """The last `Command`; before the first step zeros."""
+        """The last `Command`; zeros before the first step."""
 
     @property
     def settings(self) -> Settings:
-        """The settings, all of them: `Settings`."""
+        """All settings of the controller: `Settings`."""
 
     def hold(self, q: ArrayLike) -> References:
-        """The `References` that keep a position at rest: all tasks where they are, each contact held where it is and touching,
-        the weight shared by the contacts in equal parts.
+        """Returns the `References` that keep the robot at rest at a position: all tasks at their current values, each
+        contact held and touching, the weight shared equally by the contacts.
 
         q: nq numbers.
 
-        Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) that do not have length 1.
+        Raises `ModelError` for numbers that are not finite, and for quaternions and pairs (cos, sin) whose length is
+        not 1.
         """
 
     def optimality(self, q: ArrayLike, v: ArrayLike, references: References) -> Optimality:
-        """How far the step at this state, for these references, is from the optimum of its program of the first priority:
-        errors of the conditions of Karush, Kuhn and Tucker, below 1e-5 at the default tolerance, as `Optimality`. It must be the
-        last step. For tests: it assembles the program anew.
+        """Returns the distance of the last step from the optimum of its first-priority program, as `Optimality`: the
+        errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the same state
+        and references as to the last step. For tests: it assembles the program anew.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.
         """
 
     def step(self, q: ArrayLike, v: ArrayLike, references: References) -> Command:
-        """The `Command` at a state. There always is one: without a solution it is a safe one, and its status says why.
-        A number that is not finite is the status 'not_finite'; a quaternion, a pair (cos, sin) or a reference's rotation that is none
-        is 'invalid_state', with the joint or the frame in the reason. Other threads run meanwhile.
+        """Computes the `Command` at a state. It always returns a command: without a solution, a safe one, whose status
+        tells why. The status is 'not_finite' for a number that is not finite. It is 'invalid_state' for an invalid
+        quaternion, pair (cos, sin) or rotation of a reference; the reason names the joint or the frame. Other threads
+        can run meanwhile.
 
         q: nq numbers; v: nv.
         references: `References` of this controller.
         """
 
     def track(self, plan: Plan, t: float, references: References) -> None:
-        """Sets references to those of a plan at a time: joints, and where they bring centre of mass, momentum and frames;
-        contacts by their activation, held where the plan has them, with shares of the force that the plan's c̈ takes.
+        """Sets references to a plan at a time: the joints, and the resulting centre of mass, momentum and frames; the
+        contacts with their activation, held where the plan has them. The contacts share the force that the plan's c̈
+        requires.
 
-        plan: a `Plan` of the same robot with as many contacts.
-        t: the time (s); before the first and after the last knot the plan rests in it.
+        plan: a `Plan` of the same robot with the same number of contacts.
+        t: the time (s); before the first knot and after the last one, the plan rests at that knot.
         references: `References` of this controller, which are changed.
         """
 
 def _check_pose(name: str, pose: ArrayLike) -> None:
-    """Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is one."""
+    """Raises `ValueError` unless the rotation of a pose, a (4, 4) matrix, is valid."""
 
 def _check_rotations(name: str, q: ArrayLike, rotations: Sequence[tuple[str, int, int]]) -> None:
-    """Raises `ValueError` unless all rotations of a position have length 1; each is given by its joint and its range."""
+    """Raises `ValueError` unless all rotations of a position have length 1; each rotation is given by its joint and its
+    range in q.
+    """
 
 def _controller_from_numbers(
     model: Model, contacts: Sequence[FrictionContact], tasks: Sequence[Task], settings: Settings, numbers: ArrayLike
 ) -> WholeBodyController:
-    """The controller that a pickle holds. The model, which is one of its parts, checks the version."""
+    """Creates the controller of a pickle. The model, which is one of its parts, checks the version."""

@@ -6,6 +6,7 @@ same. Numbers keep all digits.
 
 import sys
 from collections.abc import Iterable, Iterator
+from os import PathLike
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
@@ -20,8 +21,8 @@ JOINT_WRAP, SITE_WRAP = 1, 3
 SITE_OBJECT = 6
 """The value of sites in MuJoCo's enumeration of object types."""
 FLAGS = {
-    "equality": 1 << 1, "frictionloss": 1 << 2, "limit": 1 << 3, "spring": 1 << 5, "damper": 1 << 6, "gravity": 1 << 7,
-    "clampctrl": 1 << 8, "actuation": 1 << 11,
+    "constraint": 1 << 0, "equality": 1 << 1, "frictionloss": 1 << 2, "limit": 1 << 3, "spring": 1 << 5,
+    "damper": 1 << 6, "gravity": 1 << 7, "clampctrl": 1 << 8, "actuation": 1 << 11,
 }  # fmt: skip
 """Features that can be disabled, with their bits in MuJoCo 4; other versions are asked for their own bits."""
 
@@ -30,6 +31,15 @@ _Attributes = dict[str, Any]
 
 def mjcf(model: Any) -> str:
     """Returns the text of an MJCF that describes a compiled model."""
+    if not (hasattr(model, "nbody") and hasattr(model, "opt")):
+        found, hint = type(model).__name__, ""
+        if hasattr(model, "compile"):
+            hint = "; call spec.compile()"
+        elif hasattr(model, "model"):
+            hint = "; give data.model"
+        elif isinstance(model, (str, PathLike)):
+            hint = "; `from_mjcf` reads a file"
+        raise TypeError(f"model: expected an MjModel, found {found}{hint}")
     return _Text(model).text()
 
 
@@ -49,10 +59,14 @@ class _Text:
         m = self.m
         compiler = {"angle": "radian", "autolimits": False, "inertiafromgeom": False, "balanceinertia": False}
         option = {"gravity": m.opt.gravity, "density": m.opt.density, "viscosity": m.opt.viscosity, "wind": m.opt.wind}
+        disabled = int(getattr(m.opt, "disableactuator", 0))
+        groups = {"actuatorgroupdisable": [group for group in range(31) if disabled >> group & 1]} if disabled else {}
         lines = [
             f"<mujoco model={quoteattr(self._name(0))}>",
             _element("compiler", compiler),
-            _element("option", {k: v for k, v in option.items() if k == "gravity" or np.any(v)}, self._flags()),
+            _element(
+                "option", {k: v for k, v in option.items() if k == "gravity" or np.any(v)} | groups, self._flags()
+            ),
             "<worldbody>",
             *self._inside(0),
         ]
@@ -257,6 +271,7 @@ class _Text:
                 attributes[what] = numbers[: max(1, int(np.max(np.flatnonzero(numbers), initial=0)) + 1)]
             found = {"damping": _polynomial(_row(m, "actuator_damping", a), _row(m, "actuator_dampingpoly", a))}
             found["armature"] = [float(_row(m, "actuator_armature", a))]
+            found["group"] = [float(_row(m, "actuator_group", a))]
             yield _element("general", attributes | {what: numbers for what, numbers in found.items() if any(numbers)})
 
     def _keyframes(self) -> Iterator[str]:

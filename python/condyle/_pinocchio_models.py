@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ._condyle import WORLD, BodyId, Joint, Model, ModelBuilder, ModelError
 from ._inertia import Inertia
+from ._types import ModelWarning
 
 _Part = tuple[Joint, NDArray[np.float64]]
 """A joint, and its placement."""
@@ -83,6 +84,27 @@ def warn_of_armature(model: Model) -> None:
         if kind == "free_flyer" and model.armature[at : at + 3].any():
             text = f"joint `{name}`: its armature {model.armature[at]} is along the axes of its parent in Condyle"
             warnings.warn(f"{text}, along those of its body in Pinocchio", stacklevel=3)
+
+
+def warn_of_additions(model: Model) -> None:
+    """Warns of parts that a model of Pinocchio does not have."""
+    left_out = {
+        "springs of joints": [spring.joint for spring in model.springs],
+        "damping that depends on the speed of joints": [
+            name
+            for name, at, nv in zip(model.names, model.idx_vs, model.nvs, strict=True)
+            if model.damping_polynomial[at : at + nv].any()
+        ],
+        "gravity compensation of bodies": [carried.body for carried in model.gravity_compensation],
+        "actuators": [actuator.name or str(k) for k, actuator in enumerate(model.actuators)],
+        "keyframes": [*model.keyframes],
+        "constraints": [*model.constraints()],
+    }
+    for what, names in left_out.items():
+        if names:
+            listed = ", ".join(f"`{name}`" for name in names[:8]) + (", …" if len(names) > 8 else "")
+            text = f"{what} {listed}: left out, for a model of Pinocchio has none"
+            warnings.warn(ModelWarning(text, "left_out", names[0]), stacklevel=3)
 
 
 TURNS = {"free_flyer": 3, "planar": 2}
@@ -227,6 +249,7 @@ def to_pinocchio(ours: Model) -> Any:
     theirs.lowerEffortLimit = np.array(limits.effort_lower)
     theirs.damping, theirs.armature = np.array(ours.damping), np.array(ours.armature)
     warn_of_armature(ours)
+    warn_of_additions(ours)
     theirs.upperDryFrictionLimit, theirs.lowerDryFrictionLimit = np.array(ours.friction), -np.array(ours.friction)
     return theirs
 

@@ -317,7 +317,9 @@ class ContactConstraint(NamedTuple):
 
 
 class Coupling(NamedTuple):
-    """Two coupled joints of a robot's file: the follower's position is Σ cᵢ qⁱ, with q the position of the leader."""
+    """Two coupled joints of a robot's file: the follower's position is Σ cᵢ qⁱ, with q the position of the leader. No
+    function enforces it; if it is linear, the readers' `mimic=True` lets the follower follow in the tree.
+    """
 
     follower: str
     """The joint that follows."""
@@ -441,6 +443,10 @@ class GravityCompensation(NamedTuple):
     """The mass whose weight is supported (kg)."""
     mass_com: _Array
     """This mass times its centre, in the body's frame (kg m), 3 numbers."""
+    ratio: float
+    """The supported ratio of the body's weight, except for parts with another ratio. The mass follows by this ratio
+    when the inertia of the body changes.
+    """
 
 
 class Actuator(NamedTuple):

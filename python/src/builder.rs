@@ -299,22 +299,28 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Supports a part of a body's weight, as MuJoCo's `gravcomp` does: the force −factor m g acts at the part's centre
-    /// of mass.
+    /// Supports a ratio of a body's weight, as MuJoCo's `gravcomp` does: the force −ratio m g acts at the centre of
+    /// mass. The supported weight follows when the inertia of the body changes.
     ///
-    /// inertia: the part's inertia, in a frame at `placement` in the body's frame. factor: the supported share of its
-    /// weight.
-    #[pyo3(signature = (body, inertia, factor=1.0, placement=None))]
+    /// ratio: the supported ratio of the weight; 1 supports all of it.
+    /// part: None for the whole body, or the inertia of a part of the body that has this ratio instead. It is included
+    ///     in the inertia of the body, and is in a frame at `placement` in the body's frame.
+    #[pyo3(signature = (body, ratio=1.0, part=None, placement=None))]
     fn compensate_gravity(
         &mut self,
         body: &Bound<'_, BodyId>,
-        inertia: &Bound<'_, PyAny>,
-        factor: f64,
+        ratio: f64,
+        part: Option<&Bound<'_, PyAny>>,
         placement: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let (body, placement) = (self.body_of("body", body)?, placed("placement", placement)?);
-        let inertia = read_inertia("inertia", inertia)?;
-        self.builder()?.compensate_gravity(body, placement, inertia, factor);
+        match part {
+            Some(part) => {
+                let part = read_inertia("part", part)?;
+                self.builder()?.compensate_gravity_of_part(body, placement, part, ratio);
+            }
+            None => self.builder()?.compensate_gravity(body, ratio),
+        }
         Ok(())
     }
 

@@ -36,8 +36,12 @@ named_tuples! {
 /// Converts a `ContactConstraint` of `condyle._types` to the library's type.
 pub(crate) fn constraint(model: &condyle::Model, given: &Bound<'_, PyAny>) -> PyResult<condyle::ContactConstraint> {
     if !given.is_instance(class!(given.py(), "ContactConstraint")?)? {
-        let found = found_type(given);
-        return Err(PyTypeError::new_err(format!("constraints: expected `ContactConstraint`s, found {found}")));
+        let (found, coupling) = (found_type(given), class!(given.py(), "Coupling")?);
+        let why = match given.is_instance(coupling)? {
+            true => ": no constraint holds it; if it is linear, read the file with mimic=True",
+            false => "",
+        };
+        return Err(PyTypeError::new_err(format!("constraints: expected `ContactConstraint`s, found {found}{why}")));
     }
     let optional = |name: &str| given.getattr(name).map(|x| (!x.is_none()).then_some(x));
     let frame = frame_index(model, &given.getattr("frame")?)?;

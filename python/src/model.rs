@@ -285,7 +285,10 @@ impl Model {
             return Err(PyAttributeError::new_err(format!("'condyle.Model' object has no attribute '{name}'")));
         }
         let other = match name {
-            "limits" | "gravity" | "armature" | "inertias" => format!("model.with_{name}(...)"),
+            "limits" | "gravity" | "armature" | "damping" | "friction" | "inertias" => {
+                format!("model.with_{name}(...)")
+            }
+            "damping_polynomial" => "model.with_damping(...)".to_owned(),
             "inertial_parameters" => "model.with_inertias(...)".to_owned(),
             _ => "a ModelBuilder".to_owned(),
         };

@@ -47,8 +47,9 @@ batch b: any(q: Position) -> One { b.potential_energy_regressor(model, q) }
 ///
 /// q: nq numbers; v: nv; smoothing: ε > 0, the speed (rad/s, m/s) at which friction is 76 % of f. A spring acts with
 /// −(k₀ + k₁ Δ + k₂ Δ²) Δ against the displacement Δ from its rest position; for joints with several degrees of freedom
-/// the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`. No other function includes
-/// these efforts: add them to τ where needed.
+/// the brackets contain |Δ|. The equations are the same as for MuJoCo's `qfrc_passive`, except for joints with
+/// `actuatorgravcomp`, where MuJoCo counts gravity compensation among the efforts of actuators. No other function
+/// includes these efforts: add them to τ where needed.
 ///
 /// >>> arm = condyle.robots.arm7()
 /// >>> q, v = np.zeros(7), np.ones(7)

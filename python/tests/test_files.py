@@ -26,7 +26,7 @@ def sprung() -> Model:
     lower = builder.body("lower", upper, Joint.prismatic([0, 0, 1]), inertia=rod)
     builder.spring(upper, [1.0, 2.0, 3.0], rest=[0.1])
     builder.spring(lower, 4.0, rest=-0.5)
-    builder.compensate_gravity(upper, rod, 0.5)
+    builder.compensate_gravity(upper, 0.5)
     builder.actuator("motor", upper, gear=50.0, force=(-3.0, 3.0))
     builder.actuator("servo", [(upper, 1.0), (lower, -2.0)], tendon="cord", kp=100.0, kv=10.0, control=(-1.0, 1.0))
     return builder.build()
@@ -41,7 +41,9 @@ def test_additions_of_a_builder() -> None:
     assert (first.joint, first.stiffness.tolist(), first.rest.tolist()) == ("upper", [1.0, 2.0, 3.0], [0.1])
     assert (second.joint, second.stiffness.tolist(), second.rest.tolist()) == ("lower", [4.0, 0.0, 0.0], [-0.5])
     (carried,) = model.gravity_compensation
-    assert (carried.body, carried.mass) == ("upper", 1.0)
+    assert (carried.body, carried.mass, carried.ratio) == ("upper", 1.0, 0.5)
+    twice = [i._replace(mass=2.0 * i.mass) for i in model.inertias]
+    assert model.with_inertias(twice).gravity_compensation[0].mass == 2.0
     motor, servo = model.actuators
     assert (motor.joint, motor.tendon, motor.gear.tolist()) == ("upper", None, [50.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     assert (motor.force, motor.control, motor.gain, motor.bias) == ((-3.0, 3.0), (-np.inf, np.inf), 1.0, 0.0)
@@ -151,3 +153,36 @@ def test_write_mjcf(tmp_path: Path) -> None:
     model.with_armature([0.75]).with_limits(upper=[0.25 * np.pi]).write_mjcf(new, original)
     expected = text.replace('range="-90 90"', 'range="-90 45" limited="true" armature="0.75"')
     assert new.read_text(encoding="utf-8") == expected
+
+
+def test_other_damping_and_friction() -> None:
+    model = sprung().with_damping([0.5, 0.25]).with_friction([0.0, 0.125])
+    assert (model.damping.tolist(), model.friction.tolist()) == ([0.5, 0.25], [0.0, 0.125])
+    assert np.array_equal(model.damping_polynomial, [[0.25, 0.5], [0.0, 0.0]])
+    assert np.array_equal(model.with_damping([0.5, 0.25], [[0, 0], [1, 2]]).damping_polynomial, [[0, 0], [1, 2]])
+    # at the speeds 2 and 1: −(0.5 + 0.25 · 2 + 0.5 · 4) 2 and −0.25, with the friction of the second joint
+    weightless = model.with_gravity([0, 0, 0]).with_damping([0.5, 0.25])
+    found = condyle.passive_torque(weightless, [0.1, -0.5], [2.0, 1.0], 1e-3)
+    np.testing.assert_allclose(found, [-6.0, -0.375], atol=1e-12)
+    with pytest.raises(condyle.ModelError, match="damping is -1, expected a finite number of at least 0"):
+        model.with_damping([-1.0, 0.0])
+    with pytest.raises(ValueError, match=r"^polynomial: expected shape \(2, 2\)"):
+        model.with_damping([0.0, 0.0], [0.0])
+    with pytest.raises(ValueError, match="with_friction"):
+        model.friction[0] = 1.0
+
+
+def test_couplings_that_nothing_holds() -> None:
+    body = '<body><joint name="{}" axis="0 1 0"/><geom size="0.1"/>{}</body>'
+    tree = body.format("a", body.format("b", ""))
+    coupled = '<equality><joint name="e" joint1="b" joint2="a" polycoef="0.1 2"/></equality>'
+    model = Model.from_mjcf_str(f"<mujoco><worldbody>{tree}</worldbody>{coupled}</mujoco>")
+    coupling = model.constraints()["e"]
+    expected = "found a Coupling: no constraint holds it; if it is linear, read the file with mimic=True"
+    with pytest.raises(TypeError, match=expected):
+        condyle.ConstraintSet(model, [coupling])  # type: ignore[list-item]
+    (warning,) = model.warnings
+    assert warning.endswith("nothing enforces the coupling `e`")
+    locked = model.lock(["b"], [0.0, 0.5])
+    assert locked.constraints()["e"] == condyle.Coupling("a", None, (0.2, 0.0, 0.0, 0.0, 0.0))
+    assert locked.warnings == model.warnings

@@ -194,8 +194,8 @@ ATTRIBUTES = {
     "inertial_parameters": "with_inertias",
     "inertias[1].com": "with_inertias",
     "inertias[1].rotational": "with_inertias",
-    "damping": "",
-    "friction": "",
+    "damping": "with_damping",
+    "friction": "with_friction",
     "joint_placements": "",
     "frames[3].placement": "",
 }

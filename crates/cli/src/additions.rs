@@ -73,7 +73,8 @@ impl Additions {
             gravity_compensation: model
                 .gravity_compensation()
                 .iter()
-                .map(|carried| (model.bodies()[carried.body].name.clone(), carried.mass))
+                .map(|c| (c, &model.bodies()[c.body]))
+                .map(|(compensation, body)| (body.name.clone(), compensation.carried(body.inertia).mass))
                 .collect(),
             keyframes: model
                 .keyframes()

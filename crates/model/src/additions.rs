@@ -11,7 +11,9 @@ use crate::joint::Joint;
 use crate::keyframe::Keyframe;
 use crate::model::Model;
 use crate::passive::{GravityCompensation, Spring};
+use crate::warning::Warning;
 use alloc::borrow::ToOwned;
+use alloc::collections::BTreeMap;
 use alloc::string::String;
 use alloc::vec::Vec;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
@@ -23,10 +25,26 @@ type JointState = (BodyId, Vec<f64>, Vec<f64>);
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Additions {
     springs: Vec<(BodyId, [f64; 3], Vec<f64>)>,
-    compensation: Vec<(BodyId, f64, Vec3<f64>)>,
+    /// Ratio of the compensated weight of each body, by its index in the builder.
+    compensation: BTreeMap<usize, f64>,
+    compensated_parts: Vec<CompensatedPart>,
     actuators: Vec<Actuator<BodyId>>,
     keyframes: Vec<(String, Vec<JointState>, Vec<f64>)>,
     constraints: Vec<(String, Draft)>,
+    /// Warnings about the sources of appended models.
+    warnings: Vec<Warning>,
+}
+
+/// Part of a body whose weight is compensated with another ratio than the rest of the body.
+#[derive(Clone, Debug)]
+struct CompensatedPart {
+    body: BodyId,
+    /// Ratio of the part's weight; `None` if the part is no part of the body's inertia, and compensated entirely.
+    ratio: Option<f64>,
+    /// Mass (kg).
+    mass: f64,
+    /// Mass times centre of mass, in the body's frame (kg m).
+    mass_com: Vec3<f64>,
 }
 
 /// Constraint of a builder.
@@ -43,18 +61,21 @@ impl ModelBuilder {
         self.additions.springs.push((body, stiffness, rest.to_vec()));
     }
 
-    /// Compensates `factor` times the weight of a part of a body: see [`GravityCompensation`]. The part's inertia is
-    /// given in a frame at `placement` in the body's frame.
-    pub fn compensate_gravity(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>, factor: f64) {
-        let carried = placement.act(Inertia { rotational: Sym3::zero(), ..inertia }.scale(factor));
-        self.add_compensation(body, carried.mass, carried.mass_com);
+    /// Compensates a ratio of a body's weight: see [`GravityCompensation`]. The weight includes all that is merged into
+    /// the body, except parts with another ratio ([`compensate_gravity_of_part`](Self::compensate_gravity_of_part)).
+    pub fn compensate_gravity(&mut self, body: BodyId, ratio: f64) {
+        self.additions.compensation.insert(body.0, ratio);
     }
 
-    fn add_compensation(&mut self, body: BodyId, mass: f64, mass_com: Vec3<f64>) {
-        match self.additions.compensation.iter_mut().find(|(b, ..)| *b == body) {
-            Some((_, m, c)) => (*m, *c) = (*m + mass, *c + mass_com),
-            None => self.additions.compensation.push((body, mass, mass_com)),
-        }
+    /// Compensates another ratio of the weight of a part of a body. The part's inertia is included in the body's
+    /// inertia, and is given in a frame at `placement` in the body's frame.
+    pub fn compensate_gravity_of_part(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>, ratio: f64) {
+        self.add_compensated_part(body, placement, inertia, Some(ratio));
+    }
+
+    fn add_compensated_part(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>, ratio: Option<f64>) {
+        let Inertia { mass, mass_com, .. } = placement.act(Inertia { rotational: Sym3::zero(), ..inertia });
+        self.additions.compensated_parts.push(CompensatedPart { body, ratio, mass, mass_com });
     }
 
     /// Adds an actuator. It does not change limits, armature and damping, which belong to the joints
@@ -118,20 +139,37 @@ impl ModelBuilder {
         q: &[f64],
     ) {
         let body = |i: &usize| (!locked.contains(i)).then(|| place[*i].0);
+        self.additions.warnings.extend(model.warnings.iter().filter(|w| w.is_about_source()).cloned());
         for Spring { body: i, stiffness, rest } in &model.springs {
             if let Some(id) = body(i) {
                 self.spring(id, *stiffness, rest);
             }
         }
-        for &GravityCompensation { body: i, mass, mass_com } in &model.gravity_compensation {
+        let mut ratios = vec![0.0; model.bodies.len()];
+        for &GravityCompensation { body: i, ratio, added_mass: mass, added_mass_com: mass_com } in
+            &model.gravity_compensation
+        {
             let (on, pXb) = place[i];
-            let carried = pXb.act(Inertia { mass, mass_com, rotational: Sym3::zero() });
-            self.add_compensation(on, carried.mass, carried.mass_com);
+            ratios[i] = ratio;
+            self.add_compensated_part(on, pXb, Inertia { mass, mass_com, rotational: Sym3::zero() }, None);
+        }
+        for (i, ratio) in ratios.into_iter().enumerate() {
+            let (on, pXb) = place[i];
+            if i == 0 || locked.contains(&i) {
+                self.compensate_gravity_of_part(on, pXb, model.bodies[i].inertia, ratio);
+            } else if ratio != 0.0 {
+                self.compensate_gravity(on, ratio);
+            }
         }
         let (before, mut kept) = (self.additions.actuators.len(), Vec::new());
-        for (k, actuator) in model.actuators.iter().enumerate() {
-            if let Some(mut actuator) = actuator.renamed(body, |frame| first_frame + frame) {
+        for (k, old) in model.actuators.iter().enumerate() {
+            if let Some(mut actuator) = old.renamed(body, |frame| first_frame + frame) {
                 actuator.name.insert_str(0, prefix);
+                if let Transmission::Tendon { joints, .. } = &old.transmission {
+                    let held = joints.iter().filter(|(i, _)| locked.contains(i));
+                    let length: f64 = held.map(|&(i, coefficient)| coefficient * model.joint_position(i, q)).sum();
+                    actuator.bias -= actuator.kp * actuator.gear[0] * length; // the locked part of −kp l
+                }
                 self.actuator(actuator);
                 kept.push(k);
             }
@@ -155,14 +193,27 @@ impl ModelBuilder {
                 ModelConstraintKind::Point { frames } => moved(frames).map(Draft::Point),
                 ModelConstraintKind::Rigid { frames } => moved(frames).map(Draft::Rigid),
                 ModelConstraintKind::Coupling { follower, leader, coefficients: c } => {
-                    body(follower).map(|id| match leader {
-                        Some(i) if locked.contains(i) => {
+                    let held = |id, at| Some(Draft::Coupling(id, None, [at, 0.0, 0.0, 0.0, 0.0]));
+                    match (body(follower), leader) {
+                        (Some(id), Some(i)) if locked.contains(i) => {
                             let at = model.joint_position(*i, q);
-                            let value = c.iter().rev().fold(0.0, |sum, c| sum * at + c); // Σ cᵢ qⁱ
-                            Draft::Coupling(id, None, [value, 0.0, 0.0, 0.0, 0.0])
+                            held(id, c.iter().rev().fold(0.0, |sum, c| sum * at + c)) // Σ cᵢ qⁱ
                         }
-                        leader => Draft::Coupling(id, leader.as_ref().and_then(body), *c),
-                    })
+                        (Some(id), leader) => Some(Draft::Coupling(id, leader.as_ref().and_then(body), *c)),
+                        // q_l = (q_f − c₀) / c₁
+                        (None, Some(i)) if c[1] != 0.0 && c[2..] == [0.0; 3] => {
+                            body(i).and_then(|id| held(id, (model.joint_position(*follower, q) - c[0]) / c[1]))
+                        }
+                        (None, Some(i)) if c[1..] != [0.0; 4] && !locked.contains(i) => {
+                            let [follower, leader] = [*follower, *i].map(|i| &model.bodies[i].joint_name);
+                            let why = format!("joint `{follower}` is locked, and its polynomial is not linear");
+                            let what = format!("{why}: joint `{leader}`, which it follows, is left free");
+                            let element = format!("constraint `{prefix}{name}`");
+                            self.additions.warnings.push(Warning::LeftOut { place: None, element, what });
+                            None
+                        }
+                        (None, _) => None,
+                    }
                 }
             };
             if let Some(draft) = draft {
@@ -173,25 +224,22 @@ impl ModelBuilder {
 }
 
 impl Additions {
-    /// Scales the masses whose weight is compensated.
+    /// Scales the masses of parts whose weight is compensated.
     #[cfg(feature = "loaders")]
     pub(crate) fn scale_masses(&mut self, by: f64) {
-        for (_, mass, mass_com) in &mut self.compensation {
-            (*mass, *mass_com) = (*mass * by, mass_com.scale(by));
+        for part in &mut self.compensated_parts {
+            (part.mass, part.mass_com) = (part.mass * by, part.mass_com.scale(by));
         }
     }
 
     /// Moves the additions into the built model; `number` maps each body of the builder to its index in the model.
     pub(crate) fn add_to(self, model: &mut Model, number: &[usize]) -> Result<(), Error> {
-        let Self { springs, compensation, actuators, keyframes, constraints } = self;
+        let Self { springs, compensation, compensated_parts, actuators, keyframes, constraints, warnings } = self;
+        model.warnings = warnings;
         let index = |id: BodyId| number[id.0];
         model.springs =
             springs.into_iter().map(|(b, stiffness, rest)| Spring { body: index(b), stiffness, rest }).collect();
-        model.gravity_compensation = compensation
-            .into_iter()
-            .map(|(b, mass, mass_com)| GravityCompensation { body: index(b), mass, mass_com })
-            .filter(|c| c.body > 0 && c.mass != 0.0)
-            .collect();
+        model.gravity_compensation = merged_compensation(&compensation, &compensated_parts, number);
         model.actuators =
             actuators.iter().filter_map(|actuator| actuator.renamed(|&b| Some(index(b)), |frame| frame)).collect();
         for (name, joints, mut control) in keyframes {
@@ -230,6 +278,30 @@ impl Additions {
         model.constraints = constraints.into_iter().map(constraint).collect();
         Ok(())
     }
+}
+
+/// Returns the gravity compensation of each body of the built model; `number` maps the builder's bodies to its bodies.
+fn merged_compensation(
+    ratios: &BTreeMap<usize, f64>,
+    parts: &[CompensatedPart],
+    number: &[usize],
+) -> Vec<GravityCompensation> {
+    let of_body = |b: usize| GravityCompensation {
+        body: number[b],
+        ratio: ratios.get(&b).copied().unwrap_or(0.0),
+        added_mass: 0.0,
+        added_mass_com: Vec3::zero(),
+    };
+    let mut merged: BTreeMap<usize, GravityCompensation> =
+        ratios.keys().filter(|&&b| number[b] > 0).map(|&b| (number[b], of_body(b))).collect();
+    for &CompensatedPart { body, ratio, mass, mass_com } in parts.iter().filter(|part| number[part.body.0] > 0) {
+        let whole = merged.entry(number[body.0]).or_insert_with(|| of_body(body.0));
+        let other = ratio.map_or(1.0, |ratio| ratio - whole.ratio);
+        whole.added_mass += other * mass;
+        whole.added_mass_com += mass_com.scale(other);
+    }
+    let acts = |c: &GravityCompensation| (c.ratio, c.added_mass, c.added_mass_com) != (0.0, 0.0, Vec3::zero());
+    merged.into_values().filter(acts).collect()
 }
 
 impl Model {
@@ -275,7 +347,8 @@ impl Model {
         }
         for carried in &self.gravity_compensation {
             let body = there("a gravity compensation", carried.body)?;
-            if !carried.mass_com.to_array().into_iter().chain([carried.mass]).all(f64::is_finite) {
+            let GravityCompensation { ratio, added_mass, added_mass_com, .. } = carried;
+            if !added_mass_com.to_array().into_iter().chain([*ratio, *added_mass]).all(f64::is_finite) {
                 let what = "its gravity compensation is not finite".to_owned();
                 return Err(Error::Body { body: body.name.clone(), what });
             }

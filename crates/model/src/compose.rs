@@ -134,7 +134,8 @@ impl Model {
     /// Returns the same robot with some joints locked at q; `bodies` are the bodies that they carry.
     ///
     /// Each of these bodies is merged into the body that carries it, and stays as a frame. A joint that follows a
-    /// locked one is locked, too.
+    /// locked one is locked, too. A locked joint keeps its part of the length of a tendon. A coupling of a locked joint
+    /// holds the other joint; where this is not possible, the model warns. Warnings about the robot's file are kept.
     ///
     /// ```
     /// use condyle_model::robots;
@@ -169,7 +170,8 @@ impl Model {
     }
 
     /// Returns this robot with another one attached, whose world is at `placement` in the frame of a body of this robot
-    /// (0 is the world). `prefix` is put before all names of the other robot. Gravity and name of this robot are kept.
+    /// (0 is the world). `prefix` is put before all names of the other robot. Gravity and name of this robot are kept,
+    /// and warnings about the files of both robots.
     ///
     /// The bodies of the other robot are numbered after all bodies that `body` carried before, as in Pinocchio's
     /// `appendModel`.

@@ -2,8 +2,8 @@
 
 use alloc::string::String;
 
-/// Constraint in addition to the tree of a model. Tree algorithms ignore it; constrained dynamics uses it if the caller
-/// asks for it.
+/// Constraint in addition to the tree of a model. Tree algorithms ignore it. Constrained dynamics closes loops if the
+/// caller asks for it, and does not enforce couplings.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModelConstraint {

@@ -38,11 +38,11 @@ pub enum Error {
         what: String,
     },
     /// An element of a URDF, MJCF or SDF is invalid.
-    #[error("{file}:{line}: {element}: {what}")]
+    #[error("{file}{}: {element}: {what}", colon(*.line))]
     Element {
         /// Path of the file, or `<string>`; the included file if the element is in one.
         file: String,
-        /// Line on which the element, or its invalid part, begins; from 1.
+        /// Line on which the element, or its invalid part, begins; from 1, or 0 if the text is no file.
         line: u32,
         /// Element, for example ``joint `elbow` ``.
         element: String,
@@ -169,6 +169,11 @@ fn where_looked(looked: &[String]) -> String {
         return "there are no folders to look in (`packages`, ROS_PACKAGE_PATH, AMENT_PREFIX_PATH)".to_owned();
     }
     format!("looked for {}", looked.join(", "))
+}
+
+/// Returns a line number after a colon, or nothing for 0.
+fn colon(line: u32) -> String {
+    if line == 0 { String::new() } else { format!(":{line}") }
 }
 
 /// Returns the end of a message about an unknown name: the nearest name, or `otherwise` if no name is near.

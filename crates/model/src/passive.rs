@@ -1,7 +1,7 @@
 //! Passive forces: springs of joints and gravity compensation.
 
 use alloc::vec::Vec;
-use condyle_spatial::Vec3;
+use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 
 /// Spring of a joint. With the displacement Δ from its rest position, it exerts
 ///
@@ -24,15 +24,32 @@ pub struct Spring {
     pub rest: Vec<f64>,
 }
 
-/// Compensation of a part of a body's weight by an external force: MuJoCo's `gravcomp`. The force −g m acts at the
-/// point `mass_com` / m of the body.
+/// Compensation of the weight of a body by an external force: MuJoCo's `gravcomp`. With the compensated mass m and its
+/// centre c ([`carried`](Self::carried)), the force −m g acts at c.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GravityCompensation {
     /// Index of the body.
     pub body: usize,
-    /// Mass m whose weight is compensated (kg): the sum of factor times mass over the parts of the body.
-    pub mass: f64,
-    /// Sum of factor times mass times centre of mass over the parts of the body, in the body's frame (kg m).
-    pub mass_com: Vec3<f64>,
+    /// Ratio of the body's weight that is compensated; 1 compensates all of it. The compensated mass follows when the
+    /// body's inertia changes.
+    pub ratio: f64,
+    /// Mass that is compensated in addition (kg), for parts of the body with another ratio. It is negative if their
+    /// ratio is smaller, and stays when the body's inertia changes.
+    pub added_mass: f64,
+    /// Added mass times its centre of mass, in the body's frame (kg m).
+    pub added_mass_com: Vec3<f64>,
+}
+
+impl GravityCompensation {
+    /// Returns the compensated mass and its centre as an inertia without rotational part, for the body's inertia. Both
+    /// are in the body's frame.
+    pub fn carried<S: Scalar>(&self, body: Inertia<S>) -> Inertia<S> {
+        let ratio = S::splat(self.ratio);
+        Inertia {
+            mass: body.mass * ratio + S::splat(self.added_mass),
+            mass_com: body.mass_com.scale(ratio) + self.added_mass_com.lift(),
+            rotational: Sym3::zero(),
+        }
+    }
 }

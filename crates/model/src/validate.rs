@@ -165,7 +165,7 @@ impl Model {
         }
         self.find_singular();
         warnings.extend(self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() }));
-        warnings.extend(self.warnings.drain(..).filter(|warning| warning.place().is_some()));
+        warnings.extend(self.warnings.drain(..).filter(Warning::is_about_source));
         self.warnings = warnings;
         Ok(())
     }

@@ -63,6 +63,52 @@ impl Model {
         Ok(self)
     }
 
+    /// Returns the same robot with another viscous damping, one number for each degree of freedom (N m s/rad, N s/m).
+    /// The [coefficients](Self::damping_polynomial) of a damping that depends on the speed are kept.
+    ///
+    /// # Errors
+    /// [`Error::Joint`] if a number is negative or not finite.
+    ///
+    /// # Panics
+    /// If `damping` does not have nv numbers.
+    #[track_caller]
+    pub fn with_damping(mut self, damping: &[f64]) -> Result<Self, Error> {
+        check("damping", damping.len(), self.nv());
+        self.damping.copy_from_slice(damping);
+        self.validate()?;
+        Ok(self)
+    }
+
+    /// Returns the same robot with other coefficients d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v².
+    ///
+    /// # Errors
+    /// [`Error::Joint`] if a number is not finite.
+    ///
+    /// # Panics
+    /// If `polynomial` does not have nv pairs.
+    #[track_caller]
+    pub fn with_damping_polynomial(mut self, polynomial: &[[f64; 2]]) -> Result<Self, Error> {
+        check("polynomial", polynomial.len(), self.nv());
+        self.damping_polynomial.copy_from_slice(polynomial);
+        self.validate()?;
+        Ok(self)
+    }
+
+    /// Returns the same robot with another Coulomb friction, one number for each degree of freedom (N m, N).
+    ///
+    /// # Errors
+    /// [`Error::Joint`] if a number is negative or not finite.
+    ///
+    /// # Panics
+    /// If `friction` does not have nv numbers.
+    #[track_caller]
+    pub fn with_friction(mut self, friction: &[f64]) -> Result<Self, Error> {
+        check("friction", friction.len(), self.nv());
+        self.friction.copy_from_slice(friction);
+        self.validate()?;
+        Ok(self)
+    }
+
     /// Returns the same robot with other limits of position, velocity and effort.
     ///
     /// ```

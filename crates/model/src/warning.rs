@@ -63,8 +63,8 @@ pub enum Warning {
     },
     /// An element or attribute of a file is unknown, misspelt or misplaced. It has no effect.
     Unknown {
-        /// Position in the file.
-        place: Place,
+        /// Position in the file; `None` if there is no file.
+        place: Option<Place>,
         /// Element, for example ``joint `elbow` ``.
         element: String,
         /// Unknown name, and the nearest known one.
@@ -72,8 +72,8 @@ pub enum Warning {
     },
     /// A model cannot represent a feature of the file.
     LeftOut {
-        /// Position in the file.
-        place: Place,
+        /// Position in the file; `None` if there is no file.
+        place: Option<Place>,
         /// Element, for example ``joint `loop` ``.
         element: String,
         /// Feature that is left out, and the effect of its absence.
@@ -81,8 +81,8 @@ pub enum Warning {
     },
     /// A value is missing in the file, and a default is used.
     Assumed {
-        /// Position in the file.
-        place: Place,
+        /// Position in the file; `None` if there is no file.
+        place: Option<Place>,
         /// Element, for example ``link `base` ``.
         element: String,
         /// Missing value, and its default.
@@ -90,8 +90,8 @@ pub enum Warning {
     },
     /// A joint that could follow another one is left free.
     Mimic {
-        /// Position in the file.
-        place: Place,
+        /// Position in the file; `None` if there is no file.
+        place: Option<Place>,
         /// Element, for example ``joint `finger` ``.
         element: String,
         /// Message that names the joint that it would follow.
@@ -200,9 +200,14 @@ impl Warning {
             Self::Unknown { place, .. }
             | Self::LeftOut { place, .. }
             | Self::Assumed { place, .. }
-            | Self::Mimic { place, .. } => Some(place),
+            | Self::Mimic { place, .. } => place.as_ref(),
             _ => None,
         }
+    }
+
+    /// Returns whether the warning is about the source of a model. All others follow from the model's numbers.
+    pub(crate) fn is_about_source(&self) -> bool {
+        matches!(self.kind(), WarningKind::Unknown | WarningKind::LeftOut | WarningKind::Assumed | WarningKind::Mimic)
     }
 
     /// Returns the subject of the warning: the name of the body or joint, or the element.
@@ -241,7 +246,10 @@ impl fmt::Display for Warning {
             Self::Unknown { place, element, what }
             | Self::LeftOut { place, element, what }
             | Self::Assumed { place, element, what }
-            | Self::Mimic { place, element, what } => write!(f, "{place}: {element}: {what}"),
+            | Self::Mimic { place, element, what } => {
+                place.iter().try_for_each(|place| write!(f, "{place}: "))?;
+                write!(f, "{element}: {what}")
+            }
         }
     }
 }

@@ -140,7 +140,8 @@ fn armature_is_written_as_the_inertia_of_a_rotor() {
     let armature = |m: &Model| m.clone().with_armature(&[0.5, 0.125]).unwrap();
     let rotor = |x| format!("<drake:rotor_inertia xmlns:drake=\"http://drake.mit.edu\" value=\"{x}\"/>");
     let of = |joint: &str, x| {
-        let inside = format!("<joint name=\"{joint}\"/><actuator name=\"{joint}\">{}</actuator>", rotor(x));
+        let kind = "<type>transmission_interface/SimpleTransmission</type>"; // Drake requires it
+        let inside = format!("{kind}<joint name=\"{joint}\"/><actuator name=\"{joint}\">{}</actuator>", rotor(x));
         format!("\n\t<transmission name=\"{joint}\">{inside}</transmission>")
     };
     let begin = "xmlns:k=\"about:k\">";
@@ -179,7 +180,7 @@ fn numbers_that_a_urdf_cannot_represent_are_errors() {
             Box::new(limited(|l| (l.effort_lower[1], l.effort_upper[1]) = (-1.0, 1.0))),
         ),
         (
-            "gravity is [0.0, 0.0, -1.6] m/s² in the model and [0.0, 0.0, -9.81] m/s² in the file",
+            "gravity (m/s²) is [0.0, 0.0, -1.6] in the model and [0.0, 0.0, -9.81] in the file",
             Box::new(|m| m.clone().with_gravity(Vec3::new(0.0, 0.0, -1.6)).unwrap()),
         ),
         (
@@ -323,6 +324,75 @@ fn inertias_of_an_mjcf_come_back() {
     let small = |m: &Model| m.with_inertias(|i, I| if i == 1 { other(1).scale(0.1) } else { I }).unwrap();
     let new = written("fingers", HAND, small).unwrap();
     assert!(new.contains("<inertial pos='0 0 0' mass='0' diaginertia='0 0 0'/>"), "{new}");
+}
+
+/// An `<inertial>` in a `<frame>` is edited there, in the axes of the frame.
+#[test]
+fn an_inertial_inside_frames_is_edited() {
+    let inertial = "<inertial pos='0.1 0 0' mass='1' diaginertia='0.1 0.2 0.25'/>";
+    let frames = format!("<frame euler='0 0 90' pos='0.1 0 0'><frame pos='0 0 1'>{inertial}</frame></frame>");
+    let text = format!("<mujoco><worldbody><body name='b'><joint name='j'/>{frames}</body></worldbody></mujoco>");
+    let twice = |m: &Model| m.with_inertias(|_, I| I.scale(2.0)).unwrap();
+    let new = written("frames", &text, twice).unwrap();
+    assert_eq!(new.matches("<inertial").count(), 1, "{new}");
+    assert!(new.contains("mass='2' diaginertia='0.2"), "{new}");
+    written("frames", &text, with_other_inertias).unwrap();
+}
+
+/// Numbers that differ from the file by rounding only are not written.
+#[test]
+fn rounding_is_no_difference() {
+    let rounded = |_: &Model| {
+        let pose = HAND.replace("pos='0.1 0.2 0.3'", "pos='0.10000000000000002 0.2 0.3'");
+        let text = pose.replace("mass='0.25'", "mass='0.25000000000000006'").replace("-90 90", "-90 90.00000000000001");
+        Model::from_mjcf_str(&text, &MjcfOptions::default()).unwrap()
+    };
+    assert_eq!(written("rounded", HAND, rounded).unwrap(), HAND);
+}
+
+#[test]
+fn losses_of_an_mjcf_are_written() {
+    let change = |m: &Model| {
+        let m = m.clone().with_damping(&[3.0, 2.0, 2.0]).unwrap().with_friction(&[0.0, 0.5, 0.25]).unwrap();
+        m.with_damping_polynomial(&[[0.0; 2], [0.0; 2], [0.5, 0.75]]).unwrap()
+    };
+    let expected = HAND
+        .replace("range='-90 90'", "range='-90 90' damping=\"3\"")
+        .replace("ref='30'", "ref='30' frictionloss=\"0.5\"")
+        .replace("axis='1 0 0'", "axis='1 0 0' damping=\"2 0.5 0.75\"");
+    assert_eq!(written("losses", HAND, change).unwrap(), expected);
+}
+
+/// Each error names the thing, both numbers, and the attribute of the file that is the cause.
+#[test]
+fn numbers_that_depend_on_the_inertia_name_their_cause() {
+    let text = |joint: &str, rest: &str| {
+        let geom = "<geom type='box' size='.1 .2 .3' pos='.1 0 0' euler='10 20 30' mass='1'/><site name='s'/>";
+        format!("<mujoco><worldbody><body name='b'>{joint}{geom}</body></worldbody>{rest}</mujoco>")
+    };
+    let hinge = "<joint name='j' axis='0 1 0'/>";
+    let servo = "<actuator><position name='p' joint='j' kp='40' dampratio='1'/></actuator>";
+    for (text, what, why) in [
+        (
+            text("<joint name='j' axis='0 1 0' springdamper='.2 .7'/>", ""),
+            "joint `j`: the stiffness of its spring is [",
+            "`springdamper` makes stiffness and damping depend on the inertia",
+        ),
+        (text(hinge, servo), "actuator `p`: kv is ", "`dampratio` makes kv depend on the inertia"),
+        (
+            text(hinge, "<compiler settotalmass='3'/>"),
+            "body `b`: its inertial parameters [",
+            "`settotalmass` scales all masses",
+        ),
+        (
+            text("<freejoint align='true'/>", ""),
+            "frame `s`: its pose in its body is [",
+            "`align` turns the frame of a free body to the principal axes of its inertia",
+        ),
+    ] {
+        let said = written("causes", &text, with_other_inertias).expect_err(what);
+        assert!(said.contains(what) && said.ends_with(&format!("({why})")), "{said}");
+    }
 }
 
 #[test]

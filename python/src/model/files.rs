@@ -195,14 +195,14 @@ impl Model {
 
     /// Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
     ///
-    /// The names, q and v are the same as with `from_mjcf`. All work of MuJoCo's compiler is included: meshes,
+    /// The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. All work of MuJoCo's compiler is included: meshes,
     /// `replicate`, `attach`, composites, `settotalmass`. Numbers that were changed after compilation are used.
     /// Contents that a model cannot represent are reported in `warnings`, or refused, as by `from_mjcf`. MuJoCo itself
     /// is not imported.
     ///
     /// mimic, strict, allow: as for `from_mjcf`.
     ///
-    /// Raises `ParseError` or `ModelError`; `ValueError` for an unknown kind.
+    /// Raises `TypeError` for anything but an `MjModel`, `ParseError` or `ModelError`; `ValueError` for an unknown kind.
     #[staticmethod]
     #[pyo3(signature = (model, mimic=false, strict=false, *, allow=None))]
     fn from_mujoco(
@@ -214,7 +214,7 @@ impl Model {
         let options = MjcfOptions { strict, mimic, allow: kinds(allow)?, ..MjcfOptions::default() };
         let written = model.py().import("condyle._mujoco_models")?.call_method1("mjcf", (model,))?;
         let text: String = written.extract()?;
-        Ok(condyle::Model::from_mjcf_text(&text, "<MjModel>", &options).map_err(exception)?.into())
+        Ok(condyle::Model::from_compiled_mjcf(&text, &options).map_err(exception)?.into())
     }
 
     /// Converts a `pinocchio.Model`: the same joints, bodies, frames, limits and losses, so that results are equal.

@@ -79,7 +79,8 @@ impl Model {
     /// with d₀ in `damping`. It acts where `damping` acts.
     #[getter]
     fn damping_polynomial<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.cached.value(py, Attribute::DampingPolynomial, || read_only(py, self.inner.damping_polynomial(), ""))
+        let polynomial = || read_only(py, self.inner.damping_polynomial(), "with_damping");
+        self.cached.value(py, Attribute::DampingPolynomial, polynomial)
     }
 
     /// The springs of joints, as `Spring(joint, stiffness, rest)`. They act only in `passive_torque` and in a
@@ -96,15 +97,16 @@ impl Model {
         })
     }
 
-    /// The supported weights, as `GravityCompensation(body, mass, mass_com)`: MuJoCo's `gravcomp`. They act only in
-    /// `passive_torque` and in a `Simulation` that includes them.
+    /// The supported weights, as `GravityCompensation(body, mass, mass_com, ratio)`: MuJoCo's `gravcomp`. They act only
+    /// in `passive_torque` and in a `Simulation` that includes them.
     #[getter]
     fn gravity_compensation<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         self.cached.list(py, Attribute::GravityCompensation, || {
             let class = class!(py, "GravityCompensation")?;
             let carried = |c: &condyle::tree::GravityCompensation| {
-                let body = &*self.inner.bodies()[c.body].name;
-                class.call1((body, c.mass, read_only(py, &c.mass_com.to_array()[..], "")?))
+                let body = &self.inner.bodies()[c.body];
+                let carried = c.carried(body.inertia);
+                class.call1((&*body.name, carried.mass, read_only(py, &carried.mass_com.to_array()[..], "")?, c.ratio))
             };
             self.inner.gravity_compensation().iter().map(carried).collect()
         })
@@ -159,14 +161,14 @@ impl Model {
     /// and in a `Simulation` that includes it.
     #[getter]
     fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.numbers(py, Attribute::Damping, "", || self.inner.damping().to_vec())
+        self.numbers(py, Attribute::Damping, "with_damping", || self.inner.damping().to_vec())
     }
 
     /// The Coulomb friction of each degree of freedom, nv numbers (N m, N). It acts only in `passive_torque` and in a
     /// `Simulation` that includes it.
     #[getter]
     fn friction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.numbers(py, Attribute::Friction, "", || self.inner.friction().to_vec())
+        self.numbers(py, Attribute::Friction, "with_friction", || self.inner.friction().to_vec())
     }
 
     /// The inertia of the rotor as seen at each joint, nv numbers (kg m², kg): a part of M in every algorithm.
@@ -176,9 +178,10 @@ impl Model {
     }
 
     /// Returns the constraints of the robot's file outside its tree, by name: loops as `ContactConstraint`, without
-    /// stabilisation, and coupled joints as `Coupling`.
+    /// stabilisation, and coupled joints as `Coupling`. Inactive ones, and the `<mimic>` of a URDF or SDF, are left out.
     ///
-    /// The algorithms for trees ignore loops. `constrained_dynamics` closes the loops in its `ConstraintSet`:
+    /// The algorithms for trees ignore both. `constrained_dynamics` closes the loops in its `ConstraintSet`. No function
+    /// enforces a coupling; if it is linear, the readers' `mimic=True` puts it into the tree instead.
     ///
     /// >>> robot = condyle.robots.quadruped()
     /// >>> loops = [c for c in robot.constraints().values() if isinstance(c, condyle.ContactConstraint)]

@@ -1,7 +1,7 @@
 //! Copies of a robot with a change.
 
 use super::{Model, body_index, frame_index, members_of};
-use crate::arrays::{pose, three, vector};
+use crate::arrays::{matrix, pose, three, vector};
 use crate::exceptions::exception;
 use crate::inertial_parameters::read_inertia;
 use condyle::{Se3, tree::FrameParent};
@@ -25,6 +25,34 @@ impl Model {
     fn with_armature(&self, armature: &Bound<'_, PyAny>) -> PyResult<Self> {
         let armature = vector("armature", armature, self.inner.nv())?;
         Ok((*self.inner).clone().with_armature(&armature).map_err(exception)?.into())
+    }
+
+    /// Returns the same robot with another viscous damping, nv numbers (N m s/rad, N s/m).
+    ///
+    /// polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2); None keeps them.
+    ///
+    /// Raises `ModelError` if a number is not finite, or a damping is negative.
+    ///
+    /// >>> arm = condyle.robots.arm7()
+    /// >>> arm.with_damping([0.1] * 7).damping[0].item()
+    /// 0.1
+    #[pyo3(signature = (damping, polynomial=None))]
+    fn with_damping(&self, damping: &Bound<'_, PyAny>, polynomial: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let nv = self.inner.nv();
+        let mut model = (*self.inner).clone().with_damping(&vector("damping", damping, nv)?).map_err(exception)?;
+        if let Some(polynomial) = polynomial {
+            let polynomial = matrix("polynomial", polynomial, [nv, 2])?;
+            model = model.with_damping_polynomial(polynomial.as_chunks().0).map_err(exception)?;
+        }
+        Ok(model.into())
+    }
+
+    /// Returns the same robot with another Coulomb friction, nv numbers (N m, N).
+    ///
+    /// Raises `ModelError` if one is negative or not finite.
+    fn with_friction(&self, friction: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let friction = vector("friction", friction, self.inner.nv())?;
+        Ok((*self.inner).clone().with_friction(&friction).map_err(exception)?.into())
     }
 
     /// Returns the same robot with other limits of position (nq numbers), velocity and effort (nv each). None keeps a
@@ -128,7 +156,8 @@ impl Model {
     /// Returns the same robot with some joints locked at their positions in q.
     ///
     /// Their bodies are merged into their parent bodies and remain as frames. A mimic joint is locked together with the
-    /// joint that it follows.
+    /// joint that it follows. A locked joint keeps its part of the length of a tendon, and holds the other joint of a
+    /// coupling if that is linear. Warnings about the file are kept.
     ///
     /// joints: a list of names or indices of bodies.
     /// q: nq numbers.

@@ -175,6 +175,11 @@ def test_actuators(read: list[Robot]) -> None:
             close([ours[k] for k in ("gain", "bias", "kp", "kv")], law)
             close(ours["gear"], m.actuator_gear[i])
             force = m.actuator_forcerange[i] if m.actuator_forcelimited[i] else [-np.inf, np.inf]
+            tendon = m.actuator_trnid[i, 0]
+            on_tendon = m.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON
+            alone = on_tendon[i] and np.sum(on_tendon & (m.actuator_trnid[:, 0] == tendon)) == 1
+            if alone and m.tendon_actfrclimited[tendon]:
+                force = np.clip(m.tendon_actfrcrange[tendon], *force)
             close(ends(ours["force"]), force)
             u = m.actuator_ctrladr[i]
             if mujoco.mjtDyn(m.actuator_dyntype[i]) in (mujoco.mjtDyn.mjDYN_NONE, mujoco.mjtDyn.mjDYN_DCMOTOR):
@@ -289,5 +294,6 @@ def test_carried_weights(read: list[Robot]) -> None:
     for robot in read:
         m = robot.theirs
         moves = m.body_weldid != 0
-        carried = sum(c["mass"] for c in robot.ours["gravity_compensation"])
+        masses = [body["inertia"]["mass"] for body in robot.ours["bodies"]]
+        carried = sum(c["ratio"] * masses[c["body"]] + c["added_mass"] for c in robot.ours["gravity_compensation"])
         close(carried, (m.body_mass * m.body_gravcomp)[moves].sum())

@@ -271,3 +271,86 @@ def test_written_numbers(text: str, tmp_path: Path) -> None:
     same_robot(condyle.Model.from_mujoco(theirs), condyle.Model.from_mjcf(new))
     close(condyle.Model.from_mjcf(new).inertial_parameters, changed.inertial_parameters)
     agrees(changed, theirs, 2)
+
+
+DRIVEN = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/>
+  <body name="b" pos="0.5 0 0" gravcomp="0.5"><joint name="k" axis="0 1 0"/>
+    <geom size="0.1" pos="0.2 0 0"/></body></body>
+</worldbody>
+<tendon><fixed name="t" actuatorfrcrange="-1 1"><joint joint="j" coef="2"/><joint joint="k" coef="-1"/></fixed></tendon>
+<actuator><motor name="off" joint="j" group="1" ctrlrange="-1 1"/>
+  <motor name="pull" tendon="t" forcerange="-3 3"/></actuator>
+</mujoco>"""
+
+
+def test_actuators_that_are_disabled() -> None:
+    theirs = mujoco.MjModel.from_xml_string(DRIVEN)
+    theirs.opt.disableactuator = 1 << 1
+    ours = condyle.Model.from_mujoco(theirs)
+    assert [actuator.name for actuator in ours.actuators] == ["pull"]
+    (warning,) = ours.warnings
+    assert warning == "general `off`: it is disabled by <option>: it is no actuator, and no limit of effort"
+    assert (warning.kind, warning.file, warning.line) == ("left_out", None, None)
+    theirs.opt.disableactuator = 1  # group 0 alone
+    assert [actuator.name for actuator in condyle.Model.from_mujoco(theirs).actuators] == ["off"]
+
+
+def test_constraints_that_are_disabled() -> None:
+    """The flag disables limits, friction and equalities of the compiled model, as in its file."""
+    joint = '<joint name="j" axis="0 1 0" range="-10 10" frictionloss="1"/>'
+    tree = f'<worldbody><body name="b">{joint}<geom size="0.1"/></body></worldbody>'
+    loop = '<equality><connect body1="b" anchor="1 0 0"/></equality>'
+    theirs = mujoco.MjModel.from_xml_string(f"<mujoco>{tree}{loop}</mujoco>")
+    theirs.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    ours = condyle.Model.from_mujoco(theirs)
+    assert (ours.limits.upper[0], ours.friction[0], ours.constraints()) == (np.inf, 0.0, {})
+
+
+def test_range_of_a_tendon() -> None:
+    """The force in the table of actuators is clipped as `actuator_force` is."""
+    theirs = mujoco.MjModel.from_xml_string(DRIVEN)
+    data = mujoco.MjData(theirs)
+    data.ctrl[:] = 0.0, 5.0
+    mujoco.mj_forward(theirs, data)
+    pull = condyle.Model.from_mjcf_str(DRIVEN).actuators[1]
+    force = np.clip(pull.gain * 5.0, *pull.force)
+    close(np.array([coefficient * force for coefficient in pull.coefficients.values()]), data.qfrc_actuator)
+
+
+def test_compensation_after_a_change_of_masses(tmp_path: Path) -> None:
+    """`gravcomp` is a ratio: heavier bodies have more support, here and in MuJoCo."""
+    original = tmp_path / "driven.xml"
+    original.write_text(DRIVEN, encoding="utf-8")
+    theirs, ours = mujoco.MjModel.from_xml_string(DRIVEN), condyle.Model.from_mjcf(original)
+    theirs.body_mass[1:] *= 2.0
+    heavier = ours.with_inertias([i._replace(mass=2.0 * i.mass, rotational=2.0 * i.rotational) for i in ours.inertias])
+    heavier.write_mjcf(tmp_path / "heavier.xml", original)
+    data, q = mujoco.MjData(theirs), [0.3, -0.2]
+    data.qpos[:] = q
+    mujoco.mj_forward(theirs, data)
+    for model in heavier, condyle.Model.from_mjcf(tmp_path / "heavier.xml"):
+        close(condyle.passive_torque(model, q, [0.0, 0.0], 0.1), data.qfrc_passive)
+
+
+def test_a_compiled_model_is_written_to_its_source(tmp_path: Path) -> None:
+    """The compiler rounds: only numbers that were changed are edited."""
+    original, new = tmp_path / "original.xml", tmp_path / "new.xml"
+    text = RandomMjcf(3).text
+    original.write_text(text, encoding="utf-8")
+    ours = condyle.Model.from_mujoco(mujoco.MjModel.from_xml_path(str(original)))
+    ours.write_mjcf(new, original)
+    assert new.read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        (mujoco.MjSpec.from_string(DRIVEN), "expected an MjModel, found MjSpec; call spec.compile()"),
+        (mujoco.MjData(mujoco.MjModel.from_xml_string(DRIVEN)), "expected an MjModel, found MjData; give data.model"),
+        ("robot.xml", "expected an MjModel, found str; `from_mjcf` reads a file"),
+        (None, "expected an MjModel, found NoneType"),
+    ],
+)
+def test_anything_but_a_compiled_model(given: object, expected: str) -> None:
+    with pytest.raises(TypeError, match=re.escape(expected)):
+        condyle.Model.from_mujoco(given)

@@ -235,3 +235,20 @@ def test_by_name_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(load, "find_spec", lambda name: None)
     with pytest.raises(ImportError, match="example_robot_data or robot_descriptions, which is not installed"):
         condyle.load("talos")
+
+
+def test_parts_that_pinocchio_does_not_have() -> None:
+    body = '<body name="a" gravcomp="1"><joint name="j" axis="0 1 0" stiffness="2" damping="1 2"/><geom size="0.1"/>'
+    text = f"""<mujoco><worldbody>{body}</body></worldbody><actuator><motor name="m" joint="j"/></actuator>
+      <equality><connect name="loop" body1="a" anchor="1 0 0"/></equality>
+      <keyframe><key name="up" qpos="1"/></keyframe></mujoco>"""
+    with pytest.warns(UserWarning, match="left out, for a model of Pinocchio has none") as found:
+        Model.from_mjcf_str(text).to_pinocchio()
+    said = [warning.message.args[0] for warning in found]  # type: ignore[union-attr]
+    assert {(warning.kind, warning.subject) for warning in said} == {
+        ("left_out", name) for name in ("j", "a", "m", "up", "loop")
+    }
+    assert [warning.split(" `")[0] for warning in said] == [
+        "springs of joints", "damping that depends on the speed of joints", "gravity compensation of bodies",
+        "actuators", "keyframes", "constraints",
+    ]  # fmt: skip

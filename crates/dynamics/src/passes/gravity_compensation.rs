@@ -14,20 +14,19 @@
 use condyle_model::joint::Joint;
 use condyle_model::layout::{Layout, Pairs};
 use condyle_model::{GravityCompensation, Model};
-use condyle_spatial::{Act, Force, Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
+use condyle_spatial::{Act, Force, Inertia, Mat3, Se3, Vec3};
 
 /// Returns the carried mass in the turned frame of its body, and −g in that frame.
 #[inline(always)]
 fn carried<L: Layout, R>(l: &L, model: &Model<R>, of: &GravityCompensation, q: &[L::S]) -> (Inertia<L::S>, Vec3<L::S>) {
-    let turned = Se3::new(model.nodes()[of.body].axis_rotation, Vec3::zero()); // bXz
-    let mass = turned.act_inv(Inertia { mass: of.mass, mass_com: of.mass_com, rotational: Sym3::zero() });
+    let bRz = model.nodes()[of.body].axis_rotation;
+    let turned = GravityCompensation { added_mass_com: bRz.transpose_mul(of.added_mass_com), ..*of };
     let (mut i, mut rotation) = (of.body, Mat3::identity());
     while i > 0 {
         rotation = Joint::placement(l, i, q).rotation * rotation; // oRb
         i = model.nodes()[i].parent;
     }
-    let mass = Inertia { mass: L::S::splat(of.mass), mass_com: mass.mass_com.lift(), rotational: Sym3::zero() };
-    (mass, rotation.transpose_mul(l.minus_gravity())) // a₀ = −oRbᵀ g
+    (turned.carried(l.inertia(of.body)), rotation.transpose_mul(l.minus_gravity())) // a₀ = −oRbᵀ g
 }
 
 /// Adds the efforts to tau.

@@ -185,7 +185,8 @@ impl Tree {
                 builder.spring(id, stiffness, rest(part.joint));
             }
             if i % 3 == 2 {
-                builder.compensate_gravity(id, part.frame, part.inertia, 0.7);
+                builder.compensate_gravity(id, 0.4);
+                builder.compensate_gravity_of_part(id, part.frame, part.inertia.scale(0.5), 0.7);
             }
             builder.frame(&format!("f{}", i + 1), id, part.frame);
             ids.push(id);

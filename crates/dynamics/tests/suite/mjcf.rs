@@ -170,10 +170,11 @@ fn joints_that_cannot_follow() {
         ),
     ];
     for (equality, why, number) in left_out {
-        let held = format!("the joint is left free, and the constraint `joint{number}` holds it");
+        let held = format!("the joint is left free, and nothing enforces the coupling `joint{number}`");
         assert_eq!(mimic(equality).unwrap(), [format!("<string>:6: <joint>: {why}: {held}")]);
     }
-    assert!(mimic("<joint joint1='a'/>").unwrap().is_empty()); // the constraint is separate from the tree
+    let constant = "<string>:6: <joint>: the joint is left free: nothing enforces its constant position";
+    assert_eq!(mimic("<joint joint1='a'/>").unwrap(), [constant]);
     let said = |equality: &str| mimic(equality).unwrap_err().to_string();
     assert_eq!(said("<joint joint2='b'/>"), "<string>:6: <joint>: has no joint1");
     assert_eq!(said("<joint joint1='c'/>"), "<string>:6: <joint>: joint1: no joint is named `c`");

@@ -10,6 +10,7 @@ use condyle_dynamics::{
     nonlinear_effects, passive_torque, passive_torque_derivatives, random_configuration,
 };
 use nalgebra::DMatrix;
+use num_dual::Dual64;
 
 const SMOOTHING: f64 = 0.01;
 
@@ -93,10 +94,10 @@ fn gravity_that_is_compensated() {
                 let names = (name.as_str(), name.as_str());
                 let options = JointOptions::default();
                 ids.push(builder.body_with(names, ids[body.parent], body.joint, body.placement, body.inertia, options));
-                // in two parts, one of them in its own frame
+                // half of the body is a part with another ratio, in its own frame
                 let X = Se3 { translation: Vec3::new(0.3, -0.2, 0.5), ..Se3::identity() };
-                builder.compensate_gravity(ids[i], Se3::identity(), body.inertia, 0.25 * factor);
-                builder.compensate_gravity(ids[i], X, X.act_inv(body.inertia), 0.75 * factor);
+                builder.compensate_gravity(ids[i], 2.0 * factor);
+                builder.compensate_gravity_of_part(ids[i], X, X.act_inv(body.inertia).scale(0.5), 0.0);
             }
             for (i, body) in model.bodies().iter().enumerate().skip(1) {
                 if let Some(mimic) = body.mimic {
@@ -117,6 +118,33 @@ fn gravity_that_is_compensated() {
     }
 }
 
+/// The compensated weight depends on the inertia: its efforts are linear in the masses, and their derivative with
+/// respect to a mass is exact.
+#[test]
+fn compensation_has_derivatives_with_respect_to_masses() {
+    let model = like_mujoco();
+    let q = random_configuration(&model, &mut rng(3));
+    let efforts = |mass: f64| {
+        let heavier =
+            model.with_inertias(|i, I| Inertia { mass: I.mass + if i == 2 { mass } else { 0.0 }, ..I }).unwrap();
+        let mut tau = vec![0.0; model.nv()];
+        passive_torque(&heavier, &q, &vec![0.0; model.nv()], SMOOTHING, &mut tau);
+        tau
+    };
+    let dual = model
+        .with_inertias(|i, I| Inertia::<Dual64> {
+            mass: Dual64::new(I.mass, if i == 2 { 1.0 } else { 0.0 }),
+            ..I.lift()
+        })
+        .unwrap();
+    let (q, zero) = (q.iter().map(|&q| Dual64::from(q)).collect::<Vec<_>>(), Dual64::from(0.0));
+    let mut tau = vec![zero; model.nv()];
+    passive_torque(&dual, &q, &vec![zero; model.nv()], SMOOTHING, &mut tau);
+    let slope: Vec<f64> = tau.iter().map(|tau| tau.eps).collect();
+    let expected: Vec<f64> = efforts(1.0).iter().zip(efforts(0.0)).map(|(a, b)| a - b).collect();
+    assert!(slope.iter().any(|x| x.abs() > 1.0) && common::relative(&slope, &expected) < 1e-12, "{slope:?}");
+}
+
 /// Creates the robot of `passive.xml`, with MuJoCo's laws of springs and damping, and the armature of its free joint.
 fn like_mujoco() -> Model {
     let mut builder = ModelBuilder::new("passive");
@@ -133,12 +161,12 @@ fn like_mujoco() -> Model {
     let free = options(2.5, 0.4, [0.3, 0.2]);
     let base = builder.body_with(("base", "float"), WORLD, Joint::FreeFlyer, Se3::identity(), I, free);
     builder.spring(base, [3.0, 1.0, 0.5], &[0.2, -0.1, 0.8, 0.0, 0.6, 0.0, 0.8]);
-    builder.compensate_gravity(base, Se3::identity(), I, 0.5);
+    builder.compensate_gravity(base, 0.5);
     let I = full(1.5, Vec3::new(0.2, 0.0, 0.1), [0.1, 0.2, 0.15, 0.0, 0.0, 0.0]);
     let joint = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
     let arm = builder.body_with(("arm", "hinge"), base, joint, at(0.3, 0.1, 0.0), I, options(0.1, 0.3, [0.2, 0.1]));
     builder.spring(arm, [3.0, 1.0, 0.5], &[0.4]);
-    builder.compensate_gravity(arm, Se3::identity(), I, 1.0);
+    builder.compensate_gravity(arm, 1.0);
     let I = full(0.8, Vec3::new(0.05, 0.1, 0.0), [0.03, 0.02, 0.04, 0.0, 0.0, 0.0]);
     let ball = options(0.05, 0.2, [0.0, 0.4]);
     let wrist = builder.body_with(("wrist", "ball"), arm, Joint::Spherical, at(0.4, 0.0, 0.1), I, ball);
@@ -147,7 +175,7 @@ fn like_mujoco() -> Model {
     let joint = Joint::Prismatic { axis: Vec3::new(1.0, 0.0, 0.0) };
     let tip = builder.body_with(("tip", "slide"), wrist, joint, at(0.0, 0.1, 0.2), I, options(0.0, 1.0, [0.0; 2]));
     builder.spring(tip, [40.0, 0.0, 9.0], &[-0.1]);
-    builder.compensate_gravity(tip, Se3::identity(), I, 0.3);
+    builder.compensate_gravity(tip, 0.3);
     builder.build().expect("it is well-formed")
 }
 
@@ -216,6 +244,7 @@ fn carried_energy(model: &Model, q: &[f64]) -> f64 {
     let placements = forward_kinematics(model, &mut data, q);
     let energy = |carried: &GravityCompensation| {
         let X: Se3<f64> = placements.body(carried.body);
+        let carried = carried.carried(model.bodies()[carried.body].inertia);
         model.gravity().dot(X.rotation * carried.mass_com + X.translation.scale(carried.mass))
     };
     model.gravity_compensation().iter().map(energy).sum()
@@ -254,7 +283,7 @@ fn simulations_keep_the_energy_of_springs() {
         let name = format!("{k}");
         let options = JointOptions { armature: 0.3, ..JointOptions::default() };
         parent = builder.body_with((&name, &name), parent, joint, Se3::identity(), I, options);
-        builder.compensate_gravity(parent, Se3::identity(), I, 0.5);
+        builder.compensate_gravity(parent, 0.5);
         let rest = match joint {
             Joint::FreeFlyer => &[0.1, 0.2, 0.3, 0.0, 0.6, 0.0, 0.8][..],
             Joint::Spherical => &[0.0, 0.6, 0.0, 0.8],

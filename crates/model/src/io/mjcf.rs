@@ -144,6 +144,18 @@ impl Model {
         model(&files, options)
     }
 
+    /// Reads a text that describes a compiled model of MuJoCo. Errors and warnings have no line, because the user does
+    /// not see the text.
+    ///
+    /// # Errors
+    /// The errors of [`from_mjcf`](Self::from_mjcf).
+    #[doc(hidden)]
+    pub fn from_compiled_mjcf(text: &str, options: &MjcfOptions) -> Result<Self, Error> {
+        let mut files = Files::new(Known::new(ELEMENTS));
+        files.parse_without_lines(text, "<MjModel>")?;
+        model(&files, options)
+    }
+
     /// Reads a text instead of a file: the path names it in errors, and its folder is searched for included files.
     ///
     /// # Errors
@@ -154,6 +166,15 @@ impl Model {
         files.read_text(path.as_ref(), text)?;
         model(&files, options)
     }
+}
+
+/// Returns the function that computes the pose of a `<frame>` in its surroundings, by the settings of its file.
+///
+/// # Errors
+/// The errors of [`Model::from_mjcf`].
+pub(super) fn frame_poses(root: &Element) -> Result<impl Fn(&Element) -> Result<Se3<f64>, Error>, Error> {
+    let compiler = Compiler::read(root)?;
+    Ok(move |frame: &Element| compiler.pose(&Attributes::plain(frame)))
 }
 
 /// A file with its own settings.

@@ -6,6 +6,7 @@
 //! subtracted once. If the file then does not reproduce the model, it is not written.
 
 mod changes;
+mod differences;
 mod edits;
 mod mjcf;
 mod urdf;
@@ -16,6 +17,7 @@ use super::xml::{Amount, Element};
 use crate::error::Error;
 use crate::model::Model;
 use changes::{Changes, NO_SHARE, ROUNDING};
+use differences::{Difference, difference};
 use edits::Edits;
 use std::collections::HashMap;
 use std::path::Path;
@@ -130,18 +132,19 @@ impl<'a> Original<'a> {
 fn write(model: &Model, path: &Path, original: &Original, format: &impl Format) -> Result<(), Error> {
     let mut now = format.read(&original.text)?;
     let masses = format.masses(&original.root);
-    let mut changes = Changes::new(model, &now, &masses).map_err(|what| original.wrong(what))?;
+    let refused = |difference: Difference| original.wrong(difference.text(&original.root));
+    let mut changes = Changes::new(model, &now, &masses).map_err(refused)?;
     let mut new = original.text.clone();
     if !changes.is_empty() {
         new = original.edited(format, &changes)?;
         now = format.read(&new)?;
     }
-    if changes::difference(model, &now, NO_SHARE).is_some() && changes.take_shares_off(model, &now) {
+    if difference(model, &now, NO_SHARE).is_some() && changes.take_shares_off(model, &now) {
         new = original.edited(format, &changes)?;
         now = format.read(&new)?;
     }
-    match changes::difference(model, &now, ROUNDING) {
-        Some(what) => Err(original.wrong(what)),
+    match difference(model, &now, ROUNDING) {
+        Some(difference) => Err(refused(difference)),
         None => std::fs::write(path, new).map_err(|e| {
             Error::File { file: path.display().to_string(), what: e.to_string() } //
         }),

@@ -36,7 +36,7 @@ pub(crate) struct Element {
     pub(crate) children: Vec<Element>,
     /// Path of the file, or `<string>`.
     pub(crate) file: Rc<str>,
-    /// Line number, from 1.
+    /// Line number, from 1; 0 if the user does not see the text.
     pub(crate) line: u32,
     /// Byte index of its `<` in the text of the file.
     pub(crate) at: usize,
@@ -176,9 +176,15 @@ impl Element {
         }
     }
 
-    /// Returns file and line of this element.
-    pub(crate) fn place(&self) -> Place {
-        Place { file: self.file.to_string(), line: self.line }
+    /// Returns file and line of this element; `None` if the user does not see the text.
+    pub(crate) fn place(&self) -> Option<Place> {
+        (self.line > 0).then(|| Place { file: self.file.to_string(), line: self.line })
+    }
+
+    /// Forgets the lines of this element and of its content, for a text that the user does not see.
+    pub(crate) fn forget_lines(&mut self) {
+        self.line = 0;
+        self.children.iter_mut().for_each(Self::forget_lines);
     }
 
     /// Returns a warning about an unknown, misspelt or misplaced name in this element.

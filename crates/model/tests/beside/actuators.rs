@@ -63,11 +63,13 @@ fn tendons_limit_effort() {
     assert_eq!(effort(&found), [-32.0, 12.0]);
     let Transmission::Tendon { name, joints } = &found.actuators()[1].transmission else { panic!() };
     assert_eq!((name.as_str(), &joints[..]), ("t", &[(1, -2.0)][..]));
+    assert_eq!(found.actuators()[1].force, (-3.0, 3.0)); // `actuator_force` stays in it, whatever the gear
     assert!(said(&found).is_empty());
     let shared =
         model("", joint, &format!("{tendon}<actuator>{}</actuator>", "<motor tendon='t' ctrlrange='-9 9'/>".repeat(2)));
     assert_eq!(effort(&shared), [-36.0, 12.0]);
-    let what = "actuatorfrcrange: it is no limit of effort, for several actuators share the tendon";
+    assert_eq!(shared.actuators()[0].force, (f64::NEG_INFINITY, f64::INFINITY));
+    let what = "actuatorfrcrange: it limits neither actuators nor efforts, for several actuators share the tendon";
     assert_eq!(said(&shared), [format!("<string>:1: fixed `t`: {what}")]);
 }
 

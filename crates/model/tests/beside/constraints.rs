@@ -63,7 +63,8 @@ fn loops_and_couplings() {
         panic!()
     };
     assert_eq!(coefficients, [0.25, 0.0, 0.0, 0.0, 0.0]);
-    assert!(said(&found).is_empty());
+    let kinds: Vec<_> = found.warnings().iter().map(|warning| warning.kind()).collect();
+    assert_eq!(kinds, [WarningKind::Mimic, WarningKind::LeftOut]); // nothing enforces the couplings
     // here both bodies are parts of one body
     let held = model("", &format!("{HINGE}<body name='c'/>"), "<equality><weld body1='b' body2='c'/></equality>");
     assert_eq!(said(&held), ["<string>:1: <weld>: both ends are fixed to one body, which no constraint can move"]);
@@ -94,11 +95,17 @@ fn followers_of_followers() {
     let circle = format!("{chain}<joint joint1='a' joint2='c'/>");
     let found = Model::from_mjcf_str(&text(&circle), &options).unwrap();
     assert_eq!((found.nv(), found.constraints().len()), (1, 1));
-    let what = "joint1 follows another joint, or joint2 follows joint1: the joint is left free, and the constraint `joint3` holds it";
+    let what = "joint1 follows another joint, or joint2 follows joint1: the joint is left free, and nothing enforces the coupling `joint3`";
     assert_eq!(said(&found), [format!("<string>:1: <joint>: {what}")]);
     let free = read(&text(chain)).unwrap();
     assert_eq!((free.nv(), free.constraints().len()), (3, 2));
     assert!(free.warnings().iter().all(|warning| warning.kind() == WarningKind::Mimic));
+    let curve = read(&text("<joint name='e' joint1='b' joint2='a' polycoef='0 1 2'/>")).unwrap();
+    let what = "polycoef 0 1 2 0 0 is not linear: the joint is left free, and nothing enforces the coupling `e`";
+    assert_eq!(said(&curve), [format!("<string>:1: joint `e`: {what}")]);
+    let constant = read(&text("<joint name='e' joint1='b'/>")).unwrap();
+    let what = "the joint is left free: nothing enforces its constant position";
+    assert_eq!(said(&constant), [format!("<string>:1: joint `e`: {what}")]);
 }
 
 /// Compares with `key_qpos`, and with `mj_objectVelocity` along the body's axes.

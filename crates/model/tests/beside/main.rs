@@ -4,8 +4,8 @@
 #![allow(non_snake_case)]
 
 use condyle_model::{
-    Error, FrameKind, MjcfOptions, Model, ModelBuilder, ModelConstraintKind, Se3, Spring, Transmission, WORLD, Warning,
-    WarningKind, neutral,
+    Error, FrameKind, Inertia, MjcfOptions, Model, ModelBuilder, ModelConstraintKind, Se3, Spring, Sym3, Transmission,
+    Vec3, WORLD, Warning, WarningKind, neutral,
 };
 
 mod actuators;

@@ -140,14 +140,19 @@ fn weight_is_compensated() {
         "<mujoco><worldbody><body name='b' gravcomp='2'>{inside}</body><body gravcomp='1'>{INERTIAL}</body></worldbody></mujoco>"
     );
     let found = read(&text).unwrap();
-    let [carried] = found.gravity_compensation() else { panic!() };
-    assert_eq!((carried.body, carried.mass), (1, 5.0));
-    close(&carried.mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 · (0.1, 0, 0) + 0.5 · 2 · (0.1, 0, 1)
+    let carried = |model: &Model| {
+        let [compensation] = model.gravity_compensation() else { panic!() };
+        assert_eq!((compensation.body, compensation.ratio), (1, 2.0));
+        compensation.carried(model.bodies()[1].inertia)
+    };
+    assert_eq!(carried(&found).mass, 5.0);
+    close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 · (0.1, 0, 0) + 0.5 · 2 · (0.1, 0, 1)
     let scaled = read(&text.replace("<worldbody>", "<compiler settotalmass='12'/><worldbody>")).unwrap();
-    close(&[scaled.gravity_compensation()[0].mass], &[10.0]);
+    close(&[carried(&scaled).mass], &[10.0]);
     let acting = "<joint name='j' axis='0 1 0' actuatorgravcomp='true' actuatorfrcrange='-1 1'/>";
     let found = read(&text.replace(HINGE, acting)).unwrap();
-    let what = "actuatorgravcomp: the compensation of gravity acts beside the limits of effort, as a passive force";
+    let what = "actuatorgravcomp: the compensation of gravity acts as a passive force, outside the limits of effort; MuJoCo \
+                adds it to the efforts of the actuators";
     assert_eq!(said(&found), [format!("<string>:1: joint `j`: {what}")]);
 }
 
@@ -155,7 +160,7 @@ fn weight_is_compensated() {
 #[test]
 fn switches() {
     let joint = "<joint name='j' axis='0 1 0' stiffness='1' damping='2' frictionloss='3' range='-10 10'/>";
-    let after = "<equality><joint joint1='j'/></equality><actuator><motor joint='j' ctrlrange='-1 1' group='3' armature='0.1'/></actuator>";
+    let after = "<equality><weld body1='b'/></equality><actuator><motor joint='j' ctrlrange='-1 1' group='3' armature='0.1'/></actuator>";
     let with = |flags: &str| {
         read(&one(&format!("<option {flags}</option>"), joint, after).replace("name='b'", "name='b' gravcomp='1'"))
             .unwrap()
@@ -180,4 +185,62 @@ fn switches() {
         let what = "it is disabled by <option>: it is no actuator, and no limit of effort";
         assert_eq!(said(&off), [format!("<string>:1: <motor>: {what}")]);
     }
+}
+
+/// `gravcomp` is a ratio in MuJoCo: after its masses are doubled, `body_mass · body_gravcomp` is doubled too. A part
+/// with another ratio keeps its own.
+#[test]
+fn compensation_follows_the_inertia() {
+    let text = format!(
+        "<mujoco><worldbody><body name='b' gravcomp='0.5'>{HINGE}{INERTIAL}
+        <body name='part' pos='0 0 1'>{INERTIAL}</body></body></worldbody></mujoco>"
+    );
+    let found = read(&text).unwrap();
+    let carried = |model: &Model| {
+        let [compensation] = model.gravity_compensation() else { panic!() };
+        let carried = compensation.carried(model.bodies()[1].inertia);
+        [carried.mass, carried.mass_com.x, carried.mass_com.y, carried.mass_com.z]
+    };
+    close(&carried(&found), &[1.0, 0.1, 0.0, 0.0]); // 0.5 · 2 kg at (0.1, 0, 0)
+    // the moving link is heavier by 4 kg at its centre, as `write_mjcf` writes it
+    let more = Inertia::from_com(4.0, Vec3::new(0.1, 0.0, 0.0), Sym3::diagonal(0.1));
+    let heavier = found.with_inertias(|i, I| if i == 1 { I + more } else { I }).unwrap();
+    close(&carried(&heavier), &[3.0, 0.3, 0.0, 0.0]); // 0.5 · 6 kg
+    let (folder, file) = (std::env::temp_dir(), format!("condyle_gravcomp_{}.xml", std::process::id()));
+    let path = folder.join(file);
+    std::fs::write(&path, &text).unwrap();
+    heavier.write_mjcf(&path, &path).unwrap();
+    let written = Model::from_mjcf(&path, &MjcfOptions::default()).unwrap();
+    close(&carried(&written), &carried(&heavier));
+    // without the rest of the inertia, the part keeps none either, and the ratio is another one
+    let light = found.with_inertias(|i, I| if i == 1 { I.scale(0.3) } else { I }).unwrap();
+    let said = light.write_mjcf(&path, &path).unwrap_err().to_string();
+    let what = "cannot be written, for its links have different ratios: the file gives";
+    assert!(said.contains(&format!("body `b`: its compensated mass -0.4 kg {what} 0.6 kg")), "{said}");
+    std::fs::remove_file(path).unwrap();
+}
+
+/// A locked body keeps its own ratio, and so does the base of a robot that is attached to another one.
+#[test]
+fn compensation_of_merged_bodies() {
+    let text = |ratio: [&str; 2]| {
+        format!(
+            "<mujoco><worldbody><body name='a' gravcomp='{}'><joint name='a' axis='0 1 0'/>{INERTIAL}
+            <body name='b' pos='0 0 1' gravcomp='{}'><joint name='b' axis='0 1 0'/>{INERTIAL}</body></body></worldbody>
+            </mujoco>",
+            ratio[0], ratio[1]
+        )
+    };
+    // 2 kg each, the second one 1 m above the first one, each with its centre at x = 0.1 m
+    for (ratio, mass, moment) in [(["0.5", "1"], 3.0, 2.0), (["0.5", "0"], 1.0, 0.0), (["0", "0.25"], 0.5, 0.5)] {
+        let found = read(&text(ratio)).unwrap();
+        let locked = found.lock(&[2], &[0.0; 2]).unwrap();
+        let [compensation] = locked.gravity_compensation() else { panic!() };
+        let carried = compensation.carried(locked.bodies()[1].inertia);
+        close(&[carried.mass, carried.mass_com.x, carried.mass_com.z], &[mass, 0.1 * mass, moment]);
+    }
+    let base = read(&format!("<mujoco><worldbody><body name='c'>{INERTIAL}</body></worldbody></mujoco>")).unwrap();
+    let both = read(&text(["0", "0.5"])).unwrap().append(2, Se3::identity(), &base, "c_").unwrap();
+    let carried = both.gravity_compensation()[0].carried(both.bodies()[2].inertia);
+    close(&[carried.mass, carried.mass_com.x], &[1.0, 0.1]);
 }

@@ -108,18 +108,20 @@ pub(super) fn add(
                     }
                     (Some(_), [_, _, 0.0, 0.0, 0.0]) if !mimic => {
                         let what = "a joint that follows another one is left free unless `mimic` is asked for";
-                        warnings.push(e.mimic(format!("{what}; the constraint `{name}` holds it")));
+                        warnings.push(e.mimic(format!("{what}; nothing enforces the coupling `{name}`")));
                     }
-                    (Some(_), _) if mimic => {
+                    (Some(_), _) => {
                         let why = match p[2..] == [0.0; 3] {
                             true => "joint1 follows another joint, or joint2 follows joint1".to_owned(),
                             false => format!("polycoef {} is not linear", words(&p)),
                         };
-                        warnings.push(
-                            e.mimic(format!("{why}: the joint is left free, and the constraint `{name}` holds it")),
-                        );
+                        let what = "the joint is left free, and nothing enforces the coupling";
+                        warnings.push(e.mimic(format!("{why}: {what} `{name}`")));
                     }
-                    _ => {}
+                    (None, _) => {
+                        let what = "the joint is left free: nothing enforces its constant position";
+                        warnings.push(e.left_out(what));
+                    }
                 }
                 let x0 = leader.map_or(0.0, |(.., x0)| x0);
                 let coefficients = if leader.is_some() { shifted(p, x0, y0) } else { [y0 + p[0], 0.0, 0.0, 0.0, 0.0] };

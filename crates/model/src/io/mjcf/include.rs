@@ -61,7 +61,19 @@ impl Files {
 
     /// Reads a text, as [`read`](Self::read) does; without a folder it cannot refer to files.
     pub(super) fn parse(&mut self, text: &str, file: &str, folder: Option<&Path>) -> Result<usize, Error> {
+        let root = Element::parse(text, file, &mut self.amount)?;
+        self.add(root, folder)
+    }
+
+    /// Reads a text, as [`parse`](Self::parse) does, and forgets the lines of its elements.
+    pub(super) fn parse_without_lines(&mut self, text: &str, file: &str) -> Result<usize, Error> {
         let mut root = Element::parse(text, file, &mut self.amount)?;
+        root.forget_lines();
+        self.add(root, None)
+    }
+
+    /// Adds a file with its own settings, given its root, and returns its index.
+    fn add(&mut self, mut root: Element, folder: Option<&Path>) -> Result<usize, Error> {
         let seen = self.open.last().cloned().into_iter().collect();
         Includes { top: folder, seen, amount: &mut self.amount, warnings: &mut self.warnings }
             .resolve(&mut root, folder, 1)?;

@@ -173,8 +173,9 @@ impl<'a> FileJoint<'a> {
                 _ => model.springs.push(Spring { body: self.body, stiffness, rest: self.drawn() }),
             }
         }
-        if self.carries_weight && !model.gravity_compensation.is_empty() && self.effort.is_some() {
-            let what = "the compensation of gravity acts beside the limits of effort, as a passive force";
+        if self.carries_weight && !model.gravity_compensation.is_empty() {
+            let what = "the compensation of gravity acts as a passive force, outside the limits of effort; MuJoCo adds it to \
+                        the efforts of the actuators";
             warnings.push(self.element.left_out(format!("actuatorgravcomp: {what}")));
         }
     }

@@ -162,8 +162,9 @@ impl<'a> Drives<'a> {
         let user = model.frames.iter().enumerate().filter(|(_, frame)| frame.kind == FrameKind::User);
         let sites: HashMap<&str, usize> = user.map(|(i, frame)| (&*frame.name, i)).collect();
         let (mut table, mut ratios, counts) = (Vec::new(), 0, self.on_tendons(tendons, on));
-        for (tendon, _) in tendons.all.iter().zip(counts).filter(|(t, count)| t.effort.is_some() && *count > 1) {
-            let what = "actuatorfrcrange: it is no limit of effort, for several actuators share the tendon";
+        for (tendon, _) in tendons.all.iter().zip(&counts).filter(|(t, count)| t.effort.is_some() && **count > 1) {
+            let what =
+                "actuatorfrcrange: it limits neither actuators nor efforts, for several actuators share the tendon";
             warnings.push(tendon.element.left_out(what));
         }
         for (index, drive) in self.all.iter().enumerate() {
@@ -236,7 +237,7 @@ impl<'a> Drives<'a> {
                 kp,
                 kv,
                 control: law.activation(drive.control, drive.activation).into(),
-                force: drive.force.into(),
+                force: clipped(drive.share(tendons, &counts), drive.force).into(),
             };
             table.push((index, actuator));
         }
@@ -256,11 +257,7 @@ impl<'a> Drives<'a> {
         let mut efforts = vec![None; model.tree.columns.len()];
         for drive in self.all.iter().filter(|drive| drive.acts(on)) {
             let force = drive.law.force(drive.law.activation(drive.control, drive.activation));
-            let force = match drive.target {
-                Target::Tendon(t) if alone[t] == 1 => clipped(force, tendons.all[t].effort.unwrap_or(ALL)),
-                _ => force,
-            };
-            let force = clipped(force, drive.force);
+            let force = clipped(clipped(force, drive.share(tendons, &alone)), drive.force);
             for (k, moment) in drive.moments(model, joints, tendons) {
                 add(&mut efforts[k], scaled(force, moment));
             }
@@ -287,6 +284,15 @@ impl Drive<'_> {
     /// Returns whether the actuator is enabled.
     fn acts(&self, on: &Switches) -> bool {
         on.actuation && !on.groups.contains(&self.mechanics.group)
+    }
+
+    /// Returns the range of the force that the tendon's `actuatorfrcrange` allows. `counts` is the number of actuators of
+    /// each tendon: the range of several actuators is the range of their sum, and limits no single one.
+    fn share(&self, tendons: &Tendons, counts: &[usize]) -> [f64; 2] {
+        match self.target {
+            Target::Tendon(t) if counts[t] == 1 => tendons.all[t].effort.unwrap_or(ALL),
+            _ => ALL,
+        }
     }
 
     /// Returns the columns on which a unit force acts, with the effort at each, as far as these do not depend on

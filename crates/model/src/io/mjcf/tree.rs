@@ -156,8 +156,9 @@ impl<'a> Reader<'a> {
             builder.merge(body, bXl, inertia);
         }
         let compensated = Attributes::plain(w.element).number("gravcomp")?.unwrap_or(0.0);
-        if compensated != 0.0 && moves {
-            builder.compensate_gravity(body, bXl, inertia, compensated);
+        match count {
+            0 => builder.compensate_gravity_of_part(body, bXl, inertia, compensated),
+            _ => builder.compensate_gravity(body, compensated),
         }
         if !parts.joints.iter().any(|(a, _)| is_free(a)) {
             builder.frame_of_kind(&name, FrameKind::Link, body, bXl);

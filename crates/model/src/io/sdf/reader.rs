@@ -123,7 +123,7 @@ impl<'a> Reader<'a> {
             let names = (&*link, &*name);
             let body = builder.body_with(names, WORLD, joint, Se3::identity(), inertia, JointOptions::default());
             builder.frame_of_kind(&name, FrameKind::Joint, body, Se3::identity());
-            self.put(builder, root, (body, Se3::identity()), inertia)?;
+            self.put(builder, root, (body, Se3::identity()), None)?;
             self.walk(builder, tree, &[Some(root)])?;
         }
         Ok(())
@@ -136,21 +136,24 @@ impl<'a> Reader<'a> {
         let inertia = inertia(&self.scopes, link, warnings)?;
         let oXl = self.scopes.in_world(link);
         builder.merge(WORLD, oXl, inertia);
-        self.put(builder, link, (WORLD, oXl), inertia)
+        self.put(builder, link, (WORLD, oXl), Some(inertia))
     }
 
-    /// Stores the body and placement of a link, and adds the link's frame; `inertia` is in the link's frame.
+    /// Stores the body and placement of a link, and adds the link's frame. `merged` is the inertia of a link that is
+    /// merged into its body, in the link's frame.
     fn put(
         &mut self,
         builder: &mut ModelBuilder,
         link: usize,
         at: (BodyId, Se3<f64>),
-        inertia: Inertia<f64>,
+        merged: Option<Inertia<f64>>,
     ) -> Result<(), Error> {
         self.placed[link] = at;
         builder.frame_of_kind(self.scopes.name(link), FrameKind::Link, at.0, at.1);
-        if at.0 != WORLD && !flag(self.scopes.items[link].element, "gravity", true)? {
-            builder.compensate_gravity(at.0, at.1, inertia, 1.0);
+        let ratio = if flag(self.scopes.items[link].element, "gravity", true)? { 0.0 } else { 1.0 };
+        match merged {
+            Some(inertia) => builder.compensate_gravity_of_part(at.0, at.1, inertia, ratio),
+            None => builder.compensate_gravity(at.0, ratio),
         }
         Ok(())
     }
@@ -238,7 +241,7 @@ impl<'a> Reader<'a> {
             builder.merge(body, at, inertia);
         }
         builder.frame_of_kind(&name, FrameKind::Joint, body, at);
-        self.put(builder, link, (body, at * jXl), in_link)
+        self.put(builder, link, (body, at * jXl), (count == 0).then_some(in_link))
     }
 
     /// Adds the frames of the file and of nested models.

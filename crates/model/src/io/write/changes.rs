@@ -1,5 +1,6 @@
 //! Numbers of a model that differ from the numbers in its file.
 
+use super::differences::{Difference, different_robot};
 use crate::body::{Body, FrameKind};
 use crate::inertial_parameters;
 use crate::joint::Joint;
@@ -13,6 +14,9 @@ use std::ops::Range;
 pub(super) const ROUNDING: f64 = 1e-9;
 /// Maximum relative difference that is certainly rounding, and not the contribution of another element.
 pub(super) const NO_SHARE: f64 = 1e-14;
+/// Maximum relative difference of numbers that are not written; chosen because MuJoCo's compiler and our reader round
+/// differently.
+const EQUAL: f64 = 1e-12;
 /// Minimum fraction of a body's mass that a link may keep; with less, its centre of mass would have few digits.
 const LEAST_SHARE: f64 = 1e-3;
 
@@ -50,7 +54,7 @@ pub(super) struct JointChange {
 }
 
 /// Names of the numbers that a file has for each joint; the first two belong to q, the others to v.
-const NUMBERS: [&str; 10] = [
+pub(super) const NUMBERS: [&str; 10] = [
     "lower limit",
     "upper limit",
     "velocity limit",
@@ -66,7 +70,7 @@ const NUMBERS: [&str; 10] = [
 const LOSSES: usize = 5;
 
 /// Returns the numbers of a model, in the order of [`NUMBERS`].
-fn numbers(model: &Model) -> [Vec<f64>; 10] {
+pub(super) fn numbers(model: &Model) -> [Vec<f64>; 10] {
     let limits = model.limits.clone();
     let polynomial = |k: usize| model.damping_polynomial.iter().map(|d| d[k]).collect();
     [
@@ -84,7 +88,7 @@ fn numbers(model: &Model) -> [Vec<f64>; 10] {
 }
 
 /// Returns the slots of a joint in the k-th of its [`numbers`].
-fn slots(body: &Body, k: usize) -> Range<usize> {
+pub(super) fn slots(body: &Body, k: usize) -> Range<usize> {
     if k < 2 { body.idx_q..body.idx_q + body.joint.nq() } else { body.idx_v..body.idx_v + body.joint.nv() }
 }
 
@@ -140,9 +144,9 @@ impl LinkChange {
 
 impl Changes {
     /// Compares two models of one robot; `masses` are the masses of its links (kg), by name.
-    pub(super) fn new(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Self, String> {
+    pub(super) fn new(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Self, Difference> {
         match different_robot(model, was) {
-            Some(what) => Err(what),
+            Some(difference) => Err(difference),
             None => Ok(Self { links: links(model, was, masses)?, joints: joints(model, was)? }),
         }
     }
@@ -179,7 +183,7 @@ impl Changes {
 fn links(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Vec<LinkChange>, String> {
     let mut changes = Vec::new();
     for (i, (body, before)) in model.bodies.iter().zip(&was.bodies).enumerate() {
-        if body.inertia == before.inertia {
+        if alike(body.inertia, before.inertia, EQUAL) {
             continue;
         }
         let links: Vec<_> = model.frames.iter().filter(|f| f.body == i && f.kind == FrameKind::Link).collect();
@@ -212,7 +216,8 @@ fn joints(model: &Model, was: &Model) -> Result<Vec<JointChange>, String> {
         for (k, name) in NUMBERS.iter().enumerate() {
             let slots = slots(body, k);
             let found = &new[k][slots.clone()];
-            (values[k], differs[k]) = (found[0], *found != old[k][slots]);
+            let same = found.iter().zip(&old[k][slots]).all(|(&a, &b)| close(a, b, EQUAL));
+            (values[k], differs[k]) = (found[0], !same);
             if differs[k] && found.iter().any(|x| *x != found[0]) {
                 return Err(format!("joint `{}`: {name} {found:?}: a file has one for a joint", body.joint_name));
             }
@@ -225,72 +230,15 @@ fn joints(model: &Model, was: &Model) -> Result<Vec<JointChange>, String> {
     Ok(changes)
 }
 
-/// Returns the first property, except numbers that can be written, in which two models differ.
-fn different_robot(model: &Model, file: &Model) -> Option<String> {
-    let alike = |a: &Body, b: &Body| {
-        let names = (&a.name, &a.joint_name) == (&b.name, &b.joint_name);
-        names && (a.parent, a.joint, a.placement, a.mimic) == (b.parent, b.joint, b.placement, b.mimic)
-    };
-    let counts = (model.bodies.len(), file.bodies.len());
-    if let Some((a, b)) = model.bodies.iter().zip(&file.bodies).find(|(a, b)| !alike(a, b)) {
-        let differ = if a.joint_name == b.joint_name { "placed or coupled in another way" } else { "another one" };
-        return Some(format!("joint `{}` of the file is {differ} in the model, `{}`", b.joint_name, a.joint_name));
-    }
-    if counts.0 != counts.1 {
-        return Some(format!("the model has {} bodies and the file {}", counts.0 - 1, counts.1 - 1));
-    }
-    if let Some((a, b)) = model.frames.iter().zip(&file.frames).find(|(a, b)| a != b) {
-        return Some(format!("frame `{}` of the file is `{}` in the model, or elsewhere", b.name, a.name));
-    }
-    if model.frames.len() != file.frames.len() {
-        return Some(format!("the model has {} frames and the file {}", model.frames.len(), file.frames.len()));
-    }
-    if model.gravity != file.gravity {
-        let (a, b) = (model.gravity.to_array(), file.gravity.to_array());
-        return Some(format!("gravity is {a:?} m/s² in the model and {b:?} m/s² in the file"));
-    }
-    let others = [
-        (model.name == file.name, "name"),
-        (model.springs == file.springs, "springs"),
-        (model.gravity_compensation.len() == file.gravity_compensation.len(), "gravity compensation"),
-        (model.actuators == file.actuators, "actuators"),
-        (model.keyframes == file.keyframes, "keyframes"),
-        (model.constraints == file.constraints, "constraints"),
-    ];
-    others.into_iter().find(|(same, _)| !same).map(|(_, what)| format!("{what} of the model and of the file differ"))
-}
-
-/// Returns the first difference between a model and the model in a file that exceeds a relative rounding error.
-pub(super) fn difference(model: &Model, file: &Model, rounding: f64) -> Option<String> {
-    if let Some(what) = different_robot(model, file) {
-        return Some(what);
-    }
-    for (a, b) in model.bodies.iter().zip(&file.bodies) {
-        if !alike(a.inertia, b.inertia, rounding) {
-            let pi = |b: &Body| inertial_parameters::from_inertia(b.inertia);
-            let what = "cannot be written: the file gives";
-            return Some(format!("body `{}`: its inertial parameters {:?} {what} {:?}", a.name, pi(a), pi(b)));
-        }
-    }
-    for (k, (a, b)) in numbers(model).into_iter().zip(numbers(file)).enumerate() {
-        if let Some(slot) = (0..a.len()).find(|&slot| !close(a[slot], b[slot], rounding)) {
-            let (a, b, what) = (a[slot], b[slot], NUMBERS[k]);
-            let owner = model.bodies.iter().skip(1).find(|body| slots(body, k).contains(&slot));
-            let joint = owner.map_or("", |body| &body.joint_name);
-            return Some(format!("joint `{joint}`: its {what} {a} cannot be written: the file gives {b}"));
-        }
-    }
-    None
-}
-
 /// Returns whether two numbers are equal up to rounding. The tolerance of numbers below 0.001, such as sums of small
 /// armatures, is the tolerance of 0.001.
-fn close(a: f64, b: f64, rounding: f64) -> bool {
-    a == b || (a - b).abs() <= rounding * a.abs().max(b.abs()).max(1e-3)
+pub(super) fn close(a: f64, b: f64, rounding: f64) -> bool {
+    let tolerance = rounding * a.abs().max(b.abs()).max(1e-3);
+    a == b || tolerance.is_finite() && (a - b).abs() <= tolerance
 }
 
 /// Returns whether two inertias are equal up to rounding: |m c| is at most √(m tr Ī).
-fn alike(a: Inertia<f64>, b: Inertia<f64>, rounding: f64) -> bool {
+pub(super) fn alike(a: Inertia<f64>, b: Inertia<f64>, rounding: f64) -> bool {
     let size = |I: Inertia<f64>| (I.rotational.xx.abs() + I.rotational.yy.abs() + I.rotational.zz.abs()).max(1e-300);
     let (mass, size) = (a.mass.abs().max(b.mass.abs()), size(a).max(size(b)));
     let largest = |numbers: &[f64]| numbers.iter().fold(0.0, |most: f64, x| most.max(x.abs()));

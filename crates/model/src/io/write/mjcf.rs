@@ -4,10 +4,10 @@ use super::Format;
 use super::changes::{Changes, JointChange};
 use super::edits::{Edits, about_com, words};
 use crate::error::Error;
-use crate::io::mjcf::MjcfOptions;
+use crate::io::mjcf::{MjcfOptions, frame_poses};
 use crate::io::xml::Element;
 use crate::model::Model;
-use condyle_spatial::Inertia;
+use condyle_spatial::{Act, Inertia, Se3};
 use std::collections::HashMap;
 use std::path::Path;
 
@@ -20,10 +20,21 @@ pub(super) struct Mjcf<'a> {
 /// Bodies and joints of a document, by the names that the reader gives them.
 #[derive(Default)]
 struct Elements<'a> {
-    bodies: HashMap<String, &'a Element>,
+    bodies: HashMap<String, Parts<'a>>,
     joints: HashMap<String, &'a Element>,
     /// Number of bodies so far.
     count: usize,
+}
+
+/// Parts of a body, including the parts in its `<frame>`s.
+struct Parts<'a> {
+    body: &'a Element,
+    inertial: Option<&'a Element>,
+    /// Frames around the inertial, outermost first.
+    frames: Vec<&'a Element>,
+    has_geom: bool,
+    joints: Vec<&'a Element>,
+    inside: Vec<&'a Element>,
 }
 
 impl<'a> Elements<'a> {
@@ -32,34 +43,50 @@ impl<'a> Elements<'a> {
         let mut waiting: Vec<&Element> = root.all("worldbody").collect();
         waiting.reverse();
         while let Some(element) = waiting.pop() {
-            let body = if element.tag == "body" { elements.add(element) } else { String::new() };
-            let (mut joints, mut inside) = (Vec::new(), Vec::new());
-            gather(element, &mut joints, &mut inside);
-            for (k, &joint) in joints.iter().enumerate() {
-                let number = if joints.len() == 1 { String::new() } else { format!("{}", k + 1) };
-                elements.joints.insert(name(joint, || format!("{body}_joint{number}")), joint);
+            let parts = Parts::new(element);
+            waiting.extend(parts.inside.iter().rev());
+            if element.tag == "body" {
+                elements.add(parts);
             }
-            waiting.extend(inside.into_iter().rev());
         }
         elements
     }
 
-    fn add(&mut self, body: &'a Element) -> String {
+    fn add(&mut self, parts: Parts<'a>) {
         self.count += 1;
-        let name = name(body, || format!("body{}", self.count));
-        self.bodies.insert(name.clone(), body);
-        name
+        let body = name(parts.body, || format!("body{}", self.count));
+        for (k, &joint) in parts.joints.iter().enumerate() {
+            let number = if parts.joints.len() == 1 { String::new() } else { format!("{}", k + 1) };
+            self.joints.insert(name(joint, || format!("{body}_joint{number}")), joint);
+        }
+        self.bodies.insert(body, parts);
     }
 }
 
-/// Finds the joints and child bodies of a body, including those in its frames.
-fn gather<'a>(element: &'a Element, joints: &mut Vec<&'a Element>, bodies: &mut Vec<&'a Element>) {
-    for child in &element.children {
-        match &*child.tag {
-            "joint" | "freejoint" => joints.push(child),
-            "body" => bodies.push(child),
-            "frame" => gather(child, joints, bodies),
-            _ => {}
+impl<'a> Parts<'a> {
+    /// Finds the parts of a body.
+    fn new(body: &'a Element) -> Self {
+        let [frames, joints, inside] = [const { Vec::new() }; 3];
+        let mut parts = Self { body, inertial: None, frames, has_geom: false, joints, inside };
+        parts.gather(body, &mut Vec::new());
+        parts
+    }
+
+    /// Adds the content of the body, or of a frame inside other ones.
+    fn gather(&mut self, element: &'a Element, frames: &mut Vec<&'a Element>) {
+        for child in &element.children {
+            match &*child.tag {
+                "joint" | "freejoint" => self.joints.push(child),
+                "body" => self.inside.push(child),
+                "geom" => self.has_geom = true,
+                "inertial" => (self.inertial, self.frames) = (Some(child), frames.clone()),
+                "frame" => {
+                    frames.push(child);
+                    self.gather(child, frames);
+                    frames.pop();
+                }
+                _ => {}
+            }
         }
     }
 }
@@ -81,12 +108,12 @@ impl Format for Mjcf<'_> {
     }
 
     fn masses(&self, root: &Element) -> HashMap<String, f64> {
-        let mass = |body: &Element| match (body.child("inertial"), body.child("geom")) {
-            (Some(inertial), _) => inertial.attribute("mass")?.trim().parse().ok(),
-            (None, geom) => geom.map(|_| f64::MIN_POSITIVE), // some mass, which an <inertial> replaces
+        let mass = |parts: &Parts| match parts.inertial {
+            Some(inertial) => inertial.attribute("mass")?.trim().parse().ok(),
+            None => parts.has_geom.then_some(f64::MIN_POSITIVE), // some mass, which an <inertial> replaces
         };
         let bodies = Elements::new(root).bodies.into_iter();
-        bodies.filter_map(|(name, body)| Some((name, mass(body)?))).collect()
+        bodies.filter_map(|(name, parts)| Some((name, mass(&parts)?))).collect()
     }
 
     fn edit(&self, edits: &mut Edits, root: &Element, changes: &Changes) -> Result<(), String> {
@@ -96,10 +123,16 @@ impl Format for Mjcf<'_> {
             let what = "inertiafromgeom=\"true\" of the compiler replaces its inertia by that of its geoms";
             return Err(format!("body `{}`: {what}", change.link));
         }
-        let body = |name: &str| elements.bodies.get(name).copied().ok_or_else(|| format!("body `{name}` {elsewhere}"));
+        let body = |name: &str| elements.bodies.get(name).ok_or_else(|| format!("body `{name}` {elsewhere}"));
+        let frame_poses = frame_poses(root).map_err(|e| e.to_string())?;
+        let pose = |parts: &Parts| {
+            let poses = parts.frames.iter().map(|frame| frame_poses(frame)).collect::<Result<Vec<_>, _>>();
+            poses.map(|poses| poses.into_iter().fold(Se3::identity(), |X, Y| X * Y)).map_err(|e| e.to_string())
+        };
         for change in &changes.links {
             let of_body = |what| format!("body `{}`: {what}", change.link);
-            inertial(edits, body(&change.link)?, change.inertia()).map_err(of_body)?;
+            let parts = body(&change.link)?;
+            inertial(edits, parts, pose(parts)?.act_inv(change.inertia())).map_err(of_body)?;
             for name in &change.emptied {
                 inertial(edits, body(name)?, Inertia::zero())?;
             }
@@ -114,23 +147,23 @@ impl Format for Mjcf<'_> {
     }
 }
 
-/// Sets the inertia of a body, in the body's frame.
-fn inertial(edits: &mut Edits, body: &Element, I: Inertia<f64>) -> Result<(), String> {
+/// Sets the inertia of a body, in the frame around its `<inertial>`.
+fn inertial(edits: &mut Edits, parts: &Parts, I: Inertia<f64>) -> Result<(), String> {
     let (mass, com, J) = about_com(I)?;
     // MuJoCo accepts a full inertia only if it is positive definite
     let (moments, numbers) = match [J.xy, J.xz, J.yz] {
         [0.0, 0.0, 0.0] => ("diaginertia", vec![J.xx, J.yy, J.zz]),
         [xy, xz, yz] => ("fullinertia", vec![J.xx, J.yy, J.zz, xy, xz, yz]),
     };
-    let Some(inertial) = body.child("inertial") else {
+    let Some(inertial) = parts.inertial else {
         let (mass, com, numbers) = (words(&[mass]), words(&com), words(&numbers));
-        edits.insert(body, &format!("<inertial pos=\"{com}\" mass=\"{mass}\" {moments}=\"{numbers}\"/>"));
+        edits.insert(parts.body, &format!("<inertial pos=\"{com}\" mass=\"{mass}\" {moments}=\"{numbers}\"/>"));
         return Ok(());
     };
     edits.set(inertial, "pos", &com);
     edits.set(inertial, "mass", &[mass]);
     edits.set(inertial, moments, &numbers);
-    // the axes of the new inertia are the axes of the body
+    // the axes of the new inertia are the axes of that frame
     let others = ["diaginertia", "fullinertia", "quat", "axisangle", "xyaxes", "zaxis", "euler"];
     others.into_iter().filter(|name| *name != moments).for_each(|name| edits.remove(inertial, name));
     Ok(())

@@ -156,7 +156,8 @@ fn transmission(edits: &mut Edits, robot: &Element, joint: &str, armature: f64) 
         (_, Some(old)) => edits.set(old, "value", &[inertia]),
         (Some(actuator), None) => edits.insert(actuator, &rotor),
         (None, None) => {
-            let inside = format!("<joint name=\"{joint}\"/><actuator name=\"{joint}\">{rotor}</actuator>");
+            let kind = "<type>transmission_interface/SimpleTransmission</type>"; // without it, Drake refuses the file
+            let inside = format!("{kind}<joint name=\"{joint}\"/><actuator name=\"{joint}\">{rotor}</actuator>");
             edits.insert(robot, &format!("<transmission name=\"{joint}\">{inside}</transmission>"));
         }
     }
