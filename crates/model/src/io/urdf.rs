@@ -55,7 +55,9 @@ impl Model {
     /// - A `<transmission>` with a rotor's inertia J (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a
     ///   reduction n (`mechanicalReduction`, `drake:gear_ratio`) results in the armature n² J. A reduction alone causes
     ///   a warning.
-    /// - Drake's `<frame>`s become frames; its joints `ball`, `screw` and `planar` are supported.
+    /// - Drake's `<frame>`s become frames; its joints `ball`, `screw`, `planar` and `universal` are supported. A universal
+    ///   joint becomes two revolute joints about x and y, the first named `name#1`, with a body `child#1` between them.
+    /// - A spherical, ball or universal joint has its losses along each of its coordinates.
     ///
     /// An unknown, misspelt or misplaced name causes a warning, and so does each feature that a model cannot represent
     /// ([`Model::warnings`]). Some elements are ignored without a warning: shapes, materials, sensors, controllers,
