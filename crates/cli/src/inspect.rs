@@ -122,7 +122,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
         say(&report.text(&robot.model));
     }
     match report.warnings.iter().filter(|finding| !arguments.allow.iter().any(|kind| kind == finding.kind)).count() {
-        n if n > 0 && arguments.strict => Err(Error::No(format!("{} has {n} warnings", robot.source))),
+        n if n > 0 && arguments.strict => {
+            Err(Error::No(format!("{} has {n} warning{}", robot.source, if n == 1 { "" } else { "s" })))
+        }
         _ => Ok(()),
     }
 }

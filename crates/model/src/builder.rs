@@ -8,6 +8,7 @@ use crate::limbs::Plan;
 use crate::model::Model;
 use crate::tree::Tree;
 use crate::validate::{check_body, check_frame};
+use crate::warning::Warning;
 use alloc::borrow::ToOwned;
 use alloc::collections::BTreeSet;
 use alloc::string::String;
@@ -158,7 +159,9 @@ impl ModelBuilder {
     }
 
     /// Lets a joint follow another one, instead of having its own coordinate; see [`Mimic`]. If the leader follows a
-    /// third joint, ratios and offsets are composed.
+    /// third joint, ratios and offsets are composed. Limits of position and velocity, damping, friction and armature of
+    /// the follower act on its leader's coordinate; its limits of effort have no effect. Limits that would leave the
+    /// leader no motion are ignored, with a warning.
     ///
     /// # Panics
     /// If the follower does not belong to this builder.
@@ -208,6 +211,7 @@ impl ModelBuilder {
         // coordinates: first of the joints that have their own, in order; then of the joints that follow one
         let mut coordinates = Coordinates::default();
         let mut bodies: Vec<Body> = Vec::with_capacity(order.len());
+        let mut warnings = Vec::new();
         for (i, &old) in order.iter().enumerate() {
             let Draft { body, options, mimic, .. } = &self.drafts[old];
             let mut body = body.clone();
@@ -222,7 +226,9 @@ impl ModelBuilder {
             if let Draft { mimic: Some((leader, mimic)), options, .. } = &self.drafts[old] {
                 let (leader, mimic) = (&bodies[number[*leader]], *mimic);
                 let (idx_q, idx_v) = (leader.idx_q, leader.idx_v);
-                coordinates.armature[idx_v] += mimic.ratio * mimic.ratio * options.armature; // v_joint = ratio v
+                let ignored = coordinates.follow(leader, bodies[i].joint, options, mimic);
+                let joint = &bodies[i].joint_name;
+                warnings.extend(ignored.into_iter().map(|what| Warning::Limit { joint: joint.clone(), what }));
                 (bodies[i].idx_q, bodies[i].idx_v, bodies[i].mimic) = (idx_q, idx_v, Some(mimic));
             }
         }
@@ -249,7 +255,7 @@ impl ModelBuilder {
             tree,
             geometry: 0,
             between,
-            warnings: Vec::new(),
+            warnings,
             singular: Vec::new(),
         };
         self.additions.add_to(&mut model, &number)?;
@@ -374,6 +380,9 @@ impl ModelBuilder {
     }
 }
 
+/// Relative rounding of the limits of position of joints that follow others; a smaller range is no motion.
+const MIMIC_ROUNDING: f64 = 1e-9;
+
 /// Numbers of a model for each coordinate.
 #[derive(Default)]
 struct Coordinates {
@@ -405,5 +414,50 @@ impl Coordinates {
         self.damping_polynomial.resize(self.nv, options.damping_polynomial);
         self.friction.resize(self.nv, options.friction);
         self.armature.resize(self.nv, options.armature);
+    }
+
+    /// Adds the limits and losses of a joint that follows a leader: with x = ratio q + offset, its limits of position
+    /// and velocity also limit the leader. Its limits of effort have no effect. Returns messages about limits that leave
+    /// the leader no motion, and are ignored.
+    fn follow(
+        &mut self,
+        leader: &Body,
+        joint: Joint,
+        options: &JointOptions,
+        Mimic { ratio, offset }: Mimic,
+    ) -> Vec<String> {
+        let (q, v, k) = (leader.idx_q, leader.idx_v, ratio.abs());
+        self.armature[v] += k * k * options.armature;
+        self.damping[v] += k * k * options.damping;
+        let [d1, d2] = options.damping_polynomial;
+        self.damping_polynomial[v][0] += k * k * k * d1;
+        self.damping_polynomial[v][1] += k * k * k * k * d2;
+        self.friction[v] += k * options.friction;
+        let mut ignored = Vec::new();
+        if k == 0.0 {
+            return ignored;
+        }
+        match options.velocity {
+            Some(0.0) if self.limits.velocity[v] > 0.0 => {
+                let name = &leader.joint_name;
+                ignored
+                    .push(format!("its limit of velocity, 0, leaves its leader `{name}` no motion: it has no effect"));
+            }
+            Some(limit) => self.limits.velocity[v] = self.limits.velocity[v].min(limit / k),
+            None => {}
+        }
+        if let Some((lower, upper)) = options.position.filter(|_| leader.joint.nq() == 1 && joint.nq() == 1) {
+            let mut ends = [lower, upper].map(|x| (x - offset) / ratio);
+            ends.sort_by(f64::total_cmp);
+            let (lower, upper) = (self.limits.lower[q].max(ends[0]), self.limits.upper[q].min(ends[1]));
+            if upper - lower > MIMIC_ROUNDING * (1.0 + upper.abs()) {
+                (self.limits.lower[q], self.limits.upper[q]) = (lower, upper);
+            } else if self.limits.lower[q] < self.limits.upper[q] {
+                let ([lower, upper], name) = (ends, &leader.joint_name);
+                let limits = format!("its limits of position, {lower} to {upper} for its leader `{name}`");
+                ignored.push(format!("{limits}, leave the leader no motion: they have no effect"));
+            }
+        }
+        ignored
     }
 }

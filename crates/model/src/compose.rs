@@ -1,6 +1,6 @@
 //! Models made from models: chains of joints, appended robots, locked joints, joints that follow others.
 
-use crate::body::FrameKind;
+use crate::body::{FrameKind, JointOptions};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
 use crate::error::Error;
 use crate::joint::{Joint, Mimic};
@@ -93,10 +93,10 @@ impl ModelBuilder {
                 place.push((on, pXb));
                 continue;
             }
-            let mut options = model.joint_options(body.idx_q, body.idx_v);
-            if body.mimic.is_some() {
-                options.armature = 0.0; // the leader's armature includes it
-            }
+            let options = match body.mimic {
+                None => model.joint_options(body.idx_q, body.idx_v),
+                Some(_) => JointOptions::default(), // the leader's options include those of the follower
+            };
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
             let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);
             if model.between[i] {
@@ -199,7 +199,8 @@ impl Model {
     }
 
     /// Returns the same robot with one joint that follows another one, instead of having its own coordinate. Each joint
-    /// is given by the index of its body. The limits are the limits of the leader.
+    /// is given by the index of its body. Limits and losses of the follower act on its leader, as
+    /// [`ModelBuilder::mimic`] states.
     ///
     /// ```
     /// use condyle_model::{Mimic, robots};

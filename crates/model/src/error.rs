@@ -130,7 +130,7 @@ pub enum Error {
         what: String,
     },
     /// A strict loader found something that is a warning otherwise.
-    #[error("{file}: {warning}")]
+    #[error("{}{warning}", file_of(file, warning))]
     Strict {
         /// Path of the file, or `<string>`.
         file: String,
@@ -161,6 +161,11 @@ pub enum Error {
         /// Most similar existing name; empty if no name is similar.
         nearest: String,
     },
+}
+
+/// Returns the begin of the message of [`Error::Strict`]: the file, unless the warning names it.
+fn file_of(file: &str, warning: &Warning) -> String {
+    if warning.place().is_some() { String::new() } else { format!("{file}: ") }
 }
 
 /// Returns the end of the message of [`Error::Package`].

@@ -9,6 +9,7 @@ use crate::layout::{Columns, Layout, Pairs, Single};
 use crate::model::Model;
 use crate::warning::Warning;
 use alloc::borrow::ToOwned;
+use alloc::collections::BTreeSet;
 use alloc::string::String;
 use alloc::vec::Vec;
 use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3, Sym3};
@@ -17,6 +18,9 @@ use rand::{SeedableRng, rngs::StdRng};
 
 /// Relative rounding of a body's moments of inertia in files, which have six digits.
 const MOMENT_ROUNDING: f64 = 1e-6;
+/// Moments about the centre of mass below this fraction of the mass times the square of its distance from the origin
+/// are rounding errors.
+const COM_ROUNDING: f64 = 1e-12;
 /// Pivots below this fraction of the sum of their products are rounding errors and count as 0.
 const PIVOT_ROUNDING: f64 = 1e-13;
 /// Minimum pivot (kg m², kg); the reciprocal of a smaller one may overflow.
@@ -26,6 +30,8 @@ const SAMPLES: usize = 3;
 /// Maximum radius of gyration of a body without a warning (m). The largest ships and cranes have less; public robots
 /// with more have a wrong unit.
 const LARGEST_RADIUS: f64 = 100.0;
+/// Minimum radius of gyration of a body with an inertia, without a warning (m). A point mass does not have one.
+const LEAST_RADIUS: f64 = 1e-7;
 
 /// Checks a body's inertia and placement.
 pub(crate) fn check_body(Body { name, inertia: I, placement, .. }: &Body) -> Result<(), Error> {
@@ -104,10 +110,14 @@ fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     let unlikely = |what: String| Warning::Unlikely { body: name(), what };
     if I.mass == 0.0 {
         warnings.push(unlikely(format!("has no mass and a moment of inertia of {greatest:e} kg m²")));
-    } else if greatest > I.mass * LARGEST_RADIUS * LARGEST_RADIUS {
+    } else if greatest > 0.0 {
         let radius = (greatest / I.mass).sqrt();
-        let what = format!("{} kg and {greatest:e} kg m² are a radius of gyration of {radius:.0} m", I.mass);
-        warnings.push(unlikely(format!("{what}, expected at most {LARGEST_RADIUS} m")));
+        let what = format!("{} kg and {greatest:e} kg m² are a radius of gyration of", I.mass);
+        if radius > LARGEST_RADIUS {
+            warnings.push(unlikely(format!("{what} {radius:.0} m, expected at most {LARGEST_RADIUS} m")));
+        } else if radius < LEAST_RADIUS && greatest > COM_ROUNDING * com.norm_squared() * I.mass {
+            warnings.push(unlikely(format!("{what} {radius:.1e} m, expected at least {LEAST_RADIUS:e} m")));
+        }
     }
     let rounding = MOMENT_ROUNDING * greatest.abs();
     if moments[0] < -rounding {
@@ -165,7 +175,11 @@ impl Model {
         }
         self.find_singular();
         warnings.extend(self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() }));
-        warnings.extend(self.warnings.drain(..).filter(Warning::is_about_source));
+        // warnings that are not computed from the model: about files, and about limits of followers that are ignored
+        let followers = self.bodies.iter().filter(|body| body.mimic.is_some());
+        let followers: BTreeSet<&str> = followers.map(|body| &*body.joint_name).collect();
+        let is_limit = |w: &Warning| matches!(w, Warning::Limit { joint, .. } if followers.contains(&**joint));
+        warnings.extend(self.warnings.drain(..).filter(|w| w.is_about_source() || is_limit(w)));
         self.warnings = warnings;
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use crate::error::near_or;
 use crate::names::nearest;
+use alloc::format;
 use alloc::string::String;
 use core::fmt;
 use core::str::FromStr;
@@ -233,7 +234,8 @@ impl fmt::Display for Warning {
             Self::Negative { body, moment } => {
                 write!(f, "body `{body}`: a principal moment of inertia is {moment:e} kg m²")
             }
-            Self::Triangle { body, moments: [a, b, c] } => {
+            Self::Triangle { body, moments } => {
+                let [a, b, c] = moments.map(rounded);
                 let sum = "kg m² break the triangle inequality";
                 write!(f, "body `{body}`: principal moments {c} > {a} + {b} {sum}")
             }
@@ -252,6 +254,11 @@ impl fmt::Display for Warning {
             }
         }
     }
+}
+
+/// Returns a number with 9 significant digits, more than files have.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.8e}").parse().unwrap_or(x)
 }
 
 impl core::error::Error for Warning {}

@@ -54,14 +54,10 @@ fn positions_with_unknown_names() {
     let positions = |text: &str, strict| robots::quadruped().reference_configurations_str(text, strict);
     let odd = text("<group_state nam='x' name='a'><jont name='LF_KFE' value='1'/></group_state>");
     assert_eq!(positions(&odd, false).unwrap().len(), 1);
-    let said = "<string>: <string>:2: group_state `a`: unknown attribute `nam`; nearest is `name`";
+    let said = "<string>:2: group_state `a`: unknown attribute `nam`; nearest is `name`";
     refused(&odd, true, said);
     let odd = odd.replace(" nam='x'", "");
-    refused(
-        &odd,
-        true,
-        "<string>: <string>:2: jont `LF_KFE`: unknown element <jont> in <group_state>; nearest is `joint`",
-    );
+    refused(&odd, true, "<string>:2: jont `LF_KFE`: unknown element <jont> in <group_state>; nearest is `joint`");
     assert!(positions(&text("<group name='g'><joint nam='x'/></group>"), true).unwrap().is_empty());
 }
 

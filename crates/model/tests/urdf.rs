@@ -75,28 +75,11 @@ fn joints_on_the_world() {
 #[test]
 fn limits_without_a_number() {
     for kind in ["revolute", "prismatic"] {
-        // as Drake 1.51.1 and MuJoCo 4.0.0 have it: what is missing does not limit
-        let inf = f64::INFINITY;
-        for (limit, said, expected) in [
-            (
-                "<limit lower='-1' upper='1' velocity='3'/>",
-                "limit has no effort: it has no limit",
-                [-1.0, 1.0, 3.0, inf],
-            ),
-            (
-                "<limit lower='-1' upper='1' effort='3'/>",
-                "limit has no velocity: it has no limit",
-                [-1.0, 1.0, inf, 3.0],
-            ),
-            ("", "is revolute or prismatic and has no <limit>: it has no limits", [-inf, inf, inf, inf]),
-        ] {
-            let text = robot(kind, limit, "");
-            assert_eq!(warnings(&text), [format!("3: joint `j`: {said}")]);
-            let model = model(&text);
-            let limits = model.limits();
-            assert_eq!([limits.lower[0], limits.upper[0], limits.velocity[0], limits.effort_upper[0]], expected);
-            assert_eq!(model.warnings()[0].kind(), WarningKind::Assumed);
-        }
+        refused(&robot(kind, "\n<limit lower='-1' upper='1' velocity='3'/>", ""), "4: joint `j`: limit has no effort");
+        refused(&robot(kind, "\n<limit lower='-1' upper='1' effort='3'/>", ""), "4: joint `j`: limit has no velocity");
+        let efort = "\n<limit lower='-1' upper='1' efort='3' velocity='1'/>";
+        refused(&robot(kind, efort, ""), "4: joint `j`: limit has no effort; nearest is `efort`");
+        refused(&robot(kind, "", ""), "3: joint `j`: is revolute or prismatic and has no <limit>");
     }
     let limits = |limit: &str| {
         let model = model(&robot("continuous", limit, ""));
@@ -293,7 +276,7 @@ fn axes_of_fixed_joints() {
     assert_eq!(model(&robot("floating", "<axis xyz='a'/>", "")).nv(), 6);
     let unknown = "3: <axis>: unknown attribute `xzy`; nearest is `xyz`";
     assert_eq!(warnings(&robot("fixed", "<axis xzy='0 0 1'/>", "")), [unknown]);
-    refused(&robot("continuous", "<axis xzy='0 0 1'/>", ""), "3: joint `j`: axis has no xyz");
+    refused(&robot("continuous", "<axis xzy='0 0 1'/>", ""), "3: joint `j`: axis has no xyz; nearest is `xzy`");
     refused(&robot("continuous", "<axis xyz='0 0 0'/>", ""), "3: joint `j`: axis (0, 0, 0) is no direction");
 }
 
@@ -315,6 +298,19 @@ fn unknown_elements_and_attributes() {
         (said("", "<jont name='k'/>"), "4: jont `k`: unknown element <jont> in <robot>; nearest is `joint`"),
         (said("", "<inertial/>"), "4: <inertial>: misplaced element <inertial> in <robot>; nearest is `material`"),
         (said("<limit efort='3'/>", ""), "3: <limit>: unknown attribute `efort`; nearest is `effort`"),
+        (said("<drake:dampng value='3'/>", ""), "3: <drake:dampng>: unknown element <drake:dampng> in <joint>"),
+        (
+            said("<dark:mimic joint='j'/>", ""),
+            "3: <dark:mimic>: unknown element <dark:mimic> in <joint>; nearest is `mimic`",
+        ),
+        (
+            said("<limit drake:aceleration='3'/>", ""),
+            "3: <limit>: unknown attribute `drake:aceleration`; nearest is `drake:acceleration`",
+        ),
+        (
+            said("", "<material name='m'>\n<inertial/></material>"),
+            "5: <inertial>: misplaced element <inertial> in <material>",
+        ),
     ];
     for (found, expected) in cases {
         assert_eq!(found, [expected]);
@@ -354,6 +350,7 @@ fn entries_of_gazebo_that_change_the_robot() {
             "<springStiffness>5</springStiffness>",
             "<springStiffness>: Gazebo has a spring at the joint, the model does not",
         ),
+        ("<inertial/>", "<inertial>: Gazebo adds it to the robot, the model does not have it"),
         ("<joint name='k' type='fixed'/>", "joint `k`: Gazebo adds it to the robot, the model does not have it"),
     ] {
         assert_eq!(said(entry), [format!("5: {what}")]);
@@ -384,15 +381,30 @@ fn rotors_of_transmissions() {
     let said = |inside: &str| warnings(&robot("continuous", "", &transmission(inside)));
     let none = "4: transmission `t`: has a reduction of 50 and no rotor inertia: M has no inertia of the rotor";
     assert_eq!(said(&actuator(reduction)), [none]);
-    let alone =
-        "4: transmission `t`: has a rotor inertia of 0.001 kg m², but no reduction or joint: M does not have it";
+    let alone = "4: transmission `t`: has a rotor inertia of 0.001 kg m², but no reduction: M does not have it";
     assert_eq!(said(&actuator("<rotorInertia>0.001</rotorInertia>")), [alone]);
+    let negative = "4: transmission `t`: has a rotor inertia of -1 kg m², which is below 0: M does not have it";
+    assert_eq!(said(&actuator(&format!("{reduction}<rotorInertia>-1</rotorInertia>"))), [negative]);
+    // Drake reads its elements in an actuator only
+    let drakes = "<drake:rotor_inertia value='1'/>";
+    assert_eq!(armature(drakes), 0.0);
+    let misplaced = "5: <drake:rotor_inertia>: misplaced element <drake:rotor_inertia> in <transmission>";
+    assert!(said(drakes)[0].starts_with(misplaced), "{:?}", said(drakes));
+    let near =
+        "5: <drake:gear_ratioo>: unknown element <drake:gear_ratioo> in <actuator>; nearest is `drake:gear_ratio`";
+    assert_eq!(said(&actuator("<drake:rotor_inertia value='1'/><drake:gear_ratioo value='5'/>")), [near]);
     let coupled = "4: transmission `t`: it couples joints: M has no inertia of its rotors";
     assert_eq!(said(&format!("{}<joint name='k'/>", actuator(reduction))), [coupled]);
     let rotor = "<rotorInertia>1</rotorInertia><mechanicalReduction>2</mechanicalReduction>";
-    for (kind, name) in [("fixed", "j"), ("floating", "j"), ("continuous", "x")] {
+    let single = "its joint `j` has no single degree of freedom";
+    for (kind, name, why) in [
+        ("fixed", "j", single),
+        ("floating", "j", single),
+        ("continuous", "x", "no joint is named `x`"),
+        ("continuous", "jj", "no joint is named `jj`; nearest is `j`"),
+    ] {
         let text = transmission(&actuator(rotor)).replace("'j'", &format!("'{name}'"));
-        let none = format!("its joint `{name}` has no single degree of freedom: M has no inertia of its rotor");
+        let none = format!("{why}: M has no inertia of its rotor");
         let read = model(&robot(kind, "", &text));
         assert!(read.warnings().last().unwrap().to_string().ends_with(&none), "{:?}", read.warnings());
         assert!(read.armature().iter().all(|&x| x == 0.0));
@@ -430,7 +442,63 @@ fn mimics() {
     let said = |first: &str, second: &str| read(&followers(first, second)).unwrap_err().to_string();
     assert_eq!(said("joint='l'", "joint='k'"), "<string>:6: joint `k`: mimics itself, alone or by way of others");
     assert_eq!(said("joint='k'", "joint='j'"), "<string>:6: joint `k`: mimics itself, alone or by way of others");
-    assert_eq!(said("joint='x'", "joint='j'"), "<string>:6: joint `k`: mimics `x`, which is no moving joint");
+    assert_eq!(said("joint='x'", "joint='j'"), "<string>:6: joint `k`: mimics `x`: no joint is named `x`");
+    let missing = "6: joint `k`: has a <mimic>, but no joint is named `x`: it is free";
+    assert_eq!(warnings(&followers("joint='x'", "joint='k'"))[0], missing);
+}
+
+/// Limits and losses of a follower act on its leader: with x = −2 q + 0.5 the limits −1 and 1 of x are −0.25 and 0.75 of q. The
+/// power of the damping d of x is d ẋ² = 4 d q̇².
+#[test]
+fn limits_and_losses_of_followers() {
+    let free = followers("joint='j' multiplier='-2' offset='0.5'", "joint='j' multiplier='0'");
+    let text = free
+        .replace("<mimic", "<dynamics damping='3' friction='4'/><mimic")
+        .replace(&format!("'b'/>{LIMIT}"), &format!("'b'/>{LIMIT}<dynamics damping='0.5' friction='0.25'/>"));
+    let read = |text: &str| Model::from_urdf_str(text, &UrdfOptions { mimic: true, ..UrdfOptions::default() });
+    let found = read(&text).unwrap();
+    let limits = found.limits();
+    assert_eq!((limits.lower[0], limits.upper[0], limits.velocity[0]), (-0.25, 0.75, 1.0));
+    assert_eq!((limits.effort_lower[0], limits.effort_upper[0]), (-3.0, 3.0));
+    assert_eq!((found.damping()[0], found.friction()[0]), (12.5, 8.25));
+    // a copy is the same robot, and so are the other formats
+    let copied = found.clone().with_gravity(*found.gravity()).unwrap();
+    assert_eq!((copied.damping(), copied.limits()), (found.damping(), limits));
+    let mut two = ModelBuilder::new("two");
+    two.append(WORLD, Se3::identity(), &found, "");
+    let two = two.build().unwrap();
+    assert_eq!((two.damping(), two.friction(), two.limits()), (found.damping(), found.friction(), limits));
+    let axis = |inside: &str| {
+        format!(
+            "<axis><xyz>0 0 1</xyz><limit><lower>-1</lower><upper>1</upper><velocity>2</velocity></limit><dynamics>\
+             <damping>3</damping><friction>4</friction></dynamics>{inside}</axis>"
+        )
+    };
+    let mimic = "<mimic joint='j'><multiplier>-2</multiplier><offset>0.5</offset><reference>0</reference></mimic>";
+    let sdf = format!(
+        "<sdf version='1.11'><model name='m'><link name='a'/><link name='b'/><link name='c'/><joint name='j' type='revolute'>\
+         <parent>a</parent><child>b</child>{}</joint><joint name='k' type='revolute'><parent>b</parent><child>c</child>{}\
+         </joint></model></sdf>",
+        axis(""),
+        axis(mimic)
+    );
+    let found = Model::from_sdf_str(&sdf, &SdfOptions { mimic: true, ..SdfOptions::default() }).unwrap();
+    assert_eq!((found.damping(), found.friction()), (&[15.0][..], &[12.0][..]));
+    assert_eq!((found.limits().lower[0], found.limits().upper[0], found.limits().velocity[0]), (-0.25, 0.75, 1.0));
+    // limits that leave no motion, as in the grippers of many robots, are ignored
+    let apart = read(&followers("joint='j' offset='5'", "joint='j'").replacen(
+        "velocity='2'/><mimic",
+        "velocity='0'/><mimic",
+        1,
+    ));
+    let apart = apart.unwrap();
+    assert_eq!((apart.limits().lower[0], apart.limits().upper[0], apart.limits().velocity[0]), (-1.0, 1.0, 2.0));
+    let said: Vec<_> = apart.warnings().iter().map(ToString::to_string).collect();
+    let position = "joint `k`: its limits of position, -6 to -4 for its leader `j`, leave the leader no motion: they have no effect";
+    let velocity = "joint `k`: its limit of velocity, 0, leaves its leader `j` no motion: it has no effect";
+    assert_eq!(said, [velocity, position]);
+    let gravity = *apart.gravity();
+    assert_eq!(apart.clone().with_gravity(gravity).unwrap().warnings(), apart.warnings());
 }
 
 /// The time for a chain of followers is proportional to its length.
@@ -498,18 +566,23 @@ fn inertias_that_are_not_complete() {
 
 #[test]
 fn implausible_inertias() {
-    let of = |mass: f64, moment: f64| {
+    let at = |mass: f64, moment: f64, com: Vec3<f64>| {
         let mut builder = ModelBuilder::new("m");
-        let inertia = Inertia::from_com(mass, Vec3::new(1.0, 2.0, 3.0), Sym3::diagonal(moment));
+        let inertia = Inertia::from_com(mass, com, Sym3::diagonal(moment));
         let hinge = Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) };
         builder.body("b", WORLD, hinge, Se3::identity(), inertia);
         builder.build().unwrap().warnings().iter().map(ToString::to_string).collect::<Vec<_>>()
     };
+    let of = |mass: f64, moment: f64| at(mass, moment, Vec3::new(1.0, 2.0, 3.0));
     assert_eq!(of(0.0, 1.0), ["body `b`: has no mass and a moment of inertia of 1e0 kg m²"]);
     let said = "body `b`: 0.5 kg and 1e6 kg m² are a radius of gyration of 1414 m, expected at most 100 m";
     assert_eq!(of(0.5, 1e6), [said]);
     assert!(of(1.0, 9999.0).is_empty());
     assert!(of(1e-6, 1e-6).is_empty());
+    let said = "body `b`: 100000000000000000000 kg and 1e-1 kg m² are a radius of gyration of 3.2e-11 m, expected at least 1e-7 m";
+    assert_eq!(at(1e20, 0.1, Vec3::zero()), [said]);
+    assert!(at(1.0, 1e-12, Vec3::zero()).is_empty());
+    assert!(of(1.0, 0.0).is_empty()); // a point
 }
 
 /// Joints and frames that Drake adds to the format.
@@ -522,7 +595,23 @@ fn extensions_of_drake() {
     assert_eq!(model(&drakes("planar", "<axis xyz='0 0 1'/>")).bodies()[1].joint, Joint::Planar);
     let screw = model(&drakes("screw", "<axis xyz='0 0 1'/><drake:screw_thread_pitch value='6.283185307179586'/>"));
     assert_eq!(screw.bodies()[1].joint, Joint::Helical { axis: Vec3::new(0.0, 0.0, 1.0), pitch: 1.0 });
-    refused(&drakes("universal", ""), "3: drake:joint `j`: type `universal` is none of ball, planar, screw");
+    let losses = "<dynamics damping='0.5' friction='0.25'/>";
+    for kind in ["ball", "universal"] {
+        let text = drakes(kind, losses);
+        let found = model(&text);
+        assert!(found.damping().iter().all(|&x| x == 0.5) && found.friction().iter().all(|&x| x == 0.25), "{kind}");
+        assert_eq!(warnings(&text), [""; 0]);
+    }
+    // Drake turns about x of the joint's frame, then about the new y, whatever the axis is
+    let universal = model(&drakes("universal", "<origin xyz='1 2 3'/>"));
+    let about = |x, y| Joint::Revolute { axis: Vec3::new(x, y, 0.0) };
+    let bodies: Vec<_> = universal.bodies()[1..].iter().map(|b| (&*b.name, &*b.joint_name, b.joint)).collect();
+    assert_eq!(bodies, [("b#1", "j#1", about(1.0, 0.0)), ("b", "j", about(0.0, 1.0))]);
+    assert_eq!(universal.bodies()[1].placement.translation, Vec3::new(1.0, 2.0, 3.0));
+    assert_eq!(universal.bodies()[2].placement, Se3::identity());
+    let axis = "3: drake:joint `j`: it turns about x and y of its frame, as in Drake";
+    assert_eq!(warnings(&drakes("universal", "<axis xyz='0 0 1'/>")), [axis]);
+    refused(&drakes("univrsal", ""), "3: drake:joint `j`: type `univrsal` is none of ball, planar, screw, universal");
     let frame =
         |link: &str| robot("continuous", "", &format!("<frame name='f' link='{link}' xyz='1 2 3' rpy='0 0 0'/>"));
     let read = model(&frame("b"));

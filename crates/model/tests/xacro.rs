@@ -64,6 +64,10 @@ fn programs() {
     assert!(said.starts_with("./robot.xacro --pkg-dir"), "{said}");
     let said = read("failing", &[("xacro", fail)], "");
     assert_eq!(said, "robot.xacro: cannot be expanded: xacro: no such macro");
+    for missing in ["No module named 'ament_index_python'", "package not found: $(find arm)"] {
+        let said = read("packages", &[("xacro", &format!("echo \"{}\" >&2; exit 2", missing.replace('$', "\\$")))], "");
+        assert!(said.contains(missing) && said.contains("`pip install xacrodoc` installs a program"), "{said}");
+    }
     let said = read("silent", &[("xacro", "exit 3")], "");
     assert_eq!(said, "robot.xacro: cannot be expanded: xacro: exit status: 3");
     let said = read("none", &[], "");

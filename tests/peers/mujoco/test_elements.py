@@ -59,10 +59,13 @@ NO_EFFECT = {
 
 
 def table() -> dict[str, tuple[set[str], dict[str, str]]]:
-    """Returns attributes and children of each type; the type of a child is empty if its contents are ignored."""
+    """Returns attributes and children of each type; the type of a child is empty if its contents are ignored. The line
+    of `*`, which lists misplaced elements, is left out."""
     types = {}
     for line in TABLE.read_text().splitlines():
         name, rest = line.split(":", 1)
+        if name == "*":
+            continue
         attributes, _, children = rest.partition(";")
         inside = {}
         for child in children.split():

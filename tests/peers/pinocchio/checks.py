@@ -31,14 +31,15 @@ KINDS = {
 
 
 def check_model(pair: Pair) -> None:
-    """Compares sizes, names, order, placements, inertias, limits, frames."""
+    """Compares sizes, names, order, placements, inertias, losses, limits, frames."""
     check_bodies(pair)
+    check_losses(pair)
     check_limits(pair)
     check_frames(pair)
 
 
 def check_bodies(pair: Pair) -> None:
-    """Compares sizes, names, order, placements, inertias, losses."""
+    """Compares sizes, names, order, placements, inertias, armature."""
     ours, theirs = pair.ours, pair.theirs
     assert ours.name == theirs.name
     assert (ours.nq, ours.nv, ours.nbodies) == (theirs.nq, theirs.nv, theirs.njoints)
@@ -57,9 +58,13 @@ def check_bodies(pair: Pair) -> None:
     pair.expect("total mass", ours.total_mass, pin.computeTotalMass(theirs) + theirs.inertias[0].mass)
     parameters = [i.toDynamicParameters() for i in theirs.inertias[1:]]
     pair.expect("inertial parameters", ours.inertial_parameters, np.concatenate(parameters))
-    pair.expect("damping", ours.damping, theirs.damping)
-    pair.expect("friction", ours.friction, theirs.upperDryFrictionLimit)
     pair.expect("armature", ours.armature, theirs.armature)
+
+
+def check_losses(pair: Pair) -> None:
+    """Compares damping and friction."""
+    pair.expect("damping", pair.ours.damping, pair.theirs.damping)
+    pair.expect("friction", pair.ours.friction, pair.theirs.upperDryFrictionLimit)
 
 
 def check_limits(pair: Pair) -> None:

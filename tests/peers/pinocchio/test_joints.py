@@ -37,6 +37,7 @@ def test_single_joints(seed: int) -> None:
     robot = RandomRobot(f"built robot {seed}", seed, SINGLE, composites=False)
     robot.pair.record_size()
     checks.check_bodies(robot.pair)
+    checks.check_losses(robot.pair)
     checks.check_limits(robot.pair)
     for state in robot.pair.states(STATES, seed):
         checks.check_energy(state)
@@ -51,6 +52,7 @@ def test_chains_of_joints(seed: int) -> None:
     robot = RandomRobot(f"built robot {100 + seed}", 100 + seed, (*SINGLE, *COMPOSITES), composites=False)
     robot.pair.record_size()
     checks.check_bodies(robot.pair)
+    checks.check_losses(robot.pair)
     for state in robot.pair.states(STATES, seed):
         checks.check_energy(state)
     check(robot.pair, seed)

@@ -174,7 +174,7 @@ fn axes_that_follow() {
         close(frame, &a.translation.to_array(), &b.translation.to_array());
     }
     let nobody = mimic("joint='bolt'", "1").unwrap_err().to_string();
-    assert_eq!(nobody, "<string>:1: joint `slide`: mimic: no joint with an <axis> that moves is named `bolt`");
+    assert_eq!(nobody, "<string>:1: joint `slide`: mimic: joint `bolt` has no <axis> that moves");
     let turns = mimic("joint='spin'", "1").unwrap_err().to_string();
     assert!(
         turns.starts_with("<string>:1: joint `slide`: a slide or screw cannot follow a continuous joint"),

@@ -52,7 +52,7 @@ fn files() {
     std::fs::write(&path, with(r#"<child link="arm"/>"#, "")).unwrap();
     let error = Model::from_urdf(&path, &UrdfOptions::default()).unwrap_err().to_string();
     std::fs::remove_file(&path).unwrap();
-    assert_eq!(error, format!("{}:6: joint `j`: has no <child>", path.display()));
+    assert_eq!(error, format!("{}:6: joint `j`: has no child", path.display()));
 }
 
 #[test]
@@ -99,8 +99,8 @@ fn trees() {
         "<string>:6: joint `j`: no link is named `bace`; nearest is `base`",
     );
     expect(&with(child, r#"<child link="harm"/>"#), "<string>:6: joint `j`: no link is named `harm`; nearest is `arm`");
-    expect(&with(child, ""), "<string>:6: joint `j`: has no <child>");
-    expect(&with(parent, ""), "<string>:6: joint `j`: has no <parent>");
+    expect(&with(child, ""), "<string>:6: joint `j`: has no child");
+    expect(&with(parent, ""), "<string>:6: joint `j`: has no parent");
     expect(&with(parent, "<parent/>"), "<string>:7: joint `j`: parent has no link");
     let two = r#"<joint name="k" type="fixed"><parent link="base"/><child link="arm"/></joint></robot>"#;
     expect(&with("</robot>", two), "<string>:12: joint `k`: link `arm` is already the child of joint `j`");
@@ -199,7 +199,7 @@ fn names_in_any_spelling() {
 #[test]
 fn mimics() {
     let mimic = |what: &str| with("<axis", &format!("<mimic {what}/><axis"));
-    expect(&mimic(r#"joint="nobody""#), "<string>:6: joint `j`: mimics `nobody`, which is no moving joint");
+    expect(&mimic(r#"joint="nobody""#), "<string>:6: joint `j`: mimics `nobody`: no joint is named `nobody`");
     expect(&mimic(r#"joint="j""#), "<string>:6: joint `j`: mimics itself, alone or by way of others");
     let nan = "<string>:9: joint `j`: mimic multiplier: `nan` is no finite number";
     expect(&mimic(r#"joint="j" multiplier="nan""#), nan);

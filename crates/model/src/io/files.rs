@@ -51,8 +51,8 @@ const MODEL_PATHS: [&str; 4] = ["GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PAT
 /// `file://`, or a path.
 ///
 /// A path may be relative to the folder of the file that contains the address. Otherwise, addresses and paths are
-/// searched in `packages`, in that folder and the folders above it, in the `models` folder of each, and in the folders
-/// of Gazebo's and ROS's variables.
+/// searched in `packages`, in that folder and the one above it, in the `models` folder of both, and in the folders of
+/// Gazebo's and ROS's variables.
 pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Error> {
     let (scheme, path) = address.split_once("://").map_or(("", address), |(scheme, path)| (scheme, path));
     let missing = |what: &str| Error::File { file: address.to_owned(), what: what.to_owned() };
@@ -70,7 +70,8 @@ pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Erro
         _ => {}
     }
     let absolute = search.folder.and_then(|folder| folder.canonicalize().ok());
-    let around = absolute.iter().flat_map(|folder| folder.ancestors()).flat_map(|a| [a.to_owned(), a.join("models")]);
+    let around = absolute.iter().flat_map(|folder| folder.ancestors().take(2));
+    let around = around.flat_map(|folder| [folder.to_owned(), folder.join("models")]);
     let near: Vec<PathBuf> = search.packages.iter().cloned().chain(around).collect();
     let [ros, ament] = ["ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"].map(std::env::var_os);
     let mut all = folders(&near, None, None);
@@ -98,7 +99,10 @@ fn find(scheme: &str, address: &str, folders: &[PathBuf], fits: fn(&Path) -> boo
             if !package.is_empty() && fits(&file) {
                 return Ok(file);
             }
-            looked.push(file.display().to_string());
+            let file = file.display().to_string();
+            if !looked.contains(&file) {
+                looked.push(file);
+            }
         }
     }
     Err(Error::Package { address: format!("{scheme}{address}"), package: package.to_owned(), looked })

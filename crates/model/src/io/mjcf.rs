@@ -13,6 +13,7 @@ mod geometry;
 mod include;
 mod joint;
 mod keyframe;
+mod keywords;
 mod law;
 mod mesh;
 mod options;
@@ -88,7 +89,7 @@ impl Model {
     /// MuJoCo model. `springdamper` and `dampratio` are evaluated with the inertia in the initial configuration of the
     /// file. Actuators add gear² times their armature and damping. A `<fixed>` tendon that moves with one coordinate
     /// adds its spring, losses, armature and range to that coordinate. `gravcomp` becomes a [gravity
-    /// compensation](Self::gravity_compensation).
+    /// compensation](Self::gravity_compensation). As in MuJoCo, values below 0 act only if another one is above 0.
     ///
     /// Limits of effort are sums over the actuators of a joint, clipped to its `actuatorfrcrange`. An actuator
     /// contributes its `forcerange` times gear. If its force depends only on the control, it also contributes the
@@ -99,15 +100,15 @@ impl Model {
     ///
     /// Active `connect`, `weld` and `joint` elements of `<equality>` become [`constraints`](Self::constraints). Without
     /// a name, a constraint is named by its kind and number: `weld1`. With [`MjcfOptions::mimic`], joints follow others
-    /// in the tree instead. Damping, friction, springs and efforts of a follower then act on its leader's coordinate.
+    /// in the tree instead. Ranges, losses, springs and efforts of a follower then act on its leader's coordinate.
     /// Keyframes without a name are named by their number: `key0`, `key1`, ….
     ///
     /// An unknown, misspelt or misplaced name is a [warning](Model::warnings). So is each effect that a model cannot
     /// represent: tendons over several coordinates, activations and delays of actuators, the range of a ball joint,
     /// forces of a medium, bodies moved by a program (`mocap`). Sensors, visuals and contacts are ignored. `composite`,
     /// `flexcomp`, flexes and plugins of bodies are errors. A mesh with mass that cannot be read is an error, unless it
-    /// is on a body fixed to the world, or [`MjcfOptions::weightless_meshes`] is set. Contradictions are errors, as in
-    /// MuJoCo.
+    /// is on a body fixed to the world, or [`MjcfOptions::weightless_meshes`] is set. Contradictions, repeated names and
+    /// invalid keywords are errors, as in MuJoCo. A URDF cannot be attached.
     ///
     /// # Errors
     /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and the
@@ -193,7 +194,7 @@ fn model(files: &Files, options: &MjcfOptions) -> Result<Model, Error> {
     let mut sources = Vec::new();
     for file in &all {
         let (defaults, compiler) = (Defaults::read(&file.root)?, Compiler::read(&file.root)?);
-        let (assets, folder) = (Assets::read(&file.root), file.folder.as_deref());
+        let (assets, folder) = (Assets::read(&file.root)?, file.folder.as_deref());
         sources.push(Source { root: &file.root, compiler, defaults, assets, folder });
     }
     let root = &all[0].root;
@@ -209,6 +210,7 @@ fn model(files: &Files, options: &MjcfOptions) -> Result<Model, Error> {
         poses: vec![Se3::identity()],
         solids: Solids::default(),
         mass: 0.0,
+        compensates: root.all("worldbody").map(tree::compensates).collect::<Result<Vec<_>, _>>()?.contains(&true),
         placed: Vec::new(),
         warnings,
     };
@@ -231,6 +233,8 @@ struct Reader<'a> {
     solids: Solids,
     /// Mass of all bodies so far (kg).
     mass: f64,
+    /// Whether the weight of a body is compensated.
+    compensates: bool,
     /// Named frames and cameras so far.
     placed: Vec<Placed<'a>>,
     warnings: Vec<Warning>,
@@ -289,8 +293,24 @@ impl<'a> Reader<'a> {
             name.push('_');
         }
         match self.names.insert((kind, name.clone()), element) {
-            Some(other) => Err(element.wrong(format!("the name is taken by the {kind} on line {}", other.line))),
+            Some(other) => Err(taken(element, other)),
             None => Ok(name),
         }
     }
+}
+
+/// Returns the names of elements of one kind; an error if two have the same.
+fn names<'e>(elements: impl Iterator<Item = &'e Element>) -> Result<HashMap<&'e str, &'e Element>, Error> {
+    let mut names: HashMap<&str, &Element> = HashMap::new();
+    for element in elements {
+        if let Some(other) = element.attribute("name").and_then(|name| names.insert(name, element)) {
+            return Err(taken(element, other));
+        }
+    }
+    Ok(names)
+}
+
+/// Returns the error that the name of an element is taken by another one.
+fn taken(element: &Element, other: &Element) -> Error {
+    element.wrong(format!("the name is taken by the {} on line {}", other.tag, other.line))
 }

@@ -54,7 +54,7 @@ impl Model {
     /// nested models. An `<include>` is replaced by its model. Its address may be a path relative to the file, or begin
     /// with `model://`, `package://` or `file://`. Models are searched in:
     /// - [`SdfOptions::packages`];
-    /// - the folder of the file, the folders above it, and the folder `models` in each of these;
+    /// - the folder of the file, the folder above it, and the folder `models` in both;
     /// - the folders listed in GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH, SDF_PATH, GAZEBO_MODEL_PATH and ROS's
     ///   variables.
     ///

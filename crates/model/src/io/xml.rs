@@ -8,6 +8,7 @@ mod write;
 
 use crate::error::Error;
 use crate::model::Model;
+use crate::names::{near, nearest};
 use crate::warning::{Place, Warning, WarningKind};
 use parse::count;
 use std::ffi::OsStr;
@@ -161,6 +162,18 @@ impl Element {
             Some(name) => format!("{} `{name}`", self.tag),
             None => format!("<{}>", self.tag),
         }
+    }
+
+    /// Returns the message that an attribute or child is missing, with the nearest name that the element has.
+    pub(crate) fn missing(&self, name: &str) -> String {
+        let attributes = self.attributes.iter().map(|(name, _)| &**name);
+        let near = near(&nearest(name, attributes.chain(self.children.iter().map(|child| &*child.tag))));
+        format!("has no {name}{near}")
+    }
+
+    /// Returns an error that an attribute or child of this element is missing.
+    pub(crate) fn lacks(&self, name: &str) -> Error {
+        self.wrong(self.missing(name))
     }
 
     /// Returns an error that names this element.

@@ -167,6 +167,21 @@ fn classes_of_actuators() {
     let found = model(joints, "<joint name='j' axis='0 1 0' stiffness='7' damping='8'/>", "");
     assert_eq!((found.springs()[0].stiffness, found.damping()), ([7.0, 2.0, 3.0], &[8.0][..]));
     assert_eq!(found.damping_polynomial(), [[5.0, 6.0]]);
+    // so may the list of a class in a class; an attribute without a value is as if it were missing
+    let nested = |outer: &str, inner: &str, own: &str| {
+        let class = format!("<default class='y'><joint {inner}/></default>");
+        let before = format!("<default><default class='x'><joint {outer}/>{class}</default></default>");
+        model(&before, &format!("<joint name='j' class='y' axis='0 1 0' {own}/>"), "")
+    };
+    let damping = |found: &Model| (found.damping()[0], found.damping_polynomial()[0]);
+    assert_eq!(damping(&nested("damping='2 3 4'", "damping='5'", "")), (5.0, [3.0, 4.0]));
+    assert_eq!(damping(&nested("damping='2 3 4'", "damping=''", "")), (2.0, [3.0, 4.0]));
+    assert_eq!(damping(&nested("damping='2 3 4'", "damping='5 6'", "damping='7'")), (7.0, [6.0, 4.0]));
+    assert_eq!(nested("armature='0.3'", "armature=''", "armature=' '").armature(), [0.3]);
+    assert_eq!(nested("range='-1 1'", "range=''", "").limits().upper, [1f64.to_radians()]);
+    // a gear whose square is infinite acts on nothing
+    let found = driven(HINGE, "<motor joint='j' gear='1e300'/>");
+    assert_eq!((found.damping(), found.armature()), (&[0.0][..], &[0.0][..]));
 }
 
 /// Compares with `mj_fullM` and `qfrc_damper`: rotors count gear² times.

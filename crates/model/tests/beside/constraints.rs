@@ -108,6 +108,16 @@ fn followers_of_followers() {
     assert_eq!(said(&constant), [format!("<string>:1: joint `e`: {what}")]);
 }
 
+/// With x = 2 q + 0.1, the range of −20° to 60° of x is −0.2245 to 0.4736 of q.
+#[test]
+fn ranges_of_followers() {
+    let text = "<mujoco><worldbody><body><joint name='a'/><geom size='1'/></body><body><joint name='b' range='-20 60'/>
+        <geom size='1'/></body></worldbody><equality><joint joint1='b' joint2='a' polycoef='0.1 2'/></equality></mujoco>";
+    let found = Model::from_mjcf_str(text, &MjcfOptions { mimic: true, ..MjcfOptions::default() }).unwrap();
+    let ends = [-20f64, 60.0].map(|x| (x.to_radians() - 0.1) / 2.0);
+    close(&[found.limits().lower[0], found.limits().upper[0]], &ends);
+}
+
 /// Compares with `key_qpos`, and with `mj_objectVelocity` along the body's axes.
 #[test]
 fn keyframes() {
@@ -136,7 +146,7 @@ fn keyframes() {
     close(&short.keyframes()[0].v, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
     let expected = "<string>:2: key `k`: qpos: has 7 of 12 numbers; the other joints are as drawn";
     assert_eq!(short.warnings()[0].to_string(), expected);
-    refused("<key name='k'/><key name='k'/>", "<string>:1: <mujoco>: two keyframes have the same name");
+    refused("<key name='k'/><key name='k'/>", "<string>:2: key `k`: the name is taken by the key on line 2");
     // coordinates of followers are left out
     let hinges = format!(
         "<mujoco><worldbody><body><joint name='a'/>{ball}</body><body><joint name='b'/>{ball}</body></worldbody>

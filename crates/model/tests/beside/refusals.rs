@@ -24,6 +24,10 @@ fn errors() {
             "<position>: has kv and dampratio, which contradict each other",
         ),
         (actuator("<position joint='j' kv='-1'/>"), "<position>: kv or dampratio -1 is negative"),
+        (
+            actuator("<motor joint='j' gear='1e300' armature='1'/>"),
+            "<motor>: gear 1e300: gear² times armature or damping is not finite",
+        ),
         (actuator("<dcmotor joint='j'/>"), "<dcmotor>: motor constant 0 or resistance 0 is not positive"),
         (
             actuator("<dcmotor joint='j' motorconst='1e200' resistance='1e-200'/>"),
@@ -31,7 +35,7 @@ fn errors() {
         ),
         (
             actuator("<motor name='m' joint='j'/><motor name='m' joint='j'/>"),
-            "motor `m`: the name is taken by another actuator",
+            "motor `m`: the name is taken by the motor on line 1",
         ),
         (
             one("", "<joint name='j'/>", "<actuator><position joint='j' inheritrange='1'/></actuator>"),

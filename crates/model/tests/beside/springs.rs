@@ -149,6 +149,13 @@ fn weight_is_compensated() {
     close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 · (0.1, 0, 0) + 0.5 · 2 · (0.1, 0, 1)
     let scaled = read(&text.replace("<worldbody>", "<compiler settotalmass='12'/><worldbody>")).unwrap();
     close(&[carried(&scaled).mass], &[10.0]);
+    // as in MuJoCo, compensations below 0 act only if there is one above 0
+    let negative = text.replace("gravcomp='0.5'", "gravcomp='-0.5'");
+    close(&[carried(&read(&negative).unwrap()).mass], &[3.0]);
+    let alone = read(&negative.replace("gravcomp='2'", "").replace("gravcomp='1'", "")).unwrap();
+    assert!(alone.gravity_compensation().is_empty());
+    let what = "gravcomp: below 0, it acts in MuJoCo only if that of another body is above 0";
+    assert_eq!(said(&alone), [format!("<string>:1: body `c`: {what}")]);
     let acting = "<joint name='j' axis='0 1 0' actuatorgravcomp='true' actuatorfrcrange='-1 1'/>";
     let found = read(&text.replace(HINGE, acting)).unwrap();
     let what = "actuatorgravcomp: the compensation of gravity acts as a passive force, outside the limits of effort; MuJoCo \

@@ -251,6 +251,15 @@ fn bodies_fixed_to_the_world_have_mass() {
     assert_eq!(model(field, "<body><joint/><geom type='hfield' hfield='h'/></body>", "").total_mass(), 44000.0);
 }
 
+/// MuJoCo refuses such a body if it moves: "mass and inertia of moving bodies must be larger than mjMINVAL".
+#[test]
+fn an_inertial_without_moments() {
+    let read = model("", "<body name='b'><joint/>\n<inertial pos='0 0.1 0' mass='2'/></body>", "");
+    let what = "has neither diaginertia nor fullinertia: 0 kg m², which MuJoCo refuses in a moving body";
+    assert_eq!(said(&read, WarningKind::Assumed), [format!("<string>:2: <inertial>: {what}")]);
+    near("inertia", &inertia(&read.bodies()[1]), &[2.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 1e-15);
+}
+
 #[test]
 fn geoms_in_place_of_an_inertial() {
     let both = body("", "<geom size='0.1' mass='5'/>");

@@ -29,6 +29,69 @@ fn unknown_names_warn_with_the_nearest_one() {
     }
 }
 
+/// Elements of a robot have no effect in elements that do not change it.
+#[test]
+fn misplaced_elements() {
+    for (before, after, expected) in [
+        ("", "<contact><body name='x'><joint/></body></contact>", "body `x`: misplaced element <body> in <contact>"),
+        ("<size><option gravity='0 0 0'/></size>", "", "<option>: misplaced element <option> in <size>"),
+        ("<visual><global><option/></global></visual>", "", "<option>: misplaced element <option> in <global>"),
+        ("<custom><worldbody/></custom>", "", "<worldbody>: misplaced element <worldbody> in <custom>"),
+        ("", "<sensor><motor joint='j'/></sensor>", "<motor>: misplaced element <motor> in <sensor>"),
+        ("<drake:x/>", "", "<drake:x>: unknown element <drake:x> in <mujoco>"),
+    ] {
+        let unknown = said(&model(before, &body("", ""), after), WarningKind::Unknown);
+        assert_eq!(unknown, [format!("<string>:1: {expected}")]);
+    }
+}
+
+/// Keywords that MuJoCo 4.0 refuses.
+#[test]
+fn keywords() {
+    for (before, inside, after, expected) in [
+        (
+            "",
+            "",
+            "<actuator><general joint='j' dyntype='filtr'/></actuator>",
+            "<general>: dyntype: `filtr` is none of none, integrator, filter, filterexact, muscle, dcmotor, pid and user",
+        ),
+        ("", "", "<actuator><general joint='j' gaintype='none'/></actuator>", "<general>: gaintype: `none` is none of"),
+        ("", "", "<actuator><general joint='j' biastype='afine'/></actuator>", "<general>: biastype: `afine` is none"),
+        ("", "", "<actuator><motor joint='j' interp='cubc'/></actuator>", "<motor>: interp: `cubc` is none of zoh"),
+        ("", "", "<actuator><pid joint='j' input='pos vell'/></actuator>", "<pid>: input: `vell` is none of none"),
+        ("<option integrator='rk4'/>", "", "", "<option>: integrator: `rk4` is none of Euler, RK4"),
+        ("<default><geom type='spher'/></default>", "", "", "<geom>: type: `spher` is none of plane"),
+        ("<asset><mesh name='m' inertia='x'/></asset>", "", "", "mesh `m`: inertia: `x` is none of convex"),
+        ("", "<geom type='' mass='0'/>", "", "<geom>: type: `` is none of plane"),
+        ("", "<site type='bx'/>", "", "<site>: type: `bx` is none of plane"),
+        ("", "<camera mode='fixd'/>", "", "<camera>: mode: `fixd` is none of fixed"),
+    ] {
+        let error = refused(before, &body("", inside), after);
+        assert!(error.starts_with(&format!("<string>:1: {expected}")), "{error}\n{expected}");
+    }
+}
+
+#[test]
+fn repeated_names() {
+    let geoms = |last: &str| body("", &format!("<geom name='g' size='1' mass='0'/>\n{last}"));
+    let taken =
+        |lines: [u8; 2]| format!("<string>:{}: geom `g`: the name is taken by the geom on line {}", lines[0], lines[1]);
+    assert_eq!(refused("", &geoms("<geom name='g' size='1'/>"), ""), taken([2, 1]));
+    assert_eq!(refused("", &(geoms("") + "<geom name='g' size='1'/>"), ""), taken([1, 2])); // the world comes first
+    let twice = |section: &str, one: &str, two: &str| {
+        let after = format!("<{section}>\n{one}\n{two}</{section}>");
+        refused("", &body("", ""), &after)
+    };
+    let said = twice("keyframe", "<key name='a'/>", "<key name='a'/>");
+    assert_eq!(said, "<string>:3: key `a`: the name is taken by the key on line 2");
+    let said = twice("equality", "<joint name='a' joint1='j'/>", "<weld name='a' body1='b'/>");
+    assert_eq!(said, "<string>:3: weld `a`: the name is taken by the joint on line 2");
+    let said = twice("actuator", "<motor name='a' joint='j'/>", "<position name='a' joint='j'/>");
+    assert_eq!(said, "<string>:3: position `a`: the name is taken by the motor on line 2");
+    let said = twice("asset", "<mesh name='a' vertex='0'/>", "<mesh name='a' vertex='0'/>");
+    assert_eq!(said, "<string>:3: mesh `a`: the name is taken by the mesh on line 2");
+}
+
 #[test]
 fn names_without_effect_are_known() {
     let before = "<compiler autolimits='true' usethread='false'><lengthrange mode='none'/></compiler><size memory='1M'/>

@@ -254,6 +254,11 @@ fn chains_of_followers() {
     // 2 (2 (q − 0.1) + 0.5 − 0.1) + 0.5
     assert_eq!(rules.iter().map(|r| (r.0, r.1)).collect::<Vec<_>>(), [("k", 2.0), ("l", 4.0)]);
     close(&[rules[0].2, rules[1].2], &[0.3, 0.9]);
+    let missing = chain(&mimic("jj")).unwrap_err().to_string();
+    assert!(missing.ends_with("joint `j`: mimic: no joint is named `jj`; nearest is `j`"), "{missing}");
+    let free = format!("{links}{}", turn("j", ["a", "b"], &mimic("x")));
+    let free = said(&model("1.11", &free));
+    assert!(free.iter().any(|w| w.ends_with("has a <mimic>, but no joint is named `x`: it is free")), "{free:?}");
     assert!(chain(&mimic("l")).unwrap_err().to_string().ends_with("mimic: follows itself, through others"));
 }
 

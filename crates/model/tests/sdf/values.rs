@@ -56,6 +56,18 @@ fn inertias_of_shapes() {
         let worst = found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-11, "{shape}: {found:?}");
     }
+    // names in a shape that gives mass are checked
+    for (inside, near) in [
+        ("<posse>1 1 1 0 0 0</posse><density>5</density>", "<posse> in <collision>; nearest is `pose`"),
+        ("<densitty>5</densitty>", "<densitty> in <collision>; nearest is `density`"),
+        ("<density>5</density><inertial/>", "<inertial> in <collision>"),
+    ] {
+        let shape = collision(inside, "<box><size>1 1 1</size></box>");
+        let (_, warned) = of(auto, &shape).unwrap();
+        assert!(warned[0].contains(near), "{warned:?}");
+        let (_, warned) = of("<inertial><mass>1</mass></inertial>", &shape).unwrap();
+        assert_eq!(warned.iter().any(|w| w.contains("in <collision>")), inside.contains("inertial"), "{warned:?}");
+    }
     // a shape without a density uses the link's density, or the density of water; an explicit mass scales the result
     let density = |inertial: &str| of(inertial, &collision("", "<box><size>1 1 1</size></box>")).unwrap();
     assert_eq!(density("<inertial auto='1'><density>700</density></inertial>").0[0], 700.0);
@@ -268,6 +280,10 @@ fn elements_of_drake() {
     let rotor = "<drake:rotor_inertia>0.02</drake:rotor_inertia><drake:gear_ratio>10</drake:gear_ratio>";
     let m = of(rotor, "<other:thing/>").unwrap();
     assert_eq!((m.armature()[0], said(&m)), (2.0, Vec::new()));
+    for (name, near) in [("drake:rotor_inertiax", "drake:rotor_inertia"), ("drake:mimicx", "drake:mimic")] {
+        let expected = format!("<string>:3: <{name}>: unknown element <{name}> in <joint>; nearest is `{near}`");
+        assert_eq!(said(&of(&format!("<{name}>1</{name}>"), "").unwrap()), [expected]);
+    }
     let m = of("", "<drake:linear_bushing_rpy/>").unwrap();
     assert!(said(&m)[0].ends_with("a force or constraint of Drake's own is left out"));
     let error = of("", "<drake:joint name='k' type='planar'/>").unwrap_err().to_string();
@@ -282,4 +298,24 @@ fn a_screw_without_a_pitch() {
     let Joint::Helical { pitch, .. } = m.bodies()[1].joint else { panic!("no screw") };
     assert_eq!(pitch, 1.0 / core::f64::consts::TAU);
     assert!(said(&m)[0].ends_with("has no screw_thread_pitch: 1 m for each turn, as SDF has it"));
+}
+
+/// Elements of a robot have no effect in elements that do not change it.
+#[test]
+fn misplaced_elements() {
+    let world = |version: &str, physics: &str, visual: &str| {
+        let link = link("a").replace("</link>", &format!("<visual name='v'>{visual}</visual></link>"));
+        let text = format!(
+            "<sdf version='{version}'><world name='w'><physics type='ode'>{physics}</physics><model name='m'>{link}\
+             </model></world></sdf>"
+        );
+        said(&read(&text).unwrap())
+    };
+    let physics = "<max_step_size>0.1</max_step_size><ode><solver><type>quick</type></solver></ode>";
+    let visual = "<geometry><box><size>1 1 1</size></box></geometry><plugin name='p'><joint>j</joint></plugin>";
+    assert_eq!(world("1.6", physics, visual), [""; 0]);
+    let near = "<string>:1: <gravityx>: unknown element <gravityx> in <physics>; nearest is `gravity`";
+    assert_eq!(world("1.4", "<gravityx>0 0 -3</gravityx>", visual), [near]);
+    let misplaced = "<string>:2: <inertial>: misplaced element <inertial> in <visual>";
+    assert_eq!(world("1.6", physics, "<inertial/>"), [misplaced]);
 }

@@ -82,6 +82,21 @@ impl Mechanics {
         Ok(())
     }
 
+    /// Returns armature and coefficients of damping as seen at the driven joint or tendon, multiplied by gear².
+    pub(super) fn at_joint(&self) -> [f64; 4] {
+        let [gear, ..] = self.gear;
+        let [d0, d1, d2] = self.damping;
+        [self.armature, d0, d1, d2].map(|x| if x == 0.0 { 0.0 } else { gear * gear * x })
+    }
+
+    /// Checks that armature and damping are finite at the driven joint or tendon.
+    pub(super) fn check(&self, e: &Element) -> Result<(), Error> {
+        match self.at_joint().iter().all(|x| x.is_finite()) {
+            true => Ok(()),
+            false => Err(e.wrong(format!("gear {:e}: gear² times armature or damping is not finite", self.gear[0]))),
+        }
+    }
+
     /// Sets the torque limit that follows from the parameters of a DC motor.
     fn saturate(&mut self, e: &Element, law: &Law) -> Result<(), Error> {
         if let Some(torque) = law.saturation(&Attributes::plain(e))? {

@@ -28,15 +28,18 @@ pub(super) struct Assets<'a> {
 }
 
 impl<'a> Assets<'a> {
-    /// Finds the assets of a file. An asset without a name has its file's name, without folder and extension.
-    pub(super) fn read(root: &'a Element) -> Self {
+    /// Finds the assets of a file. One without a name has the name of its file, without folder and extension.
+    pub(super) fn read(root: &'a Element) -> Result<Self, Error> {
+        let all = |tag: &'static str| root.all("asset").flat_map(move |section| section.all(tag));
+        for tag in ["mesh", "hfield"] {
+            super::names(all(tag))?;
+        }
         let of = |tag: &'static str| {
-            let all = root.all("asset").flat_map(move |section| section.all(tag));
-            all.filter_map(|e| {
+            all(tag).filter_map(|e| {
                 Some((e.attribute("name").map(str::to_owned).or_else(|| stem(e.attribute("file")?))?, e))
             })
         };
-        Self { meshes: of("mesh").collect(), fields: of("hfield").collect() }
+        Ok(Self { meshes: of("mesh").collect(), fields: of("hfield").collect() })
     }
 
     /// Returns the `<mesh>` that a geom names, if it names one.
@@ -48,7 +51,7 @@ impl<'a> Assets<'a> {
     pub(super) fn field(&self, a: &Attributes) -> Result<Option<[f64; 3]>, Error> {
         let Some(field) = Self::find(&self.fields, a, "hfield")? else { return Ok(None) };
         let size = Attributes::plain(field).array("size")?;
-        let [x, y, height, base]: [f64; 4] = size.ok_or_else(|| field.wrong("has no size"))?;
+        let [x, y, height, base]: [f64; 4] = size.ok_or_else(|| field.lacks("size"))?;
         Ok(Some([x, y, 0.25 * height + 0.5 * base]))
     }
 

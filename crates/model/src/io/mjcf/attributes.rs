@@ -6,9 +6,14 @@ use crate::io::xml::{self, Element};
 use crate::names::{near, nearest};
 use condyle_spatial::Vec3;
 use std::collections::HashMap;
+use std::rc::Rc;
+
+/// Attributes of one kind of element in a class. Each has one or more texts: a text replaces only the first numbers of
+/// the texts before it, if it has fewer.
+type Inherited<'a> = HashMap<&'a str, Rc<[&'a str]>>;
 
 /// Attributes of a class, by kind of element.
-type Class<'a> = HashMap<&'a str, HashMap<&'a str, &'a str>>;
+type Class<'a> = HashMap<&'a str, Inherited<'a>>;
 
 /// Maximum number of attributes of all classes together, including inherited ones.
 const MAX_INHERITED: usize = 1 << 20;
@@ -44,9 +49,16 @@ impl<'a> Defaults<'a> {
             if ORIENTATIONS.iter().any(|name| kind.attribute(name).is_some()) {
                 inherited.retain(|name, _| !ORIENTATIONS.contains(name)); // the last one counts
             }
-            inherited.extend(kind.attributes.iter().map(|(name, value)| (&**name, &**value)));
+            for (name, value) in &kind.attributes {
+                let count = value.split_whitespace().count();
+                let before = inherited.get(&**name).into_iter().flat_map(|texts| texts.iter().copied());
+                let longer = before.filter(|text| text.split_whitespace().nth(count).is_some());
+                let texts = longer.chain([&**value]).collect();
+                inherited.insert(name, texts);
+            }
         }
-        self.size += class.values().map(|attributes| 1 + attributes.len()).sum::<usize>();
+        let size = |inherited: &Inherited| 1 + inherited.values().map(|texts| texts.len()).sum::<usize>();
+        self.size += class.values().map(size).sum::<usize>();
         if self.size > MAX_INHERITED {
             let what = "attributes of default classes so far, what they inherit included";
             return Err(element.wrong(format!("{} {what}: at most {MAX_INHERITED} are allowed", self.size)));
@@ -55,7 +67,7 @@ impl<'a> Defaults<'a> {
             return Err(element.wrong(format!("there are two classes `{name}`")));
         }
         for inner in element.all("default") {
-            let name = inner.attribute("class").ok_or_else(|| inner.wrong("has no class"))?;
+            let name = inner.attribute("class").ok_or_else(|| inner.lacks("class"))?;
             self.add(inner, name, class.clone())?;
         }
         Ok(())
@@ -93,7 +105,7 @@ impl<'a> Defaults<'a> {
 /// Attributes of an element; an attribute that the element lacks is taken from its class.
 pub(super) struct Attributes<'a> {
     pub(super) element: &'a Element,
-    class: Option<&'a HashMap<&'a str, &'a str>>,
+    class: Option<&'a Inherited<'a>>,
 }
 
 impl<'a> Attributes<'a> {
@@ -103,14 +115,13 @@ impl<'a> Attributes<'a> {
     }
 
     pub(super) fn get(&self, name: &str) -> Option<&'a str> {
-        self.element.attribute(name).or_else(|| self.class?.get(name).copied())
+        self.element.attribute(name).or_else(|| self.class?.get(name)?.last().copied())
     }
 
-    /// Returns the texts of an attribute, the class's text first: an element may replace only the first numbers of a
-    /// list.
+    /// Returns the texts of an attribute, the texts of the class first: each may replace only the first numbers of a list.
     pub(super) fn layers(&self, name: &str) -> impl Iterator<Item = &'a str> + use<'a> {
-        let class = self.class.and_then(|class| class.get(name).copied());
-        class.into_iter().chain(self.element.attribute(name))
+        let class = self.class.and_then(|class| class.get(name));
+        class.into_iter().flat_map(|texts| texts.iter().copied()).chain(self.element.attribute(name))
     }
 
     /// Converts the value of an attribute with `f`; `None` if the attribute is missing.

@@ -59,12 +59,7 @@ pub(super) fn add(
         return Ok(warnings);
     }
     let places = Places::new(builder, poses);
-    let mut names = HashSet::new();
-    for name in elements.iter().filter_map(|e| e.attribute("name")) {
-        if !names.insert(name.to_owned()) {
-            return Err(root.wrong(format!("two elements of <equality> are named `{name}`")));
-        }
-    }
+    let mut names: HashSet<String> = super::names(elements.iter().copied())?.into_keys().map(str::to_owned).collect();
     let mut counts = HashMap::new();
     for e in elements {
         let a = sources[e.source].defaults.of_kind(e, "equality", MAIN)?;
@@ -94,7 +89,7 @@ pub(super) fn add(
                     Ok::<_, Error>(named.transpose()?.map(|j| (j, BodyId(joints.all[j].body), joints.all[j].reference)))
                 };
                 let (follower, leader) = (joint("joint1")?, joint("joint2")?);
-                let Some((index, follower, y0)) = follower else { return Err(e.wrong("has no joint1")) };
+                let Some((index, follower, y0)) = follower else { return Err(e.lacks("joint1")) };
                 if leader.is_some_and(|(leader, ..)| leader == index) {
                     return Err(e.wrong("joint1 and joint2 are the same"));
                 }
@@ -179,7 +174,7 @@ fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     let [W1, W2] = [places.drawn((b1, X1)), places.drawn((b2, X2))];
     if e.tag == "connect" {
         // the anchor is a point of body1, and the point of body2 that coincides with it in the initial configuration
-        let anchor = point(anchor.ok_or_else(|| e.wrong("has no anchor"))?);
+        let anchor = point(anchor.ok_or_else(|| e.lacks("anchor"))?);
         return Ok(([(b1, X1 * anchor), (b2, X2 * (W2.inverse() * W1 * anchor))], rigid));
     }
     // the anchor is a point of body2

@@ -53,7 +53,7 @@ fn part(attach: &Element) -> Option<(&'static str, &str)> {
 fn models(files: &mut Files, root: &Element, folder: Option<&Path>) -> Result<Vec<(String, usize)>, Error> {
     let mut models = Vec::new();
     for asset in root.all("asset").flat_map(|section| section.all("model")) {
-        let file = asset.attribute("file").ok_or_else(|| asset.wrong("has no file"))?;
+        let file = asset.attribute("file").ok_or_else(|| asset.lacks("file"))?;
         let Some(folder) = folder else {
             return Err(asset.wrong(format!("a string has no folder to find `{file}` in")));
         };
@@ -135,7 +135,7 @@ impl Expansion<'_> {
             return Err(child.wrong("cannot be in a <replicate>"));
         }
         let a = Attributes::plain(element);
-        let count = a.number("count")?.ok_or_else(|| element.wrong("has no count"))?;
+        let count = a.number("count")?.ok_or_else(|| element.lacks("count"))?;
         if count.fract() != 0.0 {
             return Err(element.wrong(format!("count: {count} is no whole number")));
         }
@@ -188,7 +188,7 @@ impl Expansion<'_> {
         if self.files.attachments > MAX_ATTACHMENTS {
             return Err(element.wrong(format!("there are more than {MAX_ATTACHMENTS} <attach> elements")));
         }
-        let prefix = element.attribute("prefix").ok_or_else(|| element.wrong("has no prefix"))?;
+        let prefix = element.attribute("prefix").ok_or_else(|| element.lacks("prefix"))?;
         if element.attribute("body").is_some() && element.attribute("frame").is_some() {
             return Err(element.wrong("has both body and frame"));
         }

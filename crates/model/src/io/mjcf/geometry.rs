@@ -62,7 +62,7 @@ fn central(I: Inertia<f64>) -> (Vec3<f64>, Sym3<f64>) {
 
 /// Returns the inertia of an `<inertial>` in the body's frame, and the pose of its principal axes.
 pub(super) fn inertial(compiler: &Compiler, a: &Attributes) -> Result<(Inertia<f64>, Se3<f64>), Error> {
-    let needed = |name: &str| a.element.wrong(format!("has no {name}"));
+    let needed = |name: &str| a.element.lacks(name);
     a.get("pos").ok_or_else(|| needed("pos"))?;
     let mass = a.number("mass")?.ok_or_else(|| needed("mass"))?;
     let full = a.array::<6>("fullinertia")?;

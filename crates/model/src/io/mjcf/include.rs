@@ -1,6 +1,7 @@
 //! Files in files: included ones, and attached ones with their own settings.
 
 use super::expand;
+use super::keywords;
 use super::sections::Sections;
 use crate::error::Error;
 use crate::io::known::{Known, LeftOut};
@@ -77,10 +78,17 @@ impl Files {
         let seen = self.open.last().cloned().into_iter().collect();
         Includes { top: folder, seen, amount: &mut self.amount, warnings: &mut self.warnings }
             .resolve(&mut root, folder, 1)?;
+        if root.tag == "robot" {
+            return Err(root.wrong(match self.files.is_empty() {
+                true => "is a URDF: `from_urdf` reads it",
+                false => "is a URDF, which cannot be attached here (MuJoCo can): save it as an MJCF first",
+            }));
+        }
         if root.tag != "mujoco" {
             return Err(root.wrong("the root element of an MJCF is <mujoco>"));
         }
         self.known.check(&root, LEFT_OUT, &mut self.warnings);
+        keywords::check(&root)?;
         let index = self.files.len();
         belongs_to(&mut root, index);
         self.files.push(None);
@@ -91,9 +99,14 @@ impl Files {
     }
 }
 
-/// Marks an element and its content as part of the file with index `source`.
+/// Attributes whose values may be empty.
+const EMPTY: [&str; 8] = ["class", "childclass", "prefix", "sep", "file", "assetdir", "meshdir", "texturedir"];
+
+/// Marks an element and its content as part of the file with index `source`. Removes numbers and names that are empty:
+/// in MuJoCo they do not override a default.
 fn belongs_to(element: &mut Element, source: usize) {
     element.source = source;
+    element.attributes.retain(|(name, value)| !value.trim().is_empty() || EMPTY.contains(&&**name));
     for child in &mut element.children {
         belongs_to(child, source);
     }
@@ -123,7 +136,7 @@ impl Includes<'_> {
                 element.children.push(child);
                 continue;
             }
-            let file = child.attribute("file").ok_or_else(|| child.wrong("has no file"))?;
+            let file = child.attribute("file").ok_or_else(|| child.lacks("file"))?;
             let (Some(top), Some(folder)) = (self.top, folder) else {
                 return Err(child.wrong(format!("a string has no folder to find `{file}` in")));
             };

@@ -32,10 +32,7 @@ pub(super) fn add(
         let what = format!("{} keyframes of {numbers} numbers: at most {MAX_NUMBERS} are allowed", keys.len());
         return Err(root.wrong(what));
     }
-    let mut names: HashSet<String> = keys.iter().filter_map(|e| own(e)).map(str::to_owned).collect();
-    if names.len() < keys.iter().filter_map(|e| own(e)).count() {
-        return Err(root.wrong("two keyframes have the same name"));
-    }
+    let mut names: HashSet<String> = super::names(keys.iter().copied())?.into_keys().map(str::to_owned).collect();
     let drawn: Vec<f64> = joints.all.iter().flat_map(|joint| joint.drawn()).collect();
     for (index, e) in keys.into_iter().enumerate() {
         let mut name = own(e).map_or_else(|| format!("key{index}"), str::to_owned);

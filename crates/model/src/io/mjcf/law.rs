@@ -27,6 +27,15 @@ pub(super) const KINDS: [&str; 13] = [
     "plugin",
 ];
 
+/// Features of a DC motor that a model cannot represent, and the effect of their absence.
+const EXTRAS: [(&str, &str); 5] = [
+    ("inductance", "inductance: its current follows the voltage at once"),
+    ("thermal", "thermal: its resistance does not change with the temperature"),
+    ("controller", "controller: the control is a voltage, not a setpoint"),
+    ("lugre", "lugre: it has no friction by the LuGre law"),
+    ("cogging", "cogging: it has no cogging torque"),
+];
+
 /// Law of an actuator with length l and activation a, which follows the control u:
 ///
 /// ```text
@@ -45,7 +54,7 @@ pub(super) struct Law<'a> {
     pub(super) inherit: f64,
     /// Selected inputs of a kind that has several.
     pub(super) input: Option<&'a str>,
-    /// Name of a feature of a DC motor that a model cannot represent.
+    /// Feature of a DC motor that a model cannot represent, and the effect of its absence.
     pub(super) extra: &'static str,
 }
 
@@ -262,9 +271,9 @@ impl<'a> Law<'a> {
             return Err(a.element.wrong(format!("motor constant {K} or resistance {R} is not positive")));
         }
         (self.gainprm[0], self.gainprm[1]) = (R, K);
-        for name in ["inductance", "thermal", "controller", "lugre", "cogging"] {
+        for (name, what) in EXTRAS {
             if a.get(name).is_some() {
-                self.extra = name;
+                self.extra = what;
             }
         }
         (self.dynamics, self.gain, self.bias) = ("none", "dcmotor", "dcmotor");

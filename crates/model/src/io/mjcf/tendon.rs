@@ -42,14 +42,12 @@ pub(super) struct Tendons<'a> {
 impl<'a> Tendons<'a> {
     pub(super) fn read(root: &'a Element, sources: &'a [Source<'a>], joints: &Joints) -> Result<Self, Error> {
         let mut tendons = Self::default();
-        for e in root.all("tendon").flat_map(|section| &section.children) {
-            if !matches!(&*e.tag, "fixed" | "spatial") {
-                continue; // the table of known elements reports it
-            }
-            let taken = e.attribute("name").and_then(|name| tendons.named.insert(name, tendons.all.len()));
-            if taken.is_some() {
-                return Err(e.wrong("the name is taken by another tendon"));
-            }
+        // the table of known elements reports others
+        let elements = root.all("tendon").flat_map(|section| &section.children);
+        let elements: Vec<_> = elements.filter(|e| matches!(&*e.tag, "fixed" | "spatial")).collect();
+        super::names(elements.iter().copied())?;
+        for e in elements {
+            tendons.named.extend(e.attribute("name").map(|name| (name, tendons.all.len())));
             tendons.all.push(Tendon::read(e, sources, joints)?);
         }
         Ok(tendons)
@@ -64,9 +62,9 @@ impl<'a> Tendon<'a> {
         let number = |name: &str| a.number(name).map(|x| x.unwrap_or(0.0));
         let mut over = Vec::new();
         for inside in e.all("joint").filter(|_| e.tag == "fixed") {
-            let name = inside.attribute("joint").ok_or_else(|| inside.wrong("has no joint"))?;
+            let name = inside.attribute("joint").ok_or_else(|| inside.lacks("joint"))?;
             let joint = joints.scalar(inside, "joint", name)?;
-            let coefficient = Attributes::plain(inside).number("coef")?.ok_or_else(|| inside.wrong("has no coef"))?;
+            let coefficient = Attributes::plain(inside).number("coef")?.ok_or_else(|| inside.lacks("coef"))?;
             over.push((joint, coefficient));
         }
         let mut sorted: Vec<usize> = over.iter().map(|(joint, _)| *joint).collect();

@@ -15,7 +15,7 @@ use crate::joint::Joint;
 use crate::model::Model;
 use crate::warning::Warning;
 use condyle_spatial::Vec3;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 /// Maximum number of joints of the tendons of all actuators together.
 const MAX_DRIVEN: usize = 1 << 20;
@@ -61,18 +61,17 @@ impl<'a> Drives<'a> {
         tendons: &Tendons,
         on: &Switches,
     ) -> Result<Self, Error> {
-        let (mut all, mut names) = (Vec::new(), HashSet::new());
+        let mut all = Vec::new();
         let elements = || root.all("actuator").flat_map(|section| &section.children);
         if elements().next().is_none() {
             return Ok(Self { all });
         }
         let classes = sources.iter().map(|source| Classes::read(source.root)).collect::<Result<Vec<_>, _>>()?;
         let mut driven = 0;
+        super::names(elements().filter(|e| KINDS.contains(&&*e.tag)))?;
         for e in elements().filter(|e| KINDS.contains(&&*e.tag)) {
-            if e.attribute("name").is_some_and(|name| !names.insert(name)) {
-                return Err(e.wrong("the name is taken by another actuator"));
-            }
             let (mechanics, law) = classes[e.source].of(e)?;
+            mechanics.check(e)?;
             let autolimits = sources[e.source].compiler.autolimits;
             let target = target(e, joints, tendons)?;
             if let Target::Tendon(t) = target {
@@ -113,8 +112,7 @@ impl<'a> Drives<'a> {
         on: &Switches,
     ) {
         for Drive { mechanics, target, .. } in &self.all {
-            let gear = mechanics.gear[0] * mechanics.gear[0];
-            let (armature, damping) = (gear * mechanics.armature, mechanics.damping.map(|d| gear * d));
+            let [armature, damping @ ..] = mechanics.at_joint();
             match *target {
                 Target::Joint(j) => {
                     let joint = &mut joints.all[j];

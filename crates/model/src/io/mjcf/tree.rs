@@ -156,9 +156,14 @@ impl<'a> Reader<'a> {
             builder.merge(body, bXl, inertia);
         }
         let compensated = Attributes::plain(w.element).number("gravcomp")?.unwrap_or(0.0);
-        match count {
-            0 => builder.compensate_gravity_of_part(body, bXl, inertia, compensated),
-            _ => builder.compensate_gravity(body, compensated),
+        if compensated < 0.0 && !self.compensates {
+            let what = "gravcomp: below 0, it acts in MuJoCo only if that of another body is above 0";
+            self.warnings.push(w.element.left_out(what));
+        } else {
+            match count {
+                0 => builder.compensate_gravity_of_part(body, bXl, inertia, compensated),
+                _ => builder.compensate_gravity(body, compensated),
+            }
         }
         if !parts.joints.iter().any(|(a, _)| is_free(a)) {
             builder.frame_of_kind(&name, FrameKind::Link, body, bXl);
@@ -167,7 +172,7 @@ impl<'a> Reader<'a> {
         Ok((parts, body, bXl))
     }
 
-    /// Adds the named sites of a body, and stores its named frames and cameras for later.
+    /// Adds the named sites of a body, and stores its named frames and cameras for later. Checks the names of its geoms.
     fn frames(
         &mut self,
         builder: &mut ModelBuilder,
@@ -176,6 +181,9 @@ impl<'a> Reader<'a> {
         bXl: Se3<f64>,
     ) -> Result<(), Error> {
         let has_name = |a: &Attributes| a.element.attribute("name").is_some_and(|name| !name.is_empty());
+        for (a, _) in parts.geoms.iter().filter(|(a, _)| has_name(a)) {
+            self.name("geom", a.element, "")?;
+        }
         for (a, X) in parts.sites.iter().filter(|(a, _)| has_name(a)) {
             let name = self.name("site", a.element, "")?;
             let own = match from_to(a, a.get("type").unwrap_or("sphere"))? {
@@ -233,7 +241,13 @@ impl<'a> Reader<'a> {
         let (sum, axes) = match (Weight::sum(&weights), parts.inertial) {
             (Some(sum), _) => sum,
             (None, Some((e, X))) => {
-                let (inertia, axes) = geometry::inertial(self.compiler(e), &Attributes::plain(e))?;
+                let a = Attributes::plain(e);
+                let (inertia, axes) = geometry::inertial(self.compiler(e), &a)?;
+                if a.get("diaginertia").or(a.get("fullinertia")).is_none() {
+                    let what =
+                        "has neither diaginertia nor fullinertia: 0 kg m², which MuJoCo refuses in a moving body";
+                    self.warnings.push(e.assumed(what));
+                }
                 (X.act(inertia), X * axes)
             }
             (None, None) => (Inertia::zero(), Se3::identity()),
@@ -297,6 +311,16 @@ impl<'a> Reader<'a> {
             }
         }
     }
+}
+
+/// Returns whether the weight of a body in an element is compensated.
+pub(super) fn compensates(element: &Element) -> Result<bool, Error> {
+    for child in element.children.iter().filter(|child| matches!(&*child.tag, "body" | "frame")) {
+        if Attributes::plain(child).number("gravcomp")?.is_some_and(|x| x > 0.0) || compensates(child)? {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// Returns whether a joint is a free joint.

@@ -1,13 +1,13 @@
 //! Files of an SDF. Includes are replaced by their models, converted to one version, and unknown names are reported.
 
 use super::convert::convert;
-use super::schema::{KNOWN, LEFT_OUT};
+use super::schema::{HEAVY, KNOWN, LEFT_OUT};
 use super::scopes::MERGED;
 use super::tidy::tidy;
 use super::values::{attribute, flag, text};
 use crate::error::Error;
 use crate::io::files::{Search, find_model};
-use crate::io::known::Known;
+use crate::io::known::{Known, OPEN};
 use crate::io::xml::{Amount, Element, MAX_DEPTH};
 use crate::warning::Warning;
 use std::path::{Path, PathBuf};
@@ -58,9 +58,28 @@ impl<'o> Includes<'o> {
     fn expand(&mut self, mut root: Element, folder: Option<&Path>, level: usize) -> Result<Element, Error> {
         convert(&mut root)?;
         self.known.check(&root, LEFT_OUT, &mut self.warnings);
+        self.check_collisions(&root);
         tidy(&mut root, &mut self.warnings);
         self.children(&mut root, folder, level)?;
         Ok(root)
+    }
+
+    /// Adds warnings about unknown names in the collisions of all links inside an element. They have an effect only if
+    /// the inertia is computed from the collisions.
+    fn check_collisions(&mut self, element: &Element) {
+        for child in &element.children {
+            match &*child.tag {
+                "world" | "model" => self.check_collisions(child),
+                "link" => {
+                    let is_auto = |inertial: &Element| attribute(child, inertial, "auto").unwrap_or_default();
+                    let kind = if child.child("inertial").is_some_and(is_auto) { HEAVY } else { OPEN };
+                    for collision in child.all("collision") {
+                        self.known.check_as(kind, collision, LEFT_OUT, &mut self.warnings);
+                    }
+                }
+                _ => {}
+            }
+        }
     }
 
     /// Replaces the includes inside an element at depth `level` by the included models.
@@ -104,7 +123,7 @@ impl<'o> Includes<'o> {
         if self.count > MAX_INCLUDES {
             return Err(wrong(format!("{} files are included, at most {MAX_INCLUDES} are allowed", self.count)));
         }
-        let uri = text(include, "uri").ok_or_else(|| wrong("has no uri".to_owned()))?;
+        let uri = text(include, "uri").ok_or_else(|| wrong(include.missing("uri")))?;
         let found = find_model(uri, &Search { folder, packages: self.packages });
         let found = found.map_err(|e| Fault::Missing(e.to_string()))?;
         let path = if found.is_dir() { self.model_of(&found)? } else { found };

@@ -42,8 +42,14 @@ impl<'a> Axes<'a> {
         warnings: &mut Vec<Warning>,
     ) -> Result<(), Error> {
         if !mimic {
-            let what = "a joint that follows another one is left free unless `mimic` is asked for";
-            warnings.extend(self.followers.iter().map(|&(item, ..)| scopes.items[item].element.mimic(what)));
+            for &(item, mimic, _) in &self.followers {
+                let leader = mimic.attribute("joint").unwrap_or_default();
+                let what = match scopes.joint(item, leader) {
+                    Some(_) => "a joint that follows another one is left free unless `mimic` is asked for".to_owned(),
+                    None => format!("has a <mimic>, but {}: it is free", scopes.no_joint(item, leader)),
+                };
+                warnings.push(scopes.items[item].element.mimic(what));
+            }
             return Ok(());
         }
         builder.check_size()?; // before chains of followers are traversed
@@ -54,7 +60,11 @@ impl<'a> Axes<'a> {
             let tag = if axis == Some("axis2") { "axis2" } else { "axis" };
             let leader = scopes.joint(item, name).and_then(|leader| self.body(leader, tag));
             let Some(leader) = leader else {
-                return Err(joint.wrong(format!("mimic: no joint with an <{tag}> that moves is named `{name}`")));
+                let why = match scopes.joint(item, name) {
+                    Some(_) => format!("joint `{name}` has no <{tag}> that moves"),
+                    None => scopes.no_joint(item, name),
+                };
+                return Err(joint.wrong(format!("mimic: {why}")));
             };
             let read = |tag, otherwise| match mimic.attribute(tag).filter(|_| mimic.tag == DRAKE) {
                 Some(text) => bound(text).map_err(|what| joint.wrong_inside(mimic, format!("{tag}: {what}"))),

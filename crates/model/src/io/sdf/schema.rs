@@ -5,24 +5,40 @@ use crate::io::known::LeftOut;
 
 /// Known elements and attributes, by parent; see [`Known`](crate::io::known::Known).
 pub(super) const KNOWN: &str = "
-sdf: version ; world model include actor* light*
-world: name ; model include joint frame gravity magnetic_field* physics* scene* light* gui* actor* plugin* state* model_state* \
-  population* wind* atmosphere* spherical_coordinates* road* audio*
+sdf: version ; world model include actor** light*
+world: name ; model include joint frame gravity magnetic_field* physics scene* light* gui** actor** plugin** state** model_state** \
+  population** wind* atmosphere* spherical_coordinates* road* audio*
+*: ; world model include link joint inertial mass inertia axis axis2 limit dynamics mimic drake:joint drake:mimic \
+  drake:rotor_inertia drake:gear_ratio
+physics: name default type update_rate ; dt gravity max_step_size real_time_factor real_time_update_rate update_rate max_contacts \
+  magnetic_field* ode* bullet* simbody* dart*
 model: name canonical_link placement_frame namespace ; static self_collide allow_auto_disable enable_wind pose link joint frame \
-  model include plugin* gripper* model_state*
-include: merge ; uri pose name namespace static placement_frame plugin* model_state*
-link: name ; gravity enable_wind self_collide kinematic must_be_base_link velocity_decay pose inertial collision* visual* sensor* \
-  projector* audio_sink* audio_source* battery* light* particle_emitter*
+  model include plugin** gripper* model_state** drake:joint** drake:linear_bushing_rpy** drake:linear_spring_damper** \
+  drake:ball_constraint** drake:distance_constraint** drake:tendon_constraint** drake:collision_filter_group**
+include: merge ; uri pose name namespace static placement_frame plugin** model_state**
+link: name ; gravity enable_wind self_collide kinematic must_be_base_link velocity_decay pose inertial collision** visual* sensor* \
+  projector* audio_sink* audio_source* battery* light* particle_emitter* drake:visual* drake:deformable_properties** \
+  drake:surface_velocity_axis*
 velocity_decay: ; linear angular
 pose: relative_to rotation_format degrees
-inertial: auto ; mass density pose inertia fluid_added_mass* auto_inertia_params*
+inertial: auto ; mass density pose inertia fluid_added_mass* auto_inertia_params**
 inertia: ; ixx ixy ixz iyy iyz izz
+heavy_collision: name ; pose density geometry surface* laser_retro max_contacts auto_inertia_params** drake:proximity_properties*
+geometry: ; box sphere ellipsoid cylinder cone capsule empty mesh* plane* heightmap* image* polyline* drake:capsule* \
+  drake:ellipsoid*
+box: ; size
+sphere: ; radius
+ellipsoid: ; radii
+cylinder: ; radius length
+cone: ; radius length
+capsule: ; radius length
 joint: name type ; parent child pose axis axis2=axis gearbox_ratio gearbox_reference_body thread_pitch screw_thread_pitch \
-  physics=joint_physics sensor*
+  physics=joint_physics sensor* drake:rotor_inertia drake:gear_ratio drake:mimic drake:controller_gains*
+drake:mimic: joint multiplier offset
 axis: ; xyz dynamics limit mimic initial_position
 xyz: expressed_in
 dynamics: ; damping friction spring_reference spring_stiffness
-limit: ; lower upper effort velocity stiffness dissipation
+limit: ; lower upper effort velocity stiffness dissipation drake:acceleration
 mimic: joint axis ; multiplier offset reference
 joint_physics: ; simbody* ode=joint_ode provide_feedback
 joint_ode: ; provide_feedback cfm_damping implicit_spring_damper fudge_factor cfm erp bounce max_force velocity \
@@ -30,6 +46,9 @@ joint_ode: ; provide_feedback cfm_damping implicit_spring_damper fudge_factor cf
 joint_softness: ; cfm erp
 frame: name attached_to ; pose
 ";
+
+/// Type of a collision that gives its link mass.
+pub(super) const HEAVY: &str = "heavy_collision";
 
 /// Features of SDF that a model cannot represent.
 pub(super) const LEFT_OUT: &LeftOut = &[

@@ -132,7 +132,7 @@ impl<'a> Scopes<'a> {
 
     /// Adds an item.
     fn insert(&mut self, element: &'a Element, scope: usize) -> Result<usize, Error> {
-        let name = element.attribute("name").filter(|n| !n.is_empty()).ok_or_else(|| element.wrong("has no name"))?;
+        let name = element.attribute("name").filter(|n| !n.is_empty()).ok_or_else(|| element.lacks("name"))?;
         if [WORLD_LINK, MODEL].contains(&name) {
             return Err(element.wrong("the name belongs to SDF"));
         }
@@ -207,6 +207,11 @@ impl<'a> Scopes<'a> {
         self.joints.get(&format!("{}{name}", self.scopes[self.items[beside].scope].prefix)).copied()
     }
 
+    /// Returns the message that no joint has a name in the scope of an item.
+    pub(super) fn no_joint(&self, beside: usize, name: &str) -> String {
+        format!("no joint is named `{name}`{}", self.near(self.items[beside].scope, name, "joint"))
+    }
+
     pub(super) fn find_in(&self, scope: usize, name: &str) -> Option<Place> {
         match name {
             WORLD_LINK => return Some(None),
@@ -238,7 +243,7 @@ impl<'a> Scopes<'a> {
     /// Returns the link to which a joint's parent or child refers, possibly through frames; `None` is the world.
     pub(super) fn link(&mut self, joint: usize, tag: &str) -> Result<Place, Error> {
         let Item { element, scope, .. } = self.items[joint];
-        let name = text(element, tag).ok_or_else(|| element.wrong(format!("has no {tag}")))?;
+        let name = text(element, tag).ok_or_else(|| element.lacks(tag))?;
         match self.find_in(scope, name) {
             Some(at) => self.attached(at, element),
             None => Err(element.wrong(format!("no link is named `{name}`{}", self.near(scope, name, "link")))),

@@ -42,12 +42,17 @@ fn is_equal(a: &Element, b: &Element) -> bool {
 
 /// Returns the child with a tag; an error if it is missing.
 pub(super) fn needed<'a>(of: &'a Element, tag: &str) -> Result<&'a Element, Error> {
-    of.child(tag).ok_or_else(|| of.wrong(format!("has no <{tag}>")))
+    of.child(tag).ok_or_else(|| of.lacks(tag))
 }
 
 /// Returns the text of an attribute; an error if it is missing.
 pub(super) fn text<'a>(of: &Element, inside: &'a Element, name: &str) -> Result<&'a str, Error> {
-    inside.attribute(name).ok_or_else(|| of.wrong_inside(inside, format!("{} has no {name}", inside.tag)))
+    inside.attribute(name).ok_or_else(|| lacks(of, inside, name))
+}
+
+/// Returns the error that an attribute is missing.
+pub(super) fn lacks(of: &Element, inside: &Element, name: &str) -> Error {
+    of.wrong_inside(inside, format!("{} {}", inside.tag, inside.missing(name)))
 }
 
 /// Converts the value of an attribute with `f`; `None` if the attribute is missing. Errors name the attribute and its

@@ -1,6 +1,6 @@
 //! Joints of a URDF: kinds, axes, limits, losses.
 
-use super::elements::{array, read, text, vector};
+use super::elements::{array, lacks, read, text, vector};
 use crate::body::JointOptions;
 use crate::error::Error;
 use crate::io::xml::{self, Element};
@@ -10,6 +10,8 @@ use condyle_spatial::{Mat3, Vec3};
 
 /// A moving joint, and the rotation of its frame in its link's frame.
 pub(super) struct Moving {
+    /// First joint of a universal joint.
+    pub(super) first: Option<Joint>,
     pub(super) joint: Joint,
     /// Rotation R_lj of a planar joint, whose z axis is the joint's axis. Other joints use the link's frame.
     pub(super) rotation: Option<Mat3<f64>>,
@@ -18,11 +20,11 @@ pub(super) struct Moving {
 /// Returns the joint; `None` if it is fixed.
 pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Option<Moving>, Error> {
     let axis = || match joint.child("axis") {
-        Some(axis) => vector(joint, axis, "xyz")?.ok_or_else(|| joint.wrong_inside(axis, "axis has no xyz")),
+        Some(axis) => vector(joint, axis, "xyz")?.ok_or_else(|| lacks(joint, axis, "xyz")),
         None => Ok(Vec3::new(1.0, 0.0, 0.0)),
     };
     let is_drakes = joint.tag != "joint";
-    let mut rotation = None;
+    let (mut first, mut rotation) = (None, None);
     let kind = match text(joint, joint, "type")? {
         "fixed" if !is_drakes => return Ok(None),
         "revolute" if !is_drakes => Joint::Revolute { axis: axis()? },
@@ -31,9 +33,17 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
         "spherical" if !is_drakes => Joint::Spherical,
         "floating" if !is_drakes => Joint::FreeFlyer,
         "ball" if is_drakes => Joint::Spherical,
+        "universal" if is_drakes => {
+            if let Some(axis) = joint.child("axis") {
+                warnings.push(joint.left_out_inside(axis, "it turns about x and y of its frame, as in Drake"));
+            }
+            first = Some(Joint::Revolute { axis: Vec3::new(1.0, 0.0, 0.0) });
+            Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) }
+        }
         "screw" if is_drakes => {
-            let screw = joint.child("drake:screw_thread_pitch").ok_or_else(|| joint.wrong("has no thread pitch"))?;
-            let [turn] = array(joint, screw, "value")?.ok_or_else(|| joint.wrong_inside(screw, "has no value"))?;
+            let screw =
+                joint.child("drake:screw_thread_pitch").ok_or_else(|| joint.lacks("drake:screw_thread_pitch"))?;
+            let [turn] = array(joint, screw, "value")?.ok_or_else(|| lacks(joint, screw, "value"))?;
             Joint::Helical { axis: axis()?, pitch: turn / core::f64::consts::TAU } // m/turn to m/rad
         }
         "planar" => {
@@ -52,12 +62,12 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
         other => {
             let kinds = match is_drakes {
                 false => "revolute, continuous, prismatic, fixed, floating, planar, spherical",
-                true => "ball, planar, screw",
+                true => "ball, planar, screw, universal",
             };
             return Err(joint.wrong(format!("type `{other}` is none of {kinds}")));
         }
     };
-    kind.normalized().map(|joint| Some(Moving { joint, rotation })).map_err(|what| joint.wrong(what))
+    kind.normalized().map(|joint| Some(Moving { first, joint, rotation })).map_err(|what| joint.wrong(what))
 }
 
 /// Returns the shortest rotation that maps z to a unit vector u: I + \[v\]× + \[v\]×² / (1 + u_z), with v = z × u. It
@@ -73,16 +83,25 @@ fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
     Mat3 { x: Vec3::new(1.0 - k * x * x, xy, -x), y: Vec3::new(xy, 1.0 - k * y * y, -y), z: u }
 }
 
-/// Returns the limits and losses of a moving joint.
-pub(super) fn options(joint: &Element, kind: Joint, warnings: &mut Vec<Warning>) -> Result<JointOptions, Error> {
+/// Returns the limits and losses of a moving joint, or of each of its two joints.
+pub(super) fn options(
+    joint: &Element,
+    Moving { first, joint: kind, .. }: &Moving,
+    warnings: &mut Vec<Warning>,
+) -> Result<JointOptions, Error> {
     let (limit, dynamics) = (joint.child("limit"), joint.child("dynamics"));
     let mut options = JointOptions::default();
-    // the numbers of joints with several degrees of freedom have no unit
-    if kind.nv() > 1 {
+    let turns_only = first.is_some() || *kind == Joint::Spherical;
+    if let Some(dynamics) = dynamics.filter(|_| turns_only || kind.nv() == 1) {
+        let number = |name| Ok(array(joint, dynamics, name)?.map_or(0.0, |[x]| x));
+        (options.damping, options.friction) = (number("damping")?, number("friction")?);
+    }
+    // the numbers of joints with several degrees of freedom have no unit, except losses of joints that only turn
+    if first.is_some() || kind.nv() > 1 {
         let has = |inside: &Element| {
             inside.attributes.iter().any(|(_, x)| x.split_whitespace().any(|x| x.parse() != Ok(0.0)))
         };
-        for inside in [limit, dynamics].into_iter().flatten().filter(|inside| has(inside)) {
+        for inside in [limit, dynamics.filter(|_| !turns_only)].into_iter().flatten().filter(|inside| has(inside)) {
             let what = "its numbers have no unit for a joint with several degrees of freedom, and no effect";
             warnings.push(joint.left_out_inside(inside, what));
         }
@@ -94,18 +113,15 @@ pub(super) fn options(joint: &Element, kind: Joint, warnings: &mut Vec<Warning>)
         let [lower, upper, effort, velocity] = ["lower", "upper", "effort", "velocity"].map(number);
         let (lower, upper, effort, velocity) = (lower?.unwrap_or(0.0), upper?.unwrap_or(0.0), effort?, velocity?);
         let mut bound = |name, found: Option<f64>| match found {
-            None if is_limited => {
-                warnings.push(joint.assumed(format!("limit has no {name}: it has no limit")));
-                None
-            }
+            None if is_limited => Err(lacks(joint, limit, name)),
             Some(x) if x < 0.0 => {
                 warnings.push(joint.assumed(format!("limit {name} is {x}, below 0: it has no limit")));
-                None
+                Ok(None)
             }
-            _ => found,
+            _ => Ok(found),
         };
-        let effort = bound("effort", effort);
-        options.velocity = bound("velocity", velocity);
+        let effort = bound("effort", effort)?;
+        options.velocity = bound("velocity", velocity)?;
         options.effort = effort.map(|effort| (-effort, effort));
         if is_limited && lower > upper {
             let what = format!("lower limit {lower} is above upper limit {upper}: its position has no limits");
@@ -119,11 +135,7 @@ pub(super) fn options(joint: &Element, kind: Joint, warnings: &mut Vec<Warning>)
             }
         }
     } else if is_limited {
-        warnings.push(joint.assumed("is revolute or prismatic and has no <limit>: it has no limits"));
-    }
-    if let Some(dynamics) = dynamics {
-        let number = |name| Ok(array(joint, dynamics, name)?.map_or(0.0, |[x]| x));
-        (options.damping, options.friction) = (number("damping")?, number("friction")?);
+        return Err(joint.wrong("is revolute or prismatic and has no <limit>"));
     }
     Ok(options)
 }

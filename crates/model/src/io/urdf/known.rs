@@ -10,11 +10,13 @@ use std::sync::OnceLock;
 
 /// Table of [`Known`].
 const KNOWN: &str = "\
-robot: name version ; link joint drake:joint=joint transmission gazebo* material* sensor* mujoco* ros2_control* frame loop_joint* \
-    collision_filter_group* force_element* cable* bullet* drake:linear_bushing_rpy* drake:linear_spring_damper* drake:ball_constraint* \
-    drake:distance_constraint* drake:tendon_constraint*
+robot: name version ; link joint drake:joint=joint transmission gazebo** material* sensor* mujoco** ros2_control** frame \
+    loop_joint** collision_filter_group* force_element** cable** bullet* drake:collision_filter_group** \
+    drake:linear_bushing_rpy** drake:linear_spring_damper** drake:ball_constraint** drake:distance_constraint** \
+    drake:tendon_constraint**
+*: ; link joint drake:joint transmission inertial mass inertia limit dynamics mimic
 link: name type concave drake_ignore ; inertial visual* collision* sensor* contact verbose* bullet* self_collision_checking* \
-    self_filter* collision_checking* audio_source*
+    self_filter* collision_checking* audio_source* drake:surface_velocity_axis*
 inertial: ; origin mass inertia
 mass: value
 inertia: ixx ixy ixz iyy iyz izz
@@ -22,19 +24,19 @@ contact: ; lateral_friction* rolling_friction* spinning_friction* restitution* s
     friction_anchor* inertia_scaling*
 origin: xyz rpy quat_xyzw
 joint: name type dont_collapse drake_ignore ; origin parent child axis calibration dynamics limit safety_controller mimic \
-    controller_gains* hardwareInterface* drake:screw_thread_pitch*
+    controller_gains* hardwareInterface* drake:screw_thread_pitch=number
 parent: link
 child: link
 axis: xyz
 calibration: reference_position rising falling
 dynamics: damping friction coulomb_window
-limit: lower upper effort velocity acceleration deceleration jerk
+limit: lower upper effort velocity acceleration deceleration jerk drake:acceleration
 safety_controller: soft_lower_limit soft_upper_limit k_position k_velocity
 mimic: joint multiplier offset
 frame: name link xyz rpy
 transmission: name type ; type joint=driven actuator mechanicalReduction=number mechanical_reduction=number \
     gear_ratio=number gearRatio=number rotorInertia=number rotor_inertia=number motorInertia=number motor_inertia=number \
-    leftActuator* rightActuator* flexJoint* rollJoint* gap_joint* passive_joint* use_simulated_gripper_joint* \
+    leftActuator** rightActuator** flexJoint* rollJoint* gap_joint* passive_joint* use_simulated_gripper_joint* \
     simulated_actuated_joint* compensator* motorTorqueConstant robotNamespace hardwareInterface plugin
 driven: name role ; hardwareInterface role offset mechanicalReduction=number mechanical_reduction=number gear_ratio=number \
     gearRatio=number child* saturationLower saturationUpper deadBandUpper deadBandLower ignoreTransmissionAbsoluteEncoder
@@ -108,7 +110,7 @@ fn changed_by_gazebo(entry: &Element) -> Option<Warning> {
         "static" | "kinematic" if is_on => "Gazebo does not move it, in the model it moves",
         "springStiffness" => "Gazebo has a spring at the joint, the model does not",
         "dampingFactor" => "Gazebo damps all motion of the link, the model does not",
-        "joint" | "link" | "model" => "Gazebo adds it to the robot, the model does not have it",
+        "joint" | "link" | "model" | "inertial" => "Gazebo adds it to the robot, the model does not have it",
         _ => return None,
     };
     Some(entry.left_out(what))

@@ -54,7 +54,7 @@ impl<'a> Reader<'a> {
         let mut reader = Self { robot, origins, links, order: Vec::new(), joints, root: "", on_world: None, children };
         for element in robot.children.iter().filter(|c| matches!(&*c.tag, "link" | "joint" | "drake:joint")) {
             let Some(name) = element.attribute("name").filter(|n| !n.is_empty()) else {
-                return Err(element.wrong("has no name"));
+                return Err(element.lacks("name"));
             };
             let other = if element.tag == "link" {
                 reader.links.insert(name, element)
@@ -160,18 +160,31 @@ impl<'a> Reader<'a> {
                     builder.merge(parent, pXl, inertia);
                     (parent, pXl)
                 }
-                Some(Moving { joint, rotation }) => {
-                    let mut options = joints::options(element, joint, &mut warnings)?;
-                    if joint.nv() == 1 {
+                Some(moving) => {
+                    let mut options = joints::options(element, &moving, &mut warnings)?;
+                    let Moving { first, joint, rotation } = moving;
+                    if joint.nv() == 1 && first.is_none() {
                         options.armature = armatures.remove(name).map_or(0.0, |(armature, _)| armature);
                     }
+                    let (parent, pXl) = match first {
+                        None => (parent, pXl),
+                        Some(first) => {
+                            let between = (format!("{link}#1"), format!("{name}#1"));
+                            let names = (&*between.0, &*between.1);
+                            let on = builder.body_with(names, parent, first, pXl, Inertia::zero(), options.clone());
+                            builder.between(on);
+                            (on, Se3::identity())
+                        }
+                    };
                     let (pXb, bXl) = match rotation.map(|rotation| Se3::new(rotation, Vec3::zero())) {
                         None => (pXl, Se3::identity()),
                         Some(lXb) => (pXl * lXb, lXb.inverse()),
                     };
                     let inertia = if rotation.is_some() { bXl.act(inertia) } else { inertia };
                     let body = builder.body_with((link, name), parent, joint, pXb, inertia, options);
-                    bodies.insert(name, body);
+                    if first.is_none() {
+                        bodies.insert(name, body);
+                    }
                     (body, bXl)
                 }
             };
@@ -181,8 +194,11 @@ impl<'a> Reader<'a> {
             wait(&mut waiting, link, body, bXl);
         }
         for (name, (_, transmission)) in armatures {
-            let what = format!("its joint `{name}` has no single degree of freedom: M has no inertia of its rotor");
-            warnings.push(transmission.left_out(what));
+            let what = match self.joints.contains_key(name) {
+                true => format!("its joint `{name}` has no single degree of freedom"),
+                false => self.no_joint(name),
+            };
+            warnings.push(transmission.left_out(format!("{what}: M has no inertia of its rotor")));
         }
         self.add_frames(&mut builder, &links)?;
         self.add_mimics(&mut builder, &bodies, options.mimic, &mut warnings)?;
@@ -221,6 +237,11 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    /// Returns the message that no joint has a name.
+    fn no_joint(&self, name: &str) -> String {
+        format!("no joint is named `{name}`{}", near(&nearest(name, self.order.iter().copied())))
+    }
+
     /// Couples followers to their leaders, or adds warnings that they are free.
     fn add_mimics(
         &self,
@@ -233,13 +254,19 @@ impl<'a> Reader<'a> {
             let joint = self.joints[name].element;
             let (Some(element), Some(&follower)) = (joint.child("mimic"), bodies.get(name)) else { continue };
             let leader = text(joint, element, "joint")?;
+            let is_known = self.joints.contains_key(leader);
             if !mimic {
-                let what = format!("has a <mimic> of joint `{leader}`: it is left free unless `mimic` is asked for");
+                let what = match is_known {
+                    true => format!("has a <mimic> of joint `{leader}`: it is left free unless `mimic` is asked for"),
+                    false => format!("has a <mimic>, but {}: it is free", self.no_joint(leader)),
+                };
                 warnings.push(joint.mimic(what));
                 continue;
             }
             let Some(&leader) = bodies.get(leader) else {
-                return Err(joint.wrong(format!("mimics `{leader}`, which is no moving joint")));
+                let why =
+                    if is_known { "it has no single degree of freedom".to_owned() } else { self.no_joint(leader) };
+                return Err(joint.wrong(format!("mimics `{leader}`: {why}")));
             };
             let number = |name, otherwise| Ok(array(joint, element, name)?.map_or(otherwise, |[x]| x));
             let (ratio, offset) = (number("multiplier", 1.0)?, number("offset", 0.0)?);

@@ -22,7 +22,12 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
         let is_simple = joints.next().is_none() && actuators.next().is_none();
         let inside = [actuator, joint, Some(transmission)];
         let find = |tags: &[&str]| {
-            let mut elements = inside.iter().flatten().flat_map(|of| tags.iter().filter_map(|tag| of.child(tag)));
+            // Drake reads its own elements in an actuator only
+            let counts = |of: &Element, tag: &str| of.tag == "actuator" || !tag.starts_with("drake:");
+            let mut elements = inside
+                .iter()
+                .flatten()
+                .flat_map(|of| tags.iter().filter(|tag| counts(of, tag)).filter_map(|tag| of.child(tag)));
             elements.find_map(|element| Some((element, number(element)?)))
         };
         let (rotor, mut ratio) = (find(&ROTOR), find(&RATIO).map(|(_, n)| n));
@@ -39,15 +44,16 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
                 if element.tag == ROTOR[0] {
                     ratio = Some(find(&RATIO[..1]).map_or(1.0, |(_, n)| n)); // as in Drake
                 }
-                match (ratio, name) {
-                    (Some(n), Some(name)) if inertia >= 0.0 => {
+                let why = match (ratio, name) {
+                    _ if inertia < 0.0 => Some("which is below 0"),
+                    (Some(n), Some(name)) => {
                         found.entry(name).or_insert((0.0, transmission)).0 += n * n * inertia;
                         None
                     }
-                    _ => Some(format!(
-                        "has a rotor inertia of {inertia} kg m², but no reduction or joint: M does not have it"
-                    )),
-                }
+                    (None, _) => Some("but no reduction"),
+                    (_, None) => Some("but no joint"),
+                };
+                why.map(|why| format!("has a rotor inertia of {inertia} kg m², {why}: M does not have it"))
             }
         };
         warnings.extend(left_out.map(|what| transmission.left_out(what)));

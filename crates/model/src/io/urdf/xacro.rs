@@ -12,6 +12,11 @@ use std::time::{Duration, Instant};
 /// Programs that expand xacro, in the order in which they are tried: the first is part of ROS, the second is from PyPI
 /// and needs no ROS.
 const PROGRAMS: [&str; 2] = ["xacro", "xacrodoc"];
+/// Words in a message of `xacro` that it does not find packages without ROS.
+const ROS: [&str; 4] = ["ament_index_python", "rospkg", "PackageNotFoundError", "$(find"];
+/// Advice for a file that refers to packages.
+const ADVICE: &str = "\nThe program `xacro` resolves `$(find …)` by ROS only. `pip install xacrodoc` installs a program \
+    that finds packages in the folders of `packages`.";
 /// Maximum running time of a program; large robots take a few seconds.
 const MAX_TIME: Duration = Duration::from_secs(60);
 /// Maximum length of a program's output (bytes); one more than the limit for a robot's files.
@@ -38,7 +43,11 @@ pub(super) fn expand(path: &Path, arguments: &[(String, String)], packages: &[Pa
         match run(program, path, arguments, packages) {
             Ok(text) => return Ok(text),
             Err(Failure::Missing) => {}
-            Err(Failure::Said(what)) => said = Some(format!("cannot be expanded: {program}: {what}")),
+            Err(Failure::Said(what)) => {
+                let needs_ros = program == PROGRAMS[0] && ROS.iter().any(|name| what.contains(name));
+                let advice = if needs_ros { ADVICE } else { "" };
+                said = Some(format!("cannot be expanded: {program}: {what}{advice}"));
+            }
         }
     }
     let missing = || {
