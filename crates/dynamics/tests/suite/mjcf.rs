@@ -228,7 +228,8 @@ fn errors_name_file_line_and_element() {
         let said = said(&body(inside));
         assert!(said.starts_with(expected), "{said}\n{expected}");
     }
-    assert!(said("<robot/>").starts_with("<string>:1: <robot>: the root element of an MJCF"));
+    assert!(said("<robt/>").starts_with("<string>:1: <robt>: the root element of an MJCF"));
+    assert_eq!(said("<robot/>"), "<string>:1: <robot>: is a URDF: `from_urdf` reads it");
     assert!(said("<mujoco>").starts_with("<string>:1: not well-formed XML"));
     assert!(said(&"<body>".repeat(300)).starts_with("<string>:"));
     let deep = format!("<mujoco>{}{}</mujoco>", "<worldbody>".repeat(300), "</worldbody>".repeat(300));

@@ -204,9 +204,11 @@ fn joint_types() {
     assert_eq!((limits.lower[0], limits.upper[3], limits.velocity[0], limits.effort_upper[2]), (-1.0, 1.0, 3.0, 2.0));
     assert!(limits.upper[1].is_infinite() && limits.upper[4..].iter().all(|x| x.is_infinite()));
     assert_eq!((limits.velocity[1], limits.effort_upper[1]), (3.0, 2.0)); // allowed for a continuous joint
-    // damping and friction of joints without an axis have no defined unit, and are ignored
-    assert_eq!((&model.damping()[..3], &model.friction()[..3]), (&[0.5; 3][..], &[0.25; 3][..]));
-    assert!(model.damping()[3..].iter().chain(&model.friction()[3..]).all(|&x| x == 0.0));
+    // damping and friction of a floating and of a planar joint have no defined unit, and are ignored
+    for (part, is_held) in [(0..3, 1.0), (3..12, 0.0), (12..15, 1.0)] {
+        assert!(model.damping()[part.clone()].iter().all(|&x| x == 0.5 * is_held));
+        assert!(model.friction()[part].iter().all(|&x| x == 0.25 * is_held));
+    }
     let default =
         load(&format!("<robot name='r'>{}{}{}</robot>", link("x"), link("y"), joint("j", "revolute", "x", "y", "")));
     assert_eq!(default.bodies()[1].joint, Joint::Revolute { axis: Vec3::new(1.0, 0.0, 0.0) }); // the default axis is x

@@ -167,7 +167,8 @@ impl Element {
     /// Returns the message that an attribute or child is missing, with the nearest name that the element has.
     pub(crate) fn missing(&self, name: &str) -> String {
         let attributes = self.attributes.iter().map(|(name, _)| &**name);
-        let near = near(&nearest(name, attributes.chain(self.children.iter().map(|child| &*child.tag))));
+        let names = attributes.chain(self.children.iter().map(|child| &*child.tag));
+        let near = near(&nearest(name, names.filter(|found| *found != name))); // it may be there, without a value
         format!("has no {name}{near}")
     }
 

@@ -89,7 +89,7 @@ pub(super) fn add(
                     Ok::<_, Error>(named.transpose()?.map(|j| (j, BodyId(joints.all[j].body), joints.all[j].reference)))
                 };
                 let (follower, leader) = (joint("joint1")?, joint("joint2")?);
-                let Some((index, follower, y0)) = follower else { return Err(e.lacks("joint1")) };
+                let Some((index, follower, y0)) = follower else { return Err(e.wrong("has no joint1")) };
                 if leader.is_some_and(|(leader, ..)| leader == index) {
                     return Err(e.wrong("joint1 and joint2 are the same"));
                 }
