@@ -209,7 +209,7 @@ impl Element {
     /// Returns the warning of what is outside of this root element.
     pub(crate) fn outside(&self) -> Option<Warning> {
         let (line, what) = &**self.stray.as_ref()?;
-        let place = Place { line: *line, ..self.place() };
+        let place = self.place().map(|place| Place { line: *line, ..place });
         Some(Warning::Unknown { place, element: self.label(), what: what.clone() })
     }
 
