@@ -284,9 +284,8 @@ class _Text:
                 given = {what: x for what, x in numbers.items() if len(x)}
                 yield _element("key", {"name": name or _free(f"key{k}", {*names}), "qpos": q} | given)
 
-
     def _controls(self, numbers: Any) -> list[float]:
-        """Controls, as many for each actuator as the reader of MJCF counts where an element does not name its inputs."""
+        """Returns the control of each actuator. Inputs are counted as in an MJCF that does not name them."""
         m, found = self.m, []
         for a in range(len(m.actuator_trntype)):
             first, count = (

@@ -53,9 +53,10 @@ pub enum Format {
     Dae,
 }
 
-/// The points of a mesh, and its triangles by the points' indices, counter-clockwise from outside; nothing is made smaller. Of
-/// an OBJ with several objects or groups, triangles of the first one and points of all: as MuJoCo reads it. As there, faces with
-/// more than 100 corners are left out, and parts of faces that have no ear to cut off.
+/// Returns the points of a mesh, and its triangles as indices of points, counter-clockwise seen from outside. The mesh
+/// is not simplified. For an OBJ with several objects or groups, it returns the triangles of the first one and the
+/// points of all, as MuJoCo does. As in MuJoCo, faces with more than 100 corners are left out, and so are parts of faces
+/// from which no ear can be cut.
 ///
 /// # Errors
 /// The fault of the file, with the line for an OBJ or an STL in text form.
@@ -63,10 +64,10 @@ pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
     cut_triangles(format, bytes).map(|(triangles, _)| triangles)
 }
 
-/// As [`triangles`], with the number of faces of an OBJ of which triangles are left out.
+/// Does as [`triangles`], and returns the number of OBJ faces of which triangles are left out.
 ///
 /// # Errors
-/// As those of [`triangles`].
+/// As [`triangles`].
 #[doc(hidden)]
 pub fn cut_triangles(format: Format, bytes: &[u8]) -> Result<(Triangles, usize), String> {
     let (mut points, mut triangles, mut lost) = (Vec::new(), Vec::new(), 0);

@@ -86,9 +86,9 @@ impl ModelBuilder {
         self.additions.actuators.push(actuator);
     }
 
-    /// Adds a named state: for some bodies the position and velocity of their joint. The other joints are at their neutral
-    /// position and at rest. `control` has the control of each actuator, in the order in which they are added; those of later
-    /// actuators are 0.
+    /// Adds a named state: the positions and velocities of the joints of some bodies. The other joints are at their
+    /// neutral position and at rest. `control` has a number for each actuator, in the order in which they are added;
+    /// missing numbers are 0.
     pub fn keyframe(&mut self, name: &str, joints: Vec<(BodyId, Vec<f64>, Vec<f64>)>, control: Vec<f64>) {
         self.additions.keyframes.push((name.to_owned(), joints, control));
     }

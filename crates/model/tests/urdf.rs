@@ -52,7 +52,7 @@ fn plain_robots_have_no_warnings() {
     }
 }
 
-/// Drake 1.51.1: a link `world` that no element describes is the world. The mass is that of what moves.
+/// Drake 1.51.1: a link `world` that no element describes is the world. The mass is the mass of the moving link.
 #[test]
 fn joints_on_the_world() {
     let joint = "<joint name='j' type='revolute'><parent link='world'/><child link='b'/>";

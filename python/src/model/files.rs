@@ -202,7 +202,7 @@ impl Model {
     ///
     /// mimic, strict, allow: as for `from_mjcf`.
     ///
-    /// Raises `TypeError` for anything but an `MjModel`, `ParseError` or `ModelError`; `ValueError` for an unknown kind.
+    /// Raises `TypeError` for anything but an `MjModel`, `ParseError`, `ModelError`; `ValueError` for an unknown kind.
     #[staticmethod]
     #[pyo3(signature = (model, mimic=false, strict=false, *, allow=None))]
     fn from_mujoco(

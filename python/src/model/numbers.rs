@@ -178,9 +178,9 @@ impl Model {
     }
 
     /// Returns the constraints of the robot's file outside its tree, by name: loops as `ContactConstraint`, without
-    /// stabilisation, and coupled joints as `Coupling`. Inactive ones, and the `<mimic>` of a URDF or SDF, are left out.
+    /// stabilisation, and coupled joints as `Coupling`. Inactive ones and the `<mimic>` of a URDF or SDF are left out.
     ///
-    /// The algorithms for trees ignore both. `constrained_dynamics` closes the loops in its `ConstraintSet`. No function
+    /// The algorithms for trees ignore both. `constrained_dynamics` closes loops of its `ConstraintSet`. No function
     /// enforces a coupling; if it is linear, the readers' `mimic=True` puts it into the tree instead.
     ///
     /// >>> robot = condyle.robots.quadruped()

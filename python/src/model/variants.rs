@@ -29,7 +29,8 @@ impl Model {
 
     /// Returns the same robot with another viscous damping, nv numbers (N m s/rad, N s/m).
     ///
-    /// polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2); None keeps them.
+    /// polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2). None keeps
+    /// them.
     ///
     /// Raises `ModelError` if a number is not finite, or a damping is negative.
     ///

@@ -26,7 +26,7 @@ REFUSED = {"romeo", "talos_full", "talos_full_box"}
 """Robots with a joint that follows one with a higher index; Pinocchio does not read them with mimic=True."""
 
 LARGEST = np.finfo(float).max
-"""Pinocchio's limit where there is none."""
+"""Pinocchio's limit of a joint without a limit."""
 RANGE = 1e-9
 """Smallest range of position that is a motion."""
 UNREADABLE = ("not in the kinematic tree", "Mimicking and mimicked configuration spaces have different sizes")
