@@ -302,8 +302,8 @@ fn write<E: ToString>(kind: Kind, model: &Model, text: &str, write: impl Fn(&Mod
     }
 }
 
-/// Inverse dynamics and the inertia matrix at the neutral position are numbers and, where that matrix has an inverse, forward
-/// dynamics somewhere else (at the neutral position, axes may coincide).
+/// Checks that inverse dynamics and the inertia matrix at the neutral position are finite. Where that matrix has an
+/// inverse, forward dynamics elsewhere is finite too (at the neutral position, axes may coincide).
 fn use_model(model: &Model) {
     let (mut data, mut q) = (Data::new(model), neutral(model));
     let zeros = vec![0.0; model.nv()];

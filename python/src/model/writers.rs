@@ -61,8 +61,8 @@ impl Model {
     /// Returns the same robot as a `pinocchio.Model`; requires Pinocchio 3 or later.
     ///
     /// Mimic joints remain mimic joints; it is an error if one turns without limits. Springs, damping that depends on
-    /// the speed, gravity compensation, actuators, keyframes and constraints are left out, each with a `UserWarning` whose
-    /// argument is a `ModelWarning`.
+    /// the speed, gravity compensation, actuators, keyframes and constraints are left out. Each causes a `UserWarning`
+    /// whose argument is a `ModelWarning`.
     fn to_pinocchio<'py>(slf: Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("condyle._pinocchio_models")?;
         module.call_method1("to_pinocchio", (slf,))
