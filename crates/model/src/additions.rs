@@ -235,7 +235,7 @@ impl Additions {
     /// Moves the additions into the built model; `number` maps each body of the builder to its index in the model.
     pub(crate) fn add_to(self, model: &mut Model, number: &[usize]) -> Result<(), Error> {
         let Self { springs, compensation, compensated_parts, actuators, keyframes, constraints, warnings } = self;
-        model.warnings = warnings;
+        model.warnings.extend(warnings);
         let index = |id: BodyId| number[id.0];
         model.springs =
             springs.into_iter().map(|(b, stiffness, rest)| Spring { body: index(b), stiffness, rest }).collect();

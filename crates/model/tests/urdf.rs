@@ -494,7 +494,8 @@ fn limits_and_losses_of_followers() {
     let apart = apart.unwrap();
     assert_eq!((apart.limits().lower[0], apart.limits().upper[0], apart.limits().velocity[0]), (-1.0, 1.0, 2.0));
     let said: Vec<_> = apart.warnings().iter().map(ToString::to_string).collect();
-    let position = "joint `k`: its limits of position, -6 to -4 for its leader `j`, leave the leader no motion: they have no effect";
+    let position = "joint `k`: its limits of position, -6 to -4 for its leader `j`, leave the leader no motion: they have \
+                    no effect";
     let velocity = "joint `k`: its limit of velocity, 0, leaves its leader `j` no motion: it has no effect";
     assert_eq!(said, [velocity, position]);
     let gravity = *apart.gravity();

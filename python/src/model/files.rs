@@ -196,7 +196,8 @@ impl Model {
     /// Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
     ///
     /// The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. All work of
-    /// MuJoCo's compiler is included: meshes, `replicate`, `attach`, composites, `settotalmass`. Numbers that were changed after compilation are used.
+    /// MuJoCo's compiler is included: meshes, `replicate`, `attach`, composites, `settotalmass`. Numbers that were
+    /// changed after compilation are used.
     /// Contents that a model cannot represent are reported in `warnings`, or refused, as by `from_mjcf`. MuJoCo itself
     /// is not imported.
     ///
