@@ -282,7 +282,8 @@ RESULTS = {
     "Limits": "Model.limits",
     "Any": "Model.to_pinocchio _lend",
     "dict[str, _Array]": """
-        Model.keyframes Model.keyframe_velocities Model.reference_configurations Model.reference_configurations_str""",
+        Model.keyframes Model.keyframe_velocities Model.keyframe_controls
+        Model.reference_configurations Model.reference_configurations_str""",
     "list[Frame]": "Model.frames",
     "list[Inertia]": "Model.inertias",
     "list[Joint | None]": "Model.joints",

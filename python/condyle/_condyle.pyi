@@ -2194,9 +2194,9 @@ class Model:
 
     def constraints(self) -> dict[str, ContactConstraint | Coupling]:
         """Returns the constraints of the robot's file outside its tree, by name: loops as `ContactConstraint`, without
-        stabilisation, and coupled joints as `Coupling`. Inactive ones, and the `<mimic>` of a URDF or SDF, are left out.
+        stabilisation, and coupled joints as `Coupling`. Inactive ones and the `<mimic>` of a URDF or SDF are left out.
 
-        The algorithms for trees ignore both. `constrained_dynamics` closes the loops in its `ConstraintSet`. No function
+        The algorithms for trees ignore both. `constrained_dynamics` closes loops of its `ConstraintSet`. No function
         enforces a coupling; if it is linear, the readers' `mimic=True` puts it into the tree instead.
 
         >>> robot = condyle.robots.quadruped()
@@ -2271,14 +2271,14 @@ class Model:
     ) -> Model:
         """Converts a `mujoco.MjModel`, the robot as MuJoCo compiled it, with the same numbers.
 
-        The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. All work of MuJoCo's compiler is included: meshes,
-        `replicate`, `attach`, composites, `settotalmass`. Numbers that were changed after compilation are used.
+        The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. All work of
+        MuJoCo's compiler is included: meshes, `replicate`, `attach`, composites, `settotalmass`. Numbers that were changed after compilation are used.
         Contents that a model cannot represent are reported in `warnings`, or refused, as by `from_mjcf`. MuJoCo itself
         is not imported.
 
         mimic, strict, allow: as for `from_mjcf`.
 
-        Raises `TypeError` for anything but an `MjModel`, `ParseError` or `ModelError`; `ValueError` for an unknown kind.
+        Raises `TypeError` for anything but an `MjModel`, `ParseError`, `ModelError`; `ValueError` for an unknown kind.
         """
 
     @staticmethod
@@ -2446,9 +2446,9 @@ class Model:
     def to_pinocchio(self) -> Any:
         """Returns the same robot as a `pinocchio.Model`; requires Pinocchio 3 or later.
 
-        Mimic joints remain mimic joints; it is an error if one turns without limits. Springs, damping that depends on the
-        speed, gravity compensation, actuators, keyframes and constraints are left out, each with a `UserWarning` whose
-        argument is a `ModelWarning`.
+        Mimic joints remain mimic joints; it is an error if one turns without limits. Springs, damping that depends on
+        the speed, gravity compensation, actuators, keyframes and constraints are left out. Each causes a `UserWarning`
+        whose argument is a `ModelWarning`.
         """
 
     def tree(self, frames: bool = False) -> str:
@@ -2469,7 +2469,8 @@ class Model:
     def with_damping(self, damping: ArrayLike, polynomial: ArrayLike | None = None) -> Model:
         """Returns the same robot with another viscous damping, nv numbers (N m s/rad, N s/m).
 
-        polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2); None keeps them.
+        polynomial: d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v² of each degree of freedom, (nv, 2). None keeps
+        them.
 
         Raises `ModelError` if a number is not finite, or a damping is negative.
 
@@ -2553,8 +2554,8 @@ class Model:
         >>> arm.with_mimic("joint4", "joint2", ratio=-2.0).nv
         6
 
-        Raises `ModelError` if they do not have one degree of freedom each, the leader is itself a mimic joint, or another
-        joint follows the follower.
+        Raises `ModelError` if they do not have one degree of freedom each, the leader is itself a mimic joint, or
+        another joint follows the follower.
         """
 
     def write_mjcf(self, path: _Path, original: _Path) -> None:
@@ -2853,8 +2854,8 @@ class ContactDynamics:
 
 @final
 class ContactInverseDynamics:
-    """A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), τ = M q̈
-    + h − Jᵀλ; otherwise as `FreeDynamics`.
+    """A knot of a robot in contact whose controls are its nv accelerations and the forces of its contacts: u = (q̈, λ), and
+    τ = M q̈ + h − Jᵀλ; otherwise as `FreeDynamics`.
 
     The knot has two kinds of `Limit` to zero by default. One bounds the undriven efforts, Nᵀτ = 0 with Nᵀ S = 0
     (`undriven efforts`; for a floating base the first 6). The other bounds each contact's J q̈ + γ = 0 (`contact …`).
@@ -3973,8 +3974,8 @@ class Plan:
     times: N + 1 times in ascending order (s); two may be equal.
     states: (q, v) of the knots, (N + 1, nq + nv).
     touches: whether each of the controller's contacts touches between a knot and the next one, (N, contacts).
-    controls: efforts of the actuated coordinates (all coordinates except a free-flyer's) between a knot and the next one, (N,
-        nu); None for no controls.
+    controls: efforts of the actuated coordinates (all coordinates except a free-flyer's) between a knot and the next
+        one, (N, nu); None for no controls.
     gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
     fade: the time over which a contact is loaded after it begins to touch, and unloaded before it ends (s).
 
@@ -4013,8 +4014,8 @@ class Plan:
 
         t: the time (s); q: nq numbers; v: nv.
 
-        Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose quaternions or pairs
-        (cos, sin) do not have length 1.
+        Raises `ValueError` if the plan has no controls, and `ModelError` for a state that is not finite or whose
+        quaternions or pairs (cos, sin) do not have length 1.
         """
 
 @final

@@ -447,8 +447,8 @@ fn mimics() {
     assert_eq!(warnings(&followers("joint='x'", "joint='k'"))[0], missing);
 }
 
-/// Limits and losses of a follower act on its leader: with x = −2 q + 0.5 the limits −1 and 1 of x are −0.25 and 0.75 of q. The
-/// power of the damping d of x is d ẋ² = 4 d q̇².
+/// Limits and losses of a follower act on its leader. With x = −2 q + 0.5 the limits −1 and 1 of x are −0.25 and 0.75
+/// of q. The power of the damping d of x is d ẋ² = 4 d q̇².
 #[test]
 fn limits_and_losses_of_followers() {
     let free = followers("joint='j' multiplier='-2' offset='0.5'", "joint='j' multiplier='0'");

@@ -156,7 +156,8 @@ fn keyframes() {
     assert_eq!((&found.keyframes()[0].q[..], &found.keyframes()[0].v[..]), (&[2.0][..], &[4.0][..]));
 }
 
-/// `key_ctrl` and `key_act`, at `actuator_ctrladr` 0, 1, 2, 4, 5, 6, 8, 9, 12 and `actuator_actadr` 0 and 5 of integrators.
+/// `key_ctrl` and `key_act`, at `actuator_ctrladr` 0, 1, 2, 4, 5, 6, 8, 9, 12, and `actuator_actadr` 0 and 5 of
+/// integrators.
 #[test]
 fn controls_of_keyframes() {
     let text = |actuators: &str, keys: &str| {

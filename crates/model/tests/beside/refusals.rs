@@ -150,7 +150,7 @@ fn a_locked_joint_of_a_tendon() {
     }
 }
 
-/// A locked follower holds its leader where the polynomial is linear, and warns elsewhere. Warnings about the file stay.
+/// A locked follower holds its leader if the polynomial is linear; else there is a warning. Other warnings stay.
 #[test]
 fn a_locked_joint_of_a_coupling() {
     let text = |equality: &str| {
