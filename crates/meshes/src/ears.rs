@@ -1,5 +1,5 @@
-//! Polygons cut into triangles as MuJoCo's reader of OBJ (tinyobjloader, without mapbox's earcut) cuts them. Where the corners
-//! of a face are not in a plane, its cuts decide on the volume of the mesh.
+//! Polygons cut into triangles as MuJoCo's reader of OBJ (tinyobjloader, without mapbox's earcut) cuts them. Where the
+//! corners of a face are not in a plane, its cuts decide on the volume of the mesh.
 
 use super::part::Triangle;
 
@@ -18,8 +18,9 @@ pub(super) struct Ears {
 }
 
 impl Ears {
-    /// Returns the triangles of a face. A quadrilateral is cut along its shorter diagonal. Ears are cut off larger polygons, in the
-    /// plane of two axes. As in MuJoCo, what then has no ear is left out, and so are faces with more than 100 corners.
+    /// Returns the triangles of a face. A quadrilateral is cut along its shorter diagonal. Ears are cut off larger
+    /// polygons, in the plane of two axes. As in MuJoCo, what then has no ear is left out, and so are faces with more
+    /// than 100 corners.
     pub(super) fn cut(&mut self, points: &[[f64; 3]], mut face: Vec<u32>) -> Result<Vec<Triangle>, String> {
         let at = |corner: u32| points[corner as usize].map(|x| x as f32);
         if let [a, b, c, d] = face[..] {

@@ -55,8 +55,8 @@ pub enum Format {
 
 /// Returns the points of a mesh, and its triangles as indices of points, counter-clockwise seen from outside. The mesh
 /// is not simplified. For an OBJ with several objects or groups, it returns the triangles of the first one and the
-/// points of all, as MuJoCo does. As in MuJoCo, faces with more than 100 corners are left out, and so are parts of faces
-/// from which no ear can be cut.
+/// points of all, as MuJoCo does. As in MuJoCo, faces with more than 100 corners are left out, and so are parts of
+/// faces from which no ear can be cut.
 ///
 /// # Errors
 /// The fault of the file, with the line for an OBJ or an STL in text form.

@@ -23,7 +23,8 @@ pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Resu
     Ok(groups.into_iter().filter(|group| !group.1.is_empty()).map(part).collect())
 }
 
-/// All points of an OBJ, the triangles of its first object or group, and the number of faces of which triangles are left out.
+/// All points of an OBJ, the triangles of its first object or group, and the number of faces of which triangles are
+/// left out.
 pub(super) fn first(text: &str) -> Result<(super::Triangles, usize), String> {
     let Mesh { points, groups, lost } = parse(text, &|_| None, true)?;
     Ok(((points, groups.into_iter().flat_map(|group| group.1).collect()), lost))

@@ -417,8 +417,8 @@ impl Coordinates {
     }
 
     /// Adds the limits and losses of a joint that follows a leader: with x = ratio q + offset, its limits of position
-    /// and velocity also limit the leader. Its limits of effort have no effect. Returns messages about limits that leave
-    /// the leader no motion, and are ignored.
+    /// and velocity also limit the leader. Its limits of effort have no effect. Returns messages about limits that
+    /// leave the leader no motion, and are ignored.
     fn follow(
         &mut self,
         leader: &Body,

@@ -19,8 +19,8 @@ fn floats(value: &Value) -> Vec<f64> {
     all.flat_map(|x| x.as_f64().map_or_else(|| floats(x), |x| vec![x])).collect()
 }
 
-/// Compares placements, efforts, M and limits of effort, for every pair of joint types that Pinocchio supports as leader
-/// and follower. Other limits and losses of a follower act on its leader; Pinocchio drops them.
+/// Compares placements, efforts, M and limits of effort, for every pair of joint types that Pinocchio supports as
+/// leader and follower. Other limits and losses of a follower act on its leader; Pinocchio drops them.
 #[test]
 fn as_in_pinocchio() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");

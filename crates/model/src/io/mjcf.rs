@@ -105,10 +105,10 @@ impl Model {
     ///
     /// An unknown, misspelt or misplaced name is a [warning](Model::warnings). So is each effect that a model cannot
     /// represent: tendons over several coordinates, activations and delays of actuators, the range of a ball joint,
-    /// forces of a medium, bodies moved by a program (`mocap`). Sensors, visuals and contacts are ignored. `composite`,
-    /// `flexcomp`, flexes and plugins of bodies are errors. A mesh with mass that cannot be read is an error, unless it
-    /// is on a body fixed to the world, or [`MjcfOptions::weightless_meshes`] is set. Contradictions, repeated names and
-    /// invalid keywords are errors, as in MuJoCo. A URDF cannot be attached.
+    /// forces of a medium, bodies moved by a program (`mocap`). Sensors, visuals and contacts are ignored.
+    /// `composite`, `flexcomp`, flexes and plugins of bodies are errors. A mesh with mass that cannot be read is an
+    /// error, unless it is on a body fixed to the world, or [`MjcfOptions::weightless_meshes`] is set. Contradictions,
+    /// repeated names and invalid keywords are errors, as in MuJoCo. A URDF cannot be attached.
     ///
     /// # Errors
     /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and the

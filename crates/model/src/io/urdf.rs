@@ -49,15 +49,17 @@ impl Model {
     /// - A planar joint moves in the plane normal to its axis, as the format and Drake define it; a missing axis is 1 0
     ///   0. The z axis of its frame is rotated to the axis by the shortest rotation. Pinocchio's plane is always normal
     ///   to z.
-    /// - A joint whose parent is `world` is attached to the world if no link has this name, as in Drake, with a warning.
+    /// - A joint whose parent is `world` is attached to the world if no link has this name, as in Drake, with a
+    ///   warning.
     /// - A revolute or prismatic joint needs a limit with effort and velocity. A continuous joint may have either. A
     ///   negative effort or velocity is not a limit, and neither are position limits in reverse order; both cause a
     ///   warning.
     /// - A `<transmission>` with a rotor's inertia J (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a
     ///   reduction n (`mechanicalReduction`, `drake:gear_ratio`) results in the armature n² J. A reduction alone causes
     ///   a warning.
-    /// - Drake's `<frame>`s become frames; its joints `ball`, `screw`, `planar` and `universal` are supported. A universal
-    ///   joint becomes two revolute joints about x and y, the first named `name#1`, with a body `child#1` between them.
+    /// - Drake's `<frame>`s become frames; its joints `ball`, `screw`, `planar` and `universal` are supported. A
+    ///   universal joint becomes two revolute joints about x and y, the first named `name#1`, with a body `child#1`
+    ///   between them.
     /// - A spherical, ball or universal joint has its losses along each of its coordinates.
     ///
     /// An unknown, misspelt or misplaced name causes a warning, and so does each feature that a model cannot represent

@@ -118,7 +118,8 @@ impl<'a> Attributes<'a> {
         self.element.attribute(name).or_else(|| self.class?.get(name)?.last().copied())
     }
 
-    /// Returns the texts of an attribute, the texts of the class first: each may replace only the first numbers of a list.
+    /// Returns the texts of an attribute, the texts of the class first: each may replace only the first numbers of a
+    /// list.
     pub(super) fn layers(&self, name: &str) -> impl Iterator<Item = &'a str> + use<'a> {
         let class = self.class.and_then(|class| class.get(name));
         class.into_iter().flat_map(|texts| texts.iter().copied()).chain(self.element.attribute(name))

@@ -16,8 +16,8 @@ use std::collections::HashSet;
 /// Maximum number of coordinates of all keyframes together.
 const MAX_NUMBERS: usize = 1 << 22;
 
-/// Adds the keyframes of a file. As in MuJoCo, joints for which a list has no numbers are as the file draws them, and at rest,
-/// and controls are 0. `driven` has the index in the file of each of the model's actuators.
+/// Adds the keyframes of a file. As in MuJoCo, joints for which a list has no numbers are as the file draws them, and
+/// at rest, and controls are 0. `driven` has the index in the file of each of the model's actuators.
 pub(super) fn add(
     model: &mut Model,
     root: &Element,

@@ -284,8 +284,8 @@ impl Drive<'_> {
         on.actuation && !on.groups.contains(&self.mechanics.group)
     }
 
-    /// Returns the range of the force that the tendon's `actuatorfrcrange` allows. `counts` is the number of actuators of
-    /// each tendon: the range of several actuators is the range of their sum, and limits no single one.
+    /// Returns the range of the force that the tendon's `actuatorfrcrange` allows. `counts` is the number of actuators
+    /// of each tendon: the range of several actuators is the range of their sum, and limits no single one.
     fn share(&self, tendons: &Tendons, counts: &[usize]) -> [f64; 2] {
         match self.target {
             Target::Tendon(t) if counts[t] == 1 => tendons.all[t].effort.unwrap_or(ALL),

@@ -172,7 +172,8 @@ impl<'a> Reader<'a> {
         Ok((parts, body, bXl))
     }
 
-    /// Adds the named sites of a body, and stores its named frames and cameras for later. Checks the names of its geoms.
+    /// Adds the named sites of a body, and stores its named frames and cameras for later. Checks the names of its
+    /// geoms.
     fn frames(
         &mut self,
         builder: &mut ModelBuilder,

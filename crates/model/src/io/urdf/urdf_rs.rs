@@ -12,11 +12,11 @@ impl Model {
     /// Converts a robot that urdf-rs has read. The result is the model that [`from_urdf`](Self::from_urdf) reads from
     /// the same file, except for information that `urdf_rs::Robot` lacks.
     ///
-    /// - A limit that is missing has zeros there. Zeros of a continuous joint are taken as no limit; zeros of a revolute or prismatic
-    ///   joint stay, and warn.
+    /// - A limit that is missing has zeros there. Zeros of a continuous joint are taken as no limit; zeros of a
+    ///   revolute or prismatic joint stay, and warn.
     /// - A planar joint without an axis has 1 0 0, and no warning that says so.
-    /// - Versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions, frames and joints of Drake, and all
-    ///   that is unknown or left out are not there: they have neither effect nor warning.
+    /// - Versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions, frames and joints of
+    ///   Drake, and all that is unknown or left out are not there: they have neither effect nor warning.
     ///
     /// Needs the feature `urdf-rs`.
     ///
