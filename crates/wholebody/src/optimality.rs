@@ -30,8 +30,8 @@ impl Optimality {
 }
 
 impl WholeBodyController {
-    /// Computes the errors in the optimality conditions at the last step. The arguments must be the arguments of that step.
-    /// This function is for tests and demonstrations: it assembles the program again, and allocates. The errors have no
+    /// Computes the errors in the optimality conditions at the last step, whose arguments must be given again. This
+    /// function is for tests and demonstrations: it assembles the program again, and allocates. The errors have no
     /// meaning after a safe command, which is not an optimum, or for a clone before its first step.
     ///
     /// # Panics

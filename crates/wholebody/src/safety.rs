@@ -98,8 +98,8 @@ impl Safety {
         false
     }
 
-    /// Computes τ = g − Jᵀ f, where f are the smallest forces of the active contacts that carry the base: S (g − Jᵀ f)
-    /// = 0.
+    /// Computes τ = g − Jᵀ f. The forces f are the smallest forces of the active contacts that carry the base, S (g −
+    /// Jᵀ f) = 0.
     fn gravity_compensation(
         &mut self,
         kinematics: &mut Kinematics,
