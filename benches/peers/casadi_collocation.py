@@ -8,9 +8,9 @@ The problems come from python/examples. Both kinds of functions have the same tr
 constraints and zeros. condyle.casadi gives the dynamics of all points as one function (`states=`); the expressions use
 `Function.map`. The problems are `swing_up`, `reach` (of Condyle's arm) and `jump`. `reach_panda` and `reach_talos`
 (with a fixed pelvis) are the reach of robots from example-robot-data. For each problem the program prints the processor
-time of a solve (the least of the rounds), the fraction of this time in the problem's functions, the iterations, the
-cost, and the time to build the expressions. The expressions run in CasADi's own virtual machine, as pinocchio.casadi's
-expressions do.
+time of a solve (the least of the rounds), and the fraction of this time in the problem's functions. It also prints the
+iterations, the cost, and the time to build the expressions. The expressions run in CasADi's own virtual machine, as
+pinocchio.casadi's expressions do.
 
 The time outside of the functions belongs to IPOPT and its linear solver; it is the same for both kinds of functions.
 For an arm of two links (`swing_up`), it is 0.42 of the whole time with expressions. With any functions, a solve takes
