@@ -41,7 +41,7 @@ BESIDE = {
 """Algorithms that Pinocchio's benchmark lacks, each with the algorithm of Condyle whose time it is compared with."""
 
 MODES = {"": "one call", "batch": "per state of a batch", "horizon": "a horizon"}
-"""Prefixes of the names of algorithms, and what is timed under this prefix."""
+"""Prefixes in the names of algorithms, each with a description of what is timed."""
 KNOT = ("aba", "aba_derivatives", "rnea")
 """Algorithms that a solver calls at each knot of a horizon."""
 

@@ -269,8 +269,8 @@ def measure(robot: Robot, program: Path | None, rounds: int) -> list[dict]:
     rust = robot.rust(program, rounds) if program else {}
     for name, (ours, theirs, out) in robot.batches().items():
         write = lambda out=out: [x.fill(1.0) for x in out]  # noqa: E731
-        # One call after the other, as the library is timed: if calls took turns, each would begin with other data in
-        # the cache.
+        # One call after the other, as the library is timed.
+        # If calls took turns, each would begin with other data in the cache.
         ones = [np.ones(x.shape[1:]) for x in out]
         copy = lambda out=out, ones=ones: [np.copyto(x, one) for x, one in zip(out, ones, strict=True)]  # noqa: E731
         mine, other, writing, copying = (least([call], rounds, 0.0)[0] / STATES for call in (ours, theirs, write, copy))

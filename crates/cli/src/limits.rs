@@ -49,7 +49,7 @@ pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
 /// Numbers of limited coordinates of a robot, and the source of the limits.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct LimitCounts {
-    /// Path of the robot's file, or name of a built-in robot: the only source of limits.
+    /// Source of all limits: path of the robot's file, or name of a built-in robot.
     pub source: String,
     pub positions: usize,
     pub velocities: usize,

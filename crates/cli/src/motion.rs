@@ -16,7 +16,7 @@ pub(crate) struct Goal {
     pub nearest: f64,
 }
 
-/// Requested plan of a motion, and its result.
+/// A planned motion: what the user requested, and the result.
 pub(crate) struct Plan {
     pub model: Arc<Model>,
     /// Robot's file, whose shapes the page draws.

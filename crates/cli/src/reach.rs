@@ -7,7 +7,7 @@ use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residua
 use condyle::{Data, Model, Vec3, difference, integrate, neutral, rnea, terms::gravity};
 use std::sync::Arc;
 
-/// Weight of an effort without a limit: the weight for a limit of 100 N m or 100 N.
+/// Weight of an effort that has no limit. It equals the weight of an effort with a limit of 100 N m or 100 N.
 const WITHOUT_LIMIT: f64 = 1e-4;
 
 /// A problem with a warm start: the problem, the states and the efforts.

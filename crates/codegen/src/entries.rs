@@ -67,7 +67,7 @@ struct Gatherer {
     is_free: Vec<bool>,
     /// Value that must follow each value in the work space.
     next: Vec<Option<Id>>,
-    /// Whether a value must be next to another value in the work space.
+    /// Whether the work space has a fixed index for a value, next to another value.
     has_place: Vec<bool>,
 }
 

@@ -32,10 +32,10 @@ pub(crate) enum Node {
     Sqrt(Id),
     Sin(Id),
     Cos(Id),
-    /// The angle of the point with y = first and x = second operand.
+    /// The angle of the point (x, y), where y is the first operand and x the second.
     Atan2(Id, Id),
     Abs(Id),
-    /// The mask of: first operand < second operand.
+    /// The mask that is true if the first operand is less than the second.
     Less(Id, Id),
     And(Id, Id),
     Or(Id, Id),

@@ -5,7 +5,7 @@ use crate::step::Step;
 use crate::steps::Steps;
 use std::collections::BTreeSet;
 
-/// Number of a processor's registers. A good order needs no more values at the same time.
+/// Number of a processor's registers. In a good order, not more than this number of values are needed at the same time.
 const REGISTERS: usize = 16;
 
 /// Applies the better of two orders: the order of the recording, or an order in which each value is computed

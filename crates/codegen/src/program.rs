@@ -14,7 +14,7 @@ const LONGEST: usize = 2000;
 /// Minimum number of steps in a part. The last part may be shorter.
 const SHORTEST: usize = 1000;
 
-/// Place where a value is stored.
+/// Storage of a value: how the code keeps the value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Place {
     /// An input or a constant.

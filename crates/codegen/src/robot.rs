@@ -67,8 +67,8 @@ pub struct Settings {
     /// Whether the gravitational acceleration is an argument `gravity_vector` of three numbers instead of a constant.
     pub gravity_is_input: bool,
     /// Number of threads that share every state in CUDA kernels: at most one for each limb and one for the trunk. By
-    /// default, kernels can split states if this is worthwhile ([`Function::shares`]), and split them if there are few
-    /// states. Other languages ignore this setting.
+    /// default, functions for which it is worthwhile ([`Function::shares`]) can be computed in shares, and a launch
+    /// uses the shares if there are few states. Other languages ignore this setting.
     pub shares: Option<NonZero<usize>>,
 }
 

@@ -22,8 +22,9 @@
 //! whole function is best, since the trunk needs the values of all limbs. For derivatives, most limbs have their own
 //! share.
 //!
-//! Because of the loss, a kernel contains both the whole function and its shares, and each launch selects one of these
-//! forms. States are split as long as all threads fit on the device at the same time.
+//! All shares together cost more than the whole function. So a kernel contains both the whole function and its shares,
+//! and each launch selects one of these forms. States are split as long as all threads fit on the device at the same
+//! time.
 
 use crate::function::{Function, is_needed, needed};
 use crate::graph::{Id, Node};

@@ -31,7 +31,7 @@ pub(crate) struct Basis {
     T: DMatrix<f64>,
     /// p.
     pub p: Vec<f64>,
-    /// Scratch: the basic columns of some rows. Shape: rows × basic, with padding.
+    /// Scratch: the columns of basic unknowns in several rows. Shape: rows × basic unknowns, with padding.
     basic_part: DMatrix<f64>,
 }
 

@@ -218,8 +218,9 @@ impl WholeBodyController {
     /// [`Status::NotFinite`]. A quaternion or a pair (cos, sin) without length 1, or an invalid rotation in a
     /// reference, gives [`Status::InvalidState`]. The safe command is then computed from the last valid state.
     ///
-    /// q: nq numbers; v: nv. [`command`](Self::command) returns the command again. A step allocates nothing with
-    /// [`Backend::InteriorPoint`](crate::Backend); clarabel allocates once, and more for a new set of contacts.
+    /// q: nq numbers; v: nv. Later calls of [`command`](Self::command) return the same command. A step allocates
+    /// nothing with [`Backend::InteriorPoint`](crate::Backend); clarabel allocates once, and more for a new set of
+    /// contacts.
     ///
     /// # Panics
     /// If `q`, `v` or a list of the references has the wrong length.

@@ -55,7 +55,7 @@ impl Program {
     }
 }
 
-/// Solution of the first priority's solver.
+/// Solution that the solver of the first priority found.
 #[derive(Clone, Debug)]
 pub struct Optimum {
     /// x: accelerations, and forces of the contacts that touch.

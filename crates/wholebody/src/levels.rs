@@ -61,8 +61,8 @@ impl Levels {
     ) -> Self {
         let Settings { tolerance, max_iterations, time_limit, form, .. } = *settings;
         let given = |(level, &objective): (usize, &usize)| match (form, settings.backend) {
-            // The results of earlier priorities may depend on contacts and base. Only an elimination handles dependent
-            // equalities.
+            // Equalities that keep the results of earlier priorities may depend on the equalities of contacts and base.
+            // Only an elimination handles dependent equalities.
             _ if level > 0 => Given::condensed(capacity, objective),
             (Form::Condensed, _) => Given::condensed(capacity, objective),
             #[cfg(feature = "clarabel")]

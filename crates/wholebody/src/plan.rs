@@ -7,9 +7,9 @@ use condyle_linalg::check;
 /// A planned motion: states at given times, efforts and gains between these times, and the intervals in which contacts
 /// touch.
 ///
-/// [`WholeBodyController::track`](crate::WholeBodyController::track) makes references from a plan. Between knots, q is
-/// interpolated along each joint's own group, v is interpolated linearly, and a = Δv / Δt. Two knots may have the same
-/// time: the velocity then jumps at this time (an impact).
+/// [`WholeBodyController::track`](crate::WholeBodyController::track) makes references from a plan. Between knots, the
+/// position of each joint is interpolated in the joint's Lie group (for example along a rotation), v is interpolated
+/// linearly, and a = Δv / Δt. Two knots may have the same time: the velocity then jumps at this time (an impact).
 ///
 /// ```
 /// use condyle_dynamics::{neutral, robots};

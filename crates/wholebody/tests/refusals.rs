@@ -1,5 +1,5 @@
-//! Errors name what is invalid: an `Error` in a description, a `Status` in a state or a failed solve, a panic in a
-//! length.
+//! Errors name what is invalid. A description gives an `Error`, a state or a failed solve gives a `Status`, and a wrong
+//! length gives a panic.
 
 mod common;
 #[path = "../../../tests/common/panics.rs"]

@@ -161,8 +161,8 @@ fn joints_stay_within_their_limits() {
             integrate(&model, &q, &step, &mut next);
             q = next;
             assert!(beyond || v[6..].iter().all(|v| v.abs() < 5.0 + 1e-6));
-            // A joint's distance from its limits is at most a fifth of the first distance after 0.5 s. It is zero if
-            // the joint started inside.
+            // After 0.5 s, a joint is outside of its limits by at most a fifth of its initial distance. A joint that
+            // started inside its limits never leaves them.
             for i in 7..19 {
                 let out = (q[i] - upper[i]).max(lower[i] - q[i]);
                 assert!(

@@ -61,9 +61,9 @@ fn the_centre_of_pressure_stays_within() {
     }
 }
 
-/// A wrench and corner forces distribute the load in the same way: four corners with a quarter of the force each cost a
-/// quarter of the whole. Halfway to the side, the pressure is no longer in the middle of the soles, but far from their
-/// edges.
+/// A wrench and corner forces distribute the load in the same way. (Four corner forces, each a quarter of the load,
+/// cost a quarter of one force that carries the load.) Halfway to the side, the pressure is no longer in the middle of
+/// the soles, but far from their edges.
 #[test]
 fn pressure_keeps_away_from_the_edges() {
     let model = robots::humanoid();
@@ -188,7 +188,7 @@ fn a_hand_leans_on_a_wall() {
     };
     let contacts = [soles(0.7), vec![wall]].concat();
     let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // makes the wall's force small
-    // The wall should also carry a part of the weight; this part exceeds the available friction.
+    // The reference force on the wall is a part of the weight, which exceeds the available friction.
     let (references, command) = solve(&model, &contacts, &humanoid_tasks(), settings, &q, &v, |r| {
         r.contacts[2].force.linear = Vec3::new(0.0, 0.0, 100.0);
     });

@@ -27,8 +27,8 @@ DT = 0.02
 
 WORDS = {pin.LOCAL: "local", pin.LOCAL_WORLD_ALIGNED: "local_world_aligned"}
 TEXTS = {"arm7": condyle.robots.ARM7, "quadruped": condyle.robots.QUADRUPED, "humanoid": condyle.robots.HUMANOID}
-# Number of rows of each contact, by name. Crocoddyl orders contacts alphabetically, and its inverse dynamics does not
-# support contacts in a plane.
+# Number of rows of each contact, by name. Crocoddyl orders contacts alphabetically.
+# Crocoddyl's inverse dynamics does not support contacts in a plane.
 CONTACTS = {
     "arm7": {},
     "quadruped": {"LF_foot": 3, "RF_foot": 1, "RH_foot": 3},

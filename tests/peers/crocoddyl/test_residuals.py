@@ -19,8 +19,8 @@ from condyle.optimal import (
     WrenchCone,
 )
 
-# Tolerance after three iterations of a few knots. Rounding errors grow with the condition number of the problem, about
-# 1e4.
+# Tolerance after three iterations of a few knots.
+# Rounding errors grow with the condition number of the problem, which is about 1e4.
 SAME = 1e-9
 
 DT, KNOTS = 0.02, 4
@@ -180,8 +180,8 @@ def jump(r, nu):
     return crocoddyl.ResidualModelImpulseCoM(r.state), 1.0, Residual.impulse_center_of_mass(), 3
 
 
-# The velocity along the world's axes is left out: its Jacobian in Crocoddyl differs by 0.3 from differences of the
-# velocity.
+# The velocity along the world's axes is left out.
+# Its Jacobian in Crocoddyl differs by 0.3 from differences of the velocity.
 ANY = {
     "state": state,
     "com": com,
@@ -376,8 +376,8 @@ def test_control_polynomial(robot, integrator, controls):
         if free
         else crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, held, total, 0.0, True)
     )
-    # In Crocoddyl, a quadratic needs an integrator of three or four stages. For other integrators it has the nodes of
-    # four stages.
+    # In Crocoddyl, a quadratic needs an integrator of three or four stages.
+    # For other integrators, the quadratic has the nodes of four stages.
     of = kind if kind == crocoddyl.RKType.three else crocoddyl.RKType.four
     polynomial = POLYNOMIALS[controls](r.nu, of)
     if kind is None:

@@ -1,4 +1,4 @@
-"""Robots with one feature each. The features are all elements and attributes of MuJoCo's schema, set in a small robot.
+"""Compares robots with one feature each. The features are all elements and attributes in MuJoCo's schema.
 
     python tests/peers/mujoco/features.py [PATTERN]
 
@@ -47,8 +47,8 @@ HOLES = {"asset": MESH, "in_b": "", "in_c": "", "in_world": "", "after": "", "in
 ORIENTED = ["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"]
 ACTUATOR_TARGET = ["joint", "jointinparent", "tendon", "site", "refsite", "slidersite", "cranksite", "body"]
 
-# Values of an attribute; they are tried until MuJoCo accepts one that has an effect. Other attributes take values of
-# GENERIC.
+# Values of an attribute; they are tried until MuJoCo accepts one that has an effect.
+# Attributes that are not listed take values of GENERIC.
 VALUES = {
     "quat": ["0.8 0.2 0.4 0.4"],
     "axisangle": ["1 2 3 40"],

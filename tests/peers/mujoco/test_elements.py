@@ -10,10 +10,10 @@ import condyle
 
 TABLE = Path(__file__).parents[3] / "crates/model/src/io/mjcf/elements.txt"
 
-# How each attribute of the structure is treated. Either a model holds it (or rejects a value by name), or a warning
-# says
-# that it is left out, or it has no effect on kinematics, dynamics and limits. `features.py` tests springs, actuators,
-# tendons, constraints and keyframes one by one.
+# How each attribute of the structure is treated.
+# HELD: a model holds the attribute, or rejects a value by name. LEFT_OUT: a warning says that it is left out.
+# NO_EFFECT: the attribute has no effect on kinematics, dynamics and limits.
+# `features.py` tests springs, actuators, tendons, constraints and keyframes one by one.
 HELD = {
     "compiler": "alignfree angle assetdir autolimits balanceinertia boundinertia boundmass coordinate eulerseq "
     "fitaabb inertiafromgeom inertiagrouprange meshdir settotalmass strippath",
@@ -44,7 +44,7 @@ NO_EFFECT = {
     "usethread",
     "option": "ccd_iterations ccd_tolerance cone impratio integrator iterations jacobian ls_iterations ls_tolerance "
     "magnetic noslip_iterations noslip_tolerance o_friction o_margin o_solimp o_solref sdf_initpoints "
-    "sdf_iterations sleep_tolerance solver timestep tolerance wind",  # wind needs the medium, which is left out
+    "sdf_iterations sleep_tolerance solver timestep tolerance wind",  # wind acts through the medium, which is left out
     "flag": "autoreset contact diagexact energy eulerdamp filterparent fwdinv invdiscrete ipc island midphase "
     "multiccd nativeccd override refsafe sensor sleep speculative warmstart",
     "mesh": "material normal smoothnormal texcoord",
@@ -53,7 +53,7 @@ NO_EFFECT = {
     "joint": "group margin solimpfriction solimplimit solreffriction solreflimit user",
     "freejoint": "group",
     "geom": "adhesion castshadow conaffinity condim contype fluidcoef fluidshape friction gap margin material "
-    "priority rgba solimp solmix solref surfacevel user",  # fluidshape needs the medium, which is left out
+    "priority rgba solimp solmix solref surfacevel user",  # fluidshape acts through the medium, which is left out
     "site": "group material mesh rgba size user",
     "camera": "focal focalpixel fovy ipd output principal principalpixel projection resolution sensorsize target user",
 }

@@ -40,7 +40,8 @@ def test_a_quadruped_stands(lean: float) -> None:
     """If both libraries use the same PD control of the joints, posture, height and the load of each foot are the
     same."""
     world = World(condyle.robots.QUADRUPED, FEET, BALL, FRICTION)
-    world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0  # in Condyle these act only if requested
+    # in Condyle, damping and friction act only if requested
+    world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0
     world.mj.opt.impratio, world.mj.geom_solref[:] = 100.0, (0.002, 1.0)  # nearly rigid, so friction creeps less
     model, data = world.model, condyle.Data(world.model)
     q0 = standing(model)

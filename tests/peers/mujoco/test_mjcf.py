@@ -205,8 +205,8 @@ def pushed(robot: Robot, k: int, sign: float) -> tuple[float, bool]:
             continue
         driven |= moment != 0.0
         if mujoco.mjtGain(m.actuator_gaintype[i]) not in fixed or m.actuator_biasprm[i, 1:3].any():
-            # If the force depends on length and velocity, only the force's range limits it. So the actuator becomes a
-            # motor.
+            # If the force depends on length and velocity, only the force's range limits it.
+            # The test then makes the actuator a motor.
             m.actuator_gaintype[i], m.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
             m.actuator_gainprm[i, 0], m.actuator_ctrllimited[controls] = 1.0, 0
         d.ctrl[controls] = sign * np.sign(moment * m.actuator_gainprm[i, 0]) * HUGE

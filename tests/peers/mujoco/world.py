@@ -77,7 +77,7 @@ class World:
             body = spec.body(self.model.body_names[frame.body])
             body.add_geom(name=foot, contype=1, conaffinity=0, mass=0.0, **shape, **contact)
         if isinstance(size, float):
-            self.ground = -size  # the plan has the centres of the balls at height 0
+            self.ground = -size  # in the plan, the balls' centres are at height 0
         plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "pos": [0.0, 0.0, self.ground]}
         spec.worldbody.add_geom(name="ground", contype=0, conaffinity=1, **plane, **contact)
         self.mj = spec.compile()

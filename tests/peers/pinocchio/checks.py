@@ -391,7 +391,7 @@ def check_hessian(state: State) -> None:
 
 
 def check_inverse_dynamics(state: State) -> None:
-    """Compares rnea and nonlinear_effects. For mimic joints, Pinocchio has these functions, too."""
+    """Compares rnea and nonlinear_effects, which Pinocchio also supports for mimic joints."""
     pair, ours, theirs = state.pair, ours_of(state), theirs_of(state)
     q, v, a = state.q, state.v, state.a
     pair.expect("rnea", ours(condyle.rnea, q, v, a), theirs(pin.rnea, q, v, a))

@@ -165,8 +165,8 @@ def condition(pair: Pair, function: str, frame: str, q: np.ndarray) -> float:
 
 def chosen(pair: Pair, language: str) -> list[str]:
     """Returns the functions that are compiled for a robot in a language."""
-    # Functions of impacts are compiled only in plain C. In other languages they would take as long as all other
-    # functions together.
+    # Functions of impacts are compiled only in plain C.
+    # In other languages they would take as long as all other functions together.
     plain = language in ("c", "c-casadi")
     long = {"aba_derivatives", "constrained_dynamics_derivatives", "rnea_hessian", "aba_hessian"}
     long |= set() if plain else {"impulse_dynamics_derivatives"}

@@ -2,8 +2,8 @@
 projection.
 
 A robot with mimic joints moves like the same robot with free joints along q_free = G q + offset. So its efforts are Gᵀ
-τ_free, its inertia is Gᵀ M_free G, and its derivatives are Gᵀ (∂τ_free/∂·) G. Pinocchio computes the factors for the
-free robot. Results of forward dynamics are inserted into these equations.
+τ_free, its inertia is Gᵀ M_free G, and its derivatives are Gᵀ (∂τ_free/∂·) G. Pinocchio computes τ_free, M_free and
+∂τ_free for the free robot. Results of forward dynamics are checked by inserting them into the equations of motion.
 """
 
 from pathlib import Path

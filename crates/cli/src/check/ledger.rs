@@ -31,7 +31,7 @@ impl Row {
     /// Counts a case. Stores its error if it is the largest so far, relative to its bound.
     pub(super) fn see(&mut self, error: f64, bound: f64) {
         let (now, before) = (error / bound, if self.cases == 0 { -1.0 } else { self.error / self.bound });
-        // An error that is NaN stays stored.
+        // Keep an error that is NaN.
         if !before.is_nan() && (now > before || now.is_nan()) {
             (self.error, self.bound) = (error, bound);
         }

@@ -1,8 +1,8 @@
 //! The inverse of M, and products with it, from the factor of a tree. The forms here have few operations, for recorded
 //! numbers.
 //!
-//! They solve L x = b. If all entries of b on the path from k to an ancestor are zero, x_k depends on b only through
-//! that ancestor:
+//! Let L x = b. If all entries of b on the path from k to an ancestor are zero, x_k depends on b only through that
+//! ancestor:
 //!
 //! ```text
 //! x_k = −Σ L_ke x_e = Σ G_ke x_e     with G_ke = −L_ke − Σ L_kf G_fe

@@ -81,8 +81,8 @@ fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Fu
     (derivatives.inputs == function.inputs).then_some((derivatives, blocks))
 }
 
-/// Returns CasADi's interface of one function, with these names of arrays. It calls a function whose inputs are the
-/// first of these inputs.
+/// Returns CasADi's interface of one function, whose arrays have these names. The interface calls a generated function,
+/// which takes only the first of these inputs.
 fn interface(
     name: &str,
     inputs: &[(String, Array)],

@@ -71,7 +71,7 @@ pub(crate) enum Status {
     NotFinite {
         /// The field of [`ConeProgram`].
         name: &'static str,
-        /// Index of the number in that field, column by column.
+        /// Index of the invalid number in that field, counted column by column.
         index: usize,
     },
 }

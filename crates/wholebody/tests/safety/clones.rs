@@ -4,8 +4,8 @@ use crate::common::*;
 use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Command, Form, Settings, Task, WholeBodyController};
 
-/// Makes step k near the stance. Over all k, contacts appear and disappear, a state and references are invalid, and
-/// tasks have two priorities.
+/// Makes step k near the stance. In the course of the steps, contacts appear and disappear, and one state and some
+/// references are invalid. Tasks have two priorities.
 fn tick(controller: &mut WholeBodyController, k: u64) -> Command {
     let model = robots::quadruped();
     let (q, v) = state(&model, k / 4, 0.05, 0.2);

@@ -94,7 +94,7 @@ impl Cones {
             let F = &data.K[(m + cone.at) * ld + rows.start..];
             let (head, tail) = B[cone.at * ld + rows.start..].split_at_mut(ld);
             let (f0, head) = (&F[..n], &mut head[..n]);
-            // Store w₁ᵀ F₁ in the head for now.
+            // At first, `head` stores w₁ᵀ F₁; below it gets the first row of the result.
             head.fill(0.0);
             for i in 1..cone.dim {
                 let f = &F[i * ld..][..n];

@@ -27,7 +27,7 @@ const REFINEMENTS: usize = 2;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub tolerance: f64,
-    /// Maximum number of iterations, including earlier ones.
+    /// Maximum number of iterations, including the iterations of earlier attempts.
     pub iterations: u32,
     /// Start time, and the seconds allowed from then on.
     pub clock: Option<(Instant, f64)>,

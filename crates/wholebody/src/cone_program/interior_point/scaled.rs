@@ -16,8 +16,8 @@ const NO_CURVATURE: f64 = 1e-14;
 /// Maximum ratio of an unknown's unit to the value that the bounds allow if the other unknowns are zero. With a ratio
 /// of 1, programs with a singular P lose digits; from 1000 on, some programs with unreachable tasks have no solution.
 const ROOM: f64 = 30.0;
-/// Minimum ratio to which bounds may reduce an unknown's unit, relative to the size that the cost gives. P̂ⱼⱼ is then
-/// at least the square of this ratio, which still exceeds rounding errors.
+/// Minimum of an unknown's unit after bounds have reduced it, relative to the size that the cost gives. P̂ⱼⱼ is then at
+/// least the square of this number, which exceeds rounding errors.
 const LEAST_SHARE: f64 = 1e-5;
 /// Absolute tolerance for the bounds of a row or cone without coefficients.
 const NO_ROW_TOLERANCE: f64 = 1e-9;

@@ -17,7 +17,7 @@ use condyle_linalg::{
 /// Regularisation added to diagonal entries of H, which have size one for costs of size one. Refinement removes the
 /// effect of the regularisation.
 const REGULARISATION: f64 = 1e-13;
-/// Regularisation relative to the diagonal entry: a few rounding errors of a factor.
+/// Regularisation relative to the diagonal entry. It is as large as a few rounding errors of a factorisation.
 const RELATIVE_REGULARISATION: f64 = 1e-15;
 /// Regularisation added to diagonal entries of X Xᵀ, which have size one for costs of size one.
 const DUAL_REGULARISATION: f64 = 1e-13;
