@@ -4,7 +4,7 @@ use crate::common::*;
 use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Command, Form, Settings, Task, WholeBodyController};
 
-/// Makes step k near the stance. In the course of the steps, contacts appear and disappear, and one state and some
+/// Makes step k near the stance. In the course of the steps, contacts appear and disappear, and some states and
 /// references are invalid. Tasks have two priorities.
 fn tick(controller: &mut WholeBodyController, k: u64) -> Command {
     let model = robots::quadruped();
