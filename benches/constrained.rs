@@ -1,5 +1,5 @@
-//! Dynamics under contacts and its derivatives, one call on one state:
-//! `cargo bench -p condyle-benches --bench constrained`.
+//! Times the dynamics under contacts and its derivatives, with one call on one state: `cargo bench -p condyle-benches
+//! --bench constrained`.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, constrained_dynamics, constrained_dynamics_derivatives,
@@ -14,7 +14,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 
-/// Number of states used in turn, so that branch prediction cannot learn a single one.
+/// Number of states that are used in turn, so that branch prediction cannot learn a single state.
 const STATES: usize = 16;
 
 /// A position, a velocity, and an effort.

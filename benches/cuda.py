@@ -1,15 +1,16 @@
 #!/usr/bin/env python3
-"""Measures generated kernels on a GPU, in states per second, for many batch sizes, compared with MJX and MuJoCo Warp.
+"""Measures generated kernels on a GPU, in states per second, for many batch sizes. Compares them with MJX and MuJoCo
+Warp.
 
     python benches/cuda.py [--robots panda anymal talos] [--functions rnea aba ...] [--batches 10 12 14 16 18 20]
                            [--shares 1 0]
 
-Batch sizes are powers of two. "Resident" means that all arrays are on the device; "copied" includes copying arguments
-to the device and results back. Shares are the number of threads that share a state; 0 lets the kernel choose it by the
-number of states. Each kernel is compared with the CPU first. MJX and MuJoCo Warp compute `forward`, which is forward
-dynamics and kinematics, in single precision, for the same robot without shapes; they are skipped if they are not
-installed. Needs a GPU, NVIDIA's run-time compiler, the packages condyle and example-robot-data-loaders, and mujoco for
-the peers. Without a device, the program prints NOT RUN.
+Batch sizes are powers of two. "Resident" means that all arrays are on the device. "Copied" means that arguments are
+copied to the device, and results are copied back. `--shares` gives numbers of threads that share a state; with 0 the
+kernel chooses this number by the number of states. Each kernel is compared with the CPU first. MJX and MuJoCo Warp
+compute `forward`, which is forward dynamics and kinematics, in single precision, for the same robot without shapes.
+They are skipped if they are not installed. The program needs a GPU, NVIDIA's run-time compiler, the packages condyle
+and example-robot-data-loaders, and mujoco for the peers. Without a device, the program prints NOT RUN.
 """
 
 import argparse
@@ -30,13 +31,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests/peers/mujoco"))
 SECONDS = 0.3
 """Minimum duration of a measurement (s)."""
 ROUNDING = 1e-11
-"""Tolerance for rounding of double precision, amplified by M⁻¹; relative to the largest number."""
+"""Tolerance for rounding errors of double precision that M⁻¹ amplifies; relative to the largest number."""
 CHECKED = 64
 """Number of states compared with the CPU."""
 
 
 def rate(n: int, call: Callable[[], object], wait: Callable[[], object]) -> float:
-    """Returns the rate in millions of states per second: the fastest of five runs with many calls each."""
+    """Returns the rate of a call in millions of states per second: the fastest of five runs, each with many calls."""
     call(), wait()
     count, best = 1, 0.0
     while True:
@@ -58,7 +59,7 @@ def rate(n: int, call: Callable[[], object], wait: Callable[[], object]) -> floa
 
 
 def states(model: condyle.Model, names: "list[str]", n: int, dtype: str) -> list[Any]:
-    """Returns arguments of n states, along the last axis; at most 1024 states differ."""
+    """Returns arguments of n states, along the last axis. At most 1024 states are different."""
     rng = np.random.default_rng(0)
     q = np.array([condyle.random_configuration(model, seed=k) for k in range(min(n, 1024))])
     given = {"q": q, **{name: rng.standard_normal((len(q), model.nv)) for name in names if name != "q"}}
@@ -66,7 +67,7 @@ def states(model: condyle.Model, names: "list[str]", n: int, dtype: str) -> list
 
 
 def error(model: condyle.Model, kernel: condyle.cuda.Kernel) -> float:
-    """Returns the difference of the results from the CPU's, relative to the largest number."""
+    """Returns the difference between the results of the kernel and of the CPU, relative to the largest number."""
     given = states(model, list(kernel.inputs), CHECKED, kernel.dtype.name)
     found = kernel(*map(condyle.cuda.array, given))
     wanted = getattr(condyle, kernel.name)(model, condyle.Data(model), *(x.T.astype(float).copy() for x in given))
@@ -75,7 +76,7 @@ def error(model: condyle.Model, kernel: condyle.cuda.Kernel) -> float:
 
 
 def ours(model: condyle.Model, kernel: condyle.cuda.Kernel, n: int) -> tuple[float, float]:
-    """Returns the resident and the copied rate."""
+    """Returns the rate with resident arrays and the rate with copied arrays."""
     from condyle import _cuda_driver
 
     def wait() -> None:
@@ -101,7 +102,7 @@ def table(
         made = {shares: condyle.cuda.compile(model, name, dtype=dtype, shares=shares or None) for shares in all_shares}
         for shares, kernel in made.items():
             if kernel.shares == 1 and shares != next(iter(made)):
-                continue  # the same as before
+                continue  # the kernel is the same as before
             apart = error(model, kernel)
             if dtype == "float64" and not apart <= ROUNDING:
                 sys.exit(f"{robot}, {name}: {apart:.1e} from the CPU, {ROUNDING} are allowed")
@@ -109,13 +110,13 @@ def table(
             for n in batches:
                 try:
                     resident, copied = (f"{x:.3g}" for x in ours(model, kernel, n))
-                except (RuntimeError, ValueError) as refused:  # too little memory, or too many states in a call
+                except (RuntimeError, ValueError) as refused:  # too little memory, or too many states
                     resident, copied = str(refused).split(",")[0], "–"
                 print(f"| {about} | {n} | {resident} | {copied} |", flush=True)
 
 
 def mujoco_model(path: Path, is_free: bool) -> Any:
-    """Returns the robot in MuJoCo, without shapes and contacts."""
+    """Returns the robot as a model of MuJoCo, without shapes and contacts."""
     import mujoco
     from world import bare
 

@@ -1,12 +1,13 @@
-//! Growth of the analytic derivatives with the size and shape of a tree, compared with dual numbers and central
+//! Times the analytic derivatives for several sizes and shapes of a tree, compared with dual numbers and central
 //! differences: `cargo bench -p condyle-benches --bench derivatives`.
 //!
-//! The throughput is in pairs of a joint and one of its ancestors or itself. There are n · depth such pairs, where
-//! depth is the mean number of joints on the path to the world. Constant throughput means that the cost grows as O(n ·
-//! depth).
+//! The throughput is in pairs that consist of a joint and one of its ancestors or the joint itself. The number of such
+//! pairs is n · depth, where depth is the mean number of joints on the path to the world. If the throughput is
+//! constant, the cost grows as O(n · depth).
 //!
-//! Analytic derivatives on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`: µs (ns per pair),
-//! factor of time with dual numbers, factor of time with differences:
+//! Results for n = 8, 32 and 128 on a Xeon with AVX-512 under `chrt -f 20 taskset -c 1`. A cell has the times of
+//! analytic derivatives in µs, these times per pair in ns, and the ranges of two factors: how much longer dual numbers
+//! take, and how much longer differences take.
 //!
 //! | | shape | n = 8, 32, 128 |
 //! | --- | --- | --- |
@@ -23,8 +24,9 @@
 //! | λᵀ∂²q̈ | binary tree | 4.1, 26, 360 (196, 189, 464) 25–315, 18–143 |
 //! | λᵀ∂²q̈ | star | 4.0, 20, 259 (264, 323, 1017) 23–233, 17–132 |
 //!
-//! ∂τ and λᵀ∂²τ grow as O(n · depth), until n² zeros have to be written. ∂q̈ grows in the same way on chains, where it
-//! is solved for. On other trees it is a product, as is the additional part of λᵀ∂²q̈ on all trees, and grows faster.
+//! ∂τ and λᵀ∂²τ grow as O(n · depth), until most of the time is for writing n² zeros. ∂q̈ grows in the same way on
+//! chains, where a linear system is solved for it. On other trees ∂q̈ is a product and grows faster; the same holds on
+//! all trees for the additional product in λᵀ∂²q̈.
 use condyle::{
     Data, Model, Scalar, aba, aba_derivatives,
     derivatives::{LaneJacobian, StateFunction, aba_hessian, rnea_hessian},
@@ -41,7 +43,7 @@ use std::time::Duration;
 
 const SIZES: [usize; 5] = [8, 16, 32, 64, 128];
 
-/// Returns the number of pairs of a joint and one of its ancestors or itself.
+/// Returns the number of pairs that consist of a joint and one of its ancestors or the joint itself.
 fn pairs(model: &Model) -> u64 {
     let mut depth = vec![0; model.bodies().len()];
     for (i, body) in model.bodies().iter().enumerate().skip(1) {
@@ -50,7 +52,7 @@ fn pairs(model: &Model) -> u64 {
     depth.iter().sum()
 }
 
-/// q, v, a or τ, and λ.
+/// A state (q, v), a vector that serves as a or τ, and λ.
 struct State {
     q: Vec<f64>,
     v: Vec<f64>,
@@ -67,7 +69,7 @@ impl State {
     }
 }
 
-/// Calls `f` at (q ⊕ δ, v + δ, x + δ), with a step in each direction in turn: of q, of v and of x.
+/// Calls `f` at (q ⊕ δ, v + δ, x + δ) with steps in one direction after the other: all directions of q, of v and of x.
 fn along_each<S: Scalar>(
     model: &Model,
     s: &State,
@@ -102,8 +104,8 @@ fn along_each<S: Scalar>(
 
 type Group<'c> = BenchmarkGroup<'c, WallTime>;
 
-/// Measures one method for all derivatives. `steps` are the steps in one direction that give one derivative with this
-/// number type.
+/// Measures one method for all derivatives. `steps` are the steps in one direction that the method needs for one
+/// derivative, in its type of numbers.
 fn by_steps<S: Scalar>(group: &mut Group<'_>, way: &str, n: usize, model: &Model, s: &State, steps: &[S]) {
     let (mut data, nv) = (Data::<S>::new(model), model.nv());
     group.bench_function(BenchmarkId::new(format!("∂τ {way}"), n), |b| {
@@ -114,7 +116,7 @@ fn by_steps<S: Scalar>(group: &mut Group<'_>, way: &str, n: usize, model: &Model
             along_each(model, s, 3 * nv, steps, |q, v, tau| _ = black_box(aba(model, &mut data, q, v, tau, &[])))
         });
     });
-    // from the analytic first derivatives; ∂²/∂a∂a is known and not computed
+    // This starts from the analytic first derivatives. ∂²/∂a∂a is known and not computed.
     group.bench_function(BenchmarkId::new(format!("λᵀ∂²τ {way}"), n), |b| {
         let mut call = |q: &[S], v: &[S], a: &[S]| _ = black_box(rnea_derivatives(model, &mut data, q, v, a, &[]));
         b.iter(|| along_each(model, s, 2 * nv, steps, &mut call));
@@ -141,7 +143,7 @@ fn by_hand(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
     });
 }
 
-/// The function `rnea` or `aba` of (q, v, x).
+/// The function `rnea` or `aba` with the arguments (q, v, x).
 struct Dynamics<'m> {
     model: &'m Model,
     forward: bool,
@@ -159,7 +161,7 @@ impl StateFunction for Dynamics<'_> {
     }
 }
 
-/// Measures dual numbers in lanes: each lane of a vector has its own direction.
+/// Measures dual numbers in lanes. Each lane of a vector has another direction.
 fn by_lanes(group: &mut Group<'_>, n: usize, model: &Model, s: &State) {
     let x = [&s.q[..], &s.v, &s.x].concat();
     let mut jacobian = LaneJacobian::new(model, x.len(), model.nv());

@@ -1,5 +1,5 @@
-//! The rigid-body algorithms, their derivatives, and the terms of the equations of motion, one call on one state:
-//! `cargo bench -p condyle-benches --bench dynamics`.
+//! Times the rigid-body algorithms, their derivatives, and the terms of the equations of motion, with one call on one
+//! state: `cargo bench -p condyle-benches --bench dynamics`.
 
 use condyle::{
     Data, Model, aba, aba_derivatives,
@@ -14,10 +14,10 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 
-/// Number of states used in turn, so that branch prediction cannot learn a single one.
+/// Number of states that are used in turn, so that branch prediction cannot learn a single state.
 const STATES: usize = 16;
 
-/// A position, a velocity, and an acceleration or effort.
+/// A position, a velocity, and a vector that serves as acceleration or effort.
 struct State {
     q: Vec<f64>,
     v: Vec<f64>,
@@ -35,7 +35,7 @@ fn states(model: &Model) -> Vec<State> {
         .collect()
 }
 
-/// Computes the results of `compute_all_terms` by separate functions.
+/// Computes the results of `compute_all_terms` by one function for each result.
 fn apart(model: &Model, data: &mut Data<f64>, s: &State) {
     black_box(crba(model, data, &s.q));
     black_box(nonlinear_effects(model, data, &s.q, &s.v));

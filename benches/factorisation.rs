@@ -1,7 +1,7 @@
-//! Which way of forward dynamics and of M⁻¹ is fastest, for which size and shape of a tree:
-//! `cargo bench -p condyle-benches --bench factorisation`. The rule in `ForwardDynamicsMethod::fastest` rests on its
-//! figures. `docs/performance.md` has the table. The factor inverts faster than the recursion while its rows have at
-//! most about 12 entries in the mean.
+//! Finds the fastest method for forward dynamics and for M⁻¹, for several sizes and shapes of a tree: `cargo bench -p
+//! condyle-benches --bench factorisation`. `ForwardDynamicsMethod::fastest` has a rule that follows from these results;
+//! `docs/performance.md` has the table. The factor gives M⁻¹ faster than the recursion if its rows have at most about
+//! 12 entries on average.
 #![allow(non_snake_case)]
 
 use condyle::{
@@ -89,7 +89,7 @@ fn factorisation(c: &mut Criterion) {
     }
 }
 
-/// Times both factors of M.
+/// Measures the sparse and the dense factor of M.
 fn factors(c: &mut Criterion, name: &str, model: &Model) -> (Ltdl<f64>, Cholesky<f64>) {
     let q = random_configuration(model, &mut StdRng::seed_from_u64(1));
     let M = crba(model, &mut Data::new(model), &q).clone();
@@ -101,7 +101,7 @@ fn factors(c: &mut Criterion, name: &str, model: &Model) -> (Ltdl<f64>, Cholesky
     (sparse, dense)
 }
 
-/// Several humanoids in one model.
+/// Measures models that contain several humanoids.
 fn crowds(c: &mut Criterion) {
     for n in [2, 4, 8, 22] {
         let (one, mut builder) = (robots::humanoid(), ModelBuilder::new("crowd"));

@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Measures the timing figures of README and book, and writes them into the pages.
+"""Measures the timing figures of the README and of the book, and writes these figures into the pages.
 
     python3 benches/figures.py measure [PART ...]   # into benches/figures.json; all parts take about an hour
     python3 benches/figures.py write                # from the JSON into the pages
     python3 benches/figures.py check                # fails if a page and the JSON differ
 
-A table is written between `<!-- figures: NAME -->` and `<!-- end -->`. QUOTES lists each sentence that holds figures:
-its words stay as they are, its figures are replaced. Measuring needs an idle machine with two cores.
+A table is written between `<!-- figures: NAME -->` and `<!-- end -->`. QUOTES lists each sentence that contains
+figures: the words of the sentence stay as they are, and the figures are replaced. Measuring needs an idle machine with
+two cores.
 """
 
 import argparse
@@ -37,11 +38,12 @@ COMMANDS = {
 }
 """Command that measures each part."""
 WITHOUT_OPTION = ("casadi", "slopes")
-"""Parts whose command prints one JSON object, without an option --json."""
+"""Parts whose command prints one JSON object and has no option --json."""
 
 
 def measure(part: str) -> Any:
-    """Runs the command of a part. Returns its records, or criterion's medians (ns) by group and function."""
+    """Runs the command of a part. Returns the records that the command prints, or criterion's medians (ns) by group and
+    function."""
     command = COMMANDS[part]
     words = [word for word in command.split() if "=" not in word]
     environment = os.environ | dict(word.split("=") for word in command.split() if "=" in word)
@@ -62,7 +64,7 @@ def measure(part: str) -> Any:
 
 
 def machine() -> dict[str, str]:
-    """Returns the processor, its vector extension and the date."""
+    """Returns the name of the processor, its vector extension and the date."""
     lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     [name, *_] = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
     [flags, *_] = [line for line in lines if line.startswith("flags")]
@@ -71,7 +73,7 @@ def machine() -> dict[str, str]:
 
 
 class Figures:
-    """Figures of the JSON, by the names that pages use."""
+    """Figures in the JSON, by the names that the pages use."""
 
     def __init__(self, results: dict[str, Any]) -> None:
         self.results = results
@@ -100,7 +102,7 @@ ALGORITHMS = ("rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivative
 
 
 def dynamics_table(figures: Figures, mode: str) -> str:
-    """Returns a table of ratios to Pinocchio, with our time in brackets (µs)."""
+    """Returns a table of ratios to Pinocchio, with Condyle's time in brackets (µs)."""
     lines = [f"| {mode}: ratio (ours in µs) | " + " | ".join(ROBOTS) + " |", "| --- |" + " --- |" * len(ROBOTS)]
     names = list(dict.fromkeys(r["algorithm"] for r in figures.rows("dynamics") if r["mode"] == mode))
     for name in [name for name in names if mode == "a horizon" or name in ALGORITHMS]:
@@ -148,7 +150,8 @@ def us(ns: float) -> str:
 
 
 def ways_table(figures: Figures) -> str:
-    """Returns the table of forward dynamics by three methods, of the factor alone, and of the inverse of M."""
+    """Returns the table of forward dynamics by three methods, with the times of the factor alone and of the inverse of
+    M."""
     groups = figures.medians("factorisation")
     names = [group.partition("/")[2] for group in groups if group.startswith("forward dynamics/")]
     order = ["arm7", "quadruped", "humanoid"]
@@ -170,7 +173,8 @@ def ways_table(figures: Figures) -> str:
 
 
 def generated_table(figures: Figures) -> str:
-    """Returns the table of generated C: ns of a call, its ratios to our call and to Pinocchio's, and operations."""
+    """Returns the table of generated C: the time of a call (ns), its ratios to the call of Condyle and of Pinocchio,
+    and the operations."""
     rows = {(row["robot"], row["function"]): row for row in figures.rows("generated")}
     lines = ["| ns (ratios) | panda | anymal | talos | operations |", "| --- | --- | --- | --- | --- |"]
     for name in ALGORITHMS:
@@ -194,7 +198,7 @@ def cppadcodegen_table(figures: Figures) -> str:
 
 
 def threads_table(figures: Figures) -> str:
-    """Returns the table of an iteration of FDDP on two threads, as a part of one thread's time."""
+    """Returns the table of an iteration of FDDP on two threads, as fractions of the time on one thread."""
     rows = {(row["name"], row["way"]): row for row in figures.rows("threads")}
     lines = ["| time on two threads / on one | " + " | ".join(FDDP) + " |", "| --- |" + " --- |" * len(FDDP)]
     kinds = [("whole", "2 threads", "total"), ("derivatives that the sweep waits for", "2 threads", "derivatives")]
@@ -253,7 +257,7 @@ DIVIDED = ("chain of 100", "chain of 300", "chain of 1000", "star of 100", "star
 
 
 def divided_table(figures: Figures) -> str:
-    """Returns the table of divide and conquer with two halves, each by recursion."""
+    """Returns the table of divide and conquer with two halves. Each half is computed by recursion."""
     groups = figures.medians("divide_conquer")
     lines = ["| µs | `aba` | one thread | two threads |", "| --- | --- | --- | --- |"]
     for name in DIVIDED:
@@ -288,13 +292,13 @@ TABLES: dict[str, Callable[[Figures], str]] = {
 
 
 def spread(f: Figures, algorithm: str, mode: str) -> tuple[str, str]:
-    """The least and the greatest ratio to Pinocchio among the robots."""
+    """Returns the least and the greatest ratio to Pinocchio among the robots."""
     ratios = [f.ratio(algorithm, robot, mode) for robot in ROBOTS]
     return f"{min(ratios):.2f}", f"{max(ratios):.2f}"
 
 
 def share_of_sum(f: Figures, group: str) -> tuple[str, str]:
-    """Returns the least and the greatest time of the faster factor, as a multiple of ABA's."""
+    """Returns the least and the greatest ratio of two times: the faster factor of M, and ABA."""
     ratios = [
         min(ways["Dense"], ways["Sparse"]) / ways["ArticulatedBody"]
         for name, ways in f.medians("factorisation").items()
@@ -309,17 +313,17 @@ def times_of(f: Figures, name: str, slow: str, fast: str, group: str = "forward 
 
 
 def columns_to_crba(f: Figures, robot: str, n: int) -> str:
-    """Returns the time of n calls of RNEA as a multiple of one call of CRBA."""
+    """Returns the time of n calls of RNEA as a multiple of the time of one call of CRBA."""
     return f"{n * f.us('rnea', robot) / f.us('crba', robot):.0f}"
 
 
 def differences(f: Figures, calls: int) -> str:
-    """Returns the time of `calls` calls of RNEA as a multiple of its derivatives, on TALOS."""
+    """Returns the time of `calls` calls of RNEA as a multiple of the time of the derivatives of RNEA, for TALOS."""
     return f"{calls * f.us('rnea', 'talos') / f.us('rnea_derivatives', 'talos'):.0f}"
 
 
 def generated_gain(f: Figures, names: tuple[str, ...]) -> list[str]:
-    """Returns the least and the greatest time of the library's call as a multiple of generated code's."""
+    """Returns the least and the greatest ratio of two times: the library's call, and generated code."""
     gains = [
         f.us(row["function"], row["robot"]) * 1e3 / row["ns"] for row in f.rows("generated") if row["function"] in names
     ]
@@ -332,7 +336,7 @@ def fddp_spread(f: Figures) -> list[str]:
 
 
 def all_ratios(f: Figures, mode: str) -> list[str]:
-    """Returns the least and the greatest ratio to Pinocchio over algorithms and robots."""
+    """Returns the least and the greatest ratio to Pinocchio among all algorithms and robots."""
     ratios = [f.ratio(name, robot, mode) for name in ALGORITHMS for robot in ROBOTS]
     return [f"{min(ratios):.2f}", f"{max(ratios):.2f}"]
 
@@ -451,17 +455,19 @@ QUOTES: list[tuple[str, str, Callable[[Figures], list[str]]]] = [
         lambda f: [*spread(f, "rnea", "per state of a batch"), *spread(f, "rnea", "one call")],
     ),
 ]
-"""Sentences of pages: the page, the sentence with {} for each figure, and the figures."""
+"""Sentences in pages: the page, the sentence with {} in place of each figure, and the function that returns the
+figures."""
 
 
 def quote(sentence: str) -> re.Pattern[str]:
-    """Returns the pattern of a sentence with a group for each figure; it may be broken into lines."""
+    """Returns the pattern of a sentence with a group for each figure. In the page, the sentence may be broken into
+    lines."""
     parts = (re.sub(r"(?:\\ )+", r"\\s+", re.escape(part)) for part in sentence.split("{}"))
     return re.compile(r"(\d+(?:\.\d+)?)".join(parts))
 
 
 def filled(path: Path, text: str, figures: Figures) -> str:
-    """A page with the figures of the JSON."""
+    """Returns the text of a page with the figures from the JSON."""
     for name, table in TABLES.items():
         begin, end = f"<!-- figures: {name} -->", "<!-- end -->"
         pattern = re.compile(re.escape(begin) + r"\n.*?" + re.escape(end), re.DOTALL)

@@ -1,15 +1,17 @@
 #!/usr/bin/env python3
-"""Times generated C, compared with Pinocchio compiled for the same processor, and with our pass on plain f64.
+"""Times generated C. Compares it with Pinocchio compiled for the same processor, and with Condyle's library for the
+type f64.
 
     python benches/generated.py [--json] [--rounds N] [--cpu K] [ROBOT ...]
 
-Generated code is compiled by CC, else clang, else gcc, and called with 64 states in turn, as is Pinocchio, which
-benches/peers/dynamics.py builds (some ten minutes the first time). Pinocchio's own generated code is what CppADCodeGen
-makes of its recursions (benches/peers/cppadcg.cpp, some ten minutes more), compiled by the same compiler with the same
-options. One program calls it and ours in turn: their ratio is the median over the rounds. A time is the shortest, as
-the rest is what else the machine does. Our passes are timed by `cargo bench -p condyle-codegen --bench generated`:
-limbs one after the other, and in parallel lanes; then batches, compared with vectors of eight states. --json prints a
-record a line instead of tables, without our passes. Needs Linux, Rust, compilers of C and C++, and the package condyle.
+Generated code is compiled by CC, else by clang, else by gcc, and called with 64 states in turn. Pinocchio is called in
+the same way; benches/peers/dynamics.py builds it (about ten minutes the first time). Pinocchio's own generated code is
+what CppADCodeGen makes from Pinocchio's recursions (benches/peers/cppadcg.cpp, about ten minutes more). It is compiled
+by the same compiler with the same options. One program calls both generated codes in turn: their ratio is the median
+over the rounds. A time is the shortest one, since other work on the machine only adds time. Condyle's library is timed
+by `cargo bench -p condyle-codegen --bench generated`: limbs one after the other and in parallel lanes, and batches,
+which are compared with vectors of eight states. --json prints one record per line instead of tables, without the times
+of the library. The program needs Linux, Rust, compilers of C and C++, and the package condyle.
 """
 
 import argparse
@@ -88,8 +90,8 @@ def compiler() -> str:
 def measured(
     model: condyle.Model, function: str, states: Path, rounds: int, cpu: int, theirs: Path
 ) -> "dict[str, float | None]":
-    """Measures a function as generated C: ns of a call, operations, KB of the program, s of the compiler; also
-    CppADCodeGen's ns, if it has that function, and the ratio.
+    """Measures a function as generated C: time of a call (ns), operations, size of the program (KB), and time of the
+    compiler (s). Also measures CppADCodeGen's time (ns) and the ratio, if CppADCodeGen has this function.
     """
     stem, files, [(_, inputs, outputs, operations, _)] = condyle._condyle._generate(model, [function], "c")
     width = model.nq + 3 * model.nv
@@ -125,7 +127,7 @@ def measured(
 
 
 def record_theirs(program: Path, model: Path, states: Path) -> Path:
-    """Returns the folder of Pinocchio's generated code for a model, with a library for each function."""
+    """Returns the folder with Pinocchio's generated code for a model. It contains a library for each function."""
     folder = dynamics.PEERS / f"cppadcg-{model.stem}-{Path(compiler()).name}"
     if not (folder / "aba_derivatives.so").exists():
         folder.mkdir(exist_ok=True)

@@ -1,9 +1,9 @@
-//! Budgets of a horizon, by criterion: what a solver asks of the dynamics at N knots, and one iteration of FDDP.
-//! `cargo bench -p condyle-benches --bench horizon`
+//! Times the work of a solver for a horizon with N knots: the dynamics at all knots, and one iteration of FDDP. `cargo
+//! bench -p condyle-benches --bench horizon`
 //!
-//! At each knot RNEA, ABA and the derivatives of both are computed: one call at a time, as a batch on one thread (knots
-//! in the lanes of vectors), and as a batch on all threads. An iteration of FDDP goes on from the last solution with a
-//! disturbed initial state, as an MPC asks for it. `condyle budget` measures a robot of yours.
+//! At each knot, RNEA, ABA and the derivatives of both are computed. Three variants are measured: one call at a time, a
+//! batch on one thread (several knots in the lanes of vectors), and a batch on all threads. An iteration of FDDP starts
+//! from the last solution with a disturbed initial state, as in MPC. `condyle budget` measures the same for any robot.
 
 use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{Fddp, Problem};
@@ -19,12 +19,12 @@ use std::thread::available_parallelism;
 use std::time::Duration;
 
 const KNOTS: [usize; 5] = [20, 60, 100, 115, 200];
-/// Seconds from knot to knot.
+/// Time between two knots (s).
 const DT: f64 = 0.01;
-/// Distance of a new initial state from the last one (rad, m, and per s).
+/// Maximum distance of a new initial state from the last one (rad and m, and per second for velocities).
 const DISTURBANCE: f64 = 1e-3;
 
-/// Positions, velocities, accelerations and efforts of knots, one knot after the other.
+/// Positions, velocities, accelerations and efforts of all knots, one knot after the other.
 struct States {
     q: Vec<f64>,
     v: Vec<f64>,
@@ -40,7 +40,7 @@ impl States {
         Self { q, v, a, tau }
     }
 
-    /// One call after the other.
+    /// Computes one knot after the other in single calls.
     fn single(&self, model: &Model, data: &mut Data<f64>) {
         let (nq, nv) = (model.nq(), model.nv());
         for k in 0..self.q.len() / nq {
@@ -53,7 +53,7 @@ impl States {
         }
     }
 
-    /// All knots in each call.
+    /// Computes all knots as a batch.
     fn batch(&self, model: &Model, batch: &mut Batch) {
         let Self { q, v, a, tau } = self;
         black_box(batch.rnea(model, q, v, a, &[]));
@@ -91,7 +91,7 @@ fn dynamics(c: &mut Criterion) {
     }
 }
 
-/// Stay where you are, with little effort.
+/// Returns the problem of staying at the initial state with little effort, and initial controls.
 fn problem(model: &Arc<Model>, knots: usize) -> (Problem, Vec<f64>) {
     let x0 = [neutral(model), vec![0.0; model.nv()]].concat();
     let state =
@@ -114,7 +114,7 @@ fn iterations(c: &mut Criterion) {
                 let (mut problem, us) = problem(&model, knots);
                 let x0 = problem.x0().to_vec();
                 let mut solver = Fddp::new(&problem);
-                solver.settings.tolerance = 0.0; // it makes all iterations that it may
+                solver.settings.tolerance = 0.0; // makes the solver use the maximum number of iterations
                 (solver.settings.threads, solver.settings.max_iterations) = (threads, 3);
                 solver.solve(&mut problem, &x0.repeat(knots + 1), &us).expect("states and controls fit");
                 solver.settings.max_iterations = 1;
@@ -131,7 +131,7 @@ fn iterations(c: &mut Criterion) {
                     });
                 });
                 if threads == self::threads() {
-                    break; // one core: both are the same
+                    break; // with one core, both numbers of threads are 1
                 }
             }
         }

@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
-"""Counts the instructions of the algorithms at SIMD level AVX2, and fails if a count has grown by more than 3 %.
+"""Counts the instructions of the algorithms at SIMD level AVX2. Fails if a count has grown by more than 3 %.
 
     python3 benches/instructions.py [--write]
 
-It runs benches/instructions.rs under callgrind (of valgrind), and compares with benches/instructions.json, which
---write replaces. Another compiler than the baseline's gives other counts: they are printed without a comparison.
+The program runs benches/instructions.rs under callgrind (of valgrind), and compares the counts with
+benches/instructions.json, which --write replaces. If the compiler is not the compiler of that file, counts differ: they
+are printed without a comparison.
 """
 
 import argparse
@@ -21,9 +22,9 @@ ROOT = Path(__file__).resolve().parents[1]
 BASELINE = Path(__file__).with_suffix(".json")
 ROBOTS = ("arm7", "quadruped", "humanoid")
 STATES, KNOTS, ITERATIONS = 16, 32, 5
-"""Numbers of states, knots and iterations, as in instructions.rs."""
+"""Numbers of states, knots and iterations, equal to the numbers in instructions.rs."""
 PHASES = {"Fddp::calc_diff": "fddp_derivatives", "Fddp::sweep": "fddp_sweep", "LineSearch::run": "fddp_rollout"}
-"""Parts of an iteration of FDDP, by the solver's function."""
+"""Names of the parts of an FDDP iteration, by the function of the solver."""
 GROWTH = 1.03
 LINE = re.compile(r"^\s*([\d,]+) .*\b(?:instructions::measured::(\w+)|((?:Fddp|LineSearch)::\w+))")
 
@@ -43,14 +44,14 @@ def build(bench: str = "instructions", profile: str = "release") -> Path:
 
 
 def counts(program: Path, robot: str) -> dict[str, int]:
-    """Counts instructions of each algorithm for one state, and of each part of an FDDP iteration for one knot."""
+    """Counts the instructions of each algorithm for one state, and of each part of an FDDP iteration for one knot."""
     with TemporaryDirectory() as folder:
         profile = Path(folder) / "profile"
         command = ("valgrind", "--quiet", "--tool=callgrind", f"--callgrind-out-file={profile}", program, robot)
         run(*command, env={**os.environ, "CONDYLE_LEVEL": "avx2"})
         table = run("callgrind_annotate", "--inclusive=yes", "--threshold=100", "--auto=no", profile)
     found: dict[str, int] = {}
-    for match in filter(None, map(LINE.match, table.splitlines())):  # a function has a line for each of its files
+    for match in filter(None, map(LINE.match, table.splitlines())):  # a function has one line for each of its files
         name, n = match[2] or match[3], int(match[1].replace(",", ""))
         if match[3] and name not in PHASES:
             continue

@@ -1,5 +1,6 @@
-//! Instructions of each algorithm, for `instructions.py`, which runs this program under callgrind and finds the
-//! functions by name. Counts resolve a change of a thousandth, while times differ by a tenth from run to run.
+//! Runs each algorithm, so that `instructions.py` can count its instructions: the script runs this program under
+//! callgrind, which finds the functions by name. Instruction counts show a change of a thousandth, while times differ
+//! by a tenth from run to run.
 
 use condyle::optimal::robot::{Activation, Contact, ContactDynamics, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem};
@@ -9,7 +10,7 @@ use rand::{RngExt, SeedableRng};
 use std::hint::black_box;
 use std::sync::Arc;
 
-/// Number of states, used one after the other.
+/// Number of states that are used one after the other.
 const STATES: usize = 16;
 
 struct States {
@@ -34,7 +35,7 @@ impl States {
     }
 }
 
-/// Defines one function for each algorithm, which callgrind sees by its name.
+/// Defines one function for each algorithm. callgrind identifies it by its name.
 macro_rules! measured {
     ($($name:ident($m:ident, $d:ident, $q:ident, $v:ident, $x:ident) $call:expr;)*) => {
         mod measured {
@@ -68,11 +69,12 @@ measured! {
     aba_derivatives(m, d, q, v, x) condyle::aba_derivatives(m, d, q, v, x, &[]);
 }
 
-/// Number of FDDP iterations, and number of knots.
+/// Number of FDDP iterations. The next constant is the number of knots.
 const ITERATIONS: usize = 5;
 const KNOTS: usize = 32;
 
-/// Builds a motion in which a robot bends its joints while its feet, if any, stay, and then comes to rest.
+/// Builds a motion with a warm start: a robot bends its joints and then comes to rest. Its feet, if it has any, stay on
+/// the ground.
 fn motion(robot: &Arc<Model>, feet: &[&str], bent: &[(&str, f64)]) -> (Problem, Vec<f64>, Vec<f64>) {
     let (nv, mut q) = (robot.nv(), neutral(robot));
     for (joint, angle) in bent {
@@ -133,7 +135,8 @@ fn main() {
 
     let (d, b, s) = (&mut Data::new(&m), &mut Batch::new(&m, STATES, 1), &States::random(&m));
     all(&m, d, s);
-    black_box(b.aba_derivatives(&m, &s.q, &s.v, &s.x, &[])); // the first call that returns matrices allocates them
+    // A first call allocates the matrices that it returns, so this call is not counted.
+    black_box(b.aba_derivatives(&m, &s.q, &s.v, &s.x, &[]));
     measured::batch_aba(&m, b, s);
     measured::batch_aba_derivatives(&m, b, s);
 }

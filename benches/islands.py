@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Counts the cost of a quadruped on its feet together with others in one model: instructions for each robot, at the
-AVX2 level.
+"""Counts the instructions for a standing quadruped that shares a model with other quadrupeds. The numbers are
+instructions for each robot, at SIMD level AVX2.
 
     python3 benches/islands.py
 
-It runs benches/islands.rs under callgrind (of valgrind), and prints a table in thousands of instructions.
+The program runs benches/islands.rs under callgrind (of valgrind), and prints a table in thousands of instructions.
 """
 
 import os

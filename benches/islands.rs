@@ -1,7 +1,7 @@
-//! Several quadrupeds on their feet in one model: the time of each, compared with the time of one quadruped alone:
-//! `cargo bench -p condyle-benches --bench islands`, in µs. A second table has the same robots as separate models, one
-//! after the other and shared by threads: the maximum gain of islands solved in parallel. `islands.py` runs this under
-//! callgrind, which identifies the functions by name, and prints instructions.
+//! Times several quadrupeds that stand in one model, compared with one quadruped alone: `cargo bench -p condyle-benches
+//! --bench islands`, in µs per robot. A second table has the same robots as separate models, computed one after the
+//! other or shared by threads. It shows the maximum gain if islands were solved in parallel. `islands.py` runs this
+//! program under callgrind, which identifies the functions by name, and prints instructions.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Model, ModelBuilder, Se3, WORLD, constrained_dynamics,
@@ -20,7 +20,7 @@ const ROBOTS: [usize; 6] = [1, 2, 4, 8, 16, 32];
 /// Duration of the measurement of each function.
 const TIME: Duration = Duration::from_millis(500);
 
-/// Several quadrupeds and their contacts with the ground, one robot after the other.
+/// Several quadrupeds in one model, and their contacts with the ground, one robot after the other.
 struct Herd {
     model: Model,
     data: Data<f64>,
@@ -50,7 +50,7 @@ impl Herd {
     }
 }
 
-/// Defines one function for each algorithm, which callgrind sees by its name.
+/// Defines one function for each algorithm. callgrind identifies it by its name.
 macro_rules! measured {
     ($($name:ident($h:ident) $call:expr;)*) => {
         mod measured {
@@ -73,7 +73,7 @@ measured! {
     impulse_derivatives(h) impulse_dynamics_derivatives(&h.model, &mut h.data, &mut h.set, &h.q, &h.v, 0.0);
 }
 
-/// The time of a call in µs: the least of many.
+/// Returns the time of a call in µs: the shortest of many measurements.
 fn time(mut call: impl FnMut()) -> f64 {
     let (start, mut least) = (Instant::now(), f64::INFINITY);
     while start.elapsed() < TIME {

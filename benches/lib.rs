@@ -1,4 +1,4 @@
-//! Models that several benches use.
+//! Models that several benchmarks use.
 
 use condyle::spatial::Mat3;
 use condyle::tree::BodyId;
@@ -6,7 +6,8 @@ use condyle::{Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-/// Builds a tree of n hinges about changing axes. `parent` gives the parent of each body from 1 to n; 0 is the world.
+/// Builds a tree of n hinges whose axes change from joint to joint. `parent` gives the parent of each body from 1 to n;
+/// 0 is the world.
 pub fn tree(n: usize, parent: impl Fn(usize) -> usize) -> Model {
     let mut rng = StdRng::seed_from_u64(7);
     let mut builder = ModelBuilder::new("tree");

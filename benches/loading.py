@@ -1,10 +1,10 @@
-"""Times the loading of robots: the URDFs of example-robot-data, by this condyle and by another one.
+"""Times the loading of robots, the URDFs of example-robot-data, by this version of condyle and by another version.
 
     python benches/loading.py [OPTION ...]
 
-The options are `--rounds N` and `--beside FOLDER`: a folder with another `condyle` package, for example an earlier
-version. Both load each file in turn, in separate processes; a time is the median over the rounds. Prints a line for
-each robot, and the ratio of the sums.
+The options are `--rounds N` and `--beside FOLDER`, a folder with another `condyle` package, for example an earlier
+version. Both versions load each file in turn, in separate processes; a time is the median over the rounds. The program
+prints a line for each robot, and the ratio of the sums of all times.
 """
 
 import argparse
@@ -32,7 +32,7 @@ for line in sys.stdin:
 
 
 def robots() -> list[Path]:
-    """Returns the URDFs of example-robot-data, from the package's folder."""
+    """Returns the paths of the URDFs of example-robot-data, from the folder of that package."""
     import example_robot_data
 
     folders = (base / "share" / "example-robot-data" / "robots" for base in Path(example_robot_data.__file__).parents)
@@ -41,7 +41,7 @@ def robots() -> list[Path]:
 
 
 def loader(folder: str | None) -> subprocess.Popen[str]:
-    """Starts a process that loads the files whose paths it receives, and returns the time of each."""
+    """Starts a process that receives paths, loads each of these files, and prints the time of each load."""
     environment = os.environ | ({"PYTHONPATH": folder} if folder else {})
     pipe = subprocess.PIPE
     return subprocess.Popen([sys.executable, "-c", LOAD], stdin=pipe, stdout=pipe, text=True, env=environment)

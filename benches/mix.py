@@ -3,17 +3,17 @@
 
     python3 benches/mix.py [--lines] [ROBOT ...] [--of NAME ...]
 
-It runs the program of instructions.py under callgrind (of valgrind), once for each algorithm, and sorts the executed
-instructions by their names in objdump:
+The program runs the benchmark of instructions.py under callgrind (of valgrind), once for each algorithm. It sorts the
+executed instructions by the names that objdump prints:
 
 - arithmetic: sums, products, quotients and roots;
-- load, store: moves of vectors from or to memory; stack: from or to the stack, if there are too few registers;
+- load, store: moves of vectors from or to memory; stack: moves from or to the stack, if there are too few registers;
 - move: shuffles, masks, copies between registers;
 - integer: indices, bounds, branches, calls;
-- C library: sines and cosines, and copies that are function calls.
+- C library: sines, cosines, and copies, if they are function calls.
 
---lines builds the program with line tables, which takes a separate build, and also shows the lines with most
-instructions.
+--lines also shows the lines of source code with the most instructions. For this, the program is built again, with line
+tables.
 """
 
 import argparse
@@ -36,7 +36,7 @@ OBJECT = re.compile(r"^(c?)ob=(\(\d+\))(?: (.+))?$")
 COST = re.compile(r"^0x([0-9a-f]+) \S+ (\d+)$")
 LINE = re.compile(r"crates/(?!core_arch)(\w+/src/\S+?:\d+)")
 SHOWN = 25
-"""Number of lines that are shown."""
+"""Number of source lines that are shown."""
 
 
 def kind(operation: str, operands: str) -> str:
@@ -50,7 +50,8 @@ def kind(operation: str, operands: str) -> str:
 
 
 def executed(program: Path, robot: str, function: str) -> collections.Counter[int]:
-    """Counts the executions of each instruction within a function, by address; libraries have the address 0."""
+    """Counts the executions of each instruction within a function, by the instruction's address. Libraries have the
+    address 0."""
     cost: collections.Counter[int] = collections.Counter()
     with TemporaryDirectory() as folder:
         profile = Path(folder) / "profile"
@@ -71,8 +72,8 @@ def executed(program: Path, robot: str, function: str) -> collections.Counter[in
 
 
 def lines(program: Path, cost: collections.Counter[int]) -> None:
-    """Prints the lines with most executed instructions: the innermost lines outside of `spatial`, which is inlined
-    everywhere."""
+    """Prints the source lines with the most executed instructions. They are the innermost lines outside of `spatial`,
+    which is inlined everywhere."""
     addresses = "\n".join(map(hex, cost))
     table = run("addr2line", "-a", "-i", "-e", program, input=addresses)
     found: collections.Counter[str] = collections.Counter()

@@ -1,15 +1,17 @@
-//! The backward sweep, per knot, with and without the structure of Euler steps:
-//! `cargo bench -p condyle-benches --bench riccati`.
+//! Times the backward sweep per knot, with and without the structure of Euler steps: `cargo bench -p condyle-benches
+//! --bench riccati`.
 //!
-//! µs per knot on a Xeon at 2.5 GHz, default build, smallest of many sweeps of 50 knots, for (ndx, nu) = (76, 32) /
-//! (36, 12) / (18, 9) / (14, 7): AVX-512 with the structure 46 / 8.4 / 2.6 / 1.7, dense 65 / 9.1 / 2.7 / 1.6 · AVX2 63
-//! / 9.1 / 2.7 / 1.7, dense 106 / 11 / 2.9 / 1.8 · baseline 133 / 15 / 3.7 / 2.3, dense 222 / 22 / 4.9 / 2.7. The
-//! structure is used from 16 states on. Of the 46 µs, 36 % are the three products (at 57 GFLOP/s), 24 % are factor and
-//! gains, 10 % are waiting for 200 KB per knot, and the rest are copies and transposes.
+//! The figures are µs per knot on a Xeon at 2.5 GHz, default build, smallest of many sweeps of 50 knots, for (ndx, nu)
+//! = (76, 32) / (36, 12) / (18, 9) / (14, 7). AVX-512 takes 46 / 8.4 / 2.6 / 1.7 with the structure, and 65 / 9.1 / 2.7
+//! / 1.6 for dense matrices. AVX2 takes 63 / 9.1 / 2.7 / 1.7, dense 106 / 11 / 2.9 / 1.8. The baseline takes 133 / 15 /
+//! 3.7 / 2.3, dense 222 / 22 / 4.9 / 2.7. The structure is used from 16 states on. Of the 46 µs, 36 % are the three
+//! products (at 57 GFLOP/s), 24 % are factor and gains, 10 % are waiting for 200 KB per knot, and the rest are copies
+//! and transposes.
 //!
-//! In segments, on one thread, relative to such knots of 46 / 8.1 / 1.6 µs: a knot whose continuation after the segment
-//! is unknown takes 1.4 / 1.3 / 1.0, a link 1.9 / 1.7 / 1.35. The figures of `Sweep::set_segments` follow from these.
-//! The group `segments` has the time of whole sweeps, on one thread and on all threads.
+//! In segments, on one thread, other kinds of knots take longer than these knots of 46 / 8.1 / 1.6 µs. If the
+//! continuation of a knot after its segment is unknown, the knot takes 1.4 / 1.3 / 1.0 times as long. A link takes 1.9
+//! / 1.7 / 1.35 times as long. The figures of `Sweep::set_segments` follow from these ratios. The group `segments` has
+//! the time of whole sweeps, on one thread and on all threads.
 #![allow(non_snake_case)]
 
 use condyle::optimal::{LqNode, Sweep};
@@ -24,10 +26,10 @@ const HORIZON: usize = 50;
 const LONG: usize = 100;
 const DT: f64 = 0.02;
 
-/// A humanoid, a quadruped, an arm of 7 joints and one of 9: (ndx, nu, rows of the free joint).
+/// Sizes of a humanoid, a quadruped, and arms of 7 and 9 joints: (ndx, nu, rows of the free joint).
 const SIZES: [(usize, usize, usize); 4] = [(76, 32, 6), (36, 12, 6), (14, 7, 0), (18, 9, 0)];
 
-/// Returns a knot of semi-implicit Euler steps with a convex cost.
+/// Returns a knot of a problem with semi-implicit Euler steps and a convex cost.
 fn node(rng: &mut StdRng, ndx: usize, nu: usize, free: usize) -> LqNode {
     let nv = ndx / 2;
     let mut random = |rows, columns| DMatrix::from_fn(rows, columns, |_, _| 2.0 * rng.random::<f64>() - 1.0);

@@ -1,19 +1,21 @@
-//! Dense products in registers, compared with the processor's peak: `cargo bench -p condyle-benches --bench tiles`.
+//! Times dense products in registers, compared with the processor's peak: `cargo bench -p condyle-benches --bench
+//! tiles`.
 //!
-//! The peak is the rate of independent products and sums. It is measured before and after each product, since a
-//! machine's clock and its other guests change. The program prints the best of many short rounds.
+//! The peak is the rate of independent multiplications and additions. It is measured before and after each product,
+//! since the clock of a machine and the load by other virtual machines change. The program prints the best of many
+//! short rounds.
 
 use condyle::level::level;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, at_level, product};
 use std::hint::black_box;
 use std::time::Instant;
 
-/// Number of independent sums: more than a processor's latency requires, and fewer than its registers.
+/// Number of independent sums: more than a processor's latency requires, and fewer than a processor's registers.
 const SUMS: usize = 12;
 const TERMS: usize = 4096;
 const ROUNDS: usize = 400;
 
-/// Independent sums, with the number of operations on single numbers.
+/// Computation of independent sums, which also counts the operations on single numbers.
 struct Independent<'a> {
     operations: &'a mut usize,
 }
@@ -37,7 +39,7 @@ impl Vectorized for Independent<'_> {
     }
 }
 
-/// Returns the largest rate in operations per nanosecond over some rounds, each of which returns its number of
+/// Returns the largest rate, in operations per nanosecond, of several rounds. Each round returns the number of its
 /// operations.
 fn fastest(mut round: impl FnMut() -> usize) -> f64 {
     let rate = |()| {

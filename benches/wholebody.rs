@@ -1,5 +1,6 @@
-//! A tick of whole-body control, for robots that stand or move under pushes: one second of recorded ticks, each started
-//! from the controller's own last solution. `cargo bench -p condyle-benches --bench wholebody`
+//! Times a tick of whole-body control, for robots that stand or move under pushes. One second of recorded ticks is
+//! replayed; each tick starts from the controller's own last solution. `cargo bench -p condyle-benches --bench
+//! wholebody`
 
 #[path = "../crates/wholebody/tests/common/workload.rs"]
 mod workload;

@@ -1,11 +1,12 @@
-//! Energy error of each integrator without drives and brakes: a double pendulum that swings chaotically, and a humanoid
-//! that falls and tumbles with loose joints, 10 s each.
+//! Measures the energy error of each integrator without drives and brakes, over 10 s. One robot is a double pendulum
+//! that swings chaotically. The other is a humanoid that falls and tumbles with loose joints.
 //!
-//! Prints a table and draws |E(t) − E(0)|; each point is the greatest value in a hundredth of the time.
+//! The example prints a table and draws |E(t) − E(0)|; each point is the greatest value in a hundredth of the time.
 //!
-//! The humanoid is difficult: its wrists are light, loose, and sometimes near the position in which yaw and roll share
-//! an axis, where joint speeds jump. There, Euler's method uses the Coriolis forces from the beginning of a step, which
-//! adds energy without bound. With steps of 2 ms, the variational integrator reports that its equation has no solution.
+//! The humanoid is difficult. Its wrists are light, loose, and sometimes near the position in which yaw and roll share
+//! an axis; there the joint speeds jump. Near this position, Euler's method uses the Coriolis forces from the beginning
+//! of a step, which adds energy without bound. With steps of 2 ms, the variational integrator reports that its equation
+//! has no solution.
 //!
 //! ```text
 //! cargo run --release --example energy_drift -- energy_drift.svg
@@ -26,7 +27,7 @@ const INTEGRATORS: [(&str, Integrator, &str); 3] = [
     ("variational", Integrator::Variational, "#2e933c"),
 ];
 
-/// A robot and its initial state.
+/// A robot with its initial state.
 struct System {
     name: &'static str,
     model: Model,
@@ -34,7 +35,7 @@ struct System {
     v: Vec<f64>,
 }
 
-/// Creates a pendulum of two rods of 1 m and 1 kg.
+/// Creates a pendulum of two rods, each of 1 m and 1 kg.
 fn double_pendulum() -> Result<System, Error> {
     let joint = Joint::Revolute { axis: Vec3::new(0.0, 1.0, 0.0) };
     let rod = Inertia::from_com(1.0, Vec3::new(0.0, 0.0, -0.5), Sym3 { zz: 0.001, ..Sym3::diagonal(1.0 / 12.0) });
@@ -53,13 +54,13 @@ fn humanoid() -> System {
     System { name: "falling humanoid", model, q, v }
 }
 
-/// Error of the energy over time.
+/// Energy error of an integrator over time.
 struct Drift {
     /// E(0) (J).
     start: f64,
     /// Greatest kinetic energy (J).
     kinetic: f64,
-    /// Greatest |E(t) − E(0)| in each part of the time (J).
+    /// Greatest |E(t) − E(0)| in each hundredth of the time (J).
     errors: Vec<f64>,
     /// E(10 s) − E(0) (J).
     end: f64,
@@ -94,7 +95,7 @@ fn drift(system: &System, integrator: Integrator, dt: f64) -> Result<Drift, Stat
     Ok(drift)
 }
 
-/// Figure with a panel for each system: |E(t) − E(0)| on a logarithmic axis.
+/// Figure with one panel for each system, which shows |E(t) − E(0)| on a logarithmic axis.
 struct Figure {
     svg: String,
     panels: usize,

@@ -1,10 +1,10 @@
-//! Model predictive control of an arm at a fixed rate: it follows a moving point under disturbances.
+//! Model predictive control of an arm at a fixed rate. The tool follows a moving point under disturbances.
 //!
 //! `cargo run --release --example mpc`
 //!
-//! Every 10 ms: read the state, apply u + K (x ⊖ x̄) of the last plan, shift the horizon by a knot, and improve the
-//! plan by one iteration within 5 ms. Prints the error of the tool and the timing of the loop. A delayed solve ends
-//! after its iteration and reports the overrun; the next solve has its whole budget again.
+//! Every 10 ms the loop reads the state, applies u + K (x ⊖ x̄) of the last plan, shifts the horizon by a knot, and
+//! improves the plan by one iteration within 5 ms. The example prints the error of the tool and the timing of the loop.
+//! A delayed solve ends after its iteration and reports the overrun; the next solve has its whole time budget again.
 
 use condyle::optimal::robot::{Activation, Cost, FreeDynamics, Residual};
 use condyle::optimal::{ActionModel, Fddp, Problem, Status};
@@ -17,13 +17,13 @@ const HORIZON: usize = 30;
 const STEPS: usize = 500;
 const BUDGET: Duration = Duration::from_millis(5);
 
-/// Returns the target of the tool, which runs around a circle in 2.5 s.
+/// Returns the target of the tool at a time. The target runs around a circle in 2.5 s.
 fn target(time: f64) -> Vec3<f64> {
     let (sin, cos) = (time * core::f64::consts::TAU / 2.5).sin_cos();
     Vec3::new(0.45, 0.15 * cos, 0.45 + 0.15 * sin)
 }
 
-/// Returns the costs that lead the tool to its target after a number of steps, for this number of controls.
+/// Returns the costs of a knot that lead the tool to the target of step `step`. The knot has this number of controls.
 fn costs(rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
     let follow = Residual::FrameTranslation { frame: "tool".into(), target: target(step as f64 * DT) };
     let effort = Residual::Control { reference: vec![0.0; controls] };
@@ -37,7 +37,8 @@ fn costs(rest: &[f64], step: usize, controls: usize) -> Vec<Cost> {
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arm = Arc::new(robots::arm7());
     let rest = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
-    // One model serves all knots. Each knot has its own target, which it keeps while it moves to the front.
+    // One model of the arm serves all knots. Each knot has its own target, and keeps the target while the knot moves to
+    // the front.
     let mut knot = FreeDynamics::running(arm.clone(), DT, vec![])?;
     for t in 0..HORIZON {
         knot.set_costs(t, costs(&rest, t, 7))?;
@@ -61,20 +62,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
         late.push(due.elapsed());
 
-        // u = ū + K (x ⊖ x̄)
+        // apply u = ū + K (x ⊖ x̄)
         let plan = solver.solution();
         plant.difference(plan.x(0), &x, &mut dx);
         for (i, u) in u.iter_mut().enumerate() {
             *u = plan.u(0)[i] + plan.K[0].row(i).iter().zip(&dx).map(|(k, dx)| k * dx).sum::<f64>();
         }
-        // the arm moves; twice, something hits its elbow
+        // The arm moves. Twice, something hits its elbow.
         plant.calc(0, &x, &u, &mut next);
         if step == STEPS / 3 || step == 2 * STEPS / 3 {
             next[7 + 3] += 1.0;
         }
         x.copy_from_slice(&next);
 
-        // shift the horizon: its last knot and its terminal have new targets
+        // Shift the horizon. Its last knot and its terminal get new targets.
         problem.shift(0)?;
         let knots: &mut FreeDynamics = problem.model_mut(0).expect("it serves all knots");
         knots.set_costs(HORIZON - 1, costs(&rest, step + HORIZON, 7))?;

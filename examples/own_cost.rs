@@ -1,12 +1,13 @@
-//! A user's own cost and its exact derivatives: three lines for the cost, one for gradient and Hessian.
+//! A cost written by a user, with exact derivatives. The cost takes three lines, and gradient and Hessian take one
+//! line.
 //!
-//! The tool should be near a target, with small efforts and near the arm's present position. The cost is written once,
-//! for any number type; Newton's method with the exact Hessian then needs a few steps.
+//! The tool should be near a target, with small efforts, and the arm should stay near its present position. The cost is
+//! written once, for any number type. Newton's method with the exact Hessian then needs only a few steps.
 #![allow(non_snake_case)]
 
 use condyle::{Data, Error, Model, Scalar, Vec3, forward_kinematics, hessian, integrate, robots, terms::gravity};
 
-/// Computes ½ (|p(q) − target|² + 1e-4 |g(q)|² + 1e-2 |q − q₀|²), in m², (N m)² and rad².
+/// Computes ½ (|p(q) − target|² + 1e-4 |g(q)|² + 1e-2 |q − q₀|²), with terms in m², (N m)² and rad².
 fn cost<S: Scalar>(arm: &Model, data: &mut Data<S>, tool: usize, q: &[S]) -> S {
     let off = forward_kinematics(arm, data, q).frame(tool).translation - Vec3::new(0.4, 0.3, 0.4).lift();
     let efforts = gravity(arm, data, q).iter().fold(S::zero(), |sum, &g| g.mul_add(g, sum));
@@ -24,7 +25,7 @@ fn main() -> Result<(), Error> {
         if g.norm() < 1e-12 {
             break;
         }
-        // where the cost is not convex, a multiple of the identity makes the Hessian positive definite
+        // Where the cost is not convex, add a multiple of the identity to make the Hessian positive definite.
         let lowest = H.symmetric_eigenvalues().min();
         H.iter_mut().step_by(8).for_each(|x| *x += (1e-2 - lowest).max(0.0));
         let mut step = H.cholesky().expect("it is positive now").solve(&-g);

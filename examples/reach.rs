@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let target = Vec3::new(0.4, 0.2, 0.5);
     let x0 = [vec![0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0], vec![0.0; 7]].concat();
 
-    // running costs: speed and effort; terminal cost: the point, at rest
+    // Running costs are speed and effort. The terminal costs are the distance to the point and the speed.
     let only_speed = Activation::Weighted([[0.0; 7], [1.0; 7]].concat());
     let state = Residual::State { reference: x0.clone() };
     let effort = Residual::Control { reference: vec![0.0; 7] };

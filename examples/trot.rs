@@ -1,4 +1,4 @@
-//! A quadruped trots: two steps of diagonal legs, with friction cones and impacts, and a page that shows the gait.
+//! A quadruped trots: two steps of diagonal legs, with friction cones and impacts. A page shows the gait.
 //!
 //! ```text
 //! cargo run --release --example trot [PAGE.html]
@@ -14,7 +14,7 @@ use std::sync::Arc;
 use support::{Foot, Gait};
 
 const FEET: [&str; 4] = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"];
-const KNOTS: usize = 20; // per step
+const KNOTS: usize = 20; // per step of the gait
 const DT: f64 = 0.01; // s
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut gait = Gait::new(robot.clone(), &q, Foot::Point, &FEET, DT);
     gait.stand(5)?;
-    gait.step(&[1, 2], 0.08, 0.06, KNOTS)?; // right front and left hind legs
+    gait.step(&[1, 2], 0.08, 0.06, KNOTS)?; // right front leg and left hind leg
     gait.stand(3)?;
     gait.step(&[0, 3], 0.16, 0.06, KNOTS)?;
     gait.stand(3)?;

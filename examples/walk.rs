@@ -1,4 +1,4 @@
-//! A humanoid walks: two steps on soles, with wrench cones and impacts, and a page that shows the gait.
+//! A humanoid walks: two steps on soles, with wrench cones and impacts. A page shows the gait.
 //!
 //! ```text
 //! cargo run --release --example walk [PAGE.html]
@@ -15,7 +15,7 @@ use support::{Foot, Gait};
 
 const FEET: [&str; 2] = ["left_sole", "right_sole"];
 const SOLE: [f64; 2] = [0.2, 0.1]; // m
-const KNOTS: usize = 20; // per step
+const KNOTS: usize = 20; // per step of the gait
 const DT: f64 = 0.03; // s
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -1,6 +1,6 @@
-//! Whole-body control on clarabel alone: the program of `condyle::wholebody`, put together in a hundred lines.
+//! Whole-body control with clarabel alone: a hundred lines write the program of `condyle::wholebody` directly.
 //!
-//! A quadruped stands on four point feet and is pushed. Each millisecond the program
+//! A quadruped stands on four point feet and is pushed. Each millisecond, the program
 //!
 //! ```text
 //! min  ½ w ‖J q̈ + J̇ v − a*‖² + ½ w_p ‖q̈_joints − a*_joints‖² + ½ ε_a ‖q̈‖² + ½ ε_f ‖f − f_ref‖²     over q̈ and f
@@ -9,7 +9,8 @@
 //! ‖f_t‖ ≤ μ f_n                                  each foot in its cone
 //! ```
 //!
-//! is written for clarabel and solved by it. The same tick by `WholeBodyController` is compared.
+//! is written for clarabel, which solves it. The result is compared with the result of `WholeBodyController` for the
+//! same tick.
 //!
 //! ```text
 //! cargo run --release --features clarabel --example wholebody_clarabel
@@ -39,11 +40,12 @@ const TRUNK: f64 = 10.0; // w
 const POSTURE: f64 = 0.1; // w_p
 const SMALL_A: f64 = 1e-6; // ε_a
 const SMALL_F: f64 = 1e-4; // ε_f
-const TOLERANCE: f64 = 1e-11; // of both solvers: where a foot just reaches its cone, the torques depend on its root
+// Tolerance of both solvers. If a foot just reaches its cone, the error of the torques depends on the tolerance's root.
+const TOLERANCE: f64 = 1e-11;
 const DT: f64 = 1e-3; // s
 const PUSH: f64 = 60.0; // N, to the left, from 0.1 s to 0.3 s
 
-/// The entries of a matrix that are not 0.
+/// Returns the non-zero entries of a matrix.
 fn sparse(A: &DMatrix<f64>, upper_triangle: bool) -> CscMatrix<f64> {
     let entries = (0..A.ncols()).flat_map(|j| (0..A.nrows()).map(move |i| (i, j)));
     let kept = entries.filter(|&(i, j)| A[(i, j)] != 0.0 && (i <= j || !upper_triangle));
@@ -52,7 +54,7 @@ fn sparse(A: &DMatrix<f64>, upper_triangle: bool) -> CscMatrix<f64> {
     CscMatrix::new_from_triplets(A.nrows(), A.ncols(), I, J, values)
 }
 
-/// Data of the program: the posture and the trunk's pose to hold.
+/// Data of the program: the posture and the pose of the trunk that are to be held.
 struct Standing<'a> {
     model: &'a Model,
     q: &'a [f64],
@@ -60,7 +62,7 @@ struct Standing<'a> {
 }
 
 impl Standing<'_> {
-    /// (q̈, f) and τ at a state.
+    /// Computes (q̈, f) and τ at a state.
     fn solve(
         &self,
         data: &mut Data<f64>,
@@ -71,7 +73,7 @@ impl Standing<'_> {
         let (n, motors) = (nv + 3 * FEET.len(), nv - 6);
         let M = crba(model, data, q).clone();
         let h = DVector::from_column_slice(nonlinear_effects(model, data, q, v));
-        // Jacobians of the trunk and the feet, and J̇ v: accelerations at q̈ = 0.
+        // Jacobians of the trunk and of the feet, and J̇ v, which is their acceleration at q̈ = 0.
         let trunk = model.frame("trunk")?;
         let feet: Vec<usize> = FEET.iter().map(|foot| model.frame(foot)).collect::<Result<_, _>>()?;
         let (mut J, mut J_foot) = (DMatrix::zeros(6, nv), DMatrix::zeros(6, nv));
@@ -92,7 +94,7 @@ impl Standing<'_> {
         let error = condyle::Motion::new(self.trunk.translation - pose.translation, turn);
         let wanted = error.scale(GAINS.stiffness) - velocity.scale(GAINS.damping) - drift; // a* − J̇ v
         let wanted = DVector::from_column_slice(&wanted.to_array());
-        // The objective ½ xᵀ P x + cᵀ x.
+        // Write the objective ½ xᵀ P x + cᵀ x.
         let (mut P, mut c) = (DMatrix::zeros(n, n), DVector::zeros(n));
         P.view_mut((0, 0), (nv, nv)).copy_from(&(J.transpose() * &J * TRUNK));
         c.rows_mut(0, nv).copy_from(&(J.transpose() * wanted * -TRUNK));
@@ -103,12 +105,12 @@ impl Standing<'_> {
             P[(i, i)] += weight + SMALL_A;
             c[i] -= weight * (GAINS.stiffness * away[i] - GAINS.damping * v[i]);
         }
-        let share = -model.gravity().z * model.total_mass() / feet.len() as f64; // f_ref: an equal part of the weight
+        let share = -model.gravity().z * model.total_mass() / feet.len() as f64; // f_ref: an equal share of the weight
         for k in nv..n {
             P[(k, k)] += SMALL_F;
             c[k] -= if (k - nv) % 3 == 2 { SMALL_F * share } else { 0.0 };
         }
-        // The constraints A x + s = b: s = 0, s ≥ 0, s in cones.
+        // Write the constraints A x + s = b, with s = 0, s ≥ 0, or s in cones.
         let mut E = DMatrix::zeros(nv, n); // τ = E x + h with E = [M, −J_cᵀ]
         E.columns_mut(0, nv).copy_from(&M);
         E.columns_mut(nv, n - nv).copy_from(&-J_c.transpose());

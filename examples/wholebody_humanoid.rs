@@ -1,6 +1,7 @@
-//! A humanoid stands on two soles, shifts its weight to one of them, lifts the other foot, and sets it down.
+//! A humanoid stands on two soles, shifts its weight to one foot, lifts the other foot, and sets it down.
 //!
-//! The lifted foot's contact fades: its force ramps down before the foot leaves the ground, and up after it has landed.
+//! The contact of the lifted foot fades: its force decreases to 0 before the foot leaves the ground, and increases
+//! after the foot has landed.
 //!
 //! ```text
 //! cargo run --release --example wholebody_humanoid [ROBOT.urdf LEFT_SOLE RIGHT_SOLE]
@@ -19,7 +20,8 @@ const SOLE: [f64; 2] = [0.2, 0.1]; // m
 const DT: f64 = 1e-3; // s
 const LIFT: f64 = 0.1; // m
 
-/// Rises smoothly from 0 at one time to 1 at another: returns value, first and second derivative.
+/// Rises smoothly from 0 at the time `from` to 1 at the time `to`. Returns value, first and second derivative at the
+/// time t.
 fn ramp(t: f64, from: f64, to: f64) -> [f64; 3] {
     let (s, w) = (((t - from) / (to - from)).clamp(0.0, 1.0), 1.0 / (to - from));
     let poly = s * s * s * (10.0 + s * (6.0 * s - 15.0));

@@ -1,8 +1,9 @@
-//! A quadruped stands on four point feet, is pushed, sways and returns.
+//! A quadruped stands on four point feet. It is pushed, sways and returns.
 //!
 //! Every millisecond, one cone program gives the torques: whole-body control with true friction cones. The controller
-//! does not know the push; it sees only the state. The ground holds a touching foot as long as it pushes. The ground's
-//! friction is unbounded, so the example checks each force and prints the smallest distance to a cone.
+//! does not know the push; it sees only the state. The simulated ground holds a touching foot as long as the ground
+//! pushes. Friction on this ground is unbounded. So the example checks each force and prints the smallest distance of a
+//! force from the boundary of its cone.
 //!
 //! ```text
 //! cargo run --release --example wholebody_stand
@@ -52,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         error = controller.optimality(&world.q, &world.v, &references).worst().max(error);
 
         let pushed = (200..600).contains(&tick);
-        f_ext[1].linear = if pushed { PUSH } else { Vec3::zero() }; // along the trunk's axes, which hardly rotate
+        f_ext[1].linear = if pushed { PUSH } else { Vec3::zero() }; // along the axes of the trunk, which hardly rotates
         let forces = world.step(&tau, &f_ext, DT);
         let used = forces.iter().map(|f| f.x.hypot(f.y) / (FRICTION * f.z)).fold(0.0, f64::max);
         assert!(used < 1.0 && forces.iter().all(|f| f.z > 0.0), "a foot slips or lifts at tick {tick}");

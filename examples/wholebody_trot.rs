@@ -1,4 +1,5 @@
-//! A quadruped trots along a plan: FDDP finds it, and whole-body control tracks it at 1 kHz on ground that only pushes.
+//! A quadruped trots along a plan that FDDP finds. Whole-body control tracks the plan at 1 kHz, on ground that only
+//! pushes.
 //!
 //! ```text
 //! cargo run --release --example wholebody_trot
@@ -26,7 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut gait = Gait::new(robot.clone(), &q, Foot::Point, &FEET, 0.01);
     gait.stand(10)?;
-    gait.step(&[1, 2], 0.08, 0.06, 20)?; // right front and left hind legs
+    gait.step(&[1, 2], 0.08, 0.06, 20)?; // right front leg and left hind leg
     gait.stand(5)?;
     gait.step(&[0, 3], 0.16, 0.06, 20)?;
     gait.stand(5)?;
@@ -34,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     gait.stand(20)?;
     let touches = gait.touches();
     let (solution, times) = gait.solve()?;
-    // Friction is unbounded on the ground of this example, so the forces are checked.
+    // Friction on the ground of this example is unbounded, so the forces are checked.
     let plan = plan_of(&robot, &solution, &times, &touches, 0.02)?;
 
     let contacts = FEET.map(|foot| FrictionContact::point(foot, FRICTION));

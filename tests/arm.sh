@@ -34,17 +34,17 @@ run() {
     "${cargo[@]}" test --locked --target $target "${packages[@]/#/--package=condyle-}" "$@"
 }
 
-# registers and packers; dense kernels; batches, branches in lanes and products of all results, without the test of memory use;
-# in `./test full` also sweeps
+# Tests registers and packers, dense kernels, batches, branches in lanes, and products of all results. `./test full` also tests
+# sweeps. The test of memory use is left out.
 run --test vectors --test products --test sin_cos --test kernels --test tree ${CONDYLE_FULL:+--test lqr} -- --skip memory_by_state
 checked=vectors
 if [ -n "${CONDYLE_FULL:-}" ]; then
-    # knots side by side, except derivatives by differences of thousands of calls
+    # Tests knots side by side, except derivatives by differences, which take thousands of calls.
     run --test contacts -- --skip derivatives_
     checked=contacts
 fi
 
-# any program with kernels shows vector instructions that were not inlined
+# Checks one program only: every program with kernels would show vector instructions that were not inlined.
 programs=$(run --test $checked --no-run --message-format=json | sed -nE 's/.*"executable":"([^"]+)".*/\1/p')
 for program in ${programs:?}; do
     "${PYTHON:-python3}" tests/symbols.py "$program"

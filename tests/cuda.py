@@ -3,14 +3,14 @@
 
     python tests/cuda.py [--install] [--shares [ROBOT ...]]
 
-It needs the installed package `condyle`, and NVIDIA's wheels with the run-time compiler and the assembler; --install
-installs them into this Python. Without them it prints NOT RUN. It fails if a kernel does not compile, or if an expected
-kernel is missing.
+The program needs the installed package `condyle`, and NVIDIA's wheels with the run-time compiler and the assembler;
+--install installs these wheels into this Python. Without them the program prints NOT RUN. It fails if a kernel does not
+compile, or if an expected kernel is missing.
 
-With --shares it prints the table of docs/generated.md instead, for robots of example-robot-data. For kernels that are
-split among several threads, the table shows the instructions per state in the machine code. It also shows the bytes
-spilled to and from a thread's memory. NVIDIA's disassembler counts them. The code has no branches, except for large
-angles and quotients of tiny numbers, which are counted once.
+With --shares the program prints the table of docs/generated.md instead, for robots of example-robot-data. For kernels
+that are split among several threads, the table shows the instructions per state in the machine code, and the bytes that
+are spilled to and from a thread's memory. NVIDIA's disassembler shows both. The machine code has no branches, except
+for large angles and for quotients of tiny numbers; these branches are counted once.
 """
 
 import argparse
@@ -40,11 +40,11 @@ USED = re.compile(
 )
 LABEL = re.compile(r"^(?:\.text\.)?\$?([\w$]+):", re.MULTILINE)
 INSTRUCTION = re.compile(r"^\s+/\*[0-9a-f]{4,}\*/\s+(?:@!?\w+\s+)?([A-Z][A-Z0-9_.]*)")
-"""Pattern of a line of machine code: the address, optionally the condition, the operation."""
+"""Pattern of a line of machine code: the address, the condition (optional), and the operation."""
 
 
 def wheel(pattern: str) -> Path | None:
-    """Finds a file of NVIDIA's wheels."""
+    """Returns the path of a file in NVIDIA's wheels, or None."""
     found = importlib.util.find_spec("nvidia")
     for folder in (found.submodule_search_locations or []) if found else []:
         for path in sorted(Path(folder).glob(pattern)):
@@ -66,7 +66,7 @@ def assembled(ptxas: Path, made: bytes) -> tuple[str, bytes]:
 
 
 def used(said: str, kernel: str) -> tuple[int, int, int]:
-    """Returns the registers of a thread, and the bytes of its stack and of spills."""
+    """Returns the registers of a thread, the bytes of its stack, and the bytes of its spills."""
     found = {entry: (int(registers), int(stack or 0)) for entry, registers, stack in USED.findall(said)}
     if kernel not in found:
         sys.exit(f"{kernel}: it is not in what was compiled:\n{said}")
@@ -74,7 +74,8 @@ def used(said: str, kernel: str) -> tuple[int, int, int]:
 
 
 def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
-    """Returns the instructions of each share, and the bytes that it moves between registers and the thread's memory."""
+    """Returns the instructions of each share, and the bytes that the share moves between registers and the thread's
+    memory."""
     with NamedTemporaryFile(suffix=".cubin") as file:
         file.write(cubin)
         file.flush()
@@ -92,13 +93,13 @@ def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
             sums[0] += 1
             sums[1] += width if operation.startswith(("LDL", "STL")) else 0
     if len(counts) > 1:
-        counts.pop("", None)  # the code that calls the shares
+        counts.pop("", None)  # the code that calls the shares is not counted
     instructions, moved = zip(*counts.values(), strict=True)
     return list(instructions), list(moved)
 
 
 def table(robots: list[str], ptxas: Path, nvdisasm: Path) -> None:
-    """Prints the resources of kernels for each number of shares; the default number is in brackets."""
+    """Prints the resources of kernels for each number of shares. The default number is in brackets."""
     from example_robot_data.robots_loader import ROBOTS, getModelPath
 
     print("| robot, function, type | shares | registers | stack | instructions | bytes moved |")

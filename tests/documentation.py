@@ -3,8 +3,8 @@
 
     python3 tests/documentation.py
 
-Fails if the first page lists more names than a reader can grasp, or if a page shows names meant only for our own
-crates.
+The program fails if the first page lists more names than a reader can grasp, or if a page shows names that are meant
+only for Condyle's own crates.
 """
 
 import html
@@ -15,7 +15,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST = 70
-"""Maximum number of names on the first page: modules, types, traits, functions, constants."""
+"""Maximum number of names on the first page: modules, types, traits, functions and constants together."""
 INTERNAL = re.compile(r"\b(Alike|Fused|LaneDual|Lanes|Rename|Unused|Witness)\b")
 CRATES = ["condyle", "condyle_dynamics", "condyle_model", "condyle_optimal", "condyle_spatial", "condyle_wholebody"]
 REEXPORTED = {"nalgebra", "num_dual", "rand"}
@@ -23,7 +23,7 @@ REEXPORTED = {"nalgebra", "num_dual", "rand"}
 
 
 def text(page: str) -> str:
-    """Returns the words of a page, without its tags."""
+    """Returns the words of a page without the tags."""
     return html.unescape(re.sub(r"<[^>]*>", " ", page))
 
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Checks that the code for use without an operating system compiles for two processors, and runs its example on a Cortex-M4 that
-# qemu emulates. It needs compilers for them, and qemu-system-arm (`tests/targets.sh install embedded`). Without them it prints
-# NOT RUN.
+# qemu emulates. The script needs compilers for both processors, and qemu-system-arm (`tests/targets.sh install embedded`).
+# Without these it prints NOT RUN.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 . tests/targets.sh
@@ -19,7 +19,7 @@ board=$(mktemp)
 trap 'rm -f "$here" "$board"' EXIT
 cargo run --quiet --locked --package condyle-dynamics --example arm >"$here"
 export CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-$PWD/target}/embedded
-cd examples/embedded # its .cargo/config.toml defines how its program is linked and run
+cd examples/embedded # .cargo/config.toml in this folder defines how the program is linked and run
 "${cargo[@]}" build --release
 if ! command -v qemu-system-arm >/dev/null; then
     echo "NOT RUN: there is no qemu-system-arm"

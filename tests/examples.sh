@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Runs the Rust examples, which assert what they claim: those that take seconds, and with `full` all. What they write goes into
-# a temporary folder.
+# Runs the Rust examples, which assert what they claim. Without `full`, it runs only examples that take seconds. The examples
+# write their files into a temporary folder.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -11,7 +11,7 @@ diff <(printf '%s\n' "${short[@]}" "${long[@]}" | sort) <(basename --suffix .rs 
 
 run=("${short[@]}")
 [ "${1:-}" = full ] && run+=("${long[@]}")
-# features as in `cargo test --workspace`, whose build is reused
+# The features are the same as in `cargo test --workspace`, so that its build is reused.
 cargo build --locked --quiet --workspace "${run[@]/#/--example=}"
 built=$(realpath "${CARGO_TARGET_DIR:-target}")/debug/examples
 folder=$(mktemp -d)

@@ -1,15 +1,15 @@
-//! Mutated external inputs give an error or a usable result, never a panic. This is a bounded, reproducible run of the
-//! fuzz targets in `fuzz/`.
+//! A mutated input gives an error or a usable result, never a panic. This test runs the fuzz targets in `fuzz/` for a
+//! fixed number of reproducible inputs.
 
 #[path = "../fuzz/src/hostile.rs"]
-#[allow(unreachable_pub)] // the fuzz targets use it as a module of a library
+#[allow(unreachable_pub)] // the fuzz targets use this module as a module of a library
 mod hostile;
 
 use hostile::{Kind, mutated};
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-/// Input that is printed if there is a panic.
+/// Input that is printed if a panic occurs.
 struct Case<'a>(Kind, u64, &'a [u8]);
 
 impl Drop for Case<'_> {
@@ -20,8 +20,8 @@ impl Drop for Case<'_> {
     }
 }
 
-/// Checks `count` mutated inputs, or four times as many in `./test full`. The seeds are valid; of the mutated inputs,
-/// some are valid and some are not.
+/// Checks `count` mutated inputs, or four times as many in `./test full`. All seeds are valid; mutated inputs may be
+/// valid or invalid.
 fn run(kind: Kind, count: u64) {
     let count = if std::env::var_os("CONDYLE_FULL").is_some() { 4 * count } else { count };
     let seeds = kind.seeds();

@@ -4,8 +4,9 @@
     python3 tests/packages.py [--verify]
 
 A package must have its licences, its README, the metadata that the registry shows, and all files that its sources
-include. Each dependency must have a version and be published earlier. The size must be within the registry's limit.
-Otherwise the program fails. --verify also compiles each package from its own files, as `cargo publish --dry-run` does.
+include. Each dependency must have a version and be published earlier. The size of the package must be within the
+registry's limit. Otherwise the program fails. --verify also compiles each package from the files in the package, as
+`cargo publish --dry-run` does.
 """
 
 import argparse
@@ -21,7 +22,7 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = ["spatial", "linalg", "meshes", "model", "dynamics", "optimal", "wholebody", "", "codegen", "cli"]
-"""Folders of the crates, each after its dependencies; the empty name is the façade."""
+"""Folders of the crates; each crate is after its dependencies. The empty name is the crate `condyle`."""
 LARGEST = 10 * 1024 * 1024
 """Maximum size of a package on crates.io, in bytes."""
 REQUIRED = {"Cargo.toml", "Cargo.lock", "LICENSE-MIT", "LICENSE-APACHE", "README.md"}
@@ -41,7 +42,7 @@ def manifests() -> dict[str, dict[str, Any]]:
 
 
 def faults(package: Path, manifest: dict[str, Any], before: set[str]) -> list[str]:
-    """Returns the faults of one package; `before` are the crates published before it."""
+    """Returns the faults of one package. `before` are the names of the crates that are published earlier."""
     found = []
     if package.stat().st_size > LARGEST:
         found.append(f"{package.stat().st_size} bytes, at most {LARGEST} are allowed")
@@ -60,7 +61,8 @@ def faults(package: Path, manifest: dict[str, Any], before: set[str]) -> list[st
     found += [f"`{field}` is missing" for field in FIELDS if not manifest[field]]
     for needed in manifest["dependencies"]:
         name, development = needed["name"], needed["kind"] == "dev"
-        if needed["req"] == "*" and name != manifest["name"]:  # itself: features for its tests
+        # A crate may depend on itself without a version, to enable features for its tests.
+        if needed["req"] == "*" and name != manifest["name"]:
             found.append(f"the dependency {name} has no version")
         if name.startswith("condyle") and not development and name not in before:
             found.append(f"{name} is published after it")

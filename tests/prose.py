@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Finds comments and paragraphs that are hard to read, by patterns that are seldom right.
+"""Finds comments and paragraphs that are hard to read. It searches for patterns that are seldom right.
 
     python3 tests/prose.py [PATH…]       check the files below these paths (all files of the repository, if none)
     python3 tests/prose.py --sample      print 100 comments and 50 paragraphs, chosen at random with a fixed seed
     python3 tests/prose.py --count       print the number of findings per folder
 
-Covered are the comments of Rust and C++, the docstrings and comments of Python, and the paragraphs of Markdown.
-Files below TO_DO are not checked unless they are named. Exit status 1: there are findings.
+The program reads the comments of Rust and C++, the docstrings and comments of Python, and the paragraphs of Markdown.
+Files below TO_DO are not checked unless they are named. The exit status is 1 if there are findings.
 """
 
 import argparse
@@ -25,11 +25,11 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 TO_DO: tuple[str, ...] = ("crates/optimal/src/robot",)
-"""Paths that are not yet rewritten."""
+"""Paths of texts that are not yet rewritten."""
 EXCLUDED = ("crates/cli/page/vendor", "python/condyle/_condyle.pyi", "VALIDATION.md", "crates/model/robots")
-"""Paths of vendored or generated text."""
+"""Paths of texts that are copied from elsewhere or generated."""
 LONGEST = 30
-"""Maximum number of words of a sentence; the rule is 25, but a count cannot tell a formula from a word."""
+"""Maximum number of words in a sentence. The rule is 25, but the program cannot distinguish a formula from a word."""
 SEED = 20261127
 
 IRREGULAR = "been|had|done|got|run|set|read|put|found|met|made|kept|built|sent|left|held|lost|led|cut|come|gone"
@@ -47,21 +47,21 @@ PATTERNS = [
     (r"\bare had\b|\bis had\b", "write `are available` or `are computed`"),
     (r"\bit is no\b|\bthere is no one\b", "write `does not …`"),
 ]
-"""Patterns of the worst sentences, with what to write instead."""
+"""Patterns of the worst sentences, each with advice on what to write instead."""
 DOC_START = re.compile(r"(?:What|Of|Who|Whose|How)\b")
-"""First words that a doc comment may not have: it begins with a noun or a verb."""
+"""First words that a doc comment may not have: it must begin with a noun or a verb."""
 
 
 class Passage(NamedTuple):
     path: str
     line: int
     kind: str
-    """`doc` (of an item), `comment` or `paragraph`."""
+    """Kind: `doc` (documentation of an item), `comment` or `paragraph`."""
     text: str
 
 
 def rust(path: str, text: str) -> Iterator[Passage]:
-    """Yields the blocks of comments of a file of Rust or C++, without their code blocks."""
+    """Yields the blocks of comments in a file of Rust or C++, without code blocks inside the comments."""
     block: list[str] = []
     start, marker, code = 0, "", False
     for number, line in enumerate([*text.splitlines(), ""], 1):
@@ -86,7 +86,7 @@ def rust(path: str, text: str) -> Iterator[Passage]:
 
 
 def python(path: str, text: str) -> Iterator[Passage]:
-    """Yields the docstrings and comments of a file of Python."""
+    """Yields the docstrings and comments of a file in Python."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str):
             lines = without_literals(inspect.cleandoc(node.value.value).splitlines())
@@ -97,7 +97,8 @@ def python(path: str, text: str) -> Iterator[Passage]:
 
 
 def without_literals(lines: list[str]) -> list[str]:
-    """Empties the lines of literal blocks, such as commands and formulas: indented, after an empty line."""
+    """Makes the lines of literal blocks empty, such as commands and formulas. These lines are indented and follow an
+    empty line."""
     found: list[str] = []
     literal = False
     for line in lines:
@@ -107,7 +108,7 @@ def without_literals(lines: list[str]) -> list[str]:
 
 
 def markdown(path: str, text: str) -> Iterator[Passage]:
-    """Yields the paragraphs of a page, without code, formulas, tables and headings."""
+    """Yields the paragraphs of a page without code, formulas, tables and headings."""
     lines, code, formula = [], False, False
     for line in text.splitlines():
         if line.lstrip().startswith("```"):
@@ -136,7 +137,7 @@ def paragraphs(lines: list[str]) -> Iterator[tuple[int, str]]:
 
 def passages(path: str) -> list[Passage]:
     file = ROOT / path
-    if not file.is_file():  # deleted, and not yet committed
+    if not file.is_file():  # the file was deleted, but the deletion is not yet committed
         return []
     text = file.read_text(encoding="utf-8")
     reader = {".rs": rust, ".cpp": rust, ".h": rust, ".py": python, ".md": markdown}[file.suffix]
@@ -145,7 +146,7 @@ def passages(path: str) -> list[Passage]:
 
 
 def sentences(text: str) -> list[str]:
-    """Splits a passage where a sentence or its clause ends; code and formulas count as one word."""
+    """Splits a passage at the end of each sentence or clause. Code and formulas count as one word each."""
     text = re.sub(r"`[^`]*`|\$[^$]*\$|\[[^\]]*\]\([^)]*\)|\([^()]*\)", "x", text)
     return re.split(r"(?<=[.;:!?])\s+", text)
 

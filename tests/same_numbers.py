@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Compares the output of two programs: the words must be equal, and the numbers equal up to rounding.
+"""Compares the output of two programs. Words must be equal, and numbers must be equal up to rounding.
 
     python3 tests/same_numbers.py ONE OTHER [--rounding 1e-12] [--only WORD]
 
-Each number may differ by the rounding times the largest number of its line. With --rounding 0 numbers must be equal;
+Each number may differ by the rounding times the largest number in its line. With --rounding 0, numbers must be equal.
 --only selects the lines that begin with a word.
 """
 

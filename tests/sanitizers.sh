@@ -19,7 +19,7 @@ sanitized() {
         echo "NOT RUN: the compiler has no sanitizer '$name' for $host"
         return
     fi
-    # sanitizers are not stable features
+    # RUSTC_BOOTSTRAP is needed, because sanitizers are not stable features.
     RUSTC_BOOTSTRAP=1 RUSTFLAGS="-Z sanitizer=$name" CARGO_TARGET_DIR=${CARGO_TARGET_DIR:-target}/$name \
         cargo test --locked --target "$host" "$@"
 }
@@ -30,7 +30,7 @@ if [ "${1:-}" = products ]; then
         aarch64-*) levels=(baseline neon) ;;
         *) levels=(baseline) ;;
     esac
-    # few features and no debug information, so that little is compiled; one process per SIMD level
+    # Few features and no debug information make the build short. Each SIMD level has its own process.
     export CARGO_PROFILE_DEV_DEBUG=false
     for level in "${levels[@]}"; do
         CONDYLE_LEVEL=$level sanitized address asan --package condyle-dynamics --no-default-features --features std \

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Prints cycles of modules that use each other, and with --sizes the program's size and build time.
+"""Prints cycles of modules that use each other. With --sizes, also prints the program's size and build time.
 
     python3 tests/structure.py [--sizes]
 
-Fails if a cycle has more than three modules, if a line of Rust is wider than 120 characters, or if PROMISES.md
-names a file or test that does not exist. With --sizes it also fails if the program has more than 5.7 MB of code or
-one of its functions more than 64 KB. A module and its children count as one if the child uses only its parent. --sizes
-builds the program from scratch in a separate folder (some minutes) and needs `nm` and `size`.
+The check fails if a cycle has more than three modules, if a line of Rust is wider than 120 characters, or if
+PROMISES.md names a file or test that does not exist. With --sizes, it also fails if the program has more than 5.7 MB of
+code, or if one of its functions has more than 64 KB. A module and its child count as one module if the child uses only
+its parent. --sizes builds the program from scratch in a separate folder (several minutes), and needs `nm` and `size`.
 """
 
 import argparse
@@ -27,7 +27,7 @@ LARGEST_FUNCTION = 64 * 1024
 LARGEST_PROGRAM = 5_700_000
 WIDEST = 120
 LITERALS = re.compile(r"//[^\n]*|\br(#*)\".*?\"\1|\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^\\'])'", re.DOTALL)
-"""Comments, strings and characters of Rust."""
+"""Pattern of comments, strings and characters in Rust."""
 
 Module = tuple[str, ...]
 
@@ -38,7 +38,7 @@ def without_comments(text: str) -> str:
 
 
 def paths(tree: str, prefix: Module = ()) -> list[Module]:
-    """Returns the paths in a `use` tree."""
+    """Returns the paths that a `use` tree names."""
     parts, depth, start = [], 0, 0
     for i, c in enumerate(tree):
         depth += (c == "{") - (c == "}")
@@ -62,10 +62,10 @@ def modules(source: Path) -> dict[Module, Path]:
 
 
 def arrows(source: Path) -> dict[Module, set[Module]]:
-    """Returns the modules that each module uses."""
+    """Returns, for each module, the modules that it uses."""
     files = modules(source)
     texts = {module: without_comments(path.read_text(encoding="utf-8")) for module, path in files.items()}
-    shown = {}  # names that the crate's root re-exports, with their modules
+    shown = {}  # names that the crate's root re-exports, each with its module
     for tree in re.findall(r"\bpub(?:\(crate\))? use ([^;]+);", texts.get((), "")):
         shown.update({path[-1]: path for path in paths(tree)})
     uses: dict[Module, set[Module]] = {}
@@ -91,7 +91,7 @@ def arrows(source: Path) -> dict[Module, set[Module]]:
 
 
 def circles(uses: dict[Module, set[Module]]) -> list[list[Module]]:
-    """Returns sets of modules in which each module reaches all others (Tarjan)."""
+    """Returns the sets of modules in which each module reaches all other modules (Tarjan)."""
     order: dict[Module, int] = {}
     low: dict[Module, int] = {}
     stack: list[Module] = []
@@ -119,13 +119,14 @@ def circles(uses: dict[Module, set[Module]]) -> list[list[Module]]:
 
 
 def tracked(*patterns: str) -> list[str]:
-    """Returns the paths of tracked files that still exist."""
+    """Returns the paths of tracked files that have not been deleted."""
     listed = subprocess.run(["git", "ls-files", *patterns], cwd=ROOT, check=True, capture_output=True, text=True).stdout
     return [path for path in listed.splitlines() if (ROOT / path).is_file()]
 
 
 def wide_lines() -> Iterator[str]:
-    """Yields lines of Rust that are too wide without their strings, which rustfmt does not break (ruff: Python)."""
+    """Yields lines of Rust that are too wide even without their strings, which rustfmt does not break. (ruff checks
+    Python.)"""
     for path in tracked("*.rs"):
         if path.startswith(TO_DO):
             continue
@@ -138,7 +139,7 @@ def wide_lines() -> Iterator[str]:
 
 
 def broken_promises() -> Iterator[str]:
-    """Yields the files and tests that PROMISES.md names and that do not exist."""
+    """Yields the names of files and tests in PROMISES.md that do not exist."""
     files = tracked()
     sources = "".join((ROOT / path).read_text(encoding="utf-8") for path in files if path.endswith((".rs", ".py")))
     names = set(re.findall(r"\b(?:fn|def|mod) (\w+)", sources))
@@ -155,7 +156,8 @@ def broken_promises() -> Iterator[str]:
 
 
 def sizes() -> bool:
-    """Prints build time, code size and the largest functions of the program; returns whether they are small enough."""
+    """Prints build time, code size and the largest functions of the program. Returns whether all sizes are small
+    enough."""
     with TemporaryDirectory() as target:
         begin = time.monotonic()
         subprocess.run(

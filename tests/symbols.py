@@ -1,9 +1,9 @@
-"""Fails if a vector instruction of a built library is a separate function.
+"""Checks that no vector instruction of a built library is a separate function.
 
     python3 tests/symbols.py LIBRARY
 
-If the compiler does not inline a closure or helper into the code of a SIMD level, each of its vector instructions
-becomes a call. The results are still correct, but computed several times more slowly, and nothing else would reveal it.
+If the compiler does not inline a closure or helper into the code of a SIMD level, each vector instruction in it becomes
+a call. The results are then correct, but they take several times as long, and nothing else would show this mistake.
 Instructions that only fill memory once are allowed.
 """
 
@@ -19,11 +19,11 @@ OUTLINED = re.compile(r"core_arch::(?:x86::(?:avx|fma)\w*|(?:aarch64|arm_shared)
 FILLING = re.compile(r"_set1_|^vdupq_n_")
 """Instructions that fill a new `Data` with zeros."""
 FOREIGN = re.compile(r"^_mm256_movemask_epi8$")
-"""Instruction of a crate that searches text; Condyle does not use integers of eight bits."""
+"""Instruction of a crate that searches in texts. Condyle does not use integers of eight bits."""
 
 
 def outlined(library: Path) -> list[str]:
-    """Returns the vector instructions that are functions."""
+    """Returns the names of vector instructions that are separate functions."""
     symbols = subprocess.run(["nm", "-C", library], check=True, capture_output=True, text=True).stdout
     if "condyle" not in symbols:
         sys.exit(f"{library}: expected symbols of condyle, found none")

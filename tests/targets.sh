@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Finds a compiler for another kind of processor, for tests/arm.sh, tests/embedded.sh and tests/wasm.sh, which source this file.
-# It is the compiler in use or the system's, if it has the target's library, or the library's sources, which are compiled first.
+# This is the compiler in use or the system's compiler, if it has the library for the target, or the library's sources. In the
+# second case the sources are compiled first.
 #
 #     tests/targets.sh install arm|embedded|wasm
 #

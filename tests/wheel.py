@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
-"""Checks a wheel from an installer's view: its size, tag, licences, linked libraries, and a computation.
+"""Checks a wheel as a user installs it: size, tag, licences, linked libraries, and a computation.
 
     python3 tests/wheel.py WHEEL [--install]
 
-Fails if the wheel is above 8 MB, is not for the stable interface of Python 3.10, or lacks its licences or types. On
-Linux it also fails if the library needs others than a manylinux tag allows, or newer symbols of the C library than its
-tag promises. --install installs the wheel into an empty virtual environment, and computes there.
+The check fails if the wheel is larger than 8 MB, if it is not for the stable interface of Python 3.10, or if licences
+or types are missing. On Linux it also fails if the library needs other libraries than the manylinux tag allows, or
+newer symbols of the C library than the tag promises. --install installs the wheel into an empty virtual environment,
+and computes there.
 """
 
 import argparse
@@ -30,7 +31,8 @@ ALLOWED = {
     "ld-linux-x86-64.so.2",
     "ld-linux-aarch64.so.1",
 }
-"""Libraries that the manylinux policies leave to the system, as far as Rust programs use them."""
+"""Libraries that the system provides according to the manylinux policies; only libraries that Rust programs use are
+listed."""
 PROGRAM = """
 import condyle, numpy as np
 arm = condyle.robots.arm7()
@@ -42,7 +44,7 @@ assert np.abs(condyle.crba(arm, data, q) @ condyle.minv(arm, data, q) - np.eye(7
 
 
 def linked(library: Path, platform: str) -> list[str]:
-    """Returns the faults of the libraries and symbols that a Linux library needs."""
+    """Returns faults in the libraries and symbols that a library for Linux needs."""
     if shutil.which("objdump") is None:
         print("NOT RUN: there is no objdump to look at the libraries with")
         return []

@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
-"""Solves optimisations of motions with IPOPT: by condyle.casadi, and by the same functions as CasADi expressions.
+"""Solves optimisations of motions with IPOPT. The functions come from condyle.casadi, or are written as CasADi
+expressions.
 
     .venv/pinocchio/bin/python benches/peers/casadi_collocation.py [--rounds N] [--json] [PROBLEM ...]
 
-The problems come from python/examples, in the same transcription for both, with the same variables, constraints and
-zeros. Ours have the dynamics of all points as one function (`states=`), the expressions use `Function.map`. The
-problems are `swing_up`, `reach` (of our arm), `jump`; and `reach_panda`, `reach_talos` (its pelvis fixed), the reach
-on robots of example-robot-data. For each problem it prints the processor time of a solve (the least of the rounds),
-the part of it in the problem's functions, the iterations and the cost; also the time to build the expressions. The
-expressions run in CasADi's own virtual machine, as pinocchio.casadi's expressions do.
+The problems come from python/examples. Both kinds of functions have the same transcription, with the same variables,
+constraints and zeros. condyle.casadi gives the dynamics of all points as one function (`states=`); the expressions use
+`Function.map`. The problems are `swing_up`, `reach` (of Condyle's arm) and `jump`. `reach_panda` and `reach_talos`
+(with a fixed pelvis) are the reach of robots from example-robot-data. For each problem the program prints the processor
+time of a solve (the least of the rounds), and the fraction of this time in the problem's functions. It also prints the
+iterations, the cost, and the time to build the expressions. The expressions run in CasADi's own virtual machine, as
+pinocchio.casadi's expressions do.
 
-The time outside of the functions belongs to IPOPT and its linear solver, the same for both. For an arm of two links
-(`swing_up`), it is 0.42 of the expressions' time, which is a lower bound for our solves.
+The time outside of the functions belongs to IPOPT and its linear solver; it is the same for both kinds of functions.
+For an arm of two links (`swing_up`), it is 0.42 of the whole time with expressions. With any functions, a solve takes
+at least this long.
 """
 
 import argparse
@@ -63,8 +66,8 @@ def reaches(
 
 
 def reaches_of(name: str, frame: str, locked: list[str]) -> tuple[Transcription, Transcription]:
-    """Builds the reach of a robot with a fixed base, from the middle of its joints' ranges to the pose some radians
-    away."""
+    """Builds the reach of a robot with a fixed base. It goes from the middle of the joints' ranges to a pose in which
+    each joint has moved towards its upper limit."""
     from example_robot_data.robots_loader import ROBOTS, getModelPath
 
     loader = ROBOTS[name]
@@ -111,13 +114,13 @@ PROBLEMS: dict[str, Callable[[], tuple[Transcription, Transcription]]] = {
 
 
 def solve(transcription: Transcription, rounds: int) -> dict[str, float]:
-    """Returns the figures of a problem, in seconds of processor time; `build_s` is wall time."""
+    """Returns the figures of a problem, in seconds of processor time; only `build_s` is wall time."""
     begin = time.perf_counter()
     opti, _ = transcription()
     opti.solver("ipopt", {"print_time": False, "record_time": True}, SETTINGS)
     found: dict[str, float] = {}
     for one in range(rounds):
-        solution = opti.solve()  # from the same initial guess each time
+        solution = opti.solve()  # each solve starts from the same initial guess
         stats = solution.stats()
         if one == 0:
             found["build_s"] = time.perf_counter() - begin - stats["t_wall_total"]

@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""Compares with CasADi in one run: functions, derivatives, and a motion by IPOPT and by FDDP. Writes JSON.
+"""Compares Condyle with CasADi in one run: functions, derivatives, and a motion by IPOPT and by FDDP. Writes JSON.
 
     .venv/pinocchio/bin/python benches/peers/casadi_comparison.py [FILE.json] [--quick]
 
-Functions: RNEA and ABA, their Jacobian, and the Hessian of λᵀf, of the embedded robots. Each is timed in three forms:
-our own call from Python, our function in CasADi, and the same recursion built of CasADi's expressions.
+Functions: RNEA and ABA, their Jacobian, and the Hessian of λᵀf, for the embedded robots. Each function is timed in
+three forms: Condyle's call from Python, Condyle's function in CasADi, and the same recursion written as CasADi
+expressions.
 
-The motion: an arm goes to a point and comes to rest there. FDDP solves the problem as it is. IPOPT solves it by
-multiple shooting with exact Hessians, once with our ABA and once with an ABA of expressions. All three must find the
-same cost.
+The motion: an arm goes to a point and comes to rest there. FDDP solves the problem directly. IPOPT solves it by
+multiple shooting with exact Hessians, once with Condyle's ABA and once with an ABA of expressions. All three solutions
+must have the same cost.
 """
 
 import argparse
@@ -30,11 +31,11 @@ from condyle.optimal import Activation, Cost, Fddp, FreeDynamics, Problem, Resid
 
 KNOTS, DT = 50, 0.02
 SAME = 1e-6
-"""The costs of the three solutions may differ by this part."""
+"""Maximum relative difference between the costs of the three solutions."""
 
 
 def own(model: condyle.Model, name: str, x: list[np.ndarray]) -> dict[str, Callable[[], object]]:
-    """Our calls from Python, which write into arrays that exist."""
+    """Returns Condyle's calls from Python, which write into existing arrays."""
     data, value = condyle.Data(model), np.zeros(model.nv)
     function, derivatives = getattr(condyle, name), getattr(condyle, f"{name}_derivatives")
     return {
@@ -44,7 +45,7 @@ def own(model: condyle.Model, name: str, x: list[np.ndarray]) -> dict[str, Calla
 
 
 def functions(model: condyle.Model) -> list[dict[str, Any]]:
-    """The times of the functions of a robot, in µs."""
+    """Returns the times of a robot's functions, in µs."""
     rng, rows = np.random.default_rng(1), []
     x = [condyle.random_configuration(model, seed=1), *rng.standard_normal((2, model.nv))]
     for name in ("rnea", "aba"):
@@ -63,7 +64,7 @@ def functions(model: condyle.Model) -> list[dict[str, Any]]:
 
 
 class Reach:
-    """An arm goes to a point within a second, and rests there."""
+    """Problem of an arm that goes to a point within a second, and rests there."""
 
     def __init__(self) -> None:
         self.arm = condyle.robots.arm7()
@@ -71,7 +72,7 @@ class Reach:
         self.x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
 
     def by_fddp(self) -> Callable[[], tuple[float, float, int]]:
-        """Returns a solve: seconds, cost, iterations."""
+        """Returns a function that solves the problem by FDDP, and returns seconds, cost and iterations."""
         arm, x0 = self.arm, self.x0
         speed = Activation.weighted(np.r_[np.zeros(7), np.ones(7)])
         running = [
@@ -93,7 +94,8 @@ class Reach:
         return solve
 
     def by_ipopt(self, dynamics: casadi.Function, placement: casadi.Function) -> Callable[[], tuple[float, float, int]]:
-        """The same as a nonlinear program. dynamics: (q, v, τ) -> q̈ of all knots; placement: q -> (position, …)."""
+        """Returns a function that solves the problem as a nonlinear program, by IPOPT. `dynamics` maps (q, v, τ) to q̈
+        for all knots; `placement` maps q to a tuple that begins with the position."""
         n, opti = 7, casadi.Opti()
         q, v, u = opti.variable(n, KNOTS + 1), opti.variable(n, KNOTS + 1), opti.variable(n, KNOTS)
         after = v[:, :-1] + DT * dynamics(q[:, :-1], v[:, :-1], u)  # v⁺ = v + Δt q̈
@@ -111,7 +113,7 @@ class Reach:
 
         def solve() -> tuple[float, float, int]:
             begin = time.perf_counter()
-            solution = opti.solve()  # from the guess each time
+            solution = opti.solve()  # each solve starts from the same guess
             return time.perf_counter() - begin, float(solution.value(opti.f)), solution.stats()["iter_count"]
 
         return solve
@@ -128,7 +130,7 @@ class Reach:
 
 
 def motion(rounds: int) -> dict[str, Any]:
-    """The least time of a solve in each way, in ms."""
+    """Returns the least time of a solve by each method, in ms."""
     solves, found = Reach().solves(), {}
     for _ in range(rounds):
         for name, solve in solves.items():

@@ -1,4 +1,4 @@
-"""A robot's functions written as CasADi expressions, as pinocchio.casadi writes them."""
+"""Functions of a robot written as CasADi expressions, in the same way as pinocchio.casadi writes them."""
 
 import casadi
 import numpy as np
@@ -7,7 +7,7 @@ import condyle
 
 
 class Expressions:
-    """Recursions in body frames (Featherstone 2008) for revolute, prismatic and free-flyer joints."""
+    """Recursions in the bodies' frames (Featherstone 2008), for revolute, prismatic and free-flyer joints."""
 
     def __init__(self, model: condyle.Model) -> None:
         self.model = model
@@ -46,7 +46,7 @@ class Expressions:
 
     @staticmethod
     def cross(v: casadi.SX) -> casadi.SX:
-        """Returns v × for motions."""
+        """Returns the matrix of the cross product v × on motions."""
         linear, angular = casadi.skew(v[:3]), casadi.skew(v[3:])
         return casadi.blockcat([[angular, linear], [casadi.SX(3, 3), angular]])
 
@@ -102,7 +102,7 @@ class Expressions:
         return casadi.Function("aba", [self.q, self.v, tau], [a])
 
     def forward_kinematics(self, frame: str) -> casadi.Function:
-        """Returns position and rotation of a frame."""
+        """Returns the function of q that gives position and rotation of a frame."""
         R, p = self.frame(frame)
         return casadi.Function("forward_kinematics", [self.q], [p, R])
 
@@ -113,14 +113,14 @@ class Expressions:
         return R @ placement[:3, :3], p + R @ placement[:3, 3]
 
     def velocities(self) -> list[casadi.SX]:
-        """Returns the velocity of each body, in its own axes."""
+        """Returns the velocity of each body, along the body's own axes."""
         vs = [casadi.SX.zeros(6)]
         for i in range(1, self.model.nbodies):
             vs.append(self.X[i] @ vs[self.model.parents[i]] + self.S[i] @ self.joint_velocity(self.v, i))
         return vs
 
     def frame_velocity(self, name: str) -> casadi.Function:
-        """Returns the velocity of a frame, in its own axes."""
+        """Returns the function that gives the velocity of a frame, along the frame's own axes."""
         frame = self.model.frames[self.model.frame(name)]
         placement = np.array(frame.placement)
         R, p = casadi.DM(placement[:3, :3]), casadi.DM(placement[:3, 3])
@@ -129,7 +129,8 @@ class Expressions:
         return casadi.Function("frame_velocity", [self.q, self.v], [casadi.vertcat(linear, R.T @ v[3:])])
 
     def constrained_dynamics(self, points: list[str], kd: float) -> casadi.Function:
-        """Returns the accelerations, and the forces along the world's axes of points held to the ground."""
+        """Returns the function that gives the accelerations, and the forces of points that are held to the ground,
+        along the world's axes."""
         model, vs, biases = self.model, self.velocities(), [casadi.SX.zeros(6)]
         for i in range(1, model.nbodies):
             vJ = self.S[i] @ self.joint_velocity(self.v, i)
@@ -149,6 +150,6 @@ class Expressions:
         M, h = casadi.jacobian(effort, a), casadi.substitute(effort, a, casadi.SX.zeros(model.nv))
         rows = J.size1()
         K = casadi.blockcat([[M, J.T], [J, casadi.SX(rows, rows)]])
-        D, LT, order = casadi.ldl(K, False)  # not ordered: M is eliminated first
+        D, LT, order = casadi.ldl(K, False)  # not reordered: M must be eliminated first
         x = casadi.ldl_solve(casadi.vertcat(tau - h, -gamma), D, LT, order)
         return casadi.Function("constrained_dynamics", [self.q, self.v, tau], [x[: model.nv], -x[model.nv :]])

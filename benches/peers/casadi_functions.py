@@ -1,12 +1,13 @@
 #!/usr/bin/env python3
-"""Times functions of a robot in CasADi: ours, and the same recursions written as CasADi expressions.
+"""Times functions of a robot in CasADi: the functions of condyle.casadi, and the same recursions written as CasADi
+expressions.
 
     .venv/pinocchio/bin/python benches/peers/casadi_functions.py [URDF …] [--free-flyer] [--json]
 
-Without robots: the embedded arm and humanoid. For RNEA and ABA it prints times in microseconds, and the
-speed-up of ours: of the function, of its Jacobian with respect to all arguments, and of the Hessian of λᵀf. Times are
-medians of alternating rounds on one core. The expressions run in CasADi's own virtual machine, as pinocchio.casadi's
-expressions do.
+Without a URDF, the robots are the embedded arm and humanoid. For RNEA and ABA the program prints times in microseconds,
+and the speed-up by condyle.casadi: of the function, of its Jacobian with respect to all arguments, and of the Hessian
+of λᵀf. Times are medians of alternating rounds on one core. The expressions run in CasADi's own virtual machine, as
+pinocchio.casadi's expressions do.
 """
 
 import argparse
@@ -27,12 +28,13 @@ SECONDS = 0.02  # duration of each round
 
 
 def derived(f: casadi.Function) -> dict[str, casadi.Function]:
-    """Returns the function, its Jacobian, and the blocks of the Hessian of λᵀf, as an optimisation needs them."""
+    """Returns the function, its Jacobian, and the blocks of the Hessian of λᵀf that an optimisation needs."""
     return {"value": f, "Jacobian": f.jacobian(), "Hessian": f.reverse(1).jacobian()}
 
 
 def call(f: casadi.Function, x: list[np.ndarray]) -> Callable[[], None]:
-    """Returns a call of a function through its buffers, without Python's conversions; inputs beyond x are ones."""
+    """Returns a call of a function through its buffers, without Python's conversions. Inputs that x does not give are
+    ones."""
     buffer, trigger = f.buffer()
     given = [*x, *(np.ones(f.nnz_in(k)) for k in range(len(x), f.n_in()))]
     results = [np.zeros(f.nnz_out(k)) for k in range(f.n_out())]

@@ -1,12 +1,12 @@
 #!/usr/bin/env python3
-"""Times Condyle and Pinocchio 4.1 in turn, on the same robots and states, and prints the ratios.
+"""Times Condyle and Pinocchio 4.1 in turn, for the same robots and states, and prints the ratios.
 
     python3 benches/peers/dynamics.py [--json] [--rounds N] [--cpu K] [ROBOT ...]
 
 Pinocchio is compiled for this processor (clang++ -O3 -march=native, or g++), which takes about ten minutes the first
-time; Condyle is a default build. Both run on one core, in turn, round after round. A figure is the median over the
-rounds of each program's median; a ratio is the median over the rounds of the quotient. Needs Linux, Rust, Python 3
-with venv and a C++ compiler; everything else is installed under target/peers.
+time. Condyle is a default build. Both programs run on one core, in turn, round after round. A time is the median over
+the rounds of the program's own median. A ratio is the median over the rounds of the quotient of two times. The script
+needs Linux, Rust, Python 3 with venv and a C++ compiler; everything else is installed under target/peers.
 """
 
 import argparse
@@ -31,29 +31,29 @@ ROBOTS = {
     "chain50": (50, []),
     "chain100": (100, []),
 }
-"""Robots: a name in example-robot-data or the number of links of a chain, and the locked joints."""
+"""Robots. Each has a name in example-robot-data or the number of links of a chain, and a list of locked joints."""
 BESIDE = {
     "rnea_hessian": "rnea_derivatives",
     "aba_hessian": "aba_derivatives",
     "dtau_dq_by_duals": "rnea_derivatives",
     "dtau_dq_by_differences": "rnea_derivatives",
 }
-"""Algorithms that Pinocchio's benchmark lacks, and our own time with which each is compared."""
+"""Algorithms that Pinocchio's benchmark lacks, each with the algorithm of Condyle whose time it is compared with."""
 
 MODES = {"": "one call", "batch": "per state of a batch", "horizon": "a horizon"}
-"""Prefixes of the names of algorithms, and the kind of their times."""
+"""Prefixes in the names of algorithms, each with a description of what is timed."""
 KNOT = ("aba", "aba_derivatives", "rnea")
 """Algorithms that a solver calls at each knot of a horizon."""
 
 
 def run(*command: "str | Path", **options: object) -> str:
-    """Returns the output of a command."""
+    """Runs a command and returns its output."""
     result = subprocess.run([str(c) for c in command], check=True, stdout=subprocess.PIPE, text=True, **options)
     return result.stdout
 
 
 def environment(name: str, *packages: str) -> Path:
-    """Creates a virtual environment with these packages; returns its interpreter."""
+    """Creates a virtual environment with these packages; returns the path of its interpreter."""
     python = PEERS / name / "bin" / "python"
     if not python.exists():
         run(sys.executable, "-m", "venv", PEERS / name)
@@ -62,8 +62,8 @@ def environment(name: str, *packages: str) -> Path:
 
 
 def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *packages: str) -> Path:
-    """Compiles pinocchio.cpp, or a similar program in parts that needs headers of additional packages; returns its
-    path."""
+    """Compiles pinocchio.cpp, or a similar program that consists of several parts and needs headers of additional
+    packages. Returns the path of the program."""
     purelib = "import sysconfig; print(sysconfig.get_paths()['purelib'])"
     prefix = Path(run(python, "-c", purelib).strip()) / "cmeel.prefix"
     folders = [prefix / "include", prefix / "include/urdfdom"]
@@ -72,7 +72,7 @@ def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *
     for one in headers:
         include = Path(run(one, "-c", purelib).strip()) / "cmeel.prefix" / "include"
         folders += [include, include / "urdfdom_headers", include / "eigen3"]
-    # CppAD's headers of this version are not valid for clang
+    # This version of CppAD has headers that clang rejects.
     compilers = ("g++",) if packages else ("clang++-19", "clang++", "g++")
     compiler = next(c for c in compilers if shutil.which(c))
     flags = ["-std=c++17", "-march=native", "-DNDEBUG", "-w", "-DBOOST_MPL_LIMIT_LIST_SIZE=30"]
@@ -93,7 +93,7 @@ def build_pinocchio(python: Path, name: str = "pinocchio", level: str = "-O3", *
 
 
 def build_ours() -> Path:
-    """Builds benches/peers/ours.rs as `cargo bench` does; returns its path."""
+    """Builds benches/peers/ours.rs as `cargo bench` does; returns the path of the program."""
     command = ["cargo", "build", "--release", "--package", "condyle-benches", "--bench", "peers"]
     command += ["--message-format=json", "--locked"]
     for line in run(*command, cwd=ROOT).splitlines():
@@ -146,14 +146,14 @@ def times(output: str) -> dict[str, float]:
 
 
 def peer_time(kind: str, name: str, mine: dict[str, float], theirs: dict[str, float]) -> float:
-    """Returns the time with which a time of ours is compared."""
+    """Returns the time with which a time of Condyle is compared."""
     if kind == "horizon":
         return int(name) * sum(theirs[algorithm] for algorithm in KNOT)
     return theirs.get(name) or mine[BESIDE[name]]
 
 
 def compare(robot: str, python: Path, theirs: Path, ours: Path, rounds: int, cpu: int) -> list[dict]:
-    """Runs both programs in turn on one robot."""
+    """Runs both programs in turn for one robot."""
     source, locked = ROBOTS[robot]
     model, urdf, states = (PEERS / f"{robot}.{suffix}" for suffix in ("bin", "urdf", "states"))
     export = run(python, "-c", EXPORT, str(source), "0", ",".join(locked), str(STATES), model, urdf, states)
@@ -184,7 +184,7 @@ def compare(robot: str, python: Path, theirs: Path, ours: Path, rounds: int, cpu
 
 
 def table(rows: list[dict]) -> str:
-    """Returns the ratios, with a column for each robot and a table for each mode."""
+    """Returns the ratios as text: a table for each mode, with a column for each robot."""
     robots = list(dict.fromkeys(row["robot"] for row in rows))
     tables = []
     for mode in MODES.values():

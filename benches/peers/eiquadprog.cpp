@@ -1,4 +1,4 @@
-// eiquadprog's fast solver, which TSID uses, as a function for ctypes: see wholebody_theirs.py.
+// The fast solver of eiquadprog, which TSID uses, as a function for ctypes. See wholebody_theirs.py.
 #include <eiquadprog/eiquadprog-fast.hpp>
 
 using Eigen::Map;
@@ -7,7 +7,8 @@ using Eigen::VectorXd;
 
 static eiquadprog::solvers::EiquadprogFast solver;
 
-// Solves min ½ xᵀ P x + cᵀ x with A x + a = 0 and C x + b ≥ 0, matrices by columns. Returns 0 on success.
+// Solves min ½ xᵀ P x + cᵀ x with A x + a = 0 and C x + b ≥ 0. Matrices are stored column by column. Returns 0 on
+// success.
 extern "C" int solve(int n, int equalities, int rows, const double *P, const double *c, const double *A,
                      const double *a, const double *C, const double *b, double *x) {
   static MatrixXd hessian, CE, CI;

@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Solves optimal control problems with Condyle and with Crocoddyl 3.2, and compares every iteration and the time.
+"""Solves optimal control problems with Condyle and with Crocoddyl 3.2. Compares every iteration and the time.
 
     .venv/crocoddyl/bin/python benches/peers/ocp.py [OPTION ...] [NAME ...]
 
-Each problem is built in both libraries from the same JSON: from the problems of a folder (with the robots in its
-`robots`), or from `ocp_problems.py`. The program compares the costs of all iterations (to 1e-6 of each), their step
-lengths and regularisations, and the optimum. The stopping value, which loses its digits near the optimum, is only
+Both libraries build each problem from the same JSON. It comes from the problems of a folder (with the robots in its
+`robots`), or from `ocp_problems.py`. The program compares the costs of all iterations (to 1e-6 of each cost), the step
+lengths, the regularisations, and the optimum. The stopping value, which loses its digits near the optimum, is only
 shown. Both solvers are timed in turn, round after round, on one core. Each timed solve follows the same untimed solve,
-as in a control loop that solves repeatedly. Figures are medians of milliseconds per iteration, for the whole solve and
-for its phases. With --converted, `condyle.crocoddyl` converts Crocoddyl's problem; the result is timed against our
-problem built from the JSON, instead of Crocoddyl. Needs crocoddyl 3.2.1, pin 4.0.0 and condyle in one environment,
-which `./test` makes.
+as in a control loop that solves repeatedly. Times are medians of milliseconds per iteration, for the whole solve and
+for its phases. With --converted, `condyle.crocoddyl` converts Crocoddyl's problem; the converted problem is timed
+against Condyle's problem built from the JSON, instead of Crocoddyl. The program needs crocoddyl 3.2.1, pin 4.0.0 and
+condyle in one environment, which `./test` makes.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import statistics
 import sys
 from pathlib import Path
 
-os.environ["OMP_NUM_THREADS"] = "1"  # before Crocoddyl is loaded: several threads would wait for each other on one core
+os.environ["OMP_NUM_THREADS"] = "1"  # before Crocoddyl is loaded: several threads on one core would wait for each other
 
 import numpy as np
 from ocp_converted import Converted
@@ -31,7 +31,8 @@ from ocp_robots import NotRunError
 from ocp_theirs import Theirs
 
 COST = 1e-6
-"""Tolerance of the costs of an iteration, relative: Crocoddyl repeats its own costs when perturbed by 1e-12."""
+"""Relative tolerance of the costs of an iteration. If Crocoddyl's input is perturbed by 1e-12, its own costs change by
+up to this tolerance."""
 CHAOTIC = {
     ("arm_kinova_cold", "fddp"): 3,
     ("arm_kinova_cold", "ddp"): 3,
@@ -42,26 +43,29 @@ CHAOTIC = {
     ("talos_taichi", "fddp"): 0,
     ("talos_taichi", "boxfddp"): 0,
 }
-"""Problems and solvers whose trace Crocoddyl does not repeat, and the number of leading iterations that it repeats."""
+"""Problems and solvers for which Crocoddyl does not repeat its own trace, and the number of leading iterations that it
+repeats."""
 CURED = {("quadrotor_box", "boxddp"): 7}
-"""Number of leading iterations before Crocoddyl's quadratic program cycles, which ours does not."""
+"""Number of leading iterations before Crocoddyl's quadratic program cycles. Condyle's quadratic program does not
+cycle."""
 ELSEWHERE = {("arm_talos", "ddp"), ("cartpole_swingup", "ddp"), ("quadrotor_box", "boxddp")}
-"""Problems and solvers whose optimum depends on the trace."""
+"""Problems and solvers for which the optimum depends on the trace."""
 INCOMPARABLE = {("arm_kinova_box", "boxddp")}
 """Problems and solvers for which Crocoddyl repeats neither an iteration nor the optimum."""
 OPTIMUM = 1e-6
-"""Tolerance of the final costs, relative."""
+"""Relative tolerance of the final costs."""
 
 
 def load(folder, name):
-    """Returns a problem's JSON and its robot's, None without a robot."""
+    """Returns the JSON of a problem and of its robot; the latter is None if the problem has no robot."""
     spec = json.loads((folder / f"{name}.json").read_text())
     robot = spec["robot"] and json.loads((folder / "robots" / f"{spec['robot']}.json").read_text())
     return spec, robot
 
 
 def agreeing(ours, theirs):
-    """Returns the number of leading iterations with the same step and regularisation, and costs within `COST`."""
+    """Returns the number of leading iterations whose step and regularisation are equal, and whose costs agree to
+    `COST`."""
     n = min(len(ours), len(theirs))
     a, b = ours[:n], theirs[:n]
     near = np.abs(a[:, 0] - b[:, 0]) <= COST * np.maximum(np.abs(b[:, 0]), 1e-12)
@@ -70,7 +74,8 @@ def agreeing(ours, theirs):
 
 
 def compare(spec, robot, solver, make=Ours):
-    """Solves a problem with one of its solvers in both libraries, ours made by `make`, and returns the comparison."""
+    """Solves a problem by one of its solvers in both libraries, and returns the comparison. `make` builds Condyle's
+    problem."""
     case = (spec["name"], solver)
     if case in INCOMPARABLE:
         raise NotRunError("Crocoddyl does not repeat itself")
@@ -96,7 +101,8 @@ def compare(spec, robot, solver, make=Ours):
 
 
 def time_both(ours, theirs, start, iterations, trials, rounds):
-    """Returns medians over the rounds of milliseconds per iteration, for both solvers and for their quotient."""
+    """Returns milliseconds per iteration for both solvers, and the quotient of both times. All are medians over the
+    rounds."""
     names = ("total", "derivatives", "sweep", "rollout")
     rows = []
     for _ in range(rounds):
@@ -115,7 +121,8 @@ def time_both(ours, theirs, start, iterations, trials, rounds):
 
 
 def time_converted(converted, built, start, rounds):
-    """Returns medians over the rounds of milliseconds per solve, for the converted problem and ours."""
+    """Returns milliseconds per solve for the converted problem and for Condyle's own problem, as medians over the
+    rounds."""
     rows = []
     for _ in range(rounds):
         row = []
@@ -141,7 +148,8 @@ def line(result):
 
 
 def run(spec, robot, solver, options):
-    """Compares both solves of a problem and their times, and prints the result; returns whether they are the same."""
+    """Compares the solves of a problem by both libraries and the times of both, and prints the result. Returns whether
+    the solves agree."""
     show = json.dumps if options.json else line
     try:
         make = Converted if options.converted else Ours

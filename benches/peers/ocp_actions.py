@@ -1,4 +1,4 @@
-"""User-defined actions of the optimal control problems: a unicycle, a pole on a cart, a double pendulum."""
+"""User-defined actions for the optimal control problems: a unicycle, a pole on a cart, a double pendulum."""
 
 import math
 
@@ -9,7 +9,7 @@ from condyle import optimal
 
 
 def unicycle(stage):
-    """Returns the running and the terminal action: x = (x, y, θ), u = (v, ω)."""
+    """Returns the running and the terminal action of a unicycle with x = (x, y, θ) and u = (v, ω)."""
     dt, wx, wu = stage["dt"], stage["w_x"], stage["w_u"]
 
     def calc(t, x, u):
@@ -32,7 +32,7 @@ def unicycle(stage):
 
 
 class Cartpole:
-    """A pole on a cart, θ = 0 upright: x = (y, θ, ẏ, θ̇), u = (f)."""
+    """A pole on a cart with x = (y, θ, ẏ, θ̇) and u = (f); the pole is upright at θ = 0."""
 
     def __init__(self, stage):
         self.m1, self.m2, self.l, self.g = (stage[k] for k in ("m_cart", "m_pole", "length", "g"))
@@ -41,7 +41,7 @@ class Cartpole:
         self.dt = stage["dt"]
 
     def acceleration(self, x, f):
-        """Returns (ÿ, θ̈), and their derivatives with respect to θ, θ̇ and f."""
+        """Returns (ÿ, θ̈), and the derivatives of both with respect to θ, θ̇ and f."""
         m1, m2, length, g = self.m1, self.m2, self.l, self.g
         s, c, rate = math.sin(x[1]), math.cos(x[1]), x[3]
         mu, dmu = m1 + m2 * s * s, 2.0 * m2 * s * c
@@ -92,7 +92,7 @@ class Cartpole:
 
 
 class DoublePendulum:
-    """Two links and one motor, with a goal in sines and cosines and its own Hessian."""
+    """A double pendulum with one motor. Its goal is written in sines and cosines, and has its own Hessian."""
 
     def __init__(self, model, stage):
         self.model, self.data = model, condyle.Data(model)

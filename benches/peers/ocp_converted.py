@@ -1,4 +1,4 @@
-"""Optimal control problems from their JSON, built by Crocoddyl and converted by `condyle.crocoddyl`."""
+"""Optimal control problems that Crocoddyl builds from JSON and `condyle.crocoddyl` converts."""
 
 from ocp_ours import Ours
 from ocp_theirs import Theirs
@@ -7,7 +7,7 @@ import condyle.crocoddyl
 
 
 class Converted(Ours):
-    """Our solver on a problem that Crocoddyl has built."""
+    """Condyle's solver for a problem that Crocoddyl has built."""
 
     strict = True
 

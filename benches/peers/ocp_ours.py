@@ -1,4 +1,4 @@
-"""Optimal control problems, from their JSON, in Condyle."""
+"""Builds and solves optimal control problems from JSON with Condyle."""
 
 import json
 import time
@@ -20,11 +20,11 @@ def our_activation(activation, residual):
     if kind == "quadratic_barrier":
         return optimal.Activation.barrier(bounds(activation["lb"], -np.inf), bounds(activation["ub"], np.inf))
     assert kind == "cone_barrier", kind
-    return None  # the default for the residual of a cone
+    return None  # None selects the default of the residual of a cone
 
 
 def our_cost(cost, model, terminal, contacts):
-    """Returns a `Cost`, or None for a cost that a terminal knot does not have."""
+    """Returns a `Cost`, or None for a cost that does not exist at a terminal knot."""
     residual, name, weight = cost["residual"], cost["name"], cost["weight"]
     kind, activation = residual["type"], our_activation(cost["activation"], residual)
     if terminal and kind in ("control", "friction_cone", "wrench_cone"):
@@ -53,7 +53,7 @@ def our_residual(residual, model, contacts):
 
 
 def our_contact(contact, gains):
-    """Returns the `ContactConstraint` of a contact's or an impulse's JSON."""
+    """Returns the `ContactConstraint` for the JSON of a contact or of an impulse."""
     placement = np.eye(4)
     if "ref" in contact:
         placement[:3, 3] = contact["ref"]["p"]
@@ -65,7 +65,7 @@ def our_contact(contact, gains):
 
 
 def our_action(stage, model, spec, bounded, terminal=False, others=()):
-    """Returns an action; `others` lists other knots and their stages, which differ only in their costs."""
+    """Returns an action. `others` lists knots, with their stages, that may use the same action with different costs."""
     kind = stage["kind"]
     if kind == "unicycle":
         return unicycle(stage)[terminal]
@@ -100,14 +100,14 @@ def our_action(stage, model, spec, bounded, terminal=False, others=()):
 
 
 class Ours:
-    """A problem from its JSON in Condyle, with settings like Crocoddyl's solver of the given name."""
+    """A problem built from JSON by Condyle. Its settings are those that Crocoddyl's solver of this name has."""
 
     def __init__(self, spec, robot, solver):
         self.spec = spec
         self.solver = optimal.Fddp(self.made(robot, solver), **self.settings(solver))
 
     def made(self, robot, solver):
-        """Returns the problem."""
+        """Returns Condyle's `Problem`."""
         spec, bounded = self.spec, solver.startswith("box")
         model = our_robot(robot) if robot else None
         models, stages = self.phases(model, bounded)
@@ -115,10 +115,10 @@ class Ours:
         return optimal.Problem(spec["x0"], models, stages, terminal)
 
     def settings(self, solver):
-        """Returns the settings with which our solver works like Crocoddyl's solver of this name."""
+        """Returns the settings with which Condyle's solver works like Crocoddyl's solver of this name."""
         spec = self.spec
         settings = {"max_iterations": spec["maxiter"], "method": solver.removeprefix("box")}
-        settings["project_warm_start"] = False  # Crocoddyl keeps a start outside of the bounds
+        settings["project_warm_start"] = False  # Crocoddyl keeps a start that is outside of the bounds
         if spec["init_reg"] is not None:
             settings["regularisation_start"] = spec["init_reg"]
         if spec["th_stop"] is not None:
@@ -126,8 +126,8 @@ class Ours:
         return settings
 
     def phases(self, model, bounded):
-        """Returns an action for all knots with the same dynamics, whose costs may differ, and the index of each knot's
-        action."""
+        """Returns one action for each group of knots with the same dynamics, whose costs may differ, and the index of
+        the action of each knot."""
         first, serves = {}, []
         for t, k in enumerate(self.spec["stages"]):
             stage = self.spec["stage_models"][k]

@@ -1,8 +1,9 @@
-"""Optimal control problems of our own, as the JSON that `ocp.py` reads: an arm, a rotorcraft and legged robots.
+"""Condyle's own optimal control problems, as the JSON that `ocp.py` reads: an arm, a rotorcraft and legged robots.
 
-A problem names its robot and has `x0`, `stage_models`, `stages` with the index of each knot's stage, the index
-`terminal`, a `warm_start` and `solvers`. A stage of kind `euler` has a duration, dynamics and costs; a stage of kind
-`impulse` has the frames that hit the ground, and costs. The robots come from the package example-robot-data.
+A problem names its robot and has the keys `x0`, `stage_models`, `stages`, `terminal`, `warm_start` and `solvers`.
+`stages` has the index of each knot's stage, and `terminal` the index of the terminal stage. A stage of kind `euler` has
+a duration, dynamics and costs. A stage of kind `impulse` has the frames that hit the ground, and costs. The robots come
+from the package example-robot-data.
 """
 
 import math
@@ -14,11 +15,11 @@ from example_robot_data import load
 
 FRICTION = 0.7
 SOLE = [0.1, 0.05]
-"""Sides of a foot's sole along x and y (m)."""
+"""Side lengths of a sole along x and y (m)."""
 
 
 def plain(array):
-    """Returns nested lists; None for an infinite bound."""
+    """Returns an array as nested lists, with None for an infinite bound."""
     if np.ndim(array):
         return [plain(x) for x in array]
     return float(array) if abs(array) < 1e300 else None
@@ -29,7 +30,7 @@ def placement(X):
 
 
 def robot_json(name, model):
-    """Returns a robot as `ocp_robots.py` reads it."""
+    """Returns the JSON of a robot that `ocp_robots.py` reads."""
 
     def joint(k):
         inertia, kind = model.inertias[k], model.joints[k]
@@ -81,7 +82,7 @@ def weighted(w):
 
 
 def problem(name, robot, actuation, x0, knots, terminal, **more):
-    """Returns a problem's JSON; equal knots share a stage."""
+    """Returns the JSON of a problem; equal knots share a stage."""
     stages, order = [], []
     for stage in [*knots, terminal]:
         if stage not in stages:
@@ -109,7 +110,7 @@ def free(dt, costs, **bounds):
 
 
 def reach(name="reach", share=None):
-    """Returns a problem in which a panda reaches for a pose, with this share of its maximum efforts."""
+    """Returns a problem in which a panda reaches for a pose. Its efforts are limited to this share of their maximum."""
     model = load("panda").model
     q0, data = model.referenceConfigurations["default"], model.createData()
     pin.framesForwardKinematics(model, data, q0)
@@ -153,7 +154,7 @@ def hover():
 
 
 class Walker:
-    """Knots of a legged robot: feet with 3 rows are points, feet with 6 rows are soles."""
+    """Makes the knots of a legged robot. Feet with 3 rows are points, and feet with 6 rows are soles."""
 
     def __init__(self, name, feet, rows, posture):
         self.name, self.feet, self.rows = name, feet, rows
@@ -179,7 +180,7 @@ class Walker:
         return cost(f"{foot} moves", weight, "frame_placement", frame=foot, R=plain(np.eye(3)), p=plain(p))
 
     def stand(self, dt, support, moving=(), com=None):
-        """Returns a knot that stands on some feet, while others move to a point."""
+        """Returns a knot in which the robot stands on the feet `support`, while other feet move to points."""
         size = {} if self.rows == 3 else {"box": SOLE}
         kind, inner = ("friction_cone", False) if self.rows == 3 else ("wrench_cone", True)
         costs = [
@@ -200,7 +201,7 @@ class Walker:
         return {"kind": "euler", "dt": dt, "dynamics": dynamics, "costs": costs}
 
     def step(self, dt, swinging, length, height, knots):
-        """Returns the knots of a step, and the impact at its end."""
+        """Returns the knots of a step, and the impact at the step's end."""
         support = [foot for foot in self.feet if foot not in swinging]
         share = len(swinging) / len(self.feet)
         stages = []

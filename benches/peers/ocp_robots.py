@@ -1,4 +1,4 @@
-"""Robots of the optimal control problems, from their JSON, in Condyle and in Pinocchio."""
+"""Builds the robots of the optimal control problems from JSON, in Condyle and in Pinocchio."""
 
 from dataclasses import dataclass
 
@@ -15,11 +15,11 @@ FRAMES = {
 
 
 class NotRunError(Exception):
-    """One of the libraries lacks a feature that a problem needs, or nothing can be compared."""
+    """A problem that is not run: one of the libraries lacks a feature, or nothing can be compared."""
 
 
 def bounds(numbers, infinite):
-    """Returns numbers with None replaced by `infinite`."""
+    """Returns the numbers as an array, with `infinite` in place of None."""
     return np.array([infinite if x is None else x for x in numbers], dtype=float)
 
 
@@ -32,7 +32,8 @@ def homogeneous(placement):
 
 @dataclass
 class Solve:
-    """Result of a solve: a row (cost, step, regularisation, stop) per iteration, and the time of its phases (s)."""
+    """Result of a solve: for each iteration a row (cost, step, regularisation, stop), and the time of each phase
+    (s)."""
 
     rows: np.ndarray
     cost: float
@@ -41,7 +42,7 @@ class Solve:
 
 
 def our_robot(spec):
-    """Returns a `condyle.Model` of a robot's JSON."""
+    """Returns the `condyle.Model` for the JSON of a robot."""
     builder = condyle.ModelBuilder(spec["name"])
     builder.gravity(spec["gravity"][:3])
     bodies, names = [condyle.WORLD], set()
@@ -75,7 +76,7 @@ def our_robot(spec):
 
 
 def their_robot(spec):
-    """Returns a `pinocchio.Model` of a robot's JSON."""
+    """Returns the `pinocchio.Model` for the JSON of a robot."""
     model = pin.Model()
     model.gravity = pin.Motion(np.array(spec["gravity"], dtype=float))
 
@@ -107,7 +108,7 @@ def their_robot(spec):
 
 
 def actuation_matrix(spec, nv):
-    """Returns S of τ = S u; None if each joint except a free-flyer at the root has a control."""
+    """Returns the matrix S of τ = S u. Returns None if each joint, except a free-flyer at the root, has a control."""
     kind = spec["actuation"]["type"]
     if kind in ("full", "floating_base"):
         return None
@@ -116,7 +117,7 @@ def actuation_matrix(spec, nv):
     assert kind == "thrusters", kind
     S = np.zeros((nv, len(spec["actuation"]["thrusters"])))
     for j, rotor in enumerate(spec["actuation"]["thrusters"]):
-        thrust = np.array(rotor["R"], dtype=float)[:, 2]  # along z of the rotor's frame
+        thrust = np.array(rotor["R"], dtype=float)[:, 2]  # along the z axis of the rotor's frame
         turn = (-1.0 if rotor["spin"] == "CW" else 1.0) * rotor["torque_per_thrust"] * thrust
         S[:3, j], S[3:6, j] = thrust, np.cross(rotor["p"], thrust) + turn
     return S

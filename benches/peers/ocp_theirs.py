@@ -1,4 +1,4 @@
-"""Optimal control problems, from their JSON, in Crocoddyl."""
+"""Builds and solves optimal control problems from JSON with Crocoddyl."""
 
 import math
 import time
@@ -18,7 +18,7 @@ THEIRS = {
 
 
 class TheirCartpole(crocoddyl.DifferentialActionModelAbstract):
-    """`Cartpole` for Crocoddyl."""
+    """The action `Cartpole` as a class of Crocoddyl."""
 
     def __init__(self, stage):
         crocoddyl.DifferentialActionModelAbstract.__init__(self, crocoddyl.StateVector(4), 1, 5)
@@ -39,7 +39,7 @@ class TheirCartpole(crocoddyl.DifferentialActionModelAbstract):
 
 
 class TheirGoal(crocoddyl.CostModelAbstract):
-    """The goal of `DoublePendulum` for Crocoddyl."""
+    """The goal of `DoublePendulum` as a class of Crocoddyl."""
 
     def __init__(self, state, weights, nu):
         activation = crocoddyl.ActivationModelWeightedQuad(weights)
@@ -54,7 +54,7 @@ class TheirGoal(crocoddyl.CostModelAbstract):
 
 
 class TheirDrives(crocoddyl.ActuationModelAbstract):
-    """τ = S u for Crocoddyl."""
+    """The drives τ = S u as a class of Crocoddyl."""
 
     def __init__(self, state, S):
         crocoddyl.ActuationModelAbstract.__init__(self, state, S.shape[1])
@@ -73,7 +73,7 @@ class TheirDrives(crocoddyl.ActuationModelAbstract):
 
 
 class Theirs:
-    """A problem from its JSON in Crocoddyl, for its solver of the given name."""
+    """A problem built from JSON by Crocoddyl, for Crocoddyl's solver of this name."""
 
     def __init__(self, spec, robot, solver):
         self.spec, self.name, self.kept = spec, solver, []
@@ -89,7 +89,7 @@ class Theirs:
         stages = [self.stage(stage) for stage in spec["stage_models"]]
         running = [stages[k] for k in spec["stages"]]
         self.problem = crocoddyl.ShootingProblem(np.array(spec["x0"], float), running, stages[spec["terminal"]])
-        self.problem.nthreads = 1  # OMP_NUM_THREADS sets the threads of Eigen's products
+        self.problem.nthreads = 1  # OMP_NUM_THREADS sets the number of threads for Eigen's products
 
     def actuation(self):
         kind = self.spec["actuation"]["type"]
@@ -195,7 +195,7 @@ class Theirs:
         return model
 
     def warm_start(self):
-        """Returns the states and controls from which both solvers begin."""
+        """Returns the states and controls from which the solvers of both libraries start."""
         x0, kind, problem = np.array(self.spec["x0"], float), self.spec["warm_start"], self.problem
         if kind == "zero":
             xs = [m.state.zero() for m in problem.runningModels] + [problem.terminalModel.state.zero()]
@@ -227,8 +227,8 @@ class Theirs:
         return Solve(np.array(rows), float(solver.cost), np.array(list(solver.xs)), {})
 
     def time(self, xs, us, iterations, trials):
-        """Returns the seconds of a solve, and of each phase at the optimum times its number of runs in a solve, after
-        a first call."""
+        """Returns the seconds of a solve and of its phases. A phase is timed at the optimum, after a first call, and
+        multiplied by the number of its calls in a solve."""
         solver = self.solver()
         self.run(solver, xs, us)
         begin = time.perf_counter()
@@ -248,6 +248,6 @@ class Theirs:
         phases["sweep"] = iterations * call(solver.backwardPass)
         try:
             phases["rollout"] = trials * call(solver.forwardPass, 1.0)
-        except RuntimeError:  # a step that leaves all bounds
+        except RuntimeError:  # the step leaves all bounds
             phases["rollout"] = math.nan
         return phases

@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""Times an iteration of FDDP on one thread and on several.
+"""Times an iteration of FDDP on one thread and on several threads.
 
     .venv/crocoddyl/bin/python benches/peers/ocp_threads.py [--json] [--threads 2] [--rounds 15] [NAME ...]
 
-It compares three modes in turn, round after round, on the problems of `ocp_problems.py`: one thread; several threads,
-with the sweep concurrent with the derivatives; several threads, with the sweep in the same number of segments. Figures
-are medians over the rounds of milliseconds per iteration and, in brackets, of the quotient with one thread. Segments
-change the iterates by rounding only; the iterations of each mode are counted separately. Needs as many cores as
-threads.
+The program times three modes in turn, round after round, on the problems of `ocp_problems.py`: one thread; several
+threads, with the sweep at the same time as the derivatives; several threads, with the sweep in the same number of
+segments. Times are medians over the rounds of milliseconds per iteration; brackets have the medians of the quotients
+with one thread. Segments change the iterates only by rounding; the iterations of each mode are counted separately. The
+program needs as many cores as threads.
 """
 
 import argparse
@@ -30,7 +30,8 @@ def ways(threads):
 
 
 def solver(spec, robot, settings):
-    """Returns a problem's solver with its own settings, and its start: at rest, quasi-static."""
+    """Returns the solver of a problem with the problem's settings, and a start: the robot at rest, with quasi-static
+    controls."""
     ours = Ours(spec, robot, "fddp")
     problem = ours.made(robot, "fddp")
     ours.solver = optimal.Fddp(problem, **ours.settings("fddp"), **settings)

@@ -1,14 +1,15 @@
-//! Times Condyle for one call; `dynamics.py` builds and runs this program, together with Pinocchio's.
+//! Times single calls of Condyle. The script `dynamics.py` builds and runs this program, and a program that times
+//! Pinocchio.
 //!
 //! ```text
 //! ours URDF fixed|free_flyer LOCKED,JOINTS STATES [batch]
 //! ```
 //!
-//! STATES contains q, v, a, τ of one state after the other as doubles. Prints a line for each algorithm: its name and
-//! the median time of a call in ns; the derivatives of `rnea` also by dual numbers and by central differences. Lines
-//! with `batch:` have the time per state of a batch. Lines with `horizon:` have the time of N knots with `aba`, its
-//! derivatives and `rnea`. With the argument `batch`, only batches are timed, and the least time replaces the median:
-//! see `python.py`.
+//! STATES contains q, v, a, τ of one state after the other as doubles. The program prints a line for each algorithm:
+//! its name and the median time of a call in ns. The derivatives of `rnea` are also timed by dual numbers and by
+//! central differences. Lines with `batch:` have the time per state of a batch. Lines with `horizon:` have the time for
+//! N knots of `aba`, the derivatives of `aba`, and `rnea`. With the argument `batch`, only batches are timed, and the
+//! least time replaces the median (see `python.py`).
 
 use condyle::{
     Batch, Data, Joint, Model, UrdfOptions, aba, aba_derivatives, crba,
@@ -26,12 +27,12 @@ struct State {
     tau: Vec<f64>,
 }
 
-/// Returns the median over batches of the mean time of a call (ns).
+/// Returns the median, over all batches, of the mean time of a call (ns).
 fn median(states: &[State], call: impl FnMut(&State)) -> f64 {
     timed(states, 10, call)
 }
 
-/// Returns the mean time of a call (ns) in the batch with this rank among 21, the fastest first.
+/// Returns the mean time of a call (ns) in one of 21 batches: the batch with this rank, where rank 0 is the fastest.
 fn timed(states: &[State], rank: usize, mut call: impl FnMut(&State)) -> f64 {
     let mut batch = |calls: usize| {
         let start = Instant::now();
@@ -45,7 +46,7 @@ fn timed(states: &[State], rank: usize, mut call: impl FnMut(&State)) -> f64 {
     times[rank]
 }
 
-/// Computes ∂τ/∂q by dual numbers, one column at a time.
+/// Computes ∂τ/∂q by dual numbers, column by column.
 fn by_duals(model: &Model, data: &mut Data<Dual64>, s: &State) -> f64 {
     let lift = |x: &[f64]| -> Vec<Dual64> { x.iter().map(|&x| x.into()).collect() };
     let (q0, v, a) = (lift(&s.q), lift(&s.v), lift(&s.a));
@@ -75,7 +76,7 @@ fn by_differences(model: &Model, data: &mut Data<f64>, s: &State) -> f64 {
     sum
 }
 
-/// Measures times of calls for one state.
+/// Measures the times of calls for one state.
 fn singles(m: &Model, states: &[State]) {
     let (d, duals) = (&mut Data::new(m), &mut Data::<Dual64>::new(m));
     let print = |name: &str, ns: f64| println!("{name} {ns:.2}");

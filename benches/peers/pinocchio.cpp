@@ -1,11 +1,11 @@
-// Times Pinocchio for one call, compiled for this processor; dynamics.py builds and runs this program.
+// Times single calls of Pinocchio, compiled for this processor. The script dynamics.py builds and runs this program.
 //
 //     pinocchio MODEL STATES
 //
-// MODEL is an archive written by Pinocchio's Python package; STATES contains q, v, a, τ of one state after the other as
-// doubles. Prints a line for each algorithm: its name and the median time of a call in ns. If Pinocchio offers two
-// conventions, the faster one counts. Compiled once for each PART, since a single translation unit takes too much
-// memory.
+// MODEL is an archive written by Pinocchio's Python package. STATES contains q, v, a, τ of one state after the other as
+// doubles. The program prints a line for each algorithm: its name and the median time of a call in ns. If Pinocchio
+// offers two conventions for an algorithm, the faster one counts. The program is compiled once for each PART, since a
+// single translation unit takes too much memory.
 #include <pinocchio/multibody.hpp>
 #if PART == 0
 #include <pinocchio/serialization.hpp>
@@ -29,7 +29,7 @@ struct State {
   Eigen::VectorXd q, v, a, tau;
 };
 
-// Returns the median over batches of the mean time of a call (ns).
+// Returns the median, over all batches, of the mean time of a call (ns).
 template <class Call> double median(const std::vector<State> &states, Call call) {
   using Clock = std::chrono::steady_clock;
   auto batch = [&](long calls) {

@@ -1,22 +1,25 @@
 #!/usr/bin/env python3
-"""Times the Python package, compared with Pinocchio's binding and with our own library.
+"""Times the Python package. Compares it with Pinocchio's binding and with Condyle's own library.
 
     .venv/pinocchio/bin/python benches/peers/python.py [--rounds N] [--cpu K] [--json] [--no-rust] [ROBOT ...]
 
-Without robots: panda and talos. Needs the packages of tests/peers/pinocchio/requirements.txt and a release build of
-ours (`./test` makes both). Needs Rust, unless `--no-rust` is given: it builds benches/peers/ours.rs. Everything runs
-on one core, in turn; a figure is the least of all rounds, since other work on the machine only adds time. Five tables:
+Without robots, the program takes panda and talos. It needs the packages of tests/peers/pinocchio/requirements.txt and a
+release build of condyle (`./test` makes both). It also needs Rust, unless `--no-rust` is given: it builds
+benches/peers/ours.rs. Everything runs on one core, in turn. A time is the least of all rounds, since other work on the
+machine only adds time. The output has five tables:
 
-- single calls: the time of a call, Pinocchio's, and their quotient;
-- Pinocchio's spelling: the time of a call through `condyle.pinocchio`, of our own call, and their quotient;
+- single calls: Condyle's time of a call, Pinocchio's time, and the quotient;
+- Pinocchio's spelling: the time of a call through `condyle.pinocchio`, of the same call of `condyle`, and the quotient;
 - attributes of a model: the time of an access;
-- batches of 1000 states, `out` reused: the time per state, the time of a loop of Pinocchio's calls, and the limit for
-  a batch. The limit is the time of our library's own batch of the same size, plus 1.3 times the time to write the
-  results once. Filling them with a number measures the latter. Our own batch leaves matrices in the lanes of registers,
-  entry after entry for several states; NumPy needs them by rows, state after state. The last figure is the time to
-  copy one matrix from the cache to all states. For panda it is 1.7 times the filling time. With a copy alone, the
+- batches of 1000 states, `out` reused: the time per state, the time of a loop of Pinocchio's calls, and a lower limit
+  for a batch.
+  The limit is the time of the library's own batch of the same size, plus 1.3 times the time to write the results once.
+  The second time is measured by filling the results with a number. The library's batch leaves matrices in the lanes of
+  registers: each entry for several states. NumPy needs whole matrices, state after state. The last column is the time
+  to copy one matrix from the cache to all states. For panda it is 1.7 times the filling time. With a copy alone, the
   matrices of a batch would take 1.03 of the limit, and their transposition takes additional time;
-- overall: `import`, beyond NumPy's; a solve by FDDP, beyond the time that the solver itself measures.
+- overall: the time of `import` minus NumPy's, and the time of a solve by FDDP minus the time that the solver itself
+  measures.
 """
 
 import argparse
@@ -41,13 +44,13 @@ import condyle.pinocchio as spelling
 from condyle.optimal import Cost, Fddp, FreeDynamics, Problem, Residual
 
 STATES = 1000
-SECONDS = 0.002  # duration of each round of a call: shorter than the time slices in which a machine shares its cores
+SECONDS = 0.002  # duration of each round of a call, shorter than the time slices of a shared core
 WRITES = 1.3  # factor of the time to write the results
 Call = Callable[[], object]
 
 
 def least(calls: list[Call], rounds: int, seconds: float = SECONDS) -> list[float]:
-    """Returns the least time of each call, in µs, over rounds in which the calls take turns."""
+    """Returns the least time of each call (µs) over rounds in which the calls take turns."""
     repeats = []
     for call in calls:
         call()
@@ -65,7 +68,7 @@ def least(calls: list[Call], rounds: int, seconds: float = SECONDS) -> list[floa
 
 
 class Robot:
-    """A robot in both libraries, with its states."""
+    """A robot in both libraries, with random states."""
 
     def __init__(self, name: str) -> None:
         loader, (_, self.locked) = LOADERS[name], ROBOTS[name]
@@ -84,7 +87,7 @@ class Robot:
         self.v, self.a, self.tau = rng.standard_normal((3, STATES, self.model.nv))
 
     def singles(self) -> dict[str, tuple[Call, Call]]:
-        """Returns calls for one state, ours and Pinocchio's."""
+        """Returns, for one state, calls of Condyle and of Pinocchio."""
         m, d, pm, pd = self.model, self.data, self.theirs, self.their_data
         q, v, a, tau = self.q[0], self.v[0], self.a[0], self.tau[0]
         frame = len(m.frames) - 1
@@ -118,7 +121,7 @@ class Robot:
         }
 
     def spelled(self) -> dict[str, tuple[Call, Call]]:
-        """Returns calls for one state in Pinocchio's spelling, and ours."""
+        """Returns, for one state, calls in Pinocchio's spelling and calls of `condyle`."""
         m, d, sm = self.model, self.data, spelling.Model(self.model)
         sd, q, v, a, tau = sm.createData(), self.q[0], self.v[0], self.a[0], self.tau[0]
         frame = len(m.frames) - 1
@@ -176,7 +179,7 @@ class Robot:
         return {name: (lambda name=name: getattr(m, name)) for name in ("frames", "names", "limits", "inertias")}
 
     def batches(self) -> dict[str, tuple[Call, Call, list[np.ndarray]]]:
-        """Returns calls for all states, loops over Pinocchio's calls, and the arrays that our calls fill."""
+        """Returns calls for all states, loops over Pinocchio's calls, and the arrays that Condyle's calls fill."""
         m, d, pm, pd = self.model, self.data, self.theirs, self.their_data
         q, v, a, tau, n = self.q, self.v, self.a, self.tau, self.model.nv
         empty = {k: [np.zeros((STATES, *[n] * axes)) for axes in shapes] for k, shapes in SHAPES.items()}
@@ -206,10 +209,10 @@ class Robot:
         }
 
     def rust(self, program: Path, rounds: int) -> dict[str, float]:
-        """Returns the time per state of our library's own batches, in µs, without Python.
+        """Returns the time per state of the library's own batches (µs), without Python.
 
-        The addresses of a program's memory change times by a few per cent, differently in each process. Python's
-        process is one sample, so this is the median of several.
+        The memory addresses of a program change times by a few per cent, differently in each process. The Python
+        process is one sample, so this function returns the median of several processes.
         """
         with tempfile.NamedTemporaryFile(suffix=".states") as file:
             for state in zip(self.q, self.v, self.a, self.tau, strict=True):
@@ -221,7 +224,7 @@ class Robot:
 
 
 SHAPES = {"rnea": [1], "aba": [1], "crba": [2], "rnea_derivatives": [2, 2, 2], "aba_derivatives": [1, 2, 2, 2]}
-"""Number of axes of length nv of each result for one state."""
+"""Number of axes of length nv that each result has for one state."""
 
 
 def import_seconds(rounds: int) -> tuple[float, float]:
@@ -234,7 +237,8 @@ def import_seconds(rounds: int) -> tuple[float, float]:
 
 
 def solve_seconds(rounds: int) -> tuple[float, float]:
-    """Returns the least times of a solve by FDDP as measured by the solver and by Python: an arm's reach."""
+    """Returns two least times of a solve by FDDP, the reach of an arm: as the solver measures it, and as Python
+    measures it."""
     arm, knots = condyle.robots.arm7(), 100
     x0 = np.r_[0.0, 0.4, 0.0, 1.2, 0.0, 0.8, 0.0, np.zeros(7)]
     way = [Cost("state", 1e-2, Residual.state(x0)), Cost("effort", 1e-4, Residual.control(np.zeros(7)))]
@@ -265,7 +269,8 @@ def measure(robot: Robot, program: Path | None, rounds: int) -> list[dict]:
     rust = robot.rust(program, rounds) if program else {}
     for name, (ours, theirs, out) in robot.batches().items():
         write = lambda out=out: [x.fill(1.0) for x in out]  # noqa: E731
-        # one after the other, as our own library is timed: in turns, each would begin with others' data in the cache
+        # One call after the other, as the library is timed.
+        # If calls took turns, each would begin with other data in the cache.
         ones = [np.ones(x.shape[1:]) for x in out]
         copy = lambda out=out, ones=ones: [np.copyto(x, one) for x, one in zip(out, ones, strict=True)]  # noqa: E731
         mine, other, writing, copying = (least([call], rounds, 0.0)[0] / STATES for call in (ours, theirs, write, copy))

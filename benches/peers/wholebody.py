@@ -1,16 +1,16 @@
 #!/usr/bin/env python3
-"""Times a tick of whole-body control with each of our back ends, and other solvers on the same programs.
+"""Times a tick of whole-body control with each back end of Condyle, and with other solvers for the same programs.
 
     python3 benches/peers/wholebody.py [--json] [--write] [--ticks N] [--window N] [--replays N] [--cpu K] [ROBOT ...]
 
 Robots that stand, walk and trot under pushes are recorded (benches/peers/wholebody.rs), and the recordings are
-replayed. The time of a tick is the least of its replays, which excludes other work on the machine; the p99 of all
-replays is shown next to it. For our back ends: a whole tick, from state to torques, with cones and with pyramids, and
-its assembly (kinematics, rows and condensing) alone. For ProxQP, quadprog, DAQP, eiquadprog (TSID's) and our solvers:
-a solve alone, with pyramids, of the window's consecutive programs, in both forms, with warm starts if available. All
-run on one core, for some minutes after the build. With --write, the table is written to crates/wholebody/README.md.
-Talos and ANYmal come from example-robot-data. Needs Linux, Rust, Python 3 with venv and a C++ compiler; everything
-else is installed under target/peers.
+replayed. The time of a tick is the least time in all replays, which excludes other work on the machine; the p99 of all
+replays is shown next to it. For Condyle's back ends, the program times a whole tick, from state to torques, with cones
+and with pyramids. It also times the assembly (kinematics, rows and condensing) alone. For ProxQP, quadprog, DAQP,
+eiquadprog (TSID's solver) and Condyle's solvers, it times the solve alone, with pyramids. The programs are consecutive
+ticks of a window, in both forms, with warm starts if available. All solvers run on one core, for some minutes after the
+build. With --write, the table is written to crates/wholebody/README.md. Talos and ANYmal come from example-robot-data.
+The script needs Linux, Rust, Python 3 with venv and a C++ compiler; everything else is installed under target/peers.
 """
 
 import argparse
@@ -32,7 +32,7 @@ DOCUMENT = ROOT / "crates" / "wholebody" / "README.md"
 
 
 def build_ours() -> Path:
-    """Builds benches/peers/wholebody.rs as `cargo bench` does; returns its path."""
+    """Builds benches/peers/wholebody.rs as `cargo bench` does; returns the path of the program."""
     command = ["cargo", "build", "--release", "--package", "condyle-benches", "--bench", "wholebody_peers"]
     command += ["--message-format=json", "--locked"]
     for line in run(*command, cwd=ROOT).splitlines():
@@ -43,7 +43,7 @@ def build_ours() -> Path:
 
 
 def build_eiquadprog(prefix: Path) -> Path:
-    """Compiles eiquadprog.cpp against the wheel; returns its path."""
+    """Compiles eiquadprog.cpp with the headers of the installed wheel; returns the path of the library."""
     library, source = PEERS / "eiquadprog.so", HERE / "eiquadprog.cpp"
     compiler = next(c for c in ("clang++-19", "clang++", "g++") if shutil.which(c))
     flags = ["-std=c++17", "-O3", "-march=native", "-DNDEBUG", "-w", "-shared", "-fPIC"]
@@ -53,7 +53,7 @@ def build_eiquadprog(prefix: Path) -> Path:
 
 
 def table(records: list[dict]) -> str:
-    """Returns a table with a row for each solver and form, and a column for each recording."""
+    """Returns the table with a row for each solver and form, and with a column for each recording."""
     columns = list(dict.fromkeys((r["robot"], r["workload"]) for r in records))
     lines = [
         "| ms: p50, p99 (max; p99 of all replays) | " + " | ".join(f"{robot}, {what}" for robot, what in columns) + " |"

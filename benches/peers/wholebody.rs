@@ -1,13 +1,13 @@
-//! Times of whole-body control ticks, for recorded robots that stand, walk and trot under pushes. `wholebody.py` builds
-//! and runs this program, together with other solvers.
+//! Times ticks of whole-body control, for recorded robots that stand, walk and trot under pushes. The script
+//! `wholebody.py` builds and runs this program, and programs of other solvers.
 //!
 //! ```text
 //! cargo bench -p condyle-benches --bench wholebody_peers -- \
 //!     [--ticks N] [--replays N] [--export FOLDER --window N] [ROBOT[=URDF] …]
 //! ```
 //!
-//! A new controller replays each recording, with each tick starting from the solution of its previous tick; the time of
-//! a tick is the least of all replays. Prints one record per line. Run it on one core: `taskset -c 1`.
+//! A new controller replays each recording; each tick starts from the solution of the previous tick. The time of a tick
+//! is the least time in all replays. The program prints one record per line. Run it on one core: `taskset -c 1`.
 
 #[path = "../../crates/wholebody/tests/common/workload.rs"]
 mod workload;
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use workload::{Robot, Tick, record};
 
-/// Pyramid for comparisons: four faces inside the cone.
+/// Pyramid for comparisons, with four faces inside the cone.
 const PYRAMID: Friction = Friction::Pyramid { sides: 4, inscribed: true };
 
 struct Options {
@@ -54,13 +54,13 @@ impl Options {
     }
 }
 
-/// Returns the entry of the sorted numbers below which this share of them lies.
+/// Returns the entry of the sorted numbers below which this share of the numbers lies.
 fn quantile(sorted: &[f64], part: f64) -> f64 {
     sorted[(part * (sorted.len() - 1) as f64).round() as usize]
 }
 
-/// Returns the milliseconds of each tick in each replay: of `call` after `prepare`, with a new controller for each
-/// replay.
+/// Returns the time (ms) of each tick in each replay: the time of `call` after `prepare`. Each replay has a new
+/// controller.
 fn replay(
     ticks: &[Tick],
     replays: usize,
@@ -82,7 +82,7 @@ fn replay(
         .collect()
 }
 
-/// Returns p50, p99 and maximum of the least times, and the p99 of all times.
+/// Returns p50, p99 and maximum of the least time of each tick, and p99 of all times.
 fn statistics(times: &[Vec<f64>]) -> serde_json::Value {
     let mut least: Vec<f64> =
         (0..times[0].len()).map(|k| times.iter().map(|t| t[k]).fold(f64::INFINITY, f64::min)).collect();
@@ -108,7 +108,8 @@ fn print(robot: &Robot, motion: &str, what: serde_json::Value, times: &[Vec<f64>
     println!("{record}");
 }
 
-/// Times each back end with cones and with pyramids, in its own form, and the assembly of the condensed program alone.
+/// Times each back end with cones and with pyramids, in the back end's own form. Also times the assembly of the
+/// condensed program alone.
 fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     for (friction, friction_name) in [(Friction::Cone, "cone"), (PYRAMID, "pyramid")] {
         let settings = Settings { friction, ..Robot::settings() };
@@ -145,7 +146,7 @@ fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     }
 }
 
-/// Times our back ends without assembly, with pyramids, for comparison with other solvers.
+/// Times Condyle's back ends without the assembly, with pyramids, for comparison with other solvers.
 fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     for (backend, form, name, form_name) in [
         (Backend::InteriorPoint, Form::Full, "condyle", "full"),
@@ -166,9 +167,9 @@ fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
     }
 }
 
-/// Writes the programs of consecutive ticks with pyramids, in both forms, with our optimum. Sizes are JSON, a line for
-/// each tick. Numbers are doubles in the order P, c, A, b, G, l, u (matrices by columns), of the full form and then of
-/// the condensed one, then our solutions of both.
+/// Writes the programs of consecutive ticks with pyramids, in both forms, and Condyle's optimum. Sizes are written as
+/// JSON, one line for each tick. Numbers are doubles: P, c, A, b, G, l, u (matrices column by column) of the full form,
+/// the same of the condensed form, then Condyle's solutions in both forms.
 fn export(robot: &Robot, motion: &str, ticks: &[Tick], folder: &Path) -> Result<(), Box<dyn Error>> {
     let settings = Settings { friction: PYRAMID, ..Robot::settings() };
     let mut controller = robot.controller(settings);

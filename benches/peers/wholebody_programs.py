@@ -1,4 +1,4 @@
-"""Programs exported by benches/peers/wholebody.rs, for other solvers."""
+"""Reads the programs that benches/peers/wholebody.rs exports, for other solvers."""
 
 import json
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 INFINITY = 1e20
-"""Value that solvers treat as an infinite bound."""
+"""Value that the solvers treat as an infinite bound."""
 
 
 @dataclass
 class Program:
-    """min ½ xᵀ P x + cᵀ x with A x = b and lower ≤ G x ≤ upper, in all layouts that the solvers need."""
+    """The program min ½ xᵀ P x + cᵀ x with A x = b and lower ≤ G x ≤ upper, in all layouts that the solvers need."""
 
     P: np.ndarray
     c: np.ndarray
@@ -32,7 +32,7 @@ class Program:
         self.all_upper = np.concatenate([self.b, np.minimum(self.upper, INFINITY)])
         self.sense = np.array([5] * len(self.b) + [0] * len(self.lower), dtype=np.int32)
         self.normals = np.ascontiguousarray(np.vstack([self.A, self.C]).T)
-        self.offsets = np.concatenate([self.b, -self.d])  # normalsᵀ x = or ≥ offsets
+        self.offsets = np.concatenate([self.b, -self.d])  # normalsᵀ x must equal or exceed offsets
         self.minus_b = -self.b
 
     def objective(self, x: np.ndarray) -> float:
@@ -43,7 +43,7 @@ class Program:
 
 
 def read(path: Path) -> list[tuple[dict[str, Program], dict[str, np.ndarray]]]:
-    """Returns the programs of a recording in both forms, and our solutions of them."""
+    """Returns the programs of a recording in both forms, and Condyle's solutions of these programs."""
     numbers, at, ticks = np.fromfile(path.with_suffix(".numbers")), 0, []
 
     def take(*shape: int) -> np.ndarray:

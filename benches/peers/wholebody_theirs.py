@@ -1,9 +1,11 @@
-"""Times other solvers on the programs that benches/peers/wholebody.rs exports; wholebody.py runs this program.
+"""Times other solvers for the programs that benches/peers/wholebody.rs exports. The script wholebody.py runs this
+program.
 
     python wholebody_theirs.py FOLDER REPLAYS EIQUADPROG_LIBRARY
 
-All solve the same program to the same objective, with pyramids, in full and in condensed form, with warm starts if
-available. The times include a solve and the replacement of the numbers, but not their computation.
+All solvers solve the same program with pyramids to the same objective, in full and in condensed form, with warm starts
+if available. The times include a solve and the replacement of the program's numbers, but not the computation of these
+numbers.
 """
 
 import ctypes
@@ -20,12 +22,13 @@ import quadprog
 from wholebody_programs import Program, read
 
 AGREEMENT = 1e-6
-"""Maximum difference of an objective from ours, relative to 1 and its size, for a valid solution."""
+"""Maximum difference between a solver's objective and Condyle's objective for a valid solution, relative to 1 +
+|objective|."""
 ACCURACY = 1e-9
-"""Tolerance of solvers that have one; ours has the same."""
+"""Tolerance for solvers that have a tolerance. Condyle's solver has the same one."""
 ITERATIONS = 500, 50
-"""Outer and inner iterations of ProxQP. With its own limits, a tick on which it stalls takes seconds; with these
-limits it counts as unsolved, unless it is near enough."""
+"""Maximum numbers of outer and inner iterations of ProxQP. With ProxQP's own maximum, a tick on which it stalls takes
+seconds. With these numbers such a tick counts as unsolved, unless the objective is near enough."""
 Solver = Callable[[Program], np.ndarray]
 
 
@@ -93,7 +96,7 @@ def by_eiquadprog(library: str) -> Callable[[], Solver]:
 
 
 def times(ticks: list, form: str, make: Callable[[], Solver], replays: int) -> tuple[np.ndarray, int]:
-    """Returns the milliseconds of each solve in each replay, and the number of unsolved ticks."""
+    """Returns the milliseconds of each solve in each replay, and the number of ticks that were not solved."""
     found, unsolved = np.empty((replays, len(ticks))), 0
     for replay in range(replays):
         solver = make()

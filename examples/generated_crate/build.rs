@@ -1,4 +1,4 @@
-//! Writes `arm7.rs` for `src/lib.rs`.
+//! Writes `arm7.rs`, which `src/lib.rs` includes.
 
 use condyle_codegen::{Language, Settings, generate};
 use condyle_model::robots;

@@ -1,27 +1,27 @@
-//! A robot on level ground, by constrained dynamics: a foot that touches is held as long as the ground pushes, and a
-//! foot that lands is stopped by an impact. Friction is unbounded here: callers check the forces.
+//! A robot on level ground, simulated by constrained dynamics. A foot that touches is held as long as the ground
+//! pushes. An impact stops a foot that lands. Friction is unbounded here: callers must check the forces.
 
 use condyle::{
     ConstraintSet, ContactConstraint, Data, Force, Model, ReferenceFrame, Vec3, constrained_dynamics,
     constraints::impulse_dynamics, forward_kinematics, integrate,
 };
 
-/// Rate at which a held foot's drift decays (1/s).
+/// Rate at which the drift of a held foot decays (1/s).
 const HOLD: f64 = 50.0;
 
-/// A robot and its feet.
+/// A robot, its feet, and its state.
 pub(crate) struct Ground<'m> {
     model: &'m Model,
     data: Data<f64>,
     pub(crate) q: Vec<f64>,
     pub(crate) v: Vec<f64>,
     contacts: Vec<ContactConstraint>,
-    /// Position at which each foot stands; `None` if it is in the air.
+    /// Position at which each foot is held; `None` if the foot is in the air.
     standing: Vec<Option<Vec3<f64>>>,
 }
 
 impl<'m> Ground<'m> {
-    /// Creates a robot whose feet all stand at their present positions.
+    /// Creates a robot whose feet are all held at their present positions.
     pub(crate) fn new(model: &'m Model, q: &[f64], contacts: Vec<ContactConstraint>) -> Self {
         let mut data = Data::new(model);
         let placements = forward_kinematics(model, &mut data, q);
@@ -51,7 +51,7 @@ impl<'m> Ground<'m> {
                 let row = set.range(i).start;
                 Vec3::new(lambda[row], lambda[row + 1], lambda[row + 2])
             };
-            // the ground does not pull
+            // The ground cannot pull: feet that it would pull are released.
             let pulled =
                 (0..feet.len()).filter(|&i| force(i).z < 0.0).min_by(|&i, &j| force(i).z.total_cmp(&force(j).z));
             if let Some(i) = pulled {
@@ -66,7 +66,7 @@ impl<'m> Ground<'m> {
         let mut next = self.q.clone();
         integrate(self.model, &self.q, &moved, &mut next); // q⁺ = q ⊕ Δt v⁺
         self.q = next;
-        // feet that have landed
+        // Find the feet that have landed.
         let placements = forward_kinematics(self.model, &mut self.data, &self.q);
         let mut landed = false;
         for (standing, contact) in self.standing.iter_mut().zip(&self.contacts) {

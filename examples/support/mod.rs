@@ -1,4 +1,4 @@
-//! Walking as an optimal control problem, and a page that shows it: code shared by `trot.rs` and `walk.rs`.
+//! Walking as an optimal control problem, and a page that shows it. `trot.rs` and `walk.rs` share this code.
 
 use condyle::optimal::robot::{
     Activation, Contact, ContactDynamics, Cost, FreeDynamics, FrictionCone, ImpulseDynamics, Residual, WrenchCone,
@@ -8,23 +8,23 @@ use condyle::{ContactConstraint, Data, Model, ReferenceFrame, Se3, Vec3, forward
 use std::sync::Arc;
 
 const FRICTION: f64 = 0.7;
-/// Rate at which a foot's slip decays (1/s).
+/// Rate at which the slip of a foot decays (1/s).
 const HOLD: f64 = 40.0;
 
-/// Tolerance of the solver: costs are some hundreds, so it is below a millionth of them.
+/// Tolerance of the solver. Costs are several hundred, so it is below a millionth of the costs.
 const TOLERANCE: f64 = 1e-4;
 
 /// Shape of the feet.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Foot {
-    /// Points.
+    /// The feet are points.
     Point,
-    /// Soles, with their sides along x and y (m).
-    #[allow(dead_code)] // not used by the quadruped
+    /// The feet are soles with these side lengths along x and y (m).
+    #[allow(dead_code)] // the quadruped does not use it
     Sole([f64; 2]),
 }
 
-/// A gait under construction: its knots so far, and the positions of feet and centre of mass at their end.
+/// A gait while it is built: its knots so far, and the positions of feet and centre of mass at the last knot.
 pub(crate) struct Gait {
     model: Arc<Model>,
     x0: Vec<f64>,
@@ -36,12 +36,12 @@ pub(crate) struct Gait {
     stages: Vec<usize>,
     us: Vec<f64>,
     times: Vec<f64>,
-    /// Whether each foot touches, for each knot.
+    /// Whether each foot touches the ground, for each knot.
     touches: Vec<bool>,
 }
 
 impl Gait {
-    /// Starts a gait at a posture q in which the robot stands on its feet, with knots of dt seconds.
+    /// Starts a gait at the posture q, in which the robot stands on its feet. The time between knots is dt (s).
     pub(crate) fn new(model: Arc<Model>, q: &[f64], foot: Foot, names: &[&str], dt: f64) -> Self {
         let mut data = Data::new(&model);
         let placements = forward_kinematics(&model, &mut data, q);
@@ -67,15 +67,15 @@ impl Gait {
         self.model.frames()[frame].name.clone()
     }
 
-    /// Returns the cost of the posture, with weights of the trunk's position and rotation, the joints, and their
-    /// velocities.
+    /// Returns the cost of the distance from the posture. The weights are for position and rotation of the trunk, for
+    /// the joints, and for the velocities of these three.
     fn rest(&self, weights: [f64; 6]) -> Cost {
         let counts = [3, 3, self.model.nv() - 6].repeat(2);
         let w = counts.iter().zip(weights).flat_map(|(&n, w)| vec![w; n]).collect();
         Cost::new("rest", 1e1, Residual::State { reference: self.x0.clone() }, Activation::Weighted(w))
     }
 
-    /// Returns the cost of a foot at a point; a sole should also be level.
+    /// Returns the cost of the distance between a foot and a point. A sole should also be level.
     fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
         let moved = (&self.model.frames()[frame]).into();
         let residual = match self.foot {
@@ -85,7 +85,7 @@ impl Gait {
         Cost::new(&format!("{} moves", self.name(frame)), weight, residual, Activation::Quadratic)
     }
 
-    /// Returns the costs of a knot on some feet, while others move.
+    /// Returns the costs of a knot, for the feet in support and for the feet that move.
     fn costs(&self, support: &[usize], moving: &[(usize, Vec3<f64>)], com: Vec3<f64>) -> Vec<Cost> {
         let grip = |&frame: &usize| {
             let (contact, friction) = (self.name(frame), FrictionCone::new(FRICTION));
@@ -108,7 +108,8 @@ impl Gait {
         costs
     }
 
-    /// Adds some knots on `support`; knot k has the costs `costs(k)`. One action serves all knots.
+    /// Adds knots with the feet `support` on the ground. Knot k has the costs `costs(k)`. All knots have one common
+    /// action.
     fn phase(
         &mut self,
         support: &[usize],
@@ -137,7 +138,7 @@ impl Gait {
         self.phase(&feet, knots, |gait, _| gait.costs(&feet, &[], gait.com))
     }
 
-    /// Swings the feet with these indices ahead by `length`, in an arc of height `height`, and sets them down.
+    /// Swings the feet with these indices ahead by `length`, along an arc of this height, and sets them down.
     pub(crate) fn step(&mut self, swinging: &[usize], length: f64, height: f64, knots: usize) -> Result<(), Error> {
         let swings = |k: &usize| swinging.contains(k);
         let support: Vec<_> = (0..self.feet.len()).filter(|k| !swings(k)).map(|k| self.feet[k].0).collect();
@@ -165,8 +166,8 @@ impl Gait {
         Ok(())
     }
 
-    /// Returns whether each foot touches from each knot to the next, in the order of their names.
-    #[allow(dead_code)] // not used without tracking
+    /// Returns whether each foot touches, for each interval between knots, in the order of the feet's names.
+    #[allow(dead_code)] // only examples with tracking use it
     pub(crate) fn touches(&self) -> Vec<bool> {
         self.touches.clone()
     }

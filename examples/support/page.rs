@@ -1,11 +1,11 @@
-//! A page that plays a motion, made from the parts of the page of `condyle plan`.
+//! Writes a page that plays a motion, from the parts of the page of `condyle plan`.
 
 use condyle::optimal::Solution;
 use condyle::{Data, Model, Se3, forward_kinematics, spatial::Quaternion};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Parts of the template, in the order of insertion.
+/// Placeholders of the template, and the texts that replace them, in this order.
 const PARTS: [(&str, &str); 7] = [
     ("/*{{uplot.css}}*/", include_str!("../../crates/cli/page/vendor/uPlot.min.css")),
     ("/*{{plan.css}}*/", include_str!("../../crates/cli/page/plan.css")),
@@ -21,7 +21,7 @@ fn pose(placement: Se3<f64>) -> [f64; 7] {
     [p.x, p.y, p.z, q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// Draws a bone from each body to the joints and the feet that it carries.
+/// Returns the bones of each body: segments to the joints and to the feet that the body carries.
 fn bodies(model: &Model, feet: &[&str]) -> Vec<Value> {
     let mut shapes = vec![Vec::new(); model.bodies().len()];
     let mut bone = |body: usize, to: [f64; 3], radius: f64| {
@@ -43,7 +43,7 @@ fn bodies(model: &Model, feet: &[&str]) -> Vec<Value> {
     model.bodies().iter().enumerate().map(body).collect()
 }
 
-/// Returns the worst knot of each joint and quantity that violates its limits.
+/// Returns, for each joint and each quantity that violates its limits, the knot with the largest violation.
 fn violations(
     joints: &[&condyle::tree::Body],
     name: &str,
@@ -64,9 +64,9 @@ fn violations(
     found
 }
 
-/// Writes a page that plays a motion. It also draws the path of the first foot.
+/// Writes a page that plays a motion, and draws the path of the first foot.
 ///
-/// An impact is a knot without duration and controls: the page omits the state before it.
+/// An impact is a knot without duration and controls. The page omits the state before the impact.
 pub(crate) fn write(
     path: &Path,
     title: &str,

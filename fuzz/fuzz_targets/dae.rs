@@ -1,4 +1,4 @@
-//! Meshes from DAE.
+//! Fuzzes the reader of meshes from DAE.
 #![no_main]
 
 condyle_fuzz::target!(condyle_fuzz::Kind::Dae);

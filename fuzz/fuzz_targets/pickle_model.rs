@@ -1,4 +1,4 @@
-//! Models from Python pickles.
+//! Fuzzes the reader of models from Python pickles.
 #![no_main]
 
 condyle_fuzz::target!(condyle_fuzz::Kind::Pickle);

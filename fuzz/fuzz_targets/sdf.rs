@@ -1,4 +1,4 @@
-//! Robots from SDF.
+//! Fuzzes the reader of robots from SDF.
 #![no_main]
 
 condyle_fuzz::target!(condyle_fuzz::Kind::Sdf);

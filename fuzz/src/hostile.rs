@@ -1,7 +1,7 @@
-//! Hostile input from outside: seeds, mutations, and a property that holds for every input.
+//! Hostile input: seeds, mutations of seeds, and a property that must hold for every input.
 //!
-//! A robot or a problem is either rejected with an error or usable. Nothing panics, nothing hangs, and usable input
-//! gives finite numbers.
+//! A reader either rejects an input with an error, or returns a robot or problem that can be used. Nothing panics,
+//! nothing hangs, and accepted input gives finite numbers.
 
 use condyle::optimal::robot::{
     Activation, Contact, ControlBounds, Cost, Dynamics, Integrator, Knot, Limit, Residual, RobotProblem,
@@ -17,7 +17,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Format in which a robot or a problem comes from outside.
+/// Format of an input: a robot, a problem or a mesh from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A robot as URDF.
@@ -30,7 +30,7 @@ pub enum Kind {
     Model,
     /// A problem in JSON.
     Problem,
-    /// A model in the format of pickles.
+    /// A model in the format of Python's pickles.
     Pickle,
     /// Named positions as SRDF.
     Srdf,
@@ -54,7 +54,7 @@ macro_rules! mesh {
     };
 }
 
-/// MJCF that copies parts of its tree, and has meshes with mass.
+/// MJCF whose elements copy subtrees, and which has meshes with mass.
 const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default class="c"><joint damping="1"/></default></default>
 <asset><mesh name="m" inertia="exact" scale="1 -2 3" vertex="0 0 0 1 0 0 0 2 0 0 0 3" face="0 2 1 0 1 3 0 3 2 1 2 3"/>
 <mesh name="s" builtin="supersphere" params="5 0.5 1.5"/></asset><worldbody><replicate count="3" offset="1 0 0" euler="0 0 30" sep="-">
@@ -64,17 +64,17 @@ const COPIES: &str = r#"<mujoco><compiler fitaabb="true"/><default><default clas
 <intvelocity joint="j" kp="3" actrange="-1 1"/><pid joint="j" kp="1" ki="2"/></actuator><keyframe>
 <key name="k" ctrl="1 2 3" act="0.5"/></keyframe></mujoco>"#;
 
-/// An MJCF of several files: the others are [`FILES`].
+/// MJCF that consists of several files; [`FILES`] contains the other files.
 const INCLUDES: &str = r#"<mujoco><asset><model name="m" file="child.xml"/><mesh name="o" file="face.obj"/></asset><worldbody>
 <body name="b"><joint name="i"/><geom type="mesh" mesh="o"/><include file="part.xml"/><frame pos="0 0 1"><attach model="m" body="c" prefix="x-"/>
 </frame></body></worldbody></mujoco></mujoco>"#;
 
-/// An SDF of several files.
+/// SDF that consists of several files; [`FILES`] contains the other files.
 const MODELS: &str = r#"<sdf version="1.9"><world name="w"><include><uri>part.sdf</uri><name>a</name><pose>1 0 0 0 0 0</pose></include>
 <include merge="true"><uri>part.sdf</uri><name>b</name></include><joint name="j" type="ball"><parent>world</parent><child>a::l</child></joint>
 </world></sdf>"#;
 
-/// Files in the folder of a file that is read, by name.
+/// Names and contents of the files that are in the same folder as the input.
 const FILES: [(&str, &str); 4] = [
     ("part.xml", "<mujocoinclude><body name='p'><joint name='s' type='slide'/><geom size='1'/></body></mujocoinclude>"),
     (
@@ -86,12 +86,12 @@ const FILES: [(&str, &str); 4] = [
     ("face.obj", POLYGONS),
 ];
 
-/// An OBJ with faces of many corners, in no plane and concave.
+/// OBJ with faces of many corners that are concave and in no plane.
 const POLYGONS: &str = "v 3 1 0\nv 5 1 0.5\nv 6 3 0\nv 4 5 1\nv 2 3 -0.5\nv 4 2 -5\nf 1 2 3 4 5\nf 6 2 1\nf 6 3 2\nf 6 4 3\nf 6 5 4\n\
 f 6 1 5\nf 5 4 6 3 2 1\n";
 
 impl Kind {
-    /// Returns the seeds, which are all valid.
+    /// Returns the seeds of this format, which are all valid.
     pub fn seeds(self) -> Vec<Vec<u8>> {
         static SEEDS: [OnceLock<Vec<Vec<u8>>>; 10] = [const { OnceLock::new() }; 10];
         SEEDS[self as usize].get_or_init(|| self.new_seeds()).clone()
@@ -128,17 +128,18 @@ impl Kind {
         texts.into_iter().map(String::into_bytes).collect()
     }
 
-    /// Reads an input, and uses the result if reading succeeds. Returns whether it succeeded.
+    /// Reads an input, and uses the result if reading succeeds. Returns whether reading succeeded.
     ///
     /// # Panics
-    /// If an input that was read cannot be used.
+    /// If an input was accepted, but cannot be used.
     pub fn check(self, input: &[u8]) -> bool {
         let text = match self {
-            // as the text of a file, in any encoding
+            // Take the input as the text of a file, in any encoding.
             Self::Urdf | Self::Mjcf | Self::Sdf | Self::Srdf => Model::decoded(input.to_vec()).into(),
             _ => String::from_utf8_lossy(input),
         };
-        // options of a user, chosen by the input's length, which mutations change too
+        // Options that a user may choose. Here the length of the input chooses them, because mutations also change the
+        // length.
         let (some, other) = (input.len().is_multiple_of(2), input.len().is_multiple_of(3));
         let root_joint = some.then_some(Joint::FreeFlyer);
         let said = match self {
@@ -194,7 +195,7 @@ impl Kind {
     }
 }
 
-/// Robot with features of the format besides links and joints, and with additions of other programs.
+/// Robot with features of URDF besides links and joints, and with elements that other programs add.
 const URDF: &str = r#"<!------ a robot ------>
 <?xml version="1.0" encoding="windows-1252"?>
 <!DOCTYPE robot [<!ELEMENT robot (link)>]>
@@ -217,7 +218,7 @@ const URDF: &str = r#"<!------ a robot ------>
   <gazebo reference="b"><turnGravityOff>true</turnGravityOff><sensor:camera name="x"/></gazebo>
 </robot>"#;
 
-/// Returns robots with all features that a file of a model can have.
+/// Returns robots with all features that the file of a model can have.
 fn models() -> Vec<Model> {
     let mimic = UrdfOptions { mimic: true, ..UrdfOptions::default() };
     let mimic = Model::from_urdf_str(file!("mimic.urdf"), &mimic).expect("is a good robot");
@@ -225,7 +226,7 @@ fn models() -> Vec<Model> {
     vec![robots::arm7(), robots::quadruped(), mimic, linkage]
 }
 
-/// Returns problems with all kinds of dynamics, and all terms that a file can have.
+/// Returns problems with all kinds of dynamics, and with all terms that the file of a problem can have.
 fn problems() -> Vec<RobotProblem> {
     let (arm, quadruped) = (robots::arm7(), robots::quadruped());
     let state = |model: &Model| [neutral(model), vec![0.0; model.nv()]].concat();
@@ -273,7 +274,7 @@ fn problems() -> Vec<RobotProblem> {
     ]
 }
 
-/// Puts a text into a folder with [`FILES`], and returns its path.
+/// Writes a text into a folder that also contains [`FILES`], and returns the text's path.
 fn in_folder(kind: Kind, text: &str) -> PathBuf {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     let folder = FOLDER.get_or_init(|| {
@@ -289,7 +290,8 @@ fn in_folder(kind: Kind, text: &str) -> PathBuf {
     path
 }
 
-/// Writes a robot with other armature into a copy of its file: an error, or a file that gives the robot back.
+/// Writes the robot, and the robot with another armature, into a copy of its file. This must succeed, or return an
+/// error with a message.
 fn write<E: ToString>(kind: Kind, model: &Model, text: &str, write: impl Fn(&Model, &Path, &Path) -> Result<(), E>) {
     let original = in_folder(kind, text);
     let new = original.with_extension("new");
@@ -302,8 +304,8 @@ fn write<E: ToString>(kind: Kind, model: &Model, text: &str, write: impl Fn(&Mod
     }
 }
 
-/// Checks that inverse dynamics and the inertia matrix at the neutral position are finite. Where that matrix has an
-/// inverse, forward dynamics elsewhere is finite too (at the neutral position, axes may coincide).
+/// Checks that inverse dynamics and the inertia matrix are finite at the neutral position. If the inertia matrix is not
+/// singular, also checks forward dynamics at a random position. (At the neutral position, axes may coincide.)
 fn use_model(model: &Model) {
     let (mut data, mut q) = (Data::new(model), neutral(model));
     let zeros = vec![0.0; model.nv()];
@@ -317,12 +319,12 @@ fn use_model(model: &Model) {
     }
 }
 
-/// Checks that named positions are finite, with as many numbers as the quadruped has coordinates.
+/// Checks that named positions are finite, and have as many numbers as the quadruped has coordinates.
 fn use_positions(all: &[(String, Vec<f64>)]) {
     assert!(all.iter().all(|(_, q)| q.len() == 19 && q.iter().all(|x| x.is_finite())), "{all:?}");
 }
 
-/// Checks that a problem that can be built can be rolled out: to finite numbers, or to an error.
+/// Checks the rollout of a problem that could be built: it gives finite numbers or an error.
 fn use_problem(data: &RobotProblem) -> Result<(), String> {
     let mut problem = data.build().map_err(|e| e.to_string())?;
     let us = vec![0.0; (0..problem.horizon()).map(|t| problem.nu(t)).sum()];
@@ -331,7 +333,7 @@ fn use_problem(data: &RobotProblem) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks a mesh in a page: drawn triangles have valid vertex indices, and boxes are finite.
+/// Checks a mesh as a page draws it: triangles have valid vertex indices, and boxes are finite.
 fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
     if let Ok((points, triangles)) = condyle_meshes::triangles(format, bytes) {
         assert!(
@@ -354,7 +356,7 @@ fn use_mesh(format: Format, bytes: &[u8]) -> Result<(), String> {
     Ok(())
 }
 
-/// Decodes numbers of 16 bits, each with its lower byte first.
+/// Decodes numbers of 16 bits from base64, with the lower byte of each number first.
 fn from_base64(text: &str) -> Vec<u16> {
     let value = |letter: u8| match letter {
         b'A'..=b'Z' => letter - b'A',
@@ -371,7 +373,7 @@ fn from_base64(text: &str) -> Vec<u16> {
     bytes.collect::<Vec<u8>>().chunks(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect()
 }
 
-/// Returns two triangles as a binary STL.
+/// Returns a binary STL with two triangles.
 fn binary_stl() -> Vec<u8> {
     let mut bytes = vec![b' '; 80];
     bytes.extend(2_u32.to_le_bytes());
@@ -385,7 +387,7 @@ fn binary_stl() -> Vec<u8> {
     bytes
 }
 
-/// Returns an input with one to four changes.
+/// Returns a copy of an input with one to four changes.
 pub fn mutated(kind: Kind, input: &[u8], seeds: &[Vec<u8>], rng: &mut StdRng) -> Vec<u8> {
     let mut bytes = input.to_vec();
     for _ in 0..rng.random_range(1..5) {
@@ -403,7 +405,7 @@ pub fn mutated(kind: Kind, input: &[u8], seeds: &[Vec<u8>], rng: &mut StdRng) ->
     bytes
 }
 
-/// Numbers that are invalid in files, or invalid at some positions.
+/// Numbers that are invalid in all files, or invalid in some attributes.
 const NUMBERS: &[&str] = &[
     "nan",
     "inf",
@@ -429,7 +431,7 @@ const NUMBERS: &[&str] = &[
     "null",
 ];
 
-/// Words with a meaning in one of the formats or in XML.
+/// Words that have a meaning in XML or in one of the formats.
 const PIECES: &[&str] = &[
     "<",
     ">",
@@ -483,7 +485,7 @@ fn any<T: Clone>(of: &[T], rng: &mut StdRng) -> T {
     of[rng.random_range(0..of.len())].clone()
 }
 
-/// Flips, removes, swaps or repeats bytes, or inserts bytes from another input.
+/// Flips, removes, swaps or repeats bytes, or inserts bytes of another input.
 fn mutate_bytes(mut bytes: Vec<u8>, donor: &[u8], rng: &mut StdRng) -> Vec<u8> {
     if bytes.is_empty() {
         return donor.to_vec();
@@ -506,7 +508,7 @@ fn mutate_bytes(mut bytes: Vec<u8>, donor: &[u8], rng: &mut StdRng) -> Vec<u8> {
     bytes
 }
 
-/// Returns the byte ranges of words between signs.
+/// Returns the byte ranges of words, which punctuation separates.
 fn words(text: &str) -> Vec<(usize, usize)> {
     let (mut found, mut begin) = (Vec::new(), None);
     for (i, c) in text.char_indices().chain([(text.len(), ' ')]) {
@@ -527,7 +529,7 @@ fn replaced(text: &str, (from, to): (usize, usize), by: &str) -> String {
     [&text[..from], by, &text[to..]].concat()
 }
 
-/// Inserts a piece of a format, removes a word, or replaces it by another one.
+/// Inserts one of [`PIECES`], removes a word, or replaces a word by another one.
 fn mutate_tokens(text: &str, rng: &mut StdRng) -> String {
     let words = words(text);
     if words.is_empty() {
@@ -542,7 +544,7 @@ fn mutate_tokens(text: &str, rng: &mut StdRng) -> String {
     }
 }
 
-/// Replaces a number or a name by another one; sometimes all equal ones.
+/// Replaces a number or a name by another one; sometimes replaces all equal numbers or names.
 fn mutate_words(text: &str, rng: &mut StdRng) -> String {
     let words = words(text);
     let is_number = |&(from, to): &(usize, usize)| text[from..to].parse::<f64>().is_ok();
@@ -568,7 +570,7 @@ fn mutate_words(text: &str, rng: &mut StdRng) -> String {
     }
 }
 
-/// Returns the byte ranges of closed elements, from the sign that opens one to the sign that closes it.
+/// Returns the byte ranges of closed elements, from the `<` of the start tag to the `>` of the end tag.
 fn elements(text: &str) -> Vec<(usize, usize)> {
     let (mut found, mut open) = (Vec::new(), Vec::new());
     for (from, _) in text.match_indices('<') {
@@ -590,7 +592,7 @@ fn mutate_elements(text: &str, rng: &mut StdRng) -> String {
     if elements.is_empty() {
         return text.to_owned();
     }
-    // small ones are preferred: the root and similar elements would be copied too often
+    // Prefer small elements: the root and other large elements would be copied too often.
     let pick = |rng: &mut StdRng| {
         let (a, b) = (any(&elements, rng), any(&elements, rng));
         if a.1 - a.0 < b.1 - b.0 { a } else { b }
@@ -614,7 +616,7 @@ fn mutate_elements(text: &str, rng: &mut StdRng) -> String {
     }
 }
 
-/// Changes, removes, repeats or replaces a value of JSON.
+/// Changes, removes, repeats or replaces a value in a JSON text.
 fn mutate_value(bytes: &[u8], rng: &mut StdRng) -> Vec<u8> {
     let Ok(mut file) = serde_json::from_slice::<Value>(bytes) else {
         return mutate_words(&String::from_utf8_lossy(bytes), rng).into();
@@ -655,7 +657,7 @@ fn mutate_value(bytes: &[u8], rng: &mut StdRng) -> Vec<u8> {
     file.to_string().into_bytes()
 }
 
-/// Returns a random value in a file.
+/// Returns a random value inside a JSON value.
 fn anywhere<'a>(file: &'a mut Value, rng: &mut StdRng) -> &'a mut Value {
     let inside = match file {
         Value::Array(list) => list.len(),

@@ -1,7 +1,7 @@
-//! Hostile input for cargo-fuzz (`cargo +nightly fuzz run urdf`): one target for each format in which a robot or a
-//! problem comes from outside. The corpora begin with the robots of the repository; none is copied.
+//! Hostile input for cargo-fuzz (`cargo +nightly fuzz run urdf`). There is one target for each format of robots,
+//! problems and meshes. The corpora begin with the robots of the repository, which are not copied.
 //!
-//! `tests/hostile.rs` of the workspace runs the same mutations and checks the same property a fixed number of times.
+//! The test `tests/hostile.rs` uses the same mutations, and checks the same property for a fixed number of inputs.
 
 mod hostile;
 
@@ -10,8 +10,8 @@ use hostile::mutated;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 
-/// Mutates the first `size` bytes of `data` and returns the new size, at most `data.len()`. Short inputs are replaced
-/// by a mutated seed of the kind; some calls use libFuzzer's own mutations.
+/// Mutates the first `size` bytes of `data`, and returns the new size, which is at most `data.len()`. A short input is
+/// replaced by a mutated seed of the kind. Some calls use libFuzzer's own mutations.
 pub fn mutate(kind: Kind, data: &mut [u8], size: usize, seed: u32) -> usize {
     let (room, mut rng) = (data.len(), StdRng::seed_from_u64(seed.into()));
     if seed.is_multiple_of(4) && size > 64 {

@@ -31,7 +31,7 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 /// Returns the number of allocations of this thread so far.
-#[allow(dead_code)] // used by some of the tests
+#[allow(dead_code)] // only some tests use it
 pub(crate) fn allocated() -> usize {
     COUNT.get()
 }
@@ -43,8 +43,8 @@ pub(crate) fn allocations(f: impl FnOnce()) -> usize {
     COUNT.get() - before
 }
 
-/// Returns the number of bytes that a call allocates on this thread, freed or not.
-#[allow(dead_code)] // used by some of the tests
+/// Returns the number of bytes that a call allocates on this thread, including bytes that the call frees again.
+#[allow(dead_code)] // only some tests use it
 pub(crate) fn bytes(f: impl FnOnce()) -> usize {
     let before = BYTES.get();
     f();

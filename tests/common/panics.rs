@@ -1,5 +1,5 @@
-//! Location and message of a panic, for tests that a caller's mistake is reported at the caller's line.
-#![allow(dead_code)] // each program uses a part of it
+//! Location and message of a panic, for tests which check that a caller's mistake is reported at the caller's line.
+#![allow(dead_code)] // each program uses only some of the items
 
 use std::cell::RefCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
@@ -14,11 +14,12 @@ pub(crate) struct Panic {
 }
 
 thread_local! {
-    /// Last panic of this thread, while the thread waits for one.
+    /// Last panic of this thread; recorded only while the thread waits for a panic.
     static SEEN: RefCell<Option<Panic>> = const { RefCell::new(None) };
 }
 
-/// Calls a function and returns its panic; `None` if it does not panic. Other threads may panic at the same time.
+/// Calls a function and returns the panic of the function; `None` if it does not panic. Other threads may panic at the
+/// same time.
 pub(crate) fn panic_of(call: impl FnOnce()) -> Option<Panic> {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {

@@ -70,7 +70,7 @@ static void complain(const char *format, ...) {
     va_end(arguments);
 }
 
-/* Runs at the beginning of every function. */
+/* Returns the error with which a function must fail, or OK. Every function of the driver calls this first. */
 static CUresult enter(const char *name, int needs_context) {
     if (failing_with && !strcmp(failing, name)) {
         int code = failing_with;

@@ -119,7 +119,7 @@ int nvrtcCompileProgram(Program *program, int count, const char **options) {
 
 int nvrtcGetProgramLogSize(Program *program, size_t *size) { *size = strlen(program->log) + 1; return OK; }
 int nvrtcGetProgramLog(Program *program, char *log) { strcpy(log, program->log); return OK; }
-/* As NVIDIA's: the size of the existing kind, and 0 for the other kind. */
+/* Returns, as NVIDIA's function does, the size of a CUBIN, or 0 if the image is PTX. */
 int nvrtcGetCUBINSize(Program *program, size_t *size) { *size = program->is_cubin ? strlen(program->image) + 1 : 0; return OK; }
 int nvrtcGetCUBIN(Program *program, char *image) { strcpy(image, program->image); return OK; }
 int nvrtcGetPTXSize(Program *program, size_t *size) { *size = strlen(program->image) + 1; return OK; }

@@ -27,7 +27,7 @@ fi
 # A motion that does not reach its target still gives a picture: exit status 1 is not an error here.
 plan() { "$program" plan "$@" >/dev/null 2>"$folder/pages/notes" || [ $? = 1 ] || { cat "$folder/pages/notes"; exit 1; }; }
 plan --robot crates/cli/tests/boxes/boxes.urdf --target 0.2,0.1,0.6 --knots 40 --out "$folder/pages/meshes.html"
-# A humanoid with meshes, if the environment of the peers contains one: the time of the script per frame is measured with it.
+# If the environment of the peers contains a humanoid with meshes, the page's time per frame is measured with this robot.
 talos=$(find .venv/pinocchio -path '*talos_data/robots/talos_reduced.urdf' 2>/dev/null | head -1)
 rm -f "$folder/pages/talos.html"
 if [ -n "$talos" ]; then

@@ -1,13 +1,16 @@
-"""Every robot file below some folders, here and in the libraries that read it: a table of what is equal and what not.
+"""Compares every robot file below some folders with the libraries that also read it. Prints a table of what is equal
+and what differs.
 
     python tests/peers/robots.py FOLDER… [--only PATTERN] [--list] [--table FILE] [--jobs N]
 
-URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, SDFs with Drake, which may be missing. Each file
-is read in a process of its own with a time limit, so that a crash of a library is a row of the table.
+URDFs are compared with Pinocchio, Drake and MuJoCo, MJCFs with MuJoCo, and SDFs with Drake. Any of these libraries may
+be missing. Each file is read in its own process with a time limit, so that a crash of a library is only a row of the
+table.
 
-A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER, or next to it, names commits: a
-line has `owner/repository`, a tab and the commit. `--table VALIDATION.md` replaces the section on public robots in that
-file; `pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest and keeps the section.
+A path `…/owner+repository/…` is a file of that repository. `SOURCES.tsv` in FOLDER, or next to FOLDER, gives the
+commits: a line has `owner/repository`, a tab and the commit. `--table VALIDATION.md` replaces the section on public
+robots in that file. `pytest tests/peers/pinocchio --validation VALIDATION.md` writes the rest of the file and keeps the
+section.
 
 The exit status is 1 if a robot differs or a process crashes.
 """
@@ -29,7 +32,7 @@ COMMAND = "python tests/peers/robots.py FOLDER --table VALIDATION.md"
 
 
 def main() -> int:
-    """Reads the command line, compares, prints."""
+    """Reads the command line, compares the robots, and prints the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, nargs="+", help="folder with robots")
     parser.add_argument("--only", metavar="PATTERN", help="only paths below a folder that match, such as '*anymal*'")

@@ -1,11 +1,11 @@
-//! Parts of a robot besides its tree: actuators, springs, keyframes and constraints.
+//! Additions to the tree of a robot: actuators, springs, keyframes and constraints.
 
 use crate::terminal::{Table, heading, short};
 use condyle::Model;
 use condyle::tree::{Actuator, ModelConstraintKind, Transmission};
 use serde::Serialize;
 
-/// Parts of a robot besides its tree.
+/// Additions to the tree of a robot.
 #[derive(Serialize)]
 pub(crate) struct Additions {
     actuators: Vec<ActuatorReport>,
@@ -16,7 +16,7 @@ pub(crate) struct Additions {
     constraints: Vec<ConstraintReport>,
 }
 
-/// Actuator; `null` in a range means no limit.
+/// An actuator. `null` in a range means no limit.
 #[derive(Serialize)]
 struct ActuatorReport {
     name: String,
@@ -40,14 +40,14 @@ struct SpringReport {
 struct KeyframeReport {
     name: String,
     q: Vec<f64>,
-    /// A number for each actuator.
+    /// Control of each actuator, one number per actuator.
     control: Vec<f64>,
 }
 
 #[derive(Serialize)]
 struct ConstraintReport {
     name: String,
-    /// Bodies or joints, and the constraint between them.
+    /// Text that names the bodies or joints, and the constraint between them.
     what: String,
 }
 
@@ -89,7 +89,7 @@ impl Additions {
         }
     }
 
-    /// Returns the parts as text, each kind under a heading.
+    /// Returns the additions as text, each kind under a heading.
     pub(crate) fn text(&self) -> String {
         let mut text = String::new();
         if !self.actuators.is_empty() {
@@ -133,7 +133,7 @@ impl ActuatorReport {
     }
 }
 
-/// Returns a phrase with the bodies of two frames and their constraint.
+/// Returns a phrase that names the bodies of two frames and the constraint between them.
 fn bodies(model: &Model, frames: [usize; 2], what: &str) -> String {
     let [a, b] = frames.map(|frame| &*model.bodies()[model.frames()[frame].body].name);
     format!("{a} and {b} {what}")
@@ -144,7 +144,7 @@ fn list(numbers: &[f64]) -> String {
     numbers.iter().map(|&x| short(x)).collect::<Vec<_>>().join(" ")
 }
 
-/// Formats a range of two limits; empty if there are no limits.
+/// Formats a range between two limits; returns an empty text if there are no limits.
 fn range([lower, upper]: [Option<f64>; 2]) -> String {
     match (lower, upper) {
         (None, None) => String::new(),

@@ -1,4 +1,4 @@
-//! Errors of the program: an exit status for scripts, and one line of text for people.
+//! Errors of the program. Each error has an exit status for scripts, and one line of text for people.
 
 use std::process::ExitCode;
 
@@ -13,7 +13,7 @@ Exit status:
 /// Reason why the exit status is not 0.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Error {
-    /// Error in the robot's file, or in a name that is looked up in it.
+    /// Error in the robot's file, or unknown name of a frame or joint.
     #[error(transparent)]
     Model(#[from] condyle::ModelError),
     /// Error in the optimal control problem built from a task.
@@ -22,16 +22,16 @@ pub(crate) enum Error {
     /// Invalid value of an option.
     #[error("--{option}: {what}")]
     Option { option: &'static str, what: String },
-    /// Unknown robot name.
+    /// Unknown name of a robot.
     #[error("no robot `{name}`{nearest}")]
     Robot { name: String, nearest: String },
-    /// File that is not a robot's file, or cannot be read.
+    /// File that cannot be read, or that describes no robot.
     #[error("{file}: {what}")]
     File { file: String, what: String },
     /// Error in a line of a task file.
     #[error("{file}:{line}: {what}")]
     Task { file: String, line: usize, what: String },
-    /// Command of a feature that is not part of this build.
+    /// Command that needs a feature without which this program was built.
     #[cfg(not(feature = "generate"))]
     #[error(
         "{command}: this program was built without the feature `{command}`: cargo install condyle-cli --features {command}"
@@ -43,7 +43,7 @@ pub(crate) enum Error {
     /// File that cannot be written.
     #[error("{file}: {source}")]
     Write { file: String, source: std::io::Error },
-    /// Negative answer: for example over budget, or a check failed.
+    /// Negative answer to the question of a command, for example if a check failed.
     #[error("{0}")]
     No(String),
     /// Interruption by Ctrl-C.
@@ -70,7 +70,7 @@ pub(crate) fn positive(option: &'static str, value: f64) -> Result<(), Error> {
     }
 }
 
-/// Returns a suffix for an error message with the most similar name; empty if there are no names.
+/// Returns a suffix for an error message that names the most similar name; empty if there are no names.
 pub(crate) fn nearest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) -> String {
     let found = names.into_iter().min_by_key(|other| strsim::osa_distance(other, name));
     found.map_or(String::new(), |found| format!("; nearest is `{found}`"))

@@ -1,4 +1,4 @@
-//! Findings about a robot: warnings of the model, and values that cause numerical difficulties.
+//! Findings about a robot: warnings of the library, and values that cause numerical difficulties.
 
 use crate::lines::{Kind, Lines};
 use crate::terminal::{Style, styled};
@@ -6,14 +6,14 @@ use condyle::{Inertia, Model, neutral, tree::Body, tree::Warning};
 use nalgebra::Matrix3;
 use serde::Serialize;
 
-/// Warning of the library, or of this program.
+/// Warning of the library or of this program.
 #[derive(Serialize)]
 pub(crate) struct Finding {
-    /// Kind, one of [`KINDS`].
+    /// Kind of the finding, one of [`KINDS`].
     pub kind: &'static str,
-    /// Name of the body, joint or element.
+    /// Name of the body, joint or element that the finding is about.
     pub name: String,
-    /// File, if it is not the robot's own file: a robot's file may include others.
+    /// File that contains the element, if it is not the robot's own file: that file may include others.
     pub file: Option<String>,
     pub line: Option<u32>,
     pub what: String,
@@ -53,13 +53,13 @@ const HEADINGS: [&str; 13] = [
 ];
 
 impl Finding {
-    /// Creates a finding about the robot's own file.
+    /// Creates a finding about an element of the robot's own file.
     fn own(kind: &'static str, name: &str, line: Option<u32>, what: String) -> Self {
         Self { kind, name: name.to_owned(), file: None, line, what }
     }
 }
 
-/// Formats the findings, grouped by kind under headings; `source` is the robot's file.
+/// Formats the findings, grouped by kind under headings. `source` is the path of the robot's file.
 pub(crate) fn text(findings: &[Finding], source: &str) -> String {
     let mut text = String::new();
     for (kind, heading) in KINDS.into_iter().zip(HEADINGS) {
@@ -77,10 +77,10 @@ pub(crate) fn text(findings: &[Finding], source: &str) -> String {
     text
 }
 
-/// Ratio between the masses, or moments of inertia, of a body and its parent that is suspicious. Causes are a wrong
-/// unit, or a light tip that makes M ill-conditioned.
+/// Ratio between a body and its parent, of masses or of moments of inertia, from which a finding is reported. Causes
+/// are a wrong unit, or a light tip that makes M ill-conditioned.
 const APART: f64 = 1e3;
-/// Excess over a limit that counts as rounding.
+/// Excess over a limit that counts as a rounding error.
 const ROUNDING: f64 = 1e-9;
 
 /// Returns all findings, ordered by line.
@@ -98,11 +98,11 @@ pub(crate) fn of(model: &Model, lines: &Lines) -> Vec<Finding> {
     found
 }
 
-/// Converts a warning of the model to a finding with its line.
+/// Converts a warning of the model to a finding with the line number of the element.
 fn warned(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
     let (kind, subject, mut what) = (warning.kind().name(), warning.subject(), warning.to_string());
     if let Some(place) = warning.place() {
-        // in ``joint `loop` ``, the name is `loop`
+        // the name of ``joint `loop` `` is `loop`
         let name = subject.split('`').nth(1).unwrap_or(subject).to_owned();
         what.drain(..format!("{place}: ").len());
         return Finding { kind, name, file: Some(place.file.clone()), line: Some(place.line), what };
@@ -118,7 +118,8 @@ fn warned(model: &Model, warning: &Warning, lines: &Lines) -> Finding {
     Finding::own(kind, subject, line, what)
 }
 
-/// Returns a finding if a body's mass, or else its largest moment of inertia, differs much from its parent's.
+/// Returns a finding if the mass of a body differs much from its parent's mass, or else if the largest moment of
+/// inertia does.
 fn neighbours(model: &Model, i: usize) -> Option<(&'static str, String)> {
     let (b, parent) = (&model.bodies()[i], &model.bodies()[model.bodies()[i].parent]);
     if b.parent == 0 {

@@ -1,4 +1,4 @@
-//! Gaits as optimal control problems: a robot stands, steps and jumps on its feet.
+//! Gaits as optimal control problems. A robot stands, steps and jumps on its feet.
 
 use crate::budget::held;
 use crate::error::Error;
@@ -13,10 +13,10 @@ use condyle::{ContactConstraint, Data, Joint, Model, Se3, Vec3, forward_kinemati
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Gait under construction: its knots so far, and the positions of feet and centre of mass at their end.
+/// A gait while it is built: its knots so far, and the positions of feet and centre of mass at the last knot.
 pub(crate) struct Gait {
     model: Arc<Model>,
-    /// State to which the robot returns, and initial state.
+    /// State to which the robot returns; the next field is the initial state.
     rest: Vec<f64>,
     x0: Vec<f64>,
     dt: f64,
@@ -29,26 +29,27 @@ pub(crate) struct Gait {
     us: Vec<f64>,
     times: Vec<f64>,
     touches: Vec<Vec<bool>>,
-    /// Limits of positions and speeds, and of efforts, if they are constraints.
+    /// Limits of positions and speeds; the next field has the limits of efforts. Both are empty unless limits are
+    /// constraints.
     limits: Vec<Limit>,
     efforts: Vec<Limit>,
 }
 
-/// Gait as a problem with a warm start.
+/// A gait as a problem with a warm start.
 pub(crate) struct Posed {
     pub problem: Problem,
     pub xs: Vec<f64>,
     pub us: Vec<f64>,
     /// Time of each knot (s); an impact has no duration.
     pub times: Vec<f64>,
-    /// Whether each foot touches, for each knot.
+    /// Whether each foot touches the ground, for each knot.
     pub touches: Vec<Vec<bool>>,
     pub feet: Vec<usize>,
 }
 
 impl Gait {
-    /// Creates a gait in the posture of a task, with the feet at average height 0. With `held`, the robot's limits
-    /// become constraints.
+    /// Creates a gait from the posture of a task, with the feet at an average height of 0. With `held`, the limits of
+    /// the robot become constraints.
     pub(crate) fn new(model: Arc<Model>, task: &Task, dt: f64, held: bool) -> Result<Self, Error> {
         let floats = model.bodies().get(1).is_some_and(|b| b.joint == Joint::FreeFlyer);
         if !floats {
@@ -64,7 +65,7 @@ impl Gait {
             Some(start) => posture(&model, start, task)?,
             None => rest.clone(),
         };
-        // Posture and start are shifted so that their feet have the same average position, at height 0.
+        // Shift posture and start, so that their feet have the same average position, at height 0.
         let middle = |q: &[f64]| {
             let feet = feet_at(&model, q, &frames);
             feet.iter().fold(Vec3::zero(), |sum, foot| sum + foot.1).scale(1.0 / feet.len() as f64)
@@ -109,15 +110,15 @@ impl Gait {
         frames.iter().map(|&frame| Contact::new(&self.name(frame), held(make(frame)))).collect()
     }
 
-    /// Returns the cost of the distance from the posture. Weights: position and rotation of the trunk, joints, and
-    /// their velocities.
+    /// Returns the cost of the distance from the posture. The weights are for position and rotation of the trunk, for
+    /// the joints, and for the velocities of these three.
     fn rest(&self, weights: [f64; 6]) -> Cost {
         let counts = [3, 3, self.model.nv() - 6].repeat(2);
         let w = counts.iter().zip(weights).flat_map(|(&n, w)| vec![w; n]).collect();
         Cost::new("rest", 1e1, Residual::State { reference: self.rest.clone() }, Activation::Weighted(w))
     }
 
-    /// Returns the cost of a foot's distance from a point; a sole should also be level.
+    /// Returns the cost of the distance between a foot and a point. A sole should also be level.
     fn place(&self, frame: usize, target: Vec3<f64>, weight: f64) -> Cost {
         let named = (&self.model.frames()[frame]).into();
         let residual = match self.sole {
@@ -127,7 +128,7 @@ impl Gait {
         Cost::new(&format!("{} moves", self.name(frame)), weight, residual, Activation::Quadratic)
     }
 
-    /// Returns the costs of a knot with feet in support and feet that move.
+    /// Returns the costs of a knot, for the feet in support and for the feet that move.
     fn costs(&self, support: &[usize], moving: &[(usize, Vec3<f64>)], com: Option<Vec3<f64>>) -> Vec<Cost> {
         let grip = |&frame: &usize| {
             let (contact, friction) = (self.name(frame), FrictionCone::new(self.friction));
@@ -150,7 +151,8 @@ impl Gait {
         costs
     }
 
-    /// Adds `count` knots on the feet `support`, all with one action. `costs` gives the costs of the k-th knot.
+    /// Adds `count` knots with the feet `support` on the ground. They have one common action. `costs` returns the costs
+    /// of knot k.
     fn knots(
         &mut self,
         support: &[usize],
@@ -185,10 +187,10 @@ impl Gait {
         Ok(())
     }
 
-    /// Adds an impact: feet land at their current positions.
+    /// Adds an impact, in which feet land at their current positions.
     fn land(&mut self, landing: &[usize]) -> Result<(), Error> {
         let mut costs = vec![self.rest([1e0, 1e1, 1e0, 1e1, 1e1, 1e1])];
-        // for the trunk, which has moved ahead, only the height counts
+        // The trunk has moved ahead, so only its height counts.
         if let Activation::Weighted(w) = &mut costs[0].activation {
             w[..3].fill(0.0);
         }
@@ -205,13 +207,13 @@ impl Gait {
         Ok(())
     }
 
-    /// Adds a phase.
+    /// Adds the knots of a phase.
     pub(crate) fn add(&mut self, phase: &Phase, next: Option<&Phase>) -> Result<(), Error> {
         let all: Vec<usize> = (0..self.feet.len()).collect();
         let swinging = match &phase.kind {
             PhaseKind::Stand => {
                 let feet: Vec<_> = self.feet.iter().map(|foot| foot.0).collect();
-                // Before a jump, the robot may crouch.
+                // Before a jump, the robot is free to crouch.
                 let free = next.is_some_and(|next| next.kind == PhaseKind::Jump);
                 return self.knots(&feet, phase.knots, &|gait, _| gait.costs(&feet, &[], (!free).then_some(gait.com)));
             }
@@ -227,7 +229,7 @@ impl Gait {
             let s = (k + 1) as f64 / knots as f64;
             let lift = Vec3::new(0.0, 0.0, height * (core::f64::consts::PI * s).sin());
             if jumps {
-                // the centre of mass follows its arc; only the posture cost acts on the feet
+                // The centre of mass follows its arc. Only the cost of the posture acts on the feet.
                 return gait.costs(&[], &[], Some(gait.com + ahead(s) + lift));
             }
             let moving: Vec<_> = swinging.iter().map(|&k| (gait.feet[k].0, gait.feet[k].1 + ahead(s) + lift)).collect();
@@ -241,7 +243,7 @@ impl Gait {
         self.land(&landing)
     }
 
-    /// Returns the gait as a problem, with standing still as warm start.
+    /// Returns the gait as a problem. The warm start is standing still.
     pub(crate) fn pose(self) -> Result<Posed, Error> {
         let terminal = vec![self.rest([0.0, 1e3, 1e-1, 1e2, 1e2, 1e2])];
         let end = FreeDynamics::terminal(self.model.clone(), terminal)?.with_limits(self.limits.clone())?;
@@ -252,14 +254,15 @@ impl Gait {
     }
 }
 
-/// Returns frames with their positions at q.
+/// Returns the frames, each with its position at q.
 fn feet_at(model: &Model, q: &[f64], frames: &[usize]) -> Vec<(usize, Vec3<f64>)> {
     let mut data = Data::new(model);
     let placements = forward_kinematics(model, &mut data, q);
     frames.iter().map(|&frame| (frame, placements.frame(frame).translation)).collect()
 }
 
-/// Returns the position with the given joint values; the other coordinates are neutral or mid-range.
+/// Returns the position with the given joint values. The other coordinates are neutral, or mid-range if limits exclude
+/// neutral.
 pub(crate) fn posture(model: &Model, joints: &BTreeMap<String, f64>, task: &Task) -> Result<Vec<f64>, Error> {
     let mut q = inside(model, neutral(model));
     for (name, &value) in joints {

@@ -1,4 +1,4 @@
-//! `condyle generate`: writes a robot's dynamics as code.
+//! `condyle generate`: writes code that computes a robot's dynamics.
 
 use crate::error::{Error, nearest};
 use crate::robot::{self, RobotArguments, frames};
@@ -51,7 +51,7 @@ pub(crate) struct Arguments {
     shares: Option<NonZero<usize>>,
 }
 
-/// Returns the name if it is a valid one.
+/// Returns the name if it is in the list of valid names.
 fn known<'a>(option: &'static str, name: &str, names: &[&'a str]) -> Result<&'a str, Error> {
     let what = || format!("`{name}` is none of {}{}", names.join(", "), nearest(name, names.iter().copied()));
     names.iter().copied().find(|&other| other == name).ok_or_else(|| Error::Option { option, what: what() })

@@ -33,7 +33,7 @@ pub(crate) struct Arguments {
     allow: Vec<String>,
 }
 
-/// Full report on a robot.
+/// The full report on a robot.
 #[derive(Serialize)]
 struct Report {
     name: String,
@@ -58,7 +58,7 @@ struct Report {
     warnings: Vec<Finding>,
 }
 
-/// Body and its joint. Arrays of limits have one number per coordinate; `null` means no limit.
+/// A body and the joint that moves it. Arrays of limits have one number per coordinate; `null` means no limit.
 #[derive(Serialize)]
 struct BodyReport {
     index: usize,
@@ -75,7 +75,7 @@ struct BodyReport {
     lower: Vec<Option<f64>>,
     upper: Vec<Option<f64>>,
     velocity: Vec<Option<f64>>,
-    /// Largest magnitude of the effort.
+    /// Maximum magnitude of the effort.
     effort: Vec<Option<f64>>,
     effort_lower: Vec<Option<f64>>,
     effort_upper: Vec<Option<f64>>,
@@ -84,24 +84,24 @@ struct BodyReport {
     armature: Vec<f64>,
     mass: f64,
     com: [f64; 3],
-    /// Principal moments of inertia about the centre of mass (kg m²), smallest first.
+    /// Principal moments of inertia about the body's centre of mass (kg m²), smallest first.
     moments: [f64; 3],
-    /// Links that are merged into this body by fixed joints.
+    /// Names of links that fixed joints merge into this body.
     merged: Vec<String>,
 }
 
-/// Order of computation of a single call.
+/// Order in which a single call computes the bodies.
 #[derive(Serialize)]
 struct Limbs {
     /// Whether bodies of different limbs share the lanes of a vector register.
     side_by_side: bool,
-    /// Number of steps from the root to the tips.
+    /// Number of consecutive steps from the root to the tips.
     steps: usize,
-    /// Number of bodies that the steps compute.
+    /// Number of bodies that these steps compute.
     bodies: usize,
 }
 
-/// Joint that follows another joint.
+/// A joint that follows another joint.
 #[derive(Serialize)]
 struct Follower {
     joint: String,
@@ -109,7 +109,7 @@ struct Follower {
     ratio: f64,
     offset: f64,
     line: Option<u32>,
-    /// Whether the joint follows; if not, it has its own coordinate because `--mimic` is not given.
+    /// Whether the joint follows. Without `--mimic` it does not follow, and has its own coordinate.
     follows: bool,
 }
 
@@ -212,12 +212,12 @@ impl Report {
         text + &findings::text(&self.warnings, &self.source)
     }
 
-    /// Draws the bodies as a tree, with their joints.
+    /// Draws the bodies and their joints as a tree.
     fn tree(&self) -> String {
         let mut children = vec![Vec::new(); self.bodies.len() + 1];
         self.bodies.iter().for_each(|b| children[b.parent].push(b.index));
         let mut text = "  world\n".to_owned();
-        // depth first: bodies still to be drawn, with the prefix of their lines
+        // Depth first: the list has the bodies that are not yet drawn, with the prefix of their lines.
         let mut left: Vec<(usize, String, bool)> = Vec::new();
         let push = |left: &mut Vec<(usize, String, bool)>, of: usize, before: &str| {
             let last = children[of].last().copied();
@@ -341,7 +341,7 @@ fn followers(robot: &Robot, arguments: &Arguments, lines: &Lines) -> Vec<Followe
     model.bodies()[1..].iter().filter_map(follower).collect()
 }
 
-/// Formats the indices of n numbers from `first` on.
+/// Formats the indices of n numbers that begin with index `first`.
 fn range(first: usize, n: usize) -> String {
     match n {
         0 => String::new(),

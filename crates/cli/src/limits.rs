@@ -1,4 +1,5 @@
-//! Limits of a robot's joints: their number, initial positions within them, and the limits as constraints of a problem.
+//! Limits of a robot's joints: counts them, finds initial positions that respect them, and makes constraints of a
+//! problem from them.
 
 use crate::error::Error;
 use crate::robot::Robot;
@@ -7,20 +8,20 @@ use condyle::{Model, neutral};
 use serde::Serialize;
 use std::fmt;
 
-/// Coordinate with a limit.
+/// A coordinate with a limit.
 pub(crate) struct Limited<'a> {
-    /// `position`, `velocity` or `torque`.
+    /// Limited quantity: `position`, `velocity` or `torque`.
     pub what: &'static str,
     /// Name of the joint.
     pub joint: &'a str,
-    /// Index in q for a position, in v otherwise.
+    /// Index in q for a position; index in v for a velocity or a torque.
     pub index: usize,
     pub lower: f64,
     pub upper: f64,
 }
 
-/// Lists the limited positions, velocities and efforts of a robot, joint by joint. Positions count only for joints with
-/// as many positions as velocities. A velocity or effort limit of 0 counts as no limit.
+/// Lists the limited positions, velocities and efforts of a robot, joint by joint. Positions are listed only for joints
+/// with as many positions as velocities. A limit of 0 for a velocity or an effort counts as no limit.
 pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
     let limits = model.limits();
     let mut all = Vec::new();
@@ -45,15 +46,15 @@ pub(crate) fn limited(model: &Model) -> Vec<Limited<'_>> {
     all
 }
 
-/// Number of limited coordinates of a robot, and the source of the limits.
+/// Numbers of limited coordinates of a robot, and the source of the limits.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct LimitCounts {
-    /// Robot's file, or name of a built-in robot: the only source of limits.
+    /// Source of all limits: path of the robot's file, or name of a built-in robot.
     pub source: String,
     pub positions: usize,
     pub velocities: usize,
     pub efforts: usize,
-    /// Number of degrees of freedom of the robot, nv.
+    /// Number of all degrees of freedom of the robot, nv.
     pub of: usize,
 }
 
@@ -71,7 +72,7 @@ impl LimitCounts {
         }
     }
 
-    /// Returns the number of all limits.
+    /// Returns the number of limited coordinates of all kinds.
     pub(crate) fn total(&self) -> usize {
         self.positions + self.velocities + self.efforts
     }
@@ -104,7 +105,7 @@ pub(crate) fn check_start(model: &Model, q: &[f64]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Returns the last frame on the body that is farthest from the root: the tip of an arm.
+/// Returns the last frame on the body that is farthest from the root. For an arm, this is the tip.
 pub(crate) fn last_frame(model: &Model) -> usize {
     let depth = |mut body: usize| {
         let mut depth = 0;
@@ -117,12 +118,12 @@ pub(crate) fn last_frame(model: &Model) -> usize {
     (0..model.frames().len()).max_by_key(|&f| depth(model.frames()[f].body)).unwrap_or(0)
 }
 
-/// Returns the neutral position, but mid-range for coordinates whose limits exclude neutral.
+/// Returns the neutral position. Coordinates whose limits exclude neutral are mid-range instead.
 pub(crate) fn start(model: &Model) -> Vec<f64> {
     inside(model, neutral(model))
 }
 
-/// Returns the position q, but mid-range for coordinates whose limits exclude their value.
+/// Returns the position q. Coordinates whose limits exclude their value are mid-range instead.
 pub(crate) fn inside(model: &Model, q: Vec<f64>) -> Vec<f64> {
     let limits = model.limits();
     let inside = |(k, q): (usize, f64)| {
@@ -132,12 +133,12 @@ pub(crate) fn inside(model: &Model, q: Vec<f64>) -> Vec<f64> {
     q.into_iter().enumerate().map(inside).collect()
 }
 
-/// Returns the limits of positions and speeds as constraints; empty if no joint has limits.
+/// Returns the limits of positions and speeds as constraints; the list is empty if no joint has limits.
 pub(crate) fn limits_of(model: &Model, q: &[f64]) -> Vec<Limit> {
     let (nv, limits) = (model.nv(), model.limits());
     let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; 2 * nv], vec![f64::INFINITY; 2 * nv]);
     for body in model.bodies()[1..].iter().filter(|b| b.joint.nq() == 1 && b.mimic.is_none()) {
-        // for such a joint, x ⊖ x_ref is q − q_ref
+        // For such a joint, x ⊖ x_ref equals q − q_ref.
         (lower[body.idx_v], upper[body.idx_v]) =
             (limits.lower[body.idx_q] - q[body.idx_q], limits.upper[body.idx_q] - q[body.idx_q]);
     }
@@ -148,8 +149,8 @@ pub(crate) fn limits_of(model: &Model, q: &[f64]) -> Vec<Limit> {
     bounded("positions and speeds", Residual::State { reference }, lower, upper)
 }
 
-/// Returns the lower and upper efforts of the last nu degrees of freedom. An empty range, such as an effort of 0,
-/// counts as no limit.
+/// Returns the lower and upper effort limits of the last nu degrees of freedom. An empty range, such as an effort limit
+/// of 0, counts as no limit.
 pub(crate) fn efforts(model: &Model, nu: usize) -> (Vec<f64>, Vec<f64>) {
     let (limits, first) = (model.limits(), model.nv() - nu);
     let range = |(&lower, &upper): (&f64, &f64)| {
@@ -158,7 +159,7 @@ pub(crate) fn efforts(model: &Model, nu: usize) -> (Vec<f64>, Vec<f64>) {
     limits.effort_lower[first..].iter().zip(&limits.effort_upper[first..]).map(range).unzip()
 }
 
-/// Returns the limits of the efforts of the last nu degrees of freedom as constraints.
+/// Returns the effort limits of the last nu degrees of freedom as constraints.
 pub(crate) fn efforts_of(model: &Model, nu: usize) -> Vec<Limit> {
     let (lower, upper) = efforts(model, nu);
     bounded("efforts", Residual::Control { reference: vec![0.0; nu] }, lower, upper)

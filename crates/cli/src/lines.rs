@@ -9,11 +9,11 @@ pub(crate) enum Kind {
     Joint,
 }
 
-/// Line numbers of links (bodies) and joints, by name. Elements of included files are missing.
+/// Line numbers of links (bodies) and joints, by kind and name. Elements of included files are missing.
 pub(crate) struct Lines(HashMap<(Kind, String), u32>);
 
 impl Lines {
-    /// Finds the elements in the text of a URDF, MJCF or SDF, which need not be well-formed.
+    /// Finds the elements in the text of a URDF, MJCF or SDF. The text need not be well-formed.
     pub(crate) fn new(text: &str) -> Self {
         let (mut lines, mut line, mut is_comment) = (HashMap::new(), 1, false);
         for piece in text.split('<') {
@@ -25,7 +25,8 @@ impl Lines {
                 _ => None,
             };
             if let (Some(kind), Some(name), false) = (kind, name(tag), is_comment) {
-                // In an SDF, the same tag names a link inside a joint's <parent>. The first tag with a name counts.
+                // In an SDF, the same tag also names a link inside a joint's <parent>. So the first tag with a name
+                // counts.
                 lines.entry((kind, name.to_owned())).or_insert(line);
             }
             is_comment &= !piece.contains("-->");

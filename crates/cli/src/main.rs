@@ -1,6 +1,6 @@
 //! Program `condyle`: shows a robot's model, checks its numbers, measures computing times, and plans motions.
 
-#![allow(non_snake_case)] // symbols of the literature
+#![allow(non_snake_case)] // names of variables are symbols of the literature
 
 mod additions;
 mod budget;
@@ -93,8 +93,8 @@ fn main() -> ExitCode {
     }
 }
 
-/// Reports invalid command-line arguments in one line, with a similar name if there is one. Or prints the help that was
-/// requested.
+/// Reports invalid command-line arguments in one line, with the most similar name if there is one. If the arguments
+/// request help, prints the help.
 fn refuse(error: &clap::Error) -> ExitCode {
     let text = error.render().to_string();
     match error.kind() {

@@ -1,4 +1,4 @@
-//! Planned motion: the request and the result.
+//! A planned motion: what was requested, and the result.
 
 use crate::robot::Robot;
 use condyle::optimal::{Iteration, Solution, Status};
@@ -9,26 +9,26 @@ use std::sync::Arc;
 pub(crate) struct Goal {
     pub frame: usize,
     pub target: Vec3<f64>,
-    /// Final distance of the frame from the target (m).
+    /// Distance between the frame and the target at the end of the motion (m).
     pub miss: f64,
     pub tolerance: f64,
-    /// Smallest distance that was found for a posture within the limits (m).
+    /// Smallest distance (m) between frame and target that was found for any posture within the limits.
     pub nearest: f64,
 }
 
-/// Request and result of a plan.
+/// A planned motion: what the user requested, and the result.
 pub(crate) struct Plan {
     pub model: Arc<Model>,
     /// Robot's file, whose shapes the page draws.
     pub robot: Robot,
-    /// Whether the page draws the meshes that are found.
+    /// Whether the page draws the meshes that the program finds.
     pub meshes: bool,
     pub title: String,
     pub goal: Option<Goal>,
     pub feet: Vec<usize>,
     /// Whether the feet are soles; otherwise they are points.
     pub soles: bool,
-    /// Whether each foot touches, for each knot.
+    /// Whether each foot touches the ground, for each knot.
     pub touches: Vec<Vec<bool>>,
     /// Time of each knot (s); an impact has no duration.
     pub times: Vec<f64>,
@@ -43,7 +43,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Returns whether the result counts as a solution.
+    /// Returns whether the result counts as a solution of the task.
     pub(crate) fn is_solved(&self) -> bool {
         self.solution.status == Status::Converged || self.settled.is_some()
     }
@@ -53,7 +53,7 @@ impl Plan {
         self.times.len() - 1
     }
 
-    /// Returns the efforts of all degrees of freedom at a knot: 0 for undriven ones and at an impact.
+    /// Returns the efforts of all degrees of freedom at a knot. The effort is 0 for undriven ones, and at an impact.
     pub(crate) fn effort(&self, t: usize) -> Vec<f64> {
         let (u, nv) = (self.solution.u(t), self.model.nv());
         let undriven = if u.is_empty() { nv } else { nv - u.len() };

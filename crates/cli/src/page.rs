@@ -1,4 +1,4 @@
-//! HTML page of `condyle plan`: plots and playback in one file that needs no network.
+//! Writes the HTML page of `condyle plan`: plots and playback in one file that needs no network.
 
 use crate::budget::held;
 use crate::limits::LimitCounts;
@@ -9,8 +9,8 @@ use condyle::{ConstraintSet, ContactConstraint, Data, Joint, Model, constrained_
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Placeholders of the template with their texts, in the order of replacement. The data are inserted last, so that
-/// placeholders in the data are not replaced.
+/// Placeholders of the template, and the texts that replace them, in this order. The data are inserted after all of
+/// them, so that placeholders in the data are not replaced.
 const PARTS: [(&str, &str); 8] = [
     ("/*{{uplot.css}}*/", include_str!("../page/vendor/uPlot.min.css")),
     ("/*{{plan.css}}*/", include_str!("../page/plan.css")),
@@ -22,7 +22,7 @@ const PARTS: [(&str, &str); 8] = [
     ("/*{{plan.js}}*/", include_str!("../page/plan.js")),
 ];
 
-/// Writes the page, and creates its folder. Returns a one-line note on the meshes that are left out, if any.
+/// Writes the page, and creates its folder. Returns one line about the meshes that are left out, if any.
 pub(crate) fn write(
     path: &Path,
     plan: &Plan,
@@ -42,18 +42,19 @@ pub(crate) fn write(
     Ok(note)
 }
 
-/// Returns the joints that the page shows: those with one degree of freedom of their own.
+/// Returns the joints that the page shows: joints with one degree of freedom that do not mimic another joint.
 fn shown(model: &Model) -> impl Iterator<Item = &condyle::tree::Body> {
     model.bodies()[1..].iter().filter(|b| b.joint.nv() == 1 && b.mimic.is_none())
 }
 
-/// Returns the knots that are shown. An impact has no duration, so the state before it is not shown.
+/// Returns the knots that the page shows. An impact has no duration, so the state before the impact is not shown.
 fn with_time(plan: &Plan) -> Vec<usize> {
     let times = &plan.times;
     (0..times.len()).filter(|&t| t + 1 == times.len() || times[t + 1] > times[t]).collect()
 }
 
-/// Returns the positions of the feet at the knots, and for each interval whether they touch and their contact forces.
+/// Returns the positions of the feet at the knots. For each interval, also returns whether the feet touch and the
+/// contact forces.
 fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> {
     let (model, nq) = (&plan.model, plan.model.nq());
     let mut data = Data::new(model);
@@ -91,8 +92,8 @@ fn contacts(plan: &Plan, knots: &[usize]) -> Result<Value, condyle::ModelError> 
     Ok(json!({"feet": names, "trails": trails, "touches": touches, "forces": forces, "weight": weight}))
 }
 
-/// Returns all data of the page, and a note on what is left out. The comment at the top of `plan.js` describes each
-/// entry.
+/// Returns all data of the page, and a note on the meshes that are left out. The comment at the top of `plan.js`
+/// describes each entry of the data.
 fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Option<String>) {
     let Plan { model, solution, .. } = plan;
     let (nq, limits) = (model.nq(), model.limits());
@@ -128,7 +129,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
     }
     let driven = &knots[..knots.len() - 1];
     let efforts: Vec<Vec<f64>> = (0..plan.knots()).map(|t| plan.effort(t)).collect();
-    // A knot that is not shown is represented by the next one.
+    // If a knot is not shown, the next shown knot represents it.
     let violations: Vec<Value> = violations
         .iter()
         .map(|v| {
@@ -165,7 +166,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
             "poses": poses,
             "trail": (!trail.is_empty()).then_some(trail),
         },
-        // Creating the set cannot fail: the solver has used the same contacts.
+        // The set of contacts is valid, because the solver has used the same contacts.
         "contacts": if plan.feet.is_empty() { None } else { contacts(plan, &knots).ok() },
         "limits": LimitCounts::new(&plan.robot),
         "violations": violations,
@@ -175,7 +176,7 @@ fn data(plan: &Plan, budget: &Budget, violations: &[Violation]) -> (Value, Optio
     (data, note)
 }
 
-/// Rounds all numbers to six significant digits, which suffice for a screen.
+/// Rounds all numbers to six significant digits, which are enough for a screen.
 fn rounded(value: Value) -> Value {
     match value {
         Value::Number(n) if n.is_f64() => {

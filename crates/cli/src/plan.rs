@@ -79,14 +79,14 @@ pub(crate) struct Arguments {
     json: bool,
 }
 
-/// Whether meshes are shown.
+/// Whether the page shows meshes.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 enum Show {
     Auto,
     Never,
 }
 
-/// Numbers on the command line, separated by commas.
+/// Numbers of one command-line argument, separated by commas.
 #[derive(Clone)]
 struct Numbers(Vec<f64>);
 
@@ -98,19 +98,19 @@ fn numbers(text: &str) -> Result<Numbers, String> {
     text.split(',').map(number).collect::<Result<_, _>>().map(Numbers)
 }
 
-/// Default target of the default robot's frame (m).
+/// Default target of the default robot's last frame (m).
 const DEFAULT_TARGET: [f64; 3] = [0.45, -0.25, 0.35];
 const DEFAULT_ROBOT: &str = "arm7";
 const DEFAULT_FRAME: &str = "tool";
 const DEFAULT_DT: f64 = 0.01;
-/// Tolerance of the solver for gaits. Their costs are some hundreds, so less than a millionth of the cost is ignored.
+/// Tolerance of the solver for gaits. Their costs are several hundred, so less than a millionth of the cost is ignored.
 const GAIT_TOLERANCE: f64 = 1e-4;
-/// Maximum entry of the Lagrangian's gradient with limits as constraints: for reaching (costs of about 1) and for gaits
-/// (costs of hundreds).
+/// Maximum entry of the Lagrangian's gradient if limits are constraints. The first number is for reaching (costs of
+/// about 1), the second for gaits (costs of hundreds).
 const DUAL: [f64; 2] = [1e-4, 1e0];
-/// Maximum violation of a limit that still counts as held (rad, m, N m, N, and per s): half of `report::ROUNDING`.
+/// Maximum violation of a limit that still counts as held (rad, m, N m, N, and per second): half of `report::ROUNDING`.
 const HELD: f64 = 5e-6;
-/// Maximum number of inner solves until the limits must hold.
+/// Maximum number of inner solves after which the limits must hold.
 const SOLVES: usize = 15;
 /// Expected decrease of the cost, relative to the cost, below which a solve has settled.
 const SETTLED: f64 = 1e-7;
@@ -145,7 +145,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     finish(arguments, &plan, record)
 }
 
-/// Writes the page, the record and the report, and returns an error if the result is not what was requested.
+/// Writes the page, the record and the report. Returns an error if the result is not what was requested.
 fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::Format)>) -> Result<(), Error> {
     let budget = report::measure(plan);
     let violations = report::violations(plan);
@@ -200,7 +200,7 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
     }
 }
 
-/// Plans a motion to a point.
+/// Plans a motion of a frame to a target point.
 fn point(arguments: &Arguments, task: Option<&Task>) -> Result<Plan, Error> {
     let option = |option, what: String| Error::Option { option, what };
     let own = task.is_none() && arguments.robot.is_none();
@@ -340,7 +340,7 @@ fn gait(arguments: &Arguments, task: &Task) -> Result<Plan, Error> {
     Ok(plan)
 }
 
-/// Returns whether the solution exceeds limits, so that it must be solved again with constraints.
+/// Returns whether the solution exceeds limits, so that the problem must be solved again with constraints.
 fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
     let violations = report::violations(plan);
     if violations.is_empty() || watch::interrupted() {
@@ -355,10 +355,10 @@ fn must_hold(arguments: &Arguments, plan: &Plan) -> bool {
     true
 }
 
-/// Solves a problem with limits as constraints, starting from a solution that exceeds them.
+/// Solves a problem with limits as constraints, starting from a solution that exceeds the limits.
 ///
-/// The second result is set if the solver did not reach its own tolerance, but the limits hold and the cost can hardly
-/// decrease. It is the expected decrease relative to the cost.
+/// The second result is the expected decrease of the cost, relative to the cost. It is set only if the limits hold and
+/// the cost can hardly decrease, although the solver did not reach its own tolerance.
 fn hold(
     arguments: &Arguments,
     plan: &Plan,
@@ -371,16 +371,16 @@ fn hold(
     (solver.settings.tolerance, solver.settings.tolerance_dual) = (HELD, dual);
     let (xs, us) = (&plan.solution.xs, &plan.solution.us);
     let solution = solver.solve_with(&mut problem, xs, us, watch.quiet(arguments.json))?.clone();
-    // For unstable motions with many knots, rounding keeps the gradient of the Lagrangian above its tolerance. The
-    // expected decrease of the cost is an equally good criterion (half of Newton's squared decrement, which FDDP also
-    // uses): the limits hold, and nothing is left to gain.
+    // For unstable motions with many knots, rounding errors keep the gradient of the Lagrangian above its tolerance.
+    // The expected decrease of the cost is an equally good criterion: half of Newton's squared decrement, which FDDP
+    // also uses. If it is small, the limits hold and the cost can hardly decrease.
     let last = solution.trace.last().filter(|last| last.feasible && last.stop < SETTLED * solution.cost.abs());
     let settled = last.filter(|_| solution.status == Status::MaxIterations && solver.outcome().primal <= HELD);
     let settled = settled.map(|last| last.stop / solution.cost.abs());
     Ok((solution, settled))
 }
 
-/// Prints the robot and the task.
+/// Prints the name of the robot and the task.
 fn introduce(arguments: &Arguments, model: &Model, task: &str) {
     if !arguments.json {
         say(&format!("{model}{task}\n\n"));
@@ -393,7 +393,8 @@ fn heading(arguments: &Arguments) {
     }
 }
 
-/// Returns how to read the robot's file: command-line options take precedence over the task.
+/// Returns the options for reading the robot's file. Options on the command line take precedence over the task's
+/// options.
 fn options(arguments: &Arguments, task: Option<&Task>) -> ReadingOptions {
     let flags = &arguments.options;
     ReadingOptions {

@@ -1,24 +1,24 @@
-//! Inverse kinematics: the final posture of a plan, computed before the plan.
+//! Inverse kinematics: computes the final posture of a motion before the motion is planned.
 
 use condyle::{Data, Model, ReferenceFrame, Vec3, difference, forward_kinematics, integrate, random_configuration};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rand::{SeedableRng, rngs::StdRng};
 
-/// Number of random postures to start from, besides the given one.
+/// Number of random postures from which the search starts, besides the given posture.
 const STARTS: usize = 40;
-/// Maximum number of steps from each start.
+/// Maximum number of steps from each starting posture.
 const STEPS: usize = 100;
 /// Damping of a step (m): small compared with the size of an arm, large compared with rounding.
 const DAMPING: f64 = 0.02;
-/// Distance that counts as reached (m); the planner reduces the rest.
+/// Distance from the target that counts as reached (m); the planner reduces the remaining distance.
 const REACHED: f64 = 1e-4;
 
 /// Returns a posture within the limits whose frame is at the target, and the distance of its frame from the target (m).
-/// If several postures reach the target, the one nearest to `q0` is returned. If none does, the one whose frame is
-/// nearest to the target is returned.
+/// Of several postures that reach the target, the nearest one to `q0` is returned. If no posture reaches it, the
+/// posture with the smallest distance is returned.
 ///
-/// The method is damped least squares, q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), clamped to the limits (Nakamura and Hanafusa
-/// 1986).
+/// The method is damped least squares, q ⊕ Jᵀ(J Jᵀ + λ²)⁻¹ (target − p), with coordinates clamped to their limits
+/// (Nakamura and Hanafusa 1986).
 pub(crate) fn reaching(model: &Model, frame: usize, target: Vec3<f64>, q0: &[f64]) -> (Vec<f64>, f64) {
     let mut data = Data::new(model);
     let mut rng = StdRng::seed_from_u64(0);

@@ -1,4 +1,4 @@
-//! Reaching for a point as an optimal control problem.
+//! Poses the task of reaching a point as an optimal control problem.
 
 use crate::error::Error;
 use crate::limits::{efforts_of, inside, limits_of};
@@ -7,18 +7,18 @@ use condyle::optimal::robot::{Activation, Actuation, Cost, FreeDynamics, Residua
 use condyle::{Data, Model, Vec3, difference, integrate, neutral, rnea, terms::gravity};
 use std::sync::Arc;
 
-/// Weight of an effort without a limit, as if its limit were 100 N m or N.
+/// Weight of an effort that has no limit. It equals the weight of an effort with a limit of 100 N m or 100 N.
 const WITHOUT_LIMIT: f64 = 1e-4;
 
-/// Problem and warm start: problem, states and efforts.
+/// A problem with a warm start: the problem, the states and the efforts.
 pub(crate) type Posed = (Problem, Vec<f64>, Vec<f64>);
 
 /// Returns the optimal control problem and a warm start. The warm start is a straight path to a posture that reaches
 /// the target, with the efforts from inverse dynamics.
 ///
-/// Running costs are the speed and the efforts beyond those that hold the start, each relative to its limit. Barriers
-/// penalize positions, speeds and efforts outside their limits. Terminal costs are the distance to the target and the
-/// speed. With `held`, the limits are also constraints.
+/// Running costs are the speed and the deviation of the efforts from those efforts that hold the start, each relative
+/// to its limit. Barriers penalise positions, speeds and efforts outside of their limits. Terminal costs are the
+/// distance to the target and the speed. With `held`, the limits are also constraints.
 pub(crate) fn problem(
     model: &Arc<Model>,
     frame: usize,
@@ -30,12 +30,12 @@ pub(crate) fn problem(
     let nv = model.nv();
     let limits = model.limits();
     let nu = Actuation::joints(model).nu();
-    let driven = nv - nu..; // all degrees of freedom except a floating base
+    let driven = nv - nu..; // all degrees of freedom except a floating base's
     let rest = |q: &[f64]| [q, &vec![0.0; nv]].concat();
     let x0 = rest(q0);
     let state = || Residual::State { reference: rest(&neutral(model)) };
     let moving = |speed: f64| Activation::Weighted([vec![0.0; nv], vec![speed; nv]].concat());
-    // limits of joints with one coordinate, as bounds on the tangent vector from neutral
+    // The limits of joints with one coordinate are bounds on the tangent vector from the neutral position.
     let (mut lower, mut upper) = (vec![f64::NEG_INFINITY; 2 * nv], vec![f64::INFINITY; 2 * nv]);
     for body in model.bodies()[1..].iter().filter(|b| b.joint.nq() == 1) {
         (lower[body.idx_v], upper[body.idx_v]) = (limits.lower[body.idx_q], limits.upper[body.idx_q]);
@@ -61,7 +61,7 @@ pub(crate) fn problem(
         Cost::new("stop", 1e0, state(), moving(1.0)),
         Cost::new("limits", 1e2, state(), within()),
     ];
-    // straight path with minimum jerk: q0 ⊕ s(t) way, s = 10 r³ − 15 r⁴ + 6 r⁵, r = t/T
+    // A straight path with minimum jerk is q0 ⊕ s(t) way, with s = 10 r³ − 15 r⁴ + 6 r⁵ and r = t/T.
     let (mut data, mut q, mut way) = (Data::new(model), q0.to_vec(), vec![0.0; nv]);
     difference(model, q0, q_end, &mut way);
     let along = |s: f64| way.iter().map(|d| d * s).collect::<Vec<f64>>();

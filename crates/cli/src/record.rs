@@ -1,4 +1,5 @@
-//! Planned trajectory as a file for other programs: CSV, NPZ or JSON, with columns named after the robot's joints.
+//! Writes a planned trajectory to a file for other programs: CSV, NPZ or JSON. Columns are named after the robot's
+//! joints.
 
 use crate::error::{Error, nearest};
 use crate::motion::Plan;
@@ -15,7 +16,7 @@ pub(crate) enum Format {
     Json,
 }
 
-/// Returns the format, given by the extension of the file name.
+/// Returns the format of a file, from the extension of its name.
 pub(crate) fn format(path: &Path) -> Result<Format, Error> {
     match path.extension().and_then(|end| end.to_str()) {
         Some("csv") => Ok(Format::Csv),
@@ -41,7 +42,7 @@ fn parts(joint: Joint) -> (&'static [&'static str], &'static [&'static str]) {
     }
 }
 
-/// Returns the names of the entries of q, and of the entries of v and τ.
+/// Returns the names of the entries of q, and the names of the entries of v and τ.
 fn columns(model: &Model) -> (Vec<String>, Vec<String>) {
     let (mut q, mut v) = (Vec::new(), Vec::new());
     for body in model.bodies()[1..].iter().filter(|b| b.mimic.is_none()) {
@@ -56,7 +57,7 @@ fn columns(model: &Model) -> (Vec<String>, Vec<String>) {
     (q, v)
 }
 
-/// Trajectory as numbers: N + 1 states and N efforts.
+/// A trajectory as numbers: N + 1 states and N efforts.
 struct Table<'a> {
     plan: &'a Plan,
     q: Vec<f64>,
@@ -163,7 +164,7 @@ fn npz(table: &Table) -> std::io::Result<Vec<u8>> {
     add("tau", "<f8", &[*knots, of_v.len()], &floats(tau))?;
     add("touches", "|b1", &[plan.touches.len(), feet.len()], &touches)?;
     for (name, texts) in [("q_names", &of_q), ("v_names", &of_v), ("feet", &feet)] {
-        // texts of equal length in UTF-32, padded with zeros
+        // Texts have equal lengths in UTF-32, padded with zeros.
         let length = texts.iter().map(|text| text.chars().count()).max().unwrap_or(0).max(1);
         let text = |text: &String| {
             let mut codes: Vec<u32> = text.chars().map(u32::from).collect();

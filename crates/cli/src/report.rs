@@ -1,4 +1,4 @@
-//! Output of `condyle plan`: iterations, computing times, and exceeded limits.
+//! Prints the result of `condyle plan`: iterations, computing times, and exceeded limits.
 
 use crate::limits::{LimitCounts, Limited, limited};
 use crate::motion::Plan;
@@ -9,9 +9,9 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Relative tolerance for limits: an excess below this fraction of the range (or of 1, if larger) is not reported.
+/// Relative tolerance for limits: an excess below this fraction of the range (or of 1, if 1 is larger) is not reported.
 const ROUNDING: f64 = 1e-5;
-/// Number of timed repetitions of a function; the median counts.
+/// Number of timed repetitions of a function; the median of their times counts.
 const REPETITIONS: usize = 11;
 
 pub(crate) const ITERATION_HEADER: &str = "iteration           cost        gap    step  regularisation\n";
@@ -21,7 +21,7 @@ pub(crate) fn iteration(i: &Iteration) -> String {
     format!("{:9}  {:13.6}  {:9.2e}  {step:>6}  {:14.0e}\n", i.iteration, i.cost, i.gap, i.regularisation)
 }
 
-/// Row of the table of times.
+/// One row in the table of times.
 #[derive(Serialize)]
 pub(crate) struct Row {
     pub name: &'static str,
@@ -35,9 +35,9 @@ pub(crate) struct Budget {
     pub budget_ms: f64,
     pub knots: usize,
     pub per: &'static str,
-    /// Times of the parts of one solver iteration.
+    /// Time of each part of a solver iteration.
     pub rows: Vec<Row>,
-    /// Sum of the rows.
+    /// Sum of the times in all rows.
     pub total_ms: f64,
     /// Times of the dynamics functions that the iteration calls, measured alone.
     pub alone: Vec<Row>,
@@ -57,7 +57,7 @@ fn median(knots: usize, mut f: impl FnMut(usize)) -> Duration {
     times[REPETITIONS / 2]
 }
 
-/// Measures the dynamics on the planned motion; the times of sweep and rollout come from the solve.
+/// Measures the dynamics on the planned motion. The times of sweep and rollout are those that the solver measured.
 pub(crate) fn measure(plan: &Plan) -> Budget {
     let (model, solution) = (&plan.model, &plan.solution);
     let (nq, nv) = (model.nq(), model.nv());
@@ -101,10 +101,10 @@ pub(crate) fn measure(plan: &Plan) -> Budget {
     }
 }
 
-/// Exceeded limit of a quantity, at the knot with the largest excess.
+/// Exceeded limit of one quantity, at the knot where the excess is largest.
 #[derive(Serialize)]
 pub(crate) struct Violation {
-    /// `position`, `velocity` or `torque`.
+    /// Quantity: `position`, `velocity` or `torque`.
     pub what: &'static str,
     pub joint: String,
     pub at_knot: usize,
@@ -137,7 +137,7 @@ pub(crate) fn violations(plan: &Plan) -> Vec<Violation> {
     found
 }
 
-/// Returns the final status of the solve as text.
+/// Returns a text for the status with which the solve ended.
 pub(crate) fn status(plan: &Plan) -> &'static str {
     match plan.solution.status {
         _ if plan.settled.is_some() => "settled",
@@ -152,7 +152,7 @@ pub(crate) fn status(plan: &Plan) -> &'static str {
     }
 }
 
-/// Returns the report that follows the iterations.
+/// Returns the text of the report that follows the list of iterations.
 pub(crate) fn text(plan: &Plan, budget: &Budget, violations: &[Violation]) -> String {
     let (model, iterations) = (&plan.model, plan.trace.len());
     let ended = styled(if plan.is_solved() { Style::Good } else { Style::Bad }, status(plan));

@@ -1,4 +1,4 @@
-//! Robot of a command: a file of any supported format, or a built-in robot.
+//! The robot of a command: from a file in any supported format, or built in.
 
 use crate::error::{Error, nearest};
 use condyle::{Joint, MjcfOptions, Model, SdfOptions, UrdfOptions, robots};
@@ -54,7 +54,7 @@ fn argument(text: &str) -> Result<(String, String), &'static str> {
     Ok((name.to_owned(), value.to_owned()))
 }
 
-/// Joint between the world and a root link.
+/// Kind of joint between the world and a root link.
 #[derive(Clone, Copy, PartialEq, clap::ValueEnum)]
 pub(crate) enum Root {
     Fixed,
@@ -94,7 +94,7 @@ impl Format {
     }
 }
 
-/// Robot, and its source.
+/// A robot and its source.
 pub(crate) struct Robot {
     pub model: Model,
     /// Path of the file, or name of the built-in robot.
@@ -102,11 +102,11 @@ pub(crate) struct Robot {
     pub format: Format,
     /// Text of the file.
     pub text: String,
-    /// Folders in which its meshes are searched.
+    /// Folders in which the robot's meshes are searched.
     pub places: Places,
 }
 
-/// Loads a robot from a file, or a built-in one.
+/// Loads a robot from a file, or a built-in robot.
 pub(crate) fn load(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     let places = |path: &Path| Places { folder: path.parent().map(Path::to_owned), packages: options.packages.clone() };
     let Some(path) = locate(name) else {
@@ -124,14 +124,14 @@ pub(crate) fn load(name: &str, options: &ReadingOptions) -> Result<Robot, Error>
     Ok(Robot { model, source: name.to_owned(), format, text, places: places(&found) })
 }
 
-/// Returns the path of the file, or `None` for a built-in robot. A package:// address is resolved later.
+/// Returns the path of the robot's file, or `None` for a built-in robot. A package:// address is resolved later.
 fn locate(name: &str) -> Option<PathBuf> {
     let path = Path::new(name);
     let plain = !EMBEDDED.contains(&name) || path.is_file();
     (plain && (path.exists() || name.starts_with("package://"))).then(|| path.to_owned())
 }
 
-/// Reads the model from a file of known format.
+/// Reads the model from a file whose format is known.
 pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Result<Model, Error> {
     let (root_joint, mimic, packages) = (options.root.and_then(Root::joint), options.mimic, options.packages.clone());
     Ok(match format {
@@ -150,7 +150,7 @@ pub(crate) fn read(path: &str, format: Format, options: &ReadingOptions) -> Resu
     })
 }
 
-/// Loads a built-in robot, with its own root joint unless another one is requested.
+/// Loads a built-in robot. It has its usual root joint unless the options request another one.
 fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     let (text, free) = match name {
         "arm7" => (robots::ARM7, false),
@@ -167,7 +167,7 @@ fn embedded(name: &str, options: &ReadingOptions) -> Result<Robot, Error> {
     Ok(Robot { model, source: name.to_owned(), format: Format::Urdf, text: text.to_owned(), places: Places::default() })
 }
 
-/// Returns an error for a name that is neither a file nor a built-in robot, with the most similar name.
+/// Returns an error for a name that is neither a file nor a built-in robot. The message has the most similar name.
 fn unknown(name: &str) -> Error {
     let kinds = ["urdf", "xacro", "xml", "mjcf", "sdf"];
     if name.contains(['.', '/', '\\']) {
@@ -180,14 +180,14 @@ fn unknown(name: &str) -> Error {
     }
 }
 
-/// Returns an error for a missing file, with the most similar file name of the given extensions.
+/// Returns an error for a missing file. The message has the most similar file name with one of these extensions.
 pub(crate) fn no_such_file(name: &str, kinds: &[&str]) -> Error {
     let files = files_beside(name, kinds);
     let nearest = nearest(name, files.iter().map(|file| &**file));
     Error::File { file: name.to_owned(), what: format!("No such file{nearest}") }
 }
 
-/// Returns the files with the given extensions in the folder of `name`.
+/// Returns the names of files with the given extensions in the folder of `name`.
 fn files_beside(name: &str, kinds: &[&str]) -> Vec<String> {
     let folder = Path::new(name).parent().map_or("", |parent| parent.to_str().unwrap_or_default());
     let look_in = if folder.is_empty() { "." } else { folder };
@@ -200,7 +200,7 @@ fn files_beside(name: &str, kinds: &[&str]) -> Vec<String> {
     files.take(1000).collect()
 }
 
-/// Returns the format of a file, which its first element determines, and the text of the file.
+/// Returns the format and the text of a file. The first element of the text determines the format.
 fn sniff(path: &Path) -> Result<(Format, String), Error> {
     let wrong = |what: String| Error::File { file: path.display().to_string(), what };
     if path.to_str().is_some_and(|name| name.starts_with("package://")) {
@@ -220,7 +220,7 @@ fn sniff(path: &Path) -> Result<(Format, String), Error> {
     Ok((format, text))
 }
 
-/// Returns the name of the first element of an XML text, after its declaration and comments.
+/// Returns the name of the first element of an XML text; declarations and comments before it are skipped.
 fn first_tag(mut text: &str) -> Option<&str> {
     loop {
         let (_, rest) = text.split_once('<')?;
@@ -238,13 +238,13 @@ fn first_tag(mut text: &str) -> Option<&str> {
     }
 }
 
-/// Returns the indices of frames, given their names.
+/// Returns the indices of the frames with these names.
 pub(crate) fn frames(model: &Model, names: &[String]) -> Result<Vec<usize>, Error> {
     names.iter().map(|name| Ok(model.frame(name)?)).collect()
 }
 
-/// Adds armature (kg m², kg) to the joints that move nothing with inertia, so that forward dynamics has a solution.
-/// Returns the robot and the names of these joints.
+/// Adds armature (kg m², kg) to the joints that move no inertia, so that forward dynamics has a solution. Returns the
+/// robot and the names of these joints.
 pub(crate) fn regular(model: Model, armature: f64) -> Result<(Model, Vec<String>), Error> {
     let joints: Vec<String> = model.singular_joints().iter().map(|&i| model.bodies()[i].joint_name.clone()).collect();
     if joints.is_empty() {

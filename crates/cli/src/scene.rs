@@ -1,4 +1,5 @@
-//! Scene of the page: shapes and meshes from the robot's file, or bones between the joints of robots without shapes.
+//! The scene on the page. It shows shapes and meshes from the robot's file; robots without shapes have bones between
+//! joints.
 
 use crate::robot::{Format, Robot};
 use crate::visuals::{self, Geometry};
@@ -10,7 +11,7 @@ use condyle_meshes::{Drawn, Meshes, mjcf};
 use serde::Serialize;
 use std::collections::HashMap;
 
-/// Body, with the shapes that are drawn in its frame.
+/// A body, with the shapes that are drawn in its frame.
 #[derive(Serialize)]
 pub(crate) struct Body {
     name: String,
@@ -18,7 +19,8 @@ pub(crate) struct Body {
     shapes: Vec<Shape>,
 }
 
-/// Box, cylinder, sphere, capsule, segment with round ends, or part of a mesh. For a mesh, `size` is its scale.
+/// Box, cylinder, sphere, capsule, segment with round ends, or part of a mesh. For a mesh, `size` is the scale of the
+/// mesh.
 #[derive(Clone, Serialize)]
 pub(crate) struct Shape {
     kind: &'static str,
@@ -31,13 +33,13 @@ pub(crate) struct Shape {
     part: Option<usize>,
 }
 
-/// Returns position and quaternion (x, y, z, w).
+/// Returns the numbers of a pose: position, then quaternion (x, y, z, w).
 pub(crate) fn pose(placement: Se3<f64>) -> [f64; 7] {
     let (p, q) = (placement.translation, Quaternion::from_rotation(placement.rotation));
     [p.x, p.y, p.z, q.vector.x, q.vector.y, q.vector.z, q.scalar]
 }
 
-/// Returns all bodies, the world first, and their meshes if `wanted`.
+/// Returns all bodies, the world first. If meshes are `wanted`, returns their meshes, too.
 pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool) -> (Vec<Body>, Meshes) {
     let mut meshes = Meshes::new(robot.places.clone());
     let mut shapes = match robot.format {
@@ -45,8 +47,8 @@ pub(crate) fn bodies(model: &Model, robot: &Robot, ends: &[usize], wanted: bool)
         Format::Mjcf if wanted => shapes_of_mjcf(model, &robot.text, &mut meshes),
         Format::Mjcf | Format::Sdf => HashMap::new(),
     };
-    // Bones replace meshes that are left out. Unless most moving bodies have shapes of their own, bones also replace
-    // everything except meshes.
+    // Bones replace meshes that are left out. If at most half of the moving bodies have shapes, bones also replace all
+    // other shapes except meshes.
     let drawn = |b: &usize| shapes.get(b).is_some_and(|shapes| !shapes.is_empty());
     let few = 2 * (1..model.bodies().len()).filter(drawn).count() < model.bodies().len() - 1;
     for (body, bones) in bones(model, ends) {
@@ -71,8 +73,8 @@ fn hex(color: &[f64]) -> String {
     "#".to_owned() + &color.iter().take(3).map(byte).collect::<String>()
 }
 
-/// Returns the boxes, cylinders, spheres, capsules and meshes of the URDF's visuals, by body. If all meshes of a body
-/// are left out and it has no other shapes, its list is empty.
+/// Returns the shapes of each body, from the URDF's visuals: boxes, cylinders, spheres, capsules and meshes. If all
+/// meshes of a body are left out and it has no other shapes, its list is empty.
 fn shapes_of_urdf(model: &Model, urdf: &str, mut meshes: Option<&mut Meshes>) -> HashMap<usize, Vec<Shape>> {
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
     for visual in visuals::read(urdf) {
@@ -98,7 +100,7 @@ fn shapes_of_urdf(model: &Model, urdf: &str, mut meshes: Option<&mut Meshes>) ->
     shapes
 }
 
-/// Returns the meshes of the bodies of an MJCF.
+/// Returns the meshes of each body of an MJCF.
 fn shapes_of_mjcf(model: &Model, text: &str, meshes: &mut Meshes) -> HashMap<usize, Vec<Shape>> {
     let mut shapes: HashMap<usize, Vec<Shape>> = HashMap::new();
     for visual in mjcf::visuals(text) {
@@ -115,7 +117,7 @@ fn shapes_of_mjcf(model: &Model, text: &str, meshes: &mut Meshes) -> HashMap<usi
     shapes
 }
 
-/// Returns the parts of a mesh. Colours in the mesh file take precedence over `color`, as in RViz.
+/// Returns the parts of a mesh as shapes. Colours in the mesh file take precedence over `color`, as in RViz.
 fn parts(meshes: &mut Meshes, file: &str, scale: &[f64], pose: [f64; 7], color: Option<&str>) -> Vec<Shape> {
     let shape = |drawn: Drawn| Shape {
         kind: "mesh",
@@ -127,13 +129,14 @@ fn parts(meshes: &mut Meshes, file: &str, scale: &[f64], pose: [f64; 7], color: 
     meshes.get(file).into_iter().map(shape).collect()
 }
 
-/// Returns a shape at a pose, still without geometry.
+/// Returns a shape at a pose, without any geometry yet.
 fn at(pose: [f64; 7]) -> Shape {
     let [x, y, z, quaternion @ ..] = pose;
     Shape { kind: "", size: vec![], position: [x, y, z], quaternion, color: None, part: None }
 }
 
-/// Returns a segment from each body to its child joints, a sphere at each joint, and a segment to each end frame.
+/// Returns the bones of each body: a segment to each child joint, a sphere at the body's joint, and a segment to each
+/// end frame.
 fn bones(model: &Model, ends: &[usize]) -> HashMap<usize, Vec<Shape>> {
     let mut data = Data::new(model);
     let q = condyle::neutral(model);

@@ -1,10 +1,10 @@
-//! Random states of a robot: positions within the limits, all other quantities normally distributed.
+//! Random states of a robot. Positions are within the limits; all other quantities are normally distributed.
 
 use condyle::{Model, random_configuration};
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-/// Returns a random number generator with a fixed seed.
+/// Returns a random number generator with this seed.
 pub(crate) fn source(seed: u64) -> StdRng {
     StdRng::seed_from_u64(seed)
 }
@@ -18,7 +18,7 @@ pub(crate) fn normal(random: &mut StdRng, n: usize) -> Vec<f64> {
     (0..n).map(|_| one()).collect()
 }
 
-/// States stored one after another, in the layout of a batch.
+/// States that are stored one after another, in the layout of a batch.
 pub(crate) struct States {
     pub q: Vec<f64>,
     pub v: Vec<f64>,

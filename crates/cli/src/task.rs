@@ -1,4 +1,4 @@
-//! Task file: TOML, with line numbers in all errors.
+//! A task file in TOML. All its errors have line numbers.
 
 use crate::error::{Error, nearest};
 use serde::Deserialize;
@@ -7,7 +7,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 use toml::Spanned;
 
-/// Built-in example tasks, by name.
+/// Built-in example tasks: name and text.
 pub(crate) const EXAMPLES: [(&str, &str); 5] = [
     ("reach", include_str!("../tasks/reach.toml")),
     ("trot", include_str!("../tasks/trot.toml")),
@@ -16,7 +16,7 @@ pub(crate) const EXAMPLES: [(&str, &str); 5] = [
     ("stand-up", include_str!("../tasks/stand-up.toml")),
 ];
 
-/// Task as stored in its file.
+/// A task as it is stored in its file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
@@ -45,7 +45,7 @@ pub(crate) struct Reach {
     pub tolerance: Option<Spanned<f64>>,
 }
 
-/// Feet: the frames that touch the ground.
+/// Feet, given by the frames that touch the ground.
 #[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Feet {
@@ -68,12 +68,12 @@ struct PhaseFile {
     height: Option<f64>,
 }
 
-/// Phase of a gait.
+/// One phase of a gait.
 #[derive(Clone)]
 pub(crate) struct Phase {
     pub kind: PhaseKind,
     pub knots: usize,
-    /// Distances that the feet move ahead and to the left, and their lift (m).
+    /// Distances (m) that the feet move ahead and to the left, and height of their lift.
     pub length: f64,
     pub side: f64,
     pub height: f64,
@@ -81,15 +81,15 @@ pub(crate) struct Phase {
 
 #[derive(Clone, PartialEq)]
 pub(crate) enum PhaseKind {
-    /// All feet on the ground.
+    /// A phase with all feet on the ground.
     Stand,
-    /// Feet in the air, by their indices.
+    /// A phase in which the feet with these indices are in the air.
     Step(Vec<usize>),
-    /// All feet in the air.
+    /// A phase with all feet in the air.
     Jump,
 }
 
-/// Valid task. Names of frames and joints are not yet looked up in the robot.
+/// A valid task. The names of frames and joints are not yet looked up in the robot.
 pub(crate) struct Task {
     pub robot: String,
     pub root: Option<crate::robot::Root>,
@@ -106,14 +106,14 @@ pub(crate) struct Task {
     pub place: Place,
 }
 
-/// Line numbers of names in the file, for errors that are found later.
+/// Line numbers of names in the task file, for errors that are found later.
 pub(crate) struct Place {
     file: String,
     lines: BTreeMap<String, usize>,
 }
 
 impl Place {
-    /// Returns an error in the line of a name.
+    /// Returns an error for the line in which a name occurs.
     pub(crate) fn wrong(&self, name: &str, what: String) -> Error {
         Error::Task { file: self.file.clone(), line: self.lines.get(name).copied().unwrap_or(1), what }
     }
@@ -145,7 +145,7 @@ pub(crate) fn read(path: &Path) -> Result<Task, Error> {
     Ok(task)
 }
 
-/// Parses a task.
+/// Parses the text of a task file.
 pub(crate) fn parse(text: &str, file: &str) -> Result<Task, Error> {
     let line = |at: usize| text[..at.min(text.len())].matches('\n').count() + 1;
     let wrong = |at: usize, what: String| Error::Task { file: file.to_owned(), line: line(at), what };
@@ -250,7 +250,7 @@ pub(crate) fn parse(text: &str, file: &str) -> Result<Task, Error> {
     })
 }
 
-/// Checks a phase and converts it.
+/// Checks a phase from the file, and converts it.
 fn phase(from: &PhaseFile, feet: &[String], wrong: &dyn Fn(usize, String) -> Error) -> Result<Phase, Error> {
     let PhaseFile { kind, knots, length, side, height, .. } = from;
     if !(1..=MOST_KNOTS).contains(knots.get_ref()) {
@@ -300,7 +300,8 @@ fn phase(from: &PhaseFile, feet: &[String], wrong: &dyn Fn(usize, String) -> Err
     Ok(Phase { kind, knots: *knots.get_ref() as usize, length, side, height })
 }
 
-/// Returns the key that is most similar to an unknown one, given a parser message that lists the valid keys.
+/// Returns the valid key that is most similar to an unknown key. `message` is the parser's message, which lists the
+/// valid keys.
 fn nearest_key(message: &str) -> String {
     let mut names = message.split('`').skip(1).step_by(2);
     match (message.starts_with("unknown field"), names.next()) {

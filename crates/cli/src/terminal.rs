@@ -1,4 +1,4 @@
-//! Terminal output: text, tables, and colours if standard output is a terminal.
+//! Writes to the terminal: text, tables, and colours if standard output is a terminal.
 
 use std::io::{IsTerminal, Write};
 
@@ -10,9 +10,9 @@ pub(crate) fn say(text: &str) {
     }
 }
 
-/// Writes a value as JSON.
+/// Writes a value to standard output as JSON.
 pub(crate) fn say_json(value: &impl serde::Serialize) {
-    // Numbers that are not finite become `null`; nothing else can fail here.
+    // Numbers that are not finite become `null`, and no other value can fail here.
     say(&(serde_json::to_string_pretty(value).unwrap_or_default() + "\n"));
 }
 
@@ -33,7 +33,7 @@ pub(crate) enum Style {
     Bad,
 }
 
-/// Returns the text in a style, or unchanged if colours are off.
+/// Returns the text with the codes of a style, or unchanged if colours are off.
 pub(crate) fn styled(style: Style, text: &str) -> String {
     if !colours() {
         return text.to_owned();
@@ -48,7 +48,7 @@ pub(crate) fn styled(style: Style, text: &str) -> String {
     format!("\x1b[{code}m{text}\x1b[0m")
 }
 
-/// Returns a heading.
+/// Returns the text of a heading, with its style.
 pub(crate) fn heading(text: &str) -> String {
     format!("\n{}\n", styled(Style::Bold, text))
 }
@@ -70,7 +70,7 @@ pub(crate) fn short(x: f64) -> String {
     }
 }
 
-/// Table with aligned columns: columns of numbers are right-aligned, others left-aligned.
+/// A table with aligned columns. Columns of numbers are right-aligned, all others left-aligned.
 pub(crate) struct Table {
     head: Vec<String>,
     rows: Vec<Vec<String>>,

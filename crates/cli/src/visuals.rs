@@ -1,9 +1,9 @@
-//! Visuals of a URDF: the shapes of each link that are meant to be seen.
+//! Visuals of a URDF: the shapes that show what each link looks like.
 
 use condyle::{Model, Se3};
 use roxmltree::{Document, Node};
 
-/// Shape on a link, with its pose in the link's frame and its colour.
+/// A visual: a shape on a link, its pose in the link's frame, and its colour.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Visual {
     pub(crate) link: String,
@@ -13,7 +13,7 @@ pub(crate) struct Visual {
     pub(crate) color: Option<[f64; 4]>,
 }
 
-/// Shape; lengths in m.
+/// A shape, with lengths in m.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Geometry {
     Box([f64; 3]),
@@ -33,8 +33,8 @@ pub(crate) enum Geometry {
     },
 }
 
-/// Returns the visuals of all links, in the order of the file. Unreadable visuals are skipped: a picture is no reason
-/// to refuse a robot.
+/// Returns the visuals of all links, in the order of the file. Unreadable visuals are skipped: a missing picture is no
+/// reason to reject a robot.
 pub(crate) fn read(urdf: &str) -> Vec<Visual> {
     let Ok(urdf) = Model::well_formed(urdf) else { return Vec::new() };
     let Ok(document) = Document::parse(&urdf) else { return Vec::new() };
@@ -59,7 +59,7 @@ fn child<'a, 'i>(node: Node<'a, 'i>, tag: &'static str) -> Option<Node<'a, 'i>> 
     children(node, tag).next()
 }
 
-/// Returns the numbers of an attribute, if there are exactly N and all are finite.
+/// Returns the numbers of an attribute; `None` unless there are exactly N numbers and all are finite.
 fn numbers<const N: usize>(node: Node<'_, '_>, attribute: &str) -> Option<[f64; N]> {
     let mut numbers = [0.0; N];
     let mut words = node.attribute(attribute)?.split_whitespace();
@@ -85,7 +85,8 @@ fn geometry(node: Node<'_, '_>) -> Option<Geometry> {
     }
 }
 
-/// Returns the pose of a visual: `xyz`, and `rpy` about the fixed axes x, y, z in that order.
+/// Returns the pose of a visual, from `xyz` and from `rpy`, which are angles about the fixed axes x, y, z in that
+/// order.
 fn origin(visual: Node<'_, '_>) -> Se3<f64> {
     let origin = child(visual, "origin");
     let read = |attribute| origin.and_then(|o| numbers(o, attribute)).unwrap_or([0.0; 3]);
@@ -94,7 +95,7 @@ fn origin(visual: Node<'_, '_>) -> Se3<f64> {
     nalgebra::Isometry3::from_parts(xyz.into(), rotation).into()
 }
 
-/// Returns the colour of a material, or of the robot's material with the same name.
+/// Returns the colour of a material. If it has none, returns the colour of the robot's material with the same name.
 fn color(material: Node<'_, '_>, robot: Node<'_, '_>) -> Option<[f64; 4]> {
     let own = |material| child(material, "color").and_then(|c| numbers(c, "rgba"));
     let name = material.attribute("name");

@@ -1,4 +1,4 @@
-//! Observer of a solve: shows the progress, and stops the solve on Ctrl-C.
+//! Observer of a solve. It shows the progress, and stops the solve on Ctrl-C.
 
 use crate::report;
 use crate::terminal::say;
@@ -10,9 +10,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Whether Ctrl-C was pressed.
 static STOP: AtomicBool = AtomicBool::new(false);
 
-/// Installs a handler: the first Ctrl-C asks the solver to stop with its best iterate, the second ends the program.
+/// Installs a handler for Ctrl-C. The first Ctrl-C makes the solver stop with its best iterate; the second ends the
+/// program.
 pub(crate) fn catch_interrupts() {
-    // An existing handler does the same. Where signals cannot be caught, they end the program as usual.
+    // An earlier call may have installed the same handler. Where signals cannot be caught, they end the program as
+    // usual.
     let _ = ctrlc::set_handler(|| {
         if STOP.swap(true, Ordering::SeqCst) {
             std::process::exit(130);

@@ -1,4 +1,5 @@
-//! `condyle inspect`, `budget`, `check` and the command-line options, as a user sees them. No test asserts a time.
+//! Tests `condyle inspect`, `budget`, `check` and the command-line options, as a user sees them. No test asserts a
+//! time.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -6,7 +7,7 @@ use std::process::{Command, Output};
 
 const EMBEDDED: [(&str, usize, usize); 3] = [("arm7", 7, 7), ("quadruped", 19, 18), ("humanoid", 39, 38)];
 
-/// Returns an empty folder for a test.
+/// Creates an empty folder for a test, and returns its path.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("commands_{test}"));
     let _ = std::fs::remove_dir_all(&folder);
@@ -18,7 +19,7 @@ fn condyle(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_condyle")).args(arguments).output().unwrap()
 }
 
-/// Returns the standard output; asserts the exit status.
+/// Runs the program, asserts the exit status, and returns the standard output.
 fn said(arguments: &[&str], status: i32) -> String {
     let output = condyle(arguments);
     let (out, error) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
@@ -30,7 +31,7 @@ fn json(arguments: &[&str], status: i32) -> Value {
     serde_json::from_str(&said(arguments, status)).unwrap()
 }
 
-/// Returns a URDF of a chain: a base, and consecutive links with the given masses (kg).
+/// Returns a URDF of a chain: a base, and links one after another with the given masses (kg).
 fn chain(masses: &[f64]) -> String {
     let mut urdf = "<robot name=\"chain\">\n<link name=\"base\"/>\n".to_owned();
     for (k, m) in masses.iter().enumerate() {
@@ -191,7 +192,7 @@ fn all_checks_pass() {
     assert!(said(&["check", "arm7", "--states", "5"], 0).contains("34 of 34 checks pass"));
 }
 
-/// A tip without inertia has no forward dynamics, so it gets armature, which the report states.
+/// A tip without inertia has no forward dynamics. So it gets armature, and the report states this.
 #[test]
 fn massless_tips_are_given_armature() {
     let file = folder("tip").join("chain.urdf");
@@ -285,7 +286,7 @@ fn errors_are_one_line() {
     }
 }
 
-/// A program without the feature `generate` names this feature, whatever the arguments are.
+/// A program that was built without the feature `generate` names this feature, whatever the arguments are.
 #[cfg(not(feature = "generate"))]
 #[test]
 fn generate_is_a_feature() {
@@ -297,7 +298,7 @@ fn generate_is_a_feature() {
     }
 }
 
-/// `generate` writes the library's code, and names wrong arguments.
+/// `generate` writes the code that the library generates. Wrong arguments are named in the error.
 #[cfg(feature = "generate")]
 #[test]
 fn generate_writes_code() {

@@ -1,15 +1,15 @@
-//! Meshes in the page of `condyle plan`: they are found and drawn at their pose; missing ones do no harm.
+//! Tests meshes on the page of `condyle plan`. They are found, and drawn at their pose; missing meshes cause no error.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Returns the folder of the robots made of boxes, which is also their package.
+/// Returns the folder that contains the robots made of boxes. It is also their package.
 fn robots() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/boxes")
 }
 
-/// Plans a motion for a robot. Returns the output and the scene of the page.
+/// Plans a motion for a robot. Returns the output of the program and the scene of the page.
 fn plan(test: &str, robot: &Path, arguments: &[&str]) -> (Output, Value) {
     let page = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("meshes_{test}.html"));
     let mut command = Command::new(env!("CARGO_BIN_EXE_condyle"));
@@ -25,7 +25,7 @@ fn plan(test: &str, robot: &Path, arguments: &[&str]) -> (Output, Value) {
     (output, data["scene"].clone())
 }
 
-/// Returns the kinds of the shapes of each body.
+/// Returns, for each body, the kinds of its shapes.
 fn kinds(scene: &Value) -> Vec<Vec<&str>> {
     let shapes = |body: &'_ Value| body["shapes"].as_array().unwrap().clone();
     let bodies = scene["bodies"].as_array().unwrap();
@@ -56,14 +56,14 @@ fn meshes_of_a_urdf_are_drawn_and_the_missing_one_is_a_bone() {
         notes.lines().any(|line| line.starts_with("note: 1 of 4 meshes are left out: there is no file")),
         "{notes}"
     );
-    // the URDF's colour if the file has none; otherwise the file's colour
+    // The colour of the mesh file is used. If the file has no colour, the colour of the URDF is used.
     let shape = |body: usize| &scene["bodies"][body]["shapes"][0];
     assert_eq!([0, 1, 2].map(|b| shape(b)["color"].as_str().unwrap()), ["#666673", "#e6991a", "#1a8080"]);
     assert_eq!(
         (&shape(1)["position"], &shape(1)["size"]),
         (&serde_json::json!([0.0, 0.0, 0.2]), &serde_json::json!([0.08, 0.08, -0.4]))
     );
-    // a box with side 1 from each of the three file formats: 8 points, 12 triangles, in base64
+    // A box with side 1 from each of the three file formats has 8 points and 12 triangles, in base64.
     for part in scene["meshes"].as_array().unwrap() {
         let text = |key: &str| part[key].as_str().unwrap().len();
         assert_eq!((text("points"), text("triangles")), (64, 96));
@@ -78,7 +78,7 @@ fn meshes_of_a_urdf_are_drawn_and_the_missing_one_is_a_bone() {
 fn packages_are_found_by_flag() {
     let (packages, robot) = (package("elsewhere"), package("alone").join("robot.urdf"));
     std::fs::rename(packages.with_file_name("meshes_alone").join("boxes"), robot.with_file_name("other")).unwrap();
-    std::fs::copy(robots().join("boxes.urdf"), &robot).unwrap(); // its folder has no such package
+    std::fs::copy(robots().join("boxes.urdf"), &robot).unwrap(); // the new folder has no such package
     std::fs::copy(robots().join("box.obj"), robot.with_file_name("box.obj")).unwrap();
     let (output, scene) = plan("lost", &robot, &[]);
     let notes = String::from_utf8(output.stderr).unwrap();

@@ -1,10 +1,10 @@
-//! `condyle plan` as a user sees it: output, files and exit status.
+//! Tests `condyle plan` as a user sees it: output, files and exit status.
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// Returns an empty folder for a test.
+/// Creates an empty folder for a test, and returns its path.
 fn folder(test: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(test);
     let _ = std::fs::remove_dir_all(&folder);
@@ -19,7 +19,7 @@ fn plan(folder: &Path, arguments: &[&str]) -> Output {
     command.output().unwrap()
 }
 
-/// Returns the error message; asserts a failure that is not a panic.
+/// Runs the program, asserts that it fails without a panic, and returns the error message.
 fn complaint(test: &str, arguments: &[&str]) -> String {
     let output = plan(&folder(test), arguments);
     let error = String::from_utf8(output.stderr).unwrap();
@@ -49,7 +49,7 @@ fn the_built_in_arm_reaches_its_target() {
     assert_eq!(data["scene"]["poses"][100].as_array().unwrap().len(), 8);
 }
 
-/// A user's robot without shapes, here made from the built-in arm, is drawn as bones.
+/// A user's robot without shapes is drawn as bones. Here it is made from the built-in arm.
 #[test]
 fn a_robot_from_a_file_is_drawn_as_bones() {
     let folder = folder("file");
@@ -68,7 +68,7 @@ fn a_robot_from_a_file_is_drawn_as_bones() {
     assert!(page.contains("\"segment\""));
 }
 
-/// Writes a planar chain of two links with the given joints.
+/// Writes a URDF of a planar chain with two links and the given joints.
 fn chain(folder: &Path, joints: [&str; 2]) -> String {
     let mut urdf = "<robot name=\"chain\"><link name=\"base\"/>".to_owned();
     for (k, joint) in joints.iter().enumerate() {
@@ -88,8 +88,8 @@ fn chain(folder: &Path, joints: [&str; 2]) -> String {
     file.to_str().unwrap().to_owned()
 }
 
-/// The report, the page and `inspect` state the number and the source of the limits. Without limits, they do not claim
-/// that a limit holds.
+/// The report, the page and `inspect` state the number and the source of the limits. For a robot without limits, they
+/// do not claim that a limit holds.
 #[test]
 fn limits_are_counted() {
     let all = "type=\"revolute\"><limit lower=\"-2\" upper=\"2\" velocity=\"9\" effort=\"90\"/>";
@@ -136,7 +136,8 @@ fn limits_are_counted() {
     }
 }
 
-/// A joint that is too weak falls out of its range. The number of exceeded limits is given relative to all limits.
+/// A joint that is too weak falls out of its range. The report gives the number of exceeded limits and the number of
+/// all limits.
 #[test]
 fn limits_that_are_exceeded_are_counted() {
     let weak = "type=\"revolute\"><limit lower=\"1.19\" upper=\"1.21\" velocity=\"9\" effort=\"0.5\"/>";
@@ -199,7 +200,8 @@ fn going_over_the_budget_is_no_error() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("OVER the budget"));
 }
 
-/// Solves a task given as text. Returns the summary, the path of the record, the exit status and the error text.
+/// Solves a task that is given as text. Returns the summary, the path of the record, the exit status and the error
+/// text.
 fn solve_task(test: &str, text: &str, record: &str) -> (Value, PathBuf, Option<i32>, String) {
     let folder = folder(test);
     let (task, record) = (folder.join("task.toml"), folder.join(record));
@@ -215,7 +217,7 @@ fn example(name: &str) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Each example does what it describes, and all values stay within the robot's limits.
+/// Each example task does what its description says, and all values stay within the robot's limits.
 #[test]
 fn the_examples_hold_their_limits() {
     for (name, robot, ahead) in [
@@ -268,7 +270,8 @@ fn the_examples_hold_their_limits() {
     }
 }
 
-/// The forces on the page carry the robot. The gait begins and ends at rest, so their mean equals the weight.
+/// The forces on the page carry the robot: the gait begins and ends at rest, so the mean of their sum equals the
+/// weight.
 #[test]
 fn contact_forces_carry_the_robot() {
     let (_, record, ..) = solve_task("forces", &example("trot"), "motion.json");
@@ -313,7 +316,7 @@ fn the_record_is_named_after_the_joints() {
     );
 }
 
-/// A joint starts on its limit, and the solver could reduce the cost by exceeding the limit.
+/// A joint starts on its limit, where the solver could reduce the cost by exceeding the limit.
 #[test]
 fn a_joint_that_starts_on_its_limit_stays_within() {
     let urdf = include_str!("../../model/models/arm7.urdf").replace(
@@ -376,7 +379,7 @@ fn errors_in_a_task_have_a_line_number() {
     }
 }
 
-/// Ctrl-C stops the solver, and the best result so far is written.
+/// On Ctrl-C the solver stops, and the best result so far is written.
 #[test]
 #[cfg(unix)]
 fn interrupted_it_leaves_the_best_iterate() {

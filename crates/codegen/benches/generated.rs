@@ -1,8 +1,8 @@
 //! Compares generated C with the library: operations, size, time to generate and to compile, and time of a call. Also
-//! compares vectors of eight states with a batch, per state.
+//! compares the time per state of vectors of eight states and of a batch.
 //!
-//! `cargo bench -p condyle-codegen --bench generated -- panda.urdf anymal.urdf:free`; without files, it uses the
-//! embedded robots. `CC` names the compiler, `CFLAGS` its flags.
+//! `cargo bench -p condyle-codegen --bench generated -- panda.urdf anymal.urdf:free` reads these files. Without files,
+//! the benchmark uses the embedded robots. `CC` names the compiler, `CFLAGS` its flags.
 
 use condyle_codegen::{Function, Language, Settings, functions};
 use condyle_dynamics::{
@@ -14,7 +14,8 @@ use std::time::Instant;
 
 const NAMES: [&str; 6] = ["rnea", "aba", "crba", "minv", "rnea_derivatives", "aba_derivatives"];
 
-/// Number of measurements; the shortest is the time of a call, since other work on the machine only lengthens it.
+/// Number of measurements. The shortest one is the time of a call, since other work on the machine only lengthens a
+/// call.
 const MEASUREMENTS: usize = 20;
 
 /// Measures the time of a call (ns).
@@ -36,7 +37,7 @@ fn time(mut call: impl FnMut()) -> f64 {
     std::iter::repeat_with(one).take(MEASUREMENTS).fold(f64::INFINITY, f64::min)
 }
 
-/// Measures the library's call (ns).
+/// Measures the time of a call of the library (ns).
 fn library(model: &Model, name: &str) -> f64 {
     let (data, q, v) = (&mut Data::new(model), neutral(model), vec![0.1; model.nv()]);
     let (q, v) = (std::hint::black_box(q), std::hint::black_box(v));
@@ -62,7 +63,7 @@ fn library(model: &Model, name: &str) -> f64 {
     }
 }
 
-/// Measures one state of a batch on one core, with the library (ns).
+/// Measures the time per state of a batch in the library, on one core (ns).
 fn batch(model: &Model, name: &str) -> f64 {
     let n = 8 * STATES;
     let (b, q, v) = (&mut Batch::new(model, n, 1), neutral(model).repeat(n), vec![0.1; n * model.nv()]);

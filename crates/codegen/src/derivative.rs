@@ -1,4 +1,4 @@
-//! Derivatives of recorded functions, by dual numbers of expressions.
+//! Derivatives of recorded functions. They are computed by dual numbers whose parts are expressions.
 
 use crate::expression::Expression;
 use condyle_model::{Model, integrate};
@@ -6,14 +6,14 @@ use condyle_spatial::Scalar;
 use condyle_spatial::lane_dual::LaneDual;
 use nalgebra::DMatrix;
 
-/// Dual number of expressions: a value and its derivative in one direction.
+/// Dual number of expressions: a value, and the value's derivative in one direction.
 pub type DualExpression = LaneDual<Expression>;
 
 /// Records f(x) and its Jacobian ∂f(x ⊕ δ)/∂δ, inside of [`record`](crate::record).
 ///
-/// x: a position of nq numbers, then any other numbers, which form a vector space, as in
-/// [`condyle_dynamics::jacobian`]; f is generic code on dual numbers. Values common to several directions are computed
-/// once.
+/// x has a position of nq numbers, then any other numbers, which form a vector space, as in
+/// [`condyle_dynamics::jacobian`]. f must be generic code on dual numbers. Values common to several directions are
+/// computed once.
 ///
 /// ```
 /// use condyle_codegen::{jacobian, record};
@@ -32,8 +32,8 @@ pub type DualExpression = LaneDual<Expression>;
 /// ```
 ///
 /// # Panics
-/// If x has fewer than nq numbers, f returns a different number of results for another direction, or no recording is in
-/// progress.
+/// If x has fewer than nq numbers, if f returns different numbers of results for different directions, or if no
+/// recording is in progress.
 pub fn jacobian<R>(
     model: &Model<R>,
     x: &[Expression],

@@ -1,18 +1,18 @@
 //! Adjacent entries of a result with the same structure: sums of products with the same common factors, such as entries
-//! of a product of matrices. They are computed in a loop, which compilers vectorise and which is much shorter code.
+//! of a product of matrices. A loop computes these entries. Compilers vectorise the loop, and its code is much shorter.
 
 use crate::graph::{Id, Node};
 use crate::step::{Entries, Step, Term};
 
-/// Minimum number of entries of a loop.
+/// Minimum number of entries that a loop computes.
 const FEWEST: usize = 4;
 
-/// Term of one sum: whether it is subtracted, and its factors; a single value has one factor.
+/// Term of one sum: whether it is subtracted, and its factors. A term that is a single value has one factor.
 type Of = (bool, [Option<Id>; 2]);
 
-/// Replaces steps by loops.
+/// Replaces steps by loops, where adjacent results have the same structure.
 ///
-/// places: the array of each result, and its index in the array.
+/// places: for each result, its array and its index in this array.
 pub(crate) fn gather(steps: &mut Vec<Step>, results: &[Id], places: &[(usize, usize)]) {
     let mut gatherer = Gatherer::new(steps, results);
     let (mut loops, mut start) = (Vec::new(), 0);
@@ -49,7 +49,7 @@ fn product(step: &Step) -> Option<Of> {
     }
 }
 
-/// Returns the value to which a step adds a product, or from which it subtracts it.
+/// Returns the value to which a step adds a product, or from which a step subtracts a product.
 fn rest(step: &Step) -> Option<Id> {
     match *step {
         Step::MulAdd(_, [.., c]) | Step::SubMul(_, [.., c]) => Some(c),
@@ -57,17 +57,17 @@ fn rest(step: &Step) -> Option<Id> {
     }
 }
 
-/// State of the values during the search for loops.
+/// Properties of each value that the search for loops needs.
 struct Gatherer {
-    /// Index of the step that computes each value; `usize::MAX` for none.
+    /// Index of the step that computes each value; `usize::MAX` if no step does.
     maker: Vec<usize>,
-    /// Terms of each value that is a sum of products, with at most one single value; the last term first.
+    /// Terms of each value that is a sum of products, the last term first. At most one term is a single value.
     sums: Vec<Option<Vec<Of>>>,
-    /// Whether no other value uses the value, and it is not yet an entry of a loop.
+    /// Whether no step uses the value, and the value is not yet an entry of a loop.
     is_free: Vec<bool>,
-    /// Value that follows each value in the work space.
+    /// Value that must follow each value in the work space.
     next: Vec<Option<Id>>,
-    /// Whether a value has a neighbour in the work space.
+    /// Whether the work space has a fixed index for a value, next to another value.
     has_place: Vec<bool>,
 }
 
@@ -94,7 +94,7 @@ impl Gatherer {
         Self { maker, sums, is_free, next: vec![None; n], has_place: vec![false; n] }
     }
 
-    /// Returns the longest run of similar entries from index `place` on.
+    /// Returns a loop for the longest run of similar entries, beginning with the first one, which is result `place`.
     fn alike(&mut self, entries: &[Id], place: usize) -> Option<Entries> {
         let sum = |of: &Self, id: Id| of.sums[id as usize].clone().filter(|_| of.is_free[id as usize]);
         let first = sum(self, entries[0]).filter(|sum| sum.len() > 1)?;
@@ -134,7 +134,7 @@ impl Gatherer {
         Some(Entries { ids, first: place, terms })
     }
 
-    /// Places a value after another one in the work space, if possible; returns whether it is there.
+    /// Places a value directly after another value in the work space, if possible. Returns whether it is there.
     fn follows(&mut self, last: Id, id: Id) -> bool {
         match self.next[last as usize] {
             Some(next) => next == id,
@@ -148,7 +148,7 @@ impl Gatherer {
     }
 }
 
-/// Returns the factor that is not the common one.
+/// Returns the factor of a product that is not the common factor; `None` if there is no such factor.
 fn other([a, b]: [Option<Id>; 2], common: Option<Id>) -> Option<Id> {
     match (a == common, b == common) {
         (true, false) => b,

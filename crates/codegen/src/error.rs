@@ -10,18 +10,18 @@ pub enum Error {
         /// The given name.
         name: String,
     },
-    /// A function was named twice: the code would define it twice.
+    /// A function was named twice. The code would define it twice.
     #[error("{name}: named twice")]
     Twice {
         /// Name of the function.
         name: String,
     },
-    /// A function needs frames or constraints, but none were given.
+    /// A function needs frames or constraints, but the settings list none.
     #[error("{name}: needs {needs}, of which there are none")]
     Missing {
         /// Name of the function.
         name: &'static str,
-        /// The missing frames or constraints.
+        /// Whether frames or constraints are missing, in words.
         needs: &'static str,
     },
     /// M is singular, but the function needs its inverse.
@@ -29,7 +29,7 @@ pub enum Error {
     Singular {
         /// Name of the function.
         name: &'static str,
-        /// A joint that moves no inertia.
+        /// Name of a joint that moves no inertia.
         joint: String,
     },
     /// The robot, one of its frames or the constraints are invalid.

@@ -5,23 +5,24 @@ use condyle_spatial::{Constant, Scalar};
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 use std::cell::{Cell, RefCell};
 
-/// A number that records how it is computed. Algorithms that are generic over [`Scalar`] run on it once and leave a
-/// graph of all their operations; [`record`](crate::record) makes a [`Function`](crate::Function) of this graph.
+/// A number that records how it is computed. An algorithm that is generic over [`Scalar`] runs once with such numbers
+/// and leaves a graph of all its operations. [`record`](crate::record) makes a [`Function`](crate::Function) from this
+/// graph.
 ///
-/// An expression belongs to the recording in which it was made; its use in another one panics. Two expressions are
-/// equal if they are computed in the same way.
+/// An expression belongs to the recording in which it was made; its use in another recording panics. Two expressions
+/// are equal if they are computed in the same way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Expression {
-    /// Number of the recording; 0 for the constants 0 and 1, which are the same in each recording.
+    /// Number of the recording. It is 0 for the constants 0 and 1, which are the same in each recording.
     session: u32,
     id: Id,
 }
 
-/// Result of a comparison of two [`Expression`]s.
+/// Result of a comparison of two [`Expression`]s, which is recorded, too.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mask(Expression);
 
-/// Recording of a thread.
+/// A recording in progress on a thread.
 struct Session {
     number: u32,
     graph: Graph,
@@ -29,11 +30,11 @@ struct Session {
 
 thread_local! {
     static SESSION: RefCell<Option<Session>> = const { RefCell::new(None) };
-    /// Number of recordings so far.
+    /// Number of recordings that were begun so far.
     static COUNT: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Recording in progress; it ends when this is dropped, also by a panic.
+/// Guard of the recording in progress. Dropping the guard ends the recording, also after a panic.
 pub(crate) struct Open(());
 
 impl Open {
@@ -60,14 +61,15 @@ impl Drop for Open {
     }
 }
 
-/// Panics for a number outside of its recording; not inlined, to keep callers small.
+/// Panics because an expression is used outside of its recording. The function is not inlined, to keep its callers
+/// small.
 #[cold]
 #[inline(never)]
 fn outside() -> ! {
     panic!("an Expression is a number of one recording: use it inside of the closure that was given to `record`");
 }
 
-/// Computes a value in the graph of the recording.
+/// Adds a value to the graph of the recording.
 #[inline(never)]
 fn graph<const N: usize>(operands: [Expression; N], compute: fn(&mut Graph, [Id; N]) -> Id) -> Expression {
     SESSION.with_borrow_mut(|session| {
@@ -82,7 +84,7 @@ impl Expression {
         Self { session: if id <= ONE { 0 } else { session }, id }
     }
 
-    /// Records an input, given by its index among the numbers of all arguments.
+    /// Records an input number, given by its index among the numbers of all arguments.
     pub(crate) fn input(place: u32) -> Self {
         SESSION.with_borrow_mut(|session| {
             let Some(Session { number, graph }) = session else { outside() };
@@ -90,7 +92,7 @@ impl Expression {
         })
     }
 
-    /// Returns its index in the graph of the recording.
+    /// Returns the index of this expression in the graph of the recording.
     pub(crate) fn id(self) -> Id {
         graph([self], |_, [x]| x).id
     }
@@ -133,7 +135,7 @@ impl SubAssign for Expression {
 
 impl Scalar for Expression {
     type Mask = Mask;
-    /// At least 2, since an expression represents the numbers of many calls: it has no single value.
+    /// At least 2: an expression represents the numbers of many calls, and has no single value.
     const LANES: usize = 2;
 
     #[inline(never)]

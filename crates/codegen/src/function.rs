@@ -7,10 +7,10 @@ use condyle_spatial::{Dense, DenseMatrix, Scalar};
 use core::fmt;
 use core::num::NonZero;
 
-/// Argument or result of a function: some numbers with a name.
+/// Argument or result of a function: an array of numbers with a name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Array {
-    /// Name of the argument in the code.
+    /// Name of the array in the code.
     pub name: String,
     /// Number of rows.
     pub rows: usize,
@@ -21,50 +21,50 @@ pub struct Array {
 }
 
 impl Array {
-    /// Returns the number of numbers.
+    /// Returns the number of numbers in the array.
     #[allow(clippy::len_without_is_empty)]
     pub fn len(&self) -> usize {
         self.rows * self.columns
     }
 }
 
-/// Function of some arrays of numbers, as the steps of its computation: without branches, loops or memory.
+/// Function of several arrays of numbers, stored as the steps of its computation, without branches, loops or memory.
 ///
 /// [`record`] makes a function; [`Language::text`](crate::Language) writes its code.
 #[derive(Clone, Debug)]
 pub struct Function {
     /// Name of the function.
     pub name: String,
-    /// Description of the result, in a sentence.
+    /// Description of the result, as a sentence.
     pub about: String,
     /// Arguments.
     pub inputs: Vec<Array>,
     /// Results.
     pub outputs: Vec<Array>,
-    /// Values that the outputs need, each after the values from which it is computed.
+    /// Values that the outputs need. Each value is after the values from which it is computed.
     pub(crate) nodes: Vec<Node>,
-    /// Values of all outputs, one array after the other; in a share, only the share's values.
+    /// Values of all outputs, one array after the other. A share has only its own values.
     pub(crate) results: Vec<Id>,
-    /// Output array of each result, and its index in the array.
+    /// For each result, its output array and its index in this array.
     pub(crate) places: Vec<(usize, usize)>,
-    /// Limb of each result, 0 for the trunk; empty if unknown. Results are shared out by limbs (see `shares.rs`).
+    /// Limb of each result, 0 for the trunk; empty if unknown. Shares divide the results by limbs (see `shares.rs`).
     pub(crate) limbs: Vec<usize>,
-    /// Requested number of shares.
+    /// Number of shares that the settings request.
     pub(crate) shares: Option<NonZero<usize>>,
 }
 
-/// Numbers of operations of a function.
+/// Numbers of operations in a function, by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Operations {
     /// Sums and differences, except those fused with a product.
     pub sums: usize,
     /// Products, except those fused with a sum.
     pub products: usize,
-    /// Products fused with a sum or difference: one instruction if the processor has it.
+    /// Products fused with a sum or difference; each is one instruction if the processor has it.
     pub fused: usize,
     /// Quotients and square roots.
     pub quotients: usize,
-    /// Angles whose sine, cosine or both are computed; angles of points.
+    /// Angles whose sine, cosine or both are computed, and angles of points (atan2).
     pub angles: usize,
     /// Signs, absolute values, comparisons and selections.
     pub others: usize,
@@ -76,7 +76,7 @@ impl Operations {
         self.sums + self.products + self.fused + self.quotients + self.angles + self.others
     }
 
-    /// Returns the number of additions and multiplications: a fused pair counts as two.
+    /// Returns the number of additions and multiplications. A product fused with a sum counts as two.
     pub fn flops(self) -> usize {
         self.sums + self.products + 2 * self.fused + self.quotients
     }
@@ -103,10 +103,10 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Adds an argument to the function: `len` numbers.
+    /// Adds an argument with `len` numbers to the function.
     ///
     /// # Panics
-    /// If the name is not an identifier (ASCII letters, digits and `_`), or is already used.
+    /// If the name is not an identifier (ASCII letters, digits and `_`), or if another array has this name.
     pub fn input(&mut self, name: &str, len: usize, about: &str) -> Vec<Expression> {
         self.check(name);
         let first = self.places;
@@ -115,18 +115,18 @@ impl Recorder {
         (first..self.places).map(Expression::input).collect()
     }
 
-    /// Adds a result to the function: a vector.
+    /// Adds a vector to the results of the function.
     ///
     /// # Panics
-    /// If the name is not an identifier (ASCII letters, digits and `_`), or is already used.
+    /// If the name is not an identifier (ASCII letters, digits and `_`), or if another array has this name.
     pub fn output(&mut self, name: &str, values: &[Expression], about: &str) {
         self.result(name, (values.len(), 1), values, about);
     }
 
-    /// Adds a result to the function: a matrix. Its numbers are stored column by column.
+    /// Adds a matrix to the results of the function. Its numbers are stored column by column.
     ///
     /// # Panics
-    /// If the name is not an identifier (ASCII letters, digits and `_`), or is already used.
+    /// If the name is not an identifier (ASCII letters, digits and `_`), or if another array has this name.
     pub fn matrix(&mut self, name: &str, values: &DenseMatrix<Expression, impl Dense<Expression>>, about: &str) {
         self.result(name, values.shape(), values.as_slice(), about);
     }
@@ -144,7 +144,7 @@ impl Recorder {
     }
 }
 
-/// Panics unless a name is valid in every language.
+/// Panics unless the name is a valid identifier in every language.
 fn check_identifier(name: &str) {
     assert!(is_identifier(name), "name: `{name}` is not made of ASCII letters, digits and `_`, a letter first");
 }
@@ -200,7 +200,7 @@ pub fn record(name: &str, about: &str, f: impl FnOnce(&mut Recorder)) -> Functio
     }
 }
 
-/// Returns for each value whether some results need it.
+/// Returns, for each value, whether one of the results needs it.
 pub(crate) fn is_needed(all: &[Node], results: impl Iterator<Item = Id>) -> Vec<bool> {
     let mut is_needed = vec![false; all.len()];
     results.for_each(|id| is_needed[id as usize] = true);
@@ -212,7 +212,7 @@ pub(crate) fn is_needed(all: &[Node], results: impl Iterator<Item = Id>) -> Vec<
     is_needed
 }
 
-/// Returns the values that some results need, in recording order, and the results as indices among them.
+/// Returns the values that the results need, in recording order, and the results as indices of these values.
 pub(crate) fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
     let is_needed = is_needed(all, results.iter().copied());
     let (mut nodes, mut new) = (Vec::new(), vec![Id::MAX; all.len()]);
@@ -226,10 +226,10 @@ pub(crate) fn needed(all: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
 }
 
 impl Function {
-    /// Computes the results for some arguments, step by step: slowly, without a compiler.
+    /// Computes the results for the given arguments, step by step. This is slow, but needs no compiler.
     ///
     /// # Panics
-    /// If the number of arguments, or the length of one, differs from `inputs`.
+    /// If the number of arguments, or the length of an argument, differs from `inputs`.
     pub fn evaluate(&self, inputs: &[&[f64]]) -> Vec<Vec<f64>> {
         assert!(inputs.len() == self.inputs.len(), "inputs: expected {}, found {}", self.inputs.len(), inputs.len());
         for (array, given) in self.inputs.iter().zip(inputs) {
@@ -271,7 +271,7 @@ impl Function {
     }
 }
 
-/// Returns the array of each number of some arrays, and its index in the array.
+/// Returns, for each number of the arrays, the index of its array and its index in this array.
 pub(crate) fn places(arrays: &[Array]) -> Vec<(usize, usize)> {
     arrays.iter().enumerate().flat_map(|(k, array)| (0..array.len()).map(move |i| (k, i))).collect()
 }

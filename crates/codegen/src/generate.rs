@@ -1,4 +1,4 @@
-//! Files of generated code for a robot.
+//! Writes files of generated code for a robot.
 
 use crate::error::Error;
 use crate::identifiers::identifier;
@@ -7,10 +7,10 @@ use crate::text::Language;
 use condyle_model::Model;
 use std::path::{Path, PathBuf};
 
-/// Writes functions of a robot into files of a folder, which is created if needed; for programs and build scripts.
+/// Writes functions of a robot into files of a folder. The folder is created if needed. For programs and build scripts.
 ///
-/// The names of files and functions consist of the robot's name, as an identifier, and the language's suffix
-/// ([`Language::stem`]). Examples: `panda.h` and `panda.c` with `panda_aba` and so on, `panda_float_x8.h` and
+/// Names of files and functions begin with the robot's name, as an identifier, and the language's suffix
+/// ([`Language::stem`]). Examples: `panda.h` and `panda.c` with `panda_aba` and other functions, `panda_float_x8.h` and
 /// `panda_float_x8.c` with `panda_float_x8_aba`, or `panda.rs` with `aba`. Returns the paths of the files. The same
 /// robot gives the same text, and an unchanged file is not written again.
 ///

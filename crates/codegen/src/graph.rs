@@ -1,21 +1,21 @@
-//! The graph of a recording: each value once, simplified while it is recorded.
+//! The graph of a recording. It contains each value once. Values are simplified while they are recorded.
 //!
-//! An existing value is found again, even if it is written differently. Operands of sums and products are sorted, and
-//! signs are moved from products to the sum that follows. Constants are computed at once, and a product with 0 is 0.
-//! (An infinite number or NaN, times 0, is therefore 0 here.)
+//! A value that exists is found again, even if it is written differently: operands of sums and products are sorted, and
+//! signs are moved from products to the sum that follows. Operations on constants are computed at once, and a product
+//! with 0 is 0. (So an infinite number or NaN, times 0, is 0 here.)
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-/// Index of a value, in recording order.
+/// Index of a value in the graph, in recording order.
 pub(crate) type Id = u32;
 
-/// 0, the first value of every graph; as a mask, false.
+/// Index of the number 0, the first value of every graph; as a mask, false.
 pub(crate) const ZERO: Id = 0;
-/// 1, the second value of every graph; as a mask, true.
+/// Index of the number 1, the second value of every graph; as a mask, true.
 pub(crate) const ONE: Id = 1;
 
-/// Computation of a value.
+/// Operation that computes a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Node {
     /// A constant, by its bits.
@@ -27,15 +27,15 @@ pub(crate) enum Node {
     Mul(Id, Id),
     Div(Id, Id),
     Neg(Id),
-    /// −a as a separate value: its sign is not moved.
+    /// −a as a separate value, whose sign is not moved.
     Minus(Id),
     Sqrt(Id),
     Sin(Id),
     Cos(Id),
-    /// The angle of the point (second, first).
+    /// The angle of the point (x, y), where y is the first operand and x the second.
     Atan2(Id, Id),
     Abs(Id),
-    /// The mask of first < second.
+    /// The mask that is true if the first operand is less than the second.
     Less(Id, Id),
     And(Id, Id),
     Or(Id, Id),
@@ -48,7 +48,7 @@ impl Node {
         Self::Constant(x.to_bits())
     }
 
-    /// Returns the values from which it is computed.
+    /// Returns the values from which this value is computed.
     pub(crate) fn operands(self) -> impl DoubleEndedIterator<Item = Id> {
         let (n, all) = match self {
             Self::Constant(_) | Self::Input(_) => (0, [0; 3]),
@@ -62,7 +62,7 @@ impl Node {
         all.into_iter().take(n)
     }
 
-    /// Returns the same computation with other operands.
+    /// Returns the same operation with other operands.
     pub(crate) fn renamed(self, to: impl Fn(Id) -> Id) -> Self {
         match self {
             Self::Constant(_) | Self::Input(_) => self,
@@ -84,13 +84,13 @@ impl Node {
         }
     }
 
-    /// Returns whether it is a mask.
+    /// Returns whether the value is a mask.
     pub(crate) fn is_mask(self) -> bool {
         matches!(self, Self::Less(..) | Self::And(..) | Self::Or(..))
     }
 }
 
-/// Values of a recording.
+/// Values of a recording, in recording order.
 #[derive(Debug)]
 pub(crate) struct Graph {
     pub nodes: Vec<Node>,
@@ -105,7 +105,7 @@ impl Graph {
         graph
     }
 
-    /// Returns the value with this computation, which is added if it is new.
+    /// Returns the value that this operation computes, and adds it if it is new.
     fn find(&mut self, node: Node) -> Id {
         match self.known.entry(node) {
             Entry::Occupied(found) => *found.get(),
@@ -117,7 +117,7 @@ impl Graph {
         }
     }
 
-    /// Returns the value with this computation, simplified.
+    /// Returns the value that this operation computes, after simplification.
     pub(crate) fn simplified(&mut self, node: Node) -> Id {
         match node {
             Node::Constant(_) | Node::Input(_) => self.find(node),
@@ -150,7 +150,7 @@ impl Graph {
         self.find(Node::Input(place))
     }
 
-    /// Returns the number, if the value is a constant.
+    /// Returns the number if the value is a constant, otherwise `None`.
     fn value(&self, a: Id) -> Option<f64> {
         match self.nodes[a as usize] {
             Node::Constant(bits) => Some(f64::from_bits(bits)),
@@ -158,7 +158,7 @@ impl Graph {
         }
     }
 
-    /// Returns x, if the value is −x.
+    /// Returns x if the value is −x, otherwise `None`.
     fn negated(&self, a: Id) -> Option<Id> {
         match self.nodes[a as usize] {
             Node::Neg(x) => Some(x),
@@ -166,7 +166,7 @@ impl Graph {
         }
     }
 
-    /// Returns a value without its sign, and whether it had a minus sign.
+    /// Returns a value without its minus sign, and whether it had one.
     fn unsigned(&mut self, a: Id) -> (Id, bool) {
         match (self.negated(a), self.value(a)) {
             (Some(x), _) => (x, true),
@@ -187,7 +187,7 @@ impl Graph {
         }
     }
 
-    /// Returns a value whose sign stays where it is in products.
+    /// Returns a value whose minus sign is not moved out of products.
     pub(crate) fn kept(&mut self, a: Id) -> Id {
         self.negated(a).map_or(a, |x| self.find(Node::Minus(x)))
     }
@@ -286,7 +286,7 @@ impl Graph {
         }
     }
 
-    /// Returns a times the constant x, whose index is c.
+    /// Returns a times the constant x. The index of x is c.
     fn scale(&mut self, x: f64, c: Id, a: Id) -> Id {
         if c == ONE {
             return a;

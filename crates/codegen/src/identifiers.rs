@@ -1,6 +1,6 @@
 //! Valid identifiers for generated code.
 
-/// Makes identifiers of some names: invalid characters become `_`, and equal names get numbers.
+/// Makes identifiers from names. Invalid characters become `_`, and equal names get numbers.
 pub(crate) fn identifiers<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut found: Vec<String> = Vec::new();
     for name in names {
@@ -16,7 +16,7 @@ pub(crate) fn identifiers<'a>(names: impl Iterator<Item = &'a str>) -> Vec<Strin
     found
 }
 
-/// Makes an identifier of a name: `robot` is prepended if it does not begin with a letter.
+/// Makes an identifier from a name. If the name does not begin with a letter, `robot` is prepended.
 pub fn identifier(name: &str) -> String {
     let mut own: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if !own.starts_with(|c: char| c.is_ascii_alphabetic()) {

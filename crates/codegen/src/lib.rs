@@ -1,4 +1,4 @@
-//! Generated straight-line code for robots: the library's algorithms, recorded once on numbers that store how they are
+//! Generated straight-line code for robots. The algorithms of the library run once, on numbers that record how they are
 //! computed.
 //!
 //! ```
@@ -13,10 +13,10 @@
 //! ```
 //!
 //! [`record`] runs any closure that is generic over the scalar on [`Expression`]s. They leave a graph in which
-//! constants are folded, zeros are removed, and each value is computed once. [`functions`] does this with the
-//! algorithms of a robot, [`Language`] writes the graph as C, Rust or CUDA, and [`generate`] writes files. Values that
-//! do not depend on the robot's position are not computed at run time. The code has neither branches nor memory of its
-//! own, and its only loops compute entries of a result with the same structure.
+//! constants are folded, zeros are removed, and each value is computed once. [`functions`] records the algorithms for a
+//! robot, [`Language`] writes the graph as C, Rust or CUDA, and [`generate`] writes files. Values that do not depend on
+//! the robot's position are not computed at run time. The code has no branches and allocates no memory. It has loops
+//! only for entries of a result with the same structure.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![allow(non_snake_case)]
 

@@ -1,14 +1,15 @@
-//! Order of a function's steps, such that few values are needed at the same time.
+//! Order of a function's steps in which few values are needed at the same time.
 
 use crate::graph::Id;
 use crate::step::Step;
 use crate::steps::Steps;
 use std::collections::BTreeSet;
 
-/// Number of a processor's registers, which an order should not exceed.
+/// Number of a processor's registers. In a good order, not more than this number of values are needed at the same time.
 const REGISTERS: usize = 16;
 
-/// Applies the better of two orders: the order of the recording, or each value immediately before its first use.
+/// Applies the better of two orders: the order of the recording, or an order in which each value is computed
+/// immediately before its first use.
 pub(crate) fn order(steps: &mut Steps) {
     let late = on_demand(steps);
     let recorded: Vec<usize> = (0..steps.all.len()).collect();
@@ -16,7 +17,7 @@ pub(crate) fn order(steps: &mut Steps) {
     steps.all = best.into_iter().map(|k| steps.all[k].clone()).collect();
 }
 
-/// Returns the order in which each step is taken when it is first needed, for one result after the other.
+/// Returns the order in which each step is taken when a result first needs it, for one result after the other.
 fn on_demand(steps: &Steps) -> Vec<usize> {
     let mut order = Vec::with_capacity(steps.all.len());
     let mut taken = vec![false; steps.all.len()];
@@ -37,7 +38,7 @@ fn on_demand(steps: &Steps) -> Vec<usize> {
                 continue;
             }
             stack.push((k, true));
-            // the step that needs most registers comes first: it is on top of the stack
+            // The step that needs the most registers comes first: it is on top of the stack.
             let mut before: Vec<usize> = steps.all[k].takes().map(|id| maker[id as usize]).collect();
             before.retain(|&j| j != usize::MAX);
             before.sort_by_key(|&j| (weight[j], j));
@@ -47,7 +48,7 @@ fn on_demand(steps: &Steps) -> Vec<usize> {
     order
 }
 
-/// Returns the number of registers that each step needs, with all steps before it, if no values were shared (Sethi and
+/// Returns the number of registers that each step and all steps before it need, if no values were shared (Sethi and
 /// Ullman, *The generation of optimal code for arithmetic expressions*, 1970).
 fn weights(steps: &Steps, maker: &[usize]) -> Vec<u32> {
     let mut weight: Vec<u32> = Vec::with_capacity(steps.all.len());
@@ -60,15 +61,15 @@ fn weights(steps: &Steps, maker: &[usize]) -> Vec<u32> {
     weight
 }
 
-/// Returns the number of transfers between registers and memory, if the value needed last is always the one moved to
-/// memory (Belady, *A study of replacement algorithms for a virtual-storage computer*, 1966).
+/// Returns the number of transfers between registers and memory in this order. The value that moves to memory is always
+/// the one whose next use is last (Belady, *A study of replacement algorithms for a virtual-storage computer*, 1966).
 fn transfers(steps: &Steps, order: &[usize]) -> usize {
     let never = order.len();
     let mut uses: Vec<Vec<usize>> = vec![Vec::new(); steps.values];
     for (time, &k) in order.iter().enumerate().rev() {
-        steps.all[k].takes().for_each(|id| uses[id as usize].push(time)); // the next one is last in the list
+        steps.all[k].takes().for_each(|id| uses[id as usize].push(time)); // the next use is last in the list
     }
-    let mut is_free = vec![true; steps.values]; // inputs and constants are in memory anyway
+    let mut is_free = vec![true; steps.values]; // inputs and constants are in memory anyway, so moving them is free
     steps.all.iter().flat_map(Step::makes).for_each(|id| is_free[id as usize] = false);
     let mut held: BTreeSet<(usize, Id)> = BTreeSet::new();
     let mut in_register = vec![false; steps.values];
@@ -83,7 +84,7 @@ fn transfers(steps: &Steps, order: &[usize]) -> usize {
             if in_register[id as usize] {
                 held.remove(&(time, id));
             } else {
-                count += 1; // loaded
+                count += 1; // the value is loaded
             }
             while uses[id as usize].last().is_some_and(|&t| t <= time) {
                 uses[id as usize].pop();

@@ -1,4 +1,5 @@
-//! A function as a program: its ordered steps in parts of bounded size, with storage for values shared between parts.
+//! A function as a program. Its ordered steps are cut into parts of bounded size; values shared between parts are
+//! stored.
 
 use crate::function::Function;
 use crate::graph::Id;
@@ -8,37 +9,37 @@ use crate::steps::Steps;
 use core::iter::successors;
 use core::ops::Range;
 
-/// Maximum number of steps of a part: the time of compilers more than doubles with twice the number of steps.
+/// Maximum number of steps in a part. With twice as many steps, the time of compilers more than doubles.
 const LONGEST: usize = 2000;
-/// Minimum number of steps of a part, except the last part.
+/// Minimum number of steps in a part. The last part may be shorter.
 const SHORTEST: usize = 1000;
 
-/// Storage of a value.
+/// Storage of a value: how the code keeps the value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Place {
     /// An input or a constant.
     Given,
     /// A variable of the only part that computes and uses it.
     Local,
-    /// A number in the work space; in the part that computes it, also a variable.
+    /// A number in the work space. In the part that computes the number, it is also a variable.
     Work(usize),
 }
 
-/// Ordered steps of a function, in parts.
+/// Ordered steps of a function, cut into parts.
 #[derive(Debug)]
 pub(crate) struct Program<'f> {
     pub function: &'f Function,
     pub steps: Steps<'f>,
     /// Steps of each part.
     pub parts: Vec<Range<usize>>,
-    /// Index of the part that computes each value; `usize::MAX` for none.
+    /// Index of the part that computes each value; `usize::MAX` if no part does.
     pub part_of: Vec<usize>,
     pub places: Vec<Place>,
-    /// Whether a step takes each value.
+    /// Whether any step uses each value.
     pub taken: Vec<bool>,
     /// Maximum number of values that are needed at the same time.
     pub most_alive: usize,
-    /// Size of the work space: the sines of all early angles, their cosines, then other numbers.
+    /// Size of the work space. It holds the sines of all early angles, then their cosines, then other numbers.
     pub work: usize,
 }
 
@@ -59,13 +60,13 @@ impl<'f> Program<'f> {
         Self { function, steps, parts, part_of, places, taken, most_alive, work }
     }
 
-    /// Returns the angles that are computed before all steps.
+    /// Returns the early angles: their sines and cosines are computed before all steps.
     pub(crate) fn angles(&self) -> &[Angle] {
         &self.steps.angles
     }
 }
 
-/// Returns the step that uses each value last; `steps.all.len()` if only a result uses it.
+/// Returns the last step that uses each value; `steps.all.len()` if only a result uses the value.
 fn last_uses(steps: &Steps) -> Vec<usize> {
     let mut last = vec![0; steps.values];
     for (k, step) in steps.all.iter().enumerate() {
@@ -74,8 +75,8 @@ fn last_uses(steps: &Steps) -> Vec<usize> {
     last
 }
 
-/// Returns the number of values that come from before each step and are used by it or later; the last entry is for the
-/// end.
+/// Returns, for each step, how many values were computed before it and are used by it or by later steps. The last entry
+/// is the number after all steps.
 fn alive(steps: &Steps) -> Vec<usize> {
     let n = steps.all.len();
     let last = last_uses(steps);
@@ -96,8 +97,8 @@ fn alive(steps: &Steps) -> Vec<usize> {
     change.into_iter().map(next).collect()
 }
 
-/// Cuts the steps into parts: each ends, within its bounds, where the fewest values are still needed, for example at
-/// the end of a limb.
+/// Cuts the steps into parts. Within the bounds of its size, each part ends where the fewest values are still needed,
+/// for example at the end of a limb.
 fn cut(alive: &[usize]) -> Vec<Range<usize>> {
     let n = alive.len() - 1;
     let (mut parts, mut first) = (Vec::new(), 0);
@@ -110,7 +111,7 @@ fn cut(alive: &[usize]) -> Vec<Range<usize>> {
     parts
 }
 
-/// Returns the values from which loops compute entries, each after the value of the previous entry.
+/// Returns the values from which loops compute entries. Each value directly follows the value of the previous entry.
 fn side_by_side(steps: &Steps) -> Vec<Id> {
     let (mut next, mut is_first) = (vec![None; steps.values], vec![true; steps.values]);
     let mut all = Vec::new();
@@ -133,7 +134,7 @@ fn side_by_side(steps: &Steps) -> Vec<Id> {
     placed
 }
 
-/// Returns the storage of all values, and the size of the work space.
+/// Returns the places where all values are stored, and the size of the work space.
 fn place(steps: &Steps, parts: &[Range<usize>], part_of: &[usize]) -> (Vec<Place>, usize) {
     let mut places = vec![Place::Given; steps.values];
     let n = steps.angles.len();

@@ -1,4 +1,4 @@
-//! Functions of a robot: the library's algorithms, recorded.
+//! Functions of a robot, recorded from the algorithms of the library.
 
 use crate::error::Error;
 use crate::expression::Expression;
@@ -17,7 +17,7 @@ use condyle_spatial::{Force, Inertia, Matrix, Scalar};
 use core::num::NonZero;
 use nalgebra::DMatrix;
 
-/// Names of the functions that [`functions`] can record.
+/// Names of all functions that [`functions`] can record.
 pub const FUNCTIONS: [&str; 16] = [
     "rnea",
     "aba",
@@ -49,31 +49,31 @@ const INVERTING: [&str; 8] = [
     "impulse_dynamics_derivatives",
 ];
 
-/// Settings of a robot's functions.
+/// Settings for the functions of a robot.
 #[derive(Clone, Debug, Default)]
 pub struct Settings {
     /// Frames of the function `frames`, by name.
     pub frames: Vec<String>,
     /// Constraints of `constrained_dynamics` and `impulse_dynamics`, and of their derivatives.
     pub constraints: Vec<ContactConstraint>,
-    /// Whether dynamics and its derivatives have external forces on the bodies as an argument: `f_ext`, six numbers for
+    /// Whether dynamics and its derivatives have an argument `f_ext` for external forces on the bodies: six numbers for
     /// each body except the world.
     pub external_forces: bool,
-    /// Whether the inertial parameters of the bodies are an argument instead of constants: `inertia`, ten numbers for
+    /// Whether the inertial parameters of the bodies are an argument `inertia` instead of constants: ten numbers for
     /// each body except the world, as in [`inertial_parameters`](condyle_model::inertial_parameters).
     pub inertia_is_input: bool,
-    /// Whether the armature of the coordinates is an argument instead of constants: `armature`.
+    /// Whether the armature of the coordinates is an argument `armature` instead of constants.
     pub armature_is_input: bool,
-    /// Whether the gravitational acceleration is an argument instead of a constant: `gravity_vector`, three numbers.
+    /// Whether the gravitational acceleration is an argument `gravity_vector` of three numbers instead of a constant.
     pub gravity_is_input: bool,
-    /// Number of threads that share every state in CUDA kernels, at most one for each limb and one for the trunk. By
-    /// default, kernels can split states where it is worthwhile ([`Function::shares`]), and do so for few states. Other
-    /// languages ignore this setting.
+    /// Number of threads that share every state in CUDA kernels: at most one for each limb and one for the trunk. By
+    /// default, functions for which it is worthwhile ([`Function::shares`]) can be computed in shares, and a launch
+    /// uses the shares if there are few states. Other languages ignore this setting.
     pub shares: Option<NonZero<usize>>,
 }
 
-/// Records functions of a robot, by the names in [`FUNCTIONS`], with the arguments and results of the library's
-/// functions.
+/// Records functions of a robot, given by names in [`FUNCTIONS`]. Arguments and results are the same as in the
+/// library's functions.
 ///
 /// ```
 /// use condyle_codegen::{Settings, functions};
@@ -119,8 +119,8 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
             match name {
                 _ if is_constrained => return robot.constrained(r, name),
                 "frames" => robot.frames(r, &frames),
-                // in second derivatives of accelerations, M⁻¹ amplifies the rounding of another frame beyond the
-                // tolerance of the tests
+                // Keep the world's frame here: in second derivatives of accelerations, M⁻¹ amplifies the rounding
+                // errors of another frame beyond the tolerance of the tests.
                 "centroidal" | "aba_hessian" => robot.unconstrained(r, name),
                 _ => {
                     robot.in_frame_of_first_body()?;
@@ -162,8 +162,8 @@ fn about(name: &str, model: &Model) -> String {
     format!("{what}. Of the robot `{}`, nq = {nq}, nv = {nv}.", model.name().replace("*/", "* /").replace('\n', " "))
 }
 
-/// Adds the second derivatives of a weighted sum as results; the second derivatives with respect to the last argument
-/// are 0.
+/// Adds the second derivatives of a weighted sum as results. Derivatives taken twice with respect to the last argument
+/// are 0, and are left out.
 fn hessian(r: &mut Recorder, [qq, vq, vv, xq]: [&Matrix<Expression>; 4], last: &str) {
     r.matrix("dqdq", qq, "derivative by q twice, symmetric");
     r.matrix("dvdq", vq, "derivative by v (rows) and q (columns)");
@@ -171,7 +171,7 @@ fn hessian(r: &mut Recorder, [qq, vq, vv, xq]: [&Matrix<Expression>; 4], last: &
     r.matrix(&format!("d{last}dq"), xq, &format!("derivative by {last} (rows) and q (columns)"));
 }
 
-/// A robot whose constants are expressions, and the inputs that all its functions have.
+/// A robot whose constants are expressions, and the inputs that all functions of the robot have.
 struct Robot<'s> {
     model: Model<Expression>,
     data: Data<Expression>,
@@ -203,11 +203,11 @@ impl<'s> Robot<'s> {
         Ok(Self { data: Data::new(&model), model, settings, q })
     }
 
-    /// Replaces the world's frame by the frame in which the first body would be at rest in its neutral position. The
-    /// joints' dynamics are the same there, with gravity rotated accordingly, and the position of the first joint
-    /// cancels from all other results.
+    /// Replaces the world's frame by the frame that the first body has in its neutral position. The dynamics of the
+    /// joints are the same there, if gravity is rotated accordingly. The position of the first joint cancels from all
+    /// other results.
     ///
-    /// If the world carries several bodies, or another joint follows the first one, nothing changes.
+    /// Nothing changes if the world carries several bodies, or if another joint follows the first one.
     fn in_frame_of_first_body(&mut self) -> Result<(), Error> {
         let Self { model, data, q, .. } = self;
         let [_, first, others @ ..] = model.nodes() else { return Ok(()) };
@@ -231,7 +231,7 @@ impl<'s> Robot<'s> {
         self.input(r, "v", "velocity")
     }
 
-    /// Returns the external forces, if they are arguments.
+    /// Returns the external forces; none if they are not arguments.
     fn forces(&self, r: &mut Recorder) -> Vec<Force<Expression>> {
         if !self.settings.external_forces {
             return Vec::new();

@@ -1,28 +1,30 @@
-//! Shares of a function: several threads compute one state, each a part of the results, if one thread would need more
-//! registers than it has.
+//! Shares of a function. If one thread would need more registers than it has, several threads compute one state; each
+//! thread computes some of the results.
 //!
-//! Results are shared out by limbs. A limb is a subtree without forks that is attached to a body with several children,
-//! or to the world; the bodies that carry limbs are the trunk. A limb owns the columns of its coordinates in matrices
-//! and their entries in vectors; the trunk owns the rest. A value that is stored at several indices, as in a symmetric
-//! matrix, is computed once. It belongs to the limb of the first such index, and to the trunk only if the trunk owns
-//! all of them.
+//! Results are divided by limbs. A limb is a subtree without forks that is attached to a body with several children, or
+//! to the world. The bodies that carry limbs are the trunk. In matrices a limb owns the columns of its coordinates, and
+//! in vectors the entries of its coordinates; the trunk owns the rest. A value that is stored at several indices, as in
+//! a symmetric matrix, is computed once. It belongs to the limb of the first such index. Only if the trunk owns all of
+//! these indices does the value belong to the trunk.
 //!
-//! A share is the function without the results of the other shares, and without the values that only those need: a
-//! function like any other. Threads therefore neither wait for each other nor share memory; values that several shares
-//! need, such as those along the trunk, are computed by each of them. The size of this common part determines the value
-//! of a split. With few states, the GPU is not full, and a call takes as long as the largest share. With many states,
-//! it takes as long as all shares together:
+//! A share is a function like any other: the original function without the results of the other shares, and without the
+//! values that only these results need. So threads neither wait for each other nor share memory. Values that several
+//! shares need, such as values along the trunk, are computed by each of these shares. The size of this common part
+//! determines the value of a split. With few states, the GPU is not full, and a call takes as long as the largest
+//! share. With many states, a call takes as long as all shares together:
 //!
 //! ```text
 //! gain = whole / largest share        loss = sum of shares / whole        worth = gain / loss        in operations
 //! ```
 //!
-//! The search begins with a share for each limb, and repeatedly merges the two shares that give the greatest worth. The
-//! best of all these splits is used; the last one is the whole function. For efforts and accelerations the whole
-//! function is best, since the trunk needs the values of all limbs; for derivatives, most limbs have their own share.
+//! The search begins with a share for each limb, and repeatedly merges the two shares whose union gives the greatest
+//! worth. The best of all these splits is used; the last split is the whole function. For efforts and accelerations the
+//! whole function is best, since the trunk needs the values of all limbs. For derivatives, most limbs have their own
+//! share.
 //!
-//! Because of the loss, a kernel contains the whole function besides its shares, and each launch selects one of them.
-//! States are shared out while all threads fit on the device at the same time.
+//! All shares together cost more than the whole function. So a kernel contains both the whole function and its shares,
+//! and each launch selects one of these forms. States are split as long as all threads fit on the device at the same
+//! time.
 
 use crate::function::{Function, is_needed, needed};
 use crate::graph::{Id, Node};
@@ -34,8 +36,8 @@ use std::collections::{BTreeSet, HashMap};
 /// Number of a thread's registers that can hold values, of 32 bits each.
 const REGISTERS: usize = 255;
 
-/// Returns the limb of each result of a robot's function, if it is a column or an entry of a coordinate; otherwise 0,
-/// the trunk.
+/// Returns the limb of each result of a robot's function. It is 0, the trunk, for a result that is neither a column nor
+/// an entry of a limb's coordinate.
 pub(crate) fn limbs_of_results(model: &Model, function: &Function) -> Vec<usize> {
     let of_coordinate = limbs(model);
     let own = |&(array, place): &(usize, usize)| {
@@ -65,7 +67,7 @@ fn limbs(model: &Model) -> Vec<usize> {
     let nodes = model.nodes();
     let mut children = vec![0; nodes.len()];
     nodes.iter().skip(1).for_each(|node| children[node.parent] += 1);
-    // the trunk: from the forks to the world
+    // The trunk consists of the bodies from the forks to the world.
     let mut bears_limbs: Vec<bool> = children.iter().map(|&n| n > 1).collect();
     for i in (1..nodes.len()).rev() {
         bears_limbs[nodes[i].parent] |= bears_limbs[i];
@@ -82,7 +84,7 @@ fn limbs(model: &Model) -> Vec<usize> {
     of_coordinate
 }
 
-/// Some limbs, and the operations that their results need.
+/// One or several limbs, and the operations that their results need.
 #[derive(Clone)]
 struct Share {
     limbs: Vec<usize>,
@@ -110,12 +112,12 @@ impl Share {
     }
 }
 
-/// Returns whether a value takes an operation; signs do not.
+/// Returns whether a value needs an operation; a change of sign does not count.
 fn is_operation(node: Node) -> bool {
     !matches!(node, Node::Constant(_) | Node::Input(_) | Node::Neg(_) | Node::Minus(_))
 }
 
-/// Returns the largest share times the sum of all shares: the smallest cost is best.
+/// Returns the cost of a split: the size of the largest share times the sum of all sizes. The smallest cost is best.
 fn cost(counts: impl Iterator<Item = usize> + Clone) -> u128 {
     counts.clone().max().unwrap_or(0) as u128 * counts.sum::<usize>() as u128
 }
@@ -130,8 +132,8 @@ fn best_pair(shares: &[Share]) -> Option<(u128, [usize; 2])> {
     costs.min()
 }
 
-/// Returns the shares of a function, the largest first; empty if it is not split. Each number takes
-/// `registers_of_number` registers.
+/// Returns the shares of a function, the largest first. The list is empty if the function is not split. Each number
+/// takes `registers_of_number` registers.
 pub(crate) fn split(program: &Program, registers_of_number: usize) -> Vec<Function> {
     let function = program.function;
     let spills = registers_of_number * program.most_alive > REGISTERS;
@@ -157,7 +159,7 @@ pub(crate) fn split(program: &Program, registers_of_number: usize) -> Vec<Functi
 }
 
 impl Function {
-    /// Returns the function without the results of other limbs.
+    /// Returns the function with only the results of these limbs.
     fn share(&self, k: usize, limbs: &[usize]) -> Self {
         let kept = || (0..self.results.len()).filter(|&k| limbs.contains(&self.limbs[k]));
         let results: Vec<Id> = kept().map(|k| self.results[k]).collect();

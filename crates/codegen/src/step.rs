@@ -1,11 +1,11 @@
-//! Steps of a function, each computed by one line of code.
+//! Steps of a function. One line of code computes each step.
 
 use crate::graph::{Id, Node};
 
 /// Step of a function.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Step {
-    /// A value as the graph computes it.
+    /// A value, computed by the operation of the graph.
     Plain(Id, Node),
     /// a b + c.
     MulAdd(Id, [Id; 3]),
@@ -20,7 +20,7 @@ pub(crate) enum Step {
 }
 
 impl Step {
-    /// Returns the values that it computes.
+    /// Returns the values that the step computes.
     pub(crate) fn makes(&self) -> impl Iterator<Item = Id> {
         let (few, many) = match *self {
             Self::Plain(id, _) | Self::MulAdd(id, _) | Self::MulSub(id, _) | Self::SubMul(id, _) => {
@@ -32,7 +32,7 @@ impl Step {
         few.into_iter().flatten().chain(many.iter().copied())
     }
 
-    /// Returns the values that it uses.
+    /// Returns the values that the step uses.
     pub(crate) fn takes(&self) -> impl Iterator<Item = Id> {
         let (few, many) = match *self {
             Self::Plain(_, node) => {
@@ -55,14 +55,14 @@ pub(crate) struct Angle {
     pub cos: Option<Id>,
 }
 
-/// Sums Σ ± eachₖ common for each k.
+/// Sums Σ ± `each`ₖ · `common` over the terms, one sum for each k.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Entries {
-    /// The sums, which no other value uses.
+    /// The sums. No other value uses them.
     pub ids: Vec<Id>,
-    /// Index of the first sum among all results; the other sums follow.
+    /// Index of the first sum among all results. The other sums follow directly.
     pub first: usize,
-    /// Terms; the first one is added, not subtracted.
+    /// Terms of each sum. The first term is added, not subtracted.
     pub terms: Vec<Term>,
 }
 
@@ -71,8 +71,8 @@ pub(crate) struct Entries {
 pub(crate) struct Term {
     /// Whether the term is subtracted.
     pub minus: bool,
-    /// The term's value in each sum. These values are adjacent in the work space.
+    /// Value of the term in each sum. These values are adjacent in the work space.
     pub each: Vec<Id>,
-    /// Factor of the term in all sums. The first term may have none.
+    /// Common factor of the term in all sums. The first term may have no common factor.
     pub common: Option<Id>,
 }

@@ -1,5 +1,5 @@
-//! Steps of a function, made from its graph: products are fused into the sums that use them, sine and cosine of an
-//! angle are computed together, and similar entries of a result are computed in a loop.
+//! Steps of a function, made from its graph. Products are fused into the sums that use them. Sine and cosine of an
+//! angle are computed together. A loop computes similar entries of a result.
 
 use crate::entries;
 use crate::function::{Function, Operations};
@@ -8,24 +8,24 @@ use crate::step::{Angle, Step};
 use crate::sums::Sums;
 use std::collections::HashMap;
 
-/// Steps of a function, each after the steps whose values it uses.
+/// Steps of a function. Each step is after the steps whose values it uses.
 #[derive(Debug)]
 pub(crate) struct Steps<'f> {
     pub nodes: &'f [Node],
     /// Number of values.
     pub values: usize,
     pub all: Vec<Step>,
-    /// Early angles, such as joint angles: their sines and cosines are computed in a loop before all other steps.
+    /// Early angles, such as joint angles. A loop computes their sines and cosines before all other steps.
     pub angles: Vec<Angle>,
     /// Values of all outputs.
     pub results: &'f [Id],
 }
 
-/// Maximum number of operations of an early angle.
+/// Maximum number of operations that compute an early angle.
 const AT_ONCE: usize = 4;
 
-/// Returns the number of operations that compute a value from inputs and constants; `None` if it exceeds the maximum,
-/// or includes other operations than sums and products.
+/// Returns the number of operations that compute a value from inputs and constants. Returns `None` if the number
+/// exceeds the maximum, or if an operation is neither a sum nor a product.
 fn operations_from_inputs(nodes: &[Node], id: Id) -> Option<usize> {
     let node = nodes[id as usize];
     match node {
@@ -57,7 +57,7 @@ impl<'f> Steps<'f> {
                 *half = Some(id as Id);
             }
         }
-        // sine and cosine are computed where the first of them is recorded
+        // Sine and cosine are computed where the first of them was recorded.
         all.retain_mut(|step| match *step {
             Step::Plain(_, Node::Sin(angle) | Node::Cos(angle)) => match halves.remove(&angle) {
                 Some(both) => {
@@ -82,7 +82,7 @@ impl<'f> Steps<'f> {
         steps
     }
 
-    /// Removes steps whose values are not used, such as the steps to early angles.
+    /// Removes steps whose values are not used, such as the steps that compute early angles.
     fn drop_unused(&mut self) {
         let mut used = vec![false; self.values];
         self.results.iter().for_each(|&id| used[id as usize] = true);
@@ -97,7 +97,7 @@ impl<'f> Steps<'f> {
         self.all.retain(|_| kept.next() == Some(true));
     }
 
-    /// Returns the numbers of operations.
+    /// Returns the numbers of operations of all steps.
     pub(crate) fn operations(&self) -> Operations {
         let mut n = Operations { angles: self.angles.len(), ..Operations::default() };
         for step in &self.all {
@@ -119,7 +119,7 @@ impl<'f> Steps<'f> {
 }
 
 impl Function {
-    /// Returns the numbers of operations.
+    /// Returns the numbers of operations of the function, by kind.
     ///
     /// ```
     /// use condyle_codegen::record;

@@ -1,9 +1,9 @@
-//! Sums of products: the steps that compute a sum of any length, and the products that are fused into it.
+//! Sums of products: steps that compute a sum of any length, and products that are fused into the sum.
 //!
-//! A sum that only another sum needs becomes part of it. A sum is therefore a list of terms, each a value or a product
-//! of two values. Since products are fused with the sum that follows, a sum that begins with a value takes one step for
-//! each other term, with any brackets; x − (a b + c d) takes two steps. Terms are added in recording order, as soon as
-//! they are available.
+//! If only one other sum needs a sum, it becomes part of that sum. So a sum is a list of terms; each term is a value or
+//! a product of two values. A product is fused with the addition that follows it. So a sum that begins with a value
+//! takes one step for each other term, wherever the brackets are; x − (a b + c d) takes two steps. Terms are added in
+//! recording order, as soon as they are available.
 
 use crate::graph::{Graph, Id, Node};
 use crate::step::Step;
@@ -15,8 +15,8 @@ struct Term {
     minus: bool,
 }
 
-/// Returns the same values, with the constants of each sum combined into one; they include values that are no longer
-/// needed.
+/// Combines the constants of each sum into one constant. Returns all values, including values that are no longer
+/// needed, and the results.
 pub(crate) fn with_constants_gathered(nodes: &[Node], results: &[Id]) -> (Vec<Node>, Vec<Id>) {
     let sums = Sums::new(nodes, results);
     let mut graph = Graph::new();
@@ -69,18 +69,18 @@ impl<'f> Sums<'f> {
         Self { nodes, uses, by_sums, has_step }
     }
 
-    /// Returns whether a value is part of the one sum that needs it.
+    /// Returns whether a value is a sum that only one other sum uses, so that it becomes part of that sum.
     fn is_part(&self, id: Id) -> bool {
         let id = id as usize;
         is_sum(self.nodes[id]) && self.uses[id] == 1 && self.by_sums[id] == 1
     }
 
-    /// Returns whether a value is a product that is only used in sums.
+    /// Returns whether a value is a product that is used only in sums, so that it has no step of its own.
     fn is_fused(&self, id: Id) -> bool {
         matches!(self.nodes[id as usize], Node::Mul(..)) && !self.has_step[id as usize]
     }
 
-    /// Returns all steps, ordered by the recorded value at which they can be taken.
+    /// Returns all steps in order: each step follows the last recorded value on which it depends.
     pub(crate) fn steps(mut self) -> Vec<Step> {
         let mut of_sums = Vec::new();
         for (k, &node) in self.nodes.iter().enumerate() {
@@ -99,11 +99,12 @@ impl<'f> Sums<'f> {
             }
         }
         steps.extend(of_sums);
-        steps.sort_by_key(|&(place, _)| place); // stable: a value, then the sums that it goes into, step by step
+        // The sort is stable: a value comes before the steps of the sums that use it.
+        steps.sort_by_key(|&(place, _)| place);
         steps.into_iter().map(|(_, step)| step).collect()
     }
 
-    /// Returns the terms of a sum, and the sums that are parts of it.
+    /// Returns the terms of a sum, and the smaller sums that became parts of it.
     fn terms(&self, root: Id) -> (Vec<Term>, Vec<Id>) {
         let (mut terms, mut parts) = (Vec::new(), Vec::new());
         let mut stack = vec![Term { id: root, minus: false }];
@@ -125,10 +126,11 @@ impl<'f> Sums<'f> {
         (terms, parts)
     }
 
-    /// Adds the steps of a sum. Partial sums get the ids of its parts.
+    /// Adds the steps of a sum. Partial results get the ids of the smaller sums that became parts of it.
     fn sum(&mut self, root: Id, steps: &mut Vec<(Id, Step)>) {
         let (mut terms, parts) = self.terms(root);
-        // a value first; otherwise a product that is used only here; otherwise any product
+        // Begin with a value. If all terms are products, begin with one that is used only here, otherwise with any
+        // product.
         let is_single = |term: &Term| self.uses[term.id as usize] == 1;
         let first = terms.iter().position(|term| !self.is_fused(term.id));
         let first = first.or_else(|| terms.iter().position(is_single)).unwrap_or(0);
@@ -137,7 +139,7 @@ impl<'f> Sums<'f> {
         let mut place = sum;
         let mut names = parts.into_iter().chain([root]);
         for Term { id, minus } in terms {
-            let Some(name) = names.next() else { break }; // one for each term except the first
+            let Some(name) = names.next() else { break }; // there is one name for each term except the first
             place = place.max(id);
             let step = match self.nodes[id as usize] {
                 Node::Mul(a, b) if self.is_fused(id) => match (is_negative, minus) {

@@ -1,4 +1,5 @@
-//! Kernels called through a driver without a GPU (`tests/cuda_driver`), compared with the library's functions.
+//! Calls kernels through a driver without a GPU (`tests/cuda_driver`), and compares the results with the library's
+//! functions.
 #![allow(non_snake_case, unsafe_code)]
 
 mod common;
@@ -22,13 +23,13 @@ use std::process::Command;
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use trees::Tree;
 
-/// Tolerance for sums in another order, amplified by M⁻¹; relative to the largest number.
+/// Tolerance for sums in another order, whose rounding errors M⁻¹ amplifies; relative to the largest number.
 const ROUNDING: f64 = 1e-11;
 
-/// Maximum error of an `f32` kernel relative to `f64`, as a multiple of the library's `f32` error with the same states.
+/// Maximum error of an `f32` kernel relative to `f64`, as a multiple of the library's `f32` error for the same states.
 const FURTHER: f64 = 4.0;
 
-/// The fake driver and compiler, with access to the fake driver's records.
+/// The fake driver and the fake compiler, with access to the records that the fake driver keeps.
 struct Fake {
     driver: Driver,
     compiler: Compiler,
@@ -37,7 +38,7 @@ struct Fake {
 }
 
 impl Fake {
-    /// Loads the libraries, which are built once, for one test at a time; `None` without compilers.
+    /// Builds the libraries once, and loads them for one test at a time. Returns `None` if no compiler exists.
     fn new() -> Option<Self> {
         static FILES: OnceLock<Option<[PathBuf; 2]>> = OnceLock::new();
         static ALONE: Mutex<()> = Mutex::new(());
@@ -57,42 +58,43 @@ impl Fake {
         Some(Self {
             driver: Driver::open(driver).unwrap(),
             compiler: Compiler::open(nvrtc).unwrap(),
-            // SAFETY: it is a library of this test.
+            // SAFETY: this test built the library.
             library: unsafe { Library::new(driver) }.unwrap(),
             _alone: alone,
         })
     }
 
-    /// Returns the numbers of live memory blocks, streams, events, modules and contexts.
+    /// Returns the numbers of memory blocks, streams, events, modules and contexts that exist now.
     fn live(&self) -> [c_long; 5] {
-        // SAFETY: this is the function's type.
+        // SAFETY: the type is the type of the function in the fake driver.
         let live = unsafe { self.library.get::<unsafe extern "C" fn(c_int) -> c_long>(b"fake_live\0") }.unwrap();
-        // SAFETY: there are five kinds.
+        // SAFETY: the function takes a kind from 0 to 4.
         core::array::from_fn(|kind| unsafe { live(kind as c_int) })
     }
 
     fn complaint(&self) -> String {
-        // SAFETY: this is the function's type, and it returns a string.
+        // SAFETY: the type is the type of the function in the fake driver, and the function returns a string.
         unsafe {
             let complaint = self.library.get::<unsafe extern "C" fn() -> *const c_char>(b"fake_complaint\0").unwrap();
             CStr::from_ptr(complaint()).to_string_lossy().into_owned()
         }
     }
 
-    /// Makes the next call of a function fail.
+    /// Makes the next call of a function return this status.
     fn fail(&self, function: &str, status: c_int) {
         let name = CString::new(function).unwrap();
-        // SAFETY: this is the function's type.
+        // SAFETY: the type is the type of the function in the fake driver.
         unsafe {
             let fail = self.library.get::<unsafe extern "C" fn(*const c_char, c_int)>(b"fake_fail\0").unwrap();
             fail(name.as_ptr(), status);
         }
     }
 
-    /// Returns the blocks, threads of a block and rows of blocks of the last launch, and the number of launches.
+    /// Returns the numbers of blocks, of threads per block and of rows of blocks in the last launch, and the number of
+    /// launches.
     fn launches(&self) -> ([c_uint; 3], c_long) {
         let mut last = [0; 3];
-        // SAFETY: this is the function's type.
+        // SAFETY: the type is the type of the function in the fake driver.
         unsafe {
             let launches = self.library.get::<unsafe extern "C" fn(*mut c_uint) -> c_long>(b"fake_launches\0").unwrap();
             let count = launches(last.as_mut_ptr());
@@ -100,14 +102,14 @@ impl Fake {
         }
     }
 
-    /// Checks that everything was freed and that no error occurred.
+    /// Checks that all objects were freed and that no error occurred.
     fn end(self) {
         assert_eq!(self.complaint(), "");
         assert_eq!(self.live(), [0; 5]);
     }
 }
 
-/// Returns the library's results.
+/// Computes the function's results with the library.
 fn library<S: Scalar>(model: &Model, name: &str, [q, v, x]: &[Vec<S>; 3]) -> Vec<Vec<S>> {
     let data = &mut Data::new(model);
     match name {
@@ -128,7 +130,7 @@ fn library<S: Scalar>(model: &Model, name: &str, [q, v, x]: &[Vec<S>; 3]) -> Vec
     }
 }
 
-/// Returns the arrays of all states in the kernels' layout: the first numbers of all states first.
+/// Returns the arrays of all states in the layout of kernels: the first numbers of all states come first.
 fn side_by_side<T: Copy>(states: &[Vec<Vec<T>>]) -> Vec<Vec<T>> {
     let of = |a: usize, k: usize| states.iter().map(move |state| state[a][k]);
     (0..states[0].len()).map(|a| (0..states[0][a].len()).flat_map(|k| of(a, k)).collect()).collect()
@@ -150,7 +152,7 @@ impl Number for f32 {
     }
 }
 
-/// Calls a kernel for these numbers of states, and compares each result.
+/// Calls a kernel for each of these numbers of states, and compares all results with the library.
 fn check<T: Number>(device: &Device, kernels: &Kernels<T>, model: &Model, name: &str, counts: &[usize]) {
     let (stream, kernel) = (device.stream().unwrap(), kernels.kernel(name).unwrap());
     for &n in counts {
@@ -176,7 +178,7 @@ fn check<T: Number>(device: &Device, kernels: &Kernels<T>, model: &Model, name: 
             let error = |found: &[T]| {
                 assert_eq!(found.len(), expected.len());
                 let apart = found.iter().zip(expected).map(|(&x, y)| -> f64 { (x.into() - y).abs() });
-                apart.fold(0.0, |max: f64, x| if max.is_nan() || x <= max { max } else { x }) // NaN stays
+                apart.fold(0.0, |max: f64, x| if max.is_nan() || x <= max { max } else { x }) // keeps NaN
             };
             let scale = expected.iter().fold(1.0, |max: f64, x| max.max(x.abs()));
             let (found, bound) = (error(&output.to_vec(&stream).unwrap()), ROUNDING * scale + FURTHER * error(alike));
@@ -211,7 +213,7 @@ fn kernels_compute_what_the_library_computes() {
     fake.end();
 }
 
-/// Returns functions whose kernels have this number of shares, if there are enough limbs.
+/// Returns functions whose kernels have this number of shares, or fewer if there are not enough limbs.
 fn in_shares(model: &Model, names: &[&str], shares: usize) -> Vec<Function> {
     functions(model, names, &Settings { shares: NonZero::new(shares), ..Settings::default() }).unwrap()
 }
@@ -221,7 +223,7 @@ fn limbs_are_computed_by_threads_of_their_own() {
     let Some(fake) = Fake::new() else { return };
     let device = fake.driver.device(0).unwrap();
     let names = ["rnea", "crba", "minv", "rnea_derivatives"];
-    // four legs with a trunk; two legs, two arms and a head with a trunk
+    // A quadruped has four legs and a trunk. A humanoid has two legs, two arms, a head and a trunk.
     for (model, number) in [(robots::quadruped(), 2), (robots::quadruped(), 5), (robots::humanoid(), 4)] {
         let all = in_shares(&model, &names, number);
         let double = device.compile::<f64>(&fake.compiler, "robot", &all).unwrap();
@@ -247,7 +249,7 @@ fn states_are_shared_out_while_they_are_few() {
     let kernels = device.compile::<f64>(&fake.compiler, "quadruped", &of(&quadruped, &["rnea_derivatives"])).unwrap();
     let shares = kernels.kernel("rnea_derivatives").unwrap().shares();
     assert_eq!(shares, of(&quadruped, &["rnea_derivatives"])[0].shares(Language::Cuda));
-    // the device runs eight blocks of 256 threads at a time
+    // The device runs eight blocks of 256 threads at the same time.
     let most = 2048 / shares;
     for (n, rows) in [(1, shares), (most, shares), (most + 1, 1), (3000, 1)] {
         check(&device, &kernels, &quadruped, "rnea_derivatives", &[n]);
@@ -263,7 +265,7 @@ fn shares_are_as_many_as_pay() {
         let function = &of(model, &[name])[0];
         [Language::Cuda, Language::CudaFloat, Language::C, Language::Rust].map(|language| function.shares(language))
     };
-    // an arm has one limb; the trunk's efforts and all accelerations need the values of every limb
+    // An arm has one limb. For efforts of the trunk and for all accelerations, every limb must be computed.
     assert_eq!(shares(&robots::arm7(), "aba_derivatives"), [1; 4]);
     for model in [robots::quadruped(), robots::humanoid()] {
         for name in ["rnea", "aba", "gravity", "nonlinear_effects"] {
@@ -274,13 +276,13 @@ fn shares_are_as_many_as_pay() {
             assert!(double > 2 && single > 2 && others == [1; 2], "{name}: {double}, {single}, {others:?}");
         }
     }
-    // two arms on the world have nothing in common
+    // Two arms that are attached to the world have no common values.
     let arm = robots::arm7();
     let two = &of(&arm.append(0, Se3::identity(), &arm, "other_").unwrap(), &["aba_derivatives"])[0];
     let text = Language::Cuda.text("robot", core::slice::from_ref(two)).remove(0).text;
     let all = two.operations().total();
     assert!(text.contains(&format!("// Shares: 2, of {0}, {0} operations; all results together take {all}.", all / 2)));
-    // the requested number of shares is used, up to the number of limbs
+    // The requested number of shares is used, up to the number of limbs.
     let asked = |model: &Model, name: &str, number| in_shares(model, &[name], number)[0].shares(Language::CudaFloat);
     assert_eq!([1, 2, 3, 9].map(|number| asked(&robots::quadruped(), "rnea", number)), [1, 2, 3, 5]);
     assert_eq!([1, 2, 9].map(|number| asked(&robots::arm7(), "aba_derivatives", number)), [1; 3]);
@@ -302,21 +304,21 @@ fn a_split_kernel_says_how_it_is_launched() {
     assert_eq!(split, text(3), "the same functions give the same text");
     let whole = text(1);
     assert!(!whole.contains("hare") && !whole.contains("blockIdx.y"));
-    // without a requested number, the launch decides
+    // Without a requested number, the launch decides whether states are split.
     let as_pays = Language::CudaFloat.text("robot", &of(&quadruped, &["rnea_derivatives"])).remove(0).text;
     assert!(as_pays.contains("if (gridDim.y == 1) return robot_float_rnea_derivatives_whole(n, i, q, v, a, "));
 }
 
-/// A launch with fewer rows of blocks than shares computes all shares, too.
+/// If a launch has fewer rows of blocks than shares, all shares are computed nevertheless.
 #[test]
 fn shares_without_a_row_of_their_own_are_not_left_out() {
     let Some(fake) = Fake::new() else { return };
     let quadruped = robots::quadruped();
     let all = in_shares(&quadruped, &["crba"], 5);
     let image = String::from_utf8(fake.compiler.ptx::<f64>("robot", &all, (7, 0)).unwrap()).unwrap();
-    let path = image.split_whitespace().nth(4).unwrap(); // after FAKE, PTX and 70
+    let path = image.split_whitespace().nth(4).unwrap(); // the path follows the words FAKE, PTX and 70
     type Thread = unsafe extern "C" fn(*mut *mut c_void, *const c_uint, *const c_uint, c_uint, c_uint);
-    // SAFETY: the library was built by this test.
+    // SAFETY: this test built the library.
     let library = unsafe { Library::new(path) }.unwrap();
     let q = random_configuration(&quadruped, &mut StdRng::seed_from_u64(1));
     let expected = crba(&quadruped, &mut Data::new(&quadruped), &q).as_slice().to_vec();
@@ -325,7 +327,7 @@ fn shares_without_a_row_of_their_own_are_not_left_out() {
         let (mut from, mut to) = (q.as_ptr(), M.as_mut_ptr());
         let mut parameters = [(&raw mut n).cast(), (&raw mut from).cast(), (&raw mut to).cast()];
         for row in 0..rows {
-            // SAFETY: this is the function's type, and the arrays have the length that it reads and writes.
+            // SAFETY: the type is the type of the function, and the arrays have the lengths that it reads and writes.
             unsafe {
                 let thread = library.get::<Thread>(b"fake_thread_robot_crba\0").unwrap();
                 thread(parameters.as_mut_ptr(), [1, rows].as_ptr(), [0, row].as_ptr(), 0, 1);
@@ -338,7 +340,7 @@ fn shares_without_a_row_of_their_own_are_not_left_out() {
     fake.end();
 }
 
-/// Tests trees with every kind of joint, and joints that follow others.
+/// Tests trees with every kind of joint, and with joints that follow other joints.
 #[test]
 fn trees_of_any_form_are_shared_out() {
     let Some(fake) = Fake::new() else { return };
@@ -369,12 +371,12 @@ fn blocks_keep_every_multiprocessor_busy() {
     let Some(fake) = Fake::new() else { return };
     let (device, arm) = (fake.driver.device(0).unwrap(), robots::arm7());
     let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["rnea"])).unwrap();
-    // four multiprocessors; at most 256 threads in a block
+    // The device has four multiprocessors, and at most 256 threads in a block.
     for (n, [blocks, threads]) in [(1, [1, 32]), (100, [4, 32]), (129, [3, 64]), (1024, [4, 256]), (3000, [12, 256])] {
         check(&device, &kernels, &arm, "rnea", &[n]);
         assert_eq!(fake.launches().0, [blocks, threads, 1], "{n} states");
     }
-    // rows of blocks also fill the multiprocessors
+    // Rows of blocks also occupy multiprocessors.
     let quadruped = robots::quadruped();
     let split = device.compile::<f64>(&fake.compiler, "quadruped", &in_shares(&quadruped, &["rnea"], 4)).unwrap();
     for (n, [blocks, threads]) in [(1, [1, 32]), (30, [1, 32]), (100, [1, 128]), (129, [1, 160]), (3000, [12, 256])] {
@@ -408,7 +410,7 @@ fn streams_are_ordered_by_what_is_said() {
     let expected = crba(&arm, &mut Data::new(&arm), &[0.3; 7]).as_slice().to_vec();
     let found = M.to_vec(&second).unwrap();
     assert!(found.iter().zip(&expected).all(|(x, y)| (x - y).abs() < ROUNDING));
-    // objects dropped while a kernel waits stay alive until it has run
+    // Objects that are dropped while a kernel waits stay alive until the kernel has run.
     let mut again = DeviceArray::new(&device, 49).unwrap();
     kernel.call(&second, 1, &[&q], &mut [&mut again]).unwrap();
     drop(q);
@@ -426,7 +428,7 @@ fn memory_and_streams_of_others_are_used_where_they_are() {
     let kernels = device.compile::<f64>(&fake.compiler, "arm7", &of(&arm, &["gravity"])).unwrap();
     let theirs = device.stream().unwrap();
     let (q, mut g) = (DeviceArray::from_slice(&theirs, &[0.3; 14]).unwrap(), DeviceArray::new(&device, 14).unwrap());
-    // SAFETY: both arrays and the stream live until the end of the test.
+    // SAFETY: both arrays and the stream live until the end of this test.
     let (stream, [from, mut to]) = unsafe {
         let array = |a: &DeviceArray<f64>| DeviceArray::from_raw(&device, a.as_raw(), a.len());
         (Stream::from_raw(&device, theirs.as_raw()), [array(&q), array(&g)])
@@ -452,10 +454,10 @@ fn a_newer_device_gets_ptx_and_so_does_a_machine_without_a_compiler() {
     let kernels = new.compile::<f64>(&fake.compiler, "arm7", &all).unwrap();
     check(&new, &kernels, &arm, "aba", &[33]);
     let ptx = fake.compiler.ptx::<f32>("arm7", &all, (7, 0)).unwrap();
-    // SAFETY: the image was compiled from these functions.
+    // SAFETY: the image was compiled from these functions, with this name and number type.
     let loaded = unsafe { old.load::<f32>("arm7", &all, &ptx) }.unwrap();
     check(&old, &loaded, &arm, "aba", &[33]);
-    // objects of another device are rejected
+    // Objects of another device are rejected.
     let (stream, other) = (new.default_stream(), old.default_stream());
     let on = |device| DeviceArray::<f64>::new(device, 7).unwrap();
     let [q, v, tau, mut a] = [&new, &new, &old, &new].map(on);
@@ -497,7 +499,7 @@ fn what_is_wrong_is_said() {
 
     let failed = fake.compiler.ptx::<f64>("arm7", &all, (1, 0)).unwrap_err();
     assert!(said(failed).starts_with("arm7: not compiled for compute_10: status 5: "));
-    // SAFETY: the driver without a GPU reads only up to the zero.
+    // SAFETY: the fake driver reads the image only up to the first zero.
     let failed = said(unsafe { device.load::<f64>("arm7", &all, b"no code") }.unwrap_err());
     assert_eq!(
         failed,
@@ -518,7 +520,7 @@ fn without_a_driver_that_is_said() {
     assert!(said.ends_with("; the environment variable CONDYLE_CUDA_LIBRARY may name its file"), "{said}");
     let said = Compiler::open(missing).unwrap_err().to_string();
     assert!(said.starts_with("NVIDIA's run-time compiler: cannot be loaded: no-such-file.so: "), "{said}");
-    // another library is not a driver
+    // A library that is not CUDA's driver is refused.
     if let Some(fake) = Fake::new() {
         let other = folder("cuda_other").join("libother.so");
         let source = other.with_extension("c");
@@ -548,7 +550,7 @@ fn several_threads_may_call_at_a_time() {
     fake.end();
 }
 
-/// Compiles with NVIDIA's own compiler, if it is installed; it needs no GPU.
+/// Compiles with NVIDIA's own compiler, if it is installed. This compiler needs no GPU.
 #[test]
 fn nvidias_compiler_takes_the_code() {
     let Ok(compiler) = Compiler::new() else {

@@ -1,15 +1,16 @@
-//! Recorded forms of algorithms, tested on plain numbers.
-#![allow(non_snake_case)] // M, X
+//! Tests the recorded forms of algorithms on plain numbers.
+#![allow(non_snake_case)] // matrices are named M and X
 
 use condyle_codegen::{Branches, Carried, JointPlacement};
 use condyle_linalg::Ltdl;
 use condyle_spatial::{ArticulatedInertia, Force, Inertia, Mat3, Motion, Se3, Sym3, Vec3};
 use nalgebra::DMatrix;
 
-/// Tolerance for rounding of several dozen products of numbers of size 1.
+/// Tolerance for the rounding errors of several dozen products of numbers of size 1.
 const ROUNDING: f64 = 1e-13;
 
-/// Tests two trees: a trunk of two indices with three branches, one of which branches again, and a single index.
+/// Tests two trees at once: a trunk of two indices with three branches, one of which branches again, and a single
+/// index.
 #[test]
 fn solutions_and_inverse_are_those_of_the_factor() {
     let tree = [None, Some(0), Some(1), Some(2), Some(1), Some(4), Some(5), Some(5), Some(0), None];
@@ -37,14 +38,14 @@ fn solutions_and_inverse_are_those_of_the_factor() {
     }
 }
 
-/// Tolerance for rounding of a few products of numbers of size 1.
+/// Tolerance for the rounding errors of a few products of numbers of size 1.
 const FEW: f64 = 1e-14;
 
 fn is_equal(a: Force<f64>, b: Force<f64>) -> bool {
     a.to_array().iter().zip(b.to_array()).all(|(a, b)| (a - b).abs() < FEW)
 }
 
-/// The short form of a rotation about z gives the same results as a general pose.
+/// The short form of a rotation about z must give the same results as a general pose.
 #[test]
 fn about_z_is_a_pose() {
     let (sin, cos) = 0.7_f64.sin_cos();

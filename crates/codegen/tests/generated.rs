@@ -1,4 +1,4 @@
-//! Generated code, compared with the library's functions.
+//! Compares generated code with the library's functions.
 #![allow(non_snake_case)]
 
 mod common;
@@ -21,16 +21,16 @@ use rand::{RngExt, SeedableRng};
 use std::process::Command;
 use trees::Tree;
 
-/// Tolerance for sums in another order: recorded code and the library's lanes differ in rounding.
+/// Tolerance for sums in another order. Recorded code and the library's lanes have different rounding errors.
 const ROUNDING: f64 = 1e-12;
 
-/// Restitution of impacts.
+/// Coefficient of restitution in impacts.
 const RESTITUTION: f64 = 0.3;
 
-/// Tolerance for results that use M⁻¹ or Λ, whose condition amplifies rounding.
+/// Tolerance for results that use M⁻¹ or Λ: a large condition number amplifies rounding errors.
 const THROUGH_INVERSE: f64 = 1e-11;
 
-/// Returns the tolerance for random trees, whose M may have a large condition.
+/// Returns the tolerance for random trees, where M may have a large condition number.
 fn bound_of_trees(name: &str) -> f64 {
     if bound(name) == ROUNDING { ROUNDING } else { 1e-9 }
 }
@@ -48,7 +48,7 @@ fn all_robots() -> [(&'static str, Model, Settings); 3] {
     [("arm", arm, a), ("quadruped", quadruped, q), ("humanoid", humanoid, h)]
 }
 
-/// Returns q, v, numbers for a or τ, and numbers for λ.
+/// Returns q, v, numbers that serve as a or τ, and numbers that serve as λ.
 fn state(model: &Model, rng: &mut StdRng) -> [Vec<f64>; 4] {
     let mut numbers = |n: usize| (0..n).map(|_| rng.random_range(-1.0..1.0)).collect::<Vec<f64>>();
     let [v, x, lambda] = [(); 3].map(|()| numbers(model.nv()));
@@ -60,7 +60,7 @@ fn matrix(m: &DenseMatrix<f64, impl Dense<f64>>) -> Vec<f64> {
     m.as_slice().to_vec()
 }
 
-/// Returns the library's results.
+/// Computes the function's results with the library.
 fn expected(
     model: &Model,
     settings: &Settings,
@@ -140,7 +140,7 @@ fn bound(name: &str) -> f64 {
     if through_inverse { THROUGH_INVERSE } else { ROUNDING }
 }
 
-/// Returns the arguments of a function at a state.
+/// Returns the arguments of a function for a state.
 fn arguments(function: &Function, state: &[Vec<f64>; 4]) -> Vec<Vec<f64>> {
     match function.name.starts_with("impulse_dynamics") {
         true => vec![state[0].clone(), state[1].clone(), vec![RESTITUTION]],
@@ -148,12 +148,12 @@ fn arguments(function: &Function, state: &[Vec<f64>; 4]) -> Vec<Vec<f64>> {
     }
 }
 
-/// Returns whether the test may run compilers for several minutes, as `./test full` does.
+/// Returns whether the test may run compilers for several minutes: only `./test full` does.
 fn is_full() -> bool {
     std::env::var_os("CONDYLE_FULL").is_some()
 }
 
-/// Returns the functions to be compiled for a robot: functions with short code, or nearly all functions.
+/// Returns the functions to be compiled for a robot: either functions with short code, or nearly all functions.
 fn for_compilers(robot: &str) -> Vec<&'static str> {
     let short = ["rnea", "aba", "crba", "gravity", "nonlinear_effects", "frames", "centroidal"];
     match robot {
@@ -165,7 +165,7 @@ fn for_compilers(robot: &str) -> Vec<&'static str> {
     }
 }
 
-/// Compares the results of `compute` for functions at some states with the library.
+/// Compares the results of `compute` with the library, for several functions and states.
 fn check(
     what: &str,
     names: impl Fn(&str) -> Vec<&'static str>,
@@ -197,7 +197,7 @@ fn what_is_recorded_is_what_the_library_computes() {
     );
 }
 
-/// Tests trees with every kind of joint, and joints that follow others.
+/// Tests trees with every kind of joint, and with joints that follow other joints.
 #[test]
 fn random_robots() {
     for seed in 0..4 {
@@ -249,7 +249,7 @@ fn c_computes_what_the_library_does() {
     check("C", for_compilers, |robot, all, inputs| {
         let program = programs.entry(robot.to_owned()).or_insert_with(|| {
             let flags = ["-O0", "-fsanitize=undefined", "-fno-sanitize-recover"];
-            // the sanitiser checks every line: for long code this takes minutes
+            // For long code, the sanitiser takes minutes, because it checks every line.
             let flags = if robot == "humanoid" { &flags[..1] } else { &flags };
             Program::c(&folder(&format!("c_{robot}")), all, Language::C, flags)
         });
@@ -262,7 +262,7 @@ fn rust_computes_what_the_library_does() {
     if !is_there("rustc") {
         return;
     }
-    // rustc takes ten times as long as C compilers
+    // rustc takes ten times as long as C compilers, so it compiles short functions only.
     let short = |robot: &str| -> Vec<&'static str> {
         let all = for_compilers(robot);
         all.into_iter().filter(|name| !name.contains("hessian") && (robot == "arm" || !name.contains("_d"))).collect()
@@ -274,7 +274,7 @@ fn rust_computes_what_the_library_does() {
     });
 }
 
-/// Vectors of four and eight states give each state the same results as a single call.
+/// In vectors of four and eight states, each state gets the same results as in a single call.
 #[test]
 fn vectors_compute_what_the_library_does() {
     if !is_there("cc") {
@@ -299,7 +299,7 @@ fn vectors_compute_what_the_library_does() {
             let program = Program::c(&folder(&format!("{robot}_{language:?}")), &all, language, &["-O0"]);
             let mut rng = StdRng::seed_from_u64(11);
             let states: Vec<_> = (0..lanes).map(|_| state(&model, &mut rng)).collect();
-            // number k of state i at [lanes k + i]
+            // Number k of state i is at index [lanes k + i].
             let side_by_side = |f: &Function| -> Vec<Vec<f64>> {
                 let each: Vec<_> = states.iter().map(|state| arguments(f, state)).collect();
                 let array = |a: usize| {
@@ -321,7 +321,7 @@ fn vectors_compute_what_the_library_does() {
     }
 }
 
-/// Tolerance of single precision, for numbers whose rounding is amplified by the condition.
+/// Tolerance of single precision, for results whose rounding errors a large condition number amplifies.
 const SINGLE: f64 = 2e-3;
 
 #[test]
@@ -348,7 +348,7 @@ fn floats_are_near() {
     }
 }
 
-/// Files of all languages for one robot fit in one folder, and one program can contain all functions in C.
+/// One folder can contain the files of all languages for one robot, and one program can contain all C functions.
 #[test]
 fn languages_share_a_folder_and_a_program() {
     let arm = robots::arm7();
@@ -382,7 +382,7 @@ fn languages_share_a_folder_and_a_program() {
     assert_eq!(said, format!("{second:.3}\n").repeat(6));
 }
 
-/// A robot without joints has functions without numbers: compilers report nothing.
+/// For a robot without joints, functions have arrays without numbers. Compilers must report nothing.
 #[test]
 fn robots_without_joints() {
     let stone = ModelBuilder::new("stone").build().unwrap();
@@ -402,7 +402,7 @@ fn robots_without_joints() {
     }
 }
 
-/// A function that is named twice is rejected, since compilers would reject it.
+/// Rejects a function that is named twice, since compilers would reject its code.
 #[test]
 fn functions_are_named_once() {
     let error = functions(&robots::arm7(), &["aba", "rnea", "aba"], &Settings::default()).unwrap_err();
@@ -410,7 +410,7 @@ fn functions_are_named_once() {
     assert_eq!(error.to_string(), "aba: named twice");
 }
 
-/// Computes a user's own function: a cost with selections, angles and roots, whose Jacobian comes from dual numbers.
+/// Computes a function of the user: a cost with selections, angles and roots. Its Jacobian comes from dual numbers.
 fn own<S: Scalar>(q: &[S], tool: Vec3<S>) -> Vec<S> {
     let reach = (tool.x * tool.x + tool.y * tool.y).sqrt();
     let is_low = tool.z.lt(S::splat(0.4));
@@ -420,7 +420,8 @@ fn own<S: Scalar>(q: &[S], tool: Vec3<S>) -> Vec<S> {
     vec![penalty * penalty + both, tool.y.atan2(tool.x), q[1].abs() * S::splat(3.0)]
 }
 
-/// Records a product of a matrix and vectors, computed in loops; sums that begin with a value; and a copy of an entry.
+/// Records three cases: a product of a matrix and vectors, computed in loops; sums that begin with a value; and a copy
+/// of an entry.
 #[test]
 fn entries_that_are_alike_are_computed_in_loops() {
     let function = record("alike", "Products with a matrix of squares.", |r| {
@@ -510,7 +511,7 @@ fn the_text_is_the_same_every_time() {
     assert_eq!(text(), text());
 }
 
-/// The rows of generated code in the table of the book's page on complexity.
+/// Computes the rows about generated code in the table of the book's page on complexity.
 #[test]
 fn the_book_has_these_figures() {
     let page = include_str!("../../../docs/complexity.md");

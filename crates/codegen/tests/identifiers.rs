@@ -1,6 +1,6 @@
-//! Valid identifiers. The module is compiled into this program, without the rest of the library.
+//! Tests identifiers. Their module is compiled into this program, without the rest of the library.
 
-#[allow(dead_code, unreachable_pub)] // the crate uses all of the module, and exports a part
+#[allow(dead_code, unreachable_pub)] // the crate uses the whole module, and exports some of its functions
 #[path = "../src/identifiers.rs"]
 mod identifiers;
 

@@ -1,17 +1,19 @@
-//! Splits the unknowns by equalities, x_B = p − T z, and maps rows of coefficients to z.
+//! Splits the unknowns x by equalities into basic unknowns x_B = p − T z and other unknowns z, and maps rows of
+//! coefficients of x to z.
 
 use crate::cone_program::ConeProgram;
 use crate::numbers::Reader;
 use condyle_linalg::{SLACK, Vector, Vectorized, View, add_product_vector, at_level, max_abs, product_without_slack};
 use nalgebra::DMatrix;
 
-/// Smallest pivot, relative to the row's largest entry at the start; a row without a larger one depends on other rows.
+/// Smallest usable pivot, relative to the row's largest entry before the elimination. A row without a usable pivot
+/// depends linearly on other rows.
 const DEPENDENT: f64 = 1e-8;
 
-/// Smallest pivot of the last tick that is used again, relative to the row's largest entry.
+/// Smallest pivot of the last tick that is used again, relative to the largest entry of its row.
 const KEEP: f64 = 0.05;
 
-/// Index of an unknown among the basic unknowns or among the others.
+/// Index of an unknown in the list of basic unknowns or in the list of other unknowns.
 #[derive(Clone, Copy)]
 enum Place {
     Basic(usize),
@@ -29,7 +31,7 @@ pub(crate) struct Basis {
     T: DMatrix<f64>,
     /// p.
     pub p: Vec<f64>,
-    /// Scratch: the basic columns of some rows. Shape: rows × basic, with padding.
+    /// Scratch: the columns of basic unknowns in several rows. Shape: rows × basic unknowns, with padding.
     basic_part: DMatrix<f64>,
 }
 
@@ -45,12 +47,13 @@ impl Basis {
         }
     }
 
-    /// Returns the coefficients of z in a basic unknown, with the opposite sign.
+    /// Returns column i of T: minus the coefficients of z in basic unknown i.
     pub(crate) fn column(&self, i: usize) -> &[f64] {
         &self.T.as_slice()[i * self.T.nrows()..][..self.others.len()]
     }
 
-    /// Computes (G_N − G_B T)ᵀ and G_B p for the first rows, which are columns of `from`; `particular` has padding.
+    /// Computes (G_N − G_B T)ᵀ and G_B p for the first rows of G, which are the columns of `from`. `particular`, for
+    /// G_B p, needs padding.
     pub(crate) fn map_dense_rows(
         &mut self,
         from: &DMatrix<f64>,
@@ -78,7 +81,7 @@ impl Basis {
         }
     }
 
-    /// Writes the row that has a 1 for one unknown as column r of `to`, and returns its value at z = 0.
+    /// Writes the row that has a 1 for one unknown as column r of `to`, in terms of z. Returns its value at z = 0.
     pub(crate) fn map_single_row(&self, unknown: usize, to: &mut DMatrix<f64>, r: usize) -> f64 {
         let (n, ldt) = (self.others.len(), to.nrows());
         let to = &mut to.as_mut_slice()[r * ldt..][..n];
@@ -97,7 +100,7 @@ impl Basis {
         }
     }
 
-    /// Maps a row with few non-zero entries to z, writes it as column r of `to`, and returns its value at z = 0.
+    /// Maps a row with few non-zero entries to z and writes it as column r of `to`. Returns its value at z = 0.
     pub(crate) fn map_row(&self, from: &DMatrix<f64>, r: usize, to: &mut DMatrix<f64>) -> f64 {
         let ldt = to.nrows();
         let row = &from.as_slice()[r * from.nrows()..][..self.places.len()];
@@ -129,12 +132,12 @@ impl Basis {
     }
 }
 
-/// The elimination, with memory for the largest program.
+/// Elimination of the equalities, with memory for the largest program.
 pub(crate) struct Elimination {
     /// Scratch: Aᵀ while it is being eliminated. Shape: unknowns × equalities, with padding rows.
     W: DMatrix<f64>,
     right: Vec<f64>,
-    /// Equality and unknown of each pivot, in elimination order. The pivots of the last call are tried first.
+    /// Equality and unknown of each pivot, in elimination order. The next call tries these pivots first.
     pivots: Vec<(usize, usize)>,
     /// (equalities, unknowns) of the last call.
     shape: (usize, usize),
@@ -152,7 +155,7 @@ impl Elimination {
         }
     }
 
-    /// Splits the unknowns by A x = b, with the pivots of the last call where they serve.
+    /// Splits the unknowns by A x = b. Uses the pivots of the last call, unless one of them has become too small.
     pub(crate) fn split(&mut self, program: &ConeProgram, basis: &mut Basis) {
         let (n, equalities) = (program.size.unknowns, program.size.equalities);
         if self.shape != (equalities, n) || !self.eliminate(program, true) {
@@ -171,7 +174,7 @@ impl Elimination {
         }
     }
 
-    /// Writes which unknowns are basic according to the pivots.
+    /// Writes into `basis` which unknowns are basic: those with a pivot.
     fn place(&self, basis: &mut Basis) {
         basis.basic.clear();
         basis.basic.extend(self.pivots.iter().map(|pivot| pivot.1));
@@ -188,7 +191,7 @@ impl Elimination {
         out.extend(self.pivots.iter().flat_map(|&(row, unknown)| [row as f64, unknown as f64]));
     }
 
-    /// Reads the pivots of an elimination with the same capacity; `None` if they are invalid.
+    /// Reads the pivots of an elimination with the same capacity; returns `None` if they are invalid.
     pub(crate) fn read(&mut self, basis: &mut Basis, from: &mut Reader<'_>) -> Option<()> {
         let (most, unknowns) = (self.used.len(), basis.places.len());
         self.shape = (from.index(most + 1)?, from.index(unknowns + 1)?);
@@ -205,8 +208,8 @@ impl Elimination {
         Some(())
     }
 
-    /// Runs Gauss–Jordan elimination. With `again` it uses the pivots of the last call, and fails if one has become too
-    /// small.
+    /// Runs Gauss–Jordan elimination. With `again` it uses the pivots of the last call; it returns false if one of them
+    /// has become too small.
     fn eliminate(&mut self, program: &ConeProgram, again: bool) -> bool {
         let Self { W, right, used, pivots, .. } = self;
         let (n, m, stride) = (program.size.unknowns, program.size.equalities, W.nrows());

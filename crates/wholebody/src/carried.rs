@@ -1,8 +1,9 @@
-//! Numbers that a controller carries from one tick to the next: for clones and for files.
+//! Numbers that a controller carries from one tick to the next. They are needed to clone a controller or to save it.
 //!
 //! All other numbers follow from the description (model, contacts, tasks, settings) and from the arguments of a step.
-//! With [`Backend::InteriorPoint`], a controller made from the same description and given these numbers continues with
-//! the same bits. Clarabel's solvers are built again: it continues with the same solution up to its tolerance.
+//! With [`Backend::InteriorPoint`], a controller that is made from the same description and given these numbers
+//! continues with the same bits. With clarabel, whose solvers are built again, it continues with the same solution up
+//! to clarabel's tolerance.
 //!
 //! [`Backend::InteriorPoint`]: crate::Backend::InteriorPoint
 
@@ -23,8 +24,8 @@ const SOURCES: [CommandSource; 3] =
     [CommandSource::Solution, CommandSource::LastSolution, CommandSource::GravityCompensation];
 
 impl Clone for WholeBodyController {
-    /// Returns a controller with its own memory that continues as this one does, with the same bits. Clarabel's solvers
-    /// are built again: it continues with the same solution up to its tolerance.
+    /// Returns a controller with its own memory that continues as this one does, with the same bits. With clarabel,
+    /// whose solvers are built again, it continues with the same solution up to clarabel's tolerance.
     fn clone(&self) -> Self {
         let contacts: Vec<_> = self.equations.contacts.iter().map(|contact| contact.description.clone()).collect();
         let tasks: Vec<_> = self.objective.tasks.iter().map(|task| task.task.clone()).collect();
@@ -47,7 +48,7 @@ impl WholeBodyController {
         numbers
     }
 
-    /// Restores the numbers carried by a controller of the same description; returns whether they were valid.
+    /// Restores the numbers carried by a controller with the same description; returns whether the numbers were valid.
     #[doc(hidden)]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let mut from = Reader::new(numbers);
@@ -69,7 +70,7 @@ impl Safety {
             out.extend(numbers);
         }
         out.push(flag(self.current));
-        out.push(self.age.map_or(0.0, |age| f64::from(age) + 1.0)); // 0 for no solution
+        out.push(self.age.map_or(0.0, |age| f64::from(age) + 1.0)); // the age plus 1, or 0 if there is no solution
     }
 
     fn read(&mut self, from: &mut Reader<'_>) -> Option<()> {

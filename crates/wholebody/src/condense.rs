@@ -20,7 +20,7 @@ use condyle_linalg::{SLACK, View, add_product_lower, add_scaled_product};
 use nalgebra::DMatrix;
 
 /// Known structure of a program. The rows of G come in three groups: rows with few zeros, rows that bound one unknown,
-/// other rows.
+/// and all other rows.
 #[derive(Clone, Copy)]
 pub(crate) struct Known<'a> {
     /// Number of rows with few zeros.
@@ -35,7 +35,7 @@ pub(crate) struct Known<'a> {
 pub(crate) struct Condenser {
     pub elimination: Elimination,
     pub basis: Basis,
-    /// Scratch: rows of the objective. Shape: other × rows, with padding.
+    /// Scratch: rows of the objective. Shape: number of other unknowns × rows, with padding.
     rows: DMatrix<f64>,
     right_side: Vec<f64>,
     /// Scratch: P, with padding rows.
@@ -51,7 +51,7 @@ impl Condenser {
     pub(crate) fn new(capacity: Size, objective: usize) -> Self {
         let Size { unknowns, equalities, rows, .. } = capacity;
         let tall = unknowns + SLACK;
-        let most = objective + equalities; // a row for each basic unknown's own weight
+        let most = objective + equalities; // plus a row for the own weight of each basic unknown
         Self {
             elimination: Elimination::new(unknowns, equalities),
             basis: Basis::new(unknowns, equalities, rows.max(objective)),
@@ -63,7 +63,7 @@ impl Condenser {
         }
     }
 
-    /// Writes the program over z that is equivalent to a program over x with an objective over x.
+    /// Writes the program over z. It is equivalent to the program `full` over x with an objective over x.
     pub(crate) fn condense(
         &mut self,
         full: &ConeProgram,
@@ -107,7 +107,7 @@ impl Condenser {
         z
     }
 
-    /// Computes P and c of the least squares over z.
+    /// Computes P and c of the least-squares objective over z.
     fn objective(&mut self, from: &LeastSquares, out: &mut ConeProgram) {
         let Self { basis, rows, right_side, P, particular, .. } = self;
         let (n, tall) = (basis.others.len(), rows.nrows());

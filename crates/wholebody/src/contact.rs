@@ -3,18 +3,18 @@
 use crate::error::Error;
 use condyle_spatial::{Mat3, Vec3};
 
-/// Direction in which the environment pushes; of any length except 0.
+/// Direction in which the environment pushes: a vector of any length except 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Normal {
-    /// Along the world's axes: the direction stays the same when the foot turns. For points.
+    /// Along the world's axes: the direction stays the same when the foot turns. Suits points.
     World(Vec3<f64>),
-    /// Along the frame's axes: the direction turns with the frame.
+    /// Along the axes of the contact's frame: the direction turns with the frame.
     Frame(Vec3<f64>),
 }
 
 impl Normal {
-    /// Returns the direction, along the axes in which it is given.
+    /// Returns the direction, along the world's axes or the frame's axes as given.
     pub fn direction(self) -> Vec3<f64> {
         let (Self::World(n) | Self::Frame(n)) = self;
         n
@@ -35,9 +35,10 @@ pub enum SurfaceForces {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Shape {
-    /// The frame's origin: the origin is held, and the frame may turn about it.
+    /// The origin of the contact's frame: it is held, and the frame may turn about it.
     Point,
-    /// An edge (two corners: the frame may turn about it) or a convex polygon (three or more: the frame is held).
+    /// A surface of the contact's frame: an edge (two corners; the frame may turn about it) or a convex polygon (three
+    /// or more corners; the frame is held).
     Surface {
         /// Corners in the frame (m), in order around the polygon, in one plane perpendicular to the normal.
         corners: Vec<Vec3<f64>>,
@@ -46,9 +47,9 @@ pub enum Shape {
     },
 }
 
-/// A contact with friction: its point or surface is held, and each force lies in the cone ‖f_t‖ ≤ μ f_n.
+/// A contact with friction. Its point or surface is held, and each contact force f lies in the cone ‖f_t‖ ≤ μ f_n.
 ///
-/// [`ContactTarget::activation`](crate::ContactTarget) sets whether it touches at a tick, and how strongly.
+/// [`ContactTarget::activation`](crate::ContactTarget) sets whether the contact touches at a tick, and how strongly.
 ///
 /// ```
 /// use condyle_wholebody::{FrictionContact, Normal};
@@ -66,9 +67,9 @@ pub struct FrictionContact {
     pub normal: Normal,
     /// μ, Coulomb's friction coefficient; above 0.
     pub friction: f64,
-    /// γ (m): |yaw moment| of a [wrench](SurfaceForces::Wrench) ≤ γ f_n. `None`: ⅔ μ r, with r the radius of the
-    /// largest circle about the corners' mean inside the polygon (exact for a uniformly loaded disc); ½ μ l for an edge
-    /// of length 2 l.
+    /// γ (m), the bound |yaw moment| ≤ γ f_n of a [wrench](SurfaceForces::Wrench). `None` means ⅔ μ r, where r is the
+    /// radius of the largest circle inside the polygon about the mean of the corners (exact for a uniformly loaded
+    /// disc). For an edge of length 2 l, `None` means ½ μ l.
     pub yaw_friction: Option<f64>,
     /// Minimum normal force of the whole contact (N); at least 0.
     pub min_force: f64,
@@ -84,14 +85,15 @@ impl FrictionContact {
         Self { frame, shape, normal, friction, yaw_friction: None, min_force: 0.0, max_force: f64::INFINITY }
     }
 
-    /// Creates a contact of a convex polygon (or an edge) with these corners in the frame. The normal is the frame's z,
-    /// and the force is described by its wrench.
+    /// Creates a contact whose surface is the convex polygon (or the edge) with these corners, given in the frame. The
+    /// normal is the frame's z axis, and the unknown force is a wrench.
     pub fn surface(frame: &str, friction: f64, corners: &[Vec3<f64>]) -> Self {
         let shape = Shape::Surface { corners: corners.to_vec(), forces: SurfaceForces::Wrench };
         Self { shape, normal: Normal::Frame(Vec3::new(0.0, 0.0, 1.0)), ..Self::point(frame, friction) }
     }
 
-    /// Creates a rectangle about the frame's origin, with sides along the frame's x and y (m).
+    /// Creates a contact whose surface is a rectangle about the frame's origin, with sides along the frame's x and y
+    /// (m).
     pub fn sole(frame: &str, friction: f64, [length, width]: [f64; 2]) -> Self {
         let (x, y) = (0.5 * length, 0.5 * width);
         let corners = [[x, y], [-x, y], [-x, -y], [x, -y]].map(|[x, y]| Vec3::new(x, y, 0.0));
@@ -170,8 +172,8 @@ impl FrictionContact {
         };
         let turns: Vec<f64> = (0..flat.len()).map(turn).collect();
         let edge = flat.len() == 2;
-        // Each turn is to the left, and all turns make one round (a star makes more): the centre then lies left of each
-        // edge.
+        // All turns are to the left, and together they make one round (a star makes more). The centre is then to the
+        // left of each edge.
         let left = turns.iter().all(|&t| t > 0.0);
         if !edge && !left {
             if !turns.iter().all(|&t| t < 0.0) {
@@ -189,7 +191,7 @@ impl FrictionContact {
         }
         let even = if edge { 0.5 * size } else { 2.0 / 3.0 * radius };
         let yaw = self.yaw_friction.unwrap_or(self.friction * even);
-        // An edge does not hold the rotation about itself (t₁).
+        // An edge does not hold the rotation about the edge (about t₁).
         let motion: &[usize] = if edge { &[0, 1, 2, 4, 5] } else { &[0, 1, 2, 3, 4, 5] };
         Ok(Geometry { centre, axes, corners: flat, by_corners: forces == SurfaceForces::Corners, motion, yaw })
     }
@@ -200,12 +202,12 @@ impl FrictionContact {
 pub(crate) struct Geometry {
     /// Mean of the corners, in the frame.
     pub centre: Vec3<f64>,
-    /// (t₁, t₂, n), right-handed; in the world if the normal is given there, otherwise in the frame.
+    /// (t₁, t₂, n), right-handed; in the world if the normal is given along the world's axes, otherwise in the frame.
     pub axes: Mat3<f64>,
     /// Corners along t₁ and t₂ from the centre, counterclockwise about n; empty for a point.
     pub corners: Vec<[f64; 2]>,
     pub by_corners: bool,
-    /// Components of the six-dimensional motion that are held; the wrench has the same components.
+    /// Components of the six-dimensional motion that the contact holds; the wrench has the same components.
     pub motion: &'static [usize],
     /// γ.
     pub yaw: f64,
@@ -222,9 +224,9 @@ impl Geometry {
         if self.by_corners { self.corners.len() } else { 1 }
     }
 
-    /// Returns the weight of the square of unknown j, relative to a force's weight. A moment has the weight 1 / r²,
-    /// with r the root mean square of the corners' distances from its axis: it counts as the corner forces that cause
-    /// it.
+    /// Returns the weight of the square of unknown j, relative to the weight of a force. For a moment it is 1 / r²,
+    /// where r is the root mean square of the corners' distances from the moment's axis. A moment then costs as much as
+    /// the corner forces that cause it.
     pub(crate) fn weight(&self, j: usize) -> f64 {
         let (row, count) = (self.motion[j % self.motion.len()], self.corners.len() as f64);
         let mean = |square: &dyn Fn(&[f64; 2]) -> f64| self.corners.iter().map(square).sum::<f64>() / count;
@@ -237,7 +239,7 @@ impl Geometry {
         }
     }
 
-    /// Returns the half-planes (a, b, c), a x + b y + c ≥ 0, in which the centre of pressure of a wrench lies.
+    /// Returns the half-planes (a, b, c) with a x + b y + c ≥ 0 that contain the centre of pressure of a wrench.
     pub(crate) fn edges(&self) -> impl Iterator<Item = [f64; 3]> + '_ {
         let count = if self.by_corners { 0 } else { self.corners.len() };
         (0..count).map(move |k| {
@@ -246,7 +248,8 @@ impl Geometry {
         })
     }
 
-    /// Returns row r of the wrench caused by a unit of unknown j, along the contact's axes and about the centre.
+    /// Returns entry r of the wrench caused by a unit of unknown j, along the contact's axes and about the contact's
+    /// centre.
     pub(crate) fn wrench(&self, r: usize, j: usize) -> f64 {
         if !self.by_corners {
             return f64::from(u8::from(self.motion[j] == r));
@@ -254,7 +257,7 @@ impl Geometry {
         let ([x, y], axis) = (self.corners[j / 3], j % 3);
         match (r, axis) {
             (0, 0) | (1, 1) | (2, 2) => 1.0,
-            (3, 2) => y, // (x, y, 0) × f = (y f_n, −x f_n, x f₂ − y f₁)
+            (3, 2) => y, // wrench of (x, y, 0) × f = (y f_n, −x f_n, x f₂ − y f₁)
             (4, 2) => -x,
             (5, 0) => -y,
             (5, 1) => x,
@@ -263,8 +266,8 @@ impl Geometry {
     }
 }
 
-/// Returns (a, b, c): a x + b y + c is the signed distance of (x, y) from the line through two corners, positive on its
-/// left.
+/// Returns (a, b, c) of the line through two corners: a x + b y + c is the signed distance of (x, y) from the line,
+/// positive to the left of it.
 fn inside(from: [f64; 2], to: [f64; 2]) -> [f64; 3] {
     let (x, y) = (to[0] - from[0], to[1] - from[1]);
     let length = x.hypot(y);
@@ -274,7 +277,7 @@ fn inside(from: [f64; 2], to: [f64; 2]) -> [f64; 3] {
 
 /// Returns unit vectors (t₁, t₂, n), right-handed, for a unit vector n.
 fn axes(n: Vec3<f64>) -> Mat3<f64> {
-    // perpendicular to n and to x or y, whichever is farther from n
+    // The axis (x or y) that is farther from n gives a vector perpendicular to n.
     let (x, y) = (Vec3::new(1.0, 0.0, 0.0), Vec3::new(0.0, 1.0, 0.0));
     let t = if n.x.abs() < n.y.abs() { n.cross(x) } else { y.cross(n) };
     let t1 = t.scale(1.0 / norm(t));

@@ -1,4 +1,5 @@
-//! Numbers of a contact at one state: Jacobian, held acceleration, and the rows and cones of its force.
+//! Numbers of a contact at one state: its Jacobian, the acceleration at which it is held, and the rows and cones of its
+//! force.
 
 use crate::cone_program::{ConeProgram, Size};
 use crate::contact::{FrictionContact, Geometry, Normal, norm};
@@ -9,11 +10,11 @@ use crate::settings::{Friction, Settings};
 use condyle_dynamics::{Force, Mat3, Motion, Quaternion, Vec3, lie};
 use nalgebra::DMatrix;
 
-/// A contact whose rows are along its axes (t₁, t₂, n) at its centre.
+/// A contact with its numbers. The rows are along the contact's axes (t₁, t₂, n), at its centre.
 pub(crate) struct ContactNumbers {
     pub description: FrictionContact,
     pub geometry: Geometry,
-    /// Index of its frame among the frames of the kinematics.
+    /// Index of the contact's frame among the frames of the kinematics.
     pub frame: usize,
     /// Whether the contact touches.
     pub active: bool,
@@ -21,21 +22,21 @@ pub(crate) struct ContactNumbers {
     pub column: usize,
     /// Activation, at most 1.
     activation: f64,
-    /// Offsets of its unknowns and constraints in a program in which all contacts touch.
+    /// Offsets of the contact's unknowns and constraints in a program in which all contacts touch.
     first: Size,
     /// Axes, in the world.
     axes: Mat3<f64>,
-    /// Vector from the frame's origin to the centre, in the world.
+    /// Vector from the frame's origin to the contact's centre, in the world.
     arm: Vec3<f64>,
     /// Jᵀ, nv × number of held rows.
     pub Jt: DMatrix<f64>,
-    /// a* − J̇ v, the value of J q̈.
+    /// a* − J̇ v, the value that J q̈ must have.
     pub held: [f64; 6],
-    /// Reference of each of the force's unknowns.
+    /// Reference value of each unknown of the force.
     pub reference: Vec<f64>,
-    /// Weight of each of the force's unknowns, relative to the settings' force weight.
+    /// Weight of each unknown of the force, relative to the force weight of the settings.
     pub weights: Vec<f64>,
-    /// Reference of the wrench.
+    /// Reference value of the wrench.
     pub wrench: [f64; 6],
     /// Minimum and maximum normal force.
     bounds: [f64; 2],
@@ -62,7 +63,7 @@ impl ContactNumbers {
         }
     }
 
-    /// Reserves the next indices of a program in which all contacts touch.
+    /// Reserves indices for this contact at the end of a program in which all contacts touch.
     pub(crate) fn add_to(&mut self, all: &mut Size, friction: Friction) {
         self.first = *all;
         all.unknowns += self.geometry.unknowns();
@@ -71,7 +72,8 @@ impl ContactNumbers {
         all.cone_rows += if friction == Friction::Cone { 3 * self.geometry.cones() } else { 0 };
     }
 
-    /// Adds the indices of its unknowns and constraints in use, in their order in the program.
+    /// Adds the indices of this contact's unknowns and constraints to `places`, in the order of the program, and the
+    /// scale of each unknown.
     pub(crate) fn add_places(&self, places: &mut Places, friction: Friction) {
         let Size { unknowns, equalities, rows, cone_rows } = self.first;
         let end = rows + self.max_rows(friction);
@@ -84,25 +86,25 @@ impl ContactNumbers {
         }
     }
 
-    /// Returns whether the first of its rows bounds the normal force.
+    /// Returns whether the contact's first row is in use: it bounds the normal force.
     fn has_bounds(&self) -> bool {
         let [least, most] = self.bounds;
         least > 0.0 || most < f64::INFINITY
     }
 
-    /// Returns the maximum number of rows of G for the force.
+    /// Returns the maximum number of rows of G that the contact's force needs.
     fn max_rows(&self, friction: Friction) -> usize {
         let edges = self.geometry.edges().count();
         let sides = if let Friction::Pyramid { sides, .. } = friction { sides } else { 0 };
         1 + edges + 2 * usize::from(edges > 0) + sides * self.geometry.cones()
     }
 
-    /// Returns the vector from the frame's origin to the centre, in the world.
+    /// Returns the vector from the frame's origin to the contact's centre, in the world.
     pub(crate) fn centre_arm(&self, frame: &FrameMotion) -> Vec3<f64> {
         frame.pose.rotation * self.geometry.centre
     }
 
-    /// Computes all numbers of an active contact whose frame is at `frame`.
+    /// Computes all numbers of an active contact, with its frame at `frame`.
     pub(crate) fn update(&mut self, frame: &FrameMotion, target: &ContactTarget, settings: &Settings, weight: f64) {
         let R = frame.pose.rotation;
         let (centre, axes, motion) = (self.geometry.centre, self.geometry.axes, self.geometry.motion);
@@ -115,13 +117,13 @@ impl ContactNumbers {
         for &j in &frame.support {
             let s = &frame.J.as_slice()[6 * j..6 * j + 6];
             let (linear, angular) = (Vec3::new(s[0], s[1], s[2]), Vec3::new(s[3], s[4], s[5]));
-            let at = linear + angular.cross(self.arm); // velocity of the centre
+            let at = linear + angular.cross(self.arm); // velocity of the contact's centre
             let along = [t1.dot(at), t2.dot(at), n.dot(at), t1.dot(angular), t2.dot(angular), n.dot(angular)];
             for (r, &row) in motion.iter().enumerate() {
                 self.Jt[(j, r)] = along[row];
             }
         }
-        // a* = k (X_ref ⊖ X) − d v of the centre, limited to the maximum correction
+        // a* = k (X_ref ⊖ X) − d v of the contact's centre, limited to the maximum correction
         let gains = settings.contact_gains;
         let (v, w) = (frame.velocity.linear, frame.velocity.angular);
         let turn: Mat3<f64> = target.pose.rotation * R.transpose();
@@ -136,7 +138,7 @@ impl ContactNumbers {
         };
         let wanted = |error: Vec3<f64>, velocity: Vec3<f64>| {
             let a = error.scale(gains.stiffness) - velocity.scale(gains.damping);
-            a.scale((settings.max_correction / norm(a)).min(1.0)) // NaN.min(1) is 1
+            a.scale((settings.max_correction / norm(a)).min(1.0)) // the factor is 1 for a = 0, since NaN.min(1) is 1
         };
         let drift = frame.drift.linear + frame.drift.angular.cross(self.arm) + w.cross(w.cross(self.arm));
         let linear = wanted(error.linear, v + w.cross(self.arm)) - drift;
@@ -145,7 +147,7 @@ impl ContactNumbers {
         for (held, &row) in self.held.iter_mut().zip(motion) {
             *held = along[row];
         }
-        // references of the force; the target's wrench is about the frame's origin
+        // References of the force. The target's wrench is about the frame's origin.
         let Force { linear, angular } = target.force;
         self.wrench = self.along(linear, angular - self.arm.cross(linear));
         let (wrench, share) = (self.wrench, 1.0 / self.geometry.cones() as f64);
@@ -156,7 +158,7 @@ impl ContactNumbers {
         self.bounds = [min_force, max_force];
         self.activation = target.activation.min(1.0);
         if target.activation < 1.0 {
-            // f_n ≤ α times the maximum force, or times the robot's weight if the maximum is infinite
+            // f_n ≤ α times the maximum force; if that is infinite, the robot's weight replaces it
             let most = if max_force.is_finite() { max_force } else { weight };
             self.bounds = [min_force, most].map(|bound| bound * target.activation);
         }
@@ -167,7 +169,7 @@ impl ContactNumbers {
         [a.x, a.y, a.z, b.x, b.y, b.z]
     }
 
-    /// Subtracts Jᵀ f, the force's part of each coordinate's effort, from the columns of Eᵀ.
+    /// Subtracts Jᵀ f, the effect of the force on each coordinate's effort, from the columns of Eᵀ.
     pub(crate) fn add_effort(&self, support: &[usize], Et: &mut DMatrix<f64>) {
         let (rows, stride, nv) = (self.geometry.motion, Et.nrows(), self.Jt.nrows());
         let (J, Et) = (self.Jt.as_slice(), Et.as_mut_slice());
@@ -197,8 +199,8 @@ impl ContactNumbers {
         }
     }
 
-    /// Adds bounds of the force, friction cones or pyramids, and bounds of the centre of pressure and of the yaw
-    /// moment.
+    /// Adds the rows of the force: bounds, friction cones or pyramids, bounds of the centre of pressure, and bounds of
+    /// the yaw moment.
     pub(crate) fn add_force_rows(&self, program: &mut ConeProgram, friction: Friction) {
         let Geometry { by_corners, yaw, motion, .. } = self.geometry;
         let mu = self.description.friction;
@@ -214,7 +216,8 @@ impl ContactNumbers {
         if !by_corners && motion.len() > 3 {
             let (f_n, moments) = (self.column + 2, self.column + motion.len() - 2);
             for [a, b, c] in self.geometry.edges() {
-                let row = add_row(program, 0.0, f64::INFINITY); // f_n p = (−τ₂, τ₁): −a τ₂ + b τ₁ + c f_n ≥ 0
+                // Centre of pressure p, f_n p = (−τ₂, τ₁): −a τ₂ + b τ₁ + c f_n ≥ 0.
+                let row = add_row(program, 0.0, f64::INFINITY);
                 program.Gt[(moments, row)] = -a;
                 if b != 0.0 {
                     program.Gt[(moments - 1, row)] = b;
@@ -256,7 +259,7 @@ impl ContactNumbers {
         }
     }
 
-    /// Returns the wrench of the force in x about the frame's origin, along the world's axes.
+    /// Returns the wrench of this contact's force in x, about the frame's origin, along the world's axes.
     pub(crate) fn read(&self, x: &[f64]) -> Force<f64> {
         if !self.active {
             return Force::zero();
@@ -268,7 +271,7 @@ impl ContactNumbers {
     }
 }
 
-/// Adds a row of zeros and returns its index.
+/// Adds a row of zeros with these bounds to G, and returns its index.
 fn add_row(program: &mut ConeProgram, lower: f64, upper: f64) -> usize {
     let (row, n) = (program.size.rows, program.size.unknowns);
     program.row_mut(row)[..n].fill(0.0);

@@ -1,4 +1,5 @@
-//! The controller: allocates memory once; at each tick it computes the numbers, solves, and checks its output.
+//! The controller. It allocates memory once. At each tick it computes the constraints and tasks, solves the program,
+//! and checks the command.
 
 use crate::command::{Command, CommandSource};
 use crate::cone_program::Status as Stopped;
@@ -20,13 +21,15 @@ use condyle_dynamics::{Force, Model, Motion, Vec3, neutral};
 use condyle_linalg::check;
 use std::fmt;
 
-/// Maximum violation of constraints by a solution, relative to 1 + the robot's weight (N, N m, m/s²); more is an error.
+/// Maximum violation of a constraint by a solution, relative to 1 + the robot's weight (N, N m, m/s²). A larger
+/// violation is an error.
 const FEASIBLE: f64 = 1e-6;
 
-/// Weight of the task that pulls back joints which cannot be kept within their limits.
+/// Weight of the task that leads joints back which cannot be kept within their limits.
 const PULL: f64 = 1e3;
 
-/// A whole-body controller: one cone program for each tick and priority, stated in the [crate's documentation](crate).
+/// A whole-body controller. It solves one cone program for each tick and priority; the [crate's documentation](crate)
+/// states the program.
 ///
 /// ```
 /// use condyle_dynamics::robots;
@@ -51,20 +54,20 @@ pub struct WholeBodyController {
     pub(crate) levels: Levels,
     pub(crate) safety: Safety,
     pub(crate) command: Command,
-    /// Scratch: the state of a plan.
+    /// Scratch: the state of a plan at one time.
     planned: PlannedState,
 }
 
 impl WholeBodyController {
-    /// Checks everything and allocates memory. The list of contacts may be empty: a robot in free fall.
+    /// Checks all arguments and allocates memory. The list of contacts may be empty: the robot is then in free fall.
     ///
     /// # Errors
-    /// [`Error`] for an unknown frame, for a frame named by two contacts, and for any number outside of its range.
+    /// [`Error`] for an unknown frame, for a frame that two contacts name, and for any number outside of its range.
     pub fn new(model: &Model, contacts: &[FrictionContact], tasks: &[Task], settings: Settings) -> Result<Self, Error> {
         tasks.iter().try_for_each(|task| task.check(model.nv()))?;
         settings.check(model)?;
         settings.check_effort(model)?;
-        // each frame once: frames of contacts, of tasks, and of tasks' axes
+        // List each frame of contacts, of tasks, and of tasks' axes once.
         let mut frames: Vec<usize> = Vec::new();
         let mut place = |name: &str| -> Result<usize, Error> {
             let frame = model.frame(name)?;
@@ -125,8 +128,8 @@ impl WholeBodyController {
         Ok(Self { settings, equations, objective, levels, safety, command, planned })
     }
 
-    /// Returns references that keep the position q at rest: all tasks at their present values, each contact touching
-    /// and held at its present pose, the weight shared equally by the contacts.
+    /// Returns references that keep the robot at rest at position q. All tasks keep their present values. Each contact
+    /// touches, is held at its present pose, and carries an equal share of the weight.
     ///
     /// q: nq numbers.
     ///
@@ -159,11 +162,12 @@ impl WholeBodyController {
         })
     }
 
-    /// Writes the references of a plan at a time. Joints follow the plan; centre of mass, momentum and frames follow
-    /// from the joints. Contacts have the plan's activation, pose, and shares of the force that the plan's c̈ requires.
+    /// Writes the references of a plan at time t. The joints follow the plan. The centre of mass, momentum and frames
+    /// follow from the joints. Contacts get the plan's activation and pose, and their shares of the force that the
+    /// plan's c̈ requires.
     ///
     /// # Panics
-    /// If the references were made for another controller, or the plan for a robot of other bodies and joints.
+    /// If the references were made for another controller, or the plan for a robot with other bodies and joints.
     #[track_caller]
     pub fn track(&mut self, plan: &Plan, t: f64, references: &mut References) {
         let Self { equations: Equations { kinematics: k, contacts, .. }, objective, planned, .. } = self;
@@ -209,13 +213,14 @@ impl WholeBodyController {
         }
     }
 
-    /// Computes efforts, acceleration and contact forces at the state (q, v). There always is a command: without a
-    /// solution it is a safe one, and its status tells the cause. A number that is not finite gives
-    /// [`Status::NotFinite`]. A quaternion or a pair (cos, sin) without length 1, or an invalid rotation of a
-    /// reference, gives [`Status::InvalidState`]. The safe command is then made from the last valid state.
+    /// Computes efforts, acceleration and contact forces at the state (q, v). It always returns a command: without a
+    /// solution the command is a safe one, and its status tells the cause. A number that is not finite gives
+    /// [`Status::NotFinite`]. A quaternion or a pair (cos, sin) without length 1, or an invalid rotation in a
+    /// reference, gives [`Status::InvalidState`]. The safe command is then computed from the last valid state.
     ///
-    /// q: nq numbers; v: nv. The command stays readable as [`command`](Self::command). Allocates nothing with
-    /// [`Backend::InteriorPoint`](crate::Backend); clarabel allocates once, and more for a new set of contacts.
+    /// q: nq numbers; v: nv. Later calls of [`command`](Self::command) return the same command. A step allocates
+    /// nothing with [`Backend::InteriorPoint`](crate::Backend); clarabel allocates once, and more for a new set of
+    /// contacts.
     ///
     /// # Panics
     /// If `q`, `v` or a list of the references has the wrong length.
@@ -273,7 +278,7 @@ impl WholeBodyController {
         objective.update(q, v, kinematics, contacts, references, settings, actuated, n);
     }
 
-    /// Computes the command; `Err` if no iterate satisfies all constraints.
+    /// Computes the command; returns `Err` if no iterate satisfies all constraints.
     fn solve(&mut self, q: &[f64], v: &[f64], references: &References) -> Result<Status, Status> {
         self.update(q, v, references);
         let Self { equations, objective, levels, safety, command, .. } = self;
@@ -295,7 +300,7 @@ impl WholeBodyController {
         command.iterations = outcome.iterations;
         command.reduced_accuracy = outcome.reduced;
         let status = outcome.stopped.map_or(Status::Solved, Status::from);
-        // An iterate that satisfies all constraints, or the result of an earlier priority, may serve as the solution.
+        // Use an iterate that satisfies all constraints, or the result of an earlier priority, as the solution.
         let may_serve = done > 0 || matches!(status, Status::IterationLimit | Status::TimeLimit);
         let x = &levels.x[..n];
         let violation = equations.violation(x);

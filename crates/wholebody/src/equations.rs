@@ -1,4 +1,4 @@
-//! Constraints of the program at one state: each block of code has its equation as a comment.
+//! Constraints of the program at one state. A comment at each block of code shows its equation.
 //!
 //! x = (q̈, forces of active contacts).
 
@@ -14,7 +14,7 @@ use crate::settings::Settings;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::DMatrix;
 
-/// Activation below which a contact is off: the force it could carry would be lost in the solver's tolerance.
+/// Activation below which a contact is off: the force that it could carry would be smaller than the solver's tolerance.
 const LEAST_ACTIVATION: f64 = 1e-6;
 
 /// Quantities that determine the constraints, and memory for the constraints.
@@ -23,12 +23,12 @@ pub(crate) struct Equations {
     pub contacts: Vec<ContactNumbers>,
     /// Coordinates of free-flyers, which have no motor.
     pub free: Vec<usize>,
-    /// The other coordinates.
+    /// Coordinates that are not in `free`.
     pub actuated: Vec<usize>,
-    /// Coordinates with a limited motor, and their limits.
+    /// Coordinates whose motor has a limit, and these limits.
     pub limited: Vec<(usize, [f64; 2])>,
     pub bounds: AccelerationBounds,
-    /// Coordinates of the bounds.
+    /// Coordinates that have a row of `bounds`.
     bounded: Vec<usize>,
     /// Eᵀ with τ = E x + h and E = [M, −Jᵀ]: a column for each coordinate.
     pub Et: DMatrix<f64>,
@@ -41,7 +41,7 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// Allocates memory, with space for `held` more equalities.
+    /// Allocates memory, with space for `held` additional equalities.
     pub(crate) fn new(
         kinematics: Kinematics,
         mut contacts: Vec<ContactNumbers>,
@@ -77,7 +77,7 @@ impl Equations {
         (&mut self.program, Known { dense: self.limited.len(), single: &self.bounded, places: &self.places })
     }
 
-    /// Computes all constraints at (q, v).
+    /// Computes all constraints at the state (q, v).
     pub(crate) fn update(&mut self, q: &[f64], v: &[f64], references: &References, settings: &Settings) {
         let Self { kinematics, contacts, bounds, Et, program, .. } = self;
         kinematics.update(q, v);
@@ -108,7 +108,7 @@ impl Equations {
         for &i in &self.free {
             let e = program.size.equalities;
             program.equality_mut(e)[..unknowns].copy_from_slice(E(i));
-            program.b[e] = -kinematics.h[i]; // M q̈ − Jᵀ f = −h: no motor acts on the base
+            program.b[e] = -kinematics.h[i]; // M q̈ − Jᵀ f = −h for the base, on which no motor acts
             program.size.equalities += 1;
         }
         for contact in contacts.iter().filter(|contact| contact.active) {
@@ -147,7 +147,8 @@ impl Equations {
         }
     }
 
-    /// Removes the joints' limits from the rows. Joints that should be led back become tasks with this weight.
+    /// Removes the joints' limits from the rows. A joint that should be led back into its limits gets a task with this
+    /// weight.
     pub(crate) fn relax(&mut self, objective: &mut LeastSquares, weight: f64) {
         for (k, &(i, lower, upper)) in self.bounds.bounds.iter().enumerate() {
             let row = self.limited.len() + k;
@@ -158,7 +159,7 @@ impl Equations {
         }
     }
 
-    /// Returns the largest violation by x of rows, cones and equalities, in their units.
+    /// Returns the largest violation of rows, cones and equalities by x, in the units of each constraint.
     pub(crate) fn violation(&self, x: &[f64]) -> f64 {
         let p = &self.program;
         let stride = p.At.nrows();

@@ -4,7 +4,7 @@ use crate::cone_program;
 use condyle_dynamics::ROTATION_ROUNDING;
 use core::fmt;
 
-/// Error in the description of a controller or a plan, or in a state given to one.
+/// Error in the description of a controller or of a plan, or in a state given to a controller or a plan.
 ///
 /// ```
 /// use condyle_wholebody::{FrictionContact, Settings, Task, WholeBodyController};
@@ -16,7 +16,7 @@ use core::fmt;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A name of the model is unknown (the message has the nearest one), or a state is invalid.
+    /// A name is unknown in the model (the message names the nearest one), or a state is invalid.
     #[error(transparent)]
     Model(#[from] condyle_dynamics::Error),
     /// The same frame is listed as a contact twice.
@@ -38,9 +38,9 @@ pub enum Error {
         frame: String,
         /// The field of [`FrictionContact`](crate::FrictionContact).
         name: &'static str,
-        /// Its value.
+        /// The invalid value.
         value: f64,
-        /// The range.
+        /// The allowed range, in words.
         allowed: &'static str,
     },
     /// A weight or gain of a task lies outside of its range.
@@ -50,9 +50,9 @@ pub enum Error {
         task: String,
         /// The field of the task.
         name: &'static str,
-        /// Its value.
+        /// The invalid value.
         value: f64,
-        /// The range.
+        /// The allowed range, in words.
         allowed: &'static str,
     },
     /// A setting lies outside of its range.
@@ -60,19 +60,19 @@ pub enum Error {
     Setting {
         /// The field of [`Settings`](crate::Settings).
         name: &'static str,
-        /// Its value.
+        /// The invalid value.
         value: f64,
-        /// The range.
+        /// The allowed range, in words.
         allowed: &'static str,
     },
-    /// The effort limit of an actuated coordinate is not positive, so that it cannot be controlled.
+    /// The effort limit of an actuated coordinate is not positive. Such a coordinate cannot be controlled.
     #[error("joint `{joint}`: {origin} is {value}, but it must be above 0")]
     Effort {
         /// The joint's name.
         joint: String,
         /// The limit.
         value: f64,
-        /// The model or the settings, in words.
+        /// Origin of the limit, in words: the model or the settings.
         origin: &'static str,
     },
     /// A knot of a plan has an invalid state.
@@ -80,7 +80,7 @@ pub enum Error {
     Knot {
         /// Index of the knot.
         knot: usize,
-        /// The fault, with the joint and the numbers.
+        /// The error of the state; it names the joint and the numbers.
         error: condyle_dynamics::Error,
     },
     /// A vector does not have the length that the model requires.
@@ -109,10 +109,10 @@ pub enum Status {
     /// certificate of infeasibility.
     #[error("dynamics, contacts, friction cones and limits exclude each other")]
     Infeasible,
-    /// [`Settings::max_iterations`](crate::Settings::max_iterations) were not enough.
+    /// The solver needs more than [`Settings::max_iterations`](crate::Settings::max_iterations) iterations.
     #[error("not solved within the allowed iterations")]
     IterationLimit,
-    /// [`Settings::time_limit`](crate::Settings::time_limit) was not enough.
+    /// The solver needs more time than [`Settings::time_limit`](crate::Settings::time_limit).
     #[error("not solved within the allowed time")]
     TimeLimit,
     /// A factorisation failed, the iterates stopped making progress, or the solution violates its constraints.
@@ -123,7 +123,7 @@ pub enum Status {
     NotFinite {
         /// `q`, `v`, or the field of [`References`](crate::References).
         name: &'static str,
-        /// Index in the flattened argument.
+        /// Index of the number in the flattened argument.
         index: usize,
         /// The number.
         value: f64,
@@ -134,36 +134,36 @@ pub enum Status {
     InvalidState(InvalidRotation),
 }
 
-/// Invalid rotation and its numbers.
+/// An invalid rotation, with its numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum InvalidRotation {
-    /// A quaternion or a pair (cos, sin) that does not have length 1, up to 1e-3.
+    /// A quaternion or a pair (cos, sin) whose length differs from 1 by more than 1e-3.
     Joint {
         /// `q`, or `posture.q` of the references.
         name: &'static str,
-        /// Index of the body that the joint moves.
+        /// Index of the body that the rotating joint moves.
         body: usize,
-        /// Index in q of the first number.
+        /// Index of the rotation's first number in q.
         first: usize,
-        /// Index in q after the last number.
+        /// Index in q after the rotation's last number.
         end: usize,
         /// Length of the quaternion or of the pair.
         length: f64,
     },
-    /// The rotation matrix of a reference's pose is not a rotation, up to 1e-2.
+    /// A matrix in the pose of a reference differs from a rotation by more than 1e-2.
     Pose {
         /// `frames` or `contacts` of the references.
         name: &'static str,
         /// Index of the frame or of the contact.
         index: usize,
-        /// [`Mat3::rotation_error`](condyle_spatial::Mat3::rotation_error).
+        /// Distance from a rotation: [`Mat3::rotation_error`](condyle_spatial::Mat3::rotation_error).
         error: f64,
     },
 }
 
 impl InvalidRotation {
-    /// Returns the fault with its numbers, without the joint or the frame.
+    /// Returns a description of the error with its numbers, but without the joint or the frame.
     pub(crate) fn fault(&self) -> String {
         match *self {
             Self::Joint { name, first, end, length, .. } => {
@@ -191,7 +191,8 @@ impl From<cone_program::Status> for Status {
             cone_program::Status::Infeasible => Self::Infeasible,
             cone_program::Status::IterationLimit => Self::IterationLimit,
             cone_program::Status::TimeLimit => Self::TimeLimit,
-            // The objective is bounded below, and the input numbers were checked: both are numerical failures.
+            // These statuses report numerical failures: the objective is bounded below, and the input numbers were
+            // checked.
             cone_program::Status::Unbounded
             | cone_program::Status::NotFinite { .. }
             | cone_program::Status::NumericalError => Self::NumericalError,

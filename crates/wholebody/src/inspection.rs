@@ -55,18 +55,18 @@ impl Program {
     }
 }
 
-/// Solution of the first priority's solver.
+/// Solution that the solver of the first priority found.
 #[derive(Clone, Debug)]
 pub struct Optimum {
-    /// Accelerations and forces of the contacts that touch.
+    /// x: accelerations, and forces of the contacts that touch.
     pub x: DVector<f64>,
-    /// Unknowns of the solver: the unknowns of x that were not eliminated, or additional ones.
+    /// Unknowns of the solver. They are the unknowns in x that were not eliminated, or x with additional unknowns.
     pub z: DVector<f64>,
     /// Multipliers of the equalities that were not eliminated.
     pub equalities: DVector<f64>,
-    /// Multipliers of the rows: positive at a lower bound.
+    /// Multipliers of the rows of G, positive at a lower bound.
     pub rows: DVector<f64>,
-    /// Multipliers of the cones' rows.
+    /// Multipliers of the rows of the cones.
     pub cones: DVector<f64>,
 }
 
@@ -81,13 +81,13 @@ impl WholeBodyController {
         self.levels.assemble(program, kinds, &self.objective.levels[0]);
     }
 
-    /// Solves the program that was assembled.
+    /// Solves the program that the last call assembled.
     #[doc(hidden)]
     pub fn solve_assembled(&mut self) {
         self.levels.solve_assembled(self.equations.program().1);
     }
 
-    /// Computes the program of the first priority before any elimination.
+    /// Computes the program of the first priority, before any elimination.
     #[doc(hidden)]
     #[track_caller]
     pub fn program(&mut self, q: &[f64], v: &[f64], references: &References) -> Program {

@@ -1,9 +1,10 @@
-//! Kinematics and dynamics of a tick: one pass of `compute_all_terms`, and the requested frames.
+//! Kinematics and dynamics of a tick, computed by one pass of `compute_all_terms`, and the motion of the requested
+//! frames.
 
 use condyle_dynamics::{Data, Force, Model, Motion, ReferenceFrame, Se3, Vec3, compute_all_terms};
 use nalgebra::DMatrix;
 
-/// Pose, velocity, J̇ v and Jacobian J of a frame's origin and rotation, along the world's axes.
+/// Motion of a frame's origin and rotation, along the world's axes: pose, velocity, J̇ v and Jacobian J.
 #[derive(Clone, Debug)]
 pub(crate) struct FrameMotion {
     /// Index of the frame in the model.
@@ -16,7 +17,7 @@ pub(crate) struct FrameMotion {
     pub drift: Motion<f64>,
     /// J, 6 × nv.
     pub J: DMatrix<f64>,
-    /// Coordinates that move the frame: columns of J that may be non-zero.
+    /// Coordinates that move the frame: only these columns of J may be non-zero.
     pub support: Vec<usize>,
 }
 
@@ -42,7 +43,7 @@ pub(crate) struct Kinematics {
     pub Ag: DMatrix<f64>,
     /// Mass of all moving bodies (kg).
     pub mass: f64,
-    /// Motion of each frame listed in [`new`](Self::new), in the same order; each frame occurs once.
+    /// Motion of each frame listed in [`new`](Self::new), in the same order, each frame once.
     pub frames: Vec<FrameMotion>,
 }
 

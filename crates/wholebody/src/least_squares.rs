@@ -6,17 +6,17 @@ use nalgebra::DMatrix;
 /// Rows of one priority, with memory for all tasks and unknowns.
 #[derive(Clone, Debug)]
 pub(crate) struct LeastSquares {
-    /// Rᵀ: a column for each row, multiplied by √w of its task.
+    /// Rᵀ, with a column for each row of R; each column is multiplied by √w of its task.
     pub Rt: DMatrix<f64>,
-    /// b, multiplied by √w of the task.
+    /// b; each entry is multiplied by √w of its task.
     pub b: Vec<f64>,
-    /// Number of rows.
+    /// Number of rows in use.
     pub count: usize,
     /// d.
     pub diagonal: Vec<f64>,
     /// c.
     pub linear: Vec<f64>,
-    /// Unknowns whose d contains a task, not only regularisation.
+    /// Unknowns whose entry of d comes from a task, not only from the regularisation.
     pub single: Vec<usize>,
     /// Number of unknowns.
     unknowns: usize,
@@ -44,7 +44,7 @@ impl LeastSquares {
         self.single.clear();
     }
 
-    /// Adds ½ w (r x − b)²; `fill` writes r into a row of zeros.
+    /// Adds the row ½ w (r x − b)²; `fill` writes r into a slice of zeros.
     pub(crate) fn add_row(&mut self, weight: f64, b: f64, fill: impl FnOnce(&mut [f64])) {
         let root = weight.sqrt();
         let stride = self.Rt.nrows();
@@ -58,13 +58,13 @@ impl LeastSquares {
         self.count += 1;
     }
 
-    /// Adds ½ w (x_i − a)², up to a constant.
+    /// Adds ½ w (x_i − a)² up to a constant.
     pub(crate) fn add_single(&mut self, i: usize, weight: f64, a: f64) {
         self.diagonal[i] += weight;
         self.linear[i] -= weight * a;
     }
 
-    /// Writes P and c of a program in the same unknowns.
+    /// Writes P and c of a program with the same unknowns.
     pub(crate) fn write(&self, program: &mut ConeProgram) {
         let n = self.unknowns;
         for j in 0..n {
@@ -84,7 +84,7 @@ impl LeastSquares {
     }
 }
 
-/// Returns xᵀ y over the length of y, which is the shorter one; with eight partial sums.
+/// Returns xᵀ y over the length of y, which must not be longer than x. Uses eight partial sums.
 pub(crate) fn dot(x: &[f64], y: &[f64]) -> f64 {
     let x = &x[..y.len()];
     let ((xs, x), (ys, y)) = (x.as_chunks::<8>(), y.as_chunks::<8>());

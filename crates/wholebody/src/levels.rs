@@ -1,7 +1,8 @@
 //! Solves the program priority by priority: later priorities keep the results of earlier ones.
 //!
-//! All minimisers of ½ ‖R x − b‖² over a convex set have the same R x. The equality R x = R x* therefore describes all
-//! of them. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014), section 2.
+//! All minimisers of ½ ‖R x − b‖² over a convex set have the same R x. So the equality R x = R x*, with any minimiser
+//! x*, describes all minimisers. Source: Escande, Mansard and Wieber, *Hierarchical quadratic programming* (2014),
+//! section 2.
 
 use crate::basis::Elimination;
 use crate::condense::{Condenser, Known};
@@ -18,39 +19,40 @@ use crate::numbers::Reader;
 use crate::settings::{Backend, Form, Settings};
 use condyle_linalg::max_abs;
 
-/// Amount by which bounds and cones are widened for later priorities (relative to 1 + the bound; N). Equalities of
-/// earlier priorities may leave rows and cones without an interior, which interior-point methods need.
+/// Amount by which bounds and cones are widened for later priorities: relative to 1 + |bound| for rows, in N for cones.
+/// The equalities that hold earlier priorities may leave rows and cones without an interior, which interior-point
+/// methods need.
 const WIDENED: f64 = 1e-7;
 
-/// Relative size of a row's coefficients, compared with the original ones, below which the held equalities decide the
-/// row.
+/// Ratio of a row's coefficients after and before the elimination, below which the equalities of earlier priorities
+/// already determine the row's value.
 const DECIDED: f64 = 1e-9;
 
-/// Program that a priority's solver receives.
+/// Form of the program that the solver of a priority receives.
 pub(crate) enum Given {
-    /// A program without equalities.
+    /// A program whose equalities were eliminated.
     Condensed(Box<Condenser>, ConeProgram),
-    /// A sparse program.
+    /// A sparse program with additional unknowns.
     #[cfg(feature = "clarabel")]
     Lifted(Lifted),
     /// The original program.
     Full(ConeProgram),
 }
 
-/// Solvers of all priorities, and the solution.
+/// Solvers of all priorities, and their last solution.
 pub(crate) struct Levels {
     solvers: Vec<Box<dyn Solver + Send + Sync>>,
     pub given: Vec<Given>,
     /// Last solution of each solver.
     pub memories: Vec<Memory>,
     warm: bool,
-    /// Last solution.
+    /// x of the last solution.
     pub x: Vec<f64>,
 }
 
 impl Levels {
-    /// Allocates memory for programs up to this size, with `dense` rows that have few zeros and objectives with these
-    /// numbers of rows.
+    /// Allocates memory for programs up to this size, whose first `dense` rows have few zeros, and for objectives with
+    /// these numbers of rows.
     pub(crate) fn new(
         capacity: Size,
         #[cfg_attr(not(feature = "clarabel"), expect(unused_variables))] dense: usize,
@@ -59,7 +61,8 @@ impl Levels {
     ) -> Self {
         let Settings { tolerance, max_iterations, time_limit, form, .. } = *settings;
         let given = |(level, &objective): (usize, &usize)| match (form, settings.backend) {
-            // Held results may depend on contacts and base; only an elimination handles dependent equalities.
+            // Equalities that keep the results of earlier priorities may depend on the equalities of contacts and base.
+            // Only an elimination handles dependent equalities.
             _ if level > 0 => Given::condensed(capacity, objective),
             (Form::Condensed, _) => Given::condensed(capacity, objective),
             #[cfg(feature = "clarabel")]
@@ -81,7 +84,7 @@ impl Levels {
         Self { solvers, given, memories, warm: settings.warm_start, x: vec![0.0; capacity.unknowns] }
     }
 
-    /// Minimises one objective after the other subject to a program, and returns the number of objectives minimised. x
+    /// Minimises one objective after the other subject to a program, and returns the number of minimised objectives. x
     /// is the best solution found, and finite.
     pub(crate) fn solve(
         &mut self,
@@ -110,17 +113,17 @@ impl Levels {
         (all, done)
     }
 
-    /// Writes the first solver's program.
+    /// Writes the program of the first priority for its solver.
     pub(crate) fn assemble(&mut self, program: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         self.given[0].write(program, known, objective);
     }
 
-    /// Returns the first solver's last program.
+    /// Returns the last program of the first priority's solver.
     pub(crate) fn program(&self) -> &ConeProgram {
         self.given[0].program()
     }
 
-    /// Solves the assembled program.
+    /// Solves the program that `assemble` wrote.
     pub(crate) fn solve_assembled(&mut self, known: Known<'_>) {
         self.solve_given(known, 0);
     }
@@ -138,7 +141,7 @@ impl Levels {
         self.solve_given(known, level)
     }
 
-    /// Solves a solver's program, starting from the last solution.
+    /// Solves the program of one priority, starting from the last solution.
     fn solve_given(&mut self, known: Known<'_>, level: usize) -> Outcome {
         let Self { solvers, given, memories, x, warm } = self;
         let (solver, given, memory) = (&mut solvers[level], &mut given[level], &mut memories[level]);
@@ -182,18 +185,18 @@ impl Given {
         }
     }
 
-    /// Returns the elimination, whose pivots are tried first at the next tick.
+    /// Returns the elimination of the first priority. The next tick tries its pivots first.
     pub(crate) fn elimination(&self) -> Option<&Elimination> {
         if let Given::Condensed(condenser, _) = self { Some(&condenser.elimination) } else { None }
     }
 
-    /// Reads the elimination's pivots; `None` if they are invalid.
+    /// Reads the elimination's pivots; returns `None` if they are invalid.
     pub(crate) fn read_elimination(&mut self, from: &mut Reader<'_>) -> Option<()> {
         let Given::Condensed(condenser, _) = self else { return Some(()) };
         condenser.elimination.read(&mut condenser.basis, from)
     }
 
-    /// Writes the solver's program.
+    /// Writes the program in the form that the solver receives.
     fn write(&mut self, from: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         match self {
             Given::Condensed(condenser, program) => condenser.condense(from, known, objective, program),
@@ -206,7 +209,7 @@ impl Given {
         }
     }
 
-    /// Sets x and the multipliers as the solver's start.
+    /// Gives the solver x and the multipliers as its start.
     fn start_from(&mut self, x: &[f64], multipliers: Multipliers<'_>, solver: &mut dyn Solver) {
         match self {
             Given::Condensed(condenser, _) => {
@@ -218,7 +221,7 @@ impl Given {
         }
     }
 
-    /// Computes x from the solver's solution.
+    /// Computes x from the unknowns that the solver found.
     fn read(&self, found: &[f64], x: &mut [f64]) {
         match self {
             Given::Condensed(condenser, _) => condenser.basis.expand(found, x),
@@ -228,7 +231,8 @@ impl Given {
         }
     }
 
-    /// Widens bounds and cones of a condensed program, and removes rows that the held equalities decide.
+    /// Widens bounds and cones of a condensed program, and removes rows whose values earlier priorities already
+    /// determine.
     fn widen(&mut self, full: &ConeProgram) {
         let Given::Condensed(_, program) = self else { return };
         let Size { unknowns, rows, .. } = program.size;
@@ -251,7 +255,7 @@ impl Given {
     }
 }
 
-/// Adds R x = R x* to the equalities.
+/// Adds the equalities R x = R x*, which keep the result of an objective.
 fn hold(program: &mut ConeProgram, objective: &LeastSquares, x: &[f64]) {
     let n = x.len();
     let mut add = |fill: &dyn Fn(&mut [f64])| {

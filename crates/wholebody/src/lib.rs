@@ -15,23 +15,24 @@
 //!              bounds on q̈                             from limits of position and velocity: [`JointLimits`]
 //! ```
 //!
-//! The efforts τ are eliminated: their limits are rows in x. [`Task`]s move the centre of mass, frames, joints, angular
-//! momentum and forces, with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v). Tasks have weights or strict priorities.
-//! [`References`] set the targets of each tick, and which contacts touch. A step always gives a [`Command`] that is
-//! finite and within the torque limits; its [`Status`] tells whether it is the solution. Invalid states and references
-//! also give a status: a quaternion without length 1, a matrix that is not a rotation, a number that is not finite.
+//! The efforts τ are eliminated: their limits become rows in x. [`Task`]s move the centre of mass, frames, joints,
+//! angular momentum and forces, with a* = a_ref + k (x_ref ⊖ x) + d (v_ref − v). Tasks have weights or strict
+//! priorities. [`References`] set the targets of each tick, and tell which contacts touch. A step always returns a
+//! [`Command`] that is finite and within the torque limits. Its [`Status`] tells whether it is the solution. Invalid
+//! states and references also give a status: a quaternion without length 1, a matrix that is not a rotation, a number
+//! that is not finite.
 //!
 //! # Conventions
-//! - q, v, τ as in [condyle_dynamics]; free-flyers' coordinates are not actuated, all others are.
+//! - q, v, τ as in [condyle_dynamics]. Coordinates of free-flyers are not actuated; all others are.
 //! - A contact is a point, an edge or a convex polygon in a frame. Its force acts from the environment on the robot.
 //! - Positions, velocities and accelerations of tasks and contacts are along the world's axes. Accelerations are
 //!   classical: the second derivative of the position.
 //! - [`WholeBodyController::new`] allocates the memory.
-//! - An invalid description is an [`Error`] of `new`; a wrong length panics.
+//! - An invalid description makes `new` return an [`Error`]; an argument of the wrong length causes a panic.
 //!
 //! # Features
-//! On by default: `loaders` (files of robots, and embedded robots) and `threads` (uses rayon). Off by default:
-//! `clarabel` adds `Backend::Clarabel`, a second solver for comparison, with its dependencies.
+//! On by default: `loaders` (reads robots from files, and has embedded robots) and `threads` (uses rayon). Off by
+//! default: `clarabel`, which adds `Backend::Clarabel`, a second solver for comparison, and its dependencies.
 //!
 //! Sources: Sentis and Khatib (2005), operational tasks under contact; Herzog et al. (2016), inverse dynamics as a
 //! program in (q̈, f); Lobo et al. (1998), friction as a second-order cone; Baumgarte (1972), drift; Caron, Pham and
@@ -68,7 +69,7 @@ mod safety;
 mod settings;
 mod task;
 
-/// Solver behind [`Backend::Clarabel`], for programs that also call it directly.
+/// Solver that [`Backend::Clarabel`] uses, for programs that also call it directly.
 #[cfg(feature = "clarabel")]
 pub use clarabel;
 pub use command::{Command, CommandSource};

@@ -1,31 +1,32 @@
-//! The program with additional unknowns for rows with few zeros, so that its matrices have many zeros.
+//! The program with additional unknowns that replace rows with few zeros. Its matrices then have many zeros.
 //!
 //! ```text
 //! minimise     ½ ‖r‖² + ½ Σ dᵢ xᵢ² + cᵀ x                over (x, r, t)
 //! subject to   R x − r = b,  G_d x − t = 0,  l ≤ t ≤ u,  and the equalities, the other rows and the cones of x
 //! ```
 //!
-//! RᵀR is not formed, and a row with two bounds is stored once. The multipliers of rows and cones stay the same.
+//! The product RᵀR is not formed, and a row with two bounds is stored once. The multipliers of rows and cones do not
+//! change.
 
 use crate::condense::Known;
 use crate::cone_program::{ConeProgram, Size};
 use crate::least_squares::LeastSquares;
 
-/// The program, with memory for the largest one.
+/// The lifted program, with memory for the largest one.
 pub(crate) struct Lifted {
     pub program: ConeProgram,
 }
 
 impl Lifted {
-    /// Allocates memory for programs up to this size, with `dense` rows that have few zeros and objectives up to this
-    /// number of rows.
+    /// Allocates memory for programs up to this size, whose first `dense` rows have few zeros, and for objectives up to
+    /// this number of rows.
     pub(crate) fn new(capacity: Size, dense: usize, objective: usize) -> Self {
         let more = dense + objective;
         let capacity = Size { unknowns: capacity.unknowns + more, equalities: capacity.equalities + more, ..capacity };
         Self { program: ConeProgram::new(capacity) }
     }
 
-    /// Writes the lifted form of the program of x with an objective of x.
+    /// Writes the lifted form of a program over x with an objective over x.
     pub(crate) fn write(&mut self, full: &ConeProgram, known: Known<'_>, objective: &LeastSquares) {
         let to = &mut self.program;
         let (Size { unknowns: n, equalities, rows, cone_rows }, most) = (full.size, full.c.len());

@@ -3,13 +3,14 @@
 use crate::settings::JointLimits;
 use condyle_dynamics::{Joint, Model};
 
-/// Minimum width of an interval of accelerations (rad/s²): an interval of this width still has an interior.
+/// Minimum width of an interval of accelerations (rad/s²); a narrower one is widened, because the solver needs an
+/// interior.
 const WIDTH: f64 = 1e-3;
 
-/// A joint with a limit.
+/// A joint with a limit of position or velocity.
 struct Limited {
     coordinate: usize,
-    /// Index of its position in q; `None` if the position has no limit.
+    /// Index of the joint's position in q; `None` if the position has no limit.
     position: Option<usize>,
     lower: f64,
     upper: f64,
@@ -21,7 +22,7 @@ pub(crate) struct AccelerationBounds {
     look_ahead: f64,
     most: f64,
     joints: Vec<Limited>,
-    /// Coordinate, lower and upper bound of each joint in the list.
+    /// Coordinate, lower bound and upper bound of each joint in `joints`.
     pub bounds: Vec<(usize, f64, f64)>,
 }
 
@@ -52,12 +53,12 @@ impl AccelerationBounds {
         Self { look_ahead: settings.look_ahead, most: settings.max_acceleration, joints, bounds }
     }
 
-    /// Computes the bounds at (q, v).
+    /// Computes the bounds at the state (q, v).
     pub(crate) fn update(&mut self, q: &[f64], v: &[f64]) {
         let (T, most) = (self.look_ahead, self.most);
         for (joint, bound) in self.joints.iter().zip(&mut self.bounds) {
             let v = v[joint.coordinate];
-            // (±v_max − v) / T
+            // bounds of the velocity: (±v_max − v) / T
             let (mut lower, mut upper) = (((-joint.speed - v) / T).min(most), ((joint.speed - v) / T).max(-most));
             if let Some(i) = joint.position {
                 let bound = |limit: f64| (limit - q[i]) / (T * T) - 2.0 * v / T;

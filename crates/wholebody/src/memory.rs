@@ -1,15 +1,15 @@
-//! The last solution, from which the next solve starts, even if contacts have changed.
+//! The last solution. The next solve starts from it, even if contacts have changed.
 //!
-//! Every unknown and every constraint keeps its index in a numbering in which all contacts touch. Forces are stored
-//! divided by their contact's activation, so that a force at a ramped limit stays at the limit. The forces of a contact
-//! that begins start from their values when the contact ended.
+//! Every unknown and every constraint has a fixed index, from a numbering in which all contacts touch. Forces are
+//! stored divided by their contact's activation, so that a force at a ramped limit stays at the limit. When a contact
+//! begins, its forces start from the values that they had when it last ended.
 
 use crate::cone_program::{Multipliers, Size};
 
-/// Index of each unknown and constraint in use, in a numbering in which all contacts touch.
+/// Indices of the unknowns and constraints in use, from a numbering in which all contacts touch.
 pub(crate) struct Places {
     pub unknowns: Vec<usize>,
-    /// Scale of each unknown: 1, or the activation of the contact for a force.
+    /// Scale of each unknown in use: the activation of its contact for a force, otherwise 1.
     pub units: Vec<f64>,
     pub equalities: Vec<usize>,
     pub rows: Vec<usize>,
@@ -35,7 +35,7 @@ impl Places {
     }
 }
 
-/// A solution with memory for all contacts, and the part of it that a program needs.
+/// The last solution with entries for all contacts, and a copy of the entries that the present program needs.
 pub(crate) struct Memory {
     /// Whether a solution is stored.
     pub known: bool,
@@ -80,7 +80,7 @@ impl Memory {
         self.known = false;
     }
 
-    /// Stores a solution. Equalities that a solver did not receive have no multipliers.
+    /// Stores a solution. Equalities that the solver did not receive have no multipliers.
     pub(crate) fn keep(&mut self, places: &Places, x: &[f64], multipliers: Multipliers<'_>) {
         let Point { x: all_x, equalities, rows, cones } = &mut self.all;
         for (all, places, values) in [
@@ -97,7 +97,7 @@ impl Memory {
         self.known = true;
     }
 
-    /// Returns x and the multipliers for a program, if a solution is stored.
+    /// Returns the stored x and multipliers for a program, or `None` if no solution is stored.
     pub(crate) fn recall(&mut self, places: &Places) -> Option<(&[f64], Multipliers<'_>)> {
         let Self { known, all, asked } = self;
         let gather = |to: &mut [f64], places: &[usize], all: &[f64]| {

@@ -1,4 +1,4 @@
-//! Tasks at one state: J q̈ = a* − J̇ v, row by row.
+//! Tasks at one state, row by row: J q̈ = a* − J̇ v.
 
 use crate::contact_numbers::ContactNumbers;
 use crate::kinematics::{FrameMotion, Kinematics};
@@ -8,21 +8,21 @@ use crate::settings::Settings;
 use crate::task::{Axes, Gains, Task, TaskKind};
 use condyle_dynamics::{Mat3, Quaternion, Vec3, difference, lie};
 
-/// A task whose names are resolved to indices.
+/// A task in which indices replace the names.
 pub(crate) struct ResolvedTask {
     pub task: Task,
-    /// Index of the frame that it moves, among the frames of the kinematics.
+    /// Index of the frame that the task moves, among the frames of the kinematics.
     pub frame: Option<usize>,
-    /// Index of its target among the frames of the references.
+    /// Index of the task's target among the frames of the references.
     pub target: usize,
-    /// Index of the frame that gives its axes, among the frames of the kinematics.
+    /// Index of the frame that gives the task's axes, among the frames of the kinematics.
     pub axes: Option<usize>,
-    /// Index of the contact whose force it sets.
+    /// Index of the contact whose force the task sets.
     pub contact: Option<usize>,
 }
 
 impl ResolvedTask {
-    /// Returns the maximum number of rows.
+    /// Returns the maximum number of rows of the task.
     pub(crate) fn max_rows(&self) -> usize {
         match self.task.kind {
             TaskKind::Posture => 0,
@@ -31,7 +31,7 @@ impl ResolvedTask {
         }
     }
 
-    /// Adds its rows, one for each axis selected by the mask.
+    /// Adds the rows of the task, one for each axis that the mask selects.
     fn add(&self, k: &Kinematics, contacts: &[ContactNumbers], references: &References, out: &mut LeastSquares) {
         let Gains { stiffness, damping } = self.task.gains;
         let axes = self.axes.map_or(Mat3::identity(), |frame| k.frames[frame].pose.rotation);
@@ -83,7 +83,7 @@ impl ResolvedTask {
         }
     }
 
-    /// Adds rows `from` to `from` + 2 of the centroidal momentum matrix, along some axes.
+    /// Adds rows `from` to `from` + 2 of the centroidal momentum matrix, along the given axes.
     fn add_map(&self, k: &Kinematics, axes: Mat3<f64>, from: usize, scale: f64, b: Vec3<f64>, out: &mut LeastSquares) {
         for (e, _) in axes.columns().into_iter().zip(self.task.mask).filter(|(_, counts)| *counts) {
             let s = e.scale(scale);
@@ -127,7 +127,7 @@ impl ResolvedTask {
         self.add_jacobian(frame, axes, mask, 3, a - frame.drift.angular, out);
     }
 
-    /// Adds rows `from` to `from` + 2 of a frame's Jacobian, along some axes.
+    /// Adds rows `from` to `from` + 2 of the frame's Jacobian, along the given axes.
     fn add_jacobian(
         &self,
         frame: &FrameMotion,
@@ -167,7 +167,7 @@ impl Objective {
         Self { levels, error: vec![0.0; nv], tasks }
     }
 
-    /// Computes the rows at (q, v).
+    /// Computes the rows of all tasks at the state (q, v).
     ///
     /// Each priority is regularised with ½ w_a ‖q̈‖² + ½ w_f Σ ‖f − f_ref‖².
     pub(crate) fn update(
@@ -221,7 +221,7 @@ impl Objective {
 }
 
 impl ResolvedTask {
-    /// Returns the name of the frame that gives a task's axes: its own frame, or another one.
+    /// Returns the name of the frame that gives a task's axes: the frame that the task moves, or another one.
     pub(crate) fn axes_name(task: &Task) -> Option<&str> {
         match &task.axes {
             Axes::World => None,

@@ -1,22 +1,23 @@
-//! The Karush–Kuhn–Tucker conditions of a step's program, before any elimination or scaling.
+//! Errors in the Karush–Kuhn–Tucker conditions of a step's program, before any elimination or scaling.
 
 use crate::controller::WholeBodyController;
 use crate::inspection::{Optimum, Program};
 use crate::references::References;
 use nalgebra::{DVector, DVectorView};
 
-/// Errors of the Karush–Kuhn–Tucker conditions of a step's program of the first priority. At the default
-/// [`tolerance`](crate::Settings::tolerance) the first three are below 1e-7 and the last is below 1e-5. The solver's
-/// tolerance applies to numbers scaled to size one; here forces of 1000 N are compared with accelerations of 1 m/s².
+/// Errors in the Karush–Kuhn–Tucker conditions, for the program of a step's first priority. At the default
+/// [`tolerance`](crate::Settings::tolerance) the first three errors are below 1e-7, and the last is below 1e-5. The
+/// solver's tolerance applies to numbers scaled to size one; here forces of 1000 N are compared with accelerations of 1
+/// m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Optimality {
     /// Gradient P x + c − Aᵀ y − Gᵀ z − Fᵀ w, relative to the largest of its terms.
     pub stationarity: f64,
-    /// Violation of the worst equality, bound or cone, relative to its row and the unknowns.
+    /// Violation of the worst equality, bound or cone, relative to the norm of its row and to the unknowns.
     pub primal: f64,
-    /// Distance of the multipliers from their cones, relative to the multipliers.
+    /// Distance of the cones' multipliers from their cones, relative to these multipliers.
     pub dual: f64,
-    /// Sum of the products of slack variables and multipliers, relative to 1 and the terms of the objective.
+    /// Sum of the products of slack variables and multipliers, relative to 1 + the terms of the objective.
     pub complementarity: f64,
 }
 
@@ -29,9 +30,9 @@ impl Optimality {
 }
 
 impl WholeBodyController {
-    /// Computes the errors of the optimality conditions at the last step, which was at this state and for these
-    /// references. For tests and demonstrations: it assembles the program again, and allocates. The errors have no
-    /// meaning after a safe command, which is not an optimum, nor for a clone before its first step.
+    /// Computes the errors in the optimality conditions at the last step, whose arguments must be given again. This
+    /// function is for tests and demonstrations: it assembles the program again, and allocates. The errors have no
+    /// meaning after a safe command, which is not an optimum, or for a clone before its first step.
     ///
     /// # Panics
     /// If `q`, `v` or a list of the references has the wrong length.
@@ -60,11 +61,11 @@ impl WholeBodyController {
 fn errors(program: &Program, optimum: &Optimum) -> Optimality {
     let Optimum { x, rows: z, cones: w, .. } = optimum;
     let Program { P, c, A, b, G, lower, upper, F, h, cones } = program;
-    // P x + c = Aᵀ y + Gᵀ z + Fᵀ w for some y
+    // At the optimum, P x + c = Aᵀ y + Gᵀ z + Fᵀ w for some y.
     let terms = [P * x, c.clone(), -G.transpose() * z, -F.transpose() * w];
     let gradient = terms.iter().sum::<DVector<f64>>();
     let size = 1.0 + terms.iter().map(DVector::amax).fold(0.0, f64::max);
-    let Q = A.transpose().qr().q(); // the part of the gradient outside of the range of Aᵀ remains
+    let Q = A.transpose().qr().q(); // removes from the gradient what Aᵀ y can cancel
     let stationarity = (&gradient - &Q * Q.tr_mul(&gradient)).amax() / size;
 
     let norm = |M: &nalgebra::DMatrix<f64>, i: usize| M.row(i).norm() * (1.0 + x.norm());
@@ -76,7 +77,7 @@ fn errors(program: &Program, optimum: &Optimum) -> Optimality {
     for i in 0..g.len() {
         let (below, above) = (g[i] - lower[i], upper[i] - g[i]);
         primal = primal.max(f64::max(-below, -above) / norm(G, i));
-        // z⁺ belongs to the lower bound and z⁻ to the upper bound, if it exists
+        // z⁺ is the multiplier of the lower bound and z⁻ of the upper bound, if the bound exists.
         for (z, slack) in [(z[i].max(0.0), below), ((-z[i]).max(0.0), above)] {
             if z > 0.0 {
                 gap += z * slack;

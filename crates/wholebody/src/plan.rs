@@ -1,14 +1,15 @@
-//! A planned motion, given as plain arrays; it serves as references over time.
+//! A planned motion, given as plain arrays, which becomes references over time.
 
 use crate::error::Error;
 use condyle_dynamics::{Joint, Model, difference, interpolate};
 use condyle_linalg::check;
 
-/// A planned motion: states at given times, efforts and gains between them, and the times at which contacts touch.
+/// A planned motion: states at given times, efforts and gains between these times, and the intervals in which contacts
+/// touch.
 ///
-/// [`WholeBodyController::track`](crate::WholeBodyController::track) makes references from it. Between knots, q is
-/// interpolated along the joints' own groups, and v and a = Δv / Δt are interpolated. Two knots may have the same time:
-/// the velocity then jumps there (an impact).
+/// [`WholeBodyController::track`](crate::WholeBodyController::track) makes references from a plan. Between knots, the
+/// position of each joint is interpolated in the joint's Lie group (for example along a rotation), v is interpolated
+/// linearly, and a = Δv / Δt. Two knots may have the same time: the velocity then jumps at this time (an impact).
 ///
 /// ```
 /// use condyle_dynamics::{neutral, robots};
@@ -30,10 +31,10 @@ pub struct Plan {
     controls: usize,
 }
 
-/// Numbers of a [`Plan`] with N + 1 knots.
+/// Arrays of a [`Plan`] with N + 1 knots.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlanData {
-    /// N + 1 times in ascending order; equal times are allowed (s).
+    /// N + 1 times (s) in ascending order; equal times are allowed.
     pub times: Vec<f64>,
     /// States (q, v) of the knots, flat: (N + 1)·(nq + nv).
     pub states: Vec<f64>,
@@ -43,11 +44,11 @@ pub struct PlanData {
     pub gains: Vec<f64>,
     /// Whether each contact touches from each knot to the next, flat: N·contacts.
     pub touches: Vec<bool>,
-    /// Time over which a contact is loaded after it begins to touch, and unloaded before it ends (s); at least 0.
+    /// Time (s) over which a contact is loaded after its beginning, and unloaded before its end; at least 0.
     pub fade: f64,
 }
 
-/// State of a plan.
+/// State of a plan at one time.
 #[derive(Clone, Debug)]
 pub(crate) struct PlannedState {
     pub q: Vec<f64>,
@@ -59,8 +60,8 @@ impl Plan {
     /// Creates a plan for a robot with this number of contacts.
     ///
     /// # Errors
-    /// [`Error`] for arrays of the wrong length, numbers that are not finite, and times that decrease. Also for states
-    /// whose quaternions or pairs (cos, sin) do not have length 1: [`Error::Knot`] names the knot and the joint.
+    /// [`Error`] for arrays of the wrong length, numbers that are not finite, and times that decrease. [`Error::Knot`]
+    /// for a state in which a quaternion or a pair (cos, sin) does not have length 1; it names the knot and the joint.
     pub fn new(model: &Model, contacts: usize, data: PlanData) -> Result<Self, Error> {
         let (nx, nv) = (model.nq() + model.nv(), model.nv());
         let free = model.bodies().iter().skip(1).filter(|b| b.joint == Joint::FreeFlyer).count();
@@ -107,8 +108,8 @@ impl Plan {
         [self.data.times[0], self.data.times[self.data.times.len() - 1]]
     }
 
-    /// Returns the last knot at or before a time that has a successor, and the time's fraction of the interval between
-    /// them.
+    /// Returns the index of the interval between knots that contains time t, and how far t lies in this interval, from
+    /// 0 to 1.
     fn step(&self, t: f64) -> (usize, f64) {
         let times = &self.data.times;
         let after = times.partition_point(|&x| x <= t).clamp(1, times.len() - 1);
@@ -116,8 +117,8 @@ impl Plan {
         (after - 1, if to > from { ((t - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 })
     }
 
-    /// Panics unless the plan was made for this robot or one with the same bodies and joints, and for this number of
-    /// contacts.
+    /// Panics unless the plan fits: it must have been made for this number of contacts, and for this robot or one with
+    /// the same bodies and joints.
     #[track_caller]
     pub(crate) fn check(&self, model: &Model, contacts: usize) {
         let same = self.model.tree_hash() == model.tree_hash();
@@ -125,7 +126,7 @@ impl Plan {
         assert!(self.contacts == contacts, "plan: expected {contacts} contacts, found {}", self.contacts);
     }
 
-    /// Computes q, v and a at a time; before the first and after the last knot the robot rests there.
+    /// Computes q, v and a at a time. Before the first and after the last knot, the robot is at rest.
     pub(crate) fn read(&self, t: f64, out: &mut PlannedState, tangent: &mut [f64]) {
         let (nq, nx) = (self.model.nq(), self.model.nq() + self.model.nv());
         let (k, s) = self.step(t);
@@ -161,12 +162,12 @@ impl Plan {
         ramp(begin.map_or(f64::INFINITY, |k| t - times[k + 1])).min(ramp(end.map_or(f64::INFINITY, |k| times[k] - t)))
     }
 
-    /// Computes the plan's own control at a state, u = ū + K (x ⊖ x̄), as efforts of all coordinates (nv numbers), 0 at
-    /// a free-flyer.
+    /// Computes the control u = ū + K (x ⊖ x̄) of the plan at a state. `tau` gets the efforts of all coordinates (nv
+    /// numbers), 0 at a free-flyer.
     ///
     /// # Errors
-    /// [`Error::Model`] for a state that is not finite, or whose quaternions or pairs (cos, sin) do not have length 1;
-    /// `tau` is then unchanged.
+    /// [`Error::Model`] for a state that is not finite, or with a quaternion or a pair (cos, sin) that does not have
+    /// length 1. `tau` is then unchanged.
     ///
     /// # Panics
     /// If an argument has the wrong length, or the plan has no controls.

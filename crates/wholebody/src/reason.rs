@@ -1,4 +1,4 @@
-//! The status of the last command in words.
+//! Describes the status of the last command in words.
 
 use crate::command::Command;
 use crate::controller::WholeBodyController;

@@ -15,8 +15,8 @@ pub struct ComTarget {
     pub acceleration: Vec3<f64>,
 }
 
-/// Target of a frame. Velocity and acceleration refer to the frame's origin and rotation, along the world's axes:
-/// `linear` is the first and second time derivative of the position (a classical acceleration, not a spatial one).
+/// Target of a frame. Velocity and acceleration refer to the frame's origin and rotation, along the world's axes.
+/// `linear` is the first or second time derivative of the position (a classical acceleration, not a spatial one).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTarget {
     /// Pose oXf.
@@ -27,7 +27,7 @@ pub struct FrameTarget {
     pub acceleration: Motion<f64>,
 }
 
-/// Target of the joints: a state of the robot. Entries of a free-flyer have no effect.
+/// Target of the joints, as a state of the robot. The entries of a free-flyer have no effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PostureTarget {
     /// Position, nq numbers.
@@ -43,31 +43,31 @@ pub struct PostureTarget {
 pub struct MomentumTarget {
     /// Angular momentum (kg m²/s).
     pub momentum: Vec3<f64>,
-    /// Rate of the angular momentum (N m).
+    /// Desired rate of the angular momentum (N m).
     pub rate: Vec3<f64>,
 }
 
-/// Target of a contact: its activation, the pose at which it is held, and the reference of its force; in the world's
-/// frame.
+/// Target of a contact, in the world's frame: activation, pose at which the contact is held, and reference of its
+/// force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactTarget {
     /// α, from 0 (no contact: no force, and the frame may move) to 1 (full contact). Between 0 and 1 the frame is held,
-    /// and the normal force is at most α times the contact's `max_force` (or the robot's weight, if that is infinite).
-    /// A ramp of α over some ticks loads or unloads the contact without a jump in the torques. Numbers outside of 0 to
-    /// 1 are clamped.
+    /// and the normal force is at most α times the contact's `max_force`. If `max_force` is infinite, the robot's
+    /// weight replaces it. A ramp of α over several ticks loads or unloads the contact without a jump in the torques.
+    /// Numbers below 0 or above 1 are clamped.
     pub activation: f64,
-    /// Pose at which the frame is held; acts only if [`Settings::contact_gains`](crate::Settings::contact_gains) have a
-    /// stiffness. For a point, only the translation acts.
+    /// Pose at which the frame is held. It acts only if [`Settings::contact_gains`](crate::Settings::contact_gains)
+    /// have a stiffness. For a point contact, only the translation acts.
     pub pose: Se3<f64>,
     /// Reference force of the environment on the robot, about the frame's origin (N, N m): a planned force, or a share
     /// of the weight.
     pub force: Force<f64>,
 }
 
-/// References of all tasks during one tick. [`hold`](crate::WholeBodyController::hold) makes initial references.
+/// References of all tasks during one tick. [`hold`](crate::WholeBodyController::hold) returns initial references.
 ///
-/// [`step`](crate::WholeBodyController::step) checks them. Numbers must be finite, and quaternions and pairs (cos, sin)
-/// must have length 1 (up to 1e-3). Rotation matrices must be rotations (up to 1e-2, in
+/// [`step`](crate::WholeBodyController::step) checks the references. Numbers must be finite. Quaternions and pairs
+/// (cos, sin) must have length 1 (up to 1e-3). Matrices of poses must be rotations (up to 1e-2, measured by
 /// [`rotation_error`](condyle_spatial::Mat3::rotation_error)).
 ///
 /// ```
@@ -86,18 +86,18 @@ pub struct ContactTarget {
 pub struct References {
     /// Target of the centre of mass.
     pub com: ComTarget,
-    /// Target of each task that moves a frame, in the same order.
+    /// Target of each task that moves a frame, in the order of the tasks.
     pub frames: Vec<FrameTarget>,
     /// Target of the joints.
     pub posture: PostureTarget,
     /// Target of the angular momentum.
     pub momentum: MomentumTarget,
-    /// Target of each [`FrictionContact`](crate::FrictionContact), in the same order.
+    /// Target of each [`FrictionContact`](crate::FrictionContact), in the order of the contacts.
     pub contacts: Vec<ContactTarget>,
 }
 
 impl References {
-    /// Rejects infinite and NaN numbers, and invalid rotations.
+    /// Returns `Err` for infinite and NaN numbers, and for invalid rotations.
     pub(crate) fn check(&self, model: &Model) -> Result<(), Status> {
         self.finite()?;
         valid_rotations("posture.q", model, &self.posture.q)?;
@@ -105,7 +105,7 @@ impl References {
         self.contacts.iter().enumerate().try_for_each(|(k, target)| rotates("contacts", k, &target.pose))
     }
 
-    /// Rejects infinite and NaN numbers.
+    /// Returns `Err` for infinite and NaN numbers.
     fn finite(&self) -> Result<(), Status> {
         let ComTarget { position, velocity, acceleration } = self.com;
         finite("com", [position, velocity, acceleration].into_iter().flat_map(Vec3::to_array))?;
@@ -119,19 +119,19 @@ impl References {
     }
 }
 
-/// Returns the translation, then the rotation by columns.
+/// Yields the numbers of the translation, then of the rotation matrix column by column.
 fn pose(Se3 { rotation, translation }: Se3<f64>) -> impl Iterator<Item = f64> {
     [translation, rotation.x, rotation.y, rotation.z].into_iter().flat_map(Vec3::to_array)
 }
 
-/// Returns `Ok` if all rotations of a position have length 1; the numbers are finite.
+/// Returns `Ok` if all quaternions and pairs (cos, sin) of q have length 1. The numbers must be finite.
 pub(crate) fn valid_rotations(name: &'static str, model: &Model, q: &[f64]) -> Result<(), Status> {
     let Some(fault) = model.rotation_fault(q) else { return Ok(()) };
     let PositionFault { body, first, end, value: length } = fault;
     Err(Status::InvalidState(InvalidRotation::Joint { name, body, first, end, length }))
 }
 
-/// Returns `Ok` if the rotation of a target's pose is valid; its numbers are finite.
+/// Returns `Ok` if the rotation of a target's pose is valid. The numbers must be finite.
 fn rotates(name: &'static str, index: usize, pose: &Se3<f64>) -> Result<(), Status> {
     let error = pose.rotation.rotation_error();
     if error <= ROTATION_ROUNDING {

@@ -1,4 +1,5 @@
-//! Safe command for ticks without a solution: the last solution for some ticks, then gravity compensation with damping.
+//! Safe command for ticks without a solution. For some ticks it repeats the last solution; then it is gravity
+//! compensation with damping.
 
 use crate::contact_numbers::ContactNumbers;
 use crate::kinematics::Kinematics;
@@ -8,9 +9,9 @@ use nalgebra::{Matrix6, Vector6};
 /// Quantities from which the safe command is computed.
 pub(crate) struct Safety {
     data: Data<f64>,
-    /// Torques of the last solution; 0 before the first.
+    /// Torques of the last solution; 0 before the first solution.
     pub tau: Vec<f64>,
-    /// Number of ticks since the last solution; `None` before the first.
+    /// Number of ticks since the last solution; `None` before the first solution.
     pub age: Option<u32>,
     /// Last valid position.
     pub q: Vec<f64>,
@@ -46,7 +47,7 @@ impl Safety {
         }
     }
 
-    /// Stores the state of a tick, if it is valid.
+    /// Stores the state of a tick, or notes that it is invalid (`None`).
     pub(crate) fn see(&mut self, state: Option<(&[f64], &[f64])>) {
         self.current = state.is_some();
         if let Some((q, v)) = state {
@@ -69,7 +70,7 @@ impl Safety {
         }
     }
 
-    /// Writes the torques of a tick without a solution. Returns whether they are the torques of the last solution.
+    /// Writes the torques of a tick without a solution. Returns whether these are the torques of the last solution.
     pub(crate) fn command(
         &mut self,
         kinematics: &mut Kinematics,
@@ -87,17 +88,18 @@ impl Safety {
             for (i, tau) in tau.iter_mut().enumerate() {
                 let effort = self.effort[1][i].min(-self.effort[0][i]);
                 let scale = if effort.is_finite() { effort } else { 1.0 };
-                *tau -= self.damping * scale * self.v[i]; // −D v
+                *tau -= self.damping * scale * self.v[i]; // damping: −D v
             }
         }
         free.iter().for_each(|&i| tau[i] = 0.0);
         self.clip(tau);
-        // positions and velocities of 1e300 overflow
+        // Positions and velocities of 1e300 overflow: their torques become 0.
         tau.iter_mut().filter(|tau| !tau.is_finite()).for_each(|tau| *tau = 0.0);
         false
     }
 
-    /// Computes τ = g − Jᵀ f, with the smallest forces of the active contacts that carry the base: S (g − Jᵀ f) = 0.
+    /// Computes τ = g − Jᵀ f. The forces f are the smallest forces of the active contacts that carry the base, S (g −
+    /// Jᵀ f) = 0.
     fn gravity_compensation(
         &mut self,
         kinematics: &mut Kinematics,
@@ -112,7 +114,7 @@ impl Safety {
         let frames = &kinematics.frames;
         let rows = |c: &ContactNumbers| if c.geometry.motion.len() == 3 { 3 } else { 6 };
         let active = || contacts.iter().filter(|c| c.active);
-        // f = J_b λ with (Σ J_bᵀ J_b) λ = g_b
+        // f = J_b λ, where (Σ J_bᵀ J_b) λ = g_b
         let mut gram = Matrix6::identity() * 1e-9;
         for c in active() {
             for r in 0..rows(c) {

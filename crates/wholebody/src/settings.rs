@@ -5,7 +5,7 @@ use crate::task::Gains;
 use condyle_dynamics::{Joint, Model};
 use std::fmt;
 
-/// Description of the friction cone.
+/// Description of friction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Friction {
@@ -27,7 +27,7 @@ pub enum Backend {
     /// Clarabel, the reference solver. Needs the feature `clarabel`, which is off by default.
     #[cfg(feature = "clarabel")]
     Clarabel,
-    /// Our own dense interior point method, warm-started from the last tick.
+    /// Condyle's own dense interior-point method, warm-started from the last tick.
     InteriorPoint,
 }
 
@@ -41,19 +41,19 @@ impl fmt::Display for Backend {
     }
 }
 
-/// Unknowns in which the program is solved; the solution is the same.
+/// Unknowns of the program that the solver receives. The solution does not depend on them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Form {
     /// The equalities of the base and of the contacts are eliminated first.
     Condensed,
-    /// All of (q̈, f), with equalities, for comparison: slower. Clarabel gets additional unknowns, for limited torques
-    /// and for residuals of tasks, so that its matrices have more zeros. Priorities after the first are always
-    /// condensed.
+    /// All unknowns (q̈, f), with equalities. This form is slower; it is for comparison. Clarabel gets additional
+    /// unknowns for limited torques and for residuals of tasks, so that its matrices have more zeros. Priorities after
+    /// the first are always condensed.
     Full,
 }
 
-/// Limits of the joints' position and velocity, as bounds on their acceleration.
+/// Limits of the joints' positions and velocities, as bounds on their accelerations.
 ///
 /// ```text
 /// velocity   (v_min − v) / T ≤ q̈ ≤ (v_max − v) / T
@@ -61,22 +61,23 @@ pub enum Form {
 ///            (the distance d obeys d̈ ≥ −(2 / T) ḋ − d / T²)
 /// ```
 ///
-/// A lower bound is at most a_max, and an upper bound is at least −a_max. A joint beyond its limit, or too fast towards
-/// it, is therefore led back with at most a_max. If bounds of position and velocity contradict each other, the
-/// position's bound holds. A joint approaches its limit no faster than a critically damped spring with time constant T,
-/// and does not pass it (an exponential control barrier function: Nguyen and Sreenath, 2016). If dynamics, contacts and
-/// torques allow no acceleration within these bounds, the bounds become tasks of large weight at that tick.
+/// A lower bound is at most a_max, and an upper bound is at least −a_max. So a joint that is beyond its limit, or
+/// approaches it too fast, is led back with at most a_max. If the bounds of position and velocity contradict each
+/// other, the bound of the position holds. A joint approaches its limit no faster than a critically damped spring with
+/// time constant T would, and does not pass the limit (an exponential control barrier function: Nguyen and Sreenath,
+/// 2016). If dynamics, contacts and torques allow no acceleration within these bounds, the bounds become tasks of large
+/// weight at that tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointLimits {
-    /// T (s), the look-ahead time; at least several ticks.
+    /// T (s), the look-ahead time; at least the duration of several ticks.
     pub look_ahead: f64,
     /// a_max (rad/s², m/s²).
     pub max_acceleration: f64,
-    /// Minimum position, nq numbers; `None` for the model's.
+    /// Minimum position, nq numbers; `None` takes the limits of the model.
     pub lower: Option<Vec<f64>>,
-    /// Maximum position, nq numbers; `None` for the model's.
+    /// Maximum position, nq numbers; `None` takes the limits of the model.
     pub upper: Option<Vec<f64>>,
-    /// Maximum speed, nv numbers; `None` for the model's.
+    /// Maximum speed, nv numbers; `None` takes the limits of the model.
     pub velocity: Option<Vec<f64>>,
 }
 
@@ -97,37 +98,38 @@ impl Default for JointLimits {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Weight of ½ ‖q̈‖², which decides the motion that the tasks leave open; above 0.
+    /// Weight of ½ ‖q̈‖², which determines the motion that the tasks leave open; above 0.
     pub acceleration_weight: f64,
-    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which distributes the forces; above 0. A moment of a sole's wrench counts as
-    /// the corner forces that cause it, so that the pressure stays away from the edges.
+    /// Weight of ½ Σ ‖f − f_ref‖² (1/N²), which distributes the forces; above 0. A moment of a sole's wrench costs as
+    /// much as the corner forces that cause it, so that the pressure stays away from the edges.
     pub force_weight: f64,
-    /// Baumgarte gains: a contact's acceleration is k (X_ref ⊖ X) − d v instead of 0.
+    /// Baumgarte gains: the acceleration of a contact is k (X_ref ⊖ X) − d v instead of 0.
     pub contact_gains: Gains,
-    /// Maximum acceleration from `contact_gains` (m/s², rad/s²): a foot that lands fast is stopped over several ticks.
+    /// Maximum acceleration that `contact_gains` may cause (m/s², rad/s²): a foot that lands fast is stopped over
+    /// several ticks.
     pub max_correction: f64,
-    /// Friction cones or pyramids.
+    /// Description of friction: cones or pyramids.
     pub friction: Friction,
-    /// Maximum effort of each coordinate, nv numbers (N m, N), infinite for no limit; `None` for the model's. Above 0
-    /// for each actuated coordinate.
+    /// Maximum effort of each coordinate, nv numbers (N m, N); infinite for no limit. `None` takes the limits of the
+    /// model. The effort of each actuated coordinate is above 0.
     pub effort: Option<Vec<f64>>,
-    /// Limits of the joints' position and velocity; `None` for no limits.
+    /// Limits of the joints' positions and velocities; `None` for no limits.
     pub joint_limits: Option<JointLimits>,
-    /// Number of ticks after the last solution for which its torques serve as the safe command.
+    /// Number of ticks after the last solution in which its torques serve as the safe command.
     pub hold_ticks: u32,
-    /// Damping of the safe command that follows: −D v, with D = this factor (s/rad) times the maximum effort.
+    /// Damping of the safe command after `hold_ticks`: −D v, where D is this factor (s/rad) times the maximum effort.
     pub damping: f64,
     /// Solver of the programs.
     pub backend: Backend,
-    /// Unknowns of the program.
+    /// Unknowns of the program that the solver receives.
     pub form: Form,
     /// Whether the solver starts from the last tick's solution, if possible.
     pub warm_start: bool,
-    /// Tolerance of the solver, absolute and relative, on feasibility and duality gap.
+    /// Tolerance of the solver for feasibility and for the duality gap, absolute and relative.
     pub tolerance: f64,
-    /// Iterations after which a step fails.
+    /// Number of iterations after which a step fails.
     pub max_iterations: u32,
-    /// Seconds after which a step fails; may be infinite. With a finite limit, results depend on the machine's load.
+    /// Time after which a step fails (s); may be infinite. With a finite limit, results depend on the machine's load.
     pub time_limit: f64,
 }
 
@@ -210,7 +212,8 @@ impl Settings {
             let coordinates = body.idx_v..body.idx_v + body.joint.nv();
             let mut limits = coordinates.flat_map(|i| [-least[i], greatest[i]]);
             if body.joint == Joint::FreeFlyer {
-                let wrong = limits.find(|&x| x.is_nan() || x < 0.0); // no motor acts here
+                // Finds an invalid limit of a coordinate on which no motor acts
+                let wrong = limits.find(|&x| x.is_nan() || x < 0.0);
                 let error = |value: f64| Error::Setting { name: "effort", value, allowed: "at least 0" };
                 wrong.map_or(Ok(()), |value| Err(error(value)))?;
             } else if let Some(value) = limits.find(|&x| x.is_nan() || x <= 0.0) {
@@ -220,7 +223,7 @@ impl Settings {
         Ok(())
     }
 
-    /// Returns the least and the greatest effort of each coordinate.
+    /// Returns the minimum and the maximum effort of each coordinate.
     pub(crate) fn effort(&self, model: &Model) -> [Vec<f64>; 2] {
         let limits = model.limits();
         match &self.effort {

@@ -1,4 +1,4 @@
-//! Tasks of a controller, given once.
+//! Tasks of a controller, which stay the same for all ticks.
 
 use crate::error::Error;
 
@@ -12,7 +12,7 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// Returns the gains for a critically damped error with this stiffness (1/s²): d = 2 √k.
+    /// Returns the gains k and d for critical damping, from a stiffness k (1/s²): d = 2 √k.
     ///
     /// ```
     /// assert_eq!(condyle_wholebody::Gains::critical(100.0).damping, 20.0);
@@ -34,14 +34,14 @@ pub enum TaskKind {
     Position(String),
     /// Rotation of a frame, ω̇: 3 numbers.
     Orientation(String),
-    /// Velocity of a frame's origin and rotation, at any pose (only the gain d acts): 6 numbers, linear first.
+    /// Velocity of a frame's origin and rotation, whatever its pose (only the gain d acts): 6 numbers, linear first.
     Velocity(String),
     /// Actuated joints, q̈.
     Posture,
     /// Rate of the angular momentum about the centre of mass (only the gain d acts): 3 numbers.
     AngularMomentum,
-    /// Force of the contact of this frame: 6 numbers, force and moment at the contact's centre along its axes (t₁, t₂,
-    /// n); the first 3 for a point. Gains have no effect, and the task is off while the contact is off.
+    /// Force of the contact of this frame: 6 numbers, force and moment at the contact's centre, along its axes (t₁, t₂,
+    /// n). A point contact has only the first 3. Gains have no effect, and the task is off while the contact is off.
     ContactForce(String),
 }
 
@@ -54,7 +54,7 @@ impl TaskKind {
         }
     }
 
-    /// Returns the name that errors use.
+    /// Returns the name of the task in error messages.
     pub(crate) fn name(&self) -> &str {
         match self {
             Self::Com => "com",
@@ -65,22 +65,22 @@ impl TaskKind {
     }
 }
 
-/// Axes of a task's numbers, from which its mask selects.
+/// Axes along which the numbers of a task are measured; the mask selects among these numbers.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Axes {
     /// The world's axes.
     World,
-    /// The frame's own axes; for tasks that move no frame, the world's axes.
+    /// The axes of the frame that the task moves; for tasks that move no frame, the world's axes.
     Local,
     /// The axes of another frame, by name: for example, a foot along the trunk's axes.
     Frame(String),
 }
 
-/// A quantity to be controlled: ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖². Its target is in the
-/// [`References`](crate::References).
+/// A quantity to be controlled, with the cost ½ w ‖mask ∘ (J q̈ + J̇ v − a*)‖². The [`References`](crate::References)
+/// contain its target.
 ///
-/// Tasks of priority 0 come first. Tasks of priority 1 decide only the motion that priority 0 leaves open, and so on
+/// Tasks of priority 0 come first. Tasks of priority 1 determine only the motion that priority 0 leaves open, and so on
 /// (lexicographic). Within a priority the weights decide, and only their ratios matter.
 ///
 /// ```
@@ -93,15 +93,16 @@ pub enum Axes {
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Task {
-    /// The quantity.
+    /// The controlled quantity.
     pub kind: TaskKind,
-    /// w; at least 0. A task with weight 0 has no effect.
+    /// w, the weight; at least 0. A task with weight 0 has no effect.
     pub weight: f64,
     /// Gains from errors of position and velocity to acceleration.
     pub gains: Gains,
-    /// Selects the numbers that count; tasks with 3 numbers use the first 3 entries. For the posture, use `joints`.
+    /// Selects the numbers of the task that count. Tasks with 3 numbers use the first 3 entries; the posture uses
+    /// `joints` instead.
     pub mask: [bool; 6],
-    /// Axes of the numbers.
+    /// Axes of the task's numbers.
     pub axes: Axes,
     /// Priority: 0 is the highest, at most 2.
     pub priority: usize,
@@ -115,7 +116,8 @@ impl Task {
         Self { kind, weight, gains, mask: [true; 6], axes: Axes::World, priority: 0, joints: Vec::new() }
     }
 
-    /// Creates a task for the centre of mass: weight 10, critically damped at k = 100/s², as all tasks are.
+    /// Creates a task for the centre of mass, with weight 10. Like all tasks here, it is critically damped with k =
+    /// 100/s².
     pub fn com() -> Self {
         Self::new(TaskKind::Com, 10.0)
     }

@@ -1,4 +1,4 @@
-//! Steps allocate nothing, except what clarabel allocates.
+//! A step allocates nothing, unless clarabel is the back end.
 
 mod common;
 #[path = "../../../tests/common/counting.rs"]
@@ -9,8 +9,8 @@ use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Settings, Task, WholeBodyController};
 use counting::allocated;
 
-/// Assembly and our solver allocate nothing, for all contacts. Clarabel allocates once in a solve, and more for a new
-/// set of contacts.
+/// The assembly and Condyle's own solver allocate nothing, for all contacts. Clarabel allocates once in a solve, and
+/// more for a new set of contacts.
 #[test]
 fn assembly_allocates_nothing() {
     let model = robots::humanoid();
@@ -29,14 +29,14 @@ fn assembly_allocates_nothing() {
                 }
                 let before = allocated();
                 controller.step(&q, &v, &references).solved().unwrap();
-                // clarabel allocates once for each priority, unless earlier priorities leave nothing open
+                // Clarabel allocates once for each priority, unless earlier priorities leave no freedom.
                 let allowed = if backend == Backend::Clarabel { priority + 1 } else { 0 };
                 if round > 0 || backend == Backend::InteriorPoint {
                     assert!(allocated() - before <= allowed, "set {set}: {}", allocated() - before);
                 }
             }
         }
-        // a safe command allocates nothing
+        // A step with a safe command allocates nothing, too.
         references.com.position.x = f64::NAN;
         for _ in 0..10 {
             let before = allocated();

@@ -1,4 +1,4 @@
-//! Every command satisfies dynamics, contacts and cones, and is optimal.
+//! Each command satisfies dynamics, contacts and cones, and is optimal.
 #![allow(non_snake_case)]
 
 mod common;
@@ -16,7 +16,7 @@ fn standing_still() {
     let references = controller.hold(&q).unwrap();
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
-    // All tasks agree with rest, except the equal shares of the weight, which have a weight of 1e-7.
+    // All tasks can be met at rest, except the equal shares of the weight, which have a weight of 1e-7.
     assert!(max_abs(command.a.iter().copied()) < 1e-2, "{:?}", command.a);
     for (contact, &f) in contacts.iter().zip(&command.forces) {
         assert!(margin(contact, f) > 10.0, "{f:?}");
@@ -54,7 +54,7 @@ fn a_humanoid_on_two_points() {
     }
 }
 
-/// A single task for the centre of mass is met exactly, so q̈ is a minimiser regardless of the solver's report.
+/// A single task for the centre of mass is met exactly. So q̈ is a minimiser, whatever the solver reports.
 #[test]
 fn a_feasible_task_is_met() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -67,26 +67,27 @@ fn a_feasible_task_is_met() {
     assert!(norm(c - references.com.acceleration) < 1e-5, "{c:?}");
 }
 
-/// On ice, the requested push needs more friction than is available, so the forces lie on their cones.
+/// On ice, the requested push needs more friction than is available. So the forces lie on the boundaries of their
+/// cones.
 #[test]
 fn little_friction_tilts_forces_to_the_cone() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let contacts = feet(0.1);
     let mut controller = controller(&model, &contacts);
     let mut references = controller.hold(&q).unwrap();
-    references.com.acceleration.x = 3.0; // 0.1 · 9.81 is feasible
+    references.com.acceleration.x = 3.0; // 0.1 · 9.81 would be feasible
     let command = controller.step(&q, &v, &references).solved().unwrap();
     check(&model, &contacts, &q, &v, &references, command);
     for (contact, &f) in contacts.iter().zip(&command.forces) {
         assert!(margin(contact, f) < 1e-4 * f.linear.z, "{f:?} is inside of its cone");
         assert!(f.linear.x > 0.0);
     }
-    // ẍ = Σ f_x / m = μ Σ f_z / m, all forces pointing forward
+    // ẍ = Σ f_x / m = μ Σ f_z / m, if all forces point forward
     let c = command.com_acceleration;
     assert!((c.x - 0.1 * (c.z + 9.81)).abs() < 0.02, "{c:?}");
 }
 
-/// Friction is a cone, not a pyramid: the greatest friction force is the same in every direction.
+/// Friction is a cone, not a pyramid: the greatest friction force is equal in all directions.
 #[test]
 fn friction_has_no_preferred_direction() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -108,7 +109,7 @@ fn torque_limits_bind() {
     let contacts = feet(0.7);
     let free = controller(&model, &contacts).step(&q, &v, &{ controller(&model, &contacts).hold(&q).unwrap() }).clone();
     let strongest = max_abs(free.tau.iter().copied());
-    let limit = 0.5 * strongest; // internal forces cannot compensate
+    let limit = 0.5 * strongest; // internal forces cannot compensate for this limit
     let settings = Settings { effort: Some(vec![limit; 18]), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks(), settings).unwrap();
     let references = controller.hold(&q).unwrap();
@@ -133,24 +134,24 @@ fn force_bounds_bind() {
     assert!(command.forces[0].linear.z < 50.0 + EQUALITY && command.forces[3].linear.z > 95.0 - EQUALITY);
 }
 
-/// The same robot on tilted ground and in a tilted world gives the same result.
+/// A robot on tilted ground and the same robot in a tilted world get the same result.
 #[test]
 fn a_slope_is_a_tilted_world() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
     let slope = 0.3f64;
     let (sin, cos) = slope.sin_cos();
-    // The ground is level and gravity leans back.
+    // In the first case the ground is level, and gravity leans backwards.
     let leaning = model.clone().with_gravity(Vec3::new(-9.81 * sin, 0.0, -9.81 * cos)).unwrap();
     let contacts = feet(0.5);
     let mut level = controller(&leaning, &contacts);
     let references = level.hold(&q).unwrap();
     let expected = level.step(&q, &v, &references).solved().unwrap().clone();
-    // Gravity is vertical; base and normals are rotated by −slope about y.
+    // In the second case gravity is vertical, and base and normals are rotated by −slope about y.
     let mut turned = q.clone();
     let (s, c) = (-slope / 2.0).sin_cos();
     let (x, z) = (q[0], q[2]);
     turned[..7].copy_from_slice(&[x * cos - z * sin, q[1], x * sin + z * cos, 0.0, s, 0.0, c]);
-    let normal = Normal::World(Vec3::new(-2.0 * sin, 0.0, 2.0 * cos)); // of any length
+    let normal = Normal::World(Vec3::new(-2.0 * sin, 0.0, 2.0 * cos)); // a normal may have any length
     let contacts: Vec<_> = contacts.into_iter().map(|c| FrictionContact { normal, ..c }).collect();
     let mut tilted = controller(&model, &contacts);
     let references = tilted.hold(&turned).unwrap();
@@ -195,10 +196,10 @@ fn what_cannot_be_is_infeasible() {
     let contacts: Vec<_> = feet(0.7).into_iter().map(|c| FrictionContact { min_force: 1000.0, ..c }).collect();
     let mut controller = controller(&model, &contacts);
     let references = controller.hold(&q).unwrap();
-    assert_eq!(controller.step(&q, &v, &references).status, Status::Infeasible); // knees with 80 N m
+    assert_eq!(controller.step(&q, &v, &references).status, Status::Infeasible); // the knees have only 80 N m
 }
 
-/// With no active inequality, the command solves a linear system. The test builds the system from other functions:
+/// Without an active inequality, the command solves a linear system. The test builds this system from other functions:
 /// columns of M and of Jacobians are differences of RNEA and of accelerations along a path.
 #[test]
 fn inside_all_cones_the_kkt_system_is_solved() {
@@ -213,7 +214,7 @@ fn inside_all_cones_the_kkt_system_is_solved() {
         assert!(margin(contact, f) > 1.0, "the state is chosen inside of all cones: {f:?}");
     }
 
-    let (nv, n, rows) = (18, 30, 18); // x = (q̈, f); free base and four feet
+    let (nv, n, rows) = (18, 30, 18); // x = (q̈, f), rows of the free base and of four feet
     let mut data = Data::new(&model);
     let mut at = |a: &[f64]| {
         let (feet, com) = accelerations(&model, &contacts, &q, &v, a);
@@ -238,11 +239,11 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     (0..6).for_each(|i| b[i] = -h[i]);
     (0..12).for_each(|i| b[6 + i] = -feet_bias[i]);
 
-    let mut Jw = DMatrix::zeros(6, nv); // ω of the root is R ω_b, so its ω̇ at q̈ = 0 is R (ω_b × ω_b) = 0
+    let mut Jw = DMatrix::zeros(6, nv); // The root's ω is R ω_b, so its ω̇ at q̈ = 0 is R (ω_b × ω_b) = 0.
     let placements = forward_kinematics(&model, &mut data, &q);
     placements.frame_jacobian(model.frame("trunk").unwrap(), ReferenceFrame::LocalWorldAligned, &mut Jw);
     let (Jw, v) = (Jw.rows(3, 3).into_owned(), DVector::from_vec(v));
-    let damping = 20.0; // for all tasks; errors of position are zero
+    let damping = 20.0; // the damping of all tasks; errors of position are zero
     let com = DVector::from_column_slice(&references.com.acceleration.to_array())
         - DVector::from_column_slice(&com_bias)
         - damping * &Jc * &v;
@@ -256,7 +257,7 @@ fn inside_all_cones_the_kkt_system_is_solved() {
         P[(i, i)] = 1e-5;
         c[i] = if (i - nv) % 3 == 2 { -1e-5 * 9.81 * model.total_mass() / 4.0 } else { 0.0 };
     }
-    // [P Aᵀ; A 0] [x; λ] = [−c; b]
+    // Solve [P Aᵀ; A 0] [x; λ] = [−c; b].
     let mut K = DMatrix::zeros(n + rows, n + rows);
     K.view_mut((0, 0), (n, n)).copy_from(&P);
     K.view_mut((n, 0), (rows, n)).copy_from(&A);
@@ -264,8 +265,8 @@ fn inside_all_cones_the_kkt_system_is_solved() {
     let right = DVector::from_iterator(n + rows, c.iter().map(|c| -c).chain(b.iter().copied()));
     let x = K.lu().solve(&right).unwrap();
     let found = command.a.iter().copied().chain(command.forces.iter().flat_map(|f| f.linear.to_array()));
-    // A duality gap of 1e-9 bounds the error of forces, which only w_f = 1e-5 decides, by √(1e-9 / 1e-5) = 1e-2 N. The
-    // last Newton step of an interior-point method squares this error.
+    // A duality gap of 1e-9 bounds the error of forces, which only w_f = 1e-5 determines, by √(1e-9 / 1e-5) = 1e-2 N.
+    // The last Newton step of an interior-point method squares this error.
     let error = max_abs(found.zip(&x).map(|(found, x)| found - x));
     assert!(error < 1e-4, "{error:.1e}");
 }

@@ -1,4 +1,4 @@
-//! Results of a priority are not changed by later priorities.
+//! Later priorities do not change the results of earlier priorities.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,11 +7,12 @@ use common::*;
 use condyle_dynamics::{Vec3, robots};
 use condyle_wholebody::{Axes, Backend, Form, Gains, Settings, Task, TaskKind, WholeBodyController};
 
-/// Tolerance of q̈, relative to 1 and its largest number: slightly above the root of the solver's tolerance of 1e-11,
-/// where only regularisation decides.
+/// Tolerance of q̈, relative to 1 and the largest number of q̈. It is slightly above the square root of the solver's
+/// tolerance of 1e-11, because only the regularisation determines some directions of q̈.
 const AGREEMENT: f64 = 1e-5;
 
-/// The targets of the trunk's height and of the centre of mass conflict; the order decides, not the weights.
+/// The targets of the trunk's height and of the centre of mass contradict each other. The order of the priorities
+/// decides, not the weights.
 #[test]
 fn order_beats_weight() {
     let model = robots::quadruped();
@@ -31,14 +32,15 @@ fn order_beats_weight() {
         (command.com_acceleration.z - 1.0).abs()
     };
     let alone = missed(0, 1, 0.0);
-    assert!(alone < 0.01, "{alone}"); // the regularisation's share
+    assert!(alone < 0.01, "{alone}"); // only the regularisation causes this error
     let (strict, weighted) = (missed(0, 1, 1e4), missed(0, 0, 1e4));
     assert!(strict < alone + 1e-5, "{strict} {alone}");
     assert!(weighted > 1.0, "with weights it yields: {weighted}");
     assert!(missed(1, 0, 10.0) > 1.0);
 }
 
-/// A first priority at the limit of friction leaves no freedom to the next priority, which is solved nevertheless.
+/// A first priority at the limit of friction leaves no freedom to the next priority. The next priority is solved
+/// nevertheless.
 #[test]
 fn a_first_priority_at_its_limit() {
     let model = robots::humanoid();
@@ -64,7 +66,7 @@ fn references_without_frames(references: &condyle_wholebody::References) -> cond
     condyle_wholebody::References { frames: Vec::new(), ..references.clone() }
 }
 
-/// Solves three priorities in each form and with each back end: the commands agree.
+/// Solves a program with three priorities in each form and with each back end. The commands agree.
 #[test]
 fn forms_agree_on_priorities() {
     let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
@@ -106,7 +108,7 @@ fn forms_agree_on_priorities() {
     }
 }
 
-/// Tests one axis of the hand, along its own axes and other axes.
+/// Tests a task for one axis of the hand's position, along the hand's own axes and along other axes.
 #[test]
 fn masks_and_axes() {
     let model = robots::humanoid();
@@ -136,12 +138,12 @@ fn masks_and_axes() {
     }
 }
 
-/// Angular momentum, velocities and forces can be tasks.
+/// Tests tasks for angular momentum, velocities and forces.
 #[test]
 fn momentum_velocity_and_force() {
     let model = robots::humanoid();
     let (q, v, contacts) = (squat(&model), vec![0.0; 38], soles(0.7));
-    let gains = Gains { stiffness: 1e9, damping: 10.0 }; // stiffness does not act on a velocity
+    let gains = Gains { stiffness: 1e9, damping: 10.0 }; // the stiffness does not act on a velocity
     let tasks = [
         Task::com(),
         Task { weight: 100.0, ..Task::angular_momentum() },
@@ -161,7 +163,7 @@ fn momentum_velocity_and_force() {
     let hand = condyle_wholebody::FrictionContact::point("left_hand", 1.0);
     let (a, _) = accelerations(&model, &[hand], &q, &v, &command.a);
     assert!(norm(a[0] - Vec3::new(0.0, 1.0, 0.0)) < 0.1, "{:?}", a[0]);
-    // dL/dt is the moment of all forces about the centre of mass.
+    // The rate of the angular momentum is the moment of all forces about the centre of mass.
     let com = controller.hold(&q).unwrap().com.position;
     let command = controller.step(&q, &v, &references);
     let mut rate = Vec3::zero();

@@ -1,4 +1,5 @@
-//! Faults are named: in descriptions by `Error`, in states and failed solves by `Status`, in lengths by a panic.
+//! Errors name what is invalid. A description gives an `Error`, a state or a failed solve gives a `Status`, and a wrong
+//! length gives a panic.
 
 mod common;
 #[path = "../../../tests/common/panics.rs"]
@@ -93,13 +94,13 @@ fn lengths() {
     let _ = controller.step(&stance(), &[0.0; 18], &references);
 }
 
-/// A joint with an effort limit of 0 cannot be controlled: the error names the joint, and a setting can replace the
+/// A joint with an effort limit of 0 cannot be controlled. The error names the joint, and a setting can replace the
 /// limit.
 #[test]
 fn efforts_are_above_0() {
     let model = robots::quadruped();
     let mut limits = model.limits().clone();
-    limits.effort_upper[7] = 0.0; // limit of LF_HFE
+    limits.effort_upper[7] = 0.0; // effort limit of the joint LF_HFE
     let powerless = model.clone().with_limits(limits).unwrap();
     let new = |model, settings| WholeBodyController::new(model, &feet(0.7), &tasks(), settings).map(drop);
     let error = new(&powerless, Settings::default()).unwrap_err().to_string();
@@ -122,7 +123,7 @@ fn efforts_are_above_0() {
     }
 }
 
-/// Panics report the caller's location.
+/// A panic reports the location of the call.
 #[test]
 fn panics_point_at_the_caller() {
     let model = robots::quadruped();

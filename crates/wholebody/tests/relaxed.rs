@@ -1,4 +1,4 @@
-//! States with all joints beyond a limit, where the held feet prevent their return: each state has a solution.
+//! States with all joints beyond a limit, in which the held feet prevent a return: each state has a solution.
 #![allow(non_snake_case)]
 
 mod common;
@@ -7,13 +7,13 @@ use common::*;
 use condyle_dynamics::{Model, robots};
 use condyle_wholebody::{Backend, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController};
 
-/// Tolerance of accelerations, relative to the greatest. Objectives that agree to 1e-9 leave an error of about its root
-/// in accelerations, times the ratio of the weights of limits and forces.
+/// Tolerance of accelerations, relative to the greatest one. Objectives that agree to 1e-9 leave an error of about the
+/// square root of 1e-9 in accelerations, times the ratio of the weights of limits and forces.
 const APART: f64 = 5e-3;
 const STATES: u64 = 96;
 
-/// Compares the commands of both back ends in many states: at rest in the stance, near it, and far from it with high
-/// velocities; a little and far beyond the limits.
+/// Compares the commands of both back ends in many states: at rest in the stance, near the stance, and far from it with
+/// high velocities. The joints are slightly or far beyond their limits.
 fn both_solve(model: &Model, contacts: &[FrictionContact], tasks: &[Task], stance: &[f64]) {
     let mut relaxed = 0;
     for seed in 0..STATES {

@@ -1,4 +1,4 @@
-//! Every step gives a command: finite, within the torque limits, and with a status.
+//! Every step gives a command that is finite and within the torque limits, and a status.
 #![allow(non_snake_case)]
 
 #[path = "safety/clones.rs"]
@@ -13,7 +13,7 @@ use condyle_wholebody::{
     Backend, Command, CommandSource, FrictionContact, JointLimits, Settings, Status, Task, WholeBodyController,
 };
 
-/// Checks that a command is finite, and within the limits to the last bit.
+/// Checks that a command is finite, and within the limits without any tolerance.
 fn is_safe(command: &Command, effort: &[f64]) {
     let numbers = command.tau.iter().chain(&command.a).copied();
     let forces = command.forces.iter().flat_map(|f| f.to_array());
@@ -41,7 +41,7 @@ fn the_last_solution_then_gravity_compensation() {
             assert_eq!((command.source, &command.tau), (CommandSource::LastSolution, &good.tau));
         } else {
             assert_eq!(command.source, CommandSource::GravityCompensation);
-            // Four feet carry the robot: the torques are the same, except for internal forces.
+            // Four feet carry the robot. The torques are the same, except for the torques of internal forces.
             let apart = max_abs(command.tau.iter().zip(&good.tau).map(|(a, b)| a - b));
             assert!(apart < 2.0, "{apart} N m");
         }
@@ -59,7 +59,7 @@ fn a_state_that_is_not_finite() {
     let (mut no_q, mut no_v) = (q.clone(), v.clone());
     (no_q[8], no_v[3]) = (f64::NAN, f64::INFINITY);
     for tick in 0..20 {
-        // before any solution, and after one
+        // The first solution is found at tick 10, below.
         let command = controller.step(&no_q, &v, &references);
         is_safe(command, &effort);
         assert_eq!(command.status.to_string(), "`q[8]` is NaN, which is not finite");
@@ -72,7 +72,7 @@ fn a_state_that_is_not_finite() {
     }
 }
 
-/// Impossible requirements, and solvers that stop early, in random states.
+/// Tests impossible requirements, and solvers that stop early, in random states.
 #[test]
 fn nothing_breaks_the_limits() {
     let model = robots::humanoid();
@@ -93,7 +93,7 @@ fn nothing_breaks_the_limits() {
     }
 }
 
-/// Each back end reports that a time limit of almost zero is too short.
+/// Each back end reports a time limit of almost zero as too short.
 #[test]
 fn too_slow_is_a_status() {
     let (model, q, v) = (robots::quadruped(), stance(), vec![0.0; 18]);
@@ -110,7 +110,7 @@ fn too_slow_is_a_status() {
     }
 }
 
-/// In the air, the compensation consists of gravity's torques.
+/// In the air, gravity compensation consists of the torques of gravity.
 #[test]
 fn compensation_without_contacts() {
     let model = robots::quadruped();
@@ -124,7 +124,8 @@ fn compensation_without_contacts() {
     assert_eq!((&command.tau[..6], &command.tau[6..]), (&zero[..], &g[6..]));
 }
 
-/// Joints beyond the limits are led back, and others stay within them, in a simulated free fall with moving targets.
+/// A simulated free fall with moving targets: joints beyond the limits are led back, and others stay within their
+/// limits.
 #[test]
 fn joints_stay_within_their_limits() {
     let model = robots::quadruped();
@@ -144,7 +145,7 @@ fn joints_stay_within_their_limits() {
         let (mut q, mut v) = (stance(), vec![0.0; 18]);
         let mut references = controller.hold(&q).unwrap();
         for i in 7..19 {
-            references.posture.q[i] += if i % 2 == 0 { 1.0 } else { -1.0 }; // far outside
+            references.posture.q[i] += if i % 2 == 0 { 1.0 } else { -1.0 }; // a target far outside of the limits
             if beyond {
                 q[i] += if i % 2 == 0 { 0.35 } else { -0.35 };
                 v[i - 1] = if i % 2 == 0 { 4.0 } else { -4.0 };
@@ -160,7 +161,8 @@ fn joints_stay_within_their_limits() {
             integrate(&model, &q, &step, &mut next);
             q = next;
             assert!(beyond || v[6..].iter().all(|v| v.abs() < 5.0 + 1e-6));
-            // at most a fifth of the distance after the first 0.5 s, and never outside if it started inside
+            // After 0.5 s, a joint is outside of its limits by at most a fifth of its initial distance. A joint that
+            // started inside its limits never leaves them.
             for i in 7..19 {
                 let out = (q[i] - upper[i]).max(lower[i] - q[i]);
                 assert!(
@@ -180,12 +182,13 @@ fn joints_stay_within_their_limits() {
     }
 }
 
-/// A limit contradicts the held feet in this stance.
+/// In this stance, a joint limit contradicts the held feet.
 #[test]
 fn limits_give_way_to_contacts() {
     let (model, q) = (robots::quadruped(), stance());
     let mut upper = model.limits().upper.clone();
-    (7..19).for_each(|i| upper[i] = q[i] - 0.2); // all joints are too far: no trunk motion returns all
+    // All joints are beyond the limit: no motion of the trunk can lead all of them back.
+    (7..19).for_each(|i| upper[i] = q[i] - 0.2);
     let limits = JointLimits { upper: Some(upper), ..JointLimits::default() };
     let settings = Settings { joint_limits: Some(limits), ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &feet(0.7), &tasks(), settings).unwrap();

@@ -10,7 +10,7 @@ use condyle_wholebody::{
     WholeBodyController,
 };
 
-/// Tolerance of q̈, relative to 1 and its largest number: the agreement of two solvers with tolerance 1e-10.
+/// Tolerance of q̈, relative to 1 and the largest number of q̈, for two solvers with tolerance 1e-10.
 const AGREEMENT: f64 = 1e-6;
 
 fn solve(
@@ -45,7 +45,8 @@ fn a_humanoid_stands_on_soles() {
     }
 }
 
-/// A strong push to the side brings the centre of pressure to the edge of a sole, or friction to its cone.
+/// A strong push to the side moves the centre of pressure to the edge of a sole, or a force to the boundary of its
+/// friction cone.
 #[test]
 fn the_centre_of_pressure_stays_within() {
     let model = robots::humanoid();
@@ -60,9 +61,9 @@ fn the_centre_of_pressure_stays_within() {
     }
 }
 
-/// A wrench and corner forces give the same distribution of forces: four corners with a quarter of the force each cost
-/// a quarter of the whole. Halfway to the side, the pressure has left the middles of both soles but is far from their
-/// edges.
+/// A wrench and corner forces distribute the load in the same way. (Four corner forces, each a quarter of the load,
+/// cost a quarter of one force that carries the load.) Halfway to the side, the pressure is no longer in the middle of
+/// the soles, but far from their edges.
 #[test]
 fn pressure_keeps_away_from_the_edges() {
     let model = robots::humanoid();
@@ -78,14 +79,15 @@ fn pressure_keeps_away_from_the_edges() {
     let weight = 9.81 * model.total_mass();
     for (one, other) in wrench.forces.iter().zip(&corners.forces) {
         assert!(max_abs((*one - *other).to_array()) < 1e-5 * weight, "{one:?} and {other:?}");
-        let aside = one.angular.x / one.linear.z; // y of the centre of pressure, in a sole 10 cm wide
+        let aside = one.angular.x / one.linear.z; // y of the centre of pressure; a sole is 10 cm wide
         assert!(aside.abs() > 1e-3 && aside.abs() < 0.025, "{aside}");
     }
     let [left, right] = [0, 1].map(|k| wrench.forces[k].linear.z);
     assert!((left - right).abs() > 0.05 * weight, "{left} and {right}");
 }
 
-/// Condensed and full programs agree, with clarabel and with our solver; the weight of forces exceeds the tolerance.
+/// Condensed and full programs agree, with clarabel and with Condyle's own solver. The weight of the forces exceeds the
+/// tolerance.
 #[test]
 fn all_ways_agree() {
     let (humanoid, quadruped) = (robots::humanoid(), robots::quadruped());
@@ -119,7 +121,7 @@ fn all_ways_agree() {
     }
 }
 
-/// A larger set of forces cannot raise the objective of a task: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
+/// A larger set of forces cannot raise the cost of a task: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
 #[test]
 fn the_cone_lies_between_the_pyramids() {
     let model = robots::quadruped();
@@ -128,7 +130,7 @@ fn the_cone_lies_between_the_pyramids() {
         let settings = Settings { friction, ..Settings::default() };
         let tasks = [Task::com(), Task::orientation("trunk")];
         let command = solve(&model, &feet(0.2), &tasks, settings, &q, &v, |r| r.com.acceleration = push).1;
-        // the objective, without the regularisation
+        // the cost of the task, without the regularisation
         (command.com_acceleration - push).norm_squared()
     };
     let cone = missed(Friction::Cone);
@@ -142,7 +144,7 @@ fn the_cone_lies_between_the_pyramids() {
     }
 }
 
-/// A foot rolls over the edge of its toe, and hands push against a wall whose normal turns with them.
+/// A foot rolls over the edge of its toe. Hands push against a wall, with normals that turn with the hands.
 #[test]
 fn edges_and_walls() {
     let model = robots::humanoid();
@@ -161,20 +163,20 @@ fn edges_and_walls() {
         assert_eq!(command.status, Status::Solved);
         let tau = inverse_dynamics(&model, &contacts, &q, &v, &command);
         assert!(max_abs(tau.iter().zip(&command.tau).map(|(a, b)| a - b)) < EQUALITY);
-        // No moment about the edge.
+        // There is no moment about the edge.
         let (f, p) = (command.forces[0], toe[0]);
         let R = orientation(&model, &q, "left_sole");
         let about = f.angular - (R * p).cross(f.linear);
         assert!(about.dot(R * Vec3::new(0.0, 1.0, 0.0)).abs() < EQUALITY);
-        // The wall only pushes, along a normal that turns with the hand, with a limited force.
+        // The wall can only push, with a limited force, along a normal that turns with the hand.
         let R = orientation(&model, &q, "left_hand");
         let f_n = command.forces[2].linear.dot(R * Vec3::new(-1.0, 0.0, 0.0));
         assert!((-EQUALITY..30.0 + EQUALITY).contains(&f_n), "{f_n}");
     }
 }
 
-/// A hand leans on a wall next to the robot, with a normal in the world: the wall pushes, with friction perpendicular
-/// to the normal.
+/// A hand leans on a wall next to the robot. The normal is given in the world: the wall pushes along it, with friction
+/// perpendicular to it.
 #[test]
 fn a_hand_leans_on_a_wall() {
     let model = robots::humanoid();
@@ -185,8 +187,8 @@ fn a_hand_leans_on_a_wall() {
         ..FrictionContact::point("left_hand", 0.4)
     };
     let contacts = [soles(0.7), vec![wall]].concat();
-    let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // minimises the wall's force
-    // The wall should also carry a part of the weight that exceeds friction.
+    let settings = Settings { force_weight: 1e-2, ..Settings::default() }; // makes the wall's force small
+    // The reference force on the wall is a part of the weight, which exceeds the available friction.
     let (references, command) = solve(&model, &contacts, &humanoid_tasks(), settings, &q, &v, |r| {
         r.contacts[2].force.linear = Vec3::new(0.0, 0.0, 100.0);
     });
@@ -196,7 +198,7 @@ fn a_hand_leans_on_a_wall() {
     assert!(f.z > 0.0 && (f.x.hypot(f.z) / (-0.4 * f.y) - 1.0).abs() < 1e-3, "at the edge of its cone: {f:?}");
 }
 
-/// Any convex polygon, with corners listed in either direction.
+/// Tests any convex polygon, with corners in either direction.
 #[test]
 fn soles_of_many_corners() {
     let model = robots::humanoid();
@@ -224,7 +226,7 @@ fn soles_of_many_corners() {
     }
 }
 
-/// On one foot with a bounded yaw moment, the robot turns as fast as this bound allows.
+/// On one foot whose yaw moment is bounded, the robot turns as fast as this bound allows.
 #[test]
 fn the_yaw_moment_binds() {
     let model = robots::humanoid();
@@ -241,13 +243,13 @@ fn the_yaw_moment_binds() {
         });
         check(&model, &contacts, &q, &v, &references, &command);
         let f = command.forces[0];
-        f.angular.z / f.linear.z // soles are level, with frames in their middles
+        f.angular.z / f.linear.z // soles are level, and their frames are in the middle
     };
     let (less, more) = (moment(0.003), moment(0.006));
     assert!((less - 0.003).abs() < 1e-6 && (more - 0.006).abs() < 1e-6, "{less} {more}");
 }
 
-/// Four points on one foot give twelve rows, six of which are independent.
+/// Four points on one foot give twelve equalities, six of which are independent.
 #[test]
 fn redundant_contacts_are_no_obstacle() {
     let mut builder = condyle_dynamics::ModelBuilder::new("hopper");

@@ -9,11 +9,11 @@ use common::*;
 use condyle_dynamics::{Force, Model, integrate, robots};
 use condyle_wholebody::{FrictionContact, Gains, Settings, Task, WholeBodyController};
 
-/// Any set of feet, in any order, gives the same command as a controller made for this set.
+/// Any set of touching feet, in any order of sets, gives the same command as a controller made for this set.
 #[test]
 fn every_set_of_contacts() {
     let (model, contacts) = (robots::quadruped(), feet(0.7));
-    // The small weight of forces needs a tighter tolerance than the default, so that torques can be compared.
+    // The weight of forces is small. To compare torques, the tolerance must be tighter than the default.
     let make = |contacts: &[FrictionContact]| {
         let settings = Settings { tolerance: 1e-13, force_weight: 1e-5, ..Settings::default() };
         WholeBodyController::new(&model, contacts, &tasks(), settings).unwrap()
@@ -54,14 +54,15 @@ fn free_fall_is_a_tick_like_others() {
     }
 }
 
-/// The weight moves to the left foot; the right foot is unloaded in 0.2 s, hangs, and is loaded again: no torque jumps.
+/// The weight moves to the left foot. The right foot is unloaded in 0.2 s, hangs, and is loaded again: no torque jumps.
 #[test]
 fn fading_contacts_do_not_jerk() {
     let model = robots::humanoid();
     let contacts = soles(0.7);
     // A task holds the foot where the contact held it, with more weight than the posture.
     let tasks = [humanoid_tasks(), vec![Task { weight: 1e3, ..Task::pose("right_sole") }]].concat();
-    // tighter than the default tolerance, so that the gap is small compared with 1, which is larger than the objective
+    // The gap is relative to 1 if the objective is below 1. A tighter tolerance than the default makes the gap small
+    // enough.
     let settings = Settings { contact_gains: Gains::critical(100.0), tolerance: 1e-11, ..Settings::default() };
     let mut controller = WholeBodyController::new(&model, &contacts, &tasks, settings).unwrap();
     let (mut q, mut v) = (squat(&model), vec![0.0; 38]);
@@ -71,7 +72,7 @@ fn fading_contacts_do_not_jerk() {
     let mut before: Option<Vec<f64>> = None;
     let mut largest = 0.0f64;
     for tick in 0..1600 {
-        // half a cosine in 0.6 s
+        // The centre of mass moves along half a cosine in 0.6 s.
         let (sin, cos) = (core::f64::consts::PI * f64::from(tick.min(600)) / 600.0).sin_cos();
         let rate = core::f64::consts::PI / 0.6;
         references.com.position.y = 0.5 * aside * (1.0 - cos);
@@ -98,9 +99,9 @@ fn fading_contacts_do_not_jerk() {
         }
         advance(&model, &mut q, &mut v, &a, dt);
     }
-    // A tick of the ramp changes the force by 4 N, with a lever of 0.4 m between the feet. In the last tick, the
-    // friction that these 4 N allow (2.7 N, which accelerate the centre of mass) moves to the other foot too, with a
-    // lever of 0.9 m, the height of the hips.
+    // A tick of the ramp changes the force by 4 N, with a lever of 0.4 m between the feet. The last tick also moves the
+    // friction that these 4 N allow to the other foot: 2.7 N, which accelerate the centre of mass. Its lever is 0.9 m,
+    // the height of the hips.
     assert!(largest < 4.0, "a torque jumps by {largest:.3} N m in a tick");
 }
 

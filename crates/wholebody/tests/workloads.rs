@@ -1,4 +1,4 @@
-//! Commands of recorded stands, walks and trots under pushes: each is the optimum, and the back ends agree.
+//! Commands of recorded stands, walks and trots under pushes. Each command is the optimum, and the back ends agree.
 #![allow(non_snake_case)]
 
 mod common;
@@ -17,12 +17,12 @@ const TICKS: usize = 2000;
 /// Interval between checked ticks.
 const EACH: usize = 8;
 
-/// Tolerance between solutions with tolerances 1e-14 and 1e-13, in objective and q̈, relative to 1 and their size. An
-/// error of the objective, relative to some hundreds, causes an error of its root in q̈; times four where only the
-/// posture's weight of 0.1 decides.
+/// Tolerance of objective and q̈, relative to 1 and their size, for solutions with tolerances 1e-14 and 1e-13. An error
+/// of the objective, relative to a few hundred, causes an error of q̈ of the size of its square root. The error is four
+/// times larger where only the posture's weight of 0.1 determines q̈.
 const AGREEMENT: f64 = 1e-6;
 
-/// Calls a function for each workload, with its robot.
+/// Calls a function for each workload of each robot.
 fn all(mut look: impl FnMut(&Robot, &str, &[Tick])) {
     for name in ["quadruped", "humanoid"] {
         let robot = Robot::new(name, None).unwrap();
@@ -51,8 +51,8 @@ fn every_command_is_optimal() {
     });
 }
 
-/// Compares two solvers: ours, with the condensed program and warm starts; clarabel, with the full program and cold
-/// starts.
+/// Compares two solvers. Condyle's own solver gets the condensed program and warm starts; clarabel gets the full
+/// program and cold starts.
 #[test]
 fn back_ends_agree_on_every_command() {
     all(|robot, what, ticks| {
@@ -83,7 +83,7 @@ fn back_ends_agree_on_every_command() {
     });
 }
 
-/// A larger set of forces cannot raise the optimum: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
+/// A larger set of forces cannot raise the optimal cost: inscribed pyramid ⊂ cone ⊂ circumscribed pyramid.
 #[test]
 fn optima_on_cones_lie_between_those_on_pyramids() {
     let mut differ = 0;
@@ -105,7 +105,7 @@ fn optima_on_cones_lie_between_those_on_pyramids() {
     assert!(differ > 0, "friction never mattered");
 }
 
-/// In a trot, contacts fade in and out twice in half a second. Still, only 1 tick in 100 takes more than a few
+/// In a trot, contacts fade in and out twice in half a second. Nevertheless only 1 tick in 100 takes more than a few
 /// iterations; a cold start takes about ten.
 #[test]
 fn contacts_that_come_and_go_need_no_new_start() {

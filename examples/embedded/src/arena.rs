@@ -1,4 +1,4 @@
-//! Memory without an operating system: a fixed array from which each allocation takes the next bytes. Nothing is freed.
+//! Memory without an operating system. Each allocation takes the next bytes of a fixed array, and nothing is freed.
 
 use core::alloc::{GlobalAlloc, Layout};
 use core::cell::UnsafeCell;
@@ -7,7 +7,7 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 /// Size of the array (bytes).
 const SIZE: usize = 1 << 20;
 
-/// The array, the number of bytes in use, and the number of allocations.
+/// A fixed array of memory, the number of bytes in use, and the number of allocations.
 #[repr(align(16))]
 pub(crate) struct Arena {
     memory: UnsafeCell<[u8; SIZE]>,
@@ -15,7 +15,7 @@ pub(crate) struct Arena {
     count: AtomicUsize,
 }
 
-// SAFETY: each byte is handed out once, by an atomic counter.
+// SAFETY: an atomic counter ensures that each byte is handed out only once.
 unsafe impl Sync for Arena {}
 
 impl Arena {

@@ -1,18 +1,19 @@
-//! An arm of six joints, described in code, since the board has no files.
+//! An arm of six joints. It is described in code, since the board has no files.
 
 use condyle_dynamics::{Inertia, Joint, JointOptions, Mat3, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD};
 
-/// Number of joints.
+/// Number of joints of the arm.
 pub(crate) const JOINTS: usize = 6;
 
-/// A joint and the link that it moves.
+/// A link, and the joint that moves it.
 struct Link {
     name: &'static str,
-    /// Axis, in the link's frame.
+    /// Axis of the joint, in the link's frame.
     axis: [f64; 3],
-    /// Joint in the frame of the previous link (m).
+    /// Position of the joint in the frame of the previous link (m).
     at: [f64; 3],
-    /// Mass (kg), centre of mass (m), moments of inertia about it (kg m²).
+    /// Mass (kg). The next fields are the centre of mass (m) and the moments of inertia about the centre of mass (kg
+    /// m²).
     mass: f64,
     com: [f64; 3],
     moments: [f64; 3],
@@ -80,7 +81,7 @@ const LINKS: [Link; JOINTS] = [
     },
 ];
 
-/// Returns the arm.
+/// Returns the model of the arm.
 pub(crate) fn model() -> Model {
     let mut builder = ModelBuilder::new("arm");
     let mut parent = WORLD;

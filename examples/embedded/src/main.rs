@@ -1,4 +1,4 @@
-//! Inverse and forward dynamics of an arm of six joints, without an operating system: memory is a fixed array, and
+//! Inverse and forward dynamics of an arm of six joints, without an operating system. Memory is a fixed array, and
 //! nothing is allocated after construction.
 //!
 //! ```text
@@ -18,7 +18,7 @@ use cortex_m_semihosting::{debug, hprintln};
 #[global_allocator]
 static ARENA: arena::Arena = arena::Arena::new();
 
-/// Entry point of the board. Text goes to the debugger, which qemu emulates too.
+/// Entry point of the board. The debugger prints the text; qemu emulates a debugger.
 #[cortex_m_rt::entry]
 fn main() -> ! {
     let empty = (ARENA.bytes(), ARENA.allocations());

@@ -1,4 +1,4 @@
-//! A plan with user-defined residuals and constraints, and a controller that follows it.
+//! A plan with residuals and constraints that a user defines, and a controller that follows the plan.
 
 use condyle::nalgebra::DVector;
 use condyle::optimal::robot::{
@@ -28,7 +28,7 @@ impl GenericResidual for Height {
     }
 }
 
-/// Problem of an arm that reaches for a point, and stays above a slope.
+/// Returns the problem of an arm that reaches for a point. If `above` is given, the arm also stays above a slope.
 pub fn reach(arm: &Arc<Model>, x0: &[f64], target: Vec3<f64>, above: Option<f64>) -> Result<Problem, Error> {
     let (tool, n) = (arm.frame("tool")?, arm.nv());
     let place = Residual::FrameTranslation { frame: "tool".into(), target };
@@ -46,15 +46,14 @@ pub fn reach(arm: &Arc<Model>, x0: &[f64], target: Vec3<f64>, above: Option<f64>
     Ok(Problem::new(x0.to_vec(), vec![Box::new(knot)], vec![0; 30], Box::new(end))?)
 }
 
-/// Solves a problem from rest.
+/// Solves a problem; the initial guess is the arm at rest.
 pub fn solve(problem: &mut Problem) -> Result<Solution, Error> {
     let xs = problem.x0().repeat(problem.horizon() + 1);
     let us = problem.quasi_static(&xs)?;
     Ok(Fddp::new(problem).solve(problem, &xs, &us)?.clone())
 }
 
-/// Plans a motion and returns the effort of the first tick of a controller. The errors of three crates pass through
-/// `?`.
+/// Plans a motion, and returns the effort of a controller's first tick. Errors of three crates pass through `?`.
 pub fn first_effort(arm: &Arc<Model>, x0: &[f64]) -> Result<DVector<f64>, Error> {
     let mut problem = reach(arm, x0, Vec3::new(0.35, 0.2, 0.6), None)?;
     let solution = solve(&mut problem)?;

@@ -1,4 +1,5 @@
-//! First steps of a user, with the façade alone: robots, points and forces, a plan, a controller and a simulation.
+//! First steps of a user, with the crate `condyle` alone: robots, points and forces, a plan, a controller and a
+//! simulation.
 #![deny(warnings)]
 
 #[cfg(feature = "control")]

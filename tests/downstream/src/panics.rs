@@ -1,4 +1,4 @@
-//! Panics for a caller's mistake report a line of this file.
+//! If a caller makes a mistake, the panic reports a line of this file.
 
 use condyle::{Data, robots};
 

@@ -4,14 +4,14 @@ use condyle::simulation::{Control, Ground, Settings, Simulation, Status};
 use condyle::{Error, Model};
 use std::sync::Arc;
 
-/// Robot that falls onto its feet; springs and dampers hold its joints.
+/// A robot that falls onto its feet while springs and dampers hold its joints.
 pub struct Standing {
     simulation: Simulation,
     pose: Vec<f64>,
 }
 
 impl Standing {
-    /// Puts a robot above the ground, on frames that may touch it.
+    /// Puts a robot above the ground. The frames `feet` may touch the ground.
     pub fn new(robot: Arc<Model>, feet: &[&str], pose: &[f64]) -> Result<Self, Error> {
         let feet = feet.iter().map(|foot| robot.frame(foot)).collect::<Result<Vec<_>, _>>()?;
         let mut simulation = Simulation::new(robot, Settings::default());
@@ -20,7 +20,7 @@ impl Standing {
         Ok(Self { simulation, pose: pose.to_vec() })
     }
 
-    /// Simulates some steps and returns how they ended.
+    /// Simulates this number of steps, and returns the status of the simulation.
     pub fn run(&mut self, steps: usize) -> Status {
         let Self { simulation, pose } = self;
         simulation.run(steps, |now: &mut Control<'_, f64>| {
@@ -30,7 +30,7 @@ impl Standing {
         })
     }
 
-    /// Returns the sum of the forces of the ground along the vertical (N).
+    /// Returns the vertical component of the sum of all ground forces (N).
     pub fn lift(&self) -> f64 {
         self.simulation.contacts().iter().map(|contact| contact.force.z).sum()
     }

@@ -1,4 +1,4 @@
-"""Built-in actions and drives, and problems with one action per knot, as in Crocoddyl's scripts."""
+"""Tests built-in actions and drives, and problems with one action per knot, as they occur in Crocoddyl's scripts."""
 
 import crocoddyl
 import numpy as np
@@ -8,9 +8,9 @@ import pytest
 import condyle
 from condyle import optimal
 
-# Tolerance of the same sums in another order.
+# Tolerance of equal sums in another order.
 ROUNDING = 1e-12
-# Tolerance of the costs of iterates, as in benches/peers/ocp.py.
+# Tolerance of the costs of iterates, the same as in benches/peers/ocp.py.
 COST = 1e-6
 
 

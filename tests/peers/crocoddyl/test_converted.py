@@ -1,6 +1,7 @@
-"""`condyle.crocoddyl`: Crocoddyl's problems solved here, and our dynamics in Crocoddyl's solvers, with equal iterates.
+"""Tests `condyle.crocoddyl`: Condyle solves Crocoddyl's problems, and Crocoddyl's solvers use Condyle's dynamics.
+Iterates must be equal.
 
-The problems are the same as in `test_problems.py`; `test_residuals.py` converts all residuals, activations and
+The problems are the same as in `test_problems.py`. `test_residuals.py` converts all residuals, activations and
 integrators.
 """
 
@@ -23,12 +24,12 @@ from ocp_converted import Converted
 from ocp_robots import NotRunError
 from ocp_theirs import Theirs
 
-# Tolerance of the same sums in another order, relative to the largest number.
+# Tolerance of equal sums in another order, relative to the largest number.
 ROUNDING = 1e-11
 
 
 class Loose(Converted):
-    """The same problem with some actions written in Python for Crocoddyl."""
+    """The same problem, but some of its actions are written in Python as classes of Crocoddyl."""
 
     strict = False
 
@@ -39,7 +40,7 @@ def test_same_trace(name, solver):
     assert result["good"], result
 
 
-# First solver of each file. Files are skipped if Crocoddyl does not reproduce a single iteration of its own.
+# First solver of each file. A file is skipped if Crocoddyl repeats none of its own iterations.
 FIRST = {name: (name, solver) for name, solver in reversed(FILES) if ocp.CHAOTIC.get((name, solver)) != 0}
 
 
@@ -54,7 +55,7 @@ def test_same_trace_of_a_file(name, solver):
 
 
 class OnOurs(Theirs):
-    """Problem in Crocoddyl with our dynamics in its Euler steps."""
+    """Crocoddyl's problem with Condyle's dynamics in Crocoddyl's Euler steps."""
 
     def stage(self, stage):
         step = super().stage(stage)
@@ -73,11 +74,11 @@ def test_our_dynamics_in_their_solver(name, solver):
     spec, robot = PROBLEMS[name]()
     theirs, ours = Theirs(spec, robot, solver), OnOurs(spec, robot, solver)
     start = theirs.warm_start()
-    for found, expected in zip(ours.warm_start()[1], start[1], strict=True):  # computed by quasiStatic
+    for found, expected in zip(ours.warm_start()[1], start[1], strict=True):  # the controls come from quasiStatic
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-7 * max(1.0, np.abs(expected).max(initial=0.0)))
     a, b = ours.solve(*start), theirs.solve(*start)
     assert ocp.agreeing(a.rows, b.rows) == len(a.rows) == len(b.rows)
-    # and back: the actions with our dynamics are converted to the same problem
+    # Convert back: the actions with Condyle's dynamics become the same problem.
     again = condyle.crocoddyl.problem(ours.problem, strict=True)
     us = start[1] if len({len(u) for u in start[1]}) > 1 else np.array(start[1])
     first = condyle.crocoddyl.problem(theirs.problem, strict=True)
@@ -86,7 +87,8 @@ def test_our_dynamics_in_their_solver(name, solver):
 
 
 def arm():
-    """Creates an arm in Crocoddyl: its state, drives, and a function that creates a sum of costs."""
+    """Creates an arm in Crocoddyl. Returns its model, its state, its drives, and a function that creates a sum of
+    costs."""
     model = pin.buildModelFromXML(condyle.robots.ARM7)
     state = crocoddyl.StateMultibody(model)
 
@@ -111,7 +113,7 @@ def shooting(state, drives, running, end, knots=5, constraints=None):
 
 
 def test_costs_of_controls_vanish_at_the_end():
-    """As in Crocoddyl, residuals of controls, efforts or forces are zero in terminal models."""
+    """Tests that residuals of controls, efforts or forces are zero in terminal models, as in Crocoddyl."""
     model = pin.buildModelFromXML(condyle.robots.HUMANOID, pin.JointModelFreeFlyer())
     state = crocoddyl.StateMultibody(model)
     drives, foot = crocoddyl.ActuationModelFloatingBase(state), model.getFrameId("left_sole")
@@ -145,7 +147,7 @@ def test_costs_of_controls_vanish_at_the_end():
         assert ours.costs[1] == data.cost == 0.0, residual
         problem.calc([x, x], [u])
         assert ours.costs[0] == pytest.approx(problem.runningDatas[0].cost, rel=1e-9) and ours.costs[0] > 0.0, residual
-    # a constant residual is not converted
+    # A constant residual is not converted.
     total = crocoddyl.CostModelSum(state, nu)
     effort = crocoddyl.ResidualModelJointEffort(state, drives, np.ones(nu), nu)
     total.addCost("term", crocoddyl.CostModelResidual(state, effort), 1.0)
@@ -159,7 +161,8 @@ def test_costs_of_controls_vanish_at_the_end():
 
 
 def test_a_residual_that_means_something_else_stays_theirs():
-    """Crocoddyl's residual of gravity in contact omits the forces that its documentation includes."""
+    """Crocoddyl's residual of gravity in contact is not converted: it omits the forces that its documentation
+    includes."""
     model = pin.buildModelFromXML(condyle.robots.HUMANOID, pin.JointModelFreeFlyer())
     state = crocoddyl.StateMultibody(model)
     drives = crocoddyl.ActuationModelFloatingBase(state)
@@ -214,12 +217,13 @@ def test_lqr():
     converted = condyle.crocoddyl.problem(theirs, strict=True)
     found = Fddp(converted, project_warm_start=False).solve(np.ones((11, 4)), np.zeros((10, 2)))
     assert found.cost == pytest.approx(solver.cost, rel=1e-9)
-    # the feedback has the opposite sign
+    # Crocoddyl's feedback has the opposite sign.
     np.testing.assert_allclose(found.K, -np.array([np.array(K) for K in solver.K]), atol=1e-8)
 
 
 class ActivationModelQuad(crocoddyl.ActivationModelQuad):
-    """User-defined class Σ r² with the name of one of Crocoddyl's classes, for which it must not be mistaken."""
+    """User-defined activation Σ r². Its class has the same name as one of Crocoddyl's classes; the converter must not
+    mistake it for that class."""
 
     def calc(self, data, r):
         data.a_value = float(r @ r)
@@ -296,7 +300,7 @@ def test_a_robot_with_a_joint_that_is_not_here():
 
 
 class Circle(crocoddyl.StateAbstract):
-    """State space of points on a circle, (cos, sin), and a rate."""
+    """State space of a point on a circle, (cos, sin), and its rate."""
 
     def __init__(self):
         crocoddyl.StateAbstract.__init__(self, 3, 2)
@@ -319,7 +323,7 @@ class Circle(crocoddyl.StateAbstract):
 
 
 class Turns(crocoddyl.ActionModelAbstract):
-    """User-defined action on a manifold: a wheel turns to the angle 2."""
+    """User-defined action on a manifold: a wheel rotates to the angle 2."""
 
     def __init__(self):
         crocoddyl.ActionModelAbstract.__init__(self, Circle(), 1, 2)
@@ -367,7 +371,7 @@ def test_a_class_of_ones_own_is_not_taken_for_another():
 
 
 def test_drives_of_any_kind():
-    """τ = S u for any S that is constant; drives that depend on the state stay Crocoddyl's."""
+    """Tests drives τ = S u with any constant S. Drives that depend on the state are not converted."""
     _, state, _, costs = arm()
 
     class Springs(crocoddyl.ActuationModelAbstract):

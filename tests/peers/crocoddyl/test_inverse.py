@@ -1,4 +1,4 @@
-"""Inverse dynamics, free and in contact, compared with Crocoddyl: steps, costs, equations, derivatives, optima."""
+"""Compares inverse dynamics, free and in contact, with Crocoddyl: steps, costs, equations, derivatives and optima."""
 
 import crocoddyl
 import numpy as np
@@ -19,16 +19,16 @@ from condyle.optimal import (
     Residual,
 )
 
-# Tolerance of sums of some hundred products in another order, relative to the largest number.
+# Tolerance of sums of several hundred products in another order, relative to the largest number.
 ROUNDING = 1e-11
-# Tolerance of optima of two solvers, each of which stops at a tolerance.
+# Tolerance of the optima that two solvers find, each of which stops at its own tolerance.
 OPTIMUM = 1e-5
 DT = 0.02
 
 WORDS = {pin.LOCAL: "local", pin.LOCAL_WORLD_ALIGNED: "local_world_aligned"}
 TEXTS = {"arm7": condyle.robots.ARM7, "quadruped": condyle.robots.QUADRUPED, "humanoid": condyle.robots.HUMANOID}
-# Number of rows of each contact, by name; Crocoddyl orders contacts alphabetically. Its inverse dynamics does not
-# support contacts in a plane.
+# Number of rows of each contact, by name. Crocoddyl orders contacts alphabetically.
+# Crocoddyl's inverse dynamics does not support contacts in a plane.
 CONTACTS = {
     "arm7": {},
     "quadruped": {"LF_foot": 3, "RF_foot": 1, "RH_foot": 3},
@@ -39,7 +39,7 @@ KP, KD = 5.0, 10.0
 
 
 class Robot:
-    """Robot in both libraries, with drives of some joints, contacts, and a state."""
+    """A robot in both libraries, with drives of some joints, contacts, and a state."""
 
     def __init__(self, name, axes=pin.LOCAL, kinds=None, seed=1):
         floating, text = name != "arm7", TEXTS[name]
@@ -72,7 +72,7 @@ class Robot:
         return ours, theirs
 
     def costs(self, nu):
-        """Returns costs of the state, accelerations, efforts and forces in both libraries."""
+        """Returns, in both libraries, costs of the state, of accelerations, of efforts and of forces."""
         state, nv, ours, theirs = self.state, self.nv, [], crocoddyl.CostModelSum(self.state, nu)
 
         def add(name, weight, residual, other, activation=None):
@@ -89,14 +89,14 @@ class Robot:
         add("effort", 1e-3, Residual.joint_effort(np.r_[np.zeros(passive), tau]), effort, driven)
         for name, rows in self.kinds.items():
             if rows < 3:
-                continue  # Crocoddyl's residual of a force does not contain all of its entries
+                continue  # Crocoddyl's residual lacks some entries of this force
             force, frame = np.linspace(0.0, 5.0, 6), self.theirs.getFrameId(name)
             other = crocoddyl.ResidualModelContactForce(state, frame, pin.Force(force), rows, nu, False)
             add(f"{name} force", 1e-2, Residual.contact_force(name, force), other)
         return ours, theirs
 
     def dynamics(self):
-        """Returns Crocoddyl's inverse dynamics, and a function that creates ours with additional costs."""
+        """Returns Crocoddyl's inverse dynamics, and a function that creates Condyle's with additional costs."""
         nu = self.nv + self.rows
         (costs, total), (contacts, held) = self.costs(nu), self.contacts(nu)
         if self.kinds:
@@ -106,14 +106,15 @@ class Robot:
         return theirs, lambda costs=costs: ContactInverseDynamics(self.ours, contacts, DT, costs)
 
     def node(self, action):
-        """Returns the derivatives of a knot, and its evaluation."""
+        """Returns the derivatives of a knot with this action, and the evaluation of the problem."""
         problem = Problem(self.x, [action], [0], FreeDynamics(self.ours, None, []))
         xs, us = np.array([self.x, self.x]), self.u[None]
         return problem.derivatives(xs, us)[0], problem.evaluate(xs, us)
 
 
 def close(found, expected, beside=0.0):
-    """Checks equality up to rounding of the largest number, or of `beside`, a number that was subtracted."""
+    """Checks equality up to rounding errors of the largest number. The largest number may also be in `beside`, which
+    has numbers that were subtracted."""
     largest = max(np.abs(expected).max(initial=1.0), np.abs(beside).max())
     np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING * largest)
 
@@ -128,7 +129,7 @@ def hessian(node):
 
 @pytest.mark.parametrize(("name", "axes"), CASES)
 def test_step_and_costs(name, axes):
-    """Compares the next state, costs of all kinds, and their derivatives; the equations are excluded."""
+    """Compares the next state, costs of all kinds, and the derivatives of both. The equations are left out."""
     robot = Robot(name, axes)
     dynamics, ours = robot.dynamics()
     step = crocoddyl.IntegratedActionModelEuler(dynamics, DT)
@@ -147,13 +148,13 @@ def test_step_and_costs(name, axes):
 
 @pytest.mark.parametrize(("name", "axes"), CASES)
 def test_equations(name, axes):
-    """Compares h, Hx and Hu by row: a cost ½ h² of one row has the gradient h ∂h and the Hessian ∂hᵀ ∂h."""
+    """Compares h, Hx and Hu row by row. A cost ½ h² of one row has the gradient h ∂h and the Hessian ∂hᵀ ∂h."""
     robot = Robot(name, axes)
     dynamics, ours = robot.dynamics()
     data = dynamics.createData()
     dynamics.calc(data, robot.x, robot.u)
     dynamics.calcDiff(data, robot.x, robot.u)
-    # Crocoddyl orders rows by the names of its constraints; rows of forces belong to inactive contacts
+    # Crocoddyl orders rows by the names of its constraints. Its rows of forces belong to inactive contacts.
     first, residuals = 0, []
     names = [item.key() for item in dynamics.constraints.constraints]
     for key in (key for key in names if dynamics.constraints.getConstraintStatus(key)):
@@ -171,7 +172,7 @@ def test_equations(name, axes):
         only = Activation.weighted(np.eye(n)[k])
         node, value = robot.node(ours([Cost("row", 1.0 / DT, residual, only)]))
         h, H = data.h[row], np.r_[data.Hx[row], data.Hu[row]]
-        assert np.abs(h) > 1e-3  # otherwise the gradient would be too small to compare
+        assert np.abs(h) > 1e-3  # a smaller h would make the gradient too small for a comparison
         close(value.costs[0] - nothing.costs[0], 0.5 * h * h, nothing.costs[0])
         close(gradient(node) - gradient(bare), h * H, gradient(bare))
         close(hessian(node) - hessian(bare), np.outer(H, H), hessian(bare))
@@ -179,7 +180,7 @@ def test_equations(name, axes):
 
 @pytest.mark.parametrize("name", ["arm7", "quadruped", "humanoid"])
 def test_quasi_static(name):
-    """Compares the controls that hold a robot still, for all actions that provide them."""
+    """Compares the controls that hold a robot at rest, for all actions that have such controls."""
     kinds = {name: rows for name, rows in CONTACTS[name].items() if rows > 2}
     robot = Robot(name, kinds=kinds)
     x, state, drives = np.r_[robot.x[: robot.ours.nq], np.zeros(robot.nv)], robot.state, robot.drives
@@ -235,8 +236,8 @@ def test_quasi_static_of_steps_and_other_actions():
 
 @pytest.mark.parametrize(("name", "knots"), [("quadruped", 10), ("arm7", 10)])
 def test_optimum(name, knots):
-    """Compares a motion over standing feet, and one of an arm: Crocoddyl's solver of equations and our solver of
-    limits."""
+    """Compares a motion of a robot on standing feet, and a motion of an arm. Crocoddyl uses its solver of equations,
+    and Condyle uses its solver of limits."""
     stands = dict.fromkeys(CONTACTS[name], 3)
     robot = Robot(name, pin.LOCAL_WORLD_ALIGNED, stands)
     dynamics, ours = robot.dynamics()

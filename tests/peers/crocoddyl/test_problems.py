@@ -1,6 +1,6 @@
-"""Whole problems compared with Crocoddyl, iteration by iteration.
+"""Compares whole problems with Crocoddyl, iteration by iteration.
 
-The problems are from `benches/peers/ocp_problems.py`, and from the files of a folder, which CONDYLE_PROBLEMS can name.
+The problems are from `benches/peers/ocp_problems.py`, and from the files of a folder that CONDYLE_PROBLEMS may name.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Every residual, activation and integrator compared with Crocoddyl's, by iterates on a short horizon."""
+"""Compares every residual, activation and integrator with Crocoddyl, by iterates on a short horizon."""
 
 import crocoddyl
 import numpy as np
@@ -19,7 +19,8 @@ from condyle.optimal import (
     WrenchCone,
 )
 
-# Tolerance of three iterations of a few knots: rounding grows with the condition number of the problem, some 1e4.
+# Tolerance after three iterations of a few knots.
+# Rounding errors grow with the condition number of the problem, which is about 1e4.
 SAME = 1e-9
 
 DT, KNOTS = 0.02, 4
@@ -27,7 +28,7 @@ RNG = np.random.default_rng(5)
 
 
 class Robot:
-    """Robot in both libraries, a bent posture, and its feet or tool."""
+    """A robot in both libraries, with a bent posture, and with feet or a tool."""
 
     def __init__(self, name):
         if name == "arm7":
@@ -179,7 +180,8 @@ def jump(r, nu):
     return crocoddyl.ResidualModelImpulseCoM(r.state), 1.0, Residual.impulse_center_of_mass(), 3
 
 
-# The velocity along the world's axes is excluded: Crocoddyl's Jacobian of it differs from differences by 0.3.
+# The velocity along the world's axes is left out.
+# Its Jacobian in Crocoddyl differs by 0.3 from differences of the velocity.
 ANY = {
     "state": state,
     "com": com,
@@ -205,7 +207,7 @@ ACTIVATIONS = {
 
 
 def costs(r, nu, make, activation):
-    """Returns the same sum in both libraries: the term, and small terms that keep the problem convex."""
+    """Returns the same sum of costs in both libraries: the given term, and small terms that keep the problem convex."""
     residual, weight, ours, n = make(r, nu)
     theirs_activation, ours_activation = ACTIVATIONS[activation](n)
     total = crocoddyl.CostModelSum(r.state, nu)
@@ -221,7 +223,7 @@ def costs(r, nu, make, activation):
 
 
 def same_iterates(r, ours, theirs):
-    """Solves a horizon of one knot in both libraries, and compares three iterations."""
+    """Solves a horizon of one knot in both libraries, and compares the first three iterations."""
     end = crocoddyl.CostModelSum(r.state, r.nu)
     end.addCost("rest", crocoddyl.CostModelResidual(r.state, crocoddyl.ResidualModelState(r.state, r.goal, r.nu)), 1.0)
     last = crocoddyl.IntegratedActionModelEuler(
@@ -289,7 +291,7 @@ def test_runge_kutta(order):
         theirs.calc(data, r.x0, u)
         problem = Problem(r.x0, [ours], [0], FreeDynamics(r.ours, None, []))
         np.testing.assert_allclose(problem.rollout(u[None])[1], data.xnext, atol=1e-13)
-        if r is ARM and order != 3:  # otherwise Crocoddyl's derivatives differ from central differences by up to 6e-6
+        if r is ARM and order != 3:  # otherwise Crocoddyl's derivatives differ by up to 6e-6 from differences
             same_iterates(r, ours, theirs)
 
 
@@ -301,7 +303,7 @@ def test_control_gravity():
 
 
 def partial_contacts(r, kind, axes):
-    """Returns contacts of both feet along a line or in a plane, in both libraries."""
+    """Returns, in both libraries, contacts of both feet that act along a line or in a plane."""
     contacts, ours = crocoddyl.ContactModelMultiple(r.state, r.nu), {}
     word, R, x = "local" if axes == pin.LOCAL else "local_world_aligned", placement().rotation, 0.1
     for foot in r.feet:
@@ -310,7 +312,7 @@ def partial_contacts(r, kind, axes):
             made = crocoddyl.ContactModel1D(r.state, r.frame(foot), x, axes, R, r.nu, gains)
             constraint = condyle.ContactConstraint(foot, kind, None, word, *gains, at, axes=R.T)
         else:
-            # without kp: Crocoddyl takes the error of position along the world's axes, whatever the frame's axes
+            # kp is 0: Crocoddyl takes the error of position along the world's axes, whatever the frame's axes are.
             gains = np.array([0.0, 10.0])
             made = crocoddyl.ContactModel2D(r.state, r.frame(foot), np.zeros(2), r.nu, gains)
             constraint = condyle.ContactConstraint(foot, kind, kd=10.0)
@@ -343,7 +345,7 @@ def test_contacts_along_axes(robot, kind, axes, term):
     dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, theirs, total, 0.0, True)
     knot = ContactDynamics(r.ours, ours, DT, mine)
     same_iterates(r, knot, crocoddyl.IntegratedActionModelEuler(dynamics, DT))
-    # controls that hold the robot still
+    # These controls hold the robot at rest.
     x = np.r_[r.x0[: r.ours.nq], np.zeros(r.ours.nv)]
     np.testing.assert_allclose(knot.quasi_static(x), dynamics.quasiStatic(dynamics.createData(), x), atol=1e-7)
 
@@ -374,7 +376,8 @@ def test_control_polynomial(robot, integrator, controls):
         if free
         else crocoddyl.DifferentialActionModelContactFwdDynamics(r.state, r.drives, held, total, 0.0, True)
     )
-    # in Crocoddyl, a quadratic needs a method of three or four stages; with others it has the nodes of four
+    # In Crocoddyl, a quadratic needs an integrator of three or four stages.
+    # For other integrators, the quadratic has the nodes of four stages.
     of = kind if kind == crocoddyl.RKType.three else crocoddyl.RKType.four
     polynomial = POLYNOMIALS[controls](r.nu, of)
     if kind is None:

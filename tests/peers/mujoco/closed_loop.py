@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Whole-body control in MuJoCo, all cases: disturbances, the largest survived pushes, and the trot of 20 s.
+"""Makes the tables of whole-body control in MuJoCo: disturbances, the largest survived pushes, and the trot of 20 s.
 
     .venv/pinocchio/bin/python tests/peers/mujoco/closed_loop.py [disturbances] [pushes] [--write]
 
-Without a name it makes both tables, which takes some minutes on all cores with a release build. With --write it puts
-them into docs/wholebody.md.
+Without a name the program makes both tables, which takes several minutes on all cores with a release build. With
+--write it puts the tables into docs/wholebody.md.
 """
 
 import re
@@ -32,15 +32,15 @@ DISTURBANCES = {
     "10 %, five ticks late, more": Disturbance(0.1, 5, 1.2),
 }
 DIRECTIONS = range(0, 360, 30)
-"""Directions in which TALOS is pushed: degrees from ahead, to the left."""
+"""Directions in which TALOS is pushed: angles in degrees, from ahead towards the left."""
 STIFFNESS = 20.0
-"""Stiffness of the PD hold, as a fraction of a joint's maximum effort per rad."""
+"""Stiffness of the PD control that holds the posture: a fraction of a joint's maximum effort, per rad."""
 PUSH = 20.0
-"""Push in the table of disturbances (N s)."""
+"""Size of the push in the table of disturbances (N s)."""
 LAWS = {"cones": {}, "pyramids of 4 sides": {"cone": Pyramid(4, True)}, "PD hold": {"stiffness": STIFFNESS}}
-"""Controllers that are compared."""
+"""Names and settings of the compared controllers."""
 FIRST, STRIDE, STEP = 40.0, 8.0, 2.0
-"""Parameters of the search for the largest push (N s): first push, step, and accuracy of the result."""
+"""Parameters of the search for the largest push (N s): first push, first step, and accuracy of the result."""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
@@ -55,7 +55,7 @@ def deviation(record: Record) -> float:
 
 
 def cell(record: Record, unsolved: int) -> str:
-    """Describes a run in some words."""
+    """Returns a few words that describe a run."""
     if not record.stands:
         return f"falls after {record.t[-1]:.1f} s"
     failed = f", {unsolved} ticks unsolved" if unsolved else ""
@@ -63,7 +63,7 @@ def cell(record: Record, unsolved: int) -> str:
 
 
 def humanoid_cases() -> dict[str, Callable[[Humanoid], Record]]:
-    """Returns the motions of TALOS."""
+    """Returns the motions of TALOS, each as a function that makes the run."""
     return {
         "stands, 5 s": lambda h: h.run(h.control(), 5.0),
         "shifts its weight by ± 6 cm, 8 s": lambda h: h.run(h.control(h.shift), 8.0),
@@ -73,7 +73,7 @@ def humanoid_cases() -> dict[str, Callable[[Humanoid], Record]]:
 
 
 def disturbances() -> str:
-    """Returns the table of disturbances: which motions the robot survives."""
+    """Returns the table of disturbances, which shows the motions that the robots survive."""
     rows = []
     for name, case in humanoid_cases().items():
         cells = []
@@ -90,7 +90,8 @@ def disturbances() -> str:
 
 
 def largest(survives: Callable[[float], bool]) -> float:
-    """Returns the largest survived push (N s) for which all weaker tested pushes are survived, too."""
+    """Returns the largest push (N s) that the robot survives, if it also survives all weaker pushes that were
+    tested."""
     low = high = FIRST
     if survives(FIRST):
         while survives(high := low + STRIDE):
@@ -121,7 +122,7 @@ def pushed(direction: float, law: str) -> float:
 
 
 def pushes() -> str:
-    """Returns the table of the largest pushes, around the circle."""
+    """Returns the table of the largest pushes in all directions."""
     cases = list(product(DIRECTIONS, LAWS))
     with ProcessPoolExecutor() as pool:
         found = dict(zip(cases, pool.map(pushed, *zip(*cases, strict=True)), strict=True))
@@ -130,7 +131,7 @@ def pushes() -> str:
 
 
 def main() -> None:
-    """Prints the tables, and writes them if requested."""
+    """Prints the requested tables, and writes them into the page if requested."""
     text = DOCUMENT.read_text(encoding="utf-8") if DOCUMENT.exists() else ""
     tables = {"disturbances": disturbances, "pushes": pushes}
     chosen = [name for name in sys.argv[1:] if name in tables] or list(tables)

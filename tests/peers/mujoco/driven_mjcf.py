@@ -1,4 +1,4 @@
-"""Random robots in MJCF, with actuators, springs, tendons, loops, carried weights and default classes."""
+"""Random robots in MJCF, with actuators, springs, tendons, loops, gravity compensation and default classes."""
 
 import random
 from collections.abc import Callable
@@ -8,7 +8,7 @@ T = TypeVar("T")
 
 
 class DrivenMjcf:
-    """Text of a robot, which MuJoCo may reject: ranges may be empty, and classes may not fit."""
+    """Text of a random robot. MuJoCo may reject it: ranges may be empty, and classes may not fit."""
 
     def __init__(self, seed: int) -> None:
         """Writes the robot for a seed."""
@@ -30,36 +30,36 @@ class DrivenMjcf:
         )
 
     def number(self, lower: float = -1.0, upper: float = 1.0) -> float:
-        """Returns a number of three digits."""
+        """Returns a random number with three digits."""
         return round(self.random.uniform(lower, upper), 3)
 
     def numbers(self, count: int) -> str:
-        """Returns numbers between -1 and 1."""
+        """Returns random numbers between -1 and 1."""
         return " ".join(str(self.number()) for _ in range(count))
 
     def range(self, size: float) -> str:
-        """Returns two numbers in ascending order."""
+        """Returns two random numbers in ascending order."""
         lower, upper = sorted((self.number(-size, size), self.number(-size, size)))
         return f"{lower} {upper + 0.01:.3f}"
 
     def chance(self, share: float) -> bool:
-        """Returns true in a fraction of all cases."""
+        """Returns true with this probability."""
         return self.random.random() < share
 
     def maybe(self, share: float, text: str) -> str:
-        """Returns the text in a fraction of all cases, and an empty text otherwise."""
+        """Returns the text with this probability, and an empty text otherwise."""
         return text if self.chance(share) else ""
 
     def pick(self, values: list[T]) -> T:
-        """Returns one of some values."""
+        """Returns one of the values at random."""
         return self.random.choice(values)
 
     def polynomial(self, greatest: float) -> str:
-        """Returns one coefficient or three."""
+        """Returns either one coefficient or three coefficients."""
         return f"{self.number(0, greatest)}" + self.maybe(0.5, f" {self.number(0, 1)} {self.number(0, 1)}")
 
     def joint(self, name: str, kind: str) -> str:
-        """Returns a joint with springs and losses."""
+        """Returns a joint with springs, damping and friction."""
         self.joints.append((name, kind))
         text = f'<joint name="{name}" type="{kind}" '
         if kind in ("hinge", "slide"):
@@ -77,7 +77,7 @@ class DrivenMjcf:
         return text + self.maybe(0.25, f'springdamper="{self.number(0.1, 1)} {self.number(0.2, 2)}" ') + "/>"
 
     def body(self, depth: int, floats: bool = False) -> str:
-        """Returns a body and the bodies on it."""
+        """Returns a body, with the bodies that it carries."""
         k = len(self.bodies)
         self.bodies.append(f"b{k}")
         kinds = [self.pick(["hinge", "hinge", "slide", "ball"]) for _ in range(self.pick([0, 1, 1, 1, 2]))]
@@ -91,7 +91,7 @@ class DrivenMjcf:
         return f'<body name="b{k}" {place}>{joints}{inertial}{site}{children}</body>'
 
     def tendon(self, k: int) -> str:
-        """Returns a fixed tendon over one joint or two."""
+        """Returns a fixed tendon over one or two joints."""
         self.tendons.append(f"t{k}")
         attributes = [
             f'armature="{self.number(0, 1)}"',
@@ -145,11 +145,11 @@ class DrivenMjcf:
         return text
 
     def default(self, kind: str) -> str:
-        """Returns a default of a class."""
+        """Returns the default of a class for one kind of element."""
         return f"<{kind} {self.laws()[kind]()} {self.mechanics(kind)}/>"
 
     def actuator(self, k: int) -> str:
-        """Returns an actuator of a joint, a tendon or a site."""
+        """Returns an actuator that drives a joint, a tendon or a site."""
         kind = self.pick(sorted(self.laws()))
         targets = [f'site="s{self.random.randrange(len(self.bodies))}"']
         targets += [f'tendon="{name}"' for name in self.tendons]
@@ -158,7 +158,7 @@ class DrivenMjcf:
         return f'<{kind} name="a{k}" {self.pick(targets)} {attributes}/>'
 
     def constraint(self) -> str:
-        """Returns a loop or a coupling."""
+        """Returns a constraint: a loop or a coupling of joints."""
         first, second = (self.random.randrange(len(self.bodies)) for _ in range(2))
         bodies = f'body1="b{first}" ' + self.maybe(0.8, f'body2="b{second}" ')
         relative = self.maybe(0.5, f'anchor="{self.numbers(3)}" ') + self.maybe(0.4, f'relpose="{self.numbers(7)}" ')

@@ -1,9 +1,10 @@
-"""Robots with one feature each: every element and attribute of MuJoCo's schema, set in a small robot.
+"""Compares robots with one feature each. The features are all elements and attributes in MuJoCo's schema.
 
     python tests/peers/mujoco/features.py [PATTERN]
 
-prints a line for each. A feature that changes MuJoCo's compiled model (inertias, poses, limits, losses, actuators, …)
-must change our model in the same way, or give a warning or an error that names it. `test_features.py` asserts this.
+prints a line for each feature. If a feature changes MuJoCo's compiled model (inertias, poses, limits, losses, actuators
+and so on), it must change Condyle's model in the same way, or give a warning or an error that names it.
+`test_features.py` asserts this.
 """
 
 import fnmatch
@@ -46,7 +47,8 @@ HOLES = {"asset": MESH, "in_b": "", "in_c": "", "in_world": "", "after": "", "in
 ORIENTED = ["pos", "quat", "axisangle", "euler", "xyaxes", "zaxis"]
 ACTUATOR_TARGET = ["joint", "jointinparent", "tendon", "site", "refsite", "slidersite", "cranksite", "body"]
 
-# Values tried for an attribute until MuJoCo accepts one that has an effect; other attributes use GENERIC.
+# Values of an attribute; they are tried until MuJoCo accepts one that has an effect.
+# Attributes that are not listed take values of GENERIC.
 VALUES = {
     "quat": ["0.8 0.2 0.4 0.4"],
     "axisangle": ["1 2 3 40"],
@@ -135,7 +137,7 @@ VISUAL = {
 
 
 def schema() -> Iterator[tuple[tuple[str, ...], list[str]]]:
-    """Yields the path of each element and its attributes."""
+    """Yields the path of each element and the names of its attributes."""
     path: list[str] = []
     attributes: list[str] = []
     for line in mujoco.mj_printSchema(False, False).splitlines():
@@ -151,8 +153,8 @@ def schema() -> Iterator[tuple[tuple[str, ...], list[str]]]:
 
 
 def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
-    """Yields test cases for an attribute of an element: the name, the robot without the attribute, and the robot
-    with it. In the latter, `@` is the placeholder of the attribute."""
+    """Yields test cases for an attribute of an element: a name, the robot without the attribute, and the robot with the
+    attribute. In the last robot, `@` is the placeholder of the attribute."""
 
     def robot(**holes: str) -> str:
         return ROBOT.format(**HOLES | holes)
@@ -217,7 +219,7 @@ def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
             ends = "joint1='j' joint2='l'" if kind == "joint" else "body1='b' body2='f' anchor='0.1 0 0'"
             holes = {"in_world": "<body name='f'><joint name='z' axis='1 0 0'/><geom size='0.1' pos='0.1 0 0'/></body>"}
             base = f"<equality><{kind} name='x' {ends}/></equality>"
-            yield kind, robot(**holes), robot(**holes, after=base)  # the whole element is added
+            yield kind, robot(**holes), robot(**holes, after=base)  # the feature is the whole element
             yield kind, robot(**holes, after=base), robot(**holes, after=base.replace("/>", " @/>"))
         case ("actuator", kind):
             ends = {
@@ -253,7 +255,7 @@ def homes(path: tuple[str, ...]) -> Iterator[tuple[str, str, str]]:
 
 @functools.cache
 def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
-    """Returns MuJoCo's model with all fields that have an effect, or its error."""
+    """Returns MuJoCo's model and all its fields that have an effect; or MuJoCo's error."""
     try:
         m = mujoco.MjModel.from_xml_string(text)
     except ValueError as error:
@@ -316,7 +318,7 @@ def compiled(text: str) -> tuple[Any, dict[str, Any]] | str:
         "actuator_ctrllimited",
     ]:
         effect[field] = getattr(m, field).copy()
-    effect["eq_data"][:, 10] = 0.0  # the torque scale of a compliant weld
+    effect["eq_data"][:, 10] = 0.0  # the torque scale is for compliant welds
     effect["actuator_biasprm"][m.actuator_biastype == 0] = 0.0
     effect["actuator_dynprm"][m.actuator_dyntype == 0] = 0.0
     for name in ("tendon_range", "actuator_forcerange", "actuator_ctrlrange"):
@@ -340,7 +342,7 @@ def rounded(x: Any) -> Any:
 
 @functools.cache
 def ours(text: str) -> tuple[condyle.Model, dict[str, Any]] | str:
-    """Returns our model with all its contents, or the error."""
+    """Returns Condyle's model with all its contents, or the error."""
     try:
         model = condyle.Model.from_mjcf_str(text)
     except condyle.Error as error:
@@ -350,7 +352,7 @@ def ours(text: str) -> tuple[condyle.Model, dict[str, Any]] | str:
 
 
 def changed(a: dict[str, Any], b: dict[str, Any]) -> list[str]:
-    """Returns the names of the differing fields."""
+    """Returns the names of the fields in which two models differ."""
 
     def same(x: Any, y: Any) -> bool:
         if isinstance(x, str) or isinstance(y, str) or not np.shape(x) or not np.shape(y) or len(x) != len(y):
@@ -369,7 +371,7 @@ def changed(a: dict[str, Any], b: dict[str, Any]) -> list[str]:
 
 
 def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, dict[str, Any]]) -> list[str]:
-    """Returns the names of the quantities in which our robot differs from MuJoCo's."""
+    """Returns the names of the quantities in which Condyle's robot differs from MuJoCo's."""
     (m, d), effect = theirs
     model, _ = mine
     if (model.nq, model.nv) != (m.nq, m.nv):
@@ -378,7 +380,7 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
     q = there.position_from(d.qpos)
     v = there.velocity_from(d.qpos, d.qvel)
     data = condyle.Data(model)
-    turn = np.array([there.velocity(q, e) for e in np.eye(model.nv)]).T  # MuJoCo's velocity = turn · ours
+    turn = np.array([there.velocity(q, e) for e in np.eye(model.nv)]).T  # MuJoCo's velocity = turn · Condyle's velocity
     wrong = []
 
     def expect(name: str, found: Any, expected: Any) -> None:
@@ -409,7 +411,7 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
         ]
     )
     single = np.array([kind > 1 for kind in m.jnt_type for _ in range(1 if kind > 1 else 7 if kind == 0 else 4)])
-    # a tendon over one joint is stored as a property of the joint
+    # Condyle stores a tendon over one joint as a property of the joint.
     if not ((m.tendon_num == 1) & ((m.tendon_frictionloss > 0) | (m.tendon_limited > 0))).any():
         found = np.vstack([model.limits.lower, model.limits.upper]).T[single]
         if single.any() and not np.allclose(found, ranges[single]):
@@ -419,8 +421,8 @@ def differences(theirs: tuple[Any, dict[str, Any]], mine: tuple[condyle.Model, d
 
 
 def cases() -> Iterator[tuple[str, str, str]]:
-    """Yields name, robot without the feature, and robot with it; `@` in the latter is the placeholder of an
-    attribute, named `*`."""
+    """Yields a name, the robot without the feature, and the robot with the feature. In the last robot, `@` is the
+    placeholder of an attribute, which is named `*`."""
     for path, attributes in schema():
         if VISUAL & set(path):
             continue
@@ -455,7 +457,7 @@ def verdict(base: str, text: str) -> tuple[str, str]:
         return "refused", mine
     warnings = [str(w) for w in mine[0].warnings]
     known = [str(w) for w in plain[0].warnings]
-    # an omitted element already gives a warning, whatever its attributes
+    # A warning already names an element that is left out, whatever the element's attributes are.
     said = [w for w in warnings if w not in known or "`x`" in w]
     if not said and (wrong := differences(theirs, mine)):
         return "wrong", f"{wrong}; MuJoCo's changes: {effect}"
@@ -474,7 +476,7 @@ if __name__ == "__main__":
         if fnmatch.fnmatch(name, pattern):
             try:
                 kind, what = verdict(base, text)
-            except Exception as error:  # a case that the comparison itself cannot handle
+            except Exception as error:  # the comparison itself cannot handle this case
                 kind, what = "crash", repr(error)
             counts[kind] = counts.get(kind, 0) + 1
             print(f"{kind:10} {name}: {what}")

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draws the pictures of docs/wholebody.md from runs in MuJoCo, and from its existing table of the largest pushes.
+"""Draws the pictures of docs/wholebody.md from runs in MuJoCo, and from the table of the largest pushes in that page.
 
 .venv/pinocchio/bin/python tests/peers/mujoco/plots.py
 """
@@ -20,14 +20,14 @@ PUSHES = (10.0, 20.0, 30.0, 40.0)  # pushes forwards (N s)
 
 
 def save(figure: plt.Figure, name: str) -> None:
-    """Writes a picture as a small file."""
+    """Writes a picture as a file of small size."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     figure.savefig(PICTURES / name, dpi=90, metadata={"Software": None})
     plt.close(figure)
 
 
 def push() -> None:
-    """Plots TALOS under pushes of several sizes."""
+    """Plots TALOS under forward pushes of several sizes."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.4), layout="constrained", sharey=True)
     for axes, title in ((left, "whole-body control, cones"), (right, "PD hold of the joints")):
         for size in PUSHES:
@@ -44,7 +44,7 @@ def push() -> None:
 
 
 def pushes() -> None:
-    """Plots the largest pushes around the circle, from the table that closed_loop.py wrote."""
+    """Plots the largest pushes in all directions, from the table that closed_loop.py wrote."""
     text = DOCUMENT.read_text(encoding="utf-8")
     head, _, *rows = re.search(r"<!-- pushes -->\n(.*?)<!-- end -->", text, re.S)[1].strip().splitlines()
     laws = [cell.strip() for cell in head.strip("|").split("|")][1:]
@@ -53,7 +53,7 @@ def pushes() -> None:
     around = np.radians(np.r_[found[:, 0], found[0, 0] + 360.0])
     for k, (law, line) in enumerate(zip(laws, ("-", "--", ":"), strict=True), 1):
         axes.plot(around, np.r_[found[:, k], found[0, k]], line, marker="o", markersize=4, label=law)
-    axes.set_theta_zero_location("N")  # ahead is up, and left is on the left
+    axes.set_theta_zero_location("N")  # ahead is up, and left is left
     axes.set_thetagrids(range(0, 360, 90), ["ahead", "left", "back", "right"])
     axes.set_rlim(0.0, 10.0 * np.ceil(found[:, 1:].max() / 10.0))
     axes.set_title("largest push that is survived (N s)")

@@ -1,4 +1,4 @@
-"""The robots, their controllers, and their tasks in MuJoCo."""
+"""Robots in MuJoCo, with their controllers and their tasks."""
 
 import sys
 from collections import deque
@@ -28,13 +28,13 @@ sys.path.append(str(Path(__file__).parents[3] / "python" / "examples"))
 from gait import Gait
 
 Law = Callable[[float, Array, Array], Array]
-"""Function that returns efforts from time, position and velocity."""
+"""Function of time, position and velocity that returns efforts."""
 
 SOLES = ["left_sole_link", "right_sole_link"]
 SOLE = (0.2, 0.12)
-"""Sides of TALOS's soles (m)."""
+"""Side lengths of TALOS's soles (m)."""
 TRUSTED = (0.19, 0.11)
-"""Sides of the soles that the controller assumes (m): at the very edges a sole tips."""
+"""Side lengths of the soles that the controller assumes (m). They are smaller, since a sole tips at its very edges."""
 FEET = ["LF_FOOT", "RF_FOOT", "LH_FOOT", "RH_FOOT"]
 BALL = 0.03
 """Radius of ANYmal's feet (m)."""
@@ -42,35 +42,36 @@ FRICTION = 0.7
 PUSH_TIME = 0.1
 """Duration of a push (s)."""
 FALLEN = 0.75
-"""Limit of a fall: the trunk is below this fraction of its initial height, or leans by this angle (rad)."""
+"""Limits of a fall. The robot has fallen if the trunk is below this fraction of its initial height, or leans by more
+than this angle (rad)."""
 
 
 def urdf(name: str) -> str:
-    """Returns the text of a robot of example-robot-data."""
+    """Returns the text of the URDF of a robot in example-robot-data."""
     loader = ROBOTS[name]
     path = Path(loader.path) / loader.urdf_subpath / loader.urdf_filename
     return (Path(getModelPath(str(path))) / path).read_text()
 
 
 class Disturbance(NamedTuple):
-    """Differences between the world and the controller's model of it."""
+    """Disturbances that the controller does not know."""
 
     noise: float = 0.0
-    """Noise of each velocity, normally distributed, relative to the velocity."""
+    """Standard deviation of the noise of each velocity, relative to the velocity."""
     delay: int = 0
-    """Delay after which the controller receives a state (ticks)."""
+    """Number of ticks after which the controller receives a state."""
     friction: float = 1.0
-    """Friction coefficient that the controller assumes, as a multiple of μ."""
+    """Friction coefficient that the controller assumes, as a multiple of the real coefficient μ."""
 
 
 NONE = Disturbance()
 
 
 class Record(NamedTuple):
-    """Record of a run, with one entry per `every` ticks."""
+    """Record of a run. Each array has one entry per `every` ticks."""
 
     stands: bool
-    """Whether the robot has not fallen."""
+    """Whether the robot is still standing at the end."""
     t: Array
     """Times (s)."""
     q: Array
@@ -92,7 +93,7 @@ def run(
     wanted: Callable[[], Array] | None = None,
     every: int = 10,
 ) -> Record:
-    """Runs a control law on a robot that starts in its current state."""
+    """Runs a control law on a robot that starts from its current state."""
     rng, data = np.random.default_rng(0), condyle.Data(world.model)
     seen: deque[tuple[Array, Array]] = deque(maxlen=1 + disturbance.delay)
     height, rows = world.state()[0][2] - world.ground, []
@@ -105,7 +106,7 @@ def run(
         if tick % every == 0:
             c = condyle.com(world.model, data, q)
             rows.append((t, q, c, world.loads()[:, 2], wanted() if wanted else c))
-        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z component of the trunk's z axis
+        upright = 1.0 - 2.0 * (q[3] ** 2 + q[4] ** 2)  # z component of the trunk's z axis, in the world
         if not (q[2] - world.ground > FALLEN * height and upright > np.cos(FALLEN)):
             stands = False
             break
@@ -113,14 +114,14 @@ def run(
 
 
 def ramp(t: float, begin: float, end: float) -> Array:
-    """Returns a smooth transition from 0 at `begin` to 1 at `end`: value, rate, and second derivative."""
+    """Returns value, rate and second derivative of a smooth transition from 0 at `begin` to 1 at `end`."""
     s, w = np.clip((t - begin) / (end - begin), 0.0, 1.0), 1.0 / (end - begin)
     value = s**3 * (10.0 + s * (6.0 * s - 15.0))
     return np.array([value, 30.0 * w * (s * (1.0 - s)) ** 2, 60.0 * w**2 * s * (1.0 - s) * (1.0 - 2.0 * s)])
 
 
 class Humanoid:
-    """TALOS on two soles."""
+    """TALOS, which stands on two soles."""
 
     def __init__(
         self,
@@ -144,14 +145,14 @@ class Humanoid:
         for side, sign in (("left", 1.0), ("right", -1.0)):
             for name, angle in (posture | {"arm_*_1": sign * 0.26, "arm_*_2": sign * 0.17}).items():
                 q[model.idx_qs[model.joint(name.replace("*", side) + "_joint")]] = angle
-        q[2] -= self.controller.hold(q).contacts[0].pose[2, 3]  # puts the soles at height 0
+        q[2] -= self.controller.hold(q).contacts[0].pose[2, 3]  # the soles are then at height 0
         self.q, self.start = q, self.controller.hold(q)
         self.references = self.start.copy()
         self.unsolved = 0
         self.world.set_state(q, np.zeros(model.nv))
 
     def control(self, aim: Callable[[float, References], None] | None = None) -> Law:
-        """Returns the whole-body controller; `aim` changes its references over time."""
+        """Returns the whole-body controller as a law. `aim` changes the controller's references over time."""
 
         def law(t: float, q: Array, v: Array) -> Array:
             if aim:
@@ -163,11 +164,12 @@ class Humanoid:
         return law
 
     def hold(self, stiffness: float) -> Law:
-        """Returns PD control of the joints about the posture, with efforts that compensate gravity: no whole-body
-        control.
+        """Returns PD control that holds the joints at the posture, with efforts that compensate gravity. This is no
+        whole-body control.
 
-        stiffness: as a fraction of the joint's maximum effort per rad. The damping is a tenth of it per rad/s. Neither
-        has a delay or a limit, as in a motor's own control loop: MuJoCo includes them in its implicit step.
+        stiffness: a fraction of the joint's maximum effort, per rad. The damping is a tenth of the stiffness, per
+        rad/s. Both act without delay and limit, as in a motor's own control loop: MuJoCo includes them in its implicit
+        step.
         """
         most = np.where(np.isfinite(limit := self.world.model.limits.effort), limit, 0.0)
         tau0 = self.controller.step(self.q, np.zeros(len(most)), self.start).solved().tau
@@ -180,7 +182,7 @@ class Humanoid:
         return law
 
     def run(self, law: Law, seconds: float, push: Sequence[float] | None = None, begin: float = 0.5) -> Record:
-        """Runs a law; `push` (N s) is distributed evenly over PUSH_TIME."""
+        """Runs a law for some seconds. A `push` (N s) is distributed evenly over PUSH_TIME."""
 
         def force(t: float) -> Sequence[float]:
             pushed = push is not None and begin <= t < begin + PUSH_TIME
@@ -192,7 +194,7 @@ class Humanoid:
         return run(self.world, law, seconds, force, self.disturbance, wanted)
 
     def shift(self, t: float, references: References) -> None:
-        """Shifts the weight to the left and to the right sole in 8 s, by 6 cm each."""
+        """Shifts the weight to the left sole and to the right sole, by 6 cm each, in 8 s."""
         w, (b, db, ddb) = 0.5 * np.pi, ramp(t, 0.0, 1.0)
         s, ds, dds = np.sin(w * t), w * np.cos(w * t), -(w**2) * np.sin(w * t)
         y, v, a = 0.06 * np.array([b * s, db * s + b * ds, ddb * s + 2.0 * db * ds + b * dds])
@@ -200,7 +202,7 @@ class Humanoid:
         references.com.velocity[1], references.com.acceleration[1] = v, a
 
     def lift(self, t: float, references: References) -> None:
-        """Shifts the weight to the left sole, lifts the right foot by 10 cm, and returns, in 7 s."""
+        """Shifts the weight to the left sole, lifts the right foot by 10 cm, and returns. All this takes 7 s."""
         start = self.start
         to, back = ramp(t, 0.2, 1.4), ramp(t, 5.2, 6.4)
         aside = start.contacts[0].pose[:2, 3] - start.com.position[:2]
@@ -213,7 +215,7 @@ class Humanoid:
 
 
 class Quadruped:
-    """Quadruped that trots along a plan by FDDP."""
+    """A quadruped that trots along a plan made by FDDP."""
 
     def __init__(
         self,
@@ -236,7 +238,7 @@ class Quadruped:
         self.world.set_state(self.references.posture.q.copy(), np.zeros(self.world.model.nv))
 
     def law(self, t: float, q: Array, v: Array) -> Array:
-        """Tracks the plan."""
+        """Returns the efforts that track the plan."""
         self.controller.track(self.plan, t, self.references)
         command = self.controller.step(q, v, self.references)
         self.unsolved += command.status != "solved"
@@ -248,8 +250,8 @@ class Quadruped:
 
 
 def trot(urdf: str, feet: Sequence[str], knees: Sequence[float], seconds: float) -> Plan:
-    """Plans a trot by FDDP: diagonal pairs of feet alternately step 16 cm ahead, four times a second. Between steps
-    all feet stand for 50 ms."""
+    """Plans a trot by FDDP. Diagonal pairs of feet alternately step 16 cm ahead, four times a second. Between the
+    steps, all feet stand for 50 ms."""
     model = condyle.Model.from_urdf_str(urdf, root_joint="free_flyer")
     q = condyle.neutral(model)
     q[7:] = knees
@@ -265,5 +267,5 @@ def trot(urdf: str, feet: Sequence[str], knees: Sequence[float], seconds: float)
 
 @cache
 def anymal() -> Plan:
-    """Returns ANYmal's trot of 20 s."""
+    """Returns the plan of ANYmal's trot of 20 s."""
     return trot(urdf("anymal"), FEET, [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2, 20.0)

@@ -1,4 +1,5 @@
-"""`condyle.conventions` compared with MuJoCo: one state, in each library's convention, gives one motion."""
+"""Compares `condyle.conventions` with MuJoCo: one state, converted to each library's convention, must give the same
+motion."""
 
 from collections.abc import Sequence
 
@@ -12,7 +13,7 @@ import condyle
 from condyle import conventions
 
 SAME = 1e-9
-"""Tolerance of accelerations, efforts and poses, relative to the largest one."""
+"""Tolerance of accelerations, efforts and poses, relative to the largest number."""
 FEET = ["LF_foot", "RF_foot", "LH_foot", "RH_foot"]
 
 
@@ -22,7 +23,7 @@ def close(found: np.ndarray, expected: np.ndarray) -> None:
 
 @pytest.fixture(params=["quadruped", "talos"])
 def world(request: pytest.FixtureRequest) -> World:
-    """Creates a robot in both libraries, without damping or friction."""
+    """Creates one robot in both libraries, without damping or friction."""
     robots: dict[str, tuple[str, Sequence[str], tuple[float, float] | float]] = {
         "quadruped": (condyle.robots.QUADRUPED, FEET, BALL),
         "talos": (urdf("talos"), SOLES, SOLE),
@@ -34,7 +35,7 @@ def world(request: pytest.FixtureRequest) -> World:
 
 
 def orders(world: World) -> tuple[list[int], list[int]]:
-    """Returns the indices of our positions and velocities in MuJoCo's vectors, by joint names."""
+    """Returns the indices of Condyle's positions and velocities in MuJoCo's vectors, found by joint names."""
     positions, velocities = [], []
     for name, nq, nv in list(zip(world.model.names, world.model.nqs, world.model.nvs, strict=True))[1:]:
         joint = world.mj.joint(name)
@@ -63,7 +64,7 @@ def test_state_acceleration_effort(world: World) -> None:
         body = data.body(name)
         close(body.xpos, poses[i][:3, 3])
         close(conventions.rotation(conventions.xyzw(body.xquat)), poses[i][:3, :3])
-        # MuJoCo's velocity of a body is [angular, linear], at its centre of mass, here along the world's axes
+        # MuJoCo's velocity of a body is [angular, linear] at the centre of mass. Here it is along the world's axes.
         theirs = np.zeros(6)
         mujoco.mj_objectVelocity(mj, data, mujoco.mjtObj.mjOBJ_BODY, body.id, theirs, 0)
         ours = condyle.body_velocity(model, scratch, q, v, i)
@@ -75,7 +76,7 @@ def test_state_acceleration_effort(world: World) -> None:
 
 
 def test_external_forces(world: World) -> None:
-    """`xfrc_applied` is force and moment along the world's axes about the body's centre of mass."""
+    """Tests `xfrc_applied`: a force and a moment along the world's axes, about the body's centre of mass."""
     model, mj, data = world.model, world.mj, world.data
     there = conventions.Coordinates(model, "mujoco")
     at_q, at_v = orders(world)
@@ -94,7 +95,7 @@ def test_external_forces(world: World) -> None:
 
 
 def test_spherical_and_continuous() -> None:
-    """A ball joint's quaternion is converted, and so is an angle to a cosine and a sine."""
+    """Tests the conversion of a ball joint's quaternion, and of an angle to its cosine and sine."""
     text = """<mujoco><worldbody><body name="a"><joint name="ball" type="ball"/>
         <inertial pos="0.1 0 -0.3" mass="2" diaginertia="0.1 0.2 0.15"/>
         <body name="b" pos="0 0 -0.5"><joint name="hinge" axis="0 1 0"/>

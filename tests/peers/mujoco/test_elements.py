@@ -1,5 +1,5 @@
-"""The table of MJCF's elements compared with MuJoCo's schema. It contains all of MuJoCo's elements, and states how
-each attribute that may change a robot is treated."""
+"""Compares Condyle's table of MJCF elements with MuJoCo's schema. The table must contain all of MuJoCo's elements, and
+must state how each attribute that may change a robot is treated."""
 
 from pathlib import Path
 
@@ -10,9 +10,10 @@ import condyle
 
 TABLE = Path(__file__).parents[3] / "crates/model/src/io/mjcf/elements.txt"
 
-# Treatment of each attribute of the structure. A model holds it (or rejects a value by name), a warning says that it is
-# left out, or it has no effect on kinematics, dynamics and limits. `features.py` tests springs, actuators, tendons,
-# constraints and keyframes one by one.
+# How each attribute of the structure is treated.
+# HELD: a model holds the attribute, or rejects a value by name. LEFT_OUT: a warning says that it is left out.
+# NO_EFFECT: the attribute has no effect on kinematics, dynamics and limits.
+# `features.py` tests springs, actuators, tendons, constraints and keyframes one by one.
 HELD = {
     "compiler": "alignfree angle assetdir autolimits balanceinertia boundinertia boundmass coordinate eulerseq "
     "fitaabb inertiafromgeom inertiagrouprange meshdir settotalmass strippath",
@@ -52,15 +53,15 @@ NO_EFFECT = {
     "joint": "group margin solimpfriction solimplimit solreffriction solreflimit user",
     "freejoint": "group",
     "geom": "adhesion castshadow conaffinity condim contype fluidcoef fluidshape friction gap margin material "
-    "priority rgba solimp solmix solref surfacevel user",  # fluidshape acts through the medium
+    "priority rgba solimp solmix solref surfacevel user",  # fluidshape acts through the medium, which is left out
     "site": "group material mesh rgba size user",
     "camera": "focal focalpixel fovy ipd output principal principalpixel projection resolution sensorsize target user",
 }
 
 
 def table() -> dict[str, tuple[set[str], dict[str, str]]]:
-    """Returns attributes and children of each type; the type of a child is empty if its contents are ignored. The line
-    of `*`, which lists misplaced elements, is left out."""
+    """Returns attributes and children of each type of element. The type of a child is empty if its contents are
+    ignored. The line of `*`, which lists misplaced elements, is left out."""
     types = {}
     for line in TABLE.read_text().splitlines():
         name, rest = line.split(":", 1)
@@ -86,7 +87,7 @@ def test_each_type_is_reached_and_has_a_line() -> None:
             reached.add(name)
             waiting += [kind for kind in types.get(name, (set(), {}))[1].values() if kind]
     assert reached >= types.keys()
-    assert reached - types.keys() <= {"distance"}  # an older constraint, which has no attributes here
+    assert reached - types.keys() <= {"distance"}  # an older constraint, whose attributes are not in this table
 
 
 def test_what_mujoco_knows_is_known() -> None:
@@ -95,7 +96,7 @@ def test_what_mujoco_knows_is_known() -> None:
         kinds = {"mujoco"}
         for tag in path[1:]:
             found = {types[kind][1][tag] for kind in kinds if kind and tag in types[kind][1]}
-            found |= {"body", "worldbody"} if tag == "body" else set()  # the schema has one row for both
+            found |= {"body", "worldbody"} if tag == "body" else set()  # one row of the schema describes both
             assert found or "" in kinds, f"<{tag}> is unknown in {path}"
             kinds = found | ({""} & kinds)
         for kind in kinds - {"", "worldbody"}:

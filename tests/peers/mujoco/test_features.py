@@ -1,4 +1,5 @@
-"""Robots with one feature each, from MuJoCo's own schema: no feature with an effect is ignored silently."""
+"""Tests robots with one feature each, from MuJoCo's own schema. No feature with an effect may be ignored without a
+warning."""
 
 import collections
 import itertools
@@ -11,7 +12,7 @@ CASES = {path: list(cases) for path, cases in itertools.groupby(features.cases()
 
 @pytest.mark.parametrize("path", CASES)
 def test_features(path: str) -> None:
-    """Each attribute of an element is held as in MuJoCo, has no effect, gives a warning, or is rejected."""
+    """Each attribute of an element has the same effect as in MuJoCo, has no effect, gives a warning, or is rejected."""
     verdicts: dict[str, list[str]] = collections.defaultdict(list)
     for name, base, text in CASES[path]:
         kind, what = features.verdict(base, text)

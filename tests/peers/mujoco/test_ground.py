@@ -1,4 +1,4 @@
-"""The ground of a simulation compared with MuJoCo's contacts: a standing robot, and a box that slides to a stop."""
+"""Compares the ground of a simulation with MuJoCo's contacts, for a standing robot and a box that slides to a stop."""
 
 import mujoco
 import numpy as np
@@ -13,18 +13,20 @@ FRICTION = 0.7
 BALL = 0.03
 """Radius of the feet (m)."""
 STIFF, DAMPED = 600.0, 8.0
-"""Gains of the joints (N m/rad, N m s/rad)."""
+"""Stiffness and damping of the joints (N m/rad, N m s/rad)."""
 SOFT = 1e-3
-"""Tolerance of a posture (m, rad): MuJoCo's contacts yield by some hundredths of a millimetre, and creep sideways by
-some tenths in three seconds."""
+"""Tolerance of a posture (m, rad). In three seconds, MuJoCo's contacts yield by several hundredths of a millimetre, and
+creep sideways by several tenths of a millimetre."""
 LOADS = 5e-3
-"""Tolerance of a foot's load, relative to the weight: a foot that yields carries less, the others more."""
+"""Tolerance of the load on a foot, relative to the weight. A foot that yields carries less, and the other feet carry
+more."""
 PROMILLE = 3e-3
-"""Relative tolerance of a stopping distance: both methods are of order h, and MuJoCo's friction builds up gradually."""
+"""Relative tolerance of a stopping distance. Errors of both methods are of order h, and MuJoCo's friction builds up
+gradually."""
 
 
 def standing(model: condyle.Model) -> Array:
-    """Returns the quadruped's position with bent knees, its feet at height 0."""
+    """Returns a position of the quadruped with bent knees, and with the feet at height 0."""
     q = condyle.neutral(model)
     for leg, sign in (("LF", 1.0), ("RF", 1.0), ("LH", -1.0), ("RH", -1.0)):
         q[model.idx_qs[model.joint(f"{leg}_HFE")]] = 0.6 * sign
@@ -35,21 +37,23 @@ def standing(model: condyle.Model) -> Array:
 
 @pytest.mark.parametrize("lean", [0.0, 0.05])
 def test_a_quadruped_stands(lean: float) -> None:
-    """With PD control of the joints on both sides, posture, height and the load of each foot are the same."""
+    """If both libraries use the same PD control of the joints, posture, height and the load of each foot are the
+    same."""
     world = World(condyle.robots.QUADRUPED, FEET, BALL, FRICTION)
-    world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0  # in Condyle they act only if requested
-    world.mj.opt.impratio, world.mj.geom_solref[:] = 100.0, (0.002, 1.0)  # nearly rigid: friction creeps less
+    # in Condyle, damping and friction act only if requested
+    world.mj.dof_damping[:] = world.mj.dof_frictionloss[:] = 0.0
+    world.mj.opt.impratio, world.mj.geom_solref[:] = 100.0, (0.002, 1.0)  # nearly rigid, so friction creeps less
     model, data = world.model, condyle.Data(world.model)
     q0 = standing(model)
     aim = q0.copy()
-    aim[model.idx_qs[model.joint("LF_HFE")]] += lean  # one leg is bent more, so loads differ
+    aim[model.idx_qs[model.joint("LF_HFE")]] += lean  # one leg is bent more, so the loads of the feet differ
 
     def law(q: Array, v: Array) -> Array:
         tau = np.zeros(model.nv)
         tau[6:] = -STIFF * (q[7:] - aim[7:]) - DAMPED * v[6:]
         return tau
 
-    # the contact points are the lowest points of the balls around the feet
+    # The contact points are the lowest points of the balls that surround the feet.
     below = [condyle.frame_placement(model, data, q0, foot)[:3, :3].T @ [0.0, 0.0, -BALL] for foot in FEET]
     points = [(foot, [point]) for foot, point in zip(FEET, below, strict=True)]
     simulation = Simulation(model, ground=Ground(points, height=-BALL, friction=FRICTION))
@@ -73,7 +77,7 @@ def test_a_quadruped_stands(lean: float) -> None:
 
 @pytest.mark.parametrize(("mu", "speed"), [(0.2, 1.0), (0.5, 2.0)])
 def test_a_box_slides_to_a_stop(mu: float, speed: float) -> None:
-    """The stopping distance is the same, and equals v²/(2 μ g)."""
+    """The stopping distance is the same in both libraries, and equals v²/(2 μ g)."""
     x, y, z, dt = 0.2, 0.15, 0.05, 5e-4
     text = f"""<mujoco>
       <option timestep="{dt}" cone="elliptic" impratio="100" integrator="implicitfast"/>
@@ -85,7 +89,7 @@ def test_a_box_slides_to_a_stop(mu: float, speed: float) -> None:
       </worldbody></mujoco>"""
     mj = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(mj)
-    for _ in range(400):  # the box settles on its compliant contacts
+    for _ in range(400):  # the box comes to rest on its compliant contacts
         mujoco.mj_step(mj, data)
     begin = data.qpos[0]
     data.qvel[0] = speed

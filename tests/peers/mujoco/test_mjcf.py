@@ -1,4 +1,4 @@
-"""Actuators, springs, tendons, loops and keyframes of random MJCFs compared with MuJoCo's compiled models."""
+"""Compares actuators, springs, tendons, loops and keyframes of random MJCFs with the models that MuJoCo compiles."""
 
 import json
 from typing import Any
@@ -12,19 +12,19 @@ import condyle
 
 Array = np.ndarray
 SAME = 1e-8
-"""Tolerance relative to each number; some follow from M⁻¹."""
+"""Tolerance relative to each number. Some of the numbers are computed with M⁻¹."""
 BOTH = (-1.0, 1.0)
 SLIDE = int(mujoco.mjtJoint.mjJNT_SLIDE)
-"""Index from which the kinds of joints have one degree of freedom."""
+"""First of MuJoCo's kinds of joints that have one degree of freedom."""
 HUGE = 1e8
-"""Control beyond all ranges. An effort above a hundredth of it has no limit."""
+"""Control that exceeds all ranges. An effort larger than a hundredth of it has no limit."""
 
 
 class Robot:
-    """Robot as compiled by MuJoCo, and as read by us."""
+    """A robot, as MuJoCo compiles it and as Condyle reads it."""
 
     def __init__(self, text: str, theirs: mujoco.MjModel) -> None:
-        """Reads the text."""
+        """Reads the robot's text."""
         model = condyle.Model.from_mjcf_str(text)
         self.ours: dict[str, Any] = json.loads(model.to_json())
         self.said = [str(warning) for warning in model.warnings]
@@ -35,7 +35,7 @@ class Robot:
         return any(what in warning for warning in self.said)
 
     def position(self) -> Array:
-        """Returns the position of MuJoCo's state in our order: quaternions are x, y, z, w."""
+        """Returns the position of MuJoCo's state in Condyle's order, with quaternions as x, y, z, w."""
         q, m = self.data.qpos.copy(), self.theirs
         for at, kind in zip(m.jnt_qposadr, m.jnt_type, strict=True):
             if mujoco.mjtJoint(kind) in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
@@ -44,7 +44,7 @@ class Robot:
         return q
 
     def inertia(self, m: mujoco.MjModel) -> Array:
-        """Returns M of a model of MuJoCo at its first position."""
+        """Returns M of a model of MuJoCo, at the model's initial position."""
         data, matrix = mujoco.MjData(m), np.zeros((m.nv, m.nv))
         mujoco.mj_forward(m, data)
         mujoco.mj_fullM(m, data, matrix)
@@ -52,7 +52,7 @@ class Robot:
 
 
 def robots() -> list[Robot]:
-    """Returns the first robots that MuJoCo accepts."""
+    """Returns the first random robots that MuJoCo accepts."""
     found: list[Robot] = []
     seed = 0
     while len(found) < 150:
@@ -77,13 +77,13 @@ def close(found: Any, expected: Any) -> None:
 
 
 def ends(limits: list[float | None]) -> list[float]:
-    """Returns a range of a file in JSON, where null is infinite."""
+    """Returns a range that JSON contains, with infinity in place of null."""
     lower, upper = limits
     return [-np.inf if lower is None else lower, np.inf if upper is None else upper]
 
 
 def pose(X: dict[str, Any]) -> Array:
-    """Returns a pose as a matrix."""
+    """Returns a pose from JSON as a matrix."""
     matrix = np.eye(4)
     columns = [[column[k] for k in "xyz"] for column in (X["rotation"][c] for c in "xyz")]
     matrix[:3, :3], matrix[:3, 3] = np.array(columns).T, [X["translation"][k] for k in "xyz"]
@@ -111,7 +111,7 @@ def test_armature_and_friction(read: list[Robot]) -> None:
 
 
 def spring(robot: Robot, q: Array) -> Array:
-    """Returns the effort of all springs."""
+    """Returns the efforts of all springs at the position q."""
     tau = np.zeros(robot.theirs.nv)
     for s in robot.ours["springs"]:
         body, k, rest = robot.ours["bodies"][s["body"]], s["stiffness"], np.array(s["rest"])
@@ -134,7 +134,8 @@ def spring(robot: Robot, q: Array) -> Array:
 
 
 def test_springs_and_damping(read: list[Robot]) -> None:
-    """Compares with `qfrc_spring` and `qfrc_damper`, where no tendon runs over several joints."""
+    """Compares springs and damping with `qfrc_spring` and `qfrc_damper`, for robots without tendons over several
+    joints."""
     rng, compared = np.random.default_rng(0), 0
     for robot in read:
         m, d = robot.theirs, robot.data
@@ -153,7 +154,7 @@ def test_springs_and_damping(read: list[Robot]) -> None:
 
 
 def test_actuators(read: list[Robot]) -> None:
-    """Compares laws, gears and ranges of the table; a warning names each omitted actuator."""
+    """Compares laws, gears and ranges in the table of actuators. A warning must name each actuator that is left out."""
     compared = 0
     for robot in read:
         m = robot.theirs
@@ -189,7 +190,7 @@ def test_actuators(read: list[Robot]) -> None:
 
 
 def pushed(robot: Robot, k: int, sign: float) -> tuple[float, bool]:
-    """Returns the maximum effort along a degree of freedom in one direction, and whether an actuator acts on it."""
+    """Returns the maximum effort on a degree of freedom in one direction, and whether an actuator acts on it."""
     m, d, driven = mujoco.MjModel.from_xml_string(robot.text), robot.data, False
     mujoco.mj_resetData(m, d)
     mujoco.mj_forward(m, d)
@@ -200,11 +201,12 @@ def pushed(robot: Robot, k: int, sign: float) -> tuple[float, bool]:
         controls = slice(m.actuator_ctrladr[i], m.actuator_ctrladr[i] + m.actuator_ctrlnum[i])
         moment = moments[m.actuator_outadr[i], k]
         if m.actuator_trntype[i] == mujoco.mjtTrn.mjTRN_SITE:
-            m.actuator_gear[i] = 0.0  # does not limit a joint
+            m.actuator_gear[i] = 0.0  # such an actuator does not limit a joint
             continue
         driven |= moment != 0.0
         if mujoco.mjtGain(m.actuator_gaintype[i]) not in fixed or m.actuator_biasprm[i, 1:3].any():
-            # if its force depends on length and velocity, only its own range limits it, as for a motor
+            # If the force depends on length and velocity, only the force's range limits it.
+            # The test then makes the actuator a motor.
             m.actuator_gaintype[i], m.actuator_biastype[i] = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_NONE
             m.actuator_gainprm[i, 0], m.actuator_ctrllimited[controls] = 1.0, 0
         d.ctrl[controls] = sign * np.sign(moment * m.actuator_gainprm[i, 0]) * HUGE
@@ -232,7 +234,8 @@ def test_limits_of_effort(read: list[Robot]) -> None:
 
 
 def test_limits_of_position(read: list[Robot]) -> None:
-    """Tendons over one joint limit it, unless they exclude its own range, which gives a warning."""
+    """A tendon over one joint limits this joint. If the tendon's range excludes the joint's own range, there is a
+    warning."""
     for robot in read:
         m, at = robot.theirs, 0
         for j in range(m.njnt):
@@ -249,7 +252,7 @@ def test_limits_of_position(read: list[Robot]) -> None:
 
 
 def test_constraints(read: list[Robot]) -> None:
-    """Frames of loops are at the anchors of `eq_data`; couplings have the polynomial about the first position."""
+    """Frames of loops are at the anchors in `eq_data`. Couplings have the polynomial about the initial position."""
     compared = 0
     for robot in read:
         m, counts = robot.theirs, {"connect": 0, "weld": 0, "joint": 0}

@@ -1,5 +1,5 @@
-"""`Model.from_mujoco`: models compiled by MuJoCo, compared with our reader of the same files and with MuJoCo's
-numbers."""
+"""Tests `Model.from_mujoco`. Models that MuJoCo compiled are compared with Condyle's reader of the same files, and with
+MuJoCo's numbers."""
 
 import re
 import sys
@@ -18,9 +18,9 @@ from random_mjcf import RandomMjcf
 PACKAGES = ("dm_control", "gymnasium", "robosuite")
 SAME = 1e-11
 MESHES = 1e-8
-"""Tolerances of masses, poses and M, relative to the largest entry; quaternions of files are rounded twice.
+"""Tolerances of masses, poses and M, relative to the largest entry. Quaternions from files are rounded twice.
 
-`MESHES` is for models with meshes, which MuJoCo rotates into their principal axes up to some 1e-7 rad.
+`MESHES` is for models with meshes. MuJoCo rotates meshes into their principal axes with an error of about 1e-7 rad.
 """
 
 LOADED = """<mujoco model="loaded">
@@ -48,7 +48,8 @@ def close(found: np.ndarray, expected: np.ndarray) -> None:
 
 
 def same_robot(ours: condyle.Model, other: condyle.Model, inertia: float = 0.0) -> None:
-    """Checks that two of our models are one robot, up to rounding; inertia: additional tolerance of inertias."""
+    """Checks that two models of Condyle are the same robot, up to rounding. `inertia` is an additional tolerance of
+    inertias."""
     for what in ("name", "names", "body_names", "joint_types", "parents", "idx_qs", "idx_vs"):
         assert getattr(ours, what) == getattr(other, what), what
     apart = np.abs(ours.inertial_parameters - other.inertial_parameters)
@@ -86,7 +87,7 @@ def same_robot(ours: condyle.Model, other: condyle.Model, inertia: float = 0.0) 
 
 
 def agrees(ours: condyle.Model, theirs: mujoco.MjModel, seed: int) -> None:
-    """Checks that M, bias and the positions of bodies equal MuJoCo's at a random state."""
+    """Checks that M, the bias and the positions of bodies equal MuJoCo's in a random state."""
     rng, there = np.random.default_rng(seed), condyle.conventions.Coordinates(ours, "mujoco")
     q, v = condyle.random_configuration(ours, seed=seed), rng.standard_normal(ours.nv)
     data, scratch = mujoco.MjData(theirs), condyle.Data(ours)
@@ -135,7 +136,7 @@ def test_numbers_that_were_changed_after_compiling() -> None:
 
 
 def test_the_text_compiles_to_the_same_numbers() -> None:
-    """The text written for our reader compiles to the same model in MuJoCo, so nothing is lost."""
+    """The text that Condyle writes compiles to the same model in MuJoCo, so nothing is lost."""
     inside = """<body name="b" pos="0 0 1" gravcomp="0.5">
       <joint name="j" axis="0 1 0" ref="10" springref="20" stiffness="1 2 3" damping="0.5 0.1 0.2" range="-10 20"/>
       <joint name="k" type="ball" stiffness="2" actuatorgravcomp="true" range="0 60"/>
@@ -164,20 +165,21 @@ def test_the_text_compiles_to_the_same_numbers() -> None:
         if part not in ("jnt", "dof", "tendon", "key", "wrap", "qpos", "qpos0", "body", "actuator", "site", "eq"):
             continue
         found, expected = getattr(second, field), getattr(first, field)
-        # bounding volumes of geoms, and the mark of a relative pose that the compiler chose, are skipped
+        # Skip bounding volumes of geoms, and the marks of relative poses that the compiler chose.
         if not isinstance(expected, np.ndarray) or "bvh" in field or "geom" in field:
             continue
         if field == "eq_data":
             found, expected = found[:, :10], expected[:, :10]
         if field in ("body_margin", "body_contype", "body_conaffinity", "site_size", "site_rgba", "actuator_ctrlspec"):
-            continue  # shapes, colours, and the meaning of a control
+            continue  # shapes and colours do not count, nor does the meaning of a control
         np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13, err_msg=field)
         compared += 1
     assert compared > 80
 
 
 def test_controls_of_keyframes() -> None:
-    """One number for each actuator of the model, whatever numbers its inputs and states have in MuJoCo."""
+    """Keyframes have one number for each actuator of the model, whatever numbers of inputs and states the actuators
+    have in MuJoCo."""
     text = """<mujoco><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody>
     <actuator><pid name="a" joint="j" kp="2"/><pid name="b" joint="j" kp="2" input="pos" ki="1" slewmax="1"/>
     <muscle joint="j" lengthrange="0 1"/><intvelocity name="c" joint="j" kp="2" actrange="-1 1"/>
@@ -191,7 +193,7 @@ def test_controls_of_keyframes() -> None:
 
 
 def robots_of_packages() -> list[Path]:
-    """Returns the installed MJCF files of the packages that the comparison of robots reads."""
+    """Returns the MJCF files of the installed packages that the comparison of robots reads."""
     folder = Path(__file__).parents[3] / ".venv" / "robots"
     files = sorted(file for package in PACKAGES for file in (folder / package).rglob("*.xml"))
     return [file for file in files if "<mujoco" in file.read_text(encoding="utf-8", errors="ignore")]
@@ -199,17 +201,18 @@ def robots_of_packages() -> list[Path]:
 
 @pytest.mark.skipif(not robots_of_packages(), reason="no packages of robots in .venv/robots")
 def test_robots_of_packages() -> None:
-    """Each model equals MuJoCo's, and the robot that our reader creates from the file, if it can read it."""
+    """Each model equals MuJoCo's. It also equals the robot that Condyle's reader makes from the file, if the reader
+    accepts the file."""
     compared = read = 0
     for file in robots_of_packages():
         try:
             theirs = mujoco.MjModel.from_xml_path(str(file))
-        except ValueError:  # parts of models, and files that the package omits
+        except ValueError:  # the file is a part of a model, or refers to a missing file
             continue
         ours = condyle.Model.from_mujoco(theirs)
         try:
             other = condyle.Model.from_mjcf(file)
-        except condyle.Error:  # meshes of unsupported formats
+        except condyle.Error:  # a mesh has an unsupported format
             other = None
         if other is not None:
             same_robot(ours, other, MESHES)
@@ -221,7 +224,7 @@ def test_robots_of_packages() -> None:
 
 
 def test_words_for_what_has_none() -> None:
-    """Elements without a name get the names that our reader gives."""
+    """Elements without a name get the names that Condyle's reader gives."""
     text = """<mujoco><worldbody><body><joint/><joint axis="1 0 0"/><geom size="1"/>
       <body name="body3"><joint/><geom size="1"/><body><joint name="body3_joint"/><geom size="1"/></body></body>
     </body></worldbody></mujoco>"""
@@ -246,7 +249,7 @@ PLAIN = re.sub("</?replicate[^>]*>| settotalmass=.7.", "", LOADED)
 
 @pytest.mark.parametrize("text", [PLAIN, *(RandomMjcf(k).text for k in range(8))])
 def test_written_numbers(text: str, tmp_path: Path) -> None:
-    """Changed inertias, limits and armature in a copy of a file equal the robot that MuJoCo reads from it."""
+    """Inertias, limits and armature are changed in a copy of a file. MuJoCo must read the same robot from this copy."""
     original, new = tmp_path / "original.xml", tmp_path / "new.xml"
     original.write_text(text, encoding="utf-8")
     model, rng = condyle.Model.from_mjcf(original), np.random.default_rng(1)
@@ -291,12 +294,12 @@ def test_actuators_that_are_disabled() -> None:
     (warning,) = ours.warnings
     assert warning == "general `off`: it is disabled by <option>: it is no actuator, and no limit of effort"
     assert (warning.kind, warning.file, warning.line) == ("left_out", None, None)
-    theirs.opt.disableactuator = 1  # group 0 alone
+    theirs.opt.disableactuator = 1  # disables group 0 only
     assert [actuator.name for actuator in condyle.Model.from_mujoco(theirs).actuators] == ["off"]
 
 
 def test_constraints_that_are_disabled() -> None:
-    """The flag disables limits, friction and equalities of the compiled model, as in its file."""
+    """A flag disables limits, friction and equalities of the compiled model, as it does in the model's file."""
     joint = '<joint name="j" axis="0 1 0" range="-10 10" frictionloss="1"/>'
     tree = f'<worldbody><body name="b">{joint}<geom size="0.1"/></body></worldbody>'
     loop = '<equality><connect body1="b" anchor="1 0 0"/></equality>'
@@ -307,7 +310,7 @@ def test_constraints_that_are_disabled() -> None:
 
 
 def test_range_of_a_tendon() -> None:
-    """The force in the table of actuators is clipped as `actuator_force` is."""
+    """The force in the table of actuators has the same limits as `actuator_force`."""
     theirs = mujoco.MjModel.from_xml_string(DRIVEN)
     data = mujoco.MjData(theirs)
     data.ctrl[:] = 0.0, 5.0
@@ -318,7 +321,7 @@ def test_range_of_a_tendon() -> None:
 
 
 def test_compensation_after_a_change_of_masses(tmp_path: Path) -> None:
-    """`gravcomp` is a ratio: heavier bodies have more support, here and in MuJoCo."""
+    """`gravcomp` is a ratio: heavier bodies get more support, in Condyle as in MuJoCo."""
     original = tmp_path / "driven.xml"
     original.write_text(DRIVEN, encoding="utf-8")
     theirs, ours = mujoco.MjModel.from_xml_string(DRIVEN), condyle.Model.from_mjcf(original)
@@ -333,7 +336,7 @@ def test_compensation_after_a_change_of_masses(tmp_path: Path) -> None:
 
 
 def test_a_compiled_model_is_written_to_its_source(tmp_path: Path) -> None:
-    """The compiler rounds: only numbers that were changed are edited."""
+    """MuJoCo's compiler rounds numbers. So only the numbers that were changed are written."""
     original, new = tmp_path / "original.xml", tmp_path / "new.xml"
     text = RandomMjcf(3).text
     original.write_text(text, encoding="utf-8")

@@ -1,7 +1,8 @@
-"""A robot in MuJoCo and in Condyle, made from one URDF, and conversions between their states.
+"""A robot in MuJoCo and in Condyle, both made from one URDF, and conversions between the states of both.
 
-MuJoCo stores the quaternion of a free joint with w first. Its linear velocity is along the world's axes, its angular
-velocity along the body's. Condyle (as Pinocchio) stores w last, and both velocities along the body's axes.
+MuJoCo stores the quaternion of a free joint with w first. The joint's linear velocity is along the world's axes, and
+its angular velocity is along the body's axes. Condyle (as Pinocchio) stores w last, and has both velocities along the
+body's axes.
 """
 
 import xml.etree.ElementTree as ET
@@ -16,14 +17,14 @@ import condyle
 Array = NDArray[np.float64]
 
 STIFFNESS = (0.005, 1.0)
-"""Time constant (s) and damping ratio of MuJoCo's contacts, which yield some tenths of a millimetre under a
+"""Time constant (s) and damping ratio of MuJoCo's contacts. They yield several tenths of a millimetre under a
 humanoid."""
 THICKNESS = 0.02
 """Thickness of the box that represents a sole (m)."""
 
 
 def bare(urdf: str) -> ET.Element:
-    """Returns the links and joints of a URDF without shapes, moving freely."""
+    """Returns the links and joints of a URDF without shapes. The root link moves freely."""
     robot = ET.fromstring(urdf)
     for link in robot.iter("link"):
         for shape in link.findall("visual") + link.findall("collision"):
@@ -44,7 +45,8 @@ def bare(urdf: str) -> ET.Element:
 
 
 class World:
-    """Robot on level ground in MuJoCo: soles are boxes below their frames, other feet are balls around them."""
+    """A robot on level ground in MuJoCo. Soles are boxes below the frames of the feet; point feet are balls around
+    their frames."""
 
     def __init__(
         self,
@@ -54,8 +56,8 @@ class World:
         friction: float = 0.7,
         dt: float = 1e-3,
     ) -> None:
-        """size: sides of the soles along x and y (m), or radius of the balls (m). friction: Coulomb friction in
-        MuJoCo."""
+        """size: side lengths of the soles along x and y (m), or radius of the balls (m). friction: coefficient of
+        Coulomb friction in MuJoCo."""
         self.model = condyle.Model.from_urdf_str(urdf, root_joint="free_flyer")
         self.feet, self.ground = list(feet), 0.0
         spec = mujoco.MjSpec.from_string(ET.tostring(bare(urdf)).decode())
@@ -75,7 +77,7 @@ class World:
             body = spec.body(self.model.body_names[frame.body])
             body.add_geom(name=foot, contype=1, conaffinity=0, mass=0.0, **shape, **contact)
         if isinstance(size, float):
-            self.ground = -size  # the plan's feet, at height 0, are the centres of the balls
+            self.ground = -size  # in the plan, the balls' centres are at height 0
         plane = {"type": mujoco.mjtGeom.mjGEOM_PLANE, "size": [0.0, 0.0, 1.0], "pos": [0.0, 0.0, self.ground]}
         spec.worldbody.add_geom(name="ground", contype=0, conaffinity=1, **plane, **contact)
         self.mj = spec.compile()
@@ -114,26 +116,27 @@ class World:
         mujoco.mj_forward(self.mj, self.data)
 
     def generalized(self, tau: Array) -> Array:
-        """Returns the efforts of the joints in MuJoCo's order."""
+        """Returns the efforts of Condyle's joints in MuJoCo's order."""
         out = np.zeros(self.mj.nv)
         out[self._theirs[1]] = tau[self._ours[1]]
         return out
 
     def step(self, tau: Array, push: Sequence[float] = (0.0, 0.0, 0.0)) -> None:
-        """Makes one step under efforts of the joints, and a force on the trunk, at its centre of mass in the world
-        (N)."""
+        """Makes one step under efforts of the joints and a force on the trunk (N). The force acts at the trunk's centre
+        of mass, along the world's axes."""
         self.data.qfrc_applied[:] = self.generalized(tau)
         self.data.xfrc_applied[self.trunk, :3] = push
         mujoco.mj_step(self.mj, self.data)
 
     def loads(self) -> Array:
-        """Returns the force of the ground on each foot in world coordinates, from the last step, (feet, 3)."""
+        """Returns the force of the ground on each foot in the last step, in world coordinates, with the shape (feet,
+        3)."""
         out, force = np.zeros((len(self.feet), 3)), np.zeros(6)
         for k in range(self.data.ncon):
             contact = self.data.contact[k]
             mujoco.mj_contactForce(self.mj, self.data, k, force)
             names = [self.mj.geom(geom).name for geom in contact.geom]
-            sign = 1.0 if names[0] == "ground" else -1.0  # the force acts on the second of the two
+            sign = 1.0 if names[0] == "ground" else -1.0  # the force acts on the second geom of the contact
             out[self.feet.index(next(name for name in names if name != "ground"))] += (
                 sign * contact.frame.reshape(3, 3).T @ force[:3]
             )

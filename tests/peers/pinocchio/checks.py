@@ -1,4 +1,4 @@
-"""Comparisons for any pair of models."""
+"""Checks that a pair of models, Pinocchio's and Condyle's, gives the same results."""
 
 import numpy as np
 import pinocchio as pin
@@ -10,9 +10,10 @@ from condyle.simulation import Simulation
 
 METHODS = (None, "aba", "dense", "sparse")
 GRAINS = (1, 4)
-"""Grain sizes of divide and conquer: the smallest, with as many cuts as possible, and a larger one."""
+"""Grain sizes of divide and conquer: 1, which gives the largest number of cuts, and a larger size."""
 CUTS = 10.0
-"""Factor on the tolerance of divide and conquer: its pieces are worse conditioned than the whole robot."""
+"""Factor on the tolerance of divide and conquer. The pieces of a robot have larger condition numbers than the whole
+robot."""
 FRAMES = {
     "local": pin.ReferenceFrame.LOCAL,
     "world": pin.ReferenceFrame.WORLD,
@@ -21,7 +22,8 @@ FRAMES = {
 STEP = 1e-5
 """Step of central differences."""
 DIFFERENCES = 1e-7
-"""A tenth of the tolerance of central differences: rounding of 1e-16/step, and step² times a third derivative."""
+"""A tenth of the tolerance of central differences. Their error is rounding of 1e-16/step, and step² times a third
+derivative."""
 KINDS = {
     pin.FrameType.BODY: "link",
     pin.FrameType.JOINT: "joint",
@@ -31,7 +33,7 @@ KINDS = {
 
 
 def check_model(pair: Pair) -> None:
-    """Compares sizes, names, order, placements, inertias, losses, limits, frames."""
+    """Compares sizes, names, order, placements, inertias, losses, limits and frames."""
     check_bodies(pair)
     check_losses(pair)
     check_limits(pair)
@@ -39,7 +41,7 @@ def check_model(pair: Pair) -> None:
 
 
 def check_bodies(pair: Pair) -> None:
-    """Compares sizes, names, order, placements, inertias, armature."""
+    """Compares sizes, names, order, placements, inertias and armature."""
     ours, theirs = pair.ours, pair.theirs
     assert ours.name == theirs.name
     assert (ours.nq, ours.nv, ours.nbodies) == (theirs.nq, theirs.nv, theirs.njoints)
@@ -68,7 +70,7 @@ def check_losses(pair: Pair) -> None:
 
 
 def check_limits(pair: Pair) -> None:
-    """Compares limits; they are infinite where Pinocchio has none (or ±1.01 for the numbers of a rotation)."""
+    """Compares limits. A limit that Pinocchio lacks is infinite here (or ±1.01 for the numbers of a rotation)."""
     ours, theirs = pair.ours.limits, pair.theirs
     finite = np.zeros(theirs.nq, bool)
     for joint in theirs.joints[1:]:
@@ -83,7 +85,7 @@ def check_limits(pair: Pair) -> None:
 
 
 def check_frames(pair: Pair) -> None:
-    """Checks that the frames, except Pinocchio's `universe`, have the same body and placement."""
+    """Checks that all frames, except Pinocchio's `universe`, have the same body and placement."""
     ours = {(f.name, f.kind): f for f in pair.ours.frames}
     theirs = {(f.name, KINDS[f.type]): f for f in list(pair.theirs.frames)[1:]}
     assert len(theirs) == pair.theirs.nframes - 1
@@ -94,8 +96,8 @@ def check_frames(pair: Pair) -> None:
 
 
 def common_frames(pair: Pair) -> list[tuple[int, int]]:
-    """Returns the indices of the frames that both have; for a URDF, all except Pinocchio's `universe`
-    (check_frames)."""
+    """Returns pairs of indices of the frames that exist in both models. For a URDF, these are all frames except
+    Pinocchio's `universe` (see check_frames)."""
     theirs = {(f.name, KINDS[f.type]): i for i, f in enumerate(pair.theirs.frames) if i > 0}
     ours = [(f.name, f.kind) for f in pair.ours.frames]
     found = [(i, theirs[key]) for i, key in enumerate(ours) if key in theirs]
@@ -104,7 +106,7 @@ def common_frames(pair: Pair) -> list[tuple[int, int]]:
 
 
 def check_kinematics(state: State) -> None:
-    """Compares placements of bodies and frames, and the Jacobians of all frames in all three frames of reference."""
+    """Compares placements of bodies and frames, and Jacobians of all frames in all three frames of reference."""
     pair, ours, q = state.pair, ours_of(state), state.q
     model, data = pair.theirs, pair.their_data
     pin.framesForwardKinematics(model, data, q)
@@ -122,9 +124,9 @@ def check_kinematics(state: State) -> None:
 
 
 def check_motion(state: State) -> None:
-    """Compares velocities, accelerations and rates of the Jacobians of all frames in all three frames of reference.
+    """Compares velocities, accelerations and rates of Jacobians, of all frames in all three frames of reference.
 
-    In LOCAL_WORLD_ALIGNED Pinocchio's rate of the Jacobian belongs to the classical acceleration, as ours does.
+    In LOCAL_WORLD_ALIGNED, the rate of the Jacobian belongs to the classical acceleration, in both libraries.
     """
     pair, ours, q, v, a = state.pair, ours_of(state), state.q, state.v, state.a
     model, data = pair.theirs, pair.their_data
@@ -160,7 +162,8 @@ def check_motion(state: State) -> None:
 
 
 def check_centroidal(state: State) -> None:
-    """Compares centre of mass, momentum, and their maps and rates. Neither library counts bodies fixed to the world."""
+    """Compares centre of mass, momentum, and the maps and rates of both. Neither library counts bodies that are fixed
+    to the world."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     data = pair.their_data
     theirs(pin.centerOfMass, q, v, a)
@@ -183,14 +186,14 @@ def check_centroidal(state: State) -> None:
 
 
 def expect_fields(pair: Pair, what: str, ours: "tuple[np.ndarray, ...]", theirs: dict[str, np.ndarray]) -> None:
-    """Compares members of a named tuple by name."""
+    """Compares the fields of a named tuple, by name."""
     for name, value in theirs.items():
         pair.expect(f"{what}: {name}", getattr(ours, name), value)
 
 
 def check_energy(state: State) -> None:
-    """Compares energies and their regressors, only without armature. Pinocchio's kinetic energy omits the armature
-    of a revolute joint whose axis is not aligned."""
+    """Compares energies and their regressors, for robots without armature. Pinocchio's kinetic energy omits the
+    armature of a revolute joint whose axis is not aligned."""
     pair, ours, theirs, q, v = state.pair, ours_of(state), theirs_of(state), state.q, state.v
     assert not pair.theirs.armature.any()
     pair.expect("kinetic_energy", ours(condyle.kinetic_energy, q, v), theirs(pin.computeKineticEnergy, q, v))
@@ -208,7 +211,7 @@ def check_energy(state: State) -> None:
 
 
 def check_equations_of_motion(state: State) -> None:
-    """Compares the terms of the equations of motion: Coriolis matrix, M and h in one call, static efforts,
+    """Compares terms of the equations of motion: Coriolis matrix, M and h from one call, static efforts, and
     regressor."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     if pair.rates:
@@ -228,8 +231,8 @@ def check_equations_of_motion(state: State) -> None:
 
 
 def check_lock(state: State) -> None:
-    """Locks every third joint, unless Pinocchio rejects it: it finds no frame if a joint and a link have the same
-    name."""
+    """Locks every third joint and compares the robots. Pinocchio rejects some robots: it finds no frame if a joint and
+    a link have the same name."""
     pair, rng = state.pair, np.random.default_rng(0)
     locked = list(range(1, pair.theirs.njoints, 3))
     ours = pair.ours.lock([body for i in locked for body in pair.chains[i]], state.q)
@@ -254,7 +257,7 @@ def check_lock(state: State) -> None:
 
 
 def check_motion_derivatives(state: State) -> None:
-    """Compares derivatives of the motion of bodies and frames, of momentum and of the centre of mass."""
+    """Compares derivatives of the motion of bodies and frames, of the momentum, and of the centre of mass."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     if not pair.rates:
         return
@@ -307,10 +310,10 @@ def check_motion_derivatives(state: State) -> None:
 
 
 def trusted_columns(model: pin.Model, reference: str) -> np.ndarray:
-    """Returns the columns in which Pinocchio's ∂a/∂q is correct.
+    """Returns the columns of ∂a/∂q that are correct in Pinocchio.
 
-    In the world's axes it contradicts differences of Pinocchio's own accelerations (ours does not). This affects the
-    columns of joints with several degrees of freedom, if they are on a moving body.
+    Along the world's axes, ∂a/∂q contradicts differences of Pinocchio's own accelerations, while Condyle's agrees with
+    them. The wrong columns belong to joints with several degrees of freedom on a moving body.
     """
     right = np.ones(model.nv, bool)
     for joint, parent in zip(model.joints, model.parents, strict=True):
@@ -320,10 +323,10 @@ def trusted_columns(model: pin.Model, reference: str) -> np.ndarray:
 
 
 def of_numbers(by_q: np.ndarray, motion: pin.Motion, J: np.ndarray) -> np.ndarray:
-    """Converts ∂/∂q of a motion to the derivative of its six numbers in LOCAL_WORLD_ALIGNED.
+    """Converts ∂/∂q of a motion to the derivative of the motion's six numbers in LOCAL_WORLD_ALIGNED.
 
-    The origin moves with q by J's linear part. Pinocchio's derivative is of the motion itself, at the fixed current
-    origin.
+    The frame's origin moves with q by the linear part of J. Pinocchio's derivative is of the motion itself, at the
+    fixed current origin.
     """
     moved = by_q.copy()
     moved[:3] += np.cross(motion.angular, J[:3], axisb=0).T
@@ -331,8 +334,8 @@ def of_numbers(by_q: np.ndarray, motion: pin.Motion, J: np.ndarray) -> np.ndarra
 
 
 def check_effort_derivatives(state: State) -> None:
-    """Compares derivatives of static efforts, derivatives by inertial parameters and forces, and the Hessian of
-    inverse dynamics."""
+    """Compares derivatives of static efforts, derivatives with respect to inertial parameters and forces, and the
+    Hessian of inverse dynamics."""
     pair, ours, theirs, q, v, a = state.pair, ours_of(state), theirs_of(state), state.q, state.v, state.a
     if not pair.rates:
         return
@@ -366,8 +369,8 @@ def check_effort_derivatives(state: State) -> None:
 def check_hessian(state: State) -> None:
     """Compares the Hessian of λᵀ τ along a direction with differences of Pinocchio's first derivatives.
 
-    Pinocchio does not offer second derivatives in Python. Along one direction d the tangent spaces of q ⊕ h d do not
-    matter.
+    Pinocchio has no second derivatives in Python. Along one direction d, the differences between the tangent spaces at
+    q ⊕ h d have no effect.
     """
     pair, q, v, a, tau = state.pair, state.q, state.v, state.a, state.tau
     d = np.random.default_rng(0).standard_normal(pair.theirs.nv)
@@ -388,7 +391,7 @@ def check_hessian(state: State) -> None:
 
 
 def check_inverse_dynamics(state: State) -> None:
-    """Compares rnea and nonlinear_effects, which both libraries also offer for mimic joints."""
+    """Compares rnea and nonlinear_effects, which Pinocchio also supports for mimic joints."""
     pair, ours, theirs = state.pair, ours_of(state), theirs_of(state)
     q, v, a = state.q, state.v, state.a
     pair.expect("rnea", ours(condyle.rnea, q, v, a), theirs(pin.rnea, q, v, a))
@@ -398,7 +401,7 @@ def check_inverse_dynamics(state: State) -> None:
 
 
 def check_crba(state: State) -> None:
-    """Compares M, both triangles."""
+    """Compares both triangles of M."""
     state.pair.expect("crba", ours_of(state)(condyle.crba, state.q), theirs_of(state)(pin.crba, state.q))
 
 
@@ -409,7 +412,7 @@ def check_gravity(state: State) -> None:
 
 
 def check_rnea_derivatives(state: State) -> None:
-    """Compares ∂τ/∂q, ∂τ/∂v, ∂τ/∂a, with and without external forces."""
+    """Compares ∂τ/∂q, ∂τ/∂v and ∂τ/∂a, with and without external forces."""
     if not state.pair.rates:
         return
     for label, ours_extra, theirs_extra in (("", (), ()), (", f_ext", (state.f_ext,), (state.their_forces,))):
@@ -420,10 +423,10 @@ def check_rnea_derivatives(state: State) -> None:
 
 
 def check_forward_dynamics(state: State) -> bool:
-    """Compares q̈, M⁻¹ and the derivatives of q̈, with and without external forces; returns false if M has no inverse.
+    """Compares q̈, M⁻¹ and the derivatives of q̈, with and without external forces. Returns false if M has no inverse.
 
-    A body without mass at the end of a limb makes M singular. Pinocchio's q̈ is then not finite; our functions reject
-    the robot, with the joint's name.
+    A body without mass at the end of a limb makes M singular. Then Pinocchio's q̈ is not finite, and Condyle's
+    functions reject the robot with the name of the joint.
     """
     pair, q, v, tau = state.pair, state.q, state.v, state.tau
     ours, theirs, distance = ours_of(state), theirs_of(state), pair.self_distance
@@ -461,7 +464,7 @@ def check_forward_dynamics(state: State) -> bool:
 
 
 def check_factors(state: State) -> None:
-    """Compares solutions by the factors of M with solutions by Pinocchio's factor."""
+    """Compares solutions by Condyle's factors of M with solutions by Pinocchio's factor."""
     pair, q, tau, distance = state.pair, state.q, state.tau, state.pair.self_distance
     M = ours_of(state)(condyle.crba, q)
     theirs_of(state)(pin.crba, q)
@@ -477,7 +480,7 @@ def check_factors(state: State) -> None:
 
 
 def check_euler(state: State) -> None:
-    """Compares a step of the semi-implicit Euler method with Pinocchio's aba and integrate."""
+    """Compares a step of the semi-implicit Euler method with the same step by Pinocchio's aba and integrate."""
     pair, q, v, tau, h = state.pair, state.q, state.v, state.tau, 1e-3
     simulation = Simulation(pair.ours, "semi_implicit_euler", h)
     simulation.set_state(q, v)
@@ -489,10 +492,11 @@ def check_euler(state: State) -> None:
 
 
 def check_configuration(state: State) -> None:
-    """Compares neutral, integrate, difference and their Jacobians, interpolate, distance, normalize and transport.
+    """Compares neutral, integrate and difference with their Jacobians, and interpolate, distance, normalize and
+    transport.
 
-    Pinocchio's dIntegrateTransport multiplies by ∂(q ⊕ v)/∂q, from q to q ⊕ v. Ours applies the inverse, in the
-    opposite direction.
+    Pinocchio's dIntegrateTransport multiplies by ∂(q ⊕ v)/∂q, from q to q ⊕ v. Condyle's function multiplies by the
+    inverse, in the opposite direction.
     """
     pair, q, q1, v = state.pair, state.q, state.q1, state.v
     ours, theirs = pair.ours, pair.theirs
@@ -517,10 +521,10 @@ def check_configuration(state: State) -> None:
 
 
 def with_nearer_quaternions(model: pin.Model, q: np.ndarray, moved: np.ndarray) -> np.ndarray:
-    """Returns `moved` with the quaternion of each rotation that is nearer to q's, of the two possible ones.
+    """Returns `moved`, but with the sign of each quaternion for which it is nearer to the quaternion of q.
 
-    Ours is the nearer one, and so is Pinocchio's for an integrated free-flyer. Pinocchio's is not for a spherical joint
-    that rotates by more than half a turn, nor for interpolated positions.
+    Condyle always returns the nearer quaternion, and Pinocchio returns it for an integrated free-flyer. Pinocchio may
+    return the other one for a spherical joint that rotates by more than half a turn, and for interpolated positions.
     """
     first = {"JointModelSpherical": 0, "JointModelFreeFlyer": 3}
     for joint in model.joints:
@@ -531,5 +535,5 @@ def with_nearer_quaternions(model: pin.Model, q: np.ndarray, moved: np.ndarray) 
 
 
 def poses(placements: "pin.StdVec_SE3") -> np.ndarray:
-    """Returns poses as homogeneous matrices."""
+    """Returns poses as homogeneous 4 × 4 matrices."""
     return np.array([X.homogeneous for X in placements])

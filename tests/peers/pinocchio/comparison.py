@@ -1,4 +1,4 @@
-"""One robot in both libraries, states at which they are compared, and the tolerances."""
+"""One robot in both libraries, the states in which the libraries are compared, and the tolerances."""
 
 import inspect
 from collections import defaultdict
@@ -13,12 +13,12 @@ import pinocchio as pin
 import condyle
 
 TOLERANCE = 1e-10
-"""Tolerance relative to 1 + max |theirs|: some thousand roundings of double precision, with a margin for
-ill-conditioned poses."""
+"""Tolerance relative to 1 + the largest number of Pinocchio's result. It allows several thousand rounding errors of
+double precision, with a margin for ill-conditioned poses."""
 SELF_DISTANCE = 10.0
-"""Tolerance of results that contain M⁻¹, as a multiple of Pinocchio's difference from itself."""
+"""Tolerance of results that contain M⁻¹, as a multiple of the difference between two of Pinocchio's own results."""
 UNLIMITED = 3.0
-"""Range ± of random coordinates without limits (rad, m)."""
+"""Random coordinates without limits are drawn from −3 to 3 (rad, m)."""
 
 ROOT_JOINTS = {
     "free_flyer": pin.JointModelFreeFlyer,
@@ -28,24 +28,25 @@ ROOT_JOINTS = {
 }
 
 BATCH, HERE = 11, 9
-"""Number of states of a batch (more than a vector and not a multiple of it), and index of the compared state."""
+"""Number of states in a batch, and index of the state that is compared. The number exceeds a vector and is no multiple
+of a vector's length."""
 
 SELF_STATES = 20
-"""Number of states at which Pinocchio is compared with itself."""
+"""Number of states in which two of Pinocchio's own results are compared."""
 
 
 @dataclass
 class Record:
-    """Largest difference of one quantity from Pinocchio's, over all robots and states."""
+    """Largest difference of one quantity from Pinocchio, over all robots and states."""
 
     share: float = 0.0
-    """Largest difference as a fraction of the tolerance there."""
+    """Largest difference, as a fraction of the tolerance in that case."""
     difference: float = 0.0
-    """That difference relative to 1 + max |theirs|."""
+    """The same difference, relative to 1 + the largest number of Pinocchio's result."""
     bound: float = TOLERANCE
-    """Tolerance there."""
+    """Tolerance in the case of the largest difference."""
     where: str = ""
-    """Name of the robot."""
+    """Name of the robot in the case of the largest difference."""
     robots: set[str] = field(default_factory=set)
     """Names of all robots for which the quantity was compared."""
 
@@ -56,13 +57,13 @@ class Record:
 
 
 records: dict[str, Record] = defaultdict(Record)
-"""Record of each quantity, for the summary."""
+"""Record of each quantity, by name, for the summary."""
 sizes: dict[str, tuple[str, int, int, int]] = {}
-"""Root joint, moving bodies, nq and nv of each robot that was read, for the summary."""
+"""Root joint, number of moving bodies, nq and nv of each robot that was read, for the summary."""
 
 
 class Pair:
-    """Robot in Pinocchio and in Condyle."""
+    """One robot in Pinocchio and in Condyle."""
 
     def __init__(
         self,
@@ -75,26 +76,27 @@ class Pair:
         self.name, self.theirs, self.ours, self.root_joint = name, theirs, ours, root_joint
         self.their_data, self.data = theirs.createData(), condyle.Data(ours)
         self.chains = chains or [[i] for i in range(ours.nbodies)]
-        """For each of Pinocchio's joints the corresponding bodies here: several if it is a composite."""
+        """Condyle's bodies for each joint of Pinocchio. A composite joint has several bodies."""
         self.bodies = [chain[-1] for chain in self.chains]
-        """For each of Pinocchio's joints the body that it carries here."""
+        """Condyle's body that each joint of Pinocchio carries."""
         self.rates = all(len(chain) == 1 for chain in self.chains)
-        """Whether Pinocchio's rates and derivatives are correct: it treats a composite joint's axes as fixed in the
-        body."""
+        """Whether Pinocchio's rates and derivatives are correct. They are not for composite joints, whose axes
+        Pinocchio treats as fixed in the body."""
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """Returns the columns of our regressors that exist in Pinocchio's: for the bodies that its joints carry."""
+        """Returns the columns of Condyle's regressors for the bodies that Pinocchio's joints carry. Pinocchio's
+        regressors have only these columns."""
         return np.concatenate([np.arange(10 * body - 10, 10 * body) for body in self.bodies[1:]])
 
     def record_size(self) -> None:
-        """Adds the robot to the summary."""
+        """Adds the size of the robot to the summary."""
         ours = self.ours
         sizes[self.name] = (self.root_joint or "none", ours.nbodies - 1, ours.nq, ours.nv)
 
     def with_armature(self, armature: np.ndarray) -> "Pair":
-        """Returns the same robot with armature for both, except a free joint's linear coordinates, whose armature
-        differs in meaning."""
+        """Returns the same robot with armature in both libraries. The linear coordinates of a free joint get no
+        armature, because its meaning differs between the libraries."""
         armature = armature.copy()
         for kind, first in zip(self.ours.joint_types, self.ours.idx_vs, strict=True):
             if kind == "free_flyer":
@@ -104,16 +106,18 @@ class Pair:
         return Pair(self.name, theirs, self.ours.with_armature(armature), self.root_joint, self.chains)
 
     def states(self, count: int, seed: int = 0) -> "list[State]":
-        """Returns random states: q inside its limits, the rest standard normal."""
+        """Returns random states: q is within the limits, and all other numbers are standard normal."""
         return [State(self, seed + i) for i in range(count)]
 
     @cached_property
     def self_distance(self) -> float:
-        """Returns the relative difference of Pinocchio's forward dynamics from itself; NaN if M has no inverse."""
+        """Returns the largest relative difference between two of Pinocchio's own results of forward dynamics; NaN if M
+        has no inverse."""
         return float(np.max([state.self_distance() for state in self.states(SELF_STATES, seed=100)]))
 
     def expect(self, what: str, ours: np.ndarray, theirs: np.ndarray, self_distance: float = 0.0) -> None:
-        """Checks that two results are equal; `self_distance` is Pinocchio's relative difference from itself."""
+        """Checks that two results are equal. `self_distance` is the relative difference between two of Pinocchio's own
+        results."""
         ours, theirs = np.asarray(ours), np.asarray(theirs)
         assert ours.shape == theirs.shape, f"{what} of {self.name}: shape {ours.shape}, expected {theirs.shape}"
         if not theirs.size:
@@ -126,7 +130,7 @@ class Pair:
 
 
 def from_urdf(name: str, path: str, root_joint: str | None, mimic: bool = False) -> Pair:
-    """Reads a robot from the same URDF with both libraries; with `mimic` its size is not recorded."""
+    """Reads a robot from the same URDF with both libraries. With `mimic`, the size of the robot is not recorded."""
     root = (ROOT_JOINTS[root_joint](),) if root_joint else ()
     theirs = pin.buildModelFromUrdf(path, *root, mimic=mimic)
     pair = Pair(name, theirs, condyle.Model.from_urdf(path, root_joint=root_joint, mimic=mimic), root_joint)
@@ -151,7 +155,7 @@ class State:
         self.f_ext[pair.bodies] = rng.standard_normal((model.njoints, 6))
         self.pair = pair
         self.in_batch = False
-        """Whether our functions are called for a batch of states that contains this one."""
+        """Whether Condyle's functions are called for a batch of states that contains this state."""
 
     @cached_property
     def their_forces(self) -> "pin.StdVec_Force":
@@ -161,15 +165,15 @@ class State:
         return forces
 
     def self_distance(self) -> float:
-        """Returns the relative difference of Pinocchio's forward dynamics in the world's frame and in the bodies'
-        frames."""
+        """Returns the relative difference between two of Pinocchio's results of forward dynamics: in the world's frame
+        and in the bodies' frames."""
         args = (self.pair.theirs, self.pair.their_data, self.q, self.v, self.tau)
         local, world = pin.aba(*args, pin.Convention.LOCAL).copy(), pin.aba(*args, pin.Convention.WORLD).copy()
         return float(np.abs(local - world).max() / (1.0 + np.abs(world).max()))
 
 
 def ours_of(state: State) -> Callable[..., np.ndarray]:
-    """Returns our functions, with model and data filled in."""
+    """Returns Condyle's functions, with model and data filled in."""
     model, data = state.pair.ours, state.pair.data
     if not state.in_batch:
         return lambda function, *args: function(model, data, *args)
@@ -192,13 +196,13 @@ def ours_of(state: State) -> Callable[..., np.ndarray]:
 
 @cache
 def arguments_of(function: Callable[..., Any]) -> list[str]:
-    """Returns the parameters of a function besides model and data, cached because reading a signature takes longer
-    than most calls."""
+    """Returns the names of a function's parameters, without model and data. They are cached, because reading a
+    signature takes longer than most calls."""
     return list(inspect.signature(function).parameters)[2:]
 
 
 def of_state(results: Any) -> Any:
-    """Returns the results of a batch for the compared state."""
+    """Returns, from the results of a batch, the results for the compared state."""
     if not isinstance(results, tuple):
         return results[HERE]
     members = map(of_state, results)

@@ -1,5 +1,5 @@
-"""Prints the largest difference of each quantity from Pinocchio after the tests, and writes it to the --validation
-file."""
+"""After the tests, prints the largest difference of each quantity from Pinocchio, and writes it to the file that
+--validation names."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Generated code of one robot in one language, compiled into a library and called with arrays."""
+"""Compiles the generated code of one robot in one language into a library, which is called with arrays."""
 
 import ctypes
 import hashlib
@@ -17,26 +17,26 @@ compiler = os.environ.get("CC", "cc").split()[0]
 
 WARNINGS = ["-Wall", "-Wextra", "-Werror"]
 C = [*WARNINGS, "-O0", "-march=native", "-ffp-contract=fast", "-shared", "-fPIC"]
-"""Compiler options for a short compilation, not for fast code; vectors match the processor."""
+"""Compiler options that make the compilation short, not the code fast. Vectors match the processor."""
 RUST = ["--edition=2021", "--crate-type=cdylib", "-Copt-level=0", "-Cdebuginfo=0", "-Ccodegen-units=1"]
 
 
 def missing(language: str) -> str | None:
-    """Returns the compiler that a language needs, if it is missing."""
+    """Returns the name of the compiler that a language needs, if the compiler is missing."""
     name = "rustc" if language.startswith("rust") else compiler
     return None if shutil.which(name) else name
 
 
 def lanes(language: str) -> int:
-    """Returns the number of states that a call computes."""
+    """Returns the number of states that a call of code in this language computes."""
     return int(language[-1]) if language[-1] in "48" else 1
 
 
 class Library:
-    """Functions of a robot in a language, in one shared library.
+    """Functions of a robot in one language, compiled into one shared library.
 
-    A call takes `lanes` states, whose numbers have the type `real`. Sources with the same text are compiled once per
-    folder.
+    A call takes `lanes` states, whose numbers have the type `real`. Sources with the same text are compiled only once
+    per folder.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Library:
         shutil.rmtree(folder)
 
     def _exports(self) -> str:
-        """Returns Rust source that exports the functions of a module under the names that they have in C."""
+        """Returns Rust source that exports the functions of a module under the names that these functions have in C."""
         real = {4: "f32", 8: "f64"}[self.real.itemsize]
         text = f'#![deny(warnings)]\n#![allow(non_snake_case)]\n#[path = "{self.stem}.rs"]\nmod robot;\n'
         for name, (inputs, outputs) in self.functions.items():
@@ -90,10 +90,10 @@ class Library:
         return text
 
     def __call__(self, name: str, states: Sequence[Sequence[np.ndarray]]) -> list[list[np.ndarray]]:
-        """Returns the results of a function for the arguments of as many states as there are lanes."""
+        """Returns the results of a function. The number of given states must be `lanes`."""
         inputs, outputs = self.functions[name]
         assert len(states) == self.lanes and all(len(state) == len(inputs) for state in states)
-        # number k of state i has the index lanes * k + i
+        # Number k of state i is at index lanes * k + i.
         given = [np.ascontiguousarray(np.stack(of, axis=-1), self.real) for of in zip(*states, strict=True)]
         assert [array.size for array in given] == [self.lanes * rows * columns for _, rows, columns in inputs]
         found = [np.full((rows * columns, self.lanes), np.nan, self.real) for _, rows, columns in outputs]

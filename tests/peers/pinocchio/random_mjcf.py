@@ -1,8 +1,8 @@
-"""MJCFs of random robots: hinges, slides, balls, a free body, several joints on a body, bodies without joints.
+"""MJCFs of random robots, with hinges, slides, balls, a free body, several joints on a body, and bodies without joints.
 
-They exclude what Pinocchio reads differently from MuJoCo. Of several bodies in the world, Pinocchio only takes the
-first one, and if that one has no joint, it ignores its pose. A free body's position is relative to its pose, and balls
-lose their damping and friction.
+The robots exclude what Pinocchio reads differently from MuJoCo. If the world contains several bodies, Pinocchio only
+reads the first body; if this body has no joint, Pinocchio ignores its pose. The position of a free body is relative to
+its pose in the file, and ball joints lose their damping and friction.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ KINDS = ("hinge", "hinge", "slide", "ball", "two", "none")
 
 
 class RandomMjcf:
-    """Random robot of some bodies; the first one may be free."""
+    """A random robot with several bodies. The first body may be free."""
 
     def __init__(self, seed: int, bodies: int = 10) -> None:
         self.rng = np.random.default_rng(seed)

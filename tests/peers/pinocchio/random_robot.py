@@ -1,7 +1,7 @@
-"""Random robots made by both libraries' own calls, with every kind of joint of either library.
+"""Random robots that are made by calls of both libraries. They have every kind of joint that exists in either library.
 
 Pinocchio's universal, spherical ZYX and composite joints are either one joint each, or several joints with massless
-bodies between them, as in this library. q and v have the same layout.
+bodies between them, as in Condyle. q and v have the same layout.
 """
 
 import numpy as np
@@ -12,13 +12,13 @@ import condyle
 from condyle import BodyId, Inertia, Joint, ModelBuilder
 
 BRANCH = 0.4
-"""Probability that a body is not on the previous one, but on one of that body's ancestors."""
+"""Probability that a body is on an ancestor of the previous body, instead of on the previous body."""
 ONE = ("revolute", "continuous", "prismatic", "helical")
-"""Kinds of joints with an axis, which may be x, y, z or any."""
+"""Kinds of joints with an axis, which may be x, y, z or any other axis."""
 OTHERS = ("spherical", "planar", "translation", "free_flyer")
 COMPOSITES = ("universal", "spherical_zyx", "composite")
 PARTS = ("revolute", "helical", "prismatic", "continuous")
-"""Kinds of joints in the composite joint."""
+"""Kinds of joints that a composite joint may combine."""
 ALIGNED = {
     "revolute": (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ),
     "continuous": (pin.JointModelRUBX, pin.JointModelRUBY, pin.JointModelRUBZ),
@@ -30,7 +30,7 @@ UNALIGNED = {
     "prismatic": pin.JointModelPrismaticUnaligned,
     "helical": pin.JointModelHelicalUnaligned,
 }
-"""Continuous joints with a free axis, which only the URDF parser creates."""
+"""Continuous joints about any axis. In Pinocchio, only the URDF parser creates such joints."""
 FREE = {
     "spherical": (pin.JointModelSpherical, Joint.spherical),
     "planar": (pin.JointModelPlanar, Joint.planar),
@@ -39,12 +39,12 @@ FREE = {
 }
 
 Part = tuple[pin.JointModel, Joint, pin.SE3]
-"""Joint of both libraries, and its placement."""
+"""A joint in both libraries, and its placement."""
 
 
 class RandomRobot:
-    """Random robot with joints of these kinds, in any order; bodies are added depth first, as both libraries number
-    them."""
+    """Random robot with joints of the given kinds, in any order. Bodies are added depth first, in the order in which
+    both libraries number bodies."""
 
     def __init__(self, name: str, seed: int, kinds: tuple[str, ...], composites: bool) -> None:
         self.rng, self.composites = np.random.default_rng(seed), composites
@@ -70,7 +70,7 @@ class RandomRobot:
         return axis / np.linalg.norm(axis)
 
     def part(self, kind: str) -> Part:
-        """Returns a joint with a single axis or without an axis."""
+        """Returns a joint that has one axis or no axis."""
         X = pin.SE3.Random()
         if kind in FREE:
             theirs, ours = FREE[kind]
@@ -85,7 +85,7 @@ class RandomRobot:
         return pin.JointModelRevoluteUnaligned(axis), Joint.revolute(axis), X
 
     def parts(self, kind: str) -> list[Part]:
-        """Returns the parts of a joint."""
+        """Returns the joints of which a joint of this kind consists."""
         X, here = pin.SE3.Random(), pin.SE3.Identity()
         if kind == "universal":
             a, b = self.axis(), self.axis()
@@ -99,7 +99,7 @@ class RandomRobot:
         return [self.part(kind)]
 
     def add(self, name: str, parts: list[Part], parent: int, on: BodyId) -> tuple[int, BodyId]:
-        """Adds a body with its joint and a frame on it, to both."""
+        """Adds a body with its joint, and a frame on the body, in both libraries."""
         inertia, kind = pin.Inertia.Random(), name.split()[1]
         ours = Inertia.from_com(inertia.mass, inertia.lever, inertia.inertia)
         if kind == "spherical_zyx":
@@ -121,7 +121,7 @@ class RandomRobot:
         return joint, body
 
     def add_one(self, name: str, part: Part, inertia: pin.Inertia, parent: int, on: BodyId) -> tuple[int, BodyId]:
-        """Adds a joint that is a single joint in both libraries, with limits and losses."""
+        """Adds a joint that is one joint in both libraries, with limits and losses."""
         their, our, X = part
         effort, velocity, friction, damping = self.rng.uniform(0, 1, 4)
         lower, upper = self.rng.uniform(-3, 0), self.rng.uniform(0, 3)
@@ -154,7 +154,7 @@ class RandomRobot:
 
 
 def composite(kind: str, parts: list[Part]) -> pin.JointModel:
-    """Combines several joints into one of Pinocchio's; the whole has the placement of the first one."""
+    """Combines several joints into one joint of Pinocchio. It has the placement of the first joint."""
     if kind == "universal":
         return pin.JointModelUniversal(*(ours.axis for _, ours, _ in parts))
     if kind == "spherical_zyx":

@@ -1,19 +1,21 @@
-"""URDFs of random robots: every kind of joint, unusual axes and names, links without inertia, fixed joints between."""
+"""URDFs of random robots: every kind of joint, unusual axes and names, links without inertia, and fixed joints between
+moving ones."""
 
 import numpy as np
 
 AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 -1", "-1 0 0", "0 0 2", "1e-9 0 1", "0 3 4")
-"""Axes: aligned, negative, not normalised, nearly aligned. Random axes and missing ones are used, too."""
+"""Axes of joints: aligned, negative, not normalised, and nearly aligned. The robots also have random axes, and joints
+without an axis."""
 NAMES = ("J3", "_0", "j1", "j10", "j2", "J", "hip.left", "hip-left", "Über", "a b")
-"""Names whose order by bytes is neither alphabetical nor numerical."""
+"""Names of joints. Their order by bytes is neither alphabetical nor numerical."""
 KINDS = ("revolute", "continuous", "prismatic", "planar", "floating", "fixed")
 
 ONE = ("revolute", "continuous", "prismatic")
-"""Kinds of joints with one degree of freedom, which may follow another."""
+"""Kinds of joints with one degree of freedom; such joints may follow another joint."""
 
 
 class RandomUrdf:
-    """Random robot of some links; `mimics` lets some joints follow others."""
+    """A random robot with several links. With `mimics`, some joints follow other joints."""
 
     def __init__(self, seed: int, links: int = 12, mimics: bool = False) -> None:
         self.rng = np.random.default_rng(seed)
@@ -22,7 +24,7 @@ class RandomUrdf:
         names = [f"{self.rng.choice(NAMES)}{suffixes[i]}" for i in range(1, links)]
         kinds = [str(self.rng.choice(KINDS)) for _ in names]
         lines = [f'<robot name="random{seed}">']
-        # a moving body has mass, because otherwise M would have no inverse
+        # A moving body has mass; without mass, M might have no inverse.
         lines += [self._link(i, moves=i == 0 or kinds[i - 1] != "fixed") for i in range(links)]
         self.kinds = dict(zip(names, kinds, strict=True))
         leaders: list[str] = []
@@ -35,7 +37,8 @@ class RandomUrdf:
         self.text = "\n".join([lines[0], *(lines[i] for i in order), "</robot>\n"])
 
     def _leader(self, kind: str, leaders: list[str]) -> str | None:
-        """Returns a leader for some joints; only a rotating joint may follow a continuous joint."""
+        """Returns the name of a leader, or None if the joint follows no other joint. Only a rotating joint may follow a
+        continuous joint."""
         turns = kind in ("revolute", "continuous")
         leaders = [name for name in leaders if turns or self.kinds[name] != "continuous"]
         return str(self.rng.choice(leaders)) if kind in ONE and leaders and self.rng.random() < 0.4 else None
@@ -58,7 +61,7 @@ class RandomUrdf:
         axes = (f'<axis xyz="{self._numbers(3, 1.0)}"/>', "", *(f'<axis xyz="{axis}"/>' for axis in AXES))
         axis = axes[self.rng.integers(len(axes))] if kind in ("revolute", "continuous", "prismatic") else ""
         if kind == "planar":
-            axis = '<axis xyz="0 0 1"/>'  # the only plane in which Pinocchio's joint moves
+            axis = '<axis xyz="0 0 1"/>'  # Pinocchio's planar joint moves only in this plane
         lower, upper, velocity, effort = self.rng.uniform((-3, 0, 0, 0), (0, 3, 10, 100))
         limited = kind in ("revolute", "prismatic") or (kind == "continuous" and self.rng.random() < 0.5)
         limit = f'<limit lower="{lower}" upper="{upper}" velocity="{velocity}" effort="{effort}"/>' if limited else ""

@@ -1,4 +1,4 @@
-"""`condyle.algebra` compared with Pinocchio's SE3, Motion, Force, exponentials and logarithms."""
+"""Compares `condyle.algebra` with Pinocchio's SE3, Motion, Force, exponentials and logarithms."""
 
 import numpy as np
 import pinocchio as pin
@@ -7,9 +7,10 @@ import pytest
 from condyle.algebra import SE3, Force, Inertia, Jexp3, Jexp6, Jlog3, Jlog6, Motion, exp3, exp6, log3, log6
 
 EXACT = 1e-12
-"""Tolerance of some thousand roundings of numbers near 1."""
+"""Tolerance for several thousand rounding errors of numbers near 1."""
 ANGLES = [0.0, 1e-12, 1e-7, 1e-4, 0.05, 0.0999, 0.1001, 0.999, 1.001, 2.0, 3.0, np.pi - 1e-4]
-"""Angles around each point where a formula changes. Nearer to π Pinocchio's own logarithm loses digits."""
+"""Angles on both sides of each angle at which a formula changes. Nearer to π, Pinocchio's own logarithm loses
+digits."""
 
 
 def motions(angle: float) -> np.ndarray:
@@ -25,7 +26,8 @@ def close(found: np.ndarray, expected: np.ndarray, bound: float = EXACT) -> None
 
 @pytest.mark.parametrize("angle", ANGLES)
 def test_exponentials(angle: float) -> None:
-    """Pinocchio computes its Jacobians of small angles from series of few terms, so they only agree to 1e-9."""
+    """Compares exponentials and logarithms. Pinocchio computes Jacobians of small angles from series of few terms, so
+    they agree only to 1e-9."""
     many = motions(angle)
     for k, m in enumerate(many):
         X = pin.exp6(m)
@@ -43,7 +45,7 @@ def test_exponentials(angle: float) -> None:
 
 @pytest.mark.parametrize("angle", [*ANGLES, np.pi - 1e-9, np.pi])
 def test_inverses(angle: float) -> None:
-    """Checks identities without a peer, up to rounding: exp log is 1, and J is the derivative."""
+    """Checks identities up to rounding, without Pinocchio: exp(log X) is X, and Jexp is the derivative of exp."""
     for m in motions(angle):
         X = exp6(m)
         close(exp6(log6(X)).homogeneous, X.homogeneous)
@@ -97,7 +99,8 @@ def test_batches_and_what_is_refused() -> None:
 
 
 def test_inertias_of_shapes() -> None:
-    """Compares with Pinocchio's inertias, and compares a capsule and a cylinder with sums over many points."""
+    """Compares inertias with Pinocchio's. Those of a capsule and a cylinder are also compared with sums over many
+    points."""
     for ours, theirs in (
         (Inertia.from_sphere(2.0, 0.3), pin.Inertia.FromSphere(2.0, 0.3)),
         (Inertia.from_ellipsoid(2.0, [0.3, 0.2, 0.1]), pin.Inertia.FromEllipsoid(2.0, 0.3, 0.2, 0.1)),

@@ -1,4 +1,4 @@
-"""Robots assembled from robots, compared with Pinocchio's appendModel."""
+"""Compares robots that are assembled from other robots with Pinocchio's appendModel."""
 
 import checks
 import numpy as np
@@ -12,11 +12,11 @@ from condyle import Inertia, Joint, ModelBuilder
 
 STATES = 3
 PARTS = [("panda", "ur5"), ("double_pendulum", "panda"), ("kinova", "xarm7")]
-"""Pairs of fixed robots on one platform; their joints have different names."""
+"""Pairs of fixed robots that stand on one platform. Joints of the two robots have different names."""
 
 
 def together(names: tuple[str, str], seed: int) -> Pair:
-    """Returns both robots on a platform that slides and rotates."""
+    """Returns both robots on one platform that slides and rotates."""
     pin.seed(seed)
     theirs, builder = pin.Model(), ModelBuilder("together")
     theirs.name = "together"

@@ -1,4 +1,5 @@
-"""Functions of the book: the identities of `factorisation.md` on robots of example-robot-data; sizes of subtrees."""
+"""Tests functions of the book: the identities in `factorisation.md` for robots of example-robot-data, and sizes of
+subtrees."""
 
 import importlib.util
 from pathlib import Path
@@ -12,17 +13,17 @@ from test_robots import NO_URDF, ROBOTS, SINGULAR, root_joint, urdf_path
 import condyle
 
 EXACT = 1e-11
-"""Tolerance relative to the largest entry: some thousand roundings."""
+"""Tolerance relative to the largest entry: several thousand rounding errors."""
 INVERSE = 1e-9
-"""Tolerance of results with a division by pivots, whose ratio is up to 1e7 for all robots except icub."""
+"""Tolerance of results that are divided by pivots. The ratio of pivots is up to 1e7 for all robots except icub."""
 SEMIDEFINITE = 1e-11
 """Largest eigenvalue that counts as zero, relative to the largest entry."""
 NOT_PHYSICAL = {"icub", "icub_reduced"}
-"""Robots with physically impossible inertias: pivots lose 11 digits."""
+"""Robots with physically impossible inertias, for which pivots lose 11 digits."""
 
 
 def chapter(name: str) -> dict[str, Any]:
-    """Returns the functions that a chapter defines."""
+    """Returns the functions that a chapter of the book defines."""
     path = Path(__file__).parents[3] / "docs" / "run.py"
     spec = importlib.util.spec_from_file_location("run", path)
     assert spec is not None and spec.loader is not None
@@ -44,7 +45,7 @@ def test_one_factorisation(book: dict[str, Any], name: str) -> None:
     armature = rng.uniform(0.1, 1.0, model.nv) * (rng.random(model.nv) < 0.5)
     for kind, first in zip(model.joint_types, model.idx_vs, strict=True):
         if kind == "free_flyer":
-            armature[first : first + 3] = armature[first]  # the same value along its linear coordinates
+            armature[first : first + 3] = armature[first]  # the same value along all linear coordinates
     found = book["identities"](model.with_armature(armature), condyle.random_configuration(model, seed=0))
     assert len(found) == 6
     for identity, value in found.items():

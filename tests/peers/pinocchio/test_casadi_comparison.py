@@ -1,4 +1,4 @@
-"""The comparison with CasADi runs, and its three ways find the same motion."""
+"""Tests that the comparison with CasADi runs, and that its three methods find the same motion."""
 
 import json
 import subprocess

@@ -1,5 +1,5 @@
-"""Generated code for robots of example-robot-data, compared with Pinocchio and the library, and as CasADi's
-`external`."""
+"""Tests generated code for robots of example-robot-data. It is compared with Pinocchio and the library, and used as
+CasADi's `external`."""
 
 import itertools
 import os
@@ -22,30 +22,32 @@ import condyle
 import condyle.codegen
 
 BOUND = 1e-10
-"""Tolerance of results that the peer computes in another order, relative to 1 + the largest number; as in
-comparison.py."""
+"""Tolerance of results that Pinocchio computes in another order, relative to 1 + the largest number. It is the same as
+in comparison.py."""
 ROUNDING = 1e-12
 """Tolerance of results that the library computes in another order, relative to 1 + the largest number."""
 WORST = 1e10
-"""Condition number from which results are not compared: a contact in a direction in which the robot cannot move."""
+"""Condition number from which results are not compared. Such numbers arise if a contact acts in a direction in which
+the robot cannot move."""
 MILD = 1e3
-"""Condition number of M up to which ROUNDING holds; beyond, the tolerance grows with the condition number."""
+"""Condition number of M up to which ROUNDING holds. Above it, the tolerance grows with the condition number."""
 APART = 2.0
-"""Factor on the tolerance for all states except the first: the code and the library may have errors of opposite sign.
+"""Factor on the tolerance for all states except the first. The errors of the code and of the library may have opposite
+signs.
 
-For solo12's aba_hessian at the seventh state, both differ by 4.4e-12 from extended precision, and by 8.7e-12 from each
-other. The condition number there allows 8.2e-12.
+For solo12's aba_hessian in the seventh state, both errors are 4.4e-12, compared with extended precision, and the
+difference of both results is 8.7e-12. The condition number in this state allows 8.2e-12.
 """
 SINGLE = float(np.finfo(np.float32).eps / np.finfo(np.float64).eps)
-"""Ratio of the roundings of type float and double, and factor on ROUNDING for floats."""
+"""Ratio of the rounding errors of the types float and double. For floats, it multiplies ROUNDING."""
 WORST_SINGLE = 1e5
-"""Condition number from which results of floats are not compared, because fewer than two digits remain."""
+"""Condition number from which results of floats are not compared, because fewer than two digits would be correct."""
 
 ALL = "CONDYLE_FULL" in os.environ
-"""Whether to compile for all robots, which takes a quarter of an hour on two cores."""
+"""Whether code is compiled for all robots, which takes a quarter of an hour on two cores."""
 SOME = ["panda", *(["solo12", "anymal"] if ALL else [])]
 FEW = ["double_pendulum_continuous", "ur5", "borinot"]
-"""Robots for which all languages are compiled: with a joint on a circle, an arm, and a flying base with a limb."""
+"""Robots for which all languages are compiled: one with a joint on a circle, an arm, and a flying base with a limb."""
 LANGUAGES = ["c-casadi", "c-float", "c-4", "c-8", "rust"]
 CASES = [
     (name, language)
@@ -54,13 +56,13 @@ CASES = [
     if ALL or not (name == "borinot" and language == "c-float")
     if ALL or language != "c-8" or name == FEW[0] or condyle.LEVEL == "avx512"
 ]
-"""Pairs of robot and language.
+"""Pairs of a robot and a language.
 
 With vectors of four numbers, compilers take a minute for eight lanes of a robot, so only one robot is compiled with
-them. The three kinds of floats are compiled for the two smaller robots.
+them. The three languages with floats are compiled for the two smaller robots.
 """
 BESIDES = {"c-float": ["c-float-4", "c-float-8"], "rust": ["rust-float"]}
-"""Additional languages of robots with up to `SMALL` coordinates, compiled together with the language in the key."""
+"""Languages that are compiled together with the language in the key, for robots with up to `SMALL` coordinates."""
 
 pytestmark = pytest.mark.skipif(shutil.which(compiler) is None, reason="there is no C compiler")
 
@@ -105,16 +107,17 @@ RESTITUTION = 0.3
 SMALL = 9
 """Maximum number of coordinates of robots that are compiled in all languages."""
 LARGEST = 25
-"""Maximum number of coordinates for the longest functions: second derivatives and functions that need M⁻¹."""
+"""Maximum number of coordinates for which the longest functions are compiled: second derivatives, and functions that
+need M⁻¹."""
 COMPLETE = {("talos", "c-casadi")}
-"""Larger robots for which all functions are compiled in some language."""
+"""Larger robots for which all functions are compiled in this language."""
 
 Numbers = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""q, v, and an acceleration or effort."""
+"""q, v, and numbers that serve as accelerations or efforts."""
 
 
 def beside(pair: Pair, function: str, frame: str, numbers: Numbers) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Returns the arguments of a function at a state, and the library's results."""
+    """Returns the arguments of a function in a state, and the results of the library."""
     model, data = pair.ours, pair.data
     q, v, x = numbers
     told: object
@@ -147,8 +150,8 @@ def beside(pair: Pair, function: str, frame: str, numbers: Numbers) -> tuple[lis
 
 
 def condition(pair: Pair, function: str, frame: str, q: np.ndarray) -> float:
-    """Returns the factor by which a function's inverses may amplify roundings; infinite if an inverse does not
-    exist."""
+    """Returns the factor by which the inverses in a function may amplify rounding errors; infinite if an inverse does
+    not exist."""
     if not function.startswith(("aba", "minv", "constrained", "impulse")):
         return 1.0
     if pair.name in SINGULAR:
@@ -162,7 +165,8 @@ def condition(pair: Pair, function: str, frame: str, q: np.ndarray) -> float:
 
 def chosen(pair: Pair, language: str) -> list[str]:
     """Returns the functions that are compiled for a robot in a language."""
-    # functions of impacts are compiled only in plain C; otherwise they would take as long as all others together
+    # Functions of impacts are compiled only in plain C.
+    # In other languages they would take as long as all other functions together.
     plain = language in ("c", "c-casadi")
     long = {"aba_derivatives", "constrained_dynamics_derivatives", "rnea_hessian", "aba_hessian"}
     long |= set() if plain else {"impulse_dynamics_derivatives"}
@@ -171,20 +175,22 @@ def chosen(pair: Pair, language: str) -> list[str]:
 
 
 def frame_of(pair: Pair) -> str:
-    """Returns the frame that most joints move; functions are evaluated at it, and a contact constrains it."""
+    """Returns the frame that the largest number of joints moves. Functions are evaluated for this frame, and a contact
+    constrains it."""
     model, q = pair.ours, pair.states(1)[0].q
     moved = [condyle.frame_jacobian(model, pair.data, q, k).any(axis=0).sum() for k in range(len(model.frames))]
     return str(model.frames[int(np.argmax(moved))].name)
 
 
 Call = Callable[[str, Sequence[Sequence[np.ndarray]]], list[list[np.ndarray]]]
-"""Function that returns the results of a generated function for the arguments of some states."""
+"""A function that takes a name and states, and returns the results of the generated function with this name."""
 
 
 def compare(pair: Pair, language: str, compiled: Callable[[list[str], dict[str, Any]], Call]) -> Call:
-    """Checks that code is equal to the library up to roundings, which inverses amplify by their condition number.
+    """Checks that code gives the library's results, up to rounding errors that inverses amplify by their condition
+    number.
 
-    compiled: compiles functions with options. Returns the code.
+    compiled: compiles the named functions with options. This function returns the compiled code.
     """
     single = "float" in language
     rounding, worst = (ROUNDING * SINGLE, WORST_SINGLE) if single else (ROUNDING, WORST)
@@ -212,7 +218,7 @@ def compare(pair: Pair, language: str, compiled: Callable[[list[str], dict[str, 
 
 @pytest.mark.parametrize("name", SOME)
 def test_functions_one_by_one(name: str, tmp_path: Path) -> None:
-    """Functions from `condyle.codegen.compile` give the library's results."""
+    """Compiles functions one by one with `condyle.codegen.compile`, and compares them with the library's results."""
     pair = load(name)
 
     def call(names: list[str], options: dict[str, Any]) -> Call:
@@ -229,14 +235,14 @@ def test_functions_one_by_one(name: str, tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def folder() -> Iterator[Path]:
-    """Creates a temporary folder for libraries, which take a gigabyte for all robots."""
+    """Creates a temporary folder for compiled libraries, which need a gigabyte for all robots."""
     with TemporaryDirectory() as folder:
         yield Path(folder)
 
 
 @pytest.mark.parametrize(("name", "language"), CASES)
 def test_languages(name: str, language: str, folder: Path) -> None:
-    """The code in each language gives the library's results, and CasADi receives them."""
+    """The code in each language gives the library's results, and CasADi receives the same results."""
     if (lacks := missing(language)) is not None:
         pytest.skip(f"there is no {lacks}")
     pair = load(name)
@@ -251,7 +257,8 @@ def test_languages(name: str, language: str, folder: Path) -> None:
 
 
 def external(pair: Pair, code: Library) -> None:
-    """Checks that CasADi gets each function's results from the code, and its Jacobian from the derivatives."""
+    """Checks that CasADi receives each function's results from the code, and computes its Jacobian by the generated
+    derivatives."""
     state = pair.states(1)[0]
     numbers = {"q": state.q, "v": state.v, "restitution": np.array([RESTITUTION]), "lambda": state.v[::-1].copy()}
     for function, (inputs, outputs) in code.functions.items():
@@ -276,7 +283,7 @@ def external(pair: Pair, code: Library) -> None:
 
 
 def library(folder: Path) -> str:
-    """Compiles all C of a folder to robot.so; returns the name of the robot in it."""
+    """Compiles all C files of a folder to robot.so; returns the name by which the code calls the robot."""
     sources = sorted(path.name for path in folder.glob("*.c"))
     flags = ["-O1", "-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
     subprocess.run([compiler, *flags, *sources, "-o", "robot.so", "-lm"], cwd=folder, check=True)
@@ -284,7 +291,7 @@ def library(folder: Path) -> str:
 
 
 def test_external(tmp_path: Path) -> None:
-    """CasADi finds each function, its arrays by name and shape, and uses zeros for omitted arguments."""
+    """CasADi finds each function and its arrays with names and shapes. It uses zeros for omitted arguments."""
     pair = load("panda")
     model, theirs, state = pair.ours, pair.theirs, pair.states(1)[0]
     for file, text in condyle.codegen.source(model, ["rnea", "crba"], "c-casadi").items():
@@ -303,14 +310,14 @@ def test_external(tmp_path: Path) -> None:
     M += np.triu(M, 1).T
     assert crba.size_out(0) == M.shape
     assert np.abs(np.array(crba(state.q)) - M).max() <= BOUND * (1.0 + np.abs(M).max())
-    # inside an expression
+    # The function is also called inside an expression.
     q = casadi.MX.sym("q", model.nq)
     trace = casadi.Function("trace", [q], [casadi.trace(crba(q))])
     assert abs(float(trace(state.q)) - np.trace(M)) <= BOUND * (1.0 + np.trace(M))
 
 
 def test_jacobians_of_externals(tmp_path: Path) -> None:
-    """CasADi differentiates a function by its generated derivatives, also inside an expression."""
+    """CasADi differentiates a function by the function's generated derivatives, also inside an expression."""
     pair = load("panda")
     model, theirs, state = pair.ours, pair.theirs, pair.states(1)[0]
     names = ["rnea", "aba", "rnea_derivatives", "aba_derivatives"]
@@ -347,7 +354,7 @@ def test_jacobians_under_constraints(tmp_path: Path) -> None:
         _, d = beside(pair, f"{function}_derivatives", frame, (state.q, state.v, state.a))
         rows = [d[2:5], d[5:8]] if function == "constrained_dynamics" else [d[2:4], d[4:6]]
         expected = np.vstack([np.hstack(blocks) for blocks in rows])
-        # inside an expression
+        # The function is also called inside an expression.
         x = [casadi.MX.sym(name, size) for name, size in zip(of.name_in(), map(len, arguments), strict=True)]
         sines = casadi.sin(casadi.vertcat(*of.call(x)))
         jacobian = casadi.Function("jacobian", x, [casadi.jacobian(sines, casadi.vertcat(*x))])
@@ -355,7 +362,7 @@ def test_jacobians_under_constraints(tmp_path: Path) -> None:
         chain = np.cos(np.concatenate([y, lambda_]))
         chained = chain[:, None] * expected
         assert np.abs(found[:, : chained.shape[1]] - chained).max() <= bound * (1.0 + np.abs(chained).max()), function
-        # central differences of the library's function, also for arguments without derivatives
+        # Compare with central differences of the library's function, also for arguments that have no derivatives.
         step = 1e-6
         for k, by in enumerate(np.cumsum([0, *map(len, arguments[:-1])])):
             for j in range(len(arguments[k])):
@@ -376,7 +383,8 @@ def test_jacobians_under_constraints(tmp_path: Path) -> None:
 
 
 def test_positions_with_quaternions_have_no_jacobian() -> None:
-    """Derivatives along the tangent are not derivatives with respect to the numbers of q."""
+    """With quaternions there is no Jacobian: derivatives along the tangent are not derivatives with respect to the
+    numbers of q."""
     for robot, expected in [("panda", True), ("anymal", False)]:
         text = "".join(condyle.codegen.source(load(robot).ours, ["rnea", "rnea_derivatives"], "c-casadi").values())
         assert ("jac_" in text) == expected, robot

@@ -1,4 +1,4 @@
-"""Contacts and loops on random robots and on legged ones, compared with Pinocchio 4.1."""
+"""Compares contacts and loops with Pinocchio 4.1, for random robots and for legged robots."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,19 +18,19 @@ RANDOM = 30
 STATES = 2
 LEGGED = ("anymal", "anymal_kinova", "hyq", "solo12", "go1", "bolt", "talos", "talos_legs", "icub_reduced")
 WORST_CONDITION = 1e4
-"""Maximum condition number of J M⁻¹ Jᵀ: worse conditioned constraints cannot test the algorithms."""
+"""Maximum condition number of J M⁻¹ Jᵀ. Constraints with larger condition numbers cannot test the algorithms."""
 ROUNDINGS = WORST_CONDITION * np.finfo(float).eps
-"""Accuracy of the terms of ∂q̈/∂τ in both libraries: M⁻¹ minus the constraints' part, with cancellation if M⁻¹ is
+"""Accuracy of the terms of ∂q̈/∂τ in both libraries. It is M⁻¹ minus a term of the constraints; digits cancel if M⁻¹ is
 larger."""
 RESTITUTION = 0.3
 STEP = 1e-6
 DIFFERENCES = 1e-5
-"""Tolerance of central differences with that step, relative to 1 + max |theirs|."""
+"""Tolerance of central differences with this step, relative to 1 + the largest number of Pinocchio's result."""
 
 
 @dataclass
 class Case:
-    """Constraints of a robot at a state, in both libraries."""
+    """Constraints of a robot in a state, in both libraries."""
 
     state: State
     constraints: list[condyle.ContactConstraint]
@@ -48,7 +48,7 @@ class Case:
 
 
 def case(state: State, constraints: list[condyle.ContactConstraint]) -> Case:
-    """Returns constraints in Pinocchio's form: the target is part of the second placement."""
+    """Returns the constraints in both libraries. In Pinocchio, the target is a part of the second placement."""
     pair = state.pair
     theirs = dict(common_frames(pair))
     models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
@@ -72,7 +72,7 @@ def case(state: State, constraints: list[condyle.ContactConstraint]) -> Case:
 
 
 def random_case(state: State, seed: int, loops: bool) -> Case:
-    """Chooses, from a dozen random constraints, as many as the robot can satisfy with unique forces."""
+    """Chooses constraints from a dozen random ones, as many as the robot can satisfy with unique forces."""
     rng, pair = np.random.default_rng(seed), state.pair
     frames = [i for i, _ in common_frames(pair)]
     chosen: list[condyle.ContactConstraint] = []
@@ -96,22 +96,22 @@ def random_case(state: State, seed: int, loops: bool) -> Case:
             new = case(state, [*chosen, constraint])
             if new.conditions() < WORST_CONDITION:
                 chosen.append(constraint)
-        except condyle.ModelError:  # frames that do not move, or the same constraint again
+        except condyle.ModelError:  # the frames do not move, or the constraint occurs twice
             continue
     return case(state, chosen)
 
 
 def whole(c: condyle.ContactConstraint) -> bool:
-    """Returns whether Pinocchio's ∂/∂q is the derivative of its own q̈ and λ, as differences show.
+    """Returns whether Pinocchio's ∂/∂q is correct: the derivative of Pinocchio's own q̈ and λ, which differences show.
 
-    It is not for all loops of points, nor for all rigid constraints along the world's axes.
+    It is wrong for all loops of points, and for all rigid constraints along the world's axes.
     """
     return c.reference == "local" if c.kind == "rigid" else c.other is None
 
 
 def check_dynamics(case: Case) -> None:
-    """Compares q̈ and λ and their derivatives; where Pinocchio's ∂/∂q is not whole, with differences of its q̈ and
-    λ."""
+    """Compares q̈, λ and their derivatives. Where Pinocchio's ∂/∂q is wrong, compares with differences of Pinocchio's
+    q̈ and λ."""
     state, pair = case.state, case.state.pair
     model, data, far = pair.theirs, pair.their_data, pair.self_distance
     settings = pin.ProximalSettings(1e-14, 1e-14, 0.0, 1)
@@ -141,7 +141,7 @@ def check_dynamics(case: Case) -> None:
 
 
 def check_impacts(case: Case) -> None:
-    """Compares v⁺ and Λ and their derivatives; Pinocchio returns the derivatives of v⁺ − v."""
+    """Compares v⁺, Λ and their derivatives. Pinocchio returns the derivatives of v⁺ − v."""
     state, pair = case.state, case.state.pair
     model, data, far = pair.theirs, pair.their_data, pair.self_distance
     args = (model, data, state.q, state.v, case.models, case.datas, RESTITUTION)
@@ -183,7 +183,7 @@ def test_legged_robots(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in LEGGED if name in ROBOTS])
 def test_batches(name: str) -> None:
-    """Tests constrained dynamics and impacts, and their derivatives, in the lanes of a batch."""
+    """Tests constrained dynamics, impacts, and the derivatives of both in the lanes of a batch."""
     (state,) = load(name).states(1, seed=50)
     contacts = random_case(state, 50, False)
     state.in_batch = True

@@ -1,4 +1,4 @@
-"""Inertial parameters of random bodies, compared with Pinocchio 4.1."""
+"""Compares the inertial parameters of random bodies with Pinocchio 4.1."""
 
 import numpy as np
 import pinocchio as pin

@@ -1,4 +1,4 @@
-"""Robots that URDF cannot describe, made by both libraries' own calls, compared with Pinocchio 4.1."""
+"""Compares robots that URDF cannot describe with Pinocchio 4.1. The robots are made by calls of each library."""
 
 import checks
 import numpy as np
@@ -12,10 +12,10 @@ import condyle
 ROBOTS = 20
 STATES = 2
 SINGLE = (*ONE, *ONE, *OTHERS)
-"""Kinds of joints; kinds with an axis occur twice, so that most robots have aligned and other axes."""
+"""Kinds of joints. Kinds with an axis occur twice, so that most robots have both aligned and other axes."""
 STEP = 1e-6
 DIFFERENCES = 1e-6
-"""Tolerance of central differences with that step, relative to 1 + max |theirs|."""
+"""Tolerance of central differences with this step, relative to 1 + the largest number of Pinocchio's result."""
 
 
 def check(pair: Pair, seed: int) -> None:
@@ -48,7 +48,8 @@ def test_single_joints(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_chains_of_joints(seed: int) -> None:
-    """Compares every function for universal, spherical ZYX and composite joints, which are chains in Pinocchio, too."""
+    """Compares every function for universal, spherical ZYX and composite joints. Here they are chains of joints in
+    Pinocchio, too."""
     robot = RandomRobot(f"built robot {100 + seed}", 100 + seed, (*SINGLE, *COMPOSITES), composites=False)
     robot.pair.record_size()
     checks.check_bodies(robot.pair)
@@ -61,8 +62,8 @@ def test_chains_of_joints(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_composite_joints(seed: int) -> None:
-    """Compares the same robots with one joint of Pinocchio's for each chain: every function except rates and
-    derivatives."""
+    """Compares the same robots, but with one joint of Pinocchio for each chain. All functions are compared, except
+    rates and derivatives."""
     robot = RandomRobot(f"built robot {100 + seed}", 100 + seed, (*SINGLE, *COMPOSITES), composites=True)
     ours, theirs = robot.pair.ours, robot.pair.theirs
     assert (ours.nq, ours.nv) == (theirs.nq, theirs.nv)
@@ -77,9 +78,9 @@ def test_composite_joints(seed: int) -> None:
 
 
 def test_derivatives_through_composite_joints() -> None:
-    """Our ∂τ/∂q equals differences of Pinocchio's own rnea, but Pinocchio's derivatives do not.
+    """Condyle's ∂τ/∂q equals differences of Pinocchio's own rnea; Pinocchio's derivatives do not.
 
-    Once they do, the comparisons of composite joints above need no exception.
+    If Pinocchio's derivatives become correct, the comparisons of composite joints above need no exception.
     """
     pair = RandomRobot("built", 0, (*ONE, *COMPOSITES), composites=True).pair
     state = pair.states(1)[0]

@@ -1,8 +1,9 @@
-"""Mimic joints that share a coordinate: rnea, crba and nle compared with Pinocchio's, and all others by projection.
+"""Tests mimic joints that share a coordinate. rnea, crba and nle are compared with Pinocchio's, all other functions by
+projection.
 
-A robot with mimic joints moves as the same robot with free joints along q_free = G q + offset. So its efforts are Gᵀ
-τ_free, its inertia is Gᵀ M_free G, and its derivatives are Gᵀ (∂τ_free/∂·) G; Pinocchio computes them for the free
-robot. Results of forward dynamics are verified by inserting them into these equations.
+A robot with mimic joints moves like the same robot with free joints along q_free = G q + offset. So its efforts are Gᵀ
+τ_free, its inertia is Gᵀ M_free G, and its derivatives are Gᵀ (∂τ_free/∂·) G. Pinocchio computes τ_free, M_free and
+∂τ_free for the free robot. Results of forward dynamics are checked by inserting them into the equations of motion.
 """
 
 from pathlib import Path
@@ -21,21 +22,21 @@ STATES = 3
 RANDOM = 20
 ROBOTS = [n for n in test_robots.ROBOTS if n not in test_robots.NO_URDF and "<mimic" in test_robots.text(n)]
 BROKEN = {"alex_psyonic_hands"}
-"""Robots with a joint that follows a missing one; neither library reads them with mimic=True."""
+"""Robots in which a joint follows a missing joint. Neither library reads them with mimic=True."""
 REFUSED = {"romeo", "talos_full", "talos_full_box"}
-"""Robots with a joint that follows one with a higher index; Pinocchio does not read them with mimic=True."""
+"""Robots in which a joint follows a joint with a higher index. Pinocchio does not read them with mimic=True."""
 
 LARGEST = np.finfo(float).max
-"""Pinocchio's limit of a joint without a limit."""
+"""Limit that Pinocchio stores for a joint without a limit."""
 RANGE = 1e-9
-"""Smallest range of position that is a motion."""
+"""Smallest range of a position that counts as a motion."""
 UNREADABLE = ("not in the kinematic tree", "Mimicking and mimicked configuration spaces have different sizes")
-"""Pinocchio's errors for random robots: a joint follows one with a higher index, or a continuous one and another
-kind."""
+"""Errors of Pinocchio for random robots. A joint follows one with a higher index, or a continuous joint follows another
+kind (or the reverse)."""
 
 
 class Projection:
-    """Robot with mimic joints (ours) as a projection of the one without (Pinocchio's)."""
+    """Condyle's robot with mimic joints, as a projection of Pinocchio's robot without mimic joints."""
 
     def __init__(self, name: str, path: str, root_joint: str | None) -> None:
         self.free = from_urdf(name, path, root_joint)
@@ -49,7 +50,7 @@ class Projection:
                 self.G[free.idx_vs[i] + k, ours.idx_vs[i] + k] = mimic.ratio if mimic else 1.0
 
     def position(self, q: np.ndarray) -> np.ndarray:
-        """Returns the position of the free robot."""
+        """Returns the position of the robot with free joints, from the position q with mimic joints."""
         free, ours, q_free = self.free.ours, self.ours, np.empty(self.free.ours.nq)
         for i, mimic in enumerate(ours.mimics):
             own = q[ours.idx_qs[i] :][: free.nqs[i]]
@@ -62,7 +63,7 @@ class Projection:
         return q_free
 
     def check_model(self, pair: Pair) -> None:
-        """Compares the model. Limits and losses of a follower act on its leader; Pinocchio drops them."""
+        """Compares the model. Limits and losses of a follower act on its leader; Pinocchio ignores them."""
         checks.check_bodies(pair)
         checks.check_frames(pair)
         ours, free, G = pair.ours, self.free.ours, np.abs(self.G)
@@ -89,7 +90,7 @@ class Projection:
             np.testing.assert_allclose(our[finite], expected[finite], rtol=1e-14)
 
     def check(self, seed: int) -> None:
-        """Compares everything at one random state."""
+        """Compares all functions in one random state."""
         rng, pair, G, ours = np.random.default_rng(seed), self.free, self.G, (self.ours, self.data)
         q = condyle.random_configuration(self.ours, seed)
         v, a, tau = rng.standard_normal((3, self.ours.nv))
@@ -119,7 +120,7 @@ class Projection:
         d = condyle.aba_derivatives(*ours, q, v, tau, f_ext)
         pair.expect("mimic: aba of aba_derivatives", d.a, condyle.aba(*ours, q, v, tau, f_ext))
         assert np.array_equal(d.da_dtau, condyle.minv(*ours, q))
-        # M q̈ + h = τ and its consequences: M ∂q̈/∂· = −∂τ/∂·, M M⁻¹ = 1
+        # Check M q̈ + h = τ and what follows from it: M ∂q̈/∂· = −∂τ/∂· and M M⁻¹ = 1.
         dtau_dq, dtau_dv, _ = derivatives(d.a)
         pair.expect("mimic: rnea of aba", rnea(d.a), tau)
         for grain in checks.GRAINS:
@@ -131,7 +132,7 @@ class Projection:
         pair.expect("mimic: M times minv", M @ d.da_dtau, np.eye(self.ours.nv))
 
     def check_terms(self, q: np.ndarray, v: np.ndarray, a: np.ndarray, state: State) -> None:
-        """Compares the Coriolis matrix, the regressor, centre of mass, momentum and energies."""
+        """Compares the Coriolis matrix, the regressor, the centre of mass, the momentum and the energies."""
         pair, G, ours, theirs = self.free, self.G, (self.ours, self.data), (self.free.theirs, self.free.their_data)
         q_free, v_free, a_free = self.position(q), G @ v, G @ a
         C = pin.computeCoriolisMatrix(*theirs, q_free, v_free)
@@ -180,17 +181,17 @@ def test_broken(name: str) -> None:
 
 @pytest.mark.parametrize("name", sorted(REFUSED))
 def test_refused(name: str) -> None:
-    """Pinocchio rejects these robots; once it reads them, they belong to the direct comparison."""
+    """Pinocchio rejects these robots. If a later version reads them, they belong to the direct comparison."""
     with pytest.raises(ValueError, match="not in the kinematic tree"):
         pin.buildModelFromUrdf(test_robots.urdf_path(name), mimic=True)
 
 
 @pytest.mark.parametrize("seed", range(RANDOM))
 def test_random_robot(seed: int, tmp_path: Path) -> None:
-    """Compares random robots, but not M directly.
+    """Compares random robots by projection; M is not compared directly.
 
-    With joints of several degrees of freedom below a joint that follows another, Pinocchio's crba contradicts its own
-    rnea. Ours agrees with the latter.
+    Pinocchio's crba contradicts its own rnea if a joint with several degrees of freedom is below a joint that follows
+    another. Condyle agrees with Pinocchio's rnea.
     """
     path = tmp_path / "robot.urdf"
     path.write_text(RandomUrdf(1000 + seed, mimics=True).text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Random robots that both libraries read from the same MJCF, compared with Pinocchio 4.1."""
+"""Compares random robots with Pinocchio 4.1; both libraries read them from the same MJCF."""
 
 from pathlib import Path
 
@@ -17,7 +17,8 @@ STATES = 2
 
 @pytest.mark.parametrize("seed", range(ROBOTS))
 def test_random_robot(seed: int, tmp_path: Path) -> None:
-    """Several joints on one body are one composite joint in Pinocchio, and a chain of bodies here."""
+    """Compares the robots. Several joints on one body are one composite joint in Pinocchio, and a chain of bodies in
+    Condyle."""
     path = tmp_path / "robot.xml"
     path.write_text(RandomMjcf(seed).text, encoding="utf-8")
     theirs, ours = pin.buildModelFromMJCF(str(path)), condyle.Model.from_mjcf(path)

@@ -1,7 +1,7 @@
-"""Pinocchio's models converted to ours and back, for all robots of example-robot-data: the same joints, frames and
-numbers.
+"""Converts Pinocchio's models to Condyle's and back, for all robots of example-robot-data. Joints, frames and numbers
+must be the same.
 
-Named positions of SRDFs, appended robots and joints that follow others are compared with Pinocchio's own.
+Named positions of SRDFs, appended robots and joints that follow others are compared with Pinocchio's results.
 """
 
 import os
@@ -28,13 +28,14 @@ MIMICS = [n for n in test_mimic.ROBOTS if n not in test_mimic.BROKEN | test_mimi
 
 
 def close(what: str, ours: np.ndarray, theirs: np.ndarray) -> None:
-    """Checks equality, with the tolerance of all these tests."""
+    """Checks equality, with the tolerance that all tests in this file use."""
     bound = TOLERANCE * (1.0 + np.abs(theirs).max(initial=0.0))
     np.testing.assert_allclose(ours, theirs, rtol=0, atol=bound, err_msg=what)
 
 
 def check_same(ours: Model, theirs: pin.Model, bodies: list[int] | None = None, states: int = 2) -> None:
-    """Compares names, limits, losses, rnea, crba and frames; `bodies` are our bodies for each of their joints."""
+    """Compares names, limits, losses, rnea, crba and frames. `bodies` are Condyle's bodies for each joint of
+    Pinocchio."""
     pair = Pair(theirs.name, theirs, ours, chains=None if bodies is None else [[body] for body in bodies])
     bodies = bodies or list(range(ours.nbodies))
     assert (ours.name, ours.nq, ours.nv) == (theirs.name, theirs.nq, theirs.nv)
@@ -99,7 +100,7 @@ def test_every_kind_of_joint(seed: int, composites: bool) -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 def test_random_urdfs(seed: int, tmp_path: Path) -> None:
-    """Tests continuous joints about any axis, which only Pinocchio's reader creates."""
+    """Tests continuous joints about any axis. In Pinocchio, only the reader of URDFs creates such joints."""
     path = tmp_path / "robot.urdf"
     path.write_text(RandomUrdf(seed).text, encoding="utf-8")
     pair = from_urdf(f"robot {seed}", str(path), "free_flyer")
@@ -202,7 +203,7 @@ def test_by_name(name: str) -> None:
 
 
 def test_by_name_of_robot_descriptions(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Imitates a package with modules as in robot_descriptions, which downloads its files."""
+    """Tests with a fake of robot_descriptions, a package whose modules download the files of robots."""
     folder = tmp_path / "robot_descriptions"
     folder.mkdir()
     (tmp_path / "arm7.urdf").write_text(condyle.robots.ARM7, encoding="utf-8")

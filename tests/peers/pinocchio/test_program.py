@@ -1,6 +1,7 @@
-"""The program on all robots of example-robot-data: `inspect` compared with Pinocchio, `check`, `budget`, meshes.
+"""Tests the program for all robots of example-robot-data: `inspect` compared with Pinocchio, `check`, `budget`, and
+meshes.
 
-It uses the program that cargo builds (as `cargo test` does), or the one that CONDYLE_PROGRAM names.
+The tests use the program that cargo builds (as `cargo test` does), or the program that CONDYLE_PROGRAM names.
 """
 
 import base64
@@ -39,8 +40,8 @@ QUADRUPEDS = {
     "go1": ("foot", ["FL", "FR", "RL", "RR"], "{}_thigh_joint", "{}_calf_joint", (0.8, -1.6), False),
     "hyq": ("foot", ["lf", "rf", "lh", "rh"], "{}_hfe_joint", "{}_kfe_joint", (0.7, -1.4), True),
 }
-"""Suffix of the feet's names, legs, joints of thigh and shank, their angles, and whether the hind knees bend
-forwards."""
+"""Quadrupeds: suffix of the feet's names, names of the legs, joints of thigh and shank, angles of these joints, and
+whether the hind knees bend forwards."""
 
 
 def phase(kind: str, knots: int, **numbers: object) -> str:
@@ -64,7 +65,8 @@ def plan(task: str, folder: Path) -> dict:
 
 
 def check_motion(name: str, motion: dict, ahead: float) -> None:
-    """Checks that the motion reaches its goal, within Pinocchio's limits, and that its states are q ⊕ v Δt."""
+    """Checks that the motion reaches its goal within Pinocchio's limits, and that each state is q ⊕ v Δt of the
+    previous state."""
     model = pin.buildModelFromUrdf(urdf_path(name), pin.JointModelFreeFlyer())
     q, v, tau = motion["q"], motion["v"], motion["tau"]
     assert abs(q[-1, 0] - q[0, 0] - ahead) < 0.03
@@ -164,7 +166,7 @@ def test_budget_in_contact(name: str) -> None:
 
 
 def on_terminal(*line: str) -> str:
-    """Returns the program's output on a terminal."""
+    """Returns the output that the program writes to a terminal."""
     leader, follower = os.openpty()
     environment = {**os.environ, "TERM": "xterm-256color"}
     with subprocess.Popen([str(PROGRAM), *line], stdout=follower, stderr=follower, env=environment) as process:
@@ -173,7 +175,7 @@ def on_terminal(*line: str) -> str:
         while True:
             try:
                 part = os.read(leader, 4096)
-            except OSError:  # Linux reports by this error that all writers have closed the terminal
+            except OSError:  # on Linux, this error means that all writers have closed the terminal
                 part = b""
             if not part:
                 break
@@ -195,11 +197,12 @@ def test_colours_and_progress_are_for_terminals(command: str) -> None:
 
 
 MOST_TRIANGLES = 60_000
-"""Maximum number of triangles on a page, as documented by `condyle plan --help`."""
+"""Maximum number of triangles on a page, as `condyle plan --help` states it."""
 MESH_ROUNDING = 0.02
-"""Maximum difference between the box around a body's meshes and the box of the files, relative to its largest side.
+"""Maximum difference between two boxes around a body: from the page's meshes and from the files. Relative to the
+largest side.
 
-Meshes are simplified by collapsing edges, and have a resolution of 16 bits along a side.
+The program simplifies meshes by collapsing edges, and stores them with a resolution of 16 bits along a side.
 """
 
 
@@ -215,7 +218,7 @@ def scene_of(name: str, folder: Path) -> dict:
 
 
 def box_of_meshes(scene: dict, shapes: list[dict]) -> np.ndarray | None:
-    """Returns the box around the meshes of a body, in the body's frame: smallest and largest coordinates."""
+    """Returns the smallest and the largest coordinates of a body's meshes, in the body's frame."""
     points = []
     for shape in (shape for shape in shapes if shape["kind"] == "mesh"):
         mesh = scene["meshes"][shape["part"]]
@@ -230,7 +233,8 @@ def box_of_meshes(scene: dict, shapes: list[dict]) -> np.ndarray | None:
 
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name not in {*NO_URDF, *SINGULAR}])
 def test_meshes(name: str, tmp_path: Path) -> None:
-    """All meshes are found, and each body's meshes are where Pinocchio has them, which reads them by assimp."""
+    """All meshes are found. The meshes of each body are at the same place as in Pinocchio, which reads them by
+    assimp."""
     model = pin.buildModelFromUrdf(urdf_path(name))
     if model.nv == 0:
         pytest.skip("on a fixed root nothing moves")

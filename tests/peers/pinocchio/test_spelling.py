@@ -1,4 +1,4 @@
-"""`condyle.pinocchio`: the same code runs on it and on Pinocchio, and gives the same numbers."""
+"""Tests `condyle.pinocchio`: the same code runs with it and with Pinocchio, and gives the same numbers."""
 
 import copy
 import doctest
@@ -25,7 +25,7 @@ Script = Callable[[ModuleType, Any, Any, Any, int], Any]
 
 
 class State:
-    """State, and forces on all bodies."""
+    """A state, and forces on all bodies."""
 
     def __init__(self, model: condyle.Model) -> None:
         rng = np.random.default_rng(3)
@@ -187,7 +187,8 @@ def test_robots_that_are_built_in(name: str) -> None:
 
 
 def test_humanoid_of_random_numbers() -> None:
-    """It has the structure of Pinocchio's; its derivatives, computed as in Pinocchio's examples, equal Pinocchio's."""
+    """The humanoid has the structure of Pinocchio's humanoid. Its derivatives, computed as in Pinocchio's examples,
+    equal Pinocchio's."""
     np.random.seed(1)
     model = condyle.pinocchio.buildSampleModelHumanoidRandom()
     form = pinocchio.buildSampleModelHumanoidRandom()
@@ -212,7 +213,7 @@ def test_humanoid_of_random_numbers() -> None:
             out += [x.copy() for x in pin.getJointAccelerationDerivatives(m, data, joint, axes)]
         found.append(out)
     for k, (ours, theirs) in enumerate(zip(*found, strict=True)):
-        if k in (2, 5):  # Pinocchio only fills the upper triangle of M and M⁻¹
+        if k in (2, 5):  # Pinocchio fills only the upper triangle of M and M⁻¹
             ours, theirs = np.triu(ours), np.triu(theirs)
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=SAME * (1.0 + np.abs(theirs).max()))
     np.random.seed(1)
@@ -239,7 +240,8 @@ def test_derivatives_of_kinematics() -> None:
 
 
 def test_inverse_kinematics() -> None:
-    """Solves for a target pose as in Pinocchio's examples: the same steps, and the same final position."""
+    """Solves for a target pose as in Pinocchio's examples. Steps and final position must be the same as in
+    Pinocchio."""
     found = []
     for pin in (condyle.pinocchio, pinocchio):
         model = pin.buildSampleModelManipulator()
@@ -380,7 +382,7 @@ def test_a_call_that_fails_leaves_no_state() -> None:
 
 
 def test_tutorial() -> None:
-    """Runs the tutorial with Pinocchio, too."""
+    """Runs the tutorial with `condyle.pinocchio` and with Pinocchio."""
     example = Path(__file__).parents[3] / "python" / "examples" / "coming_from_pinocchio.py"
     run = subprocess.run([sys.executable, example], capture_output=True, text=True, check=False, timeout=300)
     assert run.returncode == 0, run.stderr

@@ -1,4 +1,4 @@
-"""Whole-body control on pyramids finds the same optimum as quadprog, for the same programs."""
+"""Tests that whole-body control with pyramids finds the same optimum as quadprog, for the same programs."""
 
 import subprocess
 import sys
@@ -14,15 +14,16 @@ sys.path.insert(0, str(ROOT / "benches" / "peers"))
 from wholebody_programs import Program, read  # noqa: E402
 
 AGREEMENT = 1e-6
-"""Tolerance relative to 1 and the size of the compared numbers: quadprog is exact up to rounding, our tolerance is
-1e-9."""
+"""Tolerance relative to 1 and the size of the compared numbers. quadprog is exact up to rounding, and Condyle's
+tolerance is 1e-9."""
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Writes the programs of ticks of robots that stand, walk and trot while they are pushed, with our solutions."""
+    """Writes programs and Condyle's solutions for ticks of robots that stand, walk and trot while they are pushed.
+    Returns the folder."""
     folder = tmp_path_factory.mktemp("programs")
-    # with the workspace's features, all dependencies are already compiled
+    # With the features of the workspace, all dependencies are already compiled.
     command = ["cargo", "bench", "--quiet", "--locked", "--workspace", "--profile", "dev", "--bench", "wholebody_peers"]
     command += ["--", "--ticks", "1600", "--window", "320", "--replays", "0", "--export", str(folder)]
     subprocess.run([*command, "humanoid", "quadruped"], cwd=ROOT, check=True)

@@ -1,4 +1,5 @@
-"""Random inertias, limits and armature in copies of all URDFs of example-robot-data, which Pinocchio also reads."""
+"""Writes random inertias, limits and armature into copies of all URDFs of example-robot-data. Pinocchio also reads the
+copies."""
 
 from pathlib import Path
 
@@ -12,11 +13,12 @@ import condyle
 FOLDER = Path(getModelPath("a1_description"))
 FILES = sorted(file.relative_to(FOLDER).as_posix() for file in FOLDER.rglob("*.urdf"))
 SAME = 1e-11
-"""Tolerance of M and inertias, relative to the largest entry: inertias pass through the frames of merged links."""
+"""Tolerance of M and inertias, relative to the largest entry. Inertias are transformed between the frames of merged
+links."""
 
 
 def other(inertia: condyle.Inertia, rng: np.random.Generator) -> condyle.Inertia:
-    """Returns another valid inertia of a body, of about the size of a limb."""
+    """Returns another valid inertia for a body, with about the size of a limb."""
     del inertia
     spread = 0.1 * rng.standard_normal((3, 3))
     moments = spread @ spread.T + 1e-3 * np.eye(3)

@@ -1,4 +1,4 @@
-"""The table of all differences from Pinocchio, as Markdown, from the records of one test run."""
+"""Makes the table of all differences from Pinocchio, in Markdown, from the records of one test run."""
 
 import platform
 import re
@@ -77,17 +77,18 @@ joint, with mimic joints, armature and external forces (`crates/dynamics/tests/s
 
 
 PUBLIC = re.compile(r"<!-- public robots -->.*<!-- end of public robots -->\n", re.DOTALL)
-"""Section that `tests/peers/robots.py --table` writes."""
+"""Section of the file that `tests/peers/robots.py --table` writes."""
 
 
 def kept(text: str) -> str:
-    """Returns the section on public robots of a file, which another program writes, with an empty line before it."""
+    """Returns the section on public robots, which another program writes into the file, with an empty line before
+    it."""
     section = PUBLIC.search(text)
     return "\n" + section.group() if section else ""
 
 
 def report() -> str:
-    """Returns the whole file."""
+    """Returns the text of the whole file."""
     head = HEAD.format(
         command=COMMAND,
         ours=condyle.__version__,
@@ -106,12 +107,12 @@ def report() -> str:
 
 
 def derivatives() -> list[str]:
-    """Returns the Rust tests' output about hand-written derivatives."""
+    """Returns the output of the Rust tests on hand-written derivatives."""
     modules = ("derivatives", "second_order", "inputs", "motion_derivatives", "constrained_derivatives")
     command = ("cargo", "test", "--locked", "--package", "condyle-dynamics", "--test", "suite", "--", "--nocapture")
     output = subprocess.run((*command, *modules), check=True, stdout=subprocess.PIPE, text=True).stdout
     rows = set()
-    # a test on one thread prints its name, and goes on in the same line
+    # If tests run on one thread, a test prints its name, and its output begins in the same line.
     line = re.compile(r"^(?:test \S+ \.\.\. )?(.*[∂∇].*): (\S+) \(allowed (\S+)\)$", re.MULTILINE)
     for name, error, allowed in line.findall(output):
         way = "central differences" if float(allowed) >= 1e-6 else "the contraction" if "Σ" in name else "dual numbers"
@@ -120,7 +121,7 @@ def derivatives() -> list[str]:
 
 
 def robots() -> list[str]:
-    """Returns all robots of example-robot-data, with remarks."""
+    """Returns rows with all robots of example-robot-data, with remarks."""
     lines = [
         "## Robots",
         "",
@@ -137,7 +138,7 @@ def robots() -> list[str]:
 
 
 def degrees(names: list[str]) -> str:
-    """Returns the smallest and the largest number of degrees of freedom."""
+    """Returns the smallest and the largest number of degrees of freedom of these robots."""
     nvs = [comparison.sizes[name][3] for name in names] or [0]
     return f"{min(nvs)} to {max(nvs)}"
 

@@ -1,4 +1,4 @@
-"""Comparison of robots with Drake: SDF, URDF, and MJCF that MuJoCo does not read."""
+"""Compares robots with Drake: from SDF, from URDF, and from MJCF if MuJoCo does not read the file."""
 
 import atexit
 import logging
@@ -21,14 +21,14 @@ import condyle
 
 
 class Warnings(logging.Handler):
-    """Drake's warnings about the last file."""
+    """Handler that keeps Drake's warnings about the last file."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
         self.texts: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keeps a warning."""
+        """Keeps the text of a warning."""
         self.texts.append(record.getMessage())
 
 
@@ -37,12 +37,12 @@ logger = logging.getLogger("drake")
 logger.addHandler(warnings)
 logger.propagate = False
 REPLACED = ("While parsing inertia matrix", "While re-expressing as central inertia")
-"""Warnings after which Drake takes another inertia than the file's."""
+"""Beginnings of warnings after which Drake uses another inertia than the file's."""
 TOLERANCE = 1e-10
 CONVERTED = 1e-8
-"""Tolerance of SDFs before 1.7, which Drake converts to later ones with rounded numbers."""
+"""Tolerance for SDFs before version 1.7. Drake converts them to a later version with rounded numbers."""
 UNLIMITED = 1e16
-"""SDF's default of limits of position, and a common one of URDFs: no limit."""
+"""Limit of position that means no limit: SDF's default, also common in URDFs."""
 LENGTHS = {
     "revolute": (1, 1),
     "prismatic": (1, 1),
@@ -53,7 +53,7 @@ LENGTHS = {
     "quaternion_floating": (7, 6),
     "weld": (0, 0),
 }
-"""Numbers of positions and velocities of the kinds of joints whose coordinates are known here."""
+"""Numbers of positions and of velocities, for the kinds of joints whose coordinates in Drake are known here."""
 
 
 IRRELEVANT = {
@@ -61,11 +61,13 @@ IRRELEVANT = {
     *("population", "atmosphere", "magnetic_field", "projector", "battery", "particle_emitter", "material", "contact"),
     *("velocity_decay", "kinematic", "audio_sink", "audio_source", "actor", "spherical_coordinates"),
 }
-"""Elements of SDF without effect on what is compared. Drake refuses files for some of them."""
+"""Elements of SDF that have no effect on the compared quantities. Drake rejects some files because of these
+elements."""
 
 
 class Copies:
-    """Copies of the SDFs below a folder without irrelevant elements, and the packages that Drake finds among them."""
+    """Copies of all SDFs below a folder, with the elements in `IRRELEVANT` removed, and a map of the copied packages
+    for Drake. Texts whose inertias depend on shapes are copied unchanged."""
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.place = folder, Path(tempfile.mkdtemp(prefix="robots-"))
@@ -85,12 +87,13 @@ class Copies:
                 copy.write_text(self.plain(path), encoding="utf-8")
 
     def of(self, path: Path) -> Path:
-        """Returns the path of a copy, with a suffix that Drake knows."""
+        """Returns the path at which a file is copied, with a suffix that Drake knows."""
         copy = self.place / path.relative_to(self.folder)
         return copy.with_name(copy.name + ".sdf") if copy.suffix == ".world" else copy
 
     def plain(self, path: Path) -> str:
-        """Returns the text of an SDF without irrelevant elements; as it is if its inertias depend on shapes."""
+        """Returns the text of an SDF without the elements in `IRRELEVANT`. If inertias depend on shapes, returns the
+        text unchanged."""
         text = text_of(path)
         if re.search(r"\bauto\s*=\s*[\"'](?:true|1)", text):
             return text
@@ -99,7 +102,7 @@ class Copies:
         except (ElementTree.ParseError, ValueError):
             return text
         for prefix, uri in re.findall(r"xmlns:(\w+)\s*=\s*[\"']([^\"']+)[\"']", text):
-            ElementTree.register_namespace(prefix, uri)  # Drake knows its own elements by the prefix
+            ElementTree.register_namespace(prefix, uri)  # Drake recognises its own elements by the prefix
         for parent in list(tree.iter()):
             for child in list(parent):
                 if child.tag in IRRELEVANT:
@@ -113,12 +116,12 @@ class Copies:
 
 @cache
 def copies(folder: Path) -> Copies:
-    """Returns the copies of a folder's SDFs."""
+    """Returns the copies of all SDFs below a folder."""
     return Copies(folder)
 
 
 def read(path: Path, folder: Path) -> MultibodyPlant:
-    """Returns Drake's plant of a file; the models of a file move freely, unless they are fixed to the world."""
+    """Returns Drake's plant for a file. The models in the file move freely, unless they are fixed to the world."""
     warnings.texts.clear()
     plant = MultibodyPlant(0.0)
     parser = Parser(plant)
@@ -129,7 +132,7 @@ def read(path: Path, folder: Path) -> MultibodyPlant:
     try:
         parser.AddModels(str(copy if copy.exists() else path))
         plant.Finalize()
-    except (RuntimeError, ValueError, MemoryError, SystemExit) as error:  # an assertion of Drake's is a SystemExit
+    except (RuntimeError, ValueError, MemoryError, SystemExit) as error:  # a failed assertion of Drake is a SystemExit
         raise RefusedError(str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__) from None
     if plant.num_bodies() < 2:
         raise RefusedError("no bodies")
@@ -137,7 +140,7 @@ def read(path: Path, folder: Path) -> MultibodyPlant:
 
 
 def compare(plant: MultibodyPlant, model: condyle.Model, tolerance: float = TOLERANCE) -> Quantities:
-    """Compares everything that both have; gravity's efforts apart from the others."""
+    """Compares all quantities that exist in both. The efforts of gravity are compared separately from other efforts."""
     found = Quantities(model, tolerance)
     if plant.num_velocities() != model.nv:
         if any("::" in frame.name for frame in model.frames) and model.nv < plant.num_velocities():
@@ -156,7 +159,7 @@ def compare(plant: MultibodyPlant, model: condyle.Model, tolerance: float = TOLE
     found.expect("total mass", model.total_mass, plant.CalcTotalMass(context))
     nq, nv = plant.num_positions(), plant.num_velocities()
     still = model.with_gravity([0.0, 0.0, 0.0])
-    falling = model.with_gravity(plant.gravity_field().gravity_vector())  # Drake leaves the file's out
+    falling = model.with_gravity(plant.gravity_field().gravity_vector())  # Drake ignores the gravity in the file
     for seed in range(STATES):
         q, v = state_of(model, seed)
         state = there("drake", model, joints, q, v, nq, nv)
@@ -175,28 +178,30 @@ def compare(plant: MultibodyPlant, model: condyle.Model, tolerance: float = TOLE
 
 
 class Names:
-    """Things of a plant by their names, with the names of the models around them."""
+    """Joints, bodies or frames of a plant by name. A full name begins with the names of the models that contain the
+    object."""
 
     def __init__(self) -> None:
         self.all: dict[str, list[Any]] = {}
 
     def add(self, plant: MultibodyPlant, thing: Any, name: str) -> None:
-        """Adds a thing with a name inside of its model."""
+        """Adds an object under its name and the name of its model."""
         instance = thing.model_instance()
         around = "" if instance == world_model_instance() else f"{plant.GetModelInstanceName(instance)}::"
         self.all.setdefault(around + name, []).append(thing)
 
     def find(self, name: str) -> list[Any]:
-        """Returns the things of a name of ours, of which the outermost models may be left out, or several of them."""
+        """Returns the objects that have a name of Condyle, in which names of the outermost models may be missing."""
         ends = [full for full in self.all if f"::{full}".endswith(f"::{name}")]
-        if not ends:  # a joint between nested models is in another model there
+        if not ends:  # in Drake, a joint between nested models belongs to another model
             ends = [full for full in self.all if full.split("::")[-1] == name.split("::")[-1]]
             ends = ends if len(ends) == 1 else []
         return self.all[min(ends, key=len)] if ends else []
 
 
 def matched(found: Quantities, plant: MultibodyPlant) -> list[Joint] | None:
-    """Returns the joints that move, ours with theirs by names; floating joints by the body that they carry."""
+    """Returns the moving joints of Condyle with their coordinates in Drake. Joints are matched by name; floating joints
+    by the body that they carry."""
     model, theirs, carriers = found.model, Names(), Names()
     for i in range(plant.num_joints()):
         joint = plant.get_joint(JointIndex(i))
@@ -230,7 +235,7 @@ def matched(found: Quantities, plant: MultibodyPlant) -> list[Joint] | None:
 
 
 def limits(found: Quantities, joint: object, plant: MultibodyPlant, body: int) -> None:
-    """Compares limits of one coordinate; effort only where Drake has an actuator: it makes none for 0 N m."""
+    """Compares limits of one coordinate. Effort is compared only if Drake has an actuator: it makes none for 0 N m."""
     model, limits = found.model, found.model.limits
     at, column = model.idx_qs[body], model.idx_vs[body]
     name = f"joint `{model.names[body]}`"
@@ -252,24 +257,24 @@ def limits(found: Quantities, joint: object, plant: MultibodyPlant, body: int) -
 
 
 def springs(found: Quantities, plant: MultibodyPlant, context: object, q: np.ndarray, T: np.ndarray) -> None:
-    """Compares springs of joints, at rest."""
+    """Compares springs of joints, for a robot at rest."""
     nv = plant.num_velocities()
     plant.SetVelocities(context, np.zeros(nv))
     forces = MultibodyForces(plant)
     plant.CalcForceElementsContribution(context, forces)
-    weightless = found.model.with_gravity([0.0, 0.0, 0.0])  # Drake lets all links feel it
+    weightless = found.model.with_gravity([0.0, 0.0, 0.0])  # in Drake, gravity acts on all links
     ours = condyle.passive_torque(weightless, q=q, v=np.zeros(found.model.nv), smoothing=1.0)
     found.expect("springs", ours, T.T @ forces.generalized_forces(), found.coordinate)
 
 
 def unlimited(numbers: object) -> np.ndarray:
-    """Returns limits with infinity for the numbers by which SDF means none."""
+    """Returns limits with infinity in place of the numbers by which SDF means no limit."""
     limits = np.asarray(numbers, float)
     return np.where(np.abs(limits) >= UNLIMITED, np.sign(limits) * np.inf, limits)
 
 
 def frames(found: Quantities, plant: MultibodyPlant, context: object, q: np.ndarray) -> None:
-    """Compares frames that both have by their names."""
+    """Compares frames that exist in both, by their names."""
     bodies, others = Names(), Names()
     for body in (plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())):
         bodies.add(plant, body, body.name())

@@ -1,4 +1,4 @@
-"""Comparison of robots with MuJoCo: MJCF, with coordinates in the same order, and URDF, with joints found by name."""
+"""Compares robots with MuJoCo. MJCFs have coordinates in the same order; for URDFs, joints are matched by name."""
 
 from pathlib import Path
 from xml.etree import ElementTree
@@ -11,9 +11,9 @@ from mujoco_actuators import acts, efforts
 import condyle
 
 TOLERANCE = 1e-8
-"""MuJoCo keeps inertias as principal moments and a quaternion."""
+"""Tolerance of most results: MuJoCo stores inertias as principal moments and a quaternion."""
 MESHES = 1e-6
-"""Tolerance of robots with meshes, whose vertices MuJoCo keeps in single precision."""
+"""Tolerance for robots with meshes: MuJoCo stores vertices in single precision."""
 KINDS = {
     int(mujoco.mjtJoint.mjJNT_FREE): {"free_flyer"},
     int(mujoco.mjtJoint.mjJNT_BALL): {"spherical"},
@@ -21,7 +21,8 @@ KINDS = {
     int(mujoco.mjtJoint.mjJNT_HINGE): {"revolute", "continuous"},
 }
 EASE = 1e12
-"""Smoothing of Coulomb friction that takes it out of `passive_torque`; MuJoCo has it among its constraints."""
+"""Speed over which Coulomb friction is smoothed. It removes friction from `passive_torque`, as friction is a constraint
+in MuJoCo."""
 
 
 WARNED = (
@@ -39,11 +40,11 @@ WARNED = (
     ),
     ("the keyframes of the model", "keyframes of an attached model are left out, as a warning says", ("keyframes",)),
 )
-"""Words of warnings, and what becomes different as they say."""
+"""Words of warnings, and the quantities that differ because of these warnings."""
 
 
 def read(path: Path) -> mujoco.MjModel:
-    """Returns MuJoCo's model of a file."""
+    """Returns MuJoCo's model for a file."""
     try:
         return mujoco.MjModel.from_xml_path(str(path))
     except (ValueError, RuntimeError, MemoryError) as error:
@@ -51,7 +52,7 @@ def read(path: Path) -> mujoco.MjModel:
 
 
 def read_urdf(path: Path) -> mujoco.MjModel:
-    """Returns MuJoCo's model of a URDF without its geometry, which changes nothing and needs meshes."""
+    """Returns MuJoCo's model for a URDF without geometry. The geometry changes nothing and needs meshes."""
     try:
         tree = ElementTree.fromstring(path.read_bytes())
     except (ElementTree.ParseError, LookupError, ValueError) as error:
@@ -70,7 +71,7 @@ def read_urdf(path: Path) -> mujoco.MjModel:
 
 
 def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
-    """Compares an MJCF: coordinates are MuJoCo's, one by one."""
+    """Compares a robot from an MJCF. Its coordinates are the same as MuJoCo's, one by one."""
     found = Quantities(model, MESHES if mj.nmesh else TOLERANCE)
     if (mj.nq, mj.nv) != (model.nq, model.nv):
         found.add("nq, nv", np.inf, f"{model.nq}, {model.nv}, theirs {mj.nq}, {mj.nv}")
@@ -99,7 +100,7 @@ def compare_mjcf(mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
 
 
 def weightless_moments(path: Path) -> bool:
-    """Returns whether a link of a URDF has the mass 0 and moments."""
+    """Returns whether a link of a URDF has moments of inertia, but the mass 0."""
     for inertial in ElementTree.fromstring(path.read_bytes()).iter("inertial"):
         mass, inertia = inertial.find("mass"), inertial.find("inertia")
         weightless = mass is not None and inertia is not None and float(mass.get("value", "0")) == 0.0
@@ -109,7 +110,7 @@ def weightless_moments(path: Path) -> bool:
 
 
 def compare_urdf(path: Path, mj: mujoco.MjModel, model: condyle.Model) -> Quantities:
-    """Compares a URDF: the root link is fixed to the world in MuJoCo, and joints are found by name."""
+    """Compares a robot from a URDF. In MuJoCo the root link is fixed to the world, and joints are matched by name."""
     model = without_rotors(model)
     found = Quantities(model, TOLERANCE)
     joints, bodies = [], {}
@@ -133,19 +134,19 @@ def compare_urdf(path: Path, mj: mujoco.MjModel, model: condyle.Model) -> Quanti
 
 
 def gravity(mj: mujoco.MjModel) -> np.ndarray:
-    """Returns the acceleration of free fall; zero where it is disabled."""
+    """Returns the acceleration of free fall. It is zero if a flag disables gravity."""
     off = mj.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
     return np.zeros(3) if off else mj.opt.gravity.copy()
 
 
 def disabled(mj: mujoco.MjModel, constraint: str) -> bool:
-    """Returns whether a flag of the file disables a kind of constraint, or all of them."""
+    """Returns whether a flag of the file disables this kind of constraint, or all constraints."""
     bits = (int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")) for name in (constraint, "CONSTRAINT"))
     return any(mj.opt.disableflags & bit for bit in bits)
 
 
 def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: dict[int, int]) -> None:
-    """Compares mass, limits of position, M, bias, poses of bodies, frames of bodies and sites."""
+    """Compares mass, limits of position, M, bias, poses of bodies, and frames of bodies and sites."""
     model, data = found.model, mujoco.MjData(mj)
     positions(found, mj, joints)
     warnings = " ".join(map(str, model.warnings))
@@ -171,13 +172,13 @@ def compare(found: Quantities, mj: mujoco.MjModel, joints: list[Joint], bodies: 
 
 
 def pose(found: Quantities, what: str, name: str, ours: np.ndarray, p: np.ndarray, R: np.ndarray) -> None:
-    """Compares one pose."""
+    """Compares one pose, with position p and rotation R in MuJoCo."""
     theirs = np.concatenate([R.reshape(3, 3), p[:, None]], 1)
     found.expect(what, ours[:3], theirs, lambda _: name)
 
 
 def frames(found: Quantities, mj: mujoco.MjModel, data: mujoco.MjData, q: np.ndarray, bodies: dict[int, int]) -> None:
-    """Compares frames: bodies that a joint carries, with or without a name, and bodies and sites by name."""
+    """Compares frames: of all bodies that a joint carries, and of other bodies and sites that have a name."""
     own = {(frame.name, frame.body): i for i, frame in enumerate(found.model.frames) if frame.kind == "link"}
     for i, body in bodies.items():
         name = found.model.body_names[i]
@@ -202,7 +203,7 @@ def frames(found: Quantities, mj: mujoco.MjModel, data: mujoco.MjData, q: np.nda
 
 
 def positions(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
-    """Compares limits of positions of hinges and slides."""
+    """Compares limits of position for hinges and slides."""
     model, limits = found.model, found.model.limits
     by_address = {int(mj.jnt_qposadr[j]): j for j in range(mj.njnt)}
     for joint in joints:
@@ -218,7 +219,8 @@ def positions(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> Non
 
 
 def actuators(found: Quantities, mj: mujoco.MjModel) -> None:
-    """Compares gains and gears of actuators with names; a warning has to name those that the model does not have."""
+    """Compares gains and gears of actuators that have a name. A warning must name each actuator that Condyle's model
+    lacks."""
     ours = {actuator.name: actuator for actuator in found.model.actuators}
     warnings = " ".join(map(str, found.model.warnings))
     for i in range(mj.nactuator):
@@ -226,7 +228,8 @@ def actuators(found: Quantities, mj: mujoco.MjModel) -> None:
         if not name or not acts(mj, i) or mj.actuator_outnum[i] != 1:
             continue
         if name not in ours:
-            if f"`{name}`" not in warnings and f"`{name.rstrip('0123456789')}`" not in warnings:  # a replica's
+            # the name of a replica is the original name with a number
+            if f"`{name}`" not in warnings and f"`{name.rstrip('0123456789')}`" not in warnings:
                 found.add("actuators", np.inf, f"actuator `{name}` is missing, without a warning")
             continue
         where = f"actuator `{name}`"
@@ -239,7 +242,7 @@ def actuators(found: Quantities, mj: mujoco.MjModel) -> None:
 
 
 def passive(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
-    """Compares springs, damping and gravity compensation, without friction (a constraint there) and fluids."""
+    """Compares springs, damping and gravity compensation. Friction (a constraint in MuJoCo) and fluids are left out."""
     model, data = found.model, mujoco.MjData(mj)
     if not mj.nv:
         return
@@ -256,7 +259,7 @@ def passive(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
 
 
 def keyframes(found: Quantities, mj: mujoco.MjModel, joints: list[Joint]) -> None:
-    """Compares keyframes by name."""
+    """Compares keyframes that have the same name."""
     model = found.model
     for i in range(mj.nkey):
         name = mujoco.mj_id2name(mj, mujoco.mjtObj.mjOBJ_KEY, i)

@@ -1,4 +1,4 @@
-"""Comparison of robots with Pinocchio: URDF, whose joints have the same names, order and coordinates."""
+"""Compares robots with Pinocchio, from URDF. Joints have the same names, order and coordinates."""
 
 import os
 import tempfile
@@ -18,7 +18,7 @@ LARGEST = np.finfo(float).max
 
 @contextmanager
 def written() -> Iterator[list[str]]:
-    """Collects what is written to the standard error, by libraries too."""
+    """Collects the text that is written to the standard error, also by libraries."""
     texts: list[str] = []
     before = os.dup(2)
     with tempfile.TemporaryFile() as file:
@@ -33,11 +33,11 @@ def written() -> Iterator[list[str]]:
 
 
 said: list[str] = [""]
-"""Errors of the last file that urdfdom has passed over."""
+"""Errors in the last file that urdfdom reported and ignored."""
 
 
 def read(path: Path, root_joint: str | None) -> pin.Model:
-    """Returns Pinocchio's model of a URDF."""
+    """Returns Pinocchio's model for a URDF."""
     root = (pin.JointModelFreeFlyer(),) if root_joint else ()
     try:
         with written() as texts:
@@ -49,7 +49,7 @@ def read(path: Path, root_joint: str | None) -> pin.Model:
 
 
 def compare(theirs: pin.Model, model: condyle.Model) -> Quantities:
-    """Compares everything that both have."""
+    """Compares all quantities that exist in both."""
     rotors, model = model.armature, without_rotors(model)
     found = Quantities(model, TOLERANCE)
     if rotors.any():
@@ -59,7 +59,7 @@ def compare(theirs: pin.Model, model: condyle.Model) -> Quantities:
     if (theirs.nq, theirs.nv) != (model.nq, model.nv):
         found.add("nq, nv", np.inf, f"{model.nq}, {model.nv}, theirs {theirs.nq}, {theirs.nv}")
         return found
-    # the joint above the root has another name here where the file has a `root_joint` of its own
+    # If the file has its own `root_joint`, the joint above the root has another name in Condyle.
     own = 2 if model.joint_types[1:2] == ["free_flyer"] else 1
     if list(theirs.names)[own:] != model.names[own:] or list(theirs.parents) != model.parents:
         found.add("joints", np.inf, "names or parents")
@@ -96,7 +96,7 @@ def compare(theirs: pin.Model, model: condyle.Model) -> Quantities:
 
 
 def kind_of(kind: pin.FrameType) -> str:
-    """Returns our kind of a frame."""
+    """Returns Condyle's name for a kind of frame of Pinocchio."""
     return {pin.FrameType.BODY: "link", pin.FrameType.OP_FRAME: "user"}.get(kind, "joint")
 
 
@@ -118,5 +118,5 @@ def limits(found: Quantities, theirs: pin.Model) -> None:
 
 
 def unlimited(numbers: np.ndarray) -> np.ndarray:
-    """Returns limits with infinity for the largest number."""
+    """Returns limits with infinity in place of the largest number."""
     return np.where(np.abs(numbers) == LARGEST, np.sign(numbers) * np.inf, numbers)

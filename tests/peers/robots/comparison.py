@@ -1,7 +1,7 @@
-"""One robot in Condyle and in a peer: coordinates, and quantities side by side.
+"""One robot in Condyle and in a peer library: conversions of coordinates, and comparisons of quantities.
 
-Velocities of both are related by v' = T v, accelerations by a' = T a + Ṫ v, efforts by τ = Tᵀ τ'. So M = Tᵀ M' T and
-h = Tᵀ (h' + M' Ṫ v).
+Here a prime marks the peer. Velocities are related by v' = T v, accelerations by a' = T a + Ṫ v, and efforts by τ = Tᵀ
+τ'. So M = Tᵀ M' T and h = Tᵀ (h' + M' Ṫ v).
 """
 
 from collections.abc import Callable
@@ -15,55 +15,55 @@ from condyle import conventions
 
 Array = NDArray[np.float64]
 UNLIMITED = 2.0
-"""Positions without limits are drawn from ±2."""
+"""Positions without limits are drawn from −2 to 2."""
 STATES = 2
 
 
 class RefusedError(Exception):
-    """A robot that a peer does not read."""
+    """The peer does not read the robot."""
 
 
 class UnlikeError(Exception):
-    """A robot that a peer reads, and that cannot be compared, for a named reason."""
+    """The peer reads the robot, but it cannot be compared, for the given reason."""
 
 
 class Joint(NamedTuple):
-    """A joint of ours and its coordinates in the peer."""
+    """A joint of Condyle, and the indices of its coordinates in the peer."""
 
     body: int
     q: int
-    """First index in the peer's position."""
+    """Index of the joint's first number in the peer's position."""
     v: int
-    """First index in the peer's velocity."""
+    """Index of the joint's first number in the peer's velocity."""
 
 
 class There(NamedTuple):
-    """A state in a peer's coordinates."""
+    """A state in the coordinates of a peer."""
 
     q: Array
     v: Array
     T: Array
-    """Ours to the peer's velocities, (nv', nv)."""
+    """Matrix T from Condyle's velocities to the peer's velocities, (nv', nv)."""
     drift: Array
     """Ṫ v, nv' numbers."""
 
 
 class Difference(NamedTuple):
-    """A quantity that differs."""
+    """A quantity that differs, with the size of the difference."""
 
     quantity: str
     size: float
-    """Relative to 1 + the largest number of the peer's."""
+    """Difference, relative to 1 + the largest number of the peer's result."""
     detail: str
 
 
 def without_rotors(model: condyle.Model) -> condyle.Model:
-    """Returns the model without armature, which no peer but Drake reads from a URDF."""
+    """Returns the model without armature. From a URDF, no peer except Drake reads armature."""
     return model.with_armature(np.zeros(model.nv)) if model.armature.any() else model
 
 
 def state_of(model: condyle.Model, seed: int) -> tuple[Array, Array]:
-    """Returns a random state; positions are within their limits."""
+    """Returns a random state, with positions within their limits."""
     rng = np.random.default_rng(seed)
     q = np.array(condyle.random_configuration(model, seed=seed))
     for kind, at, n in zip(model.joint_types, model.idx_qs, model.nqs, strict=True):
@@ -76,13 +76,13 @@ def state_of(model: condyle.Model, seed: int) -> tuple[Array, Array]:
 
 
 def turned(angle: float) -> Array:
-    """Returns the rotation of a plane."""
+    """Returns the rotation matrix of a plane by this angle."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s], [s, c]])
 
 
 def block(library: str, kind: str, q: Array, v: Array) -> tuple[Array, Array, Array]:
-    """Returns position, T and Ṫ v of one joint in a library's coordinates."""
+    """Returns position, T and Ṫ v of one joint in the coordinates of a library."""
     same = np.eye(len(v)), np.zeros(len(v))
     if library == "pinocchio":
         return q, *same
@@ -115,7 +115,7 @@ def block(library: str, kind: str, q: Array, v: Array) -> tuple[Array, Array, Ar
 
 
 def there(library: str, model: condyle.Model, joints: list[Joint], q: Array, v: Array, nq: int, nv: int) -> There:
-    """Returns a state of ours in the peer's coordinates."""
+    """Returns a state of Condyle in the peer's coordinates."""
     state = There(np.zeros(nq), np.zeros(nv), np.zeros((nv, model.nv)), np.zeros(nv))
     for joint in joints:
         at, n = model.idx_vs[joint.body], model.nvs[joint.body]
@@ -129,7 +129,7 @@ def there(library: str, model: condyle.Model, joints: list[Joint], q: Array, v: 
 
 
 class Quantities:
-    """Differences of one robot from one peer."""
+    """Differences between Condyle and one peer for one robot."""
 
     def __init__(self, model: condyle.Model, tolerance: float) -> None:
         self.model, self.tolerance = model, tolerance
@@ -137,14 +137,14 @@ class Quantities:
         self.differences: dict[str, Difference] = {}
         self.compared: set[str] = set()
         self.left_out: dict[str, str] = {}
-        """Reasons why quantities are not compared, by quantity."""
+        """Reason why a quantity is not compared, by the name of the quantity."""
 
     def leave_out(self, why: str, *quantities: str) -> None:
-        """Leaves quantities out of the comparison, for a reason that the table names."""
+        """Leaves quantities out of the comparison. The table of results shows the reason."""
         self.left_out |= dict.fromkeys(quantities, why)
 
     def expect(self, quantity: str, ours: Any, theirs: Any, where: Callable[[int], str] | None = None) -> None:
-        """Compares two arrays: infinite numbers must be the same, the others equal to the tolerance."""
+        """Compares two arrays. Infinite numbers must be equal, and other numbers must agree within the tolerance."""
         if quantity in self.left_out:
             return
         a, b = np.atleast_1d(np.asarray(ours, float)), np.atleast_1d(np.asarray(theirs, float))
@@ -166,35 +166,36 @@ class Quantities:
             self.add(quantity, float(error.flat[worst]), f"{name}{a.flat[worst]:.9g}, theirs {b.flat[worst]:.9g}")
 
     def spoken(self, *words: str, held: bool = False) -> None:
-        """Records a difference unless the model holds a thing, or a warning has one of its words."""
+        """Records a difference, unless `held` (the model contains the feature) or a warning contains one of the
+        words."""
         warnings = " ".join(map(str, self.model.warnings))
         self.compared.add(f"{words[0]}: held or said")
         if not held and not any(word in warnings for word in words):
             self.add(f"{words[0]}: dropped in silence", np.inf, "no warning")
 
     def add(self, quantity: str, size: float, detail: str) -> None:
-        """Records a difference, the largest of each quantity."""
+        """Records a difference. For each quantity, only the largest difference is kept."""
         if quantity in self.left_out:
             return
         if quantity not in self.differences or self.differences[quantity].size < size:
             self.differences[quantity] = Difference(quantity, size, detail)
 
     def coordinate(self, i: int) -> str:
-        """Returns the name of the joint of a velocity's coordinate."""
+        """Returns the name of the joint to which velocity coordinate i belongs."""
         for name, at, n in zip(self.model.names, self.model.idx_vs, self.model.nvs, strict=True):
             if n and at <= i < at + n:
                 return f"joint `{name}`" + (f"[{i - at}]" if n > 1 else "")
         return f"coordinate {i}"
 
     def position(self, i: int) -> str:
-        """Returns the name of the joint of a position's coordinate."""
+        """Returns the name of the joint to which position coordinate i belongs."""
         for name, at, n in zip(self.model.names, self.model.idx_qs, self.model.nqs, strict=True):
             if n and at <= i < at + n:
                 return f"joint `{name}`"
         return f"coordinate {i}"
 
     def inertia(self, q: Array, v: Array, state: There, M: Array, h: Array) -> None:
-        """Compares M and the bias, given the peer's."""
+        """Compares M and the bias with the peer's M and h."""
         model, T = self.model, state.T
         self.expect("M", condyle.crba(model, self.data, q), T.T @ M @ T, self.coordinate)
         bias = T.T @ (h + M @ state.drift)

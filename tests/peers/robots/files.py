@@ -1,4 +1,4 @@
-"""Robot files below a folder: formats by root elements, and fragments apart."""
+"""Finds robot files below a folder. The root element gives the format; fragments are recognised."""
 
 import re
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 SUFFIXES = {".xml", ".urdf", ".sdf", ".world", ".mjcf"}
 ROOTS = {"robot": "urdf", "sdf": "sdf", "gazebo": "sdf", "mujoco": "mjcf", "mujocoinclude": "mjcf"}
-"""Format of each root element; `gazebo` is the root of SDF 1.0 to 1.2."""
+"""Format for each name of a root element. `gazebo` is the root element of SDF 1.0 to 1.2."""
 XACRO = re.compile(r"<xacro:|\$\((?:find|arg|optenv|env|dirname|eval) |\$\{")
 COMMENTS = re.compile(r"<!--.*?-->", re.DOTALL)
 ROOT = re.compile(r"<(?![?!])\s*([\w:.-]+)")
@@ -20,17 +20,17 @@ class Robot(NamedTuple):
 
     path: Path
     format: str
-    """`urdf`, `mjcf` or `sdf`."""
+    """Format: `urdf`, `mjcf` or `sdf`."""
     collection: str
-    """Name of the collection: `owner/repository`, or the folder's first part below the root."""
+    """Name of the collection: `owner/repository`, or the first part of the path below the root folder."""
     fragment: str
-    """Reason why the file is no robot on its own; empty for a robot."""
+    """Reason why the file alone is no robot; empty for a robot."""
     included: bool
-    """Whether another file includes this one."""
+    """Whether another file includes this file."""
 
 
 def text_of(path: Path) -> str:
-    """Returns the text of a file, which may declare UTF-16 or Latin-1."""
+    """Returns the text of a file. The file may declare that it is in UTF-16 or Latin-1."""
     data = path.read_bytes()
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return data.decode("utf-16", "replace")
@@ -38,13 +38,13 @@ def text_of(path: Path) -> str:
 
 
 def format_of(text: str) -> str | None:
-    """Returns the format of a file by its root element; None for other files."""
+    """Returns the format of a file, from its root element; None for other files."""
     root = ROOT.search(COMMENTS.sub("", text))
     return ROOTS.get(root.group(1)) if root else None
 
 
 def fragment(text: str, kind: str) -> str:
-    """Returns the reason why a file is no robot on its own; empty if it may be one."""
+    """Returns the reason why a file alone is no robot; empty if it may be a robot."""
     bare = COMMENTS.sub("", text)
     if kind == "mjcf":
         if "<mujocoinclude" in bare:
@@ -65,7 +65,8 @@ def fragment(text: str, kind: str) -> str:
 
 
 def collection(folder: Path, path: Path) -> str:
-    """Returns the repository's name of a path `…/owner+repository/…`, else its first folders below the root."""
+    """Returns the name of the repository for a path `…/owner+repository/…`, otherwise the first folders below the
+    root."""
     parts = path.relative_to(folder).parts
     for part in (*folder.parts[-2:], *parts):
         if "+" in part and not part.endswith(tuple(SUFFIXES)):
@@ -74,7 +75,7 @@ def collection(folder: Path, path: Path) -> str:
 
 
 def find(folder: Path, only: str | None = None) -> list[Robot]:
-    """Returns all robot files below a folder, by path; `only` is a pattern for paths relative to it."""
+    """Returns all robot files below a folder, ordered by path. `only` is a pattern for paths relative to the folder."""
     found: list[tuple[Path, str, str]] = []
     included: set[Path] = set()
     for path in walk(folder):
@@ -93,7 +94,7 @@ def find(folder: Path, only: str | None = None) -> list[Robot]:
 
 
 def walk(folder: Path) -> Iterator[Path]:
-    """Yields files with a suffix of robots, in order."""
+    """Yields the files whose suffix may be a robot's, in order."""
     for path in sorted(folder.rglob("*")):
         if path.suffix.lower() in SUFFIXES and path.is_file():
             yield path

@@ -1,4 +1,4 @@
-"""Verdict on one file: Condyle compared with every peer that reads it."""
+"""Gives a verdict on one file: Condyle is compared with every peer that reads the file."""
 
 import re
 from collections.abc import Callable
@@ -15,39 +15,39 @@ import condyle
 
 try:
     import beside_drake
-except ImportError:  # Drake is left out by `./test`
+except ImportError:  # `./test` does not install Drake
     beside_drake = None  # type: ignore[assignment]
 
 
 @cache
 def packages(folder: Path) -> list[Path]:
-    """Returns the folders below a folder that hold packages or models."""
+    """Returns the folders below a folder that contain packages or models."""
     marks = (mark for name in ("package.xml", "model.config") for mark in folder.rglob(name))
     return sorted({mark.parent.parent for mark in marks})
 
 
 def prepare(folder: Path) -> None:
-    """Does once what every file needs, before processes are forked."""
+    """Does the work that all files need, once, before processes are forked."""
     packages(folder)
     if beside_drake is not None:
         beside_drake.copies(folder)
 
 
 class Verdict(NamedTuple):
-    """Result of one file."""
+    """Result for one file."""
 
     verdict: str
-    """`equal`, `different`, `refused`, `only ours`, `nobody`, `fragment`, `crash`."""
+    """Verdict: `equal`, `different`, `refused`, `only ours`, `nobody`, `fragment` or `crash`."""
     warnings: list[str]
     error: str
-    """Our error; empty if the file was read."""
+    """Error of Condyle; empty if Condyle read the file."""
     peers: dict[str, str]
-    """`equal`, `different`, or the reason why there is no comparison, by peer."""
+    """For each peer, `equal`, `different`, or the reason why there is no comparison."""
     differences: dict[str, list[Difference]]
-    """By peer."""
+    """Differences, by the name of the peer."""
     compared: list[str]
     left_out: dict[str, list[str]]
-    """Reasons why quantities were not compared, by peer."""
+    """Reasons why quantities were not compared, by the name of the peer."""
 
 
 FREE = "free_flyer"
@@ -59,7 +59,7 @@ def nv(plant: Any) -> int:
 
 
 class Trial:
-    """Condyle and the peers on one file."""
+    """Trial of one file by Condyle and the peers."""
 
     def __init__(self, robot: Robot, folder: Path) -> None:
         self.robot, self.folder = robot, folder
@@ -72,7 +72,7 @@ class Trial:
         self.read = False
 
     def ours(self, root_joint: str | None) -> condyle.Model | str:
-        """Returns our model, or the error if we refuse the file."""
+        """Returns Condyle's model, or the error if Condyle rejects the file."""
         path = self.robot.path
         try:
             if self.robot.format == "mjcf":
@@ -86,7 +86,8 @@ class Trial:
         return model
 
     def chosen(self, roots: tuple[str | None, ...], nv: int | None) -> condyle.Model | None:
-        """Returns our model with the first root joint that gives nv degrees of freedom, else with any."""
+        """Returns Condyle's model with the first root joint that gives nv degrees of freedom. If no root joint does,
+        returns any model."""
         tried = [self.ours(root) for root in roots]
         models = [model for model in tried if not isinstance(model, str)]
         if not models:
@@ -109,7 +110,7 @@ class Trial:
         roots: tuple[str | None, ...] = (None,),
         nv: Callable[[Any], int] | None = None,
     ) -> None:
-        """Compares with one peer; of several root joints the first with which nv is the peer's."""
+        """Compares with one peer. Of several root joints, takes the first one that gives the peer's nv."""
         try:
             theirs = read()
         except RefusedError as error:
@@ -132,7 +133,7 @@ class Trial:
             self.differences[peer] = sorted(found.differences.values(), key=lambda d: -d.size)
 
     def verdict(self) -> Verdict:
-        """Returns what the comparisons say together."""
+        """Runs all comparisons and returns the verdict that they give together."""
         if self.robot.fragment:
             return Verdict("fragment", [], self.robot.fragment, {}, {}, [], {})
         {"mjcf": self.mjcf, "urdf": self.urdf, "sdf": self.sdf}[self.robot.format]()
@@ -154,12 +155,12 @@ class Trial:
         return Verdict(verdict, self.warnings, error, self.peers, self.differences, compared, self.left_out)
 
     def mjcf(self) -> None:
-        """MuJoCo, whose format it is; Drake only where MuJoCo refuses."""
+        """Compares with MuJoCo, which defined this format."""
         path = self.robot.path
         self.beside("MuJoCo", lambda: beside_mujoco.read(path), beside_mujoco.compare_mjcf)
 
     def urdf(self) -> None:
-        """Pinocchio and Drake with a free root, MuJoCo with a fixed one."""
+        """Compares with Pinocchio and Drake with a free root, and with MuJoCo with a fixed root."""
         path, folder = self.robot.path, self.folder
         self.beside("Pinocchio", lambda: beside_pinocchio.read(path, FREE), beside_pinocchio.compare, (FREE,))
         if beside_drake is not None:
@@ -167,7 +168,7 @@ class Trial:
         self.beside("MuJoCo", lambda: beside_mujoco.read_urdf(path), partial(beside_mujoco.compare_urdf, path))
 
     def sdf(self) -> None:
-        """Drake."""
+        """Compares with Drake."""
         path, folder = self.robot.path, self.folder
         if beside_drake is not None:
             old = re.search(r"<(?:sdf|gazebo)[^>]*version\s*=\s*[\"']1\.[0-6]\b", text_of(path))

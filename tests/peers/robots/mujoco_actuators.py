@@ -1,7 +1,8 @@
-"""Limits of effort that follow from MuJoCo's actuators, from the numbers of its compiled model.
+"""Computes limits of effort from MuJoCo's actuators, with the numbers of MuJoCo's compiled model.
 
-An actuator gives f = gain · a + bias. Where gain and bias are constant, the range of the activation a bounds f;
-`forcerange` bounds it in any case. A joint has the sum of moment · f over its actuators, within its `actuatorfrcrange`.
+An actuator gives the force f = gain · a + bias with the activation a. If gain and bias are constant, the range of a
+bounds f. `forcerange` always bounds f. The effort of a joint is the sum of moment · f over its actuators, within its
+`actuatorfrcrange`.
 """
 
 import mujoco
@@ -31,7 +32,7 @@ FILTERS = (DYN_FILTER, DYN_FILTEREXACT)
 
 
 def efforts(mj: mujoco.MjModel) -> np.ndarray:
-    """Returns the least and the greatest effort of each coordinate, (nv, 2); not a number where it is unknown here."""
+    """Returns the least and the greatest effort of each coordinate, (nv, 2); NaN if the effort is unknown here."""
     sums: dict[int, Range] = {}
     alone = [int(mj.actuator_trnid[i, 0]) for i in range(mj.nactuator) if mj.actuator_trntype[i] == TRN_TENDON]
     for i in range(mj.nactuator):
@@ -42,7 +43,7 @@ def efforts(mj: mujoco.MjModel) -> np.ndarray:
         if mj.actuator_trntype[i] == TRN_TENDON and alone.count(tendon) == 1:
             force = clip(force, mj.tendon_actfrcrange[tendon] if mj.tendon_actfrclimited[tendon] else ALL)
         force = clip(force, mj.actuator_forcerange[i] if mj.actuator_forcelimited[i] else ALL)
-        if mj.actuator_outnum[i] != 1:  # a controller of a ball's orientation
+        if mj.actuator_outnum[i] != 1:  # the actuator controls the orientation of a ball joint
             first = int(mj.jnt_dofadr[mj.actuator_trnid[i, 0]])
             sums |= {first + k: np.full(2, np.nan) for k in range(3)}
             continue
@@ -59,14 +60,14 @@ def efforts(mj: mujoco.MjModel) -> np.ndarray:
 
 
 def acts(mj: mujoco.MjModel, i: int) -> bool:
-    """Returns whether an actuator is enabled."""
+    """Returns whether an actuator is not disabled."""
     group = int(mj.actuator_group[i])
     off = mj.opt.disableflags & DSBL_ACTUATION
     return not off and not (0 <= group < 31 and mj.opt.disableactuator & (1 << group))
 
 
 def clip(force: Range, limits: Range) -> Range:
-    """Returns a range within limits."""
+    """Returns the range of a force after it is clipped to limits."""
     return np.clip(force, limits[0], limits[1])
 
 
@@ -76,9 +77,9 @@ def times(moment: float, force: Range) -> Range:
 
 
 def constant(mj: mujoco.MjModel, i: int) -> Range:
-    """Returns the range of an actuator's force if gain and bias are constant, else no limits.
+    """Returns the range of an actuator's force if gain and bias are constant, otherwise an unlimited range.
 
-    A plugin computes its own force: gain and bias have no effect.
+    A plugin computes its own force, so gain and bias have no effect.
     """
     if mj.nplugin and mj.actuator_plugin[i] >= 0:
         return ALL
@@ -90,7 +91,7 @@ def constant(mj: mujoco.MjModel, i: int) -> Range:
 
 
 def activation(mj: mujoco.MjModel, i: int) -> Range:
-    """Returns the range of the activation: the control, or what limits the integral of it."""
+    """Returns the range of the activation: the range of the control, or the limits of its integral."""
     k = int(mj.actuator_ctrladr[i])
     control = mj.actuator_ctrlrange[k] if mj.actuator_ctrllimited[k] else ALL
     limit = mj.actuator_actrange[i] if mj.actuator_actlimited[i] else ALL
@@ -104,7 +105,7 @@ def activation(mj: mujoco.MjModel, i: int) -> Range:
 
 
 def moments(mj: mujoco.MjModel, i: int) -> list[tuple[int, float]]:
-    """Returns coordinates on which an actuator acts with a constant moment."""
+    """Returns coordinates on which an actuator acts with a constant moment, each with this moment."""
     gear, target = mj.actuator_gear[mj.actuator_outadr[i]], int(mj.actuator_trnid[i, 0])
     kind = mj.actuator_trntype[i]
     if kind in (TRN_JOINT, TRN_JOINTINPARENT):
@@ -113,7 +114,7 @@ def moments(mj: mujoco.MjModel, i: int) -> list[tuple[int, float]]:
             return [(column, gear[0])]
         if kind == TRN_JOINTINPARENT:
             return []
-        # a free joint's force is along the world's axes, its moment along the body's
+        # The force on a free joint is along the world's axes, and the moment is along the body's axes.
         axes = range(3) if joint == JNT_BALL else range(3, 6)
         return [(column + k, gear[k]) for k in axes if gear[k]]
     if kind == TRN_TENDON:

@@ -1,4 +1,4 @@
-"""Files one by one in forked processes, each with a time limit and a limit of memory."""
+"""Judges files one by one in forked processes, each with a time limit and a memory limit."""
 
 import multiprocessing
 import os
@@ -14,15 +14,15 @@ from files import Robot
 from judge import Trial, Verdict, prepare
 
 MEMORY = 8 << 30
-"""Bytes of address space of a process, beyond which it ends."""
+"""Maximum address space of a process, in bytes. A process that exceeds it ends."""
 
 
 def child(robot: Robot, folder: Path, pipe: Connection) -> None:
-    """Judges one file, without a word on the terminal."""
+    """Judges one file without any output on the terminal."""
     silent = os.open(os.devnull, os.O_WRONLY)
     os.dup2(silent, 1)
     os.dup2(silent, 2)
-    os.chdir(tempfile.gettempdir())  # MuJoCo writes a log where it runs
+    os.chdir(tempfile.gettempdir())  # MuJoCo writes a log into the current folder
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     try:
         verdict = Trial(robot, folder).verdict()
@@ -34,7 +34,7 @@ def child(robot: Robot, folder: Path, pipe: Connection) -> None:
 
 
 def run(robots: list[Robot], folder: Path, jobs: int, seconds: float) -> list[tuple[Robot, Verdict]]:
-    """Returns a verdict for each file, in their order."""
+    """Returns a verdict for each file, in the order of the files."""
     prepare(folder)
     context = multiprocessing.get_context("fork")
     results: dict[int, Verdict] = {}
@@ -74,6 +74,6 @@ def ended(code: int | None) -> str:
 
 
 def progress(done: int, of: int) -> None:
-    """Shows on a terminal how far the run is."""
+    """Shows the progress of the run on a terminal."""
     if sys.stderr.isatty():
         print(f"\r{done} of {of}", end="" if done < of else "\n", file=sys.stderr, flush=True)

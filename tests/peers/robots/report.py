@@ -1,4 +1,4 @@
-"""Tables of verdicts: one that is printed, and one that is committed."""
+"""Makes tables of verdicts: one table is printed, and another one is committed."""
 
 import platform
 import re
@@ -22,7 +22,7 @@ MEANING = {
 }
 NAMES = {"mjcf": "MJCF", "sdf": "SDF", "urdf": "URDF"}
 BEGIN, END = "<!-- public robots -->", "<!-- end of public robots -->"
-"""Marks around the section that `--table` writes; whoever writes the rest of the file keeps it."""
+"""Marks around the section that `--table` writes. The program that writes the rest of the file keeps the section."""
 
 HEAD = """## Public robots
 
@@ -42,7 +42,7 @@ robots with a warning. *Refused* are read by a peer. *Alone* are read here and b
 
 
 class Kinds(NamedTuple):
-    """Messages of one sort, by kind."""
+    """Messages of one sort, such as warnings, counted by kind."""
 
     name: str
     counts: Counter[str]
@@ -50,7 +50,7 @@ class Kinds(NamedTuple):
 
 
 def kind(text: str) -> str:
-    """Returns a message without its names and numbers."""
+    """Returns the kind of a message: the message without names and numbers."""
     text = text.splitlines()[0] if text else ""
     text = text.split("; looked for ")[0]
     text = re.sub(r"\b(https?|model|package|file)://.*?(?=: |$)", "`…`", text)
@@ -63,7 +63,8 @@ def kind(text: str) -> str:
 
 
 def kinds(results: Results, format_: str) -> list[Kinds]:
-    """Returns differences, refusals, crashes, exceptions and warnings of a format, by kind, with an example of each."""
+    """Returns the differences, refusals, crashes, exceptions and warnings for a format, by kind. Each kind has an
+    example."""
     pairs: dict[str, list[tuple[Path, str]]] = defaultdict(list)
     for robot, verdict in results:
         if robot.format != format_:
@@ -92,7 +93,7 @@ def kinds(results: Results, format_: str) -> list[Kinds]:
 
 
 def counted(results: Results) -> str:
-    """Returns the number of files of each verdict, by format."""
+    """Returns the number of files for each verdict, by format."""
     formats = sorted({robot.format for robot, _ in results})
     lines = ["| | " + " | ".join(NAMES[f] for f in formats) + " |", "| --- |" + " ---: |" * len(formats)]
     for verdict, meaning in MEANING.items():
@@ -128,7 +129,7 @@ def listing(results: Results) -> str:
 
 
 def table(results: Results, commits: dict[str, str], command: str, tolerances: str) -> str:
-    """Returns the section that is committed, in Markdown."""
+    """Returns the section that is committed, as Markdown."""
     names = ("condyle", "mujoco", "pin", "drake")
     versions = {name: installed(name) for name in names}
     lines = [HEAD.format(command=command, python=platform.python_version(), tolerances=tolerances, **versions)]
@@ -151,7 +152,7 @@ def table(results: Results, commits: dict[str, str], command: str, tolerances: s
 
 
 def row(collection: str, commit: str, format_: str, rows: Results) -> str:
-    """Returns the numbers of one collection."""
+    """Returns the row of one collection, with its numbers of files."""
     verdicts = Counter(verdict.verdict for _, verdict in rows)
     warned = sum(bool(verdict.warnings) for _, verdict in rows if verdict.verdict == "equal")
     different = verdicts["different"] + verdicts["crash"]
@@ -161,14 +162,14 @@ def row(collection: str, commit: str, format_: str, rows: Results) -> str:
 
 
 def short(path: Path) -> str:
-    """Returns the end of a path, from the repository on."""
+    """Returns the end of a path, beginning with the repository."""
     parts = path.parts
     start = next((i for i, part in enumerate(parts) if "+" in part), max(0, len(parts) - 3))
     return f"`{parts[start].replace('+', '/', 1)}` `{'/'.join(parts[start + 1 :])}`"
 
 
 def escaped(text: str) -> str:
-    """Returns a text for a cell of a table: outside of `code`, signs of HTML and Markdown mean nothing."""
+    """Returns a text for a cell of a table. Outside of `code`, characters of HTML and Markdown are escaped."""
     return text.replace("|", "\\|").replace("<", "&lt;").replace("*", "\\*").replace("[", "\\[").replace("_", "\\_")
 
 
@@ -181,7 +182,7 @@ def installed(name: str) -> str:
 
 
 def put(path: Path, section: str) -> None:
-    """Puts the section into a file, in the place of the one that is there, else at its end."""
+    """Puts the section into a file. It replaces an existing section, otherwise it is appended."""
     text = path.read_text(encoding="utf-8") if path.exists() else ""
     before, _, rest = text.partition(BEGIN)
     _, _, after = rest.partition(END + "\n")

@@ -1,4 +1,4 @@
-"""Verdicts on small robots: what is equal, different, refused, a part, or never ends."""
+"""Tests verdicts on small robots that are equal, different or refused, on fragments, and on files that never end."""
 
 import os
 import signal
@@ -30,7 +30,7 @@ URDF = f"""<robot name="r">{LINK.format("a")}{LINK.format("b")}<joint name="j" t
 
 
 def judged(folder: Path, name: str, text: str) -> judge.Verdict:
-    """Writes a file and judges it in this process."""
+    """Writes a file and judges it in the present process."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / name).write_text(text, encoding="utf-8")
     (robot,) = files.find(folder, name)
@@ -80,7 +80,7 @@ def test_part(tmp_path: Path, name: str, text: str) -> None:
 
 
 def test_files(tmp_path: Path) -> None:
-    """Formats follow from root elements, collections from folders."""
+    """Formats follow from root elements, and collections follow from folders."""
     here = tmp_path / "owner+repository" / "models"
     here.mkdir(parents=True)
     (here / "a.xml").write_text("<!-- <sdf> --><robot name='r'><link name='a'/></robot>")
@@ -107,19 +107,20 @@ def test_crash_and_time_limit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_efforts() -> None:
-    """Sums over actuators, within the joint's range: a motor by its control, a servo by its force."""
+    """Tests sums of efforts over actuators within the joint's range. The control limits a motor, and the force limits a
+    servo."""
     text = """<mujoco><worldbody><body>
         <joint name="x" type="slide" axis="1 0 0" actuatorfrcrange="-30 8"/><joint name="y" type="slide" axis="0 1 0"/>
         <joint name="z" type="slide" axis="0 0 1"/><geom size="1"/></body></worldbody><actuator>
         <motor joint="x" ctrlrange="-1 2" gear="-10"/><position joint="x" kp="5" forcerange="-3 4" gear="2"/>
         <motor joint="y" ctrlrange="-1 2" forcerange="-9 1"/><velocity joint="z"/></actuator></mujoco>"""
     found = efforts(MjModel.from_xml_string(text))
-    # x: −10 · [−1, 2] + 2 · [−3, 4] = [−26, 18], within [−30, 8]
+    # Joint x: −10 · [−1, 2] + 2 · [−3, 4] = [−26, 18], clipped to [−30, 8].
     assert found.tolist() == [[-26.0, 8.0], [-1.0, 1.0], [-float("inf"), float("inf")]]
 
 
 def test_efforts_of_a_plugin() -> None:
-    """Its force is within `forcerange`, whatever the control is."""
+    """The force of a plugin is within `forcerange`, whatever the control is."""
     text = """<mujoco><extension><plugin plugin="mujoco.pid"><instance name="p"><config key="kp" value="9"/></instance>
         </plugin></extension><worldbody><body><joint name="j"/><geom size="1"/></body></worldbody><actuator>
         <plugin joint="j" plugin="mujoco.pid" instance="p" ctrlrange="-1 1" forcerange="-5 3"/></actuator></mujoco>"""
@@ -134,7 +135,7 @@ def test_efforts_of_a_plugin() -> None:
     ],
 )
 def test_flags(tmp_path: Path, flag: str) -> None:
-    """A model does not contain what a flag disables, as in MuJoCo."""
+    """A model lacks the features that a flag disables, as in MuJoCo."""
     joint = "<joint name='{0}' axis='0 1 0' range='-10 20' frictionloss='1' damping='2' stiffness='3' springref='9'/>"
     bodies = "".join(f"<body pos='{k} 0 0' gravcomp='1'>{joint.format(k)}<geom size='.1'/></body>" for k in (1, 2))
     text = f"""<mujoco><option><flag {flag}="disable"/></option><worldbody>{bodies}</worldbody>
@@ -148,7 +149,7 @@ def test_flags(tmp_path: Path, flag: str) -> None:
 
 
 def test_section_of_a_file(tmp_path: Path) -> None:
-    """The section is put at the end, and replaced where it is."""
+    """A new section is put at the end of the file, and replaces an existing section."""
     path = tmp_path / "V.md"
     path.write_text("# Title\n")
     report.put(path, f"{report.BEGIN}\none\n{report.END}\n")

@@ -1,18 +1,18 @@
-//! Chart of computing time over the number of knots.
+//! Draws a chart: computing time over the number of knots.
 
 use super::Report;
 use std::fmt::Write;
 
 const SIZE: (f64, f64) = (720.0, 420.0);
-/// Left, right, top and bottom of the axes (px).
+/// Positions of the left, right, top and bottom ends of the axes (px).
 const FRAME: [f64; 4] = [80.0, 520.0, 30.0, 360.0];
 const COLOURS: [&str; 5] = ["#30638e", "#00798c", "#2e933c", "#d1495b", "#8f2d56"];
 
-/// Curve: name, and points (knots, p50, p99) with times in seconds.
+/// Curve of the chart: its name, and its points (knots, p50, p99) with times in seconds.
 type Curve = (String, Vec<(usize, f64, f64)>);
 
-/// Draws the times of all horizons on logarithmic axes. Thick lines are p50, thin lines p99; the dashed line is the
-/// period.
+/// Draws the times of all horizons on logarithmic axes. Thick lines show p50, thin lines show p99, and the dashed line
+/// shows the period.
 pub(super) fn svg(report: &Report) -> String {
     let curves = curves(report);
     let period = report.verdicts.first().and_then(|v| v.period_s);

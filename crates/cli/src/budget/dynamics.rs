@@ -1,4 +1,4 @@
-//! Time of the algorithms per knot: with single calls, in SIMD lanes, and on several threads.
+//! Times of the algorithms per knot: in single calls, in SIMD lanes, and on several threads.
 
 use super::clock::{Effort, Times, measure};
 use crate::states::States;
@@ -7,20 +7,20 @@ use rayon::ThreadPool;
 use serde::Serialize;
 use std::hint::black_box;
 
-/// Times of a pass over a horizon, computed in three variants.
+/// Times of an algorithm for all knots of a horizon, computed in three variants.
 #[derive(Serialize)]
 pub(crate) struct Row {
     pub name: &'static str,
     pub knots: usize,
-    /// One call per knot.
+    /// Times with one call per knot.
     pub single: Times,
-    /// Batch on one thread: several knots in SIMD lanes.
+    /// Times of a batch on one thread: several knots are computed in SIMD lanes.
     pub lanes: Times,
-    /// Batch on all threads; `None` if there is only one thread.
+    /// Times of a batch on all threads; `None` if there is only one thread.
     pub threads: Option<Times>,
 }
 
-/// Work that is measured.
+/// Algorithm or algorithms to be measured.
 #[derive(Clone, Copy)]
 enum Work {
     Rnea,
@@ -49,7 +49,7 @@ impl Work {
         }
     }
 
-    /// Computes one state.
+    /// Computes one state in a single call.
     fn single(self, model: &Model, data: &mut Data<f64>, [q, v, a, tau]: [&[f64]; 4]) {
         match self {
             Self::Rnea => {
@@ -78,7 +78,7 @@ impl Work {
         }
     }
 
-    /// Computes all states.
+    /// Computes all states as a batch.
     fn batch(self, model: &Model, batch: &mut Batch, [q, v, a, tau]: [&[f64]; 4]) {
         match self {
             Self::Rnea => {
@@ -108,7 +108,7 @@ impl Work {
     }
 }
 
-/// Robot with random states, and memory to compute them.
+/// A robot with random states, and memory for the computations.
 pub(crate) struct Bench<'a> {
     model: &'a Model,
     states: States,
@@ -131,12 +131,12 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// Measures ABA, its derivatives and RNEA at each knot.
+    /// Measures ABA, the derivatives of ABA, and RNEA together, at each knot.
     pub(crate) fn horizon(&mut self, knots: usize) -> Row {
         self.row(Work::Horizon, knots)
     }
 
-    /// Measures each algorithm.
+    /// Measures each algorithm alone.
     pub(crate) fn algorithms(&mut self, knots: usize) -> Vec<Row> {
         Work::ALGORITHMS.into_iter().map(|work| self.row(work, knots)).collect()
     }

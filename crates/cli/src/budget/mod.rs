@@ -76,7 +76,7 @@ struct Report {
     nv: usize,
     level: String,
     cores: usize,
-    /// Joints that were given armature because they move nothing with inertia.
+    /// Names of joints that received armature because they move no inertia.
     armature_added: Vec<String>,
     contacts: Vec<String>,
     horizons: Vec<dynamics::Row>,
@@ -85,19 +85,19 @@ struct Report {
     verdicts: Vec<Verdict>,
 }
 
-/// Result for a horizon: whether its iterations fit into the period, and what would fit.
+/// Result for a horizon: whether the iterations fit into the period, and what would fit.
 #[derive(Serialize)]
 struct Verdict {
     knots: usize,
     name: &'static str,
-    /// Time of one iteration, p99 (s).
+    /// Time of one iteration (s), as the 99th percentile.
     iteration_s: f64,
-    /// Highest rate at which the required iterations still fit (Hz).
+    /// Highest rate (Hz) at which the requested iterations still fit into a period.
     highest_rate: f64,
-    /// Period (s). It and the following fields are `None` without `--rate`.
+    /// Period (s). This field and the following fields are `None` without `--rate`.
     period_s: Option<f64>,
     iterations_per_period: Option<u64>,
-    /// Maximum number of knots that fit, by linear regression of the measured times.
+    /// Maximum number of knots that fits into the period, by linear regression of the measured times.
     largest_knots: Option<u64>,
     fits: Option<bool>,
 }
@@ -142,7 +142,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     let model = Arc::new(model.clone());
     let iterate = solver::Bench { q: limits::start(&model), model: model.clone(), contacts, pool: &pool, effort };
     let mut iterations = Vec::new();
-    // A line needs two points: for a single horizon, half of it is measured too.
+    // A line needs two points: if there is only one horizon, half of this horizon is measured, too.
     let half = (knots.len() == 1 && most > 1).then_some(most / 2);
     for in_contact in [false, true] {
         if !in_contact || !iterate.contacts.is_empty() {
@@ -188,12 +188,12 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     }
 }
 
-/// Returns the number that is nearest to `wanted`.
+/// Returns the number in the list that is nearest to `wanted`.
 fn nearest(numbers: &[usize], wanted: usize) -> usize {
     numbers.iter().copied().min_by_key(|n| n.abs_diff(wanted)).unwrap_or(wanted)
 }
 
-/// Returns the result for each horizon, with contacts if there are any.
+/// Returns the result for each horizon. It is in contact if the arguments name contacts, otherwise free.
 fn verdicts(iterations: &[solver::Row], knots: &[usize], arguments: &Arguments) -> Vec<Verdict> {
     let counted = iterations.last().map_or("free", |row| row.name);
     let rows: Vec<&solver::Row> = iterations.iter().filter(|row| row.name == counted).collect();
@@ -216,10 +216,10 @@ fn verdicts(iterations: &[solver::Row], knots: &[usize], arguments: &Arguments) 
     rows.iter().filter(|row| knots.contains(&row.knots)).map(verdict).collect()
 }
 
-/// Returns the maximum number of knots whose iteration takes at most `time`. The line a + b N is fitted to the measured
-/// times with relative weights.
+/// Returns the maximum number of knots for which an iteration takes at most `time`. The line a + b N is fitted to the
+/// measured times by relative errors.
 fn largest(rows: &[&solver::Row], time: f64) -> u64 {
-    // minimize Σ ((a + b N)/t − 1)²: normal equations with weights 1/t²
+    // Minimise Σ ((a + b N)/t − 1)² by normal equations with the weights 1/t².
     let (mut w, mut wn, mut wnn, mut wt, mut wnt) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for row in rows {
         let (n, t) = (row.knots as f64, row.best().p99);
@@ -232,7 +232,7 @@ fn largest(rows: &[&solver::Row], time: f64) -> u64 {
         true => ((wt * wnn - wnt * wn) / det, (w * wnt - wn * wt) / det),
         false => (0.0, wnt / wnn),
     };
-    // Noise may tilt the line: it must not fall, and must begin at 0 or above.
+    // Noise may tilt the line. It must not fall, and must begin at 0 or above.
     let (a, b) = if a < 0.0 || b <= 0.0 { (0.0, wnt / wnn) } else { (a, b) };
     ((time - a) / b).max(0.0) as u64
 }

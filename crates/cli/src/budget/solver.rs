@@ -1,4 +1,4 @@
-//! Time of an FDDP iteration as in MPC: started from the last solution, with a new initial state.
+//! Measures the time of an FDDP iteration as in MPC: it starts from the last solution, with a new initial state.
 
 use super::clock::{Effort, Times, timed};
 use crate::error::Error;
@@ -14,7 +14,7 @@ use serde::Serialize;
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Times of an iteration.
+/// Times of one iteration.
 #[derive(Serialize)]
 pub(crate) struct Row {
     /// Kind of horizon: `free` or `in contact`.
@@ -29,7 +29,7 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    /// Returns the faster variant, compared by p99.
+    /// Returns the times with one thread or with all threads, whichever has the smaller p99.
     pub(crate) fn best(&self) -> Times {
         match self.threads {
             Some(threads) if threads.p99 < self.one.p99 => threads,
@@ -38,19 +38,19 @@ impl Row {
     }
 }
 
-/// Number of threads from which a sweep in segments may be faster.
+/// Minimum number of threads for which a sweep in segments may be faster.
 const SEGMENTS_FROM: usize = 4;
 /// Time between knots (s).
 const DT: f64 = 0.01;
-/// Standard deviation of the change of the initial state (rad, m, and per s).
+/// Standard deviation of the random change of the initial state: rad and m, and per second for velocities.
 const DISTURBANCE: f64 = 1e-3;
-/// Decay rate of a contact's slip (1/s).
+/// Rate at which the slip of a contact decays (1/s).
 const HOLD: f64 = 40.0;
 /// Damping μ for redundant contacts (1/kg).
 const DAMPING: f64 = 1e-6;
 const FRICTION: f64 = 0.7;
 
-/// Robot, posture and contacts whose iterations are measured.
+/// A robot, a posture and contacts, for which iterations are measured.
 pub(crate) struct Bench<'a> {
     pub model: Arc<Model>,
     pub q: Vec<f64>,
@@ -71,7 +71,8 @@ impl Bench<'_> {
         }
         let (one, finite) = one?;
         let mut threads: Option<Times> = None;
-        let segments = [(2, 1), (SEGMENTS_FROM, cores)]; // a sweep concurrent with the derivatives, or in segments
+        // A sweep that runs at the same time as the derivatives, or a sweep in segments.
+        let segments = [(2, 1), (SEGMENTS_FROM, cores)];
         for (_, segments) in segments.into_iter().filter(|(least, _)| cores >= *least) {
             let (times, _) = self.pool.install(|| self.times(knots, [cores, segments], in_contact, damping))?;
             threads = threads.filter(|best| best.p99 <= times.p99).or(Some(times));
@@ -89,7 +90,7 @@ impl Bench<'_> {
         let (mut problem, us) = self.problem(knots, in_contact, damping)?;
         let (x0, nq) = (problem.x0().to_vec(), self.model.nq());
         let mut solver = Fddp::new(&problem);
-        solver.settings.tolerance = 0.0; // so that it makes the maximum number of iterations
+        solver.settings.tolerance = 0.0; // makes the solver use the maximum number of iterations
         (solver.settings.threads, solver.settings.segments) = (threads, segments);
         solver.settings.max_iterations = 3;
         solver.solve(&mut problem, &x0.repeat(knots + 1), &us)?;
@@ -111,8 +112,8 @@ impl Bench<'_> {
         failed.map_or(Ok((times, finite)), |error| Err(error.into()))
     }
 
-    /// Returns the problem of holding the posture with little effort, and in contact without slip; and initial
-    /// controls.
+    /// Returns initial controls, and the problem of holding the posture with little effort. In contact, the feet must
+    /// not slip.
     fn problem(&self, knots: usize, in_contact: bool, damping: f64) -> Result<(Problem, Vec<f64>), Error> {
         let (model, nv) = (&self.model, self.model.nv());
         let x0 = [&self.q[..], &vec![0.0; nv]].concat();
@@ -145,7 +146,7 @@ impl Bench<'_> {
     }
 }
 
-/// Returns the contact with the gains used for measurements and plans.
+/// Returns the contact with the gains that measurements and plans use.
 pub(crate) fn held(constraint: condyle::ContactConstraint) -> condyle::ContactConstraint {
     condyle::ContactConstraint { kd: HOLD, reference: condyle::ReferenceFrame::LocalWorldAligned, ..constraint }
 }

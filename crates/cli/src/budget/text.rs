@@ -1,4 +1,4 @@
-//! Report of `condyle budget` as text.
+//! Writes the report of `condyle budget` as text.
 
 use super::clock::Times;
 use super::{Arguments, Report, dynamics, solver};
@@ -59,7 +59,7 @@ impl Report {
         table.text()
     }
 
-    /// Returns what fits, as text with bars.
+    /// Returns text with bars that shows what fits into the period.
     fn verdict(&self, arguments: &Arguments) -> String {
         let Some(first) = self.verdicts.first() else { return String::new() };
         let mut text = heading(&match first.period_s {

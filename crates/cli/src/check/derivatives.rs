@@ -1,7 +1,7 @@
 //! Checks of the derivatives of inverse and forward dynamics against dual numbers and central differences.
 //!
-//! Forward dynamics is the inverse of RNEA: rnea(q, v, q̈(q, v, τ)) = τ. So its derivatives follow from the derivatives
-//! of RNEA at q̈, and dual numbers are needed only for RNEA.
+//! RNEA inverts forward dynamics: rnea(q, v, q̈(q, v, τ)) = τ. So the derivatives of forward dynamics follow from the
+//! derivatives of RNEA at q̈, and dual numbers are needed only for RNEA.
 
 use super::identities::{SOLVES, inverted, spectrum};
 use super::ledger::Row;
@@ -10,21 +10,21 @@ use condyle::{Data, Model, aba, aba_derivatives, crba, integrate, rnea, rnea_der
 use nalgebra::DMatrix;
 use num_dual::Dual64;
 
-/// Bound if both sides are exact except for rounding.
+/// Bound for two results that are exact except for rounding.
 const ROUNDING: f64 = 1e-10;
-/// Bound for a central difference with step 1e-6.
+/// Bound for the error of a central difference with step 1e-6.
 const DIFFERENCE: f64 = 1e-5;
-/// Allowed error of a central difference, as a multiple of its change between steps h and 2h. The error is a third of
-/// this change if the step is too long, and a part of it if the step is too short.
+/// Allowed error of a central difference, as a multiple of the change between the steps h and 2h. If the step is too
+/// long, the error is a third of this change; if it is too short, the error is smaller than the change.
 const UNCERTAIN: f64 = 10.0;
 const STEP: f64 = 1e-6;
 
-/// Variable of differentiation.
+/// Variable with respect to which a function is differentiated.
 #[derive(Clone, Copy)]
 enum By {
     Position,
     Velocity,
-    /// Third argument: accelerations of RNEA, efforts of ABA.
+    /// Third argument of the function: accelerations for RNEA, efforts for ABA.
     Input,
 }
 
@@ -35,7 +35,7 @@ enum Function {
     Aba,
 }
 
-/// State with its input.
+/// State and third argument of the function under test.
 type State<'a> = [&'a [f64]; 3];
 
 pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
@@ -115,7 +115,8 @@ fn analytical(function: Function, model: &Model, data: &mut Data<f64>, [q, v, x]
     }
 }
 
-/// Returns derivatives of RNEA, one column per variable: the ε part of rnea(q ⊕ ε δ, …).
+/// Returns derivatives of RNEA with one column per variable. Each column is the ε part of rnea(q ⊕ ε δ, v, q̈), or the
+/// same for v and q̈.
 fn by_duals(by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) -> DMatrix<f64> {
     let nv = model.nv();
     let mut J = DMatrix::zeros(nv, nv);
@@ -137,7 +138,8 @@ fn by_duals(by: By, model: &Model, data: &mut Data<Dual64>, [q, v, x]: State) ->
     J
 }
 
-/// Returns derivatives by differences, one column per variable: (f(q ⊕ h δ, …) − f(q ⊖ h δ, …)) / 2h.
+/// Returns derivatives with one column per variable. Each column is a difference, for q (f(q ⊕ h δ, v, x) − f(q ⊖ h δ,
+/// v, x)) / 2h.
 fn by_differences(
     function: Function,
     by: By,

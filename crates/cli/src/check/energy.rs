@@ -1,4 +1,4 @@
-//! Check of the integrators: energy of a robot without drive and friction.
+//! Checks the integrators: the energy of a robot without drive and friction stays constant.
 
 use super::ledger::Row;
 use crate::error::Error;
@@ -7,28 +7,28 @@ use crate::states::{normal, source};
 use condyle::simulation::{Integrator, Settings, Simulation};
 use condyle::{Data, Model, forward_velocities};
 
-/// Step lengths that are tried in order (s), because light links swing faster than a long step can follow.
+/// Step lengths (s) that are tried in this order: light links may swing faster than a long step can follow.
 const STEPS: [f64; 4] = [1e-3, 1e-4, 1e-5, 1e-6];
-/// Number of steps. With half and a quarter of the step length, twice and four times as many steps are made.
+/// Number of steps. Half of the step length needs twice as many steps, and a quarter four times as many.
 const COUNT: usize = 200;
-/// Drift below which the error is rounding and its order cannot be measured.
+/// Drift below which the error consists of rounding, so that the order of the integrator cannot be measured.
 const ROUNDING: f64 = 1e-13;
-/// Initial speed (rad/s, m/s).
+/// Initial speed of the joints (rad/s, m/s).
 const SPEED: f64 = 0.1;
-/// Name, integrator, bound and order.
+/// Rule for an integrator: name, integrator, bound of the error, and order.
 type Rule = (&'static str, Integrator, f64, f64);
 
-/// Rules for each integrator. Either max |E(t) − E(0)|, relative to the largest kinetic energy, is within the bound at
-/// the shortest step; or the error falls at least with the given order. Light links may swing faster than any step, and
-/// then only the order is meaningful.
+/// Rules for each integrator. A check passes if max |E(t) − E(0)| at the shortest step, relative to the largest kinetic
+/// energy, is within the bound. It also passes if the error falls at least with the given order. Light links may swing
+/// faster than any step; then only the order is meaningful.
 const RULES: [Rule; 3] = [
     ("energy, RK4", Integrator::RungeKutta4, 1e-7, 3.0),
     ("energy, variational", Integrator::Variational, 1e-3, 1.5),
     ("energy, semi-implicit Euler", Integrator::SemiImplicitEuler, 1e-2, 0.7),
 ];
 
-/// Returns a row for each integrator. If limbs are too light for any step, all joints get armature, and the row notes
-/// it.
+/// Returns a row for each integrator. If limbs are too light for any step, all joints receive armature, and the row
+/// notes the armature.
 pub(super) fn check(model: &Model, armature: f64) -> Result<Vec<Row>, Error> {
     let mut heavier = model.armature().to_vec();
     for body in model.bodies()[1..].iter().filter(|body| body.joint.nv() == 1) {
@@ -47,7 +47,7 @@ pub(super) fn check(model: &Model, armature: f64) -> Result<Vec<Row>, Error> {
     Ok(RULES.into_iter().map(row).collect())
 }
 
-/// Measures the drift of an integrator with the longest step length that passes.
+/// Measures the drift of an integrator with the longest step length for which the check passes.
 fn measure(model: &Model, (name, integrator, bound, order): Rule) -> Row {
     let q = limits::start(model);
     let v: Vec<f64> = normal(&mut source(3), model.nv()).into_iter().map(|x| SPEED * x).collect();

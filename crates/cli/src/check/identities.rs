@@ -1,7 +1,7 @@
-//! Identities that hold at every state of every robot.
+//! Checks identities that hold for every robot in every state.
 //!
-//! Errors are max |found − expected|, relative to 1 + the largest number involved. Results that contain M⁻¹ may have an
-//! error of the condition number κ(M) times rounding, if this exceeds the other bound.
+//! An error is max |found − expected|, relative to 1 + the largest number involved. Results that contain M⁻¹ may have
+//! an error of the condition number κ(M) times rounding, if this is larger than the other bound.
 
 use super::ledger::Row;
 use crate::states::States;
@@ -20,18 +20,18 @@ use condyle::{
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
 
-/// Bound for some hundreds of operations.
+/// Bound for the rounding of several hundred operations.
 const ROUNDING: f64 = 1e-12;
-/// Bound for the same operations on the same numbers.
+/// Bound for results of the same operations on the same numbers.
 const EXACT: f64 = 1e-14;
-/// Bound for results that use a factorization of M, or sums of several algorithms.
+/// Bound for results that use a factorisation of M, or sums of the results of several algorithms.
 const INVERTED: f64 = 1e-10;
-/// Bound for a central difference with step h = 1e-6: error h² of the function, ε/h of rounding.
+/// Bound for a central difference with step h = 1e-6: h² from the function, ε/h from rounding.
 const DIFFERENCE: f64 = 1e-6;
 const STEP: f64 = 1e-6;
-/// Maximum relative error of M⁻¹: three digits are left.
+/// Maximum relative error of M⁻¹; three digits are then still correct.
 const LOST: f64 = 1e-3;
-/// Rounding error of a solve, in units of ε κ(M).
+/// Rounding error of a solve with M, in units of ε κ(M).
 const ROUNDINGS: f64 = 100.0;
 
 /// Reasons for the bounds, as shown in the table.
@@ -42,7 +42,7 @@ pub(super) const SOLVES: &str = "100 ε κ(M), at least 1e-10";
 const STEPS: &str = "central differences";
 const DIGITS: &str = "three digits of M⁻¹ are left";
 
-/// Returns the allowed error of results that contain M⁻¹.
+/// Returns the allowed error of results that contain M⁻¹, for this condition number of M.
 pub(super) fn inverted(condition: f64) -> f64 {
     INVERTED.max(ROUNDINGS * f64::EPSILON * condition)
 }
@@ -53,15 +53,15 @@ pub(super) fn spectrum(M: &Matrix<f64>) -> (f64, f64) {
     (values.min(), if values.min() > 0.0 { values.max() / values.min() } else { f64::INFINITY })
 }
 
-/// Returns whether the first body floats and carries all others. A base with armature does not count: armature is mass
-/// without weight.
+/// Returns whether the first body floats and carries all other bodies. A base with armature does not count as floating:
+/// armature is mass without weight.
 fn floats(model: &Model) -> bool {
     let bodies = model.bodies();
     let floats = bodies.len() > 1 && bodies[1].joint == Joint::FreeFlyer && bodies[2..].iter().all(|b| b.parent > 0);
     floats && model.armature()[..3] == [0.0; 3]
 }
 
-/// Checks the identities of rigid-body dynamics at `states` random states.
+/// Checks the identities of rigid-body dynamics in `states` random states.
 pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
     let mut inverse = Row::new("RNEA, CRBA", "rnea(q, v, a) = M a + h", SUMS);
     let mut round = Row::new("RNEA of ABA", "rnea(q, v, aba(q, v, τ)) = τ", SOLVES);
@@ -114,7 +114,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         }
 
         let qdd = aba(model, &mut data, q, v, tau, &[]).to_vec();
-        // upper bound of the terms whose sum is τ: |M| |q̈| + |h|
+        // |M| |q̈| + |h|, an upper bound of the terms that add up to τ
         let parts = largest((M.abs() * vector(&qdd).abs()).as_slice()) + largest(&h);
         round.compare(rnea(model, &mut data, q, v, &qdd, &[]), tau, parts, bound);
         let again = aba(model, &mut data, q, v, &tau_of_a, &[]);
@@ -159,7 +159,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64) -> Vec<Row> {
         if floats && mass > 0.0 {
             let R = forward_kinematics(model, &mut data, q).body(1).rotation;
             let mut fall = zero.clone();
-            // the acceleration of free fall, in the base's axes
+            // This is the acceleration of free fall, along the axes of the base.
             fall[..3].copy_from_slice(&R.transpose_mul(g0).to_array());
             falling.compare(
                 rnea(model, &mut data, q, &zero, &fall, &[]),

@@ -1,24 +1,24 @@
-//! Results of a check: the worst case of each identity, with its bound.
+//! Results of a check: for each identity, the worst case and its bound.
 
 use serde::Serialize;
 
-/// Identity, and the state with its largest error relative to the bound.
+/// An identity, and its largest error relative to the bound in all states.
 #[derive(Serialize)]
 pub(crate) struct Row {
     /// Name of the check.
     pub name: &'static str,
     /// Equation that is checked.
     pub equation: &'static str,
-    /// Measured relative error, as defined in the module of the equation; `null` if it is not a number.
+    /// Measured relative error, as defined in the module that checks the equation; `null` if it is not a number.
     pub error: f64,
-    /// Allowed error in this state.
+    /// Allowed error in the state with this error.
     pub bound: f64,
-    /// Reason for the bound.
+    /// Reason why the bound has this size.
     pub because: &'static str,
     /// Number of checked cases.
     pub cases: usize,
     pub pass: bool,
-    /// Further remarks.
+    /// Further remarks on the result.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
 }
@@ -28,10 +28,10 @@ impl Row {
         Self { name, equation, because, error: 0.0, bound: 0.0, cases: 0, pass: true, note: String::new() }
     }
 
-    /// Counts a case, and keeps it if its error is the largest relative to its bound.
+    /// Counts a case. Stores its error if it is the largest so far, relative to its bound.
     pub(super) fn see(&mut self, error: f64, bound: f64) {
         let (now, before) = (error / bound, if self.cases == 0 { -1.0 } else { self.error / self.bound });
-        // an error that is NaN is kept
+        // Keep an error that is NaN.
         if !before.is_nan() && (now > before || now.is_nan()) {
             (self.error, self.bound) = (error, bound);
         }
@@ -42,7 +42,7 @@ impl Row {
     /// Compares lists of numbers: max |x − y|, relative to the larger of 1 + max |y| and 1 + `scale`.
     pub(super) fn compare(&mut self, found: &[f64], expected: &[f64], scale: f64, bound: f64) {
         let largest = expected.iter().fold(1.0 + scale, |most: f64, y| most.max(1.0 + y.abs()));
-        // f64::max would discard NaN
+        // f64::max would ignore NaN.
         let error =
             found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, |a: f64, b| if a > b { a } else { b });
         let error = if found.iter().chain(expected).all(|x| x.is_finite()) { error / largest } else { f64::NAN };
@@ -59,7 +59,7 @@ mod tests {
         let mut row = Row::new("", "", "");
         row.compare(&[1.0, 2.0], &[1.0, 2.0 + 3e-12], 0.0, 1e-10);
         assert!(row.pass && row.error > 0.9e-12 && row.error < 1.1e-12);
-        row.see(1e-3, 1e-2); // a larger part of its bound
+        row.see(1e-3, 1e-2); // a larger share of its bound
         assert!(row.pass && row.error == 1e-3);
         row.see(2e-10, 1e-10);
         assert!(!row.pass && row.error == 2e-10 && row.cases == 3);

@@ -1,4 +1,4 @@
-//! `condyle check`: checks the numbers computed for a robot on this machine.
+//! `condyle check`: checks the numbers that are computed for a robot on this machine.
 
 mod derivatives;
 mod energy;
@@ -45,7 +45,7 @@ struct Report {
     nv: usize,
     states: u32,
     seed: u64,
-    /// Joints that were given armature because they move nothing with inertia.
+    /// Names of joints that received armature because they move no inertia.
     armature_added: Vec<String>,
     pass: bool,
     rows: Vec<Row>,

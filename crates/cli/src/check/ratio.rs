@@ -1,4 +1,4 @@
-//! Check with a mass ratio of 10⁶: heavy tips on light limbs, where forward dynamics loses most digits.
+//! Checks forward dynamics with a mass ratio of 10⁶. With heavy tips on light limbs it loses most digits.
 
 use super::identities::{SOLVES, inverted, largest, spectrum};
 use super::ledger::Row;
@@ -12,7 +12,7 @@ use nalgebra::DVector;
 const RATIO: f64 = 1e6;
 
 /// Checks ABA of the robot with heavy tips against RNEA, and against a solve with M. Returns no rows if no body with
-/// mass carries another one.
+/// mass carries another body with mass.
 pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> Result<Vec<Row>, Error> {
     let mut round = Row::new("mass ratio 10⁶", "rnea(q, v, aba(q, v, τ)) = τ", SOLVES);
     let mut forward = Row::new("mass ratio 10⁶", "aba(q, v, τ) = M⁻¹ (τ − h)", SOLVES);
@@ -21,7 +21,7 @@ pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> R
         return Ok(Vec::new());
     }
     let scaled = |i: usize, I: Inertia<f64>| {
-        // an inertia is linear in its parameters
+        // An inertia is linear in its parameters.
         inertial_parameters::to_inertia(inertial_parameters::from_inertia(I).map(|x| x * factors[i]))
     };
     let (model, _) = robot::regular(model.with_inertias(scaled)?, armature)?;
@@ -46,8 +46,8 @@ pub(super) fn check(model: &Model, states: usize, seed: u64, armature: f64) -> R
     Ok(vec![round, forward].into_iter().filter(|row| row.cases > 0).collect())
 }
 
-/// Returns the factor for each body's inertia. A body with mass at the end of a limb becomes 10⁶ times as heavy as the
-/// next body with mass towards the root.
+/// Returns a factor for the inertia of each body. A body with mass at the end of a limb becomes 10⁶ times as heavy as
+/// the next body with mass on the path to the root.
 fn factors(model: &Model) -> Vec<f64> {
     let bodies = model.bodies();
     let mut factors = vec![1.0; bodies.len()];

@@ -1,4 +1,4 @@
-//! Arrays in a device's memory.
+//! Arrays in the memory of a device.
 
 use super::device::{Device, Stream};
 use super::driver::{Address, call};
@@ -27,9 +27,9 @@ mod sealed {
     impl Sealed for f32 {}
 }
 
-/// Numbers in a device's memory: number k of state i of n is stored at index `[k * n + i]`.
+/// Numbers in the memory of a device. Number k of state i of n is stored at index `[k * n + i]`.
 ///
-/// The memory is freed when the array is dropped, after all streams have finished with it.
+/// Dropping the array frees its memory, after all streams have finished with it.
 pub struct DeviceArray<T: Real> {
     pub(super) device: Device,
     pub(super) address: Address,
@@ -47,13 +47,13 @@ impl<T: Real> fmt::Debug for DeviceArray<T> {
 impl<T: Real> Drop for DeviceArray<T> {
     fn drop(&mut self) {
         if let (true, Ok(_current)) = (self.is_owned, self.device.0.current()) {
-            let _ = call!(self.device.0.driver, cuMemFree_v2(self.address)); // waits for all streams
+            let _ = call!(self.device.0.driver, cuMemFree_v2(self.address)); // freeing waits for all streams
         }
     }
 }
 
 impl<T: Real> DeviceArray<T> {
-    /// Allocates memory for some numbers; their values are undefined.
+    /// Allocates memory for `len` numbers; their values are undefined.
     ///
     /// # Errors
     /// [`Error::Call`], for example if there is too little memory.
@@ -66,7 +66,7 @@ impl<T: Real> DeviceArray<T> {
         Ok(Self { device: device.clone(), address, len, is_owned: len > 0, number: PhantomData })
     }
 
-    /// Copies some numbers into a new array.
+    /// Copies the numbers into a new array.
     ///
     /// # Errors
     /// [`Error::Call`].
@@ -76,11 +76,11 @@ impl<T: Real> DeviceArray<T> {
         Ok(array)
     }
 
-    /// Uses memory of another library, which is neither copied nor freed.
+    /// Uses memory of another library. The memory is neither copied nor freed.
     ///
     /// # Safety
-    /// `len` numbers of type `T` are stored at this address of the device, in memory that outlives the array. Streams
-    /// that are not ordered with the array's streams neither write to this memory nor read results written here.
+    /// `len` numbers of type `T` must be stored at this address of the device, in memory that outlives the array. A
+    /// stream that is not ordered with the array's streams must neither write to this memory nor read results from it.
     pub unsafe fn from_raw(device: &Device, address: u64, len: usize) -> Self {
         Self { device: device.clone(), address, len, is_owned: false, number: PhantomData }
     }
@@ -99,7 +99,7 @@ impl<T: Real> DeviceArray<T> {
     /// Copies numbers to the device, after earlier work of the stream, and waits for the copy.
     ///
     /// # Errors
-    /// [`Error::Length`] for a wrong number of numbers; [`Error::OtherDevice`]; [`Error::Call`].
+    /// [`Error::Length`] if `numbers` does not have the array's length; [`Error::OtherDevice`]; [`Error::Call`].
     pub fn write(&mut self, stream: &Stream, numbers: &[T]) -> Result<(), Error> {
         self.check(stream, "numbers", numbers.len())?;
         if self.len == 0 {
@@ -114,8 +114,8 @@ impl<T: Real> DeviceArray<T> {
     /// Copies the numbers from the device, after earlier work of the stream, and waits for the copy.
     ///
     /// # Errors
-    /// [`Error::Length`] for a wrong number of numbers; [`Error::OtherDevice`]; [`Error::Call`], also for failures of
-    /// earlier kernels.
+    /// [`Error::Length`] if `numbers` does not have the array's length; [`Error::OtherDevice`]; [`Error::Call`], also
+    /// for failures of earlier kernels.
     pub fn read(&self, stream: &Stream, numbers: &mut [T]) -> Result<(), Error> {
         self.check(stream, "numbers", numbers.len())?;
         if self.len == 0 {
@@ -145,7 +145,7 @@ impl<T: Real> DeviceArray<T> {
     }
 }
 
-/// Checks that an array or a stream is on the device where it is used.
+/// Checks that an array or a stream belongs to the device on which it is used.
 pub(super) fn on_device(name: &str, expected: &Device, found: &Device) -> Result<(), Error> {
     if expected == found {
         return Ok(());

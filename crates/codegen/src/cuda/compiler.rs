@@ -36,7 +36,7 @@ const LIBRARY: Named = Named {
     },
 };
 
-/// NVIDIA's run-time compiler, loaded. It needs neither a GPU nor a driver.
+/// NVIDIA's run-time compiler, after it was loaded. It needs neither a GPU nor a driver.
 pub struct Compiler {
     table: CompilerTable,
 }
@@ -47,28 +47,28 @@ impl fmt::Debug for Compiler {
     }
 }
 
-/// Program that is being compiled.
+/// Program of NVRTC; dropping it destroys the program.
 struct Open<'a>(&'a CompilerTable, Program);
 
 impl Drop for Open<'_> {
     fn drop(&mut self) {
-        // SAFETY: the program was created, and is destroyed once.
+        // SAFETY: the program was created before, and is destroyed only here.
         unsafe { (self.0.nvrtcDestroyProgram)(&raw mut self.1) };
     }
 }
 
 impl Open<'_> {
-    /// Returns the bytes written by `get`; `size` returns their number.
+    /// Returns the bytes that `get` writes. `size` returns the number of these bytes.
     ///
     /// # Safety
-    /// `get` writes the number of bytes that `size` returns.
+    /// `get` must write exactly the number of bytes that `size` returns.
     unsafe fn bytes(
         &self,
         size: unsafe extern "system" fn(Program, *mut usize) -> c_int,
         get: unsafe extern "system" fn(Program, *mut c_char) -> c_int,
     ) -> Vec<u8> {
         let mut count = 0;
-        // SAFETY: promised by the caller.
+        // SAFETY: the caller promises that `get` writes as many bytes as `size` returns.
         unsafe {
             if size(self.1, &raw mut count) != 0 {
                 return Vec::new();
@@ -84,7 +84,7 @@ impl Compiler {
     /// `CONDYLE_NVRTC_LIBRARY`.
     ///
     /// # Errors
-    /// [`Error::Library`] if it cannot be loaded.
+    /// [`Error::Library`] if the compiler cannot be loaded.
     pub fn new() -> Result<Self, Error> {
         Ok(Self { table: CompilerTable::load(&LIBRARY, None)? })
     }
@@ -92,15 +92,15 @@ impl Compiler {
     /// Loads the compiler from a file, such as `libnvrtc.so.12`.
     ///
     /// # Errors
-    /// [`Error::Library`] if it cannot be loaded.
+    /// [`Error::Library`] if the compiler cannot be loaded.
     pub fn open(library: &Path) -> Result<Self, Error> {
         Ok(Self { table: CompilerTable::load(&LIBRARY, Some(library))? })
     }
 
-    /// Compiles the kernels of some functions to PTX, which runs on all devices with at least this compute capability;
-    /// for example (7, 0).
+    /// Compiles the kernels of the functions to PTX. It runs on all devices with at least this compute capability, for
+    /// example (7, 0).
     ///
-    /// The result is for [`Device::load`](crate::cuda::Device::load), on a machine without the compiler.
+    /// [`Device::load`](crate::cuda::Device::load) loads the result, also on a machine without the compiler.
     ///
     /// # Errors
     /// [`Error::Compile`] with the compiler's log.
@@ -112,8 +112,8 @@ impl Compiler {
         self.compile(name, &text::<T>(name, functions), &architecture)
     }
 
-    /// Compiles to machine code for devices of this compute capability, or to PTX for the newest known earlier
-    /// capability.
+    /// Compiles to machine code for devices of this compute capability. If the compiler does not know the capability,
+    /// compiles to PTX for the newest earlier one that it knows.
     pub(super) fn image<T: Real>(
         &self,
         name: &str,
@@ -124,7 +124,7 @@ impl Compiler {
         let known = self.architectures();
         let architecture = match known.iter().filter(|&&a| a <= wanted).max() {
             Some(&a) if a != wanted => format!("compute_{a}"),
-            _ => format!("sm_{wanted}"), // the compiler reports an unknown one
+            _ => format!("sm_{wanted}"), // for an unknown architecture, the compiler reports an error
         };
         self.compile(name, &text::<T>(name, functions), &architecture)
     }
@@ -132,10 +132,10 @@ impl Compiler {
     /// Returns the compute capabilities that the compiler knows, as 10 · major + minor.
     fn architectures(&self) -> Vec<c_int> {
         let mut count = 0;
-        // SAFETY: the function writes a number.
+        // SAFETY: the function writes one number to `count`.
         unsafe { (self.table.nvrtcGetNumSupportedArchs)(&raw mut count) };
         let mut all = vec![0; usize::try_from(count).unwrap_or(0)];
-        // SAFETY: the function writes the number of entries that it returned before.
+        // SAFETY: the function writes as many entries as the earlier call counted.
         unsafe { (self.table.nvrtcGetSupportedArchs)(all.as_mut_ptr()) };
         all
     }
@@ -144,7 +144,7 @@ impl Compiler {
         let failed = |log: String| Error::Compile { name: name.to_owned(), architecture: architecture.to_owned(), log };
         let file = CString::new(format!("{name}.cu")).expect("an identifier has no zeros");
         let mut open = Open(&self.table, null_mut());
-        // SAFETY: the strings end with 0; there are no headers.
+        // SAFETY: the strings end with 0, and the number of headers is 0.
         let status = unsafe {
             (self.table.nvrtcCreateProgram)(&raw mut open.1, text.as_ptr(), file.as_ptr(), 0, null(), null())
         };
@@ -152,27 +152,27 @@ impl Compiler {
             return Err(failed(format!("nvrtcCreateProgram: status {status}")));
         }
         let option = CString::new(format!("--gpu-architecture={architecture}")).expect("a number has no zeros");
-        // SAFETY: there is one option.
+        // SAFETY: the number of options is 1.
         let status = unsafe { (self.table.nvrtcCompileProgram)(open.1, 1, [option.as_ptr()].as_ptr()) };
         let table = &self.table;
         if status != 0 {
-            // SAFETY: the two functions belong together.
+            // SAFETY: the second function writes as many bytes as the first one returns.
             let log = unsafe { open.bytes(table.nvrtcGetProgramLogSize, table.nvrtcGetProgramLog) };
             let log = String::from_utf8_lossy(&log);
             return Err(failed(format!("status {status}: {}", log.trim_end_matches('\0').trim())));
         }
         let image = if architecture.starts_with("sm_") {
-            // SAFETY: the two functions belong together.
+            // SAFETY: the second function writes as many bytes as the first one returns.
             unsafe { open.bytes(table.nvrtcGetCUBINSize, table.nvrtcGetCUBIN) }
         } else {
-            // SAFETY: as above.
+            // SAFETY: the second function writes as many bytes as the first one returns.
             unsafe { open.bytes(table.nvrtcGetPTXSize, table.nvrtcGetPTX) }
         };
         if image.is_empty() { Err(failed("nothing was made".to_owned())) } else { Ok(image) }
     }
 }
 
-/// Returns the functions as CUDA code.
+/// Returns the CUDA code of the functions.
 fn text<T: Real>(name: &str, functions: &[Function]) -> CString {
     let mut files = T::LANGUAGE.text(name, functions);
     CString::new(files.remove(0).text).expect("code has no zeros")

@@ -7,7 +7,7 @@ use core::fmt;
 use core::ptr::null_mut;
 use std::sync::Arc;
 
-/// Attributes of a device, with their numbers in CUDA's header.
+/// Attributes of a device; the numbers are from CUDA's header.
 const MULTIPROCESSORS: c_int = 16;
 const CAPABILITY_MAJOR: c_int = 75;
 const CAPABILITY_MINOR: c_int = 76;
@@ -18,9 +18,9 @@ const NON_BLOCKING: u32 = 1;
 /// Flag of an event without timing.
 const DISABLE_TIMING: u32 = 2;
 
-/// A GPU with its primary context, which is retained while this handle or an object of the device exists.
+/// A GPU with its primary context. The context is retained while this handle or any object of the device exists.
 ///
-/// Clones are the same device. Several threads may use it at a time.
+/// Clones of the handle are the same device. Several threads may use it at the same time.
 #[derive(Clone)]
 pub struct Device(pub(super) Arc<Inner>);
 
@@ -33,9 +33,9 @@ pub(super) struct Inner {
     capability: (u32, u32),
 }
 
-// SAFETY: any thread may make a context current, and several threads may do so at a time.
+// SAFETY: any thread may make a context current, also several threads at the same time.
 unsafe impl Send for Inner {}
-// SAFETY: as above.
+// SAFETY: any thread may make a context current, also several threads at the same time.
 unsafe impl Sync for Inner {}
 
 impl Drop for Inner {
@@ -44,7 +44,7 @@ impl Drop for Inner {
     }
 }
 
-/// Guard that makes a device's context current on the thread while it exists.
+/// Guard that makes a device's context current on the present thread while the guard exists.
 pub(super) struct Current<'a>(&'a Inner);
 
 impl Drop for Current<'_> {
@@ -64,7 +64,7 @@ impl Driver {
     /// Returns the device with this ordinal.
     ///
     /// # Errors
-    /// [`Error::Device`] if it does not exist; [`Error::Call`].
+    /// [`Error::Device`] if the device does not exist; [`Error::Call`].
     pub fn device(&self, ordinal: usize) -> Result<Device, Error> {
         Device::open(self.clone(), ordinal)
     }
@@ -77,7 +77,7 @@ impl fmt::Debug for Device {
 }
 
 impl PartialEq for Device {
-    /// Returns whether both are the same GPU.
+    /// Returns whether both handles are the same GPU.
     fn eq(&self, other: &Self) -> bool {
         self.0.context == other.0.context
     }
@@ -110,12 +110,12 @@ impl Device {
         Ok(Self(Arc::new(Inner { driver, ordinal, device, context, multiprocessors, capability })))
     }
 
-    /// Returns the ordinal with which the device was requested.
+    /// Returns the ordinal with which the caller requested the device.
     pub fn ordinal(&self) -> usize {
         self.0.ordinal
     }
 
-    /// Returns the compute capability: (9, 0) for Hopper.
+    /// Returns the compute capability, for example (9, 0) for Hopper.
     pub fn capability(&self) -> (u32, u32) {
         self.0.capability
     }
@@ -127,11 +127,11 @@ impl Device {
     pub fn name(&self) -> Result<String, Error> {
         let mut name: [c_char; 256] = [0; 256];
         call!(self.0.driver, cuDeviceGetName(name.as_mut_ptr(), 255, self.0.device))?;
-        // SAFETY: the last character stays 0.
+        // SAFETY: the last character of the buffer stays 0.
         Ok(unsafe { CStr::from_ptr(name.as_ptr()) }.to_string_lossy().into_owned())
     }
 
-    /// Creates a stream, which is ordered with other streams only by [`Stream::wait_for`].
+    /// Creates a stream. Only [`Stream::wait_for`] orders it with other streams.
     ///
     /// # Errors
     /// [`Error::Call`].
@@ -141,25 +141,25 @@ impl Device {
         Ok(Stream { device: self.clone(), handle, is_owned: true })
     }
 
-    /// Returns the legacy default stream. It is ordered with all streams of other libraries that were not created as
-    /// non-blocking.
+    /// Returns the legacy default stream. It is ordered with all streams of other libraries, except streams that were
+    /// created as non-blocking.
     pub fn default_stream(&self) -> Stream {
         Stream { device: self.clone(), handle: null_mut(), is_owned: false }
     }
 }
 
-/// A queue of work: items in the same stream run one after the other.
+/// A queue of work. Copies and kernels in the same stream run one after the other.
 ///
-/// Copies and calls name the stream on which they run. Several threads may use it at a time.
+/// Each copy and each call names its stream. Several threads may use a stream at the same time.
 pub struct Stream {
     pub(super) device: Device,
     pub(super) handle: Handle,
     is_owned: bool,
 }
 
-// SAFETY: any thread may add work to a stream, and several threads may do so at a time.
+// SAFETY: any thread may add work to a stream, also several threads at the same time.
 unsafe impl Send for Stream {}
-// SAFETY: as above.
+// SAFETY: any thread may add work to a stream, also several threads at the same time.
 unsafe impl Sync for Stream {}
 
 impl fmt::Debug for Stream {
@@ -171,26 +171,26 @@ impl fmt::Debug for Stream {
 impl Drop for Stream {
     fn drop(&mut self) {
         if let (true, Ok(_current)) = (self.is_owned, self.device.0.current()) {
-            let _ = call!(self.device.0.driver, cuStreamDestroy_v2(self.handle)); // work in progress continues
+            let _ = call!(self.device.0.driver, cuStreamDestroy_v2(self.handle)); // work in progress still finishes
         }
     }
 }
 
 impl Stream {
-    /// Uses a stream of another library: its `CUstream` or `cudaStream_t`. It is not destroyed.
+    /// Uses a stream of another library, given as `CUstream` or `cudaStream_t`. The stream is not destroyed.
     ///
     /// # Safety
-    /// The stream belongs to the device's primary context and outlives this object.
+    /// The stream must belong to the device's primary context and outlive this object.
     pub unsafe fn from_raw(device: &Device, handle: u64) -> Self {
         Self { device: device.clone(), handle: handle as Handle, is_owned: false }
     }
 
-    /// Returns the `CUstream`, for other libraries.
+    /// Returns the stream's `CUstream`, for other libraries.
     pub fn as_raw(&self) -> u64 {
         self.handle as u64
     }
 
-    /// Makes all later work of this stream wait for all work already in the other stream.
+    /// Makes all later work of this stream wait for all work that is already in the other stream.
     ///
     /// # Errors
     /// [`Error::Call`].
@@ -204,7 +204,7 @@ impl Stream {
         };
         let _current = self.device.0.current()?;
         let waits = made.and_then(|()| call!(driver, cuStreamWaitEvent(self.handle, event, 0)));
-        call!(driver, cuEventDestroy_v2(event))?; // the driver destroys it after it has occurred
+        call!(driver, cuEventDestroy_v2(event))?; // the driver destroys the event after it has occurred
         waits
     }
 

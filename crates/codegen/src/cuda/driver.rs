@@ -1,4 +1,4 @@
-//! The library of NVIDIA's driver.
+//! The library of NVIDIA's GPU driver.
 
 use super::error::Error;
 use super::library::{Named, library_functions};
@@ -47,12 +47,13 @@ library_functions! { DriverTable:
     );
 }
 
-/// Calls a function of the driver; returns `Ok(())`, or its name with CUDA's message. The caller guarantees that the
-/// arguments are valid.
+/// Calls a function of the driver. Returns `Ok(())`, or an error with the function's name and CUDA's message. The
+/// caller guarantees that the arguments are valid.
 macro_rules! call {
     ($driver:expr, $function:ident($($argument:expr),* $(,)?)) => {{
         let driver: &$crate::cuda::Driver = &$driver;
-        // SAFETY: handles live as long as their owners; callers pass valid pointers to results, and their sizes.
+        // SAFETY: handles live as long as their owners; callers pass valid pointers to results, and the sizes of
+        // results.
         let status = unsafe { (driver.table.$function)($($argument),*) };
         driver.check(stringify!($function), status)
     }};
@@ -65,7 +66,7 @@ const LIBRARY: Named = Named {
     files: if cfg!(windows) { &["nvcuda.dll"] } else { &["libcuda.so.1", "libcuda.so"] },
 };
 
-/// NVIDIA's driver, loaded.
+/// NVIDIA's GPU driver, after it was loaded.
 #[derive(Clone)]
 pub struct Driver {
     pub(super) table: Arc<DriverTable>,
@@ -92,7 +93,8 @@ impl Driver {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Library`] if it cannot be loaded; [`Error::Call`] if it cannot be used, for example without a device.
+    /// [`Error::Library`] if the driver cannot be loaded; [`Error::Call`] if it cannot be used, for example without a
+    /// device.
     pub fn new() -> Result<Self, Error> {
         Self::load(None)
     }
@@ -121,7 +123,7 @@ impl Driver {
         Ok(usize::try_from(count).unwrap_or(0))
     }
 
-    /// Converts a function's status to a result.
+    /// Converts the status that a function returned to a result.
     pub(super) fn check(&self, function: &'static str, status: c_int) -> Result<(), Error> {
         if status == 0 {
             return Ok(());
@@ -129,11 +131,11 @@ impl Driver {
         Err(Error::Call { function, status, text: self.text(status) })
     }
 
-    /// Returns a status's name and CUDA's message.
+    /// Returns the name of a status and CUDA's message.
     fn text(&self, status: c_int) -> String {
         let say = |function: unsafe extern "system" fn(c_int, *mut *const c_char) -> c_int| {
             let mut text = core::ptr::null();
-            // SAFETY: the function writes a pointer to a constant, or null.
+            // SAFETY: the function writes a pointer to a constant string, or null.
             unsafe {
                 if function(status, &raw mut text) != 0 || text.is_null() {
                     return "unknown".to_owned();

@@ -11,7 +11,7 @@ pub enum Error {
         library: &'static str,
         /// The system's message for each file that was tried.
         reason: String,
-        /// Environment variable that may name another file.
+        /// Environment variable that may name another file of the library.
         variable: &'static str,
     },
     /// The device does not exist.
@@ -35,7 +35,7 @@ pub enum Error {
     /// The compiler rejected the code.
     #[error("{name}: not compiled for {architecture}: {log}")]
     Compile {
-        /// Name of the code.
+        /// Name of the generated code.
         name: String,
         /// Target architecture.
         architecture: String,
@@ -45,7 +45,7 @@ pub enum Error {
     /// The driver rejected the compiled code.
     #[error("{name}: not loaded: {text}: {log}")]
     Load {
-        /// Name of the code.
+        /// Name of the generated code.
         name: String,
         /// CUDA's message.
         text: String,
@@ -60,16 +60,16 @@ pub enum Error {
         /// Names of the existing kernels.
         known: Vec<String>,
     },
-    /// There are too few or too many arrays.
+    /// A call has too few or too many arrays.
     #[error("{kernel}: expected {expected} {arrays}, found {found}")]
     Arrays {
         /// Name of the kernel.
         kernel: String,
         /// `inputs` or `outputs`.
         arrays: &'static str,
-        /// Number that it has.
+        /// Number of arrays that the kernel has.
         expected: usize,
-        /// Number that was given.
+        /// Number of arrays that were given.
         found: usize,
     },
     /// An array does not have the required length.
@@ -87,7 +87,7 @@ pub enum Error {
     States {
         /// Name of the kernel.
         kernel: String,
-        /// Maximum number of states: indices in the largest array have 32 bits.
+        /// Maximum number of states; indices in the largest array have 32 bits.
         most: usize,
         /// Number of states.
         found: usize,

@@ -13,41 +13,41 @@ use core::ptr::{null, null_mut};
 use std::ffi::CString;
 use std::sync::Arc;
 
-/// Number of threads in a warp: a smaller block would leave some of them idle.
+/// Number of threads in a warp. A smaller block would leave some threads of the warp idle.
 const WARP: usize = 32;
 
-/// Attributes of a kernel, and options of the driver's assembler, with their numbers in CUDA's header.
+/// Attributes of a kernel, and options of the driver's assembler; the numbers are from CUDA's header.
 const LOCAL_BYTES: c_int = 3;
 const REGISTERS: c_int = 4;
 const ERROR_LOG: c_int = 5;
 const ERROR_LOG_BYTES: c_int = 6;
 const LOG: usize = 16 * 1024;
 
-/// Compiled and loaded code; it stays loaded until all of its kernels are dropped.
+/// Compiled and loaded code. It stays loaded until all of its kernels are dropped.
 struct Module {
     device: Device,
     handle: Handle,
 }
 
-// SAFETY: any thread may use modules and their kernels, and several threads may do so at a time.
+// SAFETY: any thread may use modules and their kernels, also several threads at the same time.
 unsafe impl Send for Module {}
-// SAFETY: as above.
+// SAFETY: any thread may use modules and their kernels, also several threads at the same time.
 unsafe impl Sync for Module {}
 
 impl Drop for Module {
     fn drop(&mut self) {
         if let Ok(_current) = self.device.0.current() {
-            let _ = call!(self.device.0.driver, cuCtxSynchronize()); // one of its kernels may be running
+            let _ = call!(self.device.0.driver, cuCtxSynchronize()); // a kernel of the module may still be running
             let _ = call!(self.device.0.driver, cuModuleUnload(self.handle));
         }
     }
 }
 
 impl Device {
-    /// Compiles the kernels of some functions for this device, with numbers of type `T`.
+    /// Compiles the kernels of the functions for this device, with numbers of type `T`.
     ///
-    /// If the compiler does not know the device, it makes PTX for the newest device that it knows; the driver compiles
-    /// this PTX.
+    /// If the compiler does not know the device, it makes PTX for the newest device that it knows. The driver then
+    /// compiles this PTX.
     ///
     /// # Errors
     /// [`Error::Compile`] with the compiler's log; [`Error::Load`]; [`Error::Call`].
@@ -64,11 +64,11 @@ impl Device {
         Kernels::load(self, name, functions, &image)
     }
 
-    /// Loads the kernels of some functions from PTX or CUBIN made earlier by a compiler; NVRTC is not needed.
+    /// Loads the kernels of the functions from PTX or CUBIN that a compiler made earlier; NVRTC is not needed.
     ///
     /// # Safety
-    /// `image` is the complete output of [`Compiler::ptx`] (or another compiler) for the same functions, the same name
-    /// and the same `T`.
+    /// `image` must be the complete output of [`Compiler::ptx`] (or of another compiler) for the same functions, the
+    /// same name and the same `T`.
     ///
     /// # Errors
     /// [`Error::Load`] with the driver's message, for example if the image is for newer devices; [`Error::Call`].
@@ -77,7 +77,7 @@ impl Device {
     }
 }
 
-/// Kernels of some functions, ready to be called.
+/// Kernels of a robot's functions, ready to be called.
 #[derive(Debug)]
 pub struct Kernels<T: Real> {
     kernels: Vec<Kernel<T>>,
@@ -117,27 +117,27 @@ impl<T: Real> Kernels<T> {
     }
 }
 
-/// Function of a robot on a GPU: a thread computes one state, or a share of one.
+/// Function of a robot on a GPU. Each thread computes one state, or a share of one state.
 pub struct Kernel<T: Real> {
     name: String,
     inputs: Vec<Array>,
     outputs: Vec<Array>,
     module: Arc<Module>,
     handle: Handle,
-    /// Number of threads that can share a state, each in its own row of blocks.
+    /// Number of threads that can share a state; each of them is in another row of blocks.
     shares: usize,
     /// Largest number of states for which each state is split among `shares` threads.
     most_shared: usize,
-    /// Number of threads in a block that keeps the most warps on a multiprocessor.
+    /// Number of threads in a block, chosen so that the most warps run on a multiprocessor at the same time.
     threads: usize,
     registers: usize,
     local_bytes: usize,
     number: PhantomData<T>,
 }
 
-// SAFETY: the same as for the module.
+// SAFETY: any thread may use modules and their kernels, also several threads at the same time.
 unsafe impl<T: Real> Send for Kernel<T> {}
-// SAFETY: as above.
+// SAFETY: any thread may use modules and their kernels, also several threads at the same time.
 unsafe impl<T: Real> Sync for Kernel<T> {}
 
 impl<T: Real> fmt::Debug for Kernel<T> {
@@ -188,7 +188,7 @@ impl<T: Real> Kernel<T> {
         &self.outputs
     }
 
-    /// Returns the number of threads that share a state when there are few states: [`Function::shares`].
+    /// Returns the number of threads that share a state if there are few states; see [`Function::shares`].
     pub fn shares(&self) -> usize {
         self.shares
     }
@@ -198,21 +198,21 @@ impl<T: Real> Kernel<T> {
         self.registers
     }
 
-    /// Returns the local memory of a thread (bytes), for values that do not fit into registers.
+    /// Returns the size of a thread's local memory (bytes), which holds values that do not fit into registers.
     pub fn local_bytes(&self) -> usize {
         self.local_bytes
     }
 
-    /// Returns the maximum number of states in a call: indices in the largest array have 32 bits.
+    /// Returns the maximum number of states in a call; indices in the largest array have 32 bits.
     pub fn most_states(&self) -> usize {
         let largest = self.inputs.iter().chain(&self.outputs).map(Array::len).max().unwrap_or(1);
         i32::MAX as usize / largest.max(1)
     }
 
-    /// Computes n states on a stream. Returns at once; later work in the stream finds the results.
+    /// Computes n states on a stream. The function returns at once; later work in the stream finds the results.
     ///
-    /// Number k of state i of an array is stored at index `[k * n + i]`; matrices are stored column by column. The call
-    /// writes all numbers of all outputs.
+    /// Number k of state i is stored at index `[k * n + i]` of its array; matrices are stored column by column. The
+    /// call writes all numbers of all outputs.
     ///
     /// # Errors
     /// [`Error::Arrays`], [`Error::Length`], [`Error::States`] and [`Error::OtherDevice`] for wrong arguments;
@@ -249,8 +249,8 @@ impl<T: Real> Kernel<T> {
         )
     }
 
-    /// Returns the number of threads of a block, for n threads in all. It is below the optimum for large n if larger
-    /// blocks would leave multiprocessors idle.
+    /// Returns the number of threads in a block, for n threads in all blocks together. It is smaller than the optimum
+    /// for large n if larger blocks would leave multiprocessors idle.
     fn threads_for(&self, n: usize) -> usize {
         let share = n.div_ceil(self.module.device.0.multiprocessors).next_multiple_of(WARP);
         share.min(self.threads)

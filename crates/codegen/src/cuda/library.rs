@@ -1,4 +1,4 @@
-//! Libraries that are loaded at run time.
+//! Shared libraries that are loaded at run time.
 
 use super::error::Error;
 use core::error::Error as _;
@@ -6,7 +6,7 @@ use libloading::Library;
 use std::ffi::OsString;
 use std::path::Path;
 
-/// Name of a library, and its possible files.
+/// Name of a library, and the files in which it may be.
 pub(super) struct Named {
     pub(super) library: &'static str,
     pub(super) variable: &'static str,
@@ -14,8 +14,8 @@ pub(super) struct Named {
 }
 
 impl Named {
-    /// Loads the library from the given file, else from the file named by the environment variable, else from the
-    /// system's search path.
+    /// Loads the library from the given file. Without a file, loads it from the file named by the environment variable
+    /// or, if that is missing, from the system's search path.
     pub(super) fn load(&self, file: Option<&Path>) -> Result<Library, Error> {
         let given = file.map(|file| file.as_os_str().to_owned()).or_else(|| std::env::var_os(self.variable));
         let files = match given {
@@ -24,7 +24,7 @@ impl Named {
         };
         let mut reasons = Vec::new();
         for file in files {
-            // SAFETY: the library's initialisation code is NVIDIA's, or from a source that the caller trusts.
+            // SAFETY: the library's initialisation code comes from NVIDIA, or from a source that the caller trusts.
             match unsafe { Library::new(&file) } {
                 Ok(library) => return Ok(library),
                 Err(error) => reasons.push(said(&error)),
@@ -38,12 +38,12 @@ impl Named {
     }
 }
 
-/// Returns the system's message.
+/// Returns the message of the system.
 pub(super) fn said(error: &libloading::Error) -> String {
     error.source().map_or_else(|| error.to_string(), ToString::to_string)
 }
 
-/// Defines a struct of a library's functions, and its constructor, which finds them by name.
+/// Defines a struct of a library's functions, with a constructor that finds the functions by name.
 ///
 /// The library stays loaded until the process ends.
 macro_rules! library_functions {
@@ -61,7 +61,7 @@ macro_rules! library_functions {
                 let library = named.load(file)?;
                 let table = Self {
                     $($function: {
-                        // SAFETY: the type is the function's type in NVIDIA's header.
+                        // SAFETY: the type is the type of the function in NVIDIA's header.
                         let found = unsafe { library.get(concat!(stringify!($function), "\0").as_bytes()) };
                         *found.map_err(|error| named.failed($crate::cuda::library::said(&error)))?
                     },)*

@@ -1,4 +1,4 @@
-//! Generated kernels on a GPU: compiled at run time, and called with arrays on the device.
+//! Generated kernels on a GPU. They are compiled at run time, and called with arrays on the device.
 //!
 //! ```no_run
 //! use condyle_codegen::cuda::{Compiler, Device, DeviceArray};
@@ -19,14 +19,14 @@
 //! # Ok::<(), condyle_codegen::cuda::Error>(())
 //! ```
 //!
-//! Building the program needs nothing of CUDA: [`Driver::new`] loads the driver's library, and [`Compiler::new`] loads
-//! NVIDIA's run-time compiler (NVRTC). Both use the system's search path, or the files named by the environment
-//! variables `CONDYLE_CUDA_LIBRARY` and `CONDYLE_NVRTC_LIBRARY`. Without NVRTC, [`Device::load`] takes PTX that
-//! [`Compiler::ptx`] made elsewhere; making PTX needs no GPU.
+//! Building a program that uses this module needs nothing of CUDA. At run time, [`Driver::new`] loads the driver's
+//! library, and [`Compiler::new`] loads NVIDIA's run-time compiler (NVRTC). Both search the system's path, or take the
+//! files named by the environment variables `CONDYLE_CUDA_LIBRARY` and `CONDYLE_NVRTC_LIBRARY`. Without NVRTC,
+//! [`Device::load`] takes PTX that [`Compiler::ptx`] made elsewhere; making PTX needs no GPU.
 //!
-//! All work uses the device's primary context, which other libraries of the process use too. Arrays and streams of
-//! other libraries can be used: [`DeviceArray::from_raw`], [`Stream::from_raw`].
-#![allow(unsafe_code)] // two libraries in C
+//! All work uses the device's primary context, which other libraries in the process also use. [`DeviceArray::from_raw`]
+//! and [`Stream::from_raw`] use arrays and streams of other libraries.
+#![allow(unsafe_code)] // calls functions of two libraries in C
 
 mod array;
 mod compiler;

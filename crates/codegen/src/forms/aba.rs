@@ -2,9 +2,9 @@
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 7.1, line by line. As in RNEA, the classical
 //! acceleration of each origin replaces the spatial acceleration, so no linear velocity is needed. This form is for
-//! code that is recorded for one robot: a joint rotates the quantities of its body about one axis, and constants and
-//! zeros of placements and inertias fold. In the world's frame (`aba.rs` of `dynamics`), every number depends on every
-//! joint before. Generated code is tested against `aba.rs`.
+//! code that is recorded for one robot. A joint rotates the quantities of its body about one axis, so constants and
+//! zeros of placements and inertias fold. In the world's frame (`aba.rs` of `dynamics`), every number depends on all
+//! joints between the body and the world. Generated code is tested against `aba.rs`.
 
 use super::joint_placement::{Carried, JointPlacement};
 use condyle_model::joint::kinematics::JointSinCos;
@@ -12,18 +12,18 @@ use condyle_model::joint::{ClassicalMotion, Joint, JointMotion};
 use condyle_model::layout::Layout;
 use condyle_spatial::{Act, ArticulatedInertia, Force, Inertia, Mat3, Motion, Scalar, Se3, Vec3};
 
-/// Runs the whole algorithm. It allocates its memory, since recorded numbers take memory anyway.
+/// Computes q̈ by the whole algorithm. It allocates its memory, since recorded numbers take memory anyway.
 pub(super) fn pass<L: Layout>(l: &L, q: &[L::S], qd: &[L::S], tau: &[L::S], f_ext: &[Force<L::S>], qdd: &mut [L::S]) {
     let n = l.bodies().end;
     let mut angles = JointSinCos::new(n);
     Joint::sin_cos(l, q, &mut angles);
     let still = JointMotion::General(Motion::zero());
     let identity = Se3::<L::S>::identity();
-    let mut X = vec![(identity, JointPlacement::General(identity)); n]; // X_T, X_J
+    let mut X = vec![(identity, JointPlacement::General(identity)); n]; // X_T and X_J of each body
     let (mut w, mut K) = (vec![Vec3::zero(); n], vec![Mat3::zero(); n]); // ω, ω× ω×
     let (mut c, mut a) = (vec![Motion::zero(); n], vec![Motion::zero(); n]);
     let (mut IA, mut pA) = (vec![ArticulatedInertia::zero(); n], vec![Force::zero(); n]);
-    let mut U = vec![Vec::new(); n]; // U, D⁻¹, u of each column, in reverse order
+    let mut U = vec![Vec::new(); n]; // U, D⁻¹ and u of each column, in reverse order
     for i in l.bodies() {
         let (X_T, X_J) = (l.placement(i), JointPlacement::of(l, i, q, angles.sin[i], angles.cos[i])); // λXi = X_T X_J
         let turn_inv = |x| X_J.turn_inv(X_T.rotation.transpose_mul(x));

@@ -1,26 +1,29 @@
-//! Products with the inverse, and the inverse, from the factor of a tree, with few operations: for recorded numbers.
+//! The inverse of M, and products with it, from the factor of a tree. The forms here have few operations, for recorded
+//! numbers.
 //!
-//! If all entries of b on the path from k to an ancestor are zero, x_k depends on b only through that ancestor:
+//! Let L x = b. If all entries of b on the path from k to an ancestor are zero, x_k depends on b only through that
+//! ancestor:
 //!
 //! ```text
 //! x_k = −Σ L_ke x_e = Σ G_ke x_e     with G_ke = −L_ke − Σ L_kf G_fe
 //! ```
 //!
-//! where e runs over the ancestor and the indices before it, and f over the indices between. Rows of G are as short as
-//! the branches' common path to the root, and serve all b whose non-zero entries are in other branches. Rows of one
-//! branch give sums with the same structure, which compilers can vectorise.
+//! Here e runs over the ancestor and the indices before it, and f runs over the indices between the ancestor and k.
+//! Rows of G are as short as the branches' common path to the root. They serve every b whose non-zero entries are in
+//! other branches. Rows of one branch give sums with the same structure, which compilers can vectorise.
 
 use condyle_linalg::elimination_tree::NONE;
 use condyle_linalg::{Ltdl, check};
 use condyle_spatial::{Dense, DenseMatrix, Scalar};
 use std::collections::BTreeMap;
 
-/// Rows of G, by the index k and the number of indices before k that they cover.
+/// Rows of G. The key of a row is the index k and the number of indices before k that the row covers.
 pub struct Branches<'f, S> {
     factor: &'f Ltdl<S>,
-    /// Indices before each index, on the path from the root.
+    /// Indices before each index, on its path from the root.
     before: Vec<Vec<usize>>,
-    /// Number of these indices before the index's branch; a branch begins after the last index with several children.
+    /// Number of indices before each index that are not in its branch. A branch begins after the last index with
+    /// several children.
     before_branch: Vec<usize>,
     /// −D⁻¹.
     minus_inverse_diagonal: Vec<S>,
@@ -28,7 +31,7 @@ pub struct Branches<'f, S> {
 }
 
 impl<'f, S: Scalar> Branches<'f, S> {
-    /// Creates the rows for a factor.
+    /// Creates the object for a factor. Rows are computed when they are needed.
     pub fn new(factor: &'f Ltdl<S>) -> Self {
         let parents = &factor.tree().parent;
         let (mut before, mut before_branch): (Vec<Vec<usize>>, Vec<usize>) = (Vec::new(), Vec::new());
@@ -49,7 +52,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         Self { factor, before, before_branch, minus_inverse_diagonal, rows: BTreeMap::new() }
     }
 
-    /// Returns G_ke for the first m indices e before k.
+    /// Returns the row G_ke for the first m indices e before k.
     fn row(&mut self, k: usize, m: usize) -> Vec<S> {
         if let Some(row) = self.rows.get(&(k, m)) {
             return row.clone();
@@ -67,7 +70,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
         row
     }
 
-    /// Returns a number + Σ G_ke x_e over the first m indices before k, with x given by index.
+    /// Returns `start` + Σ G_ke x_e over the first m indices e before k. `x` returns an entry by its index.
     fn through(&mut self, k: usize, m: usize, start: S, x: impl Fn(usize) -> S) -> S {
         let G = self.row(k, m);
         (0..m).fold(start, |sum, p| sum + G[p] * x(self.before[k][p]))
@@ -91,8 +94,8 @@ impl<'f, S: Scalar> Branches<'f, S> {
         let (mut x, mut own) = (vec![S::zero(); n], vec![S::zero(); n]);
         for k in 0..n {
             let (way, L) = (&self.before[k][..], factor.row_from_root(k));
-            // L x = −D⁻¹ y: first the contribution of the own branch, then the contribution through the indices before
-            // it
+            // L x = −D⁻¹ y. First add the contribution of k's own branch, then the contribution of the indices before
+            // this branch.
             let m = if is_given[k] {
                 let m = self.before_branch[k];
                 let start = y[k] * self.minus_inverse_diagonal[k];
@@ -108,7 +111,8 @@ impl<'f, S: Scalar> Branches<'f, S> {
         }
     }
 
-    /// Computes X = M⁻¹, as [`Ltdl::inverse`] does: X_kj of two branches is computed through the indices before both.
+    /// Computes X = M⁻¹, as [`Ltdl::inverse`] does. X_kj of two branches is computed through the indices before both
+    /// branches.
     ///
     /// # Panics
     /// If `X` is not nv × nv.
@@ -121,7 +125,7 @@ impl<'f, S: Scalar> Branches<'f, S> {
             for j in 0..k {
                 let ways = self.before[k].iter().zip(self.before[j].iter().chain([&j]));
                 let common = ways.take_while(|(a, b)| a == b).count();
-                // if j is on the path from the root to k: all indices before k
+                // if j is on the path from the root to k, take all indices before k
                 let m =
                     if self.before[k].get(common.wrapping_sub(1)) == Some(&j) { self.before[k].len() } else { common };
                 let x = self.through(k, m, S::zero(), |e| X[at(e, j)]).kept();

@@ -2,8 +2,8 @@
 //!
 //! Source: Featherstone, *Rigid Body Dynamics Algorithms* (2008), table 6.2, line by line. This form is for code that
 //! is recorded for one robot: constants and zeros of placements and inertias fold, and S_eᵀ F is a component of F. In
-//! the world's frame of `crba.rs`, every number depends on every joint before. Generated code is tested against
-//! `crba.rs`.
+//! the world's frame of `crba.rs`, every number depends on all joints between the body and the world. Generated code is
+//! tested against `crba.rs`.
 
 use super::joint_placement::{Carried, JointPlacement};
 use condyle_model::joint::Joint;
@@ -11,7 +11,7 @@ use condyle_model::joint::kinematics::JointSinCos;
 use condyle_model::layout::Columns;
 use condyle_spatial::{Act, Inertia, Se3};
 
-/// Runs the whole algorithm. It allocates its memory, since recorded numbers take memory anyway.
+/// Computes M by the whole algorithm. It allocates its memory, since recorded numbers take memory anyway.
 pub(super) fn pass<L: Columns>(l: &L, q: &[L::S], M: &mut [L::Number]) {
     let n = l.bodies().end;
     let mut angles = JointSinCos::new(n);
@@ -19,7 +19,7 @@ pub(super) fn pass<L: Columns>(l: &L, q: &[L::S], M: &mut [L::Number]) {
     let identity = Se3::<L::S>::identity();
     let numbers: Vec<usize> = (0..n).collect();
     let mut IC = vec![Inertia::zero(); n];
-    let mut X = vec![(identity, JointPlacement::General(identity)); n]; // X_T, X_J
+    let mut X = vec![(identity, JointPlacement::General(identity)); n]; // X_T and X_J of each body
     for i in l.bodies() {
         IC[i] = l.inertia(i);
         X[i] = (l.placement(i), JointPlacement::of(l, i, q, angles.sin[i], angles.cos[i])); // λXi = X_T X_J

@@ -1,10 +1,10 @@
-//! The pose of a joint, and its action on quantities of its body.
+//! The pose of a joint, and its effect on quantities of the joint's body.
 
 use condyle_model::joint::Joint;
 use condyle_model::layout::Layout;
 use condyle_spatial::{Act, ArticulatedInertia, Force, Inertia, Mat3, Motion, Scalar, Se3, Sym3, Vec3};
 
-/// X_J(q), the body's frame in the joint's frame, in the cheapest form.
+/// X_J(q), the pose of the body's frame in the joint's frame, in the form with the fewest operations.
 #[derive(Clone, Copy, Debug)]
 pub enum JointPlacement<S> {
     /// A rotation about z.
@@ -52,18 +52,19 @@ impl<S: Scalar> JointPlacement<S> {
     }
 }
 
-/// Returns R x.
+/// Returns R x, for the rotation R about z with this sine and cosine.
 fn about_z<S: Scalar>(sin: S, cos: S, x: Vec3<S>) -> Vec3<S> {
     Vec3::new(x.x.mul_add(cos, -(x.y * sin)), x.x.mul_add(sin, x.y * cos), x.z)
 }
 
-/// Returns R A Rᵀ, with the upper left part
+/// Returns R A Rᵀ, for the rotation R about z with sine s and cosine c. The upper left block of A, with the rows (a, b)
+/// and (e, d), becomes
 ///
 /// ```text
 /// a' = a − s g,   d' = d + s g,   b' = c g − e,   e' = c g − b     with g = s (a − d) + c (b + e)
 /// ```
 ///
-/// for the rows (a, b) and (e, d): half the products of two products of matrices.
+/// This takes half the multiplications of two products of matrices.
 fn matrix_about_z<S: Scalar>(sin: S, cos: S, A: Mat3<S>) -> Mat3<S> {
     let (a, b, e, d) = (A.x.x, A.y.x, A.x.y, A.y.y);
     let g = (a - d).mul_add(sin, (b + e) * cos);
@@ -75,16 +76,16 @@ fn matrix_about_z<S: Scalar>(sin: S, cos: S, A: Mat3<S>) -> Mat3<S> {
     }
 }
 
-/// Returns R A Rᵀ for a symmetric matrix.
+/// Returns R A Rᵀ for a symmetric matrix A and the rotation R about z.
 fn symmetric_about_z<S: Scalar>(sin: S, cos: S, A: Sym3<S>) -> Sym3<S> {
     let g = (A.xx - A.yy).mul_add(sin, (A.xy + A.xy) * cos);
     let z = about_z(sin, cos, Vec3::new(A.xz, A.yz, A.zz));
     Sym3 { xx: A.xx - g * sin, xy: g.mul_add(cos, -A.xy), yy: g.mul_add(sin, A.yy), xz: z.x, yz: z.y, zz: A.zz }
 }
 
-/// Quantity of a body that a joint transforms to its parent's side, into the joint's frame.
+/// Quantity of a body that a joint transforms into the joint's frame, on the parent's side.
 pub trait Carried<S>: Sized {
-    /// Returns X x.
+    /// Returns the quantity after the transform X.
     fn carried_by(self, X: &JointPlacement<S>) -> Self;
 }
 

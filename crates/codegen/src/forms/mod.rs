@@ -1,9 +1,8 @@
-//! Algorithms in the forms with the fewest operations when recorded for one robot.
+//! Algorithms in the forms that have the fewest operations when they are recorded for one robot.
 //!
-//! Code for one robot has neither loops nor operations with zeros. ABA and CRBA therefore run in the bodies' frames,
-//! where constants fold. Where M is sparse, M and its factor serve accelerations and their derivatives. M⁻¹ is computed
-//! by the branches of the factor. These functions replace the library's functions of the same names, also in user
-//! functions.
+//! Code for one robot has neither loops nor operations with zeros. So ABA and CRBA run in the bodies' frames, where
+//! constants fold. If M is sparse, M and its factor give accelerations and their derivatives. The branches of the
+//! factor give M⁻¹. These functions replace the library's functions of the same names, also in functions of users.
 
 mod aba;
 pub(crate) mod branches;
@@ -48,7 +47,7 @@ pub fn crba<S: Scalar, R: Constant<S>>(model: &Model<R>, q: &[S]) -> DMatrix<S> 
 /// Computes q̈, nv numbers, as [`condyle_dynamics::aba`] does.
 ///
 /// # Panics
-/// As [`condyle_dynamics::aba`] does.
+/// As in [`condyle_dynamics::aba`].
 pub fn aba<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -80,7 +79,7 @@ pub fn aba<S: Scalar, R: Constant<S>>(
 /// Computes M⁻¹, nv × nv, as [`condyle_dynamics::minv`] does.
 ///
 /// # Panics
-/// As [`condyle_dynamics::minv`] does.
+/// As in [`condyle_dynamics::minv`].
 pub fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: &[S]) -> DMatrix<S> {
     match Inverse::of(model, || crba(model, q)) {
         Some(inverse) => inverse.Minv,
@@ -88,12 +87,12 @@ pub fn minv<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, q: 
     }
 }
 
-/// Computes q̈ and its derivatives, as [`condyle_dynamics::aba_derivatives`] does. M and its factor serve the
-/// acceleration too, which takes fewer operations than articulated bodies. They also serve ∂q̈ where the factor has
-/// fewer entries than M⁻¹.
+/// Computes q̈ and its derivatives, as [`condyle_dynamics::aba_derivatives`] does. M and its factor also give the
+/// acceleration, with fewer operations than articulated bodies need. They also give ∂q̈ if the factor has fewer entries
+/// than M⁻¹.
 ///
 /// # Panics
-/// As [`condyle_dynamics::aba_derivatives`] does.
+/// As in [`condyle_dynamics::aba_derivatives`].
 pub fn aba_derivatives<S: Scalar, R: Constant<S>>(
     model: &Model<R>,
     data: &mut Data<S>,
@@ -126,8 +125,8 @@ pub fn aba_derivatives<S: Scalar, R: Constant<S>>(
     ForwardDerivatives { a, da_dq, da_dv, da_dtau: inverse.Minv }
 }
 
-/// Returns the floating bodies without armature on their linear coordinates, with the first coordinate of each. The
-/// derivatives ∂q̈ with respect to its first six positions and its first three velocities are known
+/// Returns (body, first coordinate) of each floating body without armature on its linear coordinates. For such a body,
+/// the derivatives of q̈ with respect to its first six positions and its first three velocities are known
 /// ([`condyle_dynamics::aba_derivatives`]).
 fn floating<S: Scalar, R: Constant<S>>(model: &Model<R>) -> Vec<(usize, usize)> {
     let is_free =
@@ -152,14 +151,14 @@ fn zeros<S: Scalar, R>(model: &Model<R>) -> DMatrix<S> {
     DMatrix::from_element(model.nv(), model.nv(), S::zero())
 }
 
-/// M⁻¹, and the factor of M, unless M⁻¹ was computed without it.
+/// M⁻¹, and the factor of M if it was computed.
 struct Inverse<S> {
     factor: Option<Ltdl<S>>,
     Minv: DMatrix<S>,
 }
 
 impl<S: Scalar> Inverse<S> {
-    /// Computes the inverse of M; `None` if M⁻¹ of this model is computed without M.
+    /// Computes the inverse of M. Returns `None` if the library computes M⁻¹ of this model without M.
     fn of<R>(model: &Model<R>, M: impl FnOnce() -> DMatrix<S>) -> Option<Self> {
         model.check_regular();
         let (mut factor, mut Minv) = (Ltdl::new(model), zeros(model));
@@ -182,14 +181,14 @@ impl<S: Scalar> Inverse<S> {
             None => {
                 let row =
                     |row: DVectorView<'_, S>| row.iter().zip(&*b).fold(S::zero(), |sum, (&m, &b)| m.mul_add(b, sum));
-                let x: Vec<S> = self.Minv.column_iter().map(row).collect(); // symmetric: a row is a column
+                let x: Vec<S> = self.Minv.column_iter().map(row).collect(); // M⁻¹ is symmetric: rows equal columns
                 b.copy_from_slice(&x);
             }
         }
     }
 
-    /// Computes −M⁻¹ B, except for known columns, which stay zero. It uses the factor if the products and sums with its
-    /// entries, twice their number, are fewer than nv².
+    /// Computes −M⁻¹ B, except for known columns, which stay zero. It uses the factor if this takes fewer products and
+    /// sums than M⁻¹: twice the number of the factor's entries, compared with nv².
     fn minus_products<R>(&self, model: &Model<R>, B: [(&Matrix<S>, Vec<usize>); 2]) -> [DMatrix<S>; 2] {
         let n = model.nv();
         let mut all = B.map(|(B, known)| {

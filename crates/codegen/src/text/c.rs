@@ -1,24 +1,24 @@
-//! Code in C99.
+//! Writes code in C99.
 
 use super::{Dialect, SourceFile, Writer, description, digits, heading, prefixed};
 use crate::function::Array;
 use crate::program::Program;
 use core::fmt::Write;
 
-/// Sines and cosines, without branches except for angles out of range. They use the library's sums and products
-/// (`condyle_spatial::Scalar::sin_cos`), which compilers vectorise.
+/// Code of sines and cosines, without branches except for angles out of range. It has the same sums and products as the
+/// library (`condyle_spatial::Scalar::sin_cos`), and compilers vectorise it.
 const SIN_COS: &str = include_str!("sin_cos.c");
 
-/// Types and functions of vectors: GCC's extensions, which clang has too.
+/// Code of vector types and functions. It uses GCC's extensions, which clang also has.
 const VECTORS: &str = include_str!("vectors.c");
 
-/// Dialect C, with `double` or `float`.
+/// Syntax of C, with `double` or `float`.
 pub(crate) struct C {
     /// Type of numbers.
     pub real: &'static str,
     /// Number of states that a call computes, in vectors.
     pub lanes: usize,
-    /// Name of all files, and prefix of the functions.
+    /// Name of all files, which is also the prefix of the functions.
     pub name: String,
 }
 
@@ -31,7 +31,7 @@ impl C {
         self.real == "float"
     }
 
-    /// Returns the name of a function of `math.h` for the type of numbers.
+    /// Returns the name that a function of `math.h` has for this type of numbers.
     fn function(&self, name: &str) -> String {
         format!("{name}{}", if self.is_float() { "f" } else { "" })
     }
@@ -111,7 +111,7 @@ impl Dialect for C {
     }
 }
 
-/// Returns the parameters of a function: inputs, the work space, outputs.
+/// Returns the parameters of a function: inputs, then the work space, then outputs.
 fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> String {
     let reads = reads.iter().map(|a| format!("const {real} *restrict {}", a.name));
     let work = work.then(|| format!("{real} *restrict w"));
@@ -127,7 +127,7 @@ pub(crate) fn signature(real: &str, name: &str, program: &Program) -> String {
     format!("void {name}_{}({})", program.function.name, parameters(real, &reads, false, &writes))
 }
 
-/// Returns the header and the source of functions that compute `lanes` states.
+/// Returns the header and the source of functions that compute `lanes` states in a call.
 pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, lanes: usize) -> Vec<SourceFile> {
     let guard = format!("{}_H", name.to_uppercase());
     let mut lines = heading(name, programs);
@@ -166,7 +166,7 @@ pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, lanes:
     vec![SourceFile { name: format!("{name}.h"), text: header }, SourceFile { name: format!("{name}.c"), text: source }]
 }
 
-/// Returns the code of sines and cosines for a file.
+/// Returns the code of sines and cosines, with the names that a file uses.
 fn sin_cos(name: &str, real: &str) -> String {
     let section = |from: &str| {
         let (_, rest) = SIN_COS.split_once(&format!("/* {from} */\n")).unwrap_or_default();
@@ -175,7 +175,7 @@ fn sin_cos(name: &str, real: &str) -> String {
     section(real).replace("NAME", name)
 }
 
-/// Returns the code of vectors for a file.
+/// Returns the code of vectors, with the names that a file uses.
 fn vectors(name: &str, real: &str, lanes: usize) -> String {
     let is_float = real == "float";
     let (size, suffix) = if is_float { (4, "f") } else { (8, "") };
@@ -196,13 +196,13 @@ fn vectors(name: &str, real: &str, lanes: usize) -> String {
     text
 }
 
-/// Returns a comment of some lines.
+/// Returns a comment that contains these lines.
 pub(crate) fn comment(lines: &[String]) -> String {
     let body = prefixed(" * ", lines);
     format!("/*\n{body} */\n")
 }
 
-/// Returns the code of a function with its parts.
+/// Returns the code of a function and of its parts.
 fn function(writer: &Writer<C>, name: &str) -> String {
     let program = writer.program;
     let (real, function) = (writer.dialect.real, &program.function.name);

@@ -1,4 +1,4 @@
-//! C code for CasADi's `external`.
+//! Writes C code for CasADi's `external`.
 
 use super::c::comment;
 use super::{SourceFile, description, heading};
@@ -6,10 +6,10 @@ use crate::function::{Array, Function};
 use crate::program::Program;
 use core::fmt::Write;
 
-/// Types and macros of the interface, as in CasADi's own generated code.
+/// Types and macros of CasADi's interface, as in CasADi's own generated code.
 const HEAD: &str = include_str!("casadi.c");
 
-/// Returns the file that implements CasADi's interface for each function.
+/// Returns the file that implements CasADi's interface for each of the functions.
 pub(crate) fn file(name: &str, programs: &[Program]) -> SourceFile {
     let mut lines = heading(name, programs);
     lines.extend([
@@ -35,12 +35,12 @@ pub(crate) fn file(name: &str, programs: &[Program]) -> SourceFile {
     SourceFile { name: format!("{name}_casadi.c"), text }
 }
 
-/// Array that CasADi requests.
+/// Result that CasADi requests.
 enum Output {
     /// A result of the called function.
     Result(Array),
-    /// The derivative of a result y with respect to the restitution e of an impact. y is affine in e, and its value at
-    /// e = -1, where nothing happens, is known: v_after is v there, and impulses are 0. So dy/de = (y - y(-1)) / (1 +
+    /// The derivative of a result y with respect to the restitution e of an impact. y is affine in e. Its value at e =
+    /// -1 is known, because nothing happens there: `v_after` is v, and impulses are 0. So dy/de = (y - y(-1)) / (1 +
     /// e).
     ByRestitution(Array),
 }
@@ -55,15 +55,15 @@ impl Output {
     }
 }
 
-/// Returns the name of a result in its derivatives: `v_after` is the new value of `v`, and uses its name.
+/// Returns the name that a result has in its derivatives: `v_after` is the new value of `v`, and is named `v` there.
 fn differentiated(y: &Array) -> &str {
     y.name.strip_suffix("_after").unwrap_or(&y.name)
 }
 
-/// Returns the function that computes a function's derivatives, if it exists and differentiates with respect to the
-/// numbers of each argument (not for positions with quaternions). Results are `dy_dx` of `f_derivatives` for each
-/// output y (or `y_after`) and input x of `f`, in CasADi's names and order. Derivatives with respect to the restitution
-/// of an impact need no result.
+/// Returns the function that computes the derivatives of a function, if it exists. It must differentiate with respect
+/// to the numbers of each argument, so positions with quaternions are excluded. The results are `dy_dx` of
+/// `f_derivatives` for each output y (or `y_after`) and each input x of `f`, in CasADi's names and order. Derivatives
+/// with respect to the restitution of an impact need no result.
 fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Function, Vec<(String, Output)>)> {
     let name = format!("{}_derivatives", function.name);
     let derivatives = programs.iter().map(|program| program.function).find(|f| f.name == name)?;
@@ -81,8 +81,8 @@ fn jacobian<'f>(function: &Function, programs: &[Program<'f>]) -> Option<(&'f Fu
     (derivatives.inputs == function.inputs).then_some((derivatives, blocks))
 }
 
-/// Returns CasADi's interface of one function with these names of arrays. It calls a function that takes the first
-/// inputs.
+/// Returns CasADi's interface of one function, whose arrays have these names. The interface calls a generated function,
+/// which takes only the first of these inputs.
 fn interface(
     name: &str,
     inputs: &[(String, Array)],
@@ -129,7 +129,7 @@ fn interface(
         let names: Vec<String> = arrays.iter().map(|(name, _)| format!("\"{name}\"")).collect();
         let shapes: Vec<String> = arrays.iter().map(|(_, (rows, cols))| format!("{{{rows}, {cols}, 1}}")).collect();
         let n = arrays.len();
-        // an array of size 0 is invalid in C, so it has one additional entry
+        // An array of size 0 is invalid in C, so it gets an additional entry.
         let _ = write!(
             text,
             "EXPORT const char *{name}_name_{which}(casadi_int i) {{\n    \

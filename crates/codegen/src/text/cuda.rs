@@ -1,4 +1,5 @@
-//! CUDA code: a thread for each state or for each of its shares; the same number of all states is contiguous in memory.
+//! Writes CUDA code. A thread computes a state or one of the state's shares. In memory, the first numbers of all states
+//! come first.
 
 use super::{Dialect, SourceFile, Writer, description, heading, interface, prefixed};
 use crate::function::{Array, Function};
@@ -7,7 +8,7 @@ use crate::shares::split;
 use crate::text::c::C;
 use core::fmt::Write;
 
-/// Dialect C with arrays of all states.
+/// Syntax of C, for arrays that contain all states.
 struct Cuda(C);
 
 impl Dialect for Cuda {
@@ -44,7 +45,7 @@ impl Dialect for Cuda {
     }
 }
 
-/// Returns the parameters after the number of states.
+/// Returns the parameters of a function that follow the number of states.
 fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> String {
     let reads = reads.iter().map(|a| format!(", const {real} *__restrict__ {}", a.name));
     let work = work.then(|| format!(", {real} *__restrict__ w"));
@@ -52,7 +53,7 @@ fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> St
     reads.chain(work).chain(writes).collect()
 }
 
-/// Returns the file of kernels.
+/// Returns the file that contains the kernels.
 pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, registers: usize) -> Vec<SourceFile> {
     let shares: Vec<Vec<Function>> = programs.iter().map(|program| split(program, registers)).collect();
     let mut lines = heading(name, programs);
@@ -77,7 +78,7 @@ pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, regist
     vec![SourceFile { name: format!("{name}.cu"), text }]
 }
 
-/// Returns a kernel with its parts, or with functions of its shares.
+/// Returns a kernel and its parts, or a kernel and the functions of its shares.
 fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
     let (real, function) = (whole.dialect.0.real, whole.program.function);
     let (inputs, outputs): (Vec<&Array>, Vec<&Array>) =
@@ -103,7 +104,7 @@ fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
             let call = device_function(&mut text, whole, &format!("{symbol}_whole"));
             body.push(format!("if (gridDim.y == 1) return {call}"));
         }
-        // shares without their own row of blocks are computed by the existing rows
+        // The existing rows of blocks also compute the shares that have no row of their own.
         let count = shares.len();
         body.push(format!("for (int share = blockIdx.y; share < {count}; share += gridDim.y) switch (share) {{"));
         for (k, share) in shares.iter().enumerate() {
@@ -123,8 +124,8 @@ fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
     text
 }
 
-/// Returns the parts of a program as functions, and the lines that call them; with one part, lines that compute
-/// everything.
+/// Returns the parts of a program as functions, and the lines that call them. A program with one part has no functions,
+/// and lines that compute everything.
 fn computation(writer: &Writer<Cuda>, name: &str) -> (String, Vec<String>) {
     let program = writer.program;
     let (real, function) = (writer.dialect.0.real, program.function);

@@ -1,4 +1,4 @@
-//! Programs as text: code common to all languages.
+//! Writes programs as text. This module contains what all languages have in common.
 
 mod c;
 mod casadi;
@@ -12,7 +12,7 @@ use crate::shares::split;
 use crate::step::{Angle, Entries, Step, Term};
 use core::fmt::Write;
 
-/// File of code.
+/// File of generated code.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SourceFile {
     /// File name, without a folder.
@@ -25,37 +25,37 @@ pub struct SourceFile {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Language {
-    /// C99 with `double`: a header and a source, which need only `math.h`.
+    /// C99 with `double`: a header and a source. They need only `math.h`.
     #[default]
     C,
     /// C99 with `float`.
     CFloat,
-    /// C99 with vectors of GCC and clang: four states in a call, with `double`.
+    /// C99 with vectors of GCC and clang. A call computes four states, with `double`.
     CFour,
-    /// C99 with vectors: eight states in a call, with `double`.
+    /// C99 with vectors. A call computes eight states, with `double`.
     CEight,
-    /// C99 with vectors: four states in a call, with `float`.
+    /// C99 with vectors. A call computes four states, with `float`.
     CFloatFour,
-    /// C99 with vectors: eight states in a call, with `float`.
+    /// C99 with vectors. A call computes eight states, with `float`.
     CFloatEight,
     /// C99 as [`C`](Self::C), with a third file in which each function has the interface of CasADi's `external`:
-    /// `robot_aba_casadi` for `robot_aba`. It includes the Jacobian if `robot_aba_derivatives` is generated too and the
-    /// robot has no quaternions and points on circles. For impacts, this Jacobian also has the columns of the
-    /// restitution, which their derivatives lack.
+    /// `robot_aba_casadi` for `robot_aba`. The interface has the Jacobian if `robot_aba_derivatives` is also generated,
+    /// and if the robot has neither quaternions nor points on circles. For impacts, the Jacobian also has the columns
+    /// of the restitution, which the functions of derivatives lack.
     CCasadi,
     /// A module of Rust with `f64`, without `std`.
     Rust,
     /// A module of Rust with `f32`, without `std`.
     RustFloat,
-    /// CUDA with `double`: a thread for each state, or for each of its shares ([`Function::shares`]); the same number
-    /// of all states is contiguous.
+    /// CUDA with `double`. A thread computes a state, or one of the state's shares ([`Function::shares`]). In memory,
+    /// the first numbers of all states come first.
     Cuda,
     /// CUDA with `float`.
     CudaFloat,
 }
 
 impl Language {
-    /// Names of the languages, for [`named`](Self::named).
+    /// Names of the languages, as [`named`](Self::named) takes them.
     pub const NAMES: [&str; 11] = [
         "c",
         "c-float",
@@ -88,7 +88,7 @@ impl Language {
         Self::NAMES.iter().position(|&known| known == name).map(|k| all[k])
     }
 
-    /// Returns the number of registers that a number takes in a GPU's thread.
+    /// Returns the number of registers of a GPU's thread that a number takes; `None` for other languages than CUDA.
     pub(crate) fn registers_of_number(self) -> Option<usize> {
         match self {
             Self::Cuda => Some(2),
@@ -97,7 +97,7 @@ impl Language {
         }
     }
 
-    /// Returns the files of code of some functions. The same functions give the same text.
+    /// Returns the files with the code of these functions. The same functions give the same text.
     ///
     /// ```
     /// use condyle_codegen::{Language, record};
@@ -136,8 +136,8 @@ impl Language {
         }
     }
 
-    /// Returns the name of the files, which is the prefix of functions in C and CUDA: the robot's name, then `_float`
-    /// and `_x4` or `_x8`. Files of several languages can therefore be in one folder, and their functions in one
+    /// Returns the name of the files: the robot's name, then `_float`, then `_x4` or `_x8`. In C and CUDA it is also
+    /// the prefix of the functions. So files of several languages can be in one folder, and their functions in one
     /// program.
     ///
     /// ```
@@ -159,12 +159,13 @@ impl Language {
 }
 
 impl Function {
-    /// Returns the number of threads that can share a state in the function's kernel: 1 for other languages than CUDA.
+    /// Returns the number of threads that can share a state in the function's kernel. It is 1 for other languages than
+    /// CUDA.
     ///
-    /// Functions of a robot are split by limbs if one thread would need more values than it has registers. In addition,
+    /// A robot's function is split by limbs if one thread would need more values than it has registers. In addition,
     /// the largest share must shrink by a larger factor than the factor by which the sum of all shares grows.
-    /// [`Settings::shares`](crate::Settings::shares) can set the number. A kernel launched with this number of rows of
-    /// blocks (`blockIdx.y`) computes one share in each row; with one row, each thread computes a whole state.
+    /// [`Settings::shares`](crate::Settings::shares) can set the number. If a kernel is launched with this number of
+    /// rows of blocks (`blockIdx.y`), each row computes one share. With one row, each thread computes a whole state.
     ///
     /// ```
     /// use condyle_codegen::{Language, Settings, functions};
@@ -180,35 +181,35 @@ impl Function {
     }
 }
 
-/// Syntax of a language.
+/// Syntax of a language. Each function returns code.
 pub(crate) trait Dialect {
     /// Returns a constant.
     fn number(&self, x: f64) -> String;
-    /// Returns a number of an array.
+    /// Returns an element of an array.
     fn element(&self, array: &str, index: &str) -> String {
         format!("{array}[{index}]")
     }
-    /// Returns a number of the work space.
+    /// Returns an element of the work space.
     fn work(&self, slot: &str) -> String {
         format!("w[{slot}]")
     }
-    /// Returns a loop of one line over k = 0, 1, …, n − 1, with this name for k.
+    /// Returns a loop over k = 0, 1, …, n − 1, whose body is one line that uses this name for k.
     fn repeat(&self, k: &str, n: usize, line: &str) -> String {
         format!("for (int {k} = 0; {k} < {n}; {k}++) {line}")
     }
-    /// Returns a value for each state of a vector, if it is a constant that no operation extends to a vector.
+    /// Returns a vector of equal numbers from a constant, if no operation of the language extends constants to vectors.
     fn whole(&self, value: String) -> String {
         value
     }
-    /// Returns a line across which compilers do not move memory accesses.
+    /// Returns a line across which compilers do not move memory accesses; `None` if the language has none.
     fn fence(&self) -> Option<&'static str> {
         None
     }
-    /// Returns the definition of a new variable, a mask or a number.
+    /// Returns the definition of a new variable for a mask or a number.
     fn variable(&self, name: &str, expression: &str, is_mask: bool) -> String;
     /// Returns the definition of variables for the sine and the cosine of an angle.
     fn sin_cos(&self, sin: &str, cos: &str, angle: &str) -> String;
-    /// Returns a b + c, with signs of the product and of c.
+    /// Returns the code of ± a b ± c with these signs.
     fn mul_add(&self, minus_product: bool, a: &str, b: &str, minus: bool, c: &str) -> String {
         match (minus_product, minus) {
             (false, false) => format!("{a} * {b} + {c}"),
@@ -218,28 +219,29 @@ pub(crate) trait Dialect {
     }
     /// Returns a selection by a mask.
     fn select(&self, mask: &str, a: &str, b: &str) -> String;
-    /// Returns a call of a function of one number: sqrt, abs.
+    /// Returns a call of a function of one number, `sqrt` or `abs`.
     fn call(&self, function: &str, a: &str) -> String;
-    /// Returns the angle of a point.
+    /// Returns the angle of the point (x, y).
     fn atan2(&self, y: &str, x: &str) -> String;
-    /// Returns a mask as a number of the work space.
+    /// Returns a mask converted to a number of the work space.
     fn mask_to_work(&self, mask: &str) -> String;
-    /// Returns a mask from a number of the work space.
+    /// Returns a mask converted from a number of the work space.
     fn mask_from_work(&self, number: &str) -> String;
-    /// Returns 0 or 1 as a mask.
+    /// Returns a constant mask: true or false.
     fn truth(&self, holds: bool) -> &'static str;
 }
 
-/// Number of steps between two fences. LLVM's scheduler moves loads far ahead of their uses, which spills registers.
-/// With fences, vectors of Talos's derivatives take 0.72 of the time; the gain is the same for 20 to 200 steps.
+/// Number of steps between two fences. Without fences, LLVM's scheduler moves loads far ahead of their uses, which
+/// spills registers. With fences, vectors of Talos's derivatives take 0.72 of the time; the gain is the same for 20 to
+/// 200 steps.
 const FENCED: usize = 50;
 
-/// Writer of a program's parts.
+/// Writer of the code of a program's parts.
 pub(crate) struct Writer<'p, D> {
     pub program: &'p Program<'p>,
     pub dialect: D,
     inputs: Vec<(usize, usize)>,
-    /// Indices of the results equal to each value.
+    /// Indices of the results that are equal to each value.
     goes_to: Vec<Vec<usize>>,
     outputs: &'p [(usize, usize)],
 }
@@ -252,7 +254,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         Self { program, dialect, inputs: places(&function.inputs), goes_to, outputs: &function.places }
     }
 
-    /// Returns the expression of a value in part p.
+    /// Returns the code by which part p refers to a value.
     fn value(&self, p: usize, id: Id, is_mask: bool) -> String {
         match self.program.steps.nodes[id as usize] {
             Node::Constant(bits) if is_mask => self.dialect.truth(f64::from_bits(bits) != 0.0).to_owned(),
@@ -271,13 +273,13 @@ impl<'p, D: Dialect> Writer<'p, D> {
         }
     }
 
-    /// Returns the expression that computes a value in part p.
+    /// Returns the code by which part p computes a value.
     fn expression(&self, p: usize, node: Node) -> String {
         let d = &self.dialect;
         let number = |id| self.value(p, id, false);
         let mask = |id| self.value(p, id, true);
         match node {
-            Node::Constant(_) | Node::Input(_) | Node::Sin(_) | Node::Cos(_) => String::new(), // these have no step
+            Node::Constant(_) | Node::Input(_) | Node::Sin(_) | Node::Cos(_) => String::new(), // no step computes these
             Node::Add(a, b) => format!("{} + {}", number(a), number(b)),
             Node::Sub(a, b) => format!("{} - {}", number(a), number(b)),
             Node::Mul(a, b) => format!("{} * {}", number(a), number(b)),
@@ -293,7 +295,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         }
     }
 
-    /// Returns the lines of part p.
+    /// Returns the lines of code of part p.
     pub(crate) fn lines(&self, p: usize) -> Vec<String> {
         let mut lines = Vec::new();
         for (k, step) in self.program.steps.all[self.program.parts[p].clone()].iter().enumerate() {
@@ -321,7 +323,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
                     continue;
                 }
             };
-            // a value that is only a result needs no variable
+            // A value that is only a result needs no variable.
             let used_later = self.program.places[id as usize] != Place::Local || self.is_taken(id);
             if let ([only], false) = (&self.goes_to[id as usize][..], used_later) {
                 lines.push(format!("{} = {text};", self.output(*only)));
@@ -333,12 +335,12 @@ impl<'p, D: Dialect> Writer<'p, D> {
         lines
     }
 
-    /// Returns whether a step uses a value.
+    /// Returns whether any step uses a value.
     fn is_taken(&self, id: Id) -> bool {
         self.program.taken[id as usize]
     }
 
-    /// Adds the lines that write a value to the work space and to results.
+    /// Adds the lines that copy a value to the work space and to results.
     fn hand_on(&self, lines: &mut Vec<String>, id: Id, is_mask: bool) {
         if let Place::Work(slot) = self.program.places[id as usize] {
             let name = format!("t{id}");
@@ -350,13 +352,13 @@ impl<'p, D: Dialect> Writer<'p, D> {
         }
     }
 
-    /// Returns the expression of a number among all outputs.
+    /// Returns the code of number k among all outputs.
     fn output(&self, k: usize) -> String {
         let (array, index) = self.outputs[k];
         self.dialect.element(&self.program.function.outputs[array].name, &index.to_string())
     }
 
-    /// Returns the loop that computes some entries, and the lines that write them to other results too.
+    /// Returns the loop that computes several entries, and the lines that copy these entries to other results.
     fn entries(&self, p: usize, entries: &Entries) -> Vec<String> {
         let k = self.counter();
         let n = entries.ids.len();
@@ -391,7 +393,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         lines
     }
 
-    /// Returns a name that no array has.
+    /// Returns a variable name that no array has.
     fn counter(&self) -> String {
         let arrays = || self.program.function.inputs.iter().chain(&self.program.function.outputs);
         let mut name = "k".to_owned();
@@ -401,7 +403,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         name
     }
 
-    /// Returns the lines that write results which no part computes: constants, inputs, sines and cosines of inputs.
+    /// Returns the lines that write results which no part computes: constants, inputs, and sines and cosines of inputs.
     pub(crate) fn given_results(&self) -> Vec<String> {
         let part_of = &self.program.part_of;
         let given =
@@ -410,7 +412,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         given.map(|(k, &id)| format!("{} = {};", self.output(k), value(id))).collect()
     }
 
-    /// Returns the arrays that a function does not use: inputs without effect, and results without numbers.
+    /// Returns the names of arrays that a function does not use: inputs without effect, and results without numbers.
     pub(crate) fn unused_arrays(&self) -> Vec<&'p str> {
         let inputs = &self.program.function.inputs;
         let mut unused = vec![true; inputs.len()];
@@ -424,7 +426,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
         unread.chain(empty).map(|array| &*array.name).collect()
     }
 
-    /// Returns an early angle as one expression.
+    /// Returns the code of an early angle as one expression.
     pub(crate) fn angle(&self, id: Id) -> String {
         let inside = |id| self.angle(id);
         match self.program.steps.nodes[id as usize] {
@@ -458,7 +460,7 @@ impl<'p, D: Dialect> Writer<'p, D> {
     }
 }
 
-/// Returns the description of a function, line by line: arguments, results and costs.
+/// Returns the description of a function as lines: arguments, results and costs.
 pub(crate) fn description(program: &Program) -> Vec<String> {
     let mut lines = interface(program.function);
     lines.push(format!("Operations: {}.", program.steps.operations()));
@@ -468,7 +470,7 @@ pub(crate) fn description(program: &Program) -> Vec<String> {
     lines
 }
 
-/// Returns the description of a function's arguments and results, line by line.
+/// Returns the description of a function's arguments and results, as lines.
 pub(crate) fn interface(function: &Function) -> Vec<String> {
     let mut lines = vec![function.about.clone(), String::new()];
     for array in function.inputs.iter().chain(&function.outputs) {
@@ -482,7 +484,7 @@ pub(crate) fn interface(function: &Function) -> Vec<String> {
     lines
 }
 
-/// Returns the heading of every file.
+/// Returns the heading that every file has.
 pub(crate) fn heading(name: &str, programs: &[Program]) -> Vec<String> {
     let functions: Vec<&str> = programs.iter().map(|p| &*p.function.name).collect();
     vec![
@@ -497,7 +499,7 @@ pub(crate) fn heading(name: &str, programs: &[Program]) -> Vec<String> {
     ]
 }
 
-/// Returns lines with a prefix, without spaces at their ends.
+/// Returns the lines, each after a prefix and without spaces at its end.
 pub(crate) fn prefixed(prefix: &str, lines: &[String]) -> String {
     let mut text = String::new();
     for line in lines {
@@ -506,7 +508,7 @@ pub(crate) fn prefixed(prefix: &str, lines: &[String]) -> String {
     text
 }
 
-/// Returns the digits of a number, which give the same number when read.
+/// Returns the digits of a number; reading them gives the same number.
 pub(crate) fn digits(x: f64) -> String {
     format!("{x:?}")
 }

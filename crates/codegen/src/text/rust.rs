@@ -1,4 +1,4 @@
-//! Rust code without `std`.
+//! Writes Rust code that does not need `std`.
 
 use super::{Dialect, SourceFile, Writer, description, digits, heading, prefixed};
 use crate::function::Array;
@@ -7,10 +7,10 @@ use crate::program::Program;
 use crate::step::Step;
 use core::fmt::Write;
 
-/// Functions that `core` lacks, for the type of numbers.
+/// Code of functions that `core` lacks, for each type of numbers.
 const MATHEMATICS: &str = include_str!("mathematics.rs.txt");
 
-/// Dialect Rust, with `f64` or `f32`.
+/// Syntax of Rust, with `f64` or `f32`.
 struct Rust {
     real: &'static str,
 }
@@ -61,7 +61,7 @@ impl Dialect for Rust {
     }
 }
 
-/// Returns the parameters of a function: inputs, the work space, outputs.
+/// Returns the parameters of a function: inputs, then the work space, then outputs.
 fn parameters(real: &str, reads: &[&Array], work: Option<usize>, writes: &[&Array]) -> String {
     let reads = reads.iter().map(|a| format!("{}: &[{real}; {}]", a.name, a.len()));
     let work = work.map(|n| format!("w: &mut [{real}; {n}]"));
@@ -69,7 +69,7 @@ fn parameters(real: &str, reads: &[&Array], work: Option<usize>, writes: &[&Arra
     reads.chain(work).chain(writes).collect::<Vec<_>>().join(", ")
 }
 
-/// Returns the module.
+/// Returns the file that contains the module.
 pub(crate) fn files(name: &str, programs: &[Program], real: &'static str) -> Vec<SourceFile> {
     let mut text = prefixed("// ", &heading(name, programs));
     let uses = |wanted: fn(&Step) -> bool| programs.iter().any(|p| p.steps.all.iter().any(wanted));
@@ -96,11 +96,11 @@ fn section(of: &str) -> String {
     format!("\n{}", rest.split("// end\n").next().unwrap_or_default())
 }
 
-/// Lints silenced in generated code. A module may use only some of its functions, and may be private.
+/// Attribute that silences lints in generated code. A module may use only some of its functions, and may be private.
 const ALLOWED: &str = "#[allow(clippy::all, clippy::pedantic, clippy::nursery, dead_code, non_snake_case, \
                        unreachable_pub, unused_parens)]\n";
 
-/// Returns the code of a function with its parts.
+/// Returns the code of a function and of its parts.
 fn function(writer: &Writer<Rust>) -> String {
     let program = writer.program;
     let (real, function) = (writer.dialect.real, program.function);

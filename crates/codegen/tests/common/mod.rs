@@ -1,4 +1,4 @@
-//! Generated code, compiled by a compiler of the system and run.
+//! Compiles generated code with a compiler of the system, and runs it.
 #![allow(dead_code)]
 
 use condyle_codegen::{Function, Language};
@@ -14,7 +14,7 @@ pub(crate) fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Returns whether the compiler exists; if not, prints a note.
+/// Returns whether the compiler exists; if not, prints that the test is skipped.
 pub(crate) fn is_there(compiler: &str) -> bool {
     let found = Command::new(compiler).arg("--version").stdout(Stdio::null()).stderr(Stdio::null()).status().is_ok();
     if !found {
@@ -30,7 +30,7 @@ pub(crate) fn compile(command: &mut Command) {
     assert!(output.status.success() && said.is_empty(), "{command:?}\n{said}");
 }
 
-/// Returns a C program that reads the arguments of each function and writes its results.
+/// Returns a C program that reads the arguments of each function and prints the function's results.
 fn main_in_c(name: &str, functions: &[Function], real: &str, lanes: usize) -> String {
     let mut text = format!("#include \"{name}.h\"\n#include <stdio.h>\nint main(void) {{\n");
     for function in functions {
@@ -52,7 +52,7 @@ fn main_in_c(name: &str, functions: &[Function], real: &str, lanes: usize) -> St
     text + "    return 0;\n}\n"
 }
 
-/// Returns the same program in Rust.
+/// Returns a Rust program that reads the arguments of each function and prints the function's results.
 fn main_in_rust(functions: &[Function], real: &str) -> String {
     let mut text = "#![allow(non_snake_case)]\nuse std::io::{Read, Write};\nfn main() {\n    let (mut from, mut to) = (std::io::stdin(), std::io::stdout());\n".to_owned();
     for function in functions {
@@ -77,7 +77,7 @@ fn main_in_rust(functions: &[Function], real: &str) -> String {
     text + "}\n"
 }
 
-/// Compiled program that computes some functions, for one state or for several states in vectors.
+/// Compiled program that computes several functions, for one state or for several states in vectors.
 pub(crate) struct Program {
     path: PathBuf,
     functions: Vec<Function>,
@@ -86,7 +86,7 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// Compiles C code with `cc`, without warnings.
+    /// Compiles C code with `cc`. A warning is an error.
     pub(crate) fn c(folder: &Path, functions: &[Function], language: Language, flags: &[&str]) -> Self {
         let (is_float, lanes) = match language {
             Language::C => (false, 1),
@@ -112,8 +112,8 @@ impl Program {
         Self { path: folder.join("main"), functions: functions.to_vec(), is_float, lanes }
     }
 
-    /// Compiles Rust with `rustc` as a library without `std`, without warnings. Also checks it as an unused private
-    /// module, with lints that are off by default.
+    /// Compiles Rust code with `rustc` as a library without `std`. A warning is an error. Also checks the code as an
+    /// unused private module, with lints that are off by default.
     pub(crate) fn rust(folder: &Path, functions: &[Function], is_float: bool) -> Self {
         let (language, real) = if is_float { (Language::RustFloat, "f32") } else { (Language::Rust, "f64") };
         for file in language.text("robot", functions) {
@@ -137,7 +137,7 @@ impl Program {
         Self { path: folder.join("main"), functions: functions.to_vec(), is_float, lanes: 1 }
     }
 
-    /// Returns the results of all functions for their arguments.
+    /// Returns the results of all functions for these arguments.
     pub(crate) fn run(&self, inputs: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
         let mut child = Command::new(&self.path)
             .stdin(Stdio::piped())
@@ -169,7 +169,8 @@ impl Program {
     }
 }
 
-/// Panics if results differ by more than a bound, relative to the largest number of each array and at least 1.
+/// Panics if results differ by more than a bound. The bound is relative to the largest number of each array, or to 1 if
+/// all are smaller.
 pub(crate) fn assert_equal(what: &str, function: &Function, found: &[Vec<f64>], expected: &[Vec<f64>], bound: f64) {
     for ((array, found), expected) in function.outputs.iter().zip(found).zip(expected) {
         assert_eq!(

@@ -1,13 +1,14 @@
 //! Clarabel as a back end: the reference solver.
 //!
 //! Clarabel requires A x + s = b with s in a product of cones, in sparse matrices with a fixed pattern. For each shape
-//! of a program (sizes, and which bounds are finite or equal), a solver is built once and kept: a contact set that
-//! returns only needs an update of numbers. The pattern holds all entries that have been non-zero so far. When another
-//! entry becomes non-zero, as when a robot leaves a symmetric posture, the solver is built again. Clarabel allocates
-//! once in each solve; a new shape or pattern allocates more.
+//! of a program (its sizes, and which bounds are finite or equal), a solver is built once and kept. If a set of
+//! contacts returns, only numbers must be updated. The pattern holds all entries that have been non-zero so far. When
+//! another entry becomes non-zero, for example when a robot leaves a symmetric posture, the solver is built again.
+//! Clarabel allocates once in each solve; a new shape or pattern allocates more.
 //!
-//! In most ticks a robot is far from most of its limits. A row of G is left out until a solution comes close to it; if
-//! the solution violates the row, the program is solved again with the row. The solution therefore satisfies all rows.
+//! In most ticks a robot is far from most of its limits. A row of G is left out until a solution comes close to one of
+//! the row's bounds. If a solution violates a row that was left out, the program is solved again with this row. So the
+//! final solution satisfies all rows.
 
 use super::{ConeProgram, Multipliers, Outcome, Settings, Size, Solver, Start, Status};
 use ::clarabel::algebra::CscMatrix;
@@ -15,19 +16,22 @@ use ::clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus,
 use condyle_linalg::dot;
 use std::time::Instant;
 
-/// Regularisation added to diagonals before a factor is refined; clarabel's own 1e-8 requires refinement in each solve.
+/// Regularisation added to diagonals before a factor is refined. Clarabel's own value, 1e-8, requires refinement in
+/// each solve.
 const REGULARISATION: f64 = 1e-11;
 
-/// Maximum number of stored shapes; the one not used for the longest time is removed.
+/// Maximum number of stored shapes. If it is exceeded, the shape that was not used for the longest time is removed.
 const KEPT: usize = 16;
 
-/// Distance to a bound below which a row is close, relative to the width between its bounds (or to its only bound).
+/// Distance to a bound below which a row counts as close, relative to the width between the row's bounds (or to its
+/// only bound).
 const CLOSE: f64 = 0.1;
 
-/// Consecutive solutions that must be away from a row of G before it is left out again; its return builds a solver.
+/// Number of consecutive solutions that must be away from a row of G before the row is left out again. It is large
+/// because a solver must be built when the row returns.
 const PATIENCE: u32 = 1000;
 
-/// Number of solves with all rows after a solve with some rows left out has failed.
+/// Number of solves with all rows that follow a failed solve in which rows were left out.
 const RETRIES: u32 = 10;
 
 /// A row of clarabel's A x + s = b.
@@ -64,7 +68,7 @@ impl Row {
         }
     }
 
-    /// Returns whether solutions were close to the row recently. Equalities, fixed rows and cones always matter.
+    /// Returns whether recent solutions were close to the row. Equalities, fixed rows and cones always matter.
     fn matters(self, away: &[u32]) -> bool {
         match self {
             Row::Lower(i) | Row::Upper(i) => away[i] < PATIENCE,
@@ -72,7 +76,7 @@ impl Row {
         }
     }
 
-    /// Returns the number of non-zero coefficients.
+    /// Returns the number of non-zero coefficients of the row.
     fn count(self, program: &ConeProgram) -> usize {
         let (matrix, i) = match self {
             Row::Equality(i) => (&program.At, i),
@@ -87,7 +91,7 @@ fn nonzeros(x: &[f64]) -> usize {
     x.iter().map(|&x| usize::from(x != 0.0)).sum()
 }
 
-/// Lists clarabel's rows of a program: zero cone, orthant, second-order cones.
+/// Lists the rows of a program in clarabel's order: zero cone, orthant, second-order cones.
 fn list_rows(program: &ConeProgram, rows: &mut Vec<Row>) {
     let Size { equalities, rows: m, cone_rows, .. } = program.size;
     let (lower, upper) = (&program.lower[..m], &program.upper[..m]);
@@ -109,7 +113,7 @@ fn list_rows(program: &ConeProgram, rows: &mut Vec<Row>) {
 struct Shape {
     size: Size,
     cones: Vec<usize>,
-    /// All rows.
+    /// All rows of the program.
     all: Vec<Row>,
     /// Number of consecutive solutions away from each row of G.
     away: Vec<u32>,
@@ -124,7 +128,8 @@ struct Shape {
 }
 
 impl Shape {
-    /// Builds a solver for the rows that matter, with the program's non-zero entries and some additional entries.
+    /// Builds a solver for the rows that matter. The pattern holds the program's non-zero entries and the additional
+    /// entries `more`.
     fn new(
         program: &ConeProgram,
         all: Vec<Row>,
@@ -160,7 +165,7 @@ impl Shape {
             tol_feas: tolerance,
             tol_gap_abs: tolerance,
             tol_gap_rel: tolerance,
-            // Refinement as accurate as the tolerance: clarabel's own 1e-13 costs a sixth of the time.
+            // Refine as accurately as the tolerance requires: clarabel's own 1e-13 costs a sixth of the time.
             iterative_refinement_reltol: tolerance,
             iterative_refinement_abstol: tolerance,
             static_regularization_constant: REGULARISATION,
@@ -177,7 +182,7 @@ impl Shape {
         Self { size, cones, all, away, rows, entries, values, linear, right_side, solver }
     }
 
-    /// Notes which rows of G a solution is close to; returns whether it violates a row that the solver lacks.
+    /// Notes to which rows of G a solution is close. Returns whether the solution violates a row that the solver lacks.
     fn compare(&mut self, program: &ConeProgram, x: &[f64]) -> bool {
         let mut violated = false;
         for (i, away) in self.away.iter_mut().enumerate() {
@@ -190,12 +195,12 @@ impl Shape {
         violated
     }
 
-    /// Returns whether the solver has the rows that matter.
+    /// Returns whether the solver has all rows that matter now.
     fn is_complete(&self) -> bool {
         self.all.iter().filter(|row| row.matters(&self.away)).eq(&self.rows)
     }
 
-    /// Returns whether the pattern contains all non-zero entries of a program; if it does, replaces the numbers.
+    /// Returns whether the pattern contains all non-zero entries of a program. If it does, replaces the numbers.
     fn update(&mut self, program: &ConeProgram) -> bool {
         for (k, &(i, j)) in self.entries[0].iter().enumerate() {
             self.values[0][k] = program.P[(j, i)];
@@ -231,7 +236,7 @@ fn gather(program: &ConeProgram, rows: &[Row], entries: &[Vec<(usize, usize)>; 2
     ]
 }
 
-/// Sets the limits of a solver; allocates if they change.
+/// Sets the limits of a solver; allocates if the limits change.
 fn limit(solver: &mut DefaultSolver<f64>, max_iter: u32, time_limit: f64) {
     let given = solver.settings();
     if (given.max_iter, given.time_limit) != (max_iter, time_limit) {
@@ -240,11 +245,11 @@ fn limit(solver: &mut DefaultSolver<f64>, max_iter: u32, time_limit: f64) {
     }
 }
 
-/// The interior point method of clarabel.
+/// Clarabel's interior-point method.
 pub(crate) struct Clarabel {
     settings: Settings,
     capacity: Size,
-    /// Shapes, in the order of their last use: the most recent one is last.
+    /// Shapes in the order of their last use; the most recently used shape is last.
     shapes: Vec<Shape>,
     rows: Vec<Row>,
     x: Vec<f64>,
@@ -271,7 +276,7 @@ impl Clarabel {
         }
     }
 
-    /// Moves the solver of the program's shape to the end of the list, and gives it the program's numbers.
+    /// Moves the shape that fits the program to the end of the list, and gives its solver the program's numbers.
     fn prepare(&mut self, program: &ConeProgram) {
         list_rows(program, &mut self.rows);
         let found = self
@@ -296,7 +301,7 @@ impl Clarabel {
         self.shapes.push(Shape::new(program, self.rows.clone(), away, more, &self.settings));
     }
 
-    /// Solves with the rows that solutions were close to, within the iterations and time left by earlier rounds.
+    /// Solves with the rows to which solutions were close, within the iterations and the time that earlier rounds left.
     fn solve_with_rows(&mut self, program: &ConeProgram, iterations: u32, started: Instant) -> Outcome {
         self.prepare(program);
         let Settings { max_iterations, time_limit, .. } = self.settings;
@@ -359,7 +364,7 @@ impl Solver for Clarabel {
             }
             if failed || round > 0 {
                 let soon = PATIENCE - if failed { RETRIES } else { 1 };
-                shape.away.iter_mut().for_each(|away| *away = (*away).min(soon)); // so all rows matter now
+                shape.away.iter_mut().for_each(|away| *away = (*away).min(soon)); // all rows matter now
             }
         }
         unreachable!("in the third round no row is left out")

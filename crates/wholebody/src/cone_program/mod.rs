@@ -1,4 +1,4 @@
-//! A dense convex program with second-order cones and fixed memory, independent of robots.
+//! A dense convex program with second-order cones, in memory of fixed size. Nothing here refers to robots.
 //!
 //! ```text
 //! minimise     ½ xᵀ P x + cᵀ x
@@ -7,8 +7,8 @@
 //!              hₖ + Fₖ x ∈ Qₖ          second-order cones: ‖(s₂, s₃, …)‖ ≤ s₁
 //! ```
 //!
-//! Multipliers multiply the constraints' gradients: P x + c = Aᵀ y + Gᵀ z + Fᵀ w. Here z is positive at a lower bound
-//! and negative at an upper bound, and wₖ ∈ Qₖ.
+//! Multipliers are factors of the constraints' gradients: P x + c = Aᵀ y + Gᵀ z + Fᵀ w. Here z is positive at a lower
+//! bound and negative at an upper bound, and wₖ ∈ Qₖ.
 
 #[cfg(feature = "clarabel")]
 mod clarabel;
@@ -25,9 +25,9 @@ pub(crate) use program::{ConeProgram, Size};
 /// Conditions under which a solver stops.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Settings {
-    /// Maximum residuals and duality gap, relative to the terms that they are differences of.
+    /// Maximum of the residuals and of the duality gap, each relative to the terms of which it is the difference.
     pub tolerance: f64,
-    /// Maximum number of iterations, cold and warm start together.
+    /// Maximum number of iterations of the cold and the warm start together.
     pub max_iterations: u32,
     /// Maximum time (s); may be infinite.
     pub time_limit: f64,
@@ -39,16 +39,16 @@ impl Default for Settings {
     }
 }
 
-/// Start of a solver.
+/// Point from which a solver starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Start {
     /// From the data alone.
     Cold,
-    /// From the last solution, if it has this size and the solver supports it.
+    /// From the last solution, if that solution has the program's size and the solver supports it.
     Warm,
 }
 
-/// Cause of a missing minimiser.
+/// Reason why a solve has no minimiser.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum Status {
     /// The constraints contradict each other.
@@ -57,21 +57,21 @@ pub(crate) enum Status {
     /// The objective is unbounded below on the feasible set.
     #[error("the objective is unbounded below")]
     Unbounded,
-    /// [`Settings::max_iterations`] were not enough.
+    /// The solver needs more than [`Settings::max_iterations`] iterations.
     #[error("not solved within the allowed iterations")]
     IterationLimit,
-    /// [`Settings::time_limit`] was not enough.
+    /// The solver needs more time than [`Settings::time_limit`].
     #[error("not solved within the allowed time")]
     TimeLimit,
     /// The steps became too short, or a factorisation failed.
     #[error("the solver stopped for numerical reasons")]
     NumericalError,
-    /// A number of the program is NaN, or infinite where it may not be. Nothing was solved.
+    /// A number of the program is NaN, or is infinite where it must be finite. Nothing was solved.
     #[error("`{name}[{index}]` is not finite")]
     NotFinite {
         /// The field of [`ConeProgram`].
         name: &'static str,
-        /// Index in that field, column by column.
+        /// Index of the invalid number in that field, counted column by column.
         index: usize,
     },
 }
@@ -79,17 +79,17 @@ pub(crate) enum Status {
 /// Result of a solve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Outcome {
-    /// Number of iterations, all attempts together.
+    /// Number of iterations of all attempts together.
     pub iterations: u32,
-    /// Whether the solution was reached from the last solution.
+    /// Whether the solver reached the solution from the last solution.
     pub warm: bool,
-    /// Whether only reduced tolerances are met.
+    /// Whether the solution meets only the reduced tolerances.
     pub reduced: bool,
-    /// Cause, if x is not the minimiser. x is then the last iterate and finite, or zero if nothing was solved.
+    /// Reason, if x is not the minimiser. x is then the last iterate and finite, or zero if nothing was solved.
     pub stopped: Option<Status>,
 }
 
-/// Multipliers of the last solve, with the signs of the [module](self).
+/// Multipliers of the last solve. Their signs are described in the [module](self).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Multipliers<'s> {
     /// y, of A x = b.
@@ -100,15 +100,16 @@ pub(crate) struct Multipliers<'s> {
     pub cones: &'s [f64],
 }
 
-/// A solver of programs with sizes up to a capacity.
+/// A solver of programs up to a maximum size, its capacity.
 pub(crate) trait Solver {
-    /// Sets the start of the next warm solve, for a program of this size. A solver that always starts cold ignores it.
+    /// Sets the start of the next warm solve, for a program of this size. A solver that always starts cold does
+    /// nothing.
     fn start_from(&mut self, _x: &[f64], _multipliers: Multipliers<'_>) {}
 
     /// Minimises the program's objective.
     ///
     /// # Panics
-    /// If the program's capacity is not the solver's.
+    /// If the program's capacity differs from the solver's capacity.
     fn solve(&mut self, program: &ConeProgram, start: Start) -> Outcome;
 
     /// Returns x of the last solve: `size.unknowns` numbers.

@@ -1,9 +1,9 @@
-//! Numbers of a program.
+//! A program and its sizes.
 
 use super::Status;
 use nalgebra::DMatrix;
 
-/// Numbers of unknowns and constraints, in use or at most.
+/// Sizes of a program: numbers of unknowns and constraints, either in use or at most.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Size {
     /// Length of x.
@@ -12,15 +12,15 @@ pub(crate) struct Size {
     pub equalities: usize,
     /// Number of rows of G.
     pub rows: usize,
-    /// Number of rows of F, all cones together.
+    /// Number of rows of F, for all cones together.
     pub cone_rows: usize,
 }
 
-/// Numbers of a program. Matrices and vectors have the dimensions of the capacity; a solver reads the leading parts
-/// with the size in use.
+/// Numbers of a program. Matrices and vectors have the dimensions of the capacity. A solver reads only their first rows
+/// and columns, up to the size in use.
 #[derive(Clone, Debug)]
 pub(crate) struct ConeProgram {
-    /// Size in use, at most the capacity in each number.
+    /// Size in use; each number is at most the number of the capacity.
     pub size: Size,
     /// P: n × n, positive semidefinite; only the lower triangle is read.
     pub P: DMatrix<f64>,
@@ -40,13 +40,14 @@ pub(crate) struct ConeProgram {
     pub Ft: DMatrix<f64>,
     /// h.
     pub h: Vec<f64>,
-    /// Dimension of each cone in use, at least 2 (or 1, which is s₁ ≥ 0); their sum is `size.cone_rows`.
+    /// Dimension of each cone in use, at least 2, or 1 for the constraint s₁ ≥ 0. The sum of all dimensions is
+    /// `size.cone_rows`.
     pub cones: Vec<usize>,
 }
 
 impl ConeProgram {
-    /// Creates a program of zeros and infinite bounds with the size of its capacity, but without cones; later it may
-    /// have up to `cone_rows` rows of cones.
+    /// Creates a program of zeros and infinite bounds whose size is the capacity, but without cones. Cones with up to
+    /// `cone_rows` rows may be added later.
     pub(crate) fn new(capacity: Size) -> Self {
         let Size { unknowns, equalities, rows, cone_rows } = capacity;
         Self {
@@ -64,12 +65,12 @@ impl ConeProgram {
         }
     }
 
-    /// Returns the maximum size.
+    /// Returns the maximum size of the program.
     pub(crate) fn capacity(&self) -> Size {
         Size { unknowns: self.c.len(), equalities: self.b.len(), rows: self.lower.len(), cone_rows: self.h.len() }
     }
 
-    /// Returns the coefficients of an equality: a number for each unknown of the capacity.
+    /// Returns the coefficients of an equality for writing: one number for each unknown of the capacity.
     pub(crate) fn equality_mut(&mut self, i: usize) -> &mut [f64] {
         let most = self.c.len();
         &mut self.At.as_mut_slice()[i * most..][..most]
@@ -93,7 +94,7 @@ impl ConeProgram {
         }
     }
 
-    /// Returns the coefficients of a row: a number for each unknown of the capacity.
+    /// Returns the coefficients of a row: one number for each unknown of the capacity.
     pub(crate) fn row(&self, i: usize) -> &[f64] {
         &self.Gt.as_slice()[i * self.c.len()..][..self.c.len()]
     }
@@ -110,13 +111,13 @@ impl ConeProgram {
         &mut self.Ft.as_mut_slice()[i * most..][..most]
     }
 
-    /// Checks that all numbers read by a solver are finite (bounds may be infinite), and that the size in use fits.
+    /// Checks that all numbers that a solver reads are finite (bounds may be infinite), and that the size in use fits.
     ///
     /// # Errors
-    /// [`Status::NotFinite`].
+    /// [`Status::NotFinite`] names the first number that is not finite.
     ///
     /// # Panics
-    /// If the size in use exceeds the capacity, or the cones do not have `size.cone_rows` rows.
+    /// If the size in use exceeds the capacity, or if the dimensions of the cones do not add up to `size.cone_rows`.
     pub(crate) fn check(&self) -> Result<(), Status> {
         let (Size { unknowns: n, equalities, rows, cone_rows }, most) = (self.size, self.capacity());
         assert!(n <= most.unknowns && equalities <= most.equalities, "size: more than the capacity");
@@ -157,9 +158,9 @@ impl ConeProgram {
     }
 }
 
-/// Checks that the numbers of a column are finite, from index `from` on; `first` is the column's offset in the matrix.
+/// Checks that the numbers of a column are finite, from index `from` on. `first` is the column's offset in the matrix.
 fn finite(name: &'static str, column: &[f64], from: usize, first: usize) -> Result<(), Status> {
-    // 0 · x is 0 for each finite x, and NaN for all others; summed in eight independent sums.
+    // 0 · x is 0 for each finite x, and NaN for all others. Eight independent sums add these products.
     let (eights, rest) = column[from..].as_chunks::<8>();
     let mut sums = [0.0; 8];
     for x in eights {

@@ -1,5 +1,5 @@
-//! A standing quadruped and a humanoid, and checks that share no formula with the controller.
-#![allow(dead_code, non_snake_case, unreachable_pub)] // each test file uses its part
+//! A standing quadruped and a humanoid, and checks that use no formula of the controller.
+#![allow(dead_code, non_snake_case, unreachable_pub)] // each test file uses only some of the functions
 
 use condyle_dynamics::{Act, Data, Force, Model, Se3, Vec3, forward_kinematics, integrate, rnea};
 use condyle_wholebody::{
@@ -10,10 +10,10 @@ use rand::{RngExt, SeedableRng, rngs::StdRng};
 
 pub const FEET: [&str; 4] = ["LF_foot", "LH_foot", "RF_foot", "RH_foot"];
 
-/// Tolerance of equalities (N, m/s²): forces are about 100 N, and the solver's relative tolerance is 1e-9.
+/// Tolerance of equalities (N, m/s²). Forces are about 100 N, and the solver's relative tolerance is 1e-9.
 pub const EQUALITY: f64 = 1e-6;
 
-/// Returns a quadruped's position with knees inwards and feet on the ground.
+/// Returns a position of the quadruped with knees inwards and feet on the ground.
 pub fn stance() -> Vec<f64> {
     let mut q = vec![0.0, 0.0, 0.7 * 0.7f64.cos(), 0.0, 0.0, 0.0, 1.0];
     q.extend([0.0, 0.7, -1.4, 0.0, -0.7, 1.4, 0.0, 0.7, -1.4, 0.0, -0.7, 1.4]);
@@ -32,7 +32,7 @@ pub fn controller(model: &Model, contacts: &[FrictionContact]) -> WholeBodyContr
     WholeBodyController::new(model, contacts, &tasks(), Settings::default()).unwrap()
 }
 
-/// Returns a humanoid's position with bent knees and level soles under the hips.
+/// Returns a position of the humanoid with bent knees, and level soles under the hips.
 pub fn squat(model: &Model) -> Vec<f64> {
     let mut q = condyle_dynamics::neutral(model);
     for side in ["left", "right"] {
@@ -45,7 +45,7 @@ pub fn squat(model: &Model) -> Vec<f64> {
     q
 }
 
-/// Returns soles of 20 by 10 cm.
+/// Returns contacts of the humanoid's two soles, of 20 by 10 cm.
 pub fn soles(friction: f64) -> Vec<FrictionContact> {
     ["left_sole", "right_sole"].map(|sole| FrictionContact::sole(sole, friction, [0.2, 0.1])).to_vec()
 }
@@ -54,12 +54,12 @@ pub fn humanoid_tasks() -> Vec<Task> {
     vec![Task::com(), Task::orientation("pelvis"), Task::angular_momentum(), Task::posture()]
 }
 
-/// Returns a position near the stance, and a velocity.
+/// Returns a random position near the quadruped's stance, and a random velocity.
 pub fn state(model: &Model, seed: u64, distance: f64, speed: f64) -> (Vec<f64>, Vec<f64>) {
     near(model, &stance(), seed, distance, speed)
 }
 
-/// Returns a position near another one, and a velocity.
+/// Returns a random position near `centre`, and a random velocity.
 pub fn near(model: &Model, centre: &[f64], seed: u64, distance: f64, speed: f64) -> (Vec<f64>, Vec<f64>) {
     let mut rng = StdRng::seed_from_u64(seed);
     let mut draw = |scale: f64| (0..model.nv()).map(|_| scale * (2.0 * rng.random::<f64>() - 1.0)).collect::<Vec<_>>();
@@ -69,7 +69,7 @@ pub fn near(model: &Model, centre: &[f64], seed: u64, distance: f64, speed: f64)
     (q, v)
 }
 
-/// Returns the accelerations of each contact and of the centre of mass: ẍ along q(t) = q ⊕ (t v + ½ t² a).
+/// Returns the accelerations of each contact and of the centre of mass: ẍ along the path q(t) = q ⊕ (t v + ½ t² a).
 pub fn accelerations(
     model: &Model,
     contacts: &[FrictionContact],
@@ -94,7 +94,7 @@ pub fn accelerations(
     (feet, com)
 }
 
-/// Computes M q̈ + h − Jᵀ f by one pass of inverse dynamics with the contact forces.
+/// Computes M q̈ + h − Jᵀ f by one pass of inverse dynamics with the contact forces as external forces.
 pub fn inverse_dynamics(
     model: &Model,
     contacts: &[FrictionContact],
@@ -109,13 +109,13 @@ pub fn inverse_dynamics(
         let frame = model.frame(&contact.frame).unwrap();
         let body = model.frames()[frame].body;
         let point = placements.frame(frame).translation;
-        let about_origin = Force::new(f.linear, f.angular + point.cross(f.linear)); // the world's origin
+        let about_origin = Force::new(f.linear, f.angular + point.cross(f.linear)); // about the world's origin
         f_ext[body] += placements.body(body).act_inv(about_origin);
     }
     rnea(model, &mut data, q, v, &command.a, &f_ext).to_vec()
 }
 
-/// Returns μ f_n − ‖f_t‖ of a contact on level ground.
+/// Returns the margin of friction μ f_n − ‖f_t‖ of a contact on level ground.
 pub fn margin(contact: &FrictionContact, f: Force<f64>) -> f64 {
     contact.friction * f.linear.z - f.linear.x.hypot(f.linear.y)
 }
@@ -128,8 +128,8 @@ pub fn max_abs(x: impl IntoIterator<Item = f64>) -> f64 {
     x.into_iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// Checks dynamics, held contacts, momentum, cones and centre of pressure to [`EQUALITY`]. This holds for every command
-/// if contacts are held without gains.
+/// Checks dynamics, held contacts, momentum, cones and centre of pressure to [`EQUALITY`]. Every command passes if
+/// contacts are held without gains.
 pub fn check(
     model: &Model,
     contacts: &[FrictionContact],
@@ -148,7 +148,7 @@ pub fn check(
     check_forces(model, contacts, q, v, references, command);
 }
 
-/// Checks the same, except the acceleration of contacts.
+/// Checks a command as [`check`] does, except the acceleration of contacts.
 pub fn check_forces(
     model: &Model,
     contacts: &[FrictionContact],
@@ -194,7 +194,7 @@ pub fn check_forces(
                 let moment = (f.angular - middle.cross(f.linear)).dot(n);
                 assert!(moment.abs() < yaw * f_n + EQUALITY, "{}: it turns, {moment:.1e} N m", contact.frame);
             }
-            // each edge of the polygon: the moment about the edge cannot tip the sole over it
+            // For each edge of the polygon, the moment about the edge must not tip the sole over the edge.
             let count = corners.len();
             for k in 0..count {
                 let (a, b) = (R * corners[k], R * corners[(k + 1) % count]);

@@ -1,16 +1,16 @@
-//! Optimality conditions of a step.
-#![allow(dead_code, unreachable_pub)] // each test file uses its part
+//! Optimality conditions at a step.
+#![allow(dead_code, unreachable_pub)] // each test file uses only some of the functions
 
 use condyle_wholebody::{Optimality, References, WholeBodyController};
 
-/// Tolerance of the optimality conditions, as described at [`Optimality`].
+/// Tolerance of the first three errors in [`Optimality`]; its documentation explains the number.
 pub const OPTIMALITY: f64 = 1e-7;
 const GAP: f64 = 1e-6;
 
-/// Checks the result of a controller's last step, for its program's first priority.
+/// Checks that a controller's last step found the optimum of the first priority's program.
 ///
 /// # Panics
-/// If it is not the optimum; the message contains `place`.
+/// If the step did not find the optimum; the message contains `place`.
 pub fn check_optimality(
     controller: &mut WholeBodyController,
     q: &[f64],

@@ -1,9 +1,10 @@
-//! Recorded ticks of robots that stand, walk and trot while they are pushed, for timing and comparing back ends.
+//! Recorded ticks of robots that stand, walk and trot while they are pushed. The back ends are timed and compared on
+//! them.
 //!
-//! The loop is closed with Condyle's own constrained dynamics. Feet that touch according to the references are held on
-//! the ground, even if the ground would have to pull. The controller sees velocities with noise, and does not know the
+//! Condyle's own constrained dynamics close the loop. Feet that touch according to the references are held on the
+//! ground, even if the ground would have to pull. The controller receives velocities with noise, and does not know the
 //! pushes. The same arguments give the same recording on processors with the same vector instructions.
-#![allow(dead_code, unreachable_pub)] // each program uses its part
+#![allow(dead_code, unreachable_pub)] // each program uses only some of the functions
 
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, Force, Joint, Model, ReferenceFrame, UrdfOptions, Vec3,
@@ -19,25 +20,25 @@ const DT: f64 = 1e-3;
 const FRICTION: f64 = 0.6;
 /// Length and width of a sole (m).
 const SOLE: [f64; 2] = [0.2, 0.1];
-/// Maximum noise of velocities (m/s, rad/s).
+/// Maximum noise of the velocities that the controller receives (m/s, rad/s).
 const NOISE: f64 = 5e-3;
 /// Rate at which the velocity of a held foot decays (1/s).
 const HOLD: f64 = 50.0;
-/// Interval between the beginnings of pushes, and their duration (s).
+/// Interval from the beginning of one push to the next, and duration of a push (s).
 const PUSHES: [f64; 2] = [0.5, 0.1];
 
-/// Durations of a biped's step (s): the weight moves to one foot; the other foot is unloaded, swings and is loaded.
+/// Durations (s) in a biped's step. The weight moves to one foot; the other foot is unloaded, swings and is loaded.
 const SHIFT: f64 = 1.2;
 const FADE: f64 = 0.1;
 const SWING: f64 = 0.5;
 /// Length and height of a biped's step (m).
 const STEP: [f64; 2] = [0.1, 0.05];
-/// Durations (s), height (m) and speed (m/s) of a trot; half a period is two fades and a swing.
+/// Durations (s), height (m) and speed (m/s) of a trot. Half a period consists of two fades and a swing.
 const TROT_FADE: f64 = 0.03;
 const TROT_SWING: f64 = 0.2;
 const TROT_HEIGHT: f64 = 0.05;
 const TROT_SPEED: f64 = 0.25;
-/// Additional reach of a foot per unwanted speed of the trunk (s): about √(h / g), with h of half a metre.
+/// Additional reach of a foot, divided by the unwanted speed of the trunk (s): about √(h / g), with h half a metre.
 const CAPTURE: f64 = 0.2;
 
 /// A robot standing on its feet.
@@ -48,16 +49,16 @@ pub struct Robot {
     pub q: Vec<f64>,
     pub contacts: Vec<FrictionContact>,
     pub tasks: Vec<Task>,
-    /// Force of a push, relative to the weight.
+    /// Force of a push, divided by the robot's weight.
     push: f64,
 }
 
-/// Constants of a robot, by name.
+/// Constants of a robot. Joints and frames are given by name.
 struct Description {
     name: &'static str,
     trunk: &'static str,
     feet: &'static [&'static str],
-    /// Joints whose names contain the text, and their angles.
+    /// Texts and angles: a joint whose name contains the text has this angle.
     bent: &'static [(&'static str, f64)],
 }
 
@@ -100,7 +101,7 @@ const ROBOTS: [Description; 4] = [
 ];
 
 impl Robot {
-    /// Loads an embedded robot, or a known one from its URDF.
+    /// Loads an embedded robot, or one of the robots listed above from its URDF.
     pub fn new(name: &str, urdf: Option<&str>) -> Result<Self, Box<dyn std::error::Error>> {
         let known = ROBOTS.iter().find(|robot| robot.name == name).ok_or_else(|| format!("no robot `{name}`"))?;
         let options = UrdfOptions { root_joint: Some(Joint::FreeFlyer), ..UrdfOptions::default() };
@@ -138,10 +139,10 @@ impl Robot {
         Ok(robot)
     }
 
-    /// Returns the settings of the recording.
+    /// Returns the settings of the recorded controller.
     pub fn settings() -> Settings {
         let contact_gains = Gains { stiffness: 0.0, damping: 40.0 };
-        // makes the distribution of the load among the feet exceed rounding errors
+        // With this weight, the distribution of the load among the feet exceeds rounding errors.
         Settings { contact_gains, force_weight: 1e-5, ..Settings::default() }
     }
 
@@ -153,7 +154,7 @@ impl Robot {
         self.contacts.len() == 2
     }
 
-    /// Returns the name of its gait.
+    /// Returns the name of the robot's gait.
     pub fn gait(&self) -> &'static str {
         if self.is_biped() { "walk" } else { "trot" }
     }
@@ -167,7 +168,7 @@ pub struct Tick {
     pub references: References,
 }
 
-/// Rises smoothly from 0 at s = 0 to 1 at s = 1: returns value, slope and curvature.
+/// Rises smoothly from 0 at s = 0 to 1 at s = 1. Returns value, slope and curvature at s.
 fn smooth(s: f64) -> [f64; 3] {
     let s = s.clamp(0.0, 1.0);
     let rest = s * (1.0 - s);
@@ -210,7 +211,7 @@ impl World<'_> {
 struct Gait<'r> {
     robot: &'r Robot,
     start: References,
-    /// Position at which each foot is held, or from which it swings.
+    /// Position at which each foot is held, or from which the foot swings.
     feet: Vec<Vec3<f64>>,
     /// Position of the centre of mass at the beginning of a step.
     from: Vec3<f64>,
@@ -221,7 +222,7 @@ impl Gait<'_> {
     /// Index of the first foot among the frames of the references.
     const FEET: usize = 1;
 
-    /// Writes the references at a time, for a robot with this position and velocity of the centre of mass.
+    /// Writes the references at a time t, for this position and velocity of the centre of mass.
     fn write(&mut self, t: f64, com: [Vec3<f64>; 2], references: &mut References) {
         if self.robot.is_biped() { self.walk(t, references) } else { self.trot(t, com, references) }
     }
@@ -239,7 +240,7 @@ impl Gait<'_> {
         frame.acceleration.linear.z += height * 2.0 * (PI / duration).powi(2) * (cos * cos - sin * sin);
     }
 
-    /// Writes quasi-static steps: the left foot carries first.
+    /// Writes quasi-static steps; the left foot carries the weight first.
     fn walk(&mut self, t: f64, references: &mut References) {
         let duration = SHIFT + FADE + SWING + FADE;
         let step = (t / duration) as usize;
@@ -263,7 +264,7 @@ impl Gait<'_> {
         references.contacts[swings].activation = activation(t - SHIFT, FADE, SWING);
     }
 
-    /// Writes steps of diagonal pairs of feet, alternately.
+    /// Writes steps of diagonal pairs of feet, one pair after the other.
     fn trot(&mut self, t: f64, [com, velocity]: [Vec3<f64>; 2], references: &mut References) {
         let duration = 2.0 * TROT_FADE + TROT_SWING;
         let step = (t / duration) as usize;
@@ -290,7 +291,8 @@ impl Gait<'_> {
     }
 }
 
-/// Returns 1, falling to 0 within `fade`, 0 during the swing, and rising to 1 within `fade`.
+/// Returns the activation of a contact: 1, then falling to 0 within `fade`, 0 during the swing, and rising to 1 within
+/// `fade`.
 fn activation(t: f64, fade: f64, swing: f64) -> f64 {
     let (down, up) = (1.0 - t / fade, (t - fade - swing) / fade);
     down.max(up).clamp(0.0, 1.0)
@@ -340,7 +342,7 @@ pub fn record(robot: &Robot, moves: bool, ticks: usize) -> Vec<Tick> {
         } else if tick % each == each / 2 + lasts {
             push = Vec3::zero();
         }
-        f_ext[1].linear = push; // along the trunk's axes, which hardly rotate
+        f_ext[1].linear = push; // along the axes of the trunk, which hardly rotates
         let v: Vec<f64> = world.v.iter().map(|v| v + NOISE * (2.0 * rng.random::<f64>() - 1.0)).collect();
         let command = controller.step(&world.q, &v, &references);
         let (tau, height) = (command.tau.clone(), world.q[2] / robot.q[2]);

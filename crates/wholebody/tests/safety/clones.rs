@@ -1,11 +1,11 @@
-//! Clones continue as the original does.
+//! Clones of a controller continue as the original does.
 
 use crate::common::*;
 use condyle_dynamics::robots;
 use condyle_wholebody::{Backend, Command, Form, Settings, Task, WholeBodyController};
 
-/// Steps near the stance: contacts appear and disappear, a state and references are invalid, and tasks have two
-/// priorities.
+/// Makes step k near the stance. In the course of the steps, contacts appear and disappear, and some states and
+/// references are invalid. Tasks have two priorities.
 fn tick(controller: &mut WholeBodyController, k: u64) -> Command {
     let model = robots::quadruped();
     let (q, v) = state(&model, k / 4, 0.05, 0.2);
@@ -24,7 +24,7 @@ fn described(settings: Settings) -> WholeBodyController {
     WholeBodyController::new(&robots::quadruped(), &feet(0.7), &tasks, settings).unwrap()
 }
 
-/// With our solver, clones continue with the same bits from any tick, with and without warm starts.
+/// With Condyle's own solver, clones continue with the same bits from any tick, with and without warm starts.
 #[test]
 fn a_clone_has_the_same_bits() {
     for (warm_start, form) in [(true, Form::Condensed), (false, Form::Condensed), (true, Form::Full)] {
@@ -41,17 +41,17 @@ fn a_clone_has_the_same_bits() {
             }
             tick(&mut controller, k);
         }
-        // earlier clones have not changed the controller: one that was never cloned gives the same command
+        // Earlier clones have not changed the controller: one that was never cloned gives the same command.
         let mut alone = described(Settings { warm_start, form, ..Settings::default() });
         let last = (0..24).map(|k| tick(&mut alone, k)).last().unwrap();
         assert_eq!(format!("{last:?}"), format!("{:?}", controller.command()));
     }
 }
 
-/// With clarabel, whose solvers are built again, clones agree up to its tolerance.
+/// With clarabel, whose solvers are built again, commands of clones agree up to clarabel's tolerance.
 #[test]
 fn a_clone_with_clarabel_has_the_same_solution() {
-    // weights and a tolerance that determine forces and efforts
+    // With these weights and this tolerance, forces and efforts are unique enough to be compared.
     let (backend, tolerance) = (Backend::Clarabel, 1e-11);
     let settings = Settings { backend, tolerance, force_weight: 1e-5, ..Settings::default() };
     let mut controller = WholeBodyController::new(&robots::quadruped(), &feet(0.7), &tasks(), settings).unwrap();
@@ -64,7 +64,7 @@ fn a_clone_with_clarabel_has_the_same_solution() {
     }
 }
 
-/// Numbers of another controller, too few, too many, or invalid numbers are rejected.
+/// Rejects numbers of another controller, too few or too many numbers, and invalid numbers.
 #[test]
 fn numbers_of_another_controller_are_refused() {
     let mut controller = described(Settings::default());
@@ -78,7 +78,7 @@ fn numbers_of_another_controller_are_refused() {
     assert!(!restored(&other.carried()));
     for value in [f64::NAN, -1.0, 0.5, 1e300] {
         let mut broken = numbers.clone();
-        broken[0] = value; // whether a contact touches
+        broken[0] = value; // The first number tells whether a contact touches.
         assert!(!restored(&broken), "{value}");
     }
 }

@@ -1,8 +1,9 @@
-//! One side of the rows: s = ±(G x − bound) ≥ 0 with its multiplier z ≥ 0; vectorised, element by element.
+//! One side of the rows, lower or upper: s = ±(G x − bound) ≥ 0 with its multiplier z ≥ 0. All operations are element
+//! by element and vectorised.
 
 use condyle_linalg::{Vector, Vectorized};
 
-/// The lower or the upper bounds. A row without this bound has s = z = 1, and all its changes are 0.
+/// The lower or the upper bounds of all rows. A row without this bound has s = z = 1, and its s and z never change.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Side {
     /// 1 for lower bounds, −1 for upper bounds.
@@ -21,7 +22,7 @@ pub(super) struct Side {
 }
 
 impl Side {
-    /// Clears the last direction, which may not be finite.
+    /// Sets the last direction to zero, because it may not be finite.
     pub(super) fn clear(&mut self) {
         self.ds.fill(0.0);
         self.dz.fill(0.0);
@@ -76,7 +77,7 @@ impl Vectorized for Residuals<'_> {
     }
 }
 
-/// Adds ±t to `target`, with t = ξ / s − d r and ξ = σμ − s z − ds dz; the last term only with `second_order`.
+/// Adds ±t to `target`, with t = ξ / s − d r and ξ = σμ − s z − ds dz. The term ds dz is only used with `second_order`.
 pub(super) struct Target<'a> {
     pub side: &'a Side,
     pub has: &'a [f64],
@@ -99,7 +100,7 @@ impl Vectorized for Target<'_> {
     }
 }
 
-/// Computes ds = ±G dx + r, dz = (ξ − z ds) / s with ξ as in [`Target`], and the greatest of −ds/s and −dz/z.
+/// Computes ds = ±G dx + r and dz = (ξ − z ds) / s with ξ as in [`Target`]. Also finds the greatest of −ds/s and −dz/z.
 pub(super) struct Direction<'a> {
     pub side: &'a mut Side,
     pub has: &'a [f64],

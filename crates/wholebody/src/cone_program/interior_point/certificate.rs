@@ -1,17 +1,18 @@
-//! Certificates that no solution exists.
+//! Certificates: proofs that no solution exists.
 
 use super::cone::margin;
 use super::scaled::Scaled;
 use crate::cone_program::Status;
 use condyle_linalg::{dot, max_abs};
 
-/// Tolerance of a certificate: terms that should be zero, relative to the other terms. The reduced tolerance applies if
-/// iterates stop improving.
+/// Tolerance of a certificate: size of the terms that should be zero, relative to the other terms. The reduced
+/// tolerance applies if the iterates stop improving.
 const TOLERANCE: f64 = 1e-9;
 pub(super) const REDUCED_TOLERANCE: f64 = 1e-5;
-/// Minimum length of an x that may be an unbounded direction; unknowns are in units in which their size is about one.
+/// Minimum size of an x that may be a direction in which the objective is unbounded; each unknown has a unit in which
+/// its size is about one.
 const FAR: f64 = 1e3;
-/// Minimum fall of the objective along a direction of length one.
+/// Minimum decrease of the objective along a direction of size one.
 const FALL: f64 = 1e-6;
 
 /// An iterate and the quantities derived from it.
@@ -29,14 +30,14 @@ pub(super) struct Candidate<'a> {
 }
 
 impl Candidate<'_> {
-    /// Returns the distance of the iterate from a proof that no x satisfies the constraints. Every feasible x has (Kᵀ z
-    /// + E y)ᵀ x ≥ `support`, so a `force` of zero with a positive `support` is such a proof.
+    /// Returns the distance of the iterate from a proof that no x satisfies the constraints. Every feasible x satisfies
+    /// `support` ≤ (Kᵀ z + E y)ᵀ x. So a `force` of zero with a positive `support` is such a proof.
     pub(super) fn exclusion(&self) -> f64 {
         let size = max_abs(&self.x[..self.data.n]);
         if self.support > 0.0 { self.force * (1.0 + size) / self.support } else { f64::INFINITY }
     }
 
-    /// Returns the status that the iterate proves, if any.
+    /// Returns the status that the iterate proves, or `None`.
     pub(super) fn verdict(&self) -> Option<Status> {
         if self.exclusion() <= TOLERANCE {
             return Some(Status::Infeasible);
@@ -45,8 +46,8 @@ impl Candidate<'_> {
         (size > FAR && self.linear < -FALL * size && self.is_ray(size)).then_some(Status::Unbounded)
     }
 
-    /// Returns whether the objective falls without bound along x: P x = 0, E x = 0, and G x and F x stay within bounds
-    /// and cones at any length.
+    /// Returns whether the objective falls without bound along x: P x = 0, E x = 0, and all multiples of x keep G x and
+    /// F x within bounds and cones.
     fn is_ray(&self, size: f64) -> bool {
         let Self { data, x, Kx, Px, linear, .. } = *self;
         let (n, m) = (data.n, data.rows());

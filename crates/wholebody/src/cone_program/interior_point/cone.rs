@@ -1,7 +1,8 @@
-//! The algebra of a second-order cone Q = {s : ‖s₁‖ ≤ s₀}, and Nesterov and Todd's scaling of a pair in its interior.
+//! The algebra of a second-order cone Q = {s : ‖s₁‖ ≤ s₀}, and Nesterov and Todd's scaling of a pair (s, z) in the
+//! cone's interior.
 //!
-//! W = η (2 v vᵀ − J) with J = diag(1, −1, …, −1) is the matrix for which W z = W⁻¹ s = λ. With w = (s̄ + J z̄) / (2 γ),
-//! where s̄ = s / √(sᵀ J s), z̄ = z / √(zᵀ J z), γ = √((1 + s̄ᵀ z̄) / 2), η⁴ = sᵀ J s / zᵀ J z:
+//! W = η (2 v vᵀ − J) with J = diag(1, −1, …, −1) is the matrix for which W z = W⁻¹ s = λ. Let s̄ = s / √(sᵀ J s), z̄ =
+//! z / √(zᵀ J z), γ = √((1 + s̄ᵀ z̄) / 2) and η⁴ = sᵀ J s / zᵀ J z. With w = (s̄ + J z̄) / (2 γ):
 //!
 //! ```text
 //! W = η [w₀  w₁ᵀ                       W⁻¹ = 1/η [ w₀  −w₁ᵀ
@@ -11,7 +12,7 @@
 //! Sources: Nesterov and Todd (1997); Vandenberghe, *The CVXOPT linear and quadratic cone program solvers* (2010),
 //! sections 4 and 5; Domahidi, Chu and Boyd (2013), section III.
 
-/// Returns x₀ − ‖x₁‖, which is not negative in the cone.
+/// Returns x₀ − ‖x₁‖, which is at least 0 if x is in the cone.
 #[inline(always)]
 pub(super) fn margin(x: &[f64]) -> f64 {
     x[0] - tail(x, x).sqrt()
@@ -34,7 +35,7 @@ pub(super) fn tail(x: &[f64], y: &[f64]) -> f64 {
     sum
 }
 
-/// Returns η, and writes w and λ; `None` if s or z is not in the interior.
+/// Returns η, and writes w and λ. Returns `None` if s or z is not in the interior of the cone.
 #[inline(always)]
 pub(super) fn scaling(s: &[f64], z: &[f64], w: &mut [f64], lambda: &mut [f64]) -> Option<f64> {
     let (ds, dz) = (determinant(s), determinant(z));
@@ -48,7 +49,7 @@ pub(super) fn scaling(s: &[f64], z: &[f64], w: &mut [f64], lambda: &mut [f64]) -
     for i in 1..s.len() {
         w[i] = half * (s[i] * rs - z[i] * rz);
     }
-    // w has determinant 1; its first entry, computed from the others, satisfies this to the last digit.
+    // w has the determinant 1. Its first entry is computed from the others, so that this holds to the last digit.
     w[0] = (1.0 + tail(w, w)).sqrt();
     let eta = (ds / dz).sqrt().sqrt();
     apply(eta, w, z, lambda);
@@ -86,7 +87,7 @@ pub(super) fn product(x: &[f64], y: &[f64], out: &mut [f64]) {
     }
 }
 
-/// Computes the y with λ ∘ y = x.
+/// Computes the vector y for which λ ∘ y = x.
 #[inline(always)]
 pub(super) fn divide(lambda: &[f64], x: &[f64], y: &mut [f64]) {
     y[0] = (lambda[0] * x[0] - tail(lambda, x)) / determinant(lambda);
@@ -96,9 +97,10 @@ pub(super) fn divide(lambda: &[f64], x: &[f64], y: &mut [f64]) {
     }
 }
 
-/// Returns 1 / α for the greatest α with λ + α d ∈ Q; not positive if α is unbounded.
+/// Returns 1 / α for the greatest α with λ + α d ∈ Q; the result is not positive if α is unbounded.
 ///
-/// With λ̄ = λ / √(λᵀ J λ), ρ₀ = λ̄ᵀ J d and ρ₁ = d₁ − (ρ₀ + d₀) / (1 + λ̄₀) λ̄₁, it is (‖ρ₁‖ − ρ₀) / √(λᵀ J λ).
+/// The result is (‖ρ₁‖ − ρ₀) / √(λᵀ J λ), where λ̄ = λ / √(λᵀ J λ), ρ₀ = λ̄ᵀ J d and ρ₁ = d₁ − (ρ₀ + d₀) / (1 + λ̄₀)
+/// λ̄₁.
 #[inline(always)]
 pub(super) fn inverse_step(lambda: &[f64], d: &[f64]) -> f64 {
     let r = determinant(lambda).sqrt().recip();
@@ -112,9 +114,9 @@ pub(super) fn inverse_step(lambda: &[f64], d: &[f64]) -> f64 {
     r * (sum.sqrt() - rho)
 }
 
-/// Computes s and z with s ∘ z = μ e and s − z = v: s = (v + √(v² + 4 μ e)) / 2, z = s − v, in the cone's algebra.
+/// Computes s and z with s ∘ z = μ e and s − z = v. In the cone's algebra, s = (v + √(v² + 4 μ e)) / 2 and z = s − v.
 ///
-/// v has the eigenvalues v₀ ± ‖v₁‖. Source: Fukushima, Luo and Tseng (2002), smoothing of complementarity.
+/// The eigenvalues of v are v₀ ± ‖v₁‖. Source: Fukushima, Luo and Tseng (2002), smoothing of complementarity.
 #[inline(always)]
 pub(super) fn split(v: &[f64], mu: f64, s: &mut [f64], z: &mut [f64]) {
     let radius = tail(v, v).sqrt();

@@ -1,9 +1,10 @@
-//! All cones of a program: slack variables, multipliers, scalings and directions, row after row.
+//! All cones of a program, row after row: slack variables, multipliers, scalings and directions.
 
 use super::cone::{apply_inverse, divide, inverse_step, product, scaling};
 use super::scaled::{Cone, Scaled};
 
-/// Evaluates the expression with a constant `dim` for a friction cone, so that the compiler can unroll its loops.
+/// Evaluates the expression with a constant `dim` if the cone is a friction cone, so that the compiler can unroll its
+/// loops.
 macro_rules! by_dimension {
     ($value:expr, $dim:ident => $expression:expr) => {
         match $value {
@@ -56,7 +57,7 @@ impl Cones {
         }
     }
 
-    /// Computes r and the multipliers; adds to [‖r‖∞, sᵀ z, −hᵀ z].
+    /// Computes r and the multipliers; adds the contributions of the cones to the sums [‖r‖∞, sᵀ z, −hᵀ z].
     pub(super) fn residuals(&mut self, h: &[f64], Fx: &[f64], multipliers: &mut [f64], sums: &mut [f64; 3]) {
         for i in 0..h.len() {
             self.r[i] = h[i] + Fx[i] - self.s[i];
@@ -67,7 +68,7 @@ impl Cones {
         }
     }
 
-    /// Computes W and λ of each cone; returns false if a pair is not in the interior.
+    /// Computes W and λ of each cone; returns false if a pair (s, z) is not in the interior.
     pub(super) fn scale(&mut self, cones: &[Cone]) -> bool {
         cones.iter().enumerate().all(|(k, cone)| by_dimension!(cone.dim, dim => self.scale_one(k, cone.at, dim)))
     }
@@ -83,7 +84,7 @@ impl Cones {
         true
     }
 
-    /// Computes B = (W⁻¹ F)ᵀ in the rows where F is non-zero.
+    /// Computes B = (W⁻¹ F)ᵀ, in the rows in which F is non-zero.
     #[inline(always)]
     pub(super) fn scale_rows(&self, data: &Scaled, B: &mut [f64]) {
         let (ld, m) = (data.ld, data.rows());
@@ -93,7 +94,7 @@ impl Cones {
             let F = &data.K[(m + cone.at) * ld + rows.start..];
             let (head, tail) = B[cone.at * ld + rows.start..].split_at_mut(ld);
             let (f0, head) = (&F[..n], &mut head[..n]);
-            // w₁ᵀ F₁, stored in the head for now.
+            // At first, `head` stores w₁ᵀ F₁; below it gets the first row of the result.
             head.fill(0.0);
             for i in 1..cone.dim {
                 let f = &F[i * ld..][..n];
@@ -124,8 +125,8 @@ impl Cones {
         }
     }
 
-    /// Computes p = λ \ ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z (the last term only with `second_order`), and the target
-    /// W⁻¹ (p − W⁻¹ r).
+    /// Computes p = λ \ ξ with ξ = σμ e − λ ∘ λ − d̃s ∘ d̃z, and the target W⁻¹ (p − W⁻¹ r). The term d̃s ∘ d̃z is only
+    /// used with `second_order`.
     pub(super) fn target(&mut self, cones: &[Cone], centre: f64, second_order: bool, target: &mut [f64]) {
         for (k, cone) in cones.iter().enumerate() {
             by_dimension!(cone.dim, dim => self.target_one(k, cone.at, dim, centre, second_order, target));

@@ -1,32 +1,33 @@
-//! The iteration: length of each step, and conditions for the end.
+//! The iteration: the length of each step, and the conditions under which the iteration ends.
 
 use super::certificate::REDUCED_TOLERANCE;
 use super::workspace::Workspace;
 use crate::cone_program::Status;
 use std::time::Instant;
 
-/// Bounds of a step's share of the distance to the boundary. The share is 1 − a tenth of the predictor's shortfall. The
-/// upper bound keeps slack variables larger than the rounding errors of the terms that they are differences of.
+/// Minimum and maximum of a step's share of the distance to the boundary. The share is 1 minus a tenth of the
+/// predictor's shortfall. The maximum keeps each slack variable larger than the rounding errors of the terms of which
+/// it is the difference.
 const TO_BOUNDARY: [f64; 2] = [0.99, 0.9999];
 const SHORTFALL: f64 = 0.1;
-/// Share of the allowed gap at which the last steps aim.
+/// Share of the allowed duality gap at which the last steps aim.
 const AIM: f64 = 0.1;
 /// Maximum number of consecutive iterations that come closer neither to a solution nor to a proof that none exists.
 const PATIENCE: u32 = 5;
-/// Minimum length of a step; a shorter one is a failure.
+/// Minimum length of a step; a shorter step is a failure.
 const SHORT_STEP: f64 = 1e-7;
-/// Maximum error of a reduced solution, as a multiple of the tolerance.
+/// Maximum error of a solution with reduced accuracy, as a multiple of the tolerance.
 const REDUCED: f64 = 1e4;
-/// Ratio of a dual residual to its expected value, above which later solves get one more refinement; at most
+/// Ratio of the dual residual to its expected value above which later solves get one more refinement. There are at most
 /// `REFINEMENTS`.
 const INEXACT: f64 = 2.0;
 const REFINEMENTS: usize = 2;
 
-/// Limits that end an iteration.
+/// Limits that end the iteration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     pub tolerance: f64,
-    /// Maximum number of iterations, including earlier ones.
+    /// Maximum number of iterations, including the iterations of earlier attempts.
     pub iterations: u32,
     /// Start time, and the seconds allowed from then on.
     pub clock: Option<(Instant, f64)>,
@@ -70,10 +71,11 @@ impl Workspace {
             }
             *iterations += 1;
 
-            // Predictor: towards s ∘ z = 0.
+            // Predictor: a step towards s ∘ z = 0.
             let inverse = self.direction(0.0, false, refinements);
             let shortfall = if inverse > 1.0 { 1.0 - inverse.recip() } else { 0.0 };
-            // Corrector: towards s ∘ z = σ μ e with Mehrotra's σ = (1 − α)³, and no further than needed.
+            // Corrector: a step towards s ∘ z = σ μ e with Mehrotra's σ = (1 − α)³. The gap becomes no smaller than
+            // needed.
             let sigma = shortfall * shortfall * shortfall;
             let centre = (sigma * measure.mu).max(AIM * tolerance * measure.scale);
             let inverse = self.direction(centre, true, refinements);

@@ -1,12 +1,12 @@
 //! Condyle's own back end: a primal–dual interior-point method on dense matrices of about 10 to 60 unknowns.
 //!
-//! Mehrotra's predictor and corrector with Nesterov and Todd's scaling on bounds and second-order cones. Each iteration
-//! factorises P + Gᵀ D G + Fᵀ W⁻² F once and solves with it twice. The iteration starts from the data, or from the last
-//! solution moved back into the interior. Blocks of zeros in rows are skipped. Nothing allocates after construction,
-//! the same numbers give the same bits, and no result is NaN.
+//! The method is Mehrotra's predictor and corrector, with Nesterov and Todd's scaling of bounds and second-order cones.
+//! Each iteration factorises P + Gᵀ D G + Fᵀ W⁻² F once and solves with the factor twice. The iteration starts from the
+//! data, or from the last solution after it was moved back into the interior. Blocks of zeros in rows are skipped.
+//! Nothing allocates after construction, the same numbers give the same bits, and no result is NaN.
 //!
 //! Sources: Mehrotra (1992); Nesterov and Todd (1998); Vandenberghe, *The CVXOPT linear and quadratic cone program
-//! solvers* (2010). The formulas are Vandenberghe's, with a two-sided row instead of two rows.
+//! solvers* (2010). The formulas are Vandenberghe's, but a row may have two sides.
 
 mod bounds;
 mod certificate;
@@ -29,7 +29,7 @@ use workspace::Workspace;
 /// Number of iterations after which a cold start replaces a warm one.
 const WARM_ITERATIONS: u32 = 20;
 
-/// A dense interior point method; see the [module](self).
+/// A dense interior-point method; see the [module](self).
 #[derive(Clone, Debug)]
 pub(crate) struct InteriorPoint {
     settings: Settings,
@@ -46,7 +46,8 @@ impl InteriorPoint {
         Self { settings, capacity, size: Size::default(), work, solution }
     }
 
-    /// Minimises the loaded program; returns whether it started from the last solution, and the error of the result.
+    /// Minimises the loaded program. Returns whether the solution was reached from the last solution, and the error of
+    /// the result.
     fn minimise(&mut self, start: Start, iterations: &mut u32) -> (bool, Result<f64, Status>) {
         let Self { settings, work, solution, .. } = self;
         let Settings { tolerance, max_iterations, time_limit } = *settings;

@@ -1,23 +1,23 @@
 //! The program as the method receives it: padded, without empty constraints, and scaled to numbers of size one.
 //!
-//! x = D x̂, where Dⱼ is the size that the cost alone would give xⱼ: C / √Pⱼⱼ with C = max |cⱼ| / √Pⱼⱼ. Dⱼ is at most
-//! [`ROOM`] times the largest xⱼ that rows with two bounds allow on its own, max(|lᵢ|, |uᵢ|) / |Gᵢⱼ|. Otherwise, if a
-//! task is unreachable, a force of little weight would have a unit of millions of newtons, in which its limits vanish.
-//! The cost is divided by the greatest of |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². One tolerance thus serves weights that differ by many
-//! orders of magnitude, such as the weights of tasks and of forces. Rows of Ĝ = G D, and the longest row of each cone,
-//! have length one.
+//! The scaled unknowns x̂ are defined by x = D x̂. Dⱼ is the size that the cost alone would give xⱼ: C / √Pⱼⱼ with C =
+//! max |cⱼ| / √Pⱼⱼ. Rows with two bounds limit Dⱼ to [`ROOM`] times the largest xⱼ that they allow if xⱼ is the only
+//! non-zero unknown, max(|lᵢ|, |uᵢ|) / |Gᵢⱼ|. Without this limit, an unreachable task would give a force of little
+//! weight a unit of millions of newtons, in which the force's limits vanish. The cost is divided by the greatest of
+//! |cⱼ| Dⱼ and Pⱼⱼ Dⱼ². So one tolerance serves weights that differ by many orders of magnitude, such as the weights of
+//! tasks and of forces. Rows of Ĝ = G D, and the longest row of each cone, have length one.
 
 use crate::cone_program::{ConeProgram, Size, Status};
 use condyle_linalg::{SLACK, View, add_product_vector, block, dot, mask, transposed_product_vector};
 use std::ops::Range;
 
-/// Diagonal entry of P, relative to the greatest, below which it counts as zero when units are chosen.
+/// Diagonal entry of P, relative to the greatest one, below which the entry counts as zero when units are chosen.
 const NO_CURVATURE: f64 = 1e-14;
-/// Maximum ratio of a unit to the value that bounds allow its unknown on its own. At 1, programs with a singular P lose
-/// digits; from 1000 on, some programs with unreachable tasks have no solution.
+/// Maximum ratio of an unknown's unit to the value that the bounds allow if the other unknowns are zero. With a ratio
+/// of 1, programs with a singular P lose digits; from 1000 on, some programs with unreachable tasks have no solution.
 const ROOM: f64 = 30.0;
-/// Minimum ratio of a unit to its size by the cost, when bounds reduce it: P̂ⱼⱼ of this ratio squared still exceeds
-/// rounding errors.
+/// Minimum of an unknown's unit after bounds have reduced it, relative to the size that the cost gives. P̂ⱼⱼ is then at
+/// least the square of this number, which exceeds rounding errors.
 const LEAST_SHARE: f64 = 1e-5;
 /// Absolute tolerance for the bounds of a row or cone without coefficients.
 const NO_ROW_TOLERANCE: f64 = 1e-9;
@@ -33,13 +33,13 @@ pub(super) enum Source {
     Cone(usize),
 }
 
-/// A cone: its first row among the cones' rows here, its first row in F, and its dimension.
+/// A cone: its first row among the cones' rows of this program, its first row in F, and its dimension.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cone {
     pub at: usize,
     pub source: usize,
     pub dim: usize,
-    /// Factor by which its rows of F were multiplied.
+    /// Factor by which the cone's rows of F were multiplied.
     pub scale: f64,
 }
 
@@ -50,38 +50,38 @@ struct Run {
     rows: Range<usize>,
 }
 
-/// Returns the range of rows covered by a mask's blocks.
+/// Returns the range of rows that the blocks of a mask cover.
 fn range(mask: u64, n: usize, ld: usize) -> Range<usize> {
     let (block, first) = (block(ld), mask.trailing_zeros() as usize);
     let end = 64 - mask.leading_zeros() as usize;
     if mask == 0 { 0..0 } else { block * first..n.min(block * end) }
 }
 
-/// The program: minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q. The columns of K are rows of G
-/// and of F.
+/// The scaled program: minimise ½ xᵀ P x + cᵀ x subject to E x = e, l ≤ G x ≤ u, h + F x ∈ Q. The columns of K are the
+/// rows of G and of F.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Scaled {
     /// Number of unknowns.
     pub n: usize,
-    /// Distance from one column of a matrix to the next.
+    /// Offset from one column of a matrix to the next.
     pub ld: usize,
-    /// P, both triangles.
+    /// P, with both triangles.
     pub P: Vec<f64>,
     pub c: Vec<f64>,
     /// D, the unit of each unknown.
     pub units: Vec<f64>,
-    /// Scratch: one over the value that rows with two bounds allow an unknown on its own.
+    /// Scratch: inverse of the value of each unknown that rows with two bounds allow if the other unknowns are zero.
     inverse_limits: Vec<f64>,
     /// Factor by which P and c were multiplied.
     pub cost: f64,
-    /// Eᵀ: equalities, and rows of G with l = u.
+    /// Eᵀ, with a column for each equality and for each row of G with l = u.
     pub E: Vec<f64>,
     pub e: Vec<f64>,
     pub equality_sources: Vec<Source>,
     pub equality_scales: Vec<f64>,
     /// [Gᵀ Fᵀ].
     pub K: Vec<f64>,
-    /// Mask of the non-zero blocks of each column; the columns of one cone share the union of their masks.
+    /// Mask of the non-zero blocks of each column. The columns of one cone share the union of their masks.
     pub masks: Vec<u64>,
     runs: Vec<Run>,
     /// l and u, 0 for a missing bound.
@@ -94,7 +94,7 @@ pub(super) struct Scaled {
     pub scales: Vec<f64>,
     pub h: Vec<f64>,
     pub cones: Vec<Cone>,
-    /// Number of bounds and cones, by which sᵀ z is divided.
+    /// Number of bounds and cones; sᵀ z is divided by it.
     pub degree: f64,
 }
 
@@ -139,12 +139,12 @@ impl Scaled {
         self.e.len()
     }
 
-    /// Returns the range of rows in which a column is non-zero, in whole blocks (except the last block).
+    /// Returns the range of rows in which a column is non-zero, in whole blocks (only the last block may be shorter).
     pub(super) fn range(&self, column: usize) -> Range<usize> {
         range(self.masks[column], self.n, self.ld)
     }
 
-    /// Computes y = Kᵀ x: G x and F x. The padding of x is zero.
+    /// Computes y = Kᵀ x, which is G x and F x. The padding of x must be zero.
     pub(super) fn multiply(&self, x: &[f64], y: &mut [f64]) {
         for Run { columns, rows } in &self.runs {
             let K = View::new(&self.K, self.ld).at(rows.start, columns.start);
@@ -160,7 +160,7 @@ impl Scaled {
         }
     }
 
-    /// Returns the number of columns of K: rows of G and of F.
+    /// Returns the number of columns of K, which are the rows of G and of F.
     pub(super) fn columns(&self) -> usize {
         self.rows() + self.h.len()
     }
@@ -168,7 +168,7 @@ impl Scaled {
     /// Loads the numbers of a program.
     ///
     /// # Errors
-    /// [`Status::Infeasible`] if bounds contradict each other, or a row without coefficients violates its bounds.
+    /// [`Status::Infeasible`] if bounds contradict each other, or if a row without coefficients violates its bounds.
     pub(super) fn load(&mut self, program: &ConeProgram) -> Result<(), Status> {
         let (Size { unknowns: n, equalities, rows, .. }, ld) = (program.size, self.ld);
         let most = program.capacity().unknowns;
@@ -228,7 +228,7 @@ impl Scaled {
         Ok(())
     }
 
-    /// Computes the masks and runs of K's columns.
+    /// Computes the masks of K's columns, and the runs of columns with equal ranges.
     fn note_zeros(&mut self) {
         let (m, columns, ld) = (self.rows(), self.columns(), self.ld);
         self.masks.clear();
@@ -248,7 +248,7 @@ impl Scaled {
         }
     }
 
-    /// Chooses the units of the unknowns and of the cost; see the module.
+    /// Chooses the units of the unknowns and of the cost; the module's documentation gives the formulas.
     fn choose_units(&mut self, program: &ConeProgram) {
         let (n, most) = (program.size.unknowns, program.capacity().unknowns);
         let (P, c) = (|j: usize| program.P.as_slice()[j * most + j], &program.c[..n]);
@@ -256,7 +256,7 @@ impl Scaled {
         let units = &mut self.units[..n];
         let mut size = 0.0_f64;
         for j in 0..n {
-            // An unknown without curvature has no size of its own: it gets the greatest curvature.
+            // The cost gives no size for an unknown without curvature: use the greatest curvature.
             let curvature = match P(j) {
                 own if own > NO_CURVATURE * greatest => own,
                 _ if greatest > 0.0 => greatest,

@@ -1,4 +1,4 @@
-//! Start of the iteration: from the data, or from the last solution.
+//! Start of the iteration, from the data or from the last solution.
 
 use super::cone::{margin, split, split_number};
 use super::scaled::Source;
@@ -6,17 +6,17 @@ use super::solution::Solution;
 use super::workspace::Workspace;
 use condyle_linalg::{View, add_product_vector, max_abs};
 
-/// Weight of s² relative to the cost, which is also the ratio of z to s, in a cold start.
+/// Weight of s² relative to the cost in a cold start. It is also the ratio of z to s.
 const WEIGHT: f64 = 0.1;
-/// Distance of s from the boundary of its cone after it was moved inside.
+/// Distance from the boundary of the cone to which a cold start moves s.
 const INSIDE: f64 = 1.0;
-/// √μ of a warm start, relative to the error of the last solution in this program; the next constant bounds μ.
+/// √μ of a warm start, relative to the error of the last solution in this program; μ stays within `CENTRE`.
 const SHARE: f64 = 0.02;
 const CENTRE: [f64; 2] = [1e-10, 1e-2];
 
 impl Workspace {
-    /// Computes x from the minimum of the cost and of ω / 2 sᵀ s; s = h + F x and z = −ω s, both moved along e into the
-    /// cone.
+    /// Computes x as the minimiser of the cost plus ω / 2 sᵀ s, with s = h + F x. Then moves s and z = −ω s along e
+    /// into the cone.
     ///
     /// Source: Vandenberghe (2010), section 5.3, where ω = 1.
     pub(super) fn cold_start(&mut self) -> bool {
@@ -78,13 +78,15 @@ impl Workspace {
         true
     }
 
-    /// Computes x and y from the last solution, and s and z from s − z = (h + F x) − z* at that x with s ∘ z = μ e.
+    /// Takes x and y from the last solution. Computes s and z from s − z = (h + F x) − z* and s ∘ z = μ e, where z* is
+    /// the last z.
     ///
-    /// Each pair is exactly central. Where s or z is large, it differs from the last pair by μ / s only. s and z are
-    /// comparable, since all numbers are in units of size one. √μ is proportional to the last solution's error in this
-    /// program, because changes of this size turn a bound on or off.
+    /// Each pair (s, z) is exactly central. Where s or z is large, it differs from the last pair by μ / s only. s and z
+    /// are comparable, since all numbers are in units of size one. √μ is proportional to the last solution's error in
+    /// this program, because changes of this size turn a bound on or off.
     ///
-    /// Source: Chen and Harker (1993), the smoothing of complementarity; here as a start, in the cones' algebra.
+    /// Source: Chen and Harker (1993), the smoothing of complementarity. Here it gives a start, in the algebra of the
+    /// cones.
     pub(super) fn warm_start(&mut self, last: &Solution) {
         let Self { data, sides, cones, x, y, Kx, multipliers, Px, forces, rd, .. } = self;
         let (n, m, me, columns) = (data.n, data.rows(), data.equalities(), data.columns());
@@ -115,7 +117,7 @@ impl Workspace {
                 multipliers[m + at] = cones.z[at];
             }
         }
-        // Error of the last solution in this program: P x + c − Kᵀ z − E y and min(s, z).
+        // Error of the last solution in this program: the norms of P x + c − Kᵀ z − E y and of min(s, z).
         Px[..n].fill(0.0);
         forces[..n].fill(0.0);
         add_product_vector(Px, n, View::new(&data.P, data.ld), &x[..n]);

@@ -1,4 +1,4 @@
-//! Linear system of each iteration: positive definite in x, with the equalities as a Schur complement.
+//! Linear system of each iteration. It is positive definite in x; the equalities are solved by a Schur complement.
 //!
 //! ```text
 //! [ H   −Eᵀ ] [dx]   [r₁]        H = P + Gᵀ D G + Fᵀ W⁻² F
@@ -6,7 +6,7 @@
 //! ```
 //!
 //! With H = L Lᵀ and X = E L⁻ᵀ: X Xᵀ dy = r₂ − X L⁻¹ r₁, Lᵀ dx = L⁻¹ r₁ + Xᵀ dy. If equalities exist, Eᵀ E is added to
-//! H and Eᵀ r₂ to r₁. This changes no solution, and makes H regular if it is singular only without E.
+//! H and Eᵀ r₂ to r₁. This does not change the solution, and makes H regular if it is singular only without Eᵀ E.
 
 use super::scaled::Scaled;
 use condyle_linalg::{
@@ -14,30 +14,31 @@ use condyle_linalg::{
     transposed_product_vector,
 };
 
-/// Regularisation added to diagonals of H, whose entries have size one for costs of size one; refinement removes its
-/// effect.
+/// Regularisation added to diagonal entries of H, which have size one for costs of size one. Refinement removes the
+/// effect of the regularisation.
 const REGULARISATION: f64 = 1e-13;
-/// Regularisation relative to the diagonal entry: some roundings of a factor.
+/// Regularisation relative to the diagonal entry. It is as large as a few rounding errors of a factorisation.
 const RELATIVE_REGULARISATION: f64 = 1e-15;
-/// Regularisation added to diagonals of X Xᵀ, whose entries have size one for costs of size one.
+/// Regularisation added to diagonal entries of X Xᵀ, which have size one for costs of size one.
 const DUAL_REGULARISATION: f64 = 1e-13;
-/// Factor of the regularisation from one attempt to the next, after a pivot that was not positive.
+/// Factor of the regularisation from one attempt to the next. A new attempt follows a pivot that was not positive.
 const GROWTH: f64 = 1e3;
 const ATTEMPTS: usize = 4;
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct System {
-    /// Lower triangle of [H; E], then of its factor.
+    /// Lower triangle of [H; E], later of its factor.
     H: Vec<f64>,
     ldh: usize,
     /// Inverse of the factor's diagonal.
     inverse: Vec<f64>,
-    /// Scaled columns of K (√D G and W⁻¹ F), then columns of E; only their non-zero blocks are written and multiplied.
+    /// Scaled columns of K (√D G and W⁻¹ F), then the columns of E. Only non-zero blocks of these columns are written
+    /// and multiplied.
     pub B: OuterProducts,
     n: usize,
     me: usize,
     r: Vec<f64>,
-    /// r₂ of the refinement.
+    /// r₂ in a refinement.
     re: Vec<f64>,
     more: Vec<f64>,
     more_y: Vec<f64>,
@@ -57,7 +58,8 @@ impl System {
         }
     }
 
-    /// Sets the sizes of a program and the non-zero blocks of its columns; writes E, and zeros in the columns of K.
+    /// Takes the sizes of a program and the non-zero blocks of its columns; writes E, and writes zeros into the columns
+    /// of K.
     pub(super) fn prepare(&mut self, data: &Scaled) {
         let (n, me, columns, ld) = (data.n, data.equalities(), data.columns(), data.ld);
         (self.n, self.me, self.ldh) = (n, me, n + me + SLACK);
@@ -68,13 +70,13 @@ impl System {
         B.rows[columns * ld..][..me * ld].copy_from_slice(&data.E[..me * ld]);
         for k in 0..columns + me {
             let row = &if k < columns { &data.K[k * ld..] } else { &data.E[(k - columns) * ld..] }[..ld];
-            // W⁻¹ combines the rows of a cone: each result has the blocks of all of them.
+            // W⁻¹ combines the rows of a cone: each result has the union of the rows' blocks.
             let mask = if k < columns { data.masks[k] } else { mask(row) };
             B.multiply([k, k], [mask, mask]);
         }
     }
 
-    /// Factorises P + B Bᵀ, after `B` has been written; returns false if the factorisation fails with the greatest
+    /// Factorises P + B Bᵀ, after `B` has been written. Returns false if the factorisation fails even with the greatest
     /// regularisation.
     pub(super) fn factorize(&mut self, data: &Scaled) -> bool {
         let Self { H, ldh, B, n, me, inverse, .. } = self;
@@ -108,7 +110,7 @@ impl System {
         false
     }
 
-    /// Replaces r₁ by dx and r₂ by dy, using the factor.
+    /// Uses the factor to replace r₁ by dx and r₂ by dy.
     fn solve_once(&mut self, data: &Scaled, x: &mut [f64], y: &mut [f64]) {
         let (n, me, ldh) = (self.n, self.me, self.ldh);
         let (L, (inverse, inverse_S)) = (View::new(&self.H, ldh), self.inverse[..n + me].split_at(n));
@@ -129,7 +131,8 @@ impl System {
         backward_solve(L, inverse, x);
     }
 
-    /// Replaces r₁ by dx and r₂ by dy; writes K dx. `weigh` turns it into [D G dx; W⁻² F dx], for `refinements`.
+    /// Replaces r₁ by dx and r₂ by dy, and writes K dx. `weigh` turns K dx into [D G dx; W⁻² F dx] for the
+    /// `refinements`.
     pub(super) fn solve(
         &mut self,
         data: &Scaled,
@@ -145,7 +148,7 @@ impl System {
         re[..me].copy_from_slice(&y[..me]);
         self.solve_once(data, x, y);
         for _ in 0..refinements {
-            // r₁ − H dx + Eᵀ dy, r₂ − E dx
+            // residuals r₁ − H dx + Eᵀ dy and r₂ − E dx
             data.multiply(x, Kdx);
             weigh(Kdx);
             for i in 0..n {
@@ -176,7 +179,7 @@ impl System {
     }
 }
 
-/// Replaces S, which is not positive, by the factor of −S; returns whether the factorisation succeeds.
+/// Replaces S, which is not positive, by the factor of −S. Returns whether the factorisation succeeds.
 fn factorize_schur(S: &mut [f64], stride: usize, me: usize, regularisation: f64) -> bool {
     for j in 0..me {
         for x in &mut S[j * stride + j..][..me - j] {

@@ -1,4 +1,4 @@
-//! The iterate, its residuals, and its directions.
+//! The iterate, its residuals, and the directions of the steps.
 
 use super::bounds::{Direction, Residuals, Side, Target};
 use super::certificate::Candidate;
@@ -11,10 +11,11 @@ use condyle_linalg::{
     SLACK, Vector, Vectorized, View, add_product_vector, at_level, copy_scaled, dot, max_abs, transposed_product_vector,
 };
 
-/// Minimum of the cost's unit, in the method's units, in the size to which a gap is relative.
+/// Minimum of the cost's unit, in the units of the method. The gap is relative to this unit plus the size of the
+/// objective.
 const SMALL_COST: f64 = 1e-6;
 
-/// All memory except the results.
+/// All memory of the method, except the results.
 #[derive(Clone, Debug)]
 pub(super) struct Workspace {
     pub data: Scaled,
@@ -28,12 +29,12 @@ pub(super) struct Workspace {
     pub dx: Vec<f64>,
     pub dy: Vec<f64>,
     pub Kdx: Vec<f64>,
-    /// z of rows (lower − upper) and of cones, and ± their targets.
+    /// z of the rows (lower − upper) and of the cones; the next field is the sum of their targets, with the same signs.
     pub multipliers: Vec<f64>,
     pub target: Vec<f64>,
-    /// z / s, of both sides together.
+    /// Sum of z / s over both sides of each row.
     pub D: Vec<f64>,
-    /// P x, Kᵀ z + E y, P x + c − Kᵀ z − E y, E x − e.
+    /// P x, Kᵀ z + E y, P x + c − Kᵀ z − E y, and E x − e, in this order of the fields.
     pub Px: Vec<f64>,
     pub forces: Vec<f64>,
     pub rd: Vec<f64>,
@@ -63,7 +64,7 @@ impl Vectorized for Scale<'_> {
     }
 }
 
-/// Measures of an iterate's distance from a solution.
+/// Measures of the distance between an iterate and a solution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measure {
     /// sᵀ z per bound or cone; the next field is the size of the objective per bound or cone.
@@ -71,9 +72,10 @@ pub(super) struct Measure {
     pub scale: f64,
     /// ‖P x + c − Kᵀ z − E y‖∞.
     pub dual: f64,
-    /// Greatest of residuals and gap, relative to the terms that they are differences of; NaN if one is not finite.
+    /// Greatest of the residuals and the gap, each relative to the terms of which it is the difference. NaN if one of
+    /// them is not finite.
     pub error: f64,
-    /// Status that the iterate proves.
+    /// Status that the iterate proves, if any.
     pub certificate: Option<Status>,
     /// Distance of the iterate from a proof that no solution exists.
     pub exclusion: f64,
@@ -81,7 +83,7 @@ pub(super) struct Measure {
 
 impl Workspace {
     pub(super) fn new(capacity: Size) -> Self {
-        level(); // chosen now, because reading CONDYLE_LEVEL allocates
+        level(); // Choose the level now, because reading CONDYLE_LEVEL allocates.
         let Size { unknowns: n, equalities, rows, cone_rows } = capacity;
         let (m, me, columns) = (rows + cone_rows, equalities + rows, rows + cone_rows);
         let vector = |length: usize| vec![0.0; length];
@@ -118,7 +120,7 @@ impl Workspace {
             && finite(&self.cones.z[..rows])
     }
 
-    /// Computes residuals, D, and the iterate's distance from a solution.
+    /// Computes the residuals, D, and the measures of the iterate.
     pub(super) fn measure(&mut self) -> Measure {
         let Self { data, sides, cones, x, y, Kx, multipliers, Px, forces, rd, re, .. } = self;
         let (n, m, me, columns, ld) = (data.n, data.rows(), data.equalities(), data.columns(), data.ld);
@@ -167,7 +169,7 @@ impl Workspace {
         }
     }
 
-    /// Computes D, W and B.
+    /// Computes D, W and B; returns false if a pair (s, z) is not in the interior of its cone.
     pub(super) fn scale(&mut self) -> bool {
         let Self { data, sides, cones, D, system, .. } = self;
         if !cones.scale(&data.cones) {
@@ -177,8 +179,8 @@ impl Workspace {
         true
     }
 
-    /// Computes the direction towards s ∘ z = `centre` e, with `second_order` corrected by the last direction's
-    /// second-order term. Returns the inverse of the greatest step.
+    /// Computes the direction towards s ∘ z = `centre` e. With `second_order`, corrects it by the second-order term of
+    /// the last direction. Returns the inverse of the greatest step.
     pub(super) fn direction(&mut self, centre: f64, second_order: bool, refinements: usize) -> f64 {
         let Self { data, system, sides, cones, dx, dy, Kdx, target, D, rd, re, .. } = self;
         let (n, m, me, columns) = (data.n, data.rows(), data.equalities(), data.columns());

@@ -1,8 +1,8 @@
-//! Programs with known solutions.
+//! Programs whose solutions are known.
 
 use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start};
 
-/// Relative tolerance: the root of the remaining gap, where the objective is flat.
+/// Relative tolerance of x: the square root of the remaining gap, for directions in which the objective is flat.
 const TOLERANCE: f64 = 1e-7;
 
 const SHARP: Settings = Settings { tolerance: 1e-13, max_iterations: 50, time_limit: f64::INFINITY };
@@ -15,7 +15,7 @@ fn near(a: &[f64], b: &[f64]) {
     assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < TOLERANCE * (1.0 + b.abs())), "{a:?} is not {b:?}");
 }
 
-/// Solves min ½ ‖x − p‖² with x ∈ Q, the projection of p onto the cone; its multiplier is the projection of −p.
+/// Solves min ½ ‖x − p‖² with x ∈ Q, the projection of p onto the cone. The multiplier is the projection of −p.
 #[test]
 fn projection_onto_a_cone() {
     for p in [[1.0, 2.0, -2.0], [3.0, 1.0, 1.0], [-3.0, 1.0, 1.0], [0.0, 3.0, 4.0]] {
@@ -40,7 +40,8 @@ fn projection_onto_a_cone() {
     }
 }
 
-/// Solves min ½ ‖x − p‖² with l ≤ x ≤ u, with and without Σ x = 1: p is shifted by the sum's multiplier and clipped.
+/// Solves min ½ ‖x − p‖² with l ≤ x ≤ u, with and without Σ x = 1. The solution is p, shifted by the multiplier of the
+/// sum and clipped.
 #[test]
 fn projection_onto_a_box_and_a_plane() {
     let (p, lower, upper) = ([2.0, -1.0, 0.3, 0.5], [0.0, -0.5, 0.5, -9.0], [1.0, f64::INFINITY, 0.5, 9.0]);
@@ -71,9 +72,9 @@ fn projection_onto_a_box_and_a_plane() {
     }
 }
 
-/// Solves for a block of mass m on an incline of angle α, which friction holds while tan α ≤ μ. The minimum of ½ ‖f − m
-/// g‖² over the friction cone is then f = m g. For larger α it is the projection, of length m g cos(α − arctan μ) along
-/// the cone's edge.
+/// Solves for the force f on a block of mass m on an incline of angle α, which friction holds while tan α ≤ μ. The
+/// minimum of ½ ‖f − m g‖² over the friction cone is then f = m g. For larger α, f is the projection of m g onto the
+/// cone, of length m g cos(α − arctan μ) along the cone's edge.
 #[test]
 fn a_block_on_an_incline() {
     let (weight, friction) = (9.81 * 3.0, 0.6_f64);

@@ -10,7 +10,7 @@ fn radius(s: &[f64]) -> f64 {
     s.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// Errors, each relative to the terms that it is the difference of.
+/// Errors in the conditions, each relative to the terms of which it is the difference.
 #[derive(Debug, Default)]
 pub(super) struct Errors {
     /// P x + c − Aᵀ y − Gᵀ z − Fᵀ w.

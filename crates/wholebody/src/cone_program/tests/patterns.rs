@@ -1,9 +1,9 @@
-//! Clarabel's patterns grow with non-zero numbers, and its rows grow with the limits that bind.
+//! Clarabel's pattern grows when numbers become non-zero, and its set of rows grows when limits bind.
 
 use super::random::{Draw, Kind};
 use crate::cone_program::{Clarabel, ConeProgram, Settings, Size, Solver, Start, Status};
 
-/// Tolerance of x, which has size one; both solves have the tolerance 1e-9.
+/// Tolerance of x, whose numbers have size one; both solves have the tolerance 1e-9.
 const AGREEMENT: f64 = 1e-6;
 
 fn assert_same(kept: &mut Clarabel, program: &ConeProgram) {
@@ -15,7 +15,7 @@ fn assert_same(kept: &mut Clarabel, program: &ConeProgram) {
     }
 }
 
-/// Zeros of P, A, G and F become non-zero numbers, and zeros again.
+/// Tests zeros of P, A, G and F that become non-zero numbers, and zeros again.
 #[test]
 fn numbers_come_where_there_were_zeros() {
     for seed in 0..10 {
@@ -36,7 +36,7 @@ fn numbers_come_where_there_were_zeros() {
     }
 }
 
-/// Returns the program ½ ‖x − a‖² within −1 ≤ x ≤ 1, whose solution is a, clipped.
+/// Returns the program ½ ‖x − a‖² within −1 ≤ x ≤ 1. Its solution is a clipped to this interval.
 fn within_a_box(a: [f64; 3]) -> ConeProgram {
     let mut program = ConeProgram::new(Size { unknowns: 3, equalities: 0, rows: 3, cone_rows: 0 });
     for i in 0..3 {
@@ -49,7 +49,7 @@ fn within_a_box(a: [f64; 3]) -> ConeProgram {
     program
 }
 
-/// Limits that a solution violates are found in the same solve, with their multipliers, after any earlier solves.
+/// Limits that a solution violates are added within the same solve, with their multipliers, whatever was solved before.
 #[test]
 fn limits_that_were_far_away_bind() {
     let mut kept = Clarabel::new(within_a_box([0.0; 3]).capacity(), Settings::default());
@@ -61,14 +61,15 @@ fn limits_that_were_far_away_bind() {
             for i in 0..3 {
                 let x = a[i].clamp(-1.0, 1.0);
                 assert!((kept.x()[i] - x).abs() < AGREEMENT, "{a:?}: {:?}", kept.x());
-                // x − a = z
+                // The multiplier is z = x − a.
                 assert!((kept.multipliers().rows[i] - (x - a[i])).abs() < AGREEMENT * (1.0 + a[i].abs()), "{a:?}");
             }
         }
     }
 }
 
-/// Rows that are left out do not make a program unbounded, and their solve counts towards the limits.
+/// A program with rows left out is not reported as unbounded, and the iterations of its first solve count towards the
+/// limit.
 #[test]
 fn rows_left_out_change_no_status() {
     let mut program = within_a_box([0.5, 0.5, 4.0]);
@@ -87,7 +88,7 @@ fn rows_left_out_change_no_status() {
     }
 }
 
-/// A row that was away for a long time is left out again, and returns.
+/// A row to which no solution was close for a long time is left out again. Later it returns.
 #[test]
 fn limits_come_and_go() {
     let mut kept = Clarabel::new(within_a_box([0.0; 3]).capacity(), Settings::default());

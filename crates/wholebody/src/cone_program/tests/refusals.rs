@@ -3,14 +3,14 @@
 use super::random::{Draw, Kind};
 use crate::cone_program::{Clarabel, ConeProgram, InteriorPoint, Settings, Size, Solver, Start, Status};
 
-/// Writes a number into a program.
+/// Function that writes an invalid number into a program.
 type Spoil = fn(&mut ConeProgram, f64);
 
 fn ours(program: &ConeProgram) -> InteriorPoint {
     InteriorPoint::new(program.capacity(), Settings::default())
 }
 
-/// Returns a feasible program with a last row, a last equality and a last cone, which tests spoil.
+/// Returns a feasible program. Tests spoil its last row, its last equality and its last cone.
 fn program(seed: u64) -> ConeProgram {
     Draw::new(seed).program(Kind::Plain, 12, [2, 20, 4])
 }
@@ -30,7 +30,7 @@ fn constraints_that_exclude_each_other_are_proved_to() {
         equalities.At.set_column(1, &(first * 2.0));
         (equalities.b[0], equalities.b[1]) = (1.0, 2.5);
 
-        // s₀ ≥ ‖s₁‖ ≥ 0, and s₀ ≤ −0.1
+        // The cone requires s₀ ≥ ‖s₁‖ ≥ 0, but a row requires s₀ ≤ −0.1.
         let mut cone = program(seed);
         let head = cone.Ft.column(0).into_owned();
         cone.Gt.set_column(last, &head);
@@ -50,7 +50,7 @@ fn constraints_that_exclude_each_other_are_proved_to() {
     }
 }
 
-/// min −x₀ + ½ x₁² with x₀ ≥ 0 and ‖x₂‖ ≤ 1 + x₀.
+/// Solves min −x₀ + ½ x₁² with x₀ ≥ 0 and ‖x₂‖ ≤ 1 + x₀, which is unbounded.
 #[test]
 fn an_objective_without_a_lower_bound_is_named() {
     let mut program = ConeProgram::new(Size { unknowns: 3, rows: 1, cone_rows: 2, equalities: 0 });
@@ -88,7 +88,7 @@ fn numbers_that_are_not_finite_are_named() {
         }
     }
     let mut program = program(1);
-    program.P[(3, 5)] = f64::NAN; // not read
+    program.P[(3, 5)] = f64::NAN; // the upper triangle is not read
     program.lower[2] = f64::INFINITY;
     let stopped = ours(&program).solve(&program, Start::Cold).stopped;
     assert_eq!(stopped, Some(Status::NotFinite { name: "lower", index: 2 }));
@@ -111,7 +111,7 @@ fn limits_end_a_solve_with_a_finite_iterate() {
     }
 }
 
-/// Numbers too large or too different in size for any solver: for every status, no result is NaN.
+/// Numbers that are too large, or differ too much in size, for any solver: whatever the status, no result is NaN.
 #[test]
 fn wild_numbers_never_become_nan() {
     for seed in 0..200 {

@@ -9,14 +9,15 @@ const FRICTION: f64 = 0.6;
 /// Seconds from one tick to the next.
 const TICK: f64 = 0.002;
 
-/// Sequence of programs as for a robot: x = (accelerations, forces at points).
+/// Sequence of programs that resemble the programs of a robot: x = (accelerations, forces at points).
 #[derive(Clone)]
 pub(super) struct Walk {
     accelerations: usize,
     points: usize,
     tasks: DMatrix<f64>,
     weights: Vec<f64>,
-    /// Amplitude, frequency and phase of each task's target; the next field: of each limit's offset.
+    /// Amplitude, frequency and phase of each task's target. The next field holds the same numbers for the offset of
+    /// each limit.
     motion: Vec<[f64; 3]>,
     offsets: Vec<[f64; 3]>,
     references: Vec<[f64; 3]>,
@@ -30,12 +31,14 @@ pub(super) struct Walk {
 }
 
 impl Walk {
-    /// Creates a humanoid's programs: 44 unknowns, 32 efforts, 64 accelerations, 8 points.
+    /// Creates programs like a humanoid's, with 44 unknowns. Their rows limit 32 efforts and 64 accelerations, and 8
+    /// points have a friction cone.
     pub(super) fn humanoid(seed: u64) -> Self {
         Self::new(seed, 20, 8, [32, 64], 30)
     }
 
-    /// Creates a quadruped's programs: 18 unknowns, 12 efforts, 12 accelerations, 4 points.
+    /// Creates programs like a quadruped's, with 18 unknowns. Their rows limit 12 efforts and 12 accelerations, and 4
+    /// points have a friction cone.
     pub(super) fn quadruped(seed: u64) -> Self {
         Self::new(seed, 6, 4, [12, 12], 10)
     }
@@ -86,7 +89,7 @@ impl Walk {
         program
     }
 
-    /// Writes the program of a tick.
+    /// Writes the program of a tick into `program`.
     pub(super) fn write(&self, tick: usize, program: &mut ConeProgram) {
         let (n, na, t) = (program.size.unknowns, self.accelerations, TICK * tick as f64);
         let wave = |[amplitude, frequency, phase]: [f64; 3]| amplitude * (frequency * t + phase).sin();
@@ -95,7 +98,7 @@ impl Walk {
         program.P.fill(0.0);
         program.c.fill(0.0);
         for j in 0..n {
-            // Forces are attracted to their references, some of which lie outside of the cones.
+            // Each force is attracted to a reference force, which may lie outside of the cone.
             program.P[(j, j)] = 1e-3;
             if j >= na {
                 let reference = if (j - na) % 3 == 2 {
@@ -115,7 +118,7 @@ impl Walk {
                 }
             }
         }
-        // The sum of the forces carries the load and accelerates it: weight 1 on each axis, in units of the load.
+        // The sum of the forces carries and accelerates the load. Each axis has the weight 1, in units of the load.
         for axis in 0..3 {
             let of = |j: usize| {
                 if j < na {

@@ -1,14 +1,14 @@
-//! Sequences of programs: the last solution helps, and its remains never harm.
+//! Sequences of programs: a start from the last solution helps, and earlier solves never harm.
 
 use super::kkt::Errors;
 use super::random::{Draw, Kind};
 use super::walk::Walk;
 use crate::cone_program::{InteriorPoint, Settings, Solver, Start};
 
-/// Tolerance of the conditions. The solver's 1e-9 is relative to the greatest of all terms; here each row is measured
-/// by its own terms.
+/// Tolerance of the Karush–Kuhn–Tucker conditions. The solver's tolerance of 1e-9 is relative to the largest term of
+/// all rows; here the error of each row is relative to the largest term of this row.
 const KKT_TOLERANCE: f64 = 1e-7;
-/// Tolerance of the objective for both gaps together, relative to the objective.
+/// Tolerance of the objective, relative to the objective; it covers the duality gaps of both solves.
 const OBJECTIVE_TOLERANCE: f64 = 1e-8;
 const TICKS: usize = 200;
 
@@ -38,7 +38,7 @@ fn a_sequence_that_moves_slowly_takes_half_the_iterations() {
     }
 }
 
-/// Starts from the solution of another, very different program of the same or another size.
+/// Starts each solve from the solution of a very different program, which may have another size.
 #[test]
 fn a_useless_start_gives_way() {
     let mut solver = None;
@@ -58,7 +58,7 @@ fn a_useless_start_gives_way() {
     }
 }
 
-/// Earlier solves leave nothing behind: a cold start gives the same bits as a new solver.
+/// Earlier solves leave no trace: a cold start gives the same bits as a new solver.
 #[test]
 fn a_cold_start_has_no_memory() {
     let mut used: Option<InteriorPoint> = None;
