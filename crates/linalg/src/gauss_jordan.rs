@@ -7,11 +7,10 @@ use condyle_spatial::{Dense, DenseMatrix, Scalar};
 ///
 /// ```text
 /// A_ij ← A_ij − c_i d c_j,    A_ik ← c_i d,    A_kk ← −d:     from M to −M⁻¹
-/// Only the lower triangle of A is read. For lanes, only this triangle is computed. For single numbers, whole columns
-/// are computed, also column k: a column is one register, and the loop needs no exception for k.
+/// ```
 ///
 /// Only the lower triangle of A is read. For lanes, only this triangle is computed. For single numbers, whole columns
-/// are computed, column k included, because columns are registers and the loop then has no gap.
+/// are computed, also column k: a column is one register, and the loop needs no exception for k.
 #[inline(always)]
 pub fn gauss_jordan<S: Scalar, const MOST: usize>(
     M: &DenseMatrix<S, impl Dense<S>>,

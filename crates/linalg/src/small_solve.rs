@@ -9,13 +9,11 @@ use condyle_spatial::{Dense, DenseMatrix, Scalar};
 /// ```text
 /// l = A_k / d_k,    A_j ← A_j − l_j A_k  (j > k),    y ← y − y_k l,    z_k = y_k / d_k
 /// x_k = z_k − Σ l_ik x_i  (i > k)
+/// ```
+///
 /// Whole columns are computed, so that loops have no remainder; the entries above the diagonal are never read. M must
 /// be positive definite: there is no pivoting. Source: Golub and Van Loan, *Matrix Computations* (4th edition), section
 /// 4.1.
-///
-/// Whole columns are computed, also the entries above the diagonal that nothing reads, so that loops have no remainder.
-/// M must be positive definite: there are no pivots. Source: Golub and Van Loan, *Matrix Computations* (4th edition),
-/// section 4.1.
 #[inline(always)]
 pub fn small_solve<S: Scalar, const MOST: usize>(M: &DenseMatrix<S, impl Dense<S>>, b: &mut [S]) {
     let n = b.len();
