@@ -50,12 +50,14 @@ impl<S: Scalar> Quaternion<S> {
             z: Vec3::new(xz + wy, yz - wx, one - xx - yy),
         }
     }
-    /// Returns the quaternion of a rotation matrix. Its largest component is computed first (Shepperd 1978).
+    /// Returns the quaternion of a rotation matrix. The largest component of the quaternion is computed first (Shepperd
+    /// 1978).
     #[inline(always)]
     pub fn from_rotation(R: Mat3<S>) -> Self {
         let (a, b, c) = (R.x.x, R.y.y, R.z.z);
         let one = S::one();
-        // four times the products of one component with all four (x, y, z, w)
+        // Four times the products of components: `w` is 4w², `xy` is 4xy, and so on. The products of one component with
+        // all four are the quaternion times a factor.
         let (w, x, y, z) = (one + a + b + c, one + a - b - c, one - a + b - c, one - a - b + c);
         let (wx, wy, wz) = (R.y.z - R.z.y, R.z.x - R.x.z, R.x.y - R.y.x);
         let (xy, xz, yz) = (R.x.y + R.y.x, R.x.z + R.z.x, R.y.z + R.z.y);
