@@ -281,7 +281,7 @@ impl ModelBuilder {
         order
     }
 
-    /// Checks that there are not too many degrees of freedom.
+    /// Checks that a model does not have too many degrees of freedom.
     pub(crate) fn check_size(&self) -> Result<(), Error> {
         let degrees = |draft: &Draft| draft.body.joint.nv();
         let joints = || self.drafts.iter().skip(1);

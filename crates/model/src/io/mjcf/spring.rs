@@ -1,4 +1,4 @@
-//! Joints of a file, with their springs and losses, and lengths as linear functions of the model's coordinates.
+//! Joints of an MJCF with their springs and losses, and lengths as linear functions of the model's coordinates.
 
 use super::attributes::Attributes;
 use super::law::fill;
@@ -13,7 +13,7 @@ use condyle_spatial::{Quaternion, Se3};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Switches of `<option>`; MuJoCo does not compute features that are set to `disable`.
+/// Flags of `<option>`. MuJoCo does not compute a feature whose flag is `disable`.
 pub(super) struct Switches {
     pub(super) spring: bool,
     pub(super) damper: bool,
@@ -22,7 +22,7 @@ pub(super) struct Switches {
     pub(super) equality: bool,
     pub(super) actuation: bool,
     pub(super) clamp: bool,
-    /// Groups of disabled actuators.
+    /// Groups of actuators that are disabled.
     pub(super) groups: Vec<f64>,
 }
 
@@ -66,7 +66,8 @@ pub(super) struct FileJoint<'a> {
     stiffness: [f64; 3],
     /// Position at which the spring of a hinge or slide is at rest.
     rest: f64,
-    /// Time constant (s) and damping ratio that determine stiffness and damping, or zeros.
+    /// Time constant (s) and damping ratio, from which stiffness and damping are computed. They are 0 if they are not
+    /// given.
     spring_damper: [f64; 2],
     damping: [f64; 3],
     friction: f64,
@@ -76,12 +77,12 @@ pub(super) struct FileJoint<'a> {
     pub(super) range: [f64; 2],
     /// Whether the spring yields.
     is_plastic: bool,
-    /// Whether actuators carry the weight that is compensated.
+    /// Whether the actuators of the joint carry the weight that gravity compensation carries.
     carries_weight: bool,
 }
 
 impl<'a> FileJoint<'a> {
-    /// Reads the properties of a joint except its kinematics; `angle` is the unit of angle in radians.
+    /// Reads the properties of a joint except its kinematics. `angle` is the file's unit of angle, in radians.
     pub(super) fn read(a: &Attributes<'a>, joint: Joint, angle: f64, autolimits: bool) -> Result<Self, Error> {
         let plain = Attributes::plain(a.element);
         let a = if a.element.tag == "freejoint" { &plain } else { a };
@@ -119,7 +120,8 @@ impl<'a> FileJoint<'a> {
         })
     }
 
-    /// Returns the joint with the index of its body, and the body's pose in the initial configuration of the file.
+    /// Returns this joint, after storing the index of its body and the body's pose in the initial configuration of the
+    /// file.
     pub(super) fn on(self, body: usize, pose: Se3<f64>) -> Self {
         Self { body, pose, ..self }
     }
