@@ -50,9 +50,9 @@ const MODEL_PATHS: [&str; 4] = ["GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PAT
 /// Returns the file, or the folder with a `model.config`, at the address of a model: `model://`, `package://`,
 /// `file://`, or a path.
 ///
-/// A path may be relative to the folder of the file that contains the address. Otherwise, addresses and paths are
-/// searched in `packages`, in the folder of that file and its parent folder, in the `models` folder of both, and in the
-/// folders listed in environment variables of Gazebo and ROS.
+/// A path may be relative to the folder of the file that contains the address. Otherwise, the address is searched in
+/// `packages`, in the folder of that file and its parent folder, and in the `models` folder of both. Finally, it is
+/// searched in the folders listed in environment variables of Gazebo and ROS.
 pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Error> {
     let (scheme, path) = address.split_once("://").map_or(("", address), |(scheme, path)| (scheme, path));
     let missing = |what: &str| Error::File { file: address.to_owned(), what: what.to_owned() };

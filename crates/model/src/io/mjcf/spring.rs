@@ -144,12 +144,12 @@ impl<'a> FileJoint<'a> {
         first..first + self.joint.nv()
     }
 
-    /// Computes stiffness and damping from a time constant and a damping ratio. `response` is the acceleration of a
-    /// column due to a unit effort.
+    /// Computes stiffness and damping from a time constant and a damping ratio. `response(k)` is the acceleration of
+    /// column k due to a unit effort.
     pub(super) fn find_spring(&mut self, columns: Range<usize>, response: &dyn Fn(usize) -> f64) {
         let [time, ratio] = self.spring_damper;
         if time > 0.0 {
-            // mean inertia along the joint, and the oscillator with this inertia
+            // Stiffness and damping are those with which the mean inertia along the joint oscillates as specified.
             let nv = columns.len() as f64;
             let sum: f64 = columns.map(response).sum();
             let inertia = nv / sum.max(LEAST);
@@ -187,13 +187,13 @@ impl<'a> FileJoint<'a> {
         self.spring_damper[0] > 0.0
     }
 
-    /// Returns the position at which the spring of a hinge or slide is at rest.
+    /// Returns the position of a hinge or slide at which its spring is at rest.
     pub(super) fn rest(&self) -> f64 {
         self.rest
     }
 }
 
-/// Smallest divisor that MuJoCo uses.
+/// Smallest number by which MuJoCo divides.
 const LEAST: f64 = 1e-15;
 
 /// Joints of a file, in MuJoCo's order.
@@ -225,20 +225,20 @@ impl<'a> Joints<'a> {
     }
 }
 
-/// Length that depends on one coordinate only: l = slope · q + offset.
+/// Length that depends on a single coordinate q: l = slope · q + offset.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Index of the coordinate in v.
+    /// Index in v of the coordinate's degree of freedom.
     pub(super) dof: usize,
-    /// Index of the body whose joint has the coordinate.
+    /// Index of the body whose joint has this coordinate.
     leader: usize,
     pub(super) slope: f64,
     offset: f64,
 }
 
 impl Line {
-    /// Returns the position of the joint that carries a body, as a function of its leader's coordinate if it follows
-    /// another joint.
+    /// Returns the position of the joint that carries a body, as a function of the joint's coordinate. If the joint
+    /// follows another joint, it is the coordinate of the leader.
     pub(super) fn of(model: &Model, body: usize) -> Self {
         let Body { idx_v: dof, mimic, .. } = model.bodies[body];
         match mimic {
@@ -251,12 +251,13 @@ impl Line {
         }
     }
 
-    /// Returns the line of degree of freedom k of the same joint.
+    /// Returns the same length for degree of freedom k of the joint.
     pub(super) fn at(self, k: usize) -> Self {
         Self { dof: self.dof + k, ..self }
     }
 
-    /// Returns the sum of lengths, each times a coefficient; `None` unless all depend on the same coordinate.
+    /// Returns the sum of lengths, each times a coefficient. Returns `None` if the lengths depend on different
+    /// coordinates.
     pub(super) fn sum(lines: &[(Self, f64)]) -> Option<Self> {
         let &(first, _) = lines.first()?;
         let mut sum = Self { slope: 0.0, offset: 0.0, ..first };
@@ -267,8 +268,8 @@ impl Line {
         lines.iter().all(|(line, _)| line.dof == first.dof).then_some(sum)
     }
 
-    /// Adds damping d(l̇) = d₀ + d₁|l̇| + d₂l̇² and Coulomb friction of the length: with l̇ = k q̇, the effort is −k
-    /// d(k q̇) k q̇.
+    /// Adds damping d(l̇) = d₀ + d₁|l̇| + d₂l̇² and Coulomb friction of this length l. If l̇ = k q̇, the damping has
+    /// the effort −k d(k q̇) k q̇.
     pub(super) fn resist(self, model: &mut Model, [d0, d1, d2]: [f64; 3], friction: f64) {
         let k = self.slope.abs();
         model.damping[self.dof] += d0 * k * k;
@@ -283,7 +284,8 @@ impl Line {
         model.armature[self.dof] += self.slope * self.slope * armature;
     }
 
-    /// Adds a spring with the given rest length: with x = l − rest = k Δ, the effort is −k (s₀ + s₁ x + s₂ x²) x.
+    /// Adds a spring with a rest length to this length l. If l − rest = k Δ = x, where Δ is a difference of positions,
+    /// the effort is −k (s₀ + s₁ x + s₂ x²) x.
     pub(super) fn spring(self, model: &mut Model, [s0, s1, s2]: [f64; 3], rest: f64) {
         let k = self.slope;
         if k != 0.0 {
@@ -292,8 +294,8 @@ impl Line {
         }
     }
 
-    /// Limits the length, and returns whether this was possible: limits that exclude the joint's own limits are
-    /// ignored.
+    /// Limits this length, and returns whether this was possible. Limits of the length that contradict the limits of
+    /// the joint are ignored.
     pub(super) fn limit(self, model: &mut Model, [lower, upper]: [f64; 2]) -> bool {
         if self.slope == 0.0 {
             return true;
