@@ -61,8 +61,9 @@ pub enum Joint {
 /// sin θ]. Its ratio must be an integer, and the follower turns by ratio · θ + offset. If the follower is continuous
 /// and the leader has one number, the follower turns by ratio · q + offset.
 ///
-/// The follower's armature is added to the leader's coordinate as ratio² · armature, and its spring acts there, too.
-/// Its limits, damping and friction are ignored: as in Pinocchio, the coordinate has only the leader's values.
+/// As described at [`ModelBuilder::mimic`](crate::ModelBuilder::mimic), the follower's limits of position and velocity,
+/// damping, friction and armature act on the leader's coordinate. The armature is added as ratio² · armature. The
+/// follower's spring acts on this coordinate, too. Its limits of effort have no effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
@@ -251,7 +252,7 @@ impl Joint {
         }
     }
 
-    /// Returns column k of S in the world's frame, for a joint whose body is at oX.
+    /// Returns column k of S in the world's frame, for a joint whose body is at the pose oX.
     #[doc(hidden)]
     #[inline(always)]
     pub fn column<S: Scalar>(self, oX: &Se3<S>, k: usize) -> Motion<S> {
@@ -269,7 +270,7 @@ impl Joint {
         }
     }
 
-    /// Returns S of a joint that turns about z.
+    /// Returns the column S of a joint that turns about z, in the world's frame.
     #[doc(hidden)]
     #[inline(always)]
     pub fn column_about_z<S: Scalar>(oX: &Se3<S>) -> Motion<S> {
@@ -277,8 +278,8 @@ impl Joint {
     }
 }
 
-/// Returns cos kθ and sin kθ for an integer k, given cos θ and sin θ: (cos θ + i sin θ)ᵏ by repeated squaring. It is
-/// rarely used, so it is not inlined into the passes.
+/// Returns cos kθ and sin kθ for an integer k, given cos θ and sin θ. Computes (cos θ + i sin θ)ᵏ by repeated squaring.
+/// The function is rarely used, so it is not inlined into the passes.
 #[cold]
 #[inline(never)]
 fn multiple<S: Scalar>([cos, sin]: [S; 2], k: f64) -> [S; 2] {
@@ -306,7 +307,7 @@ impl<S: Scalar> Kernel for Multiple<'_, S> {
     }
 }
 
-/// Returns X_T, followed by a rotation about z.
+/// Returns the pose X_T, followed by a rotation about z.
 #[inline(always)]
 fn rotated_about_z<S: Scalar>(X_T: Se3<S>, sin: S, cos: S) -> Se3<S> {
     let Mat3 { x, y, z } = X_T.rotation;
