@@ -1,4 +1,4 @@
-//! Functions that this crate compiles for each SIMD level and other crates call.
+//! Macros for functions that this crate compiles for each SIMD level, and that other crates call.
 
 /// Defines functions that are generic over the register type V and over COLUMNS, the number of columns of a tile. The
 /// [gate](condyle_spatial::gate) turns each of them into a function without generic parameters.

@@ -1,8 +1,9 @@
 //! Elimination tree: the entries of the factor of a matrix whose zeros follow a tree.
 //!
 //! If each row of the matrix corresponds to one column of the tree, the elimination tree is that tree. If several
-//! columns share a row, branches are coupled. The rows are then eliminated in order of least coupling, and the factor
-//! follows the elimination tree of that order (Liu, *The role of elimination trees in sparse factorization*, 1990).
+//! columns share a row, branches are coupled. The rows are then eliminated in an order of minimum degree, and the
+//! factor follows the elimination tree of this order (Liu, *The role of elimination trees in sparse factorization*,
+//! 1990).
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;

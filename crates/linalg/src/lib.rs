@@ -86,7 +86,7 @@ pub fn check_index(argument: &str, found: usize, count: usize, things: &str) {
     }
 }
 
-/// Panics for [`check_index`]; not inlined.
+/// Panics on behalf of [`check_index`]. This function is not inlined.
 #[cold]
 #[inline(never)]
 #[track_caller]
@@ -94,7 +94,8 @@ fn wrong_index(argument: &str, found: usize, count: usize, things: &str) -> ! {
     panic!("{argument}: expected an index below {count}, the number of {things}, found {found}");
 }
 
-/// Panics for [`check`]; not inlined, because hundreds of functions check several arguments each.
+/// Panics on behalf of [`check`]. This function is not inlined, because hundreds of functions check several arguments
+/// each.
 #[cold]
 #[inline(never)]
 #[track_caller]

@@ -21,7 +21,7 @@ unsafe impl Witness for Gate {}
 
 /// Register of N numbers.
 pub trait Vector: Copy {
-    /// Number of numbers in a register.
+    /// Number of `f64` numbers in a register.
     const N: usize;
 
     /// Loads the first N numbers of `x`.

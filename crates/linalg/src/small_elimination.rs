@@ -199,7 +199,7 @@ unsafe fn eliminate_strip<V: Vector, const S: usize>(
         at += stride;
     }
     let at = at + i;
-    // SAFETY: by the caller; column j begins where j columns end.
+    // SAFETY: guaranteed by the caller; the slice of column j begins after the first j columns.
     let column = unsafe { h.get_unchecked_mut(at..at + S * V::N) };
     if i == j {
         sums[0].store(column);

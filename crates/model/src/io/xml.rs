@@ -243,7 +243,7 @@ impl Element {
     }
 }
 
-/// Advice about macros of xacro, which no reader expands.
+/// Advice for files with macros of xacro. No reader expands such macros.
 const EXPAND: &str = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
 
 /// Returns whether a text is a path, given by mistake instead of the text of a robot's file.

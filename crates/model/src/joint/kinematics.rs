@@ -10,9 +10,9 @@ use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, 
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct JointSinCos<S> {
-    /// Sines. Shape: bodies, rounded up to whole steps. Written by: `Joint::sin_cos`.
+    /// Sine of the angle of each joint. Shape: bodies, rounded up to whole steps. Written by: `Joint::sin_cos`.
     pub sin: Array<S>,
-    /// Cosines. Shape: as sin. Written by: `Joint::sin_cos`.
+    /// Cosine of the angle of each joint. Shape: as `sin`. Written by: `Joint::sin_cos`.
     pub cos: Array<S>,
 }
 

@@ -14,9 +14,9 @@ use crate::scalar::Scalar;
 /// Computes the entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, at t = θ²:
 /// cos θ, sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, (cos θ − 1 + θ²/2)/θ⁴, (sin θ − θ + θ³/6)/θ⁵.
 ///
-/// Source: Stumpff (1959). For t < 1, c₄ and c₅ are computed by their series, and the others by the recurrence
-/// cₖ = 1/k! − t cₖ₊₂, to full relative precision (without cancellation). For t ≥ 1, sine and cosine and the same
-/// recurrence upwards give errors within 1e-15.
+/// Source: Stumpff (1959). For t < 1, c₄ and c₅ are computed by their series. The others follow from the recurrence cₖ
+/// = 1/k! − t cₖ₊₂ with full relative precision, because nothing cancels. For t ≥ 1, c₀ and c₁ are computed by cosine
+/// and sine, and the others by the same recurrence upwards, with errors within 1e-15.
 ///
 /// ```
 /// let c = condyle_spatial::lie::stumpff(0.0_f64);

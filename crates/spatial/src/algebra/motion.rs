@@ -42,7 +42,7 @@ macro_rules! impl_six {
             pub fn new(linear: Vec3<S>, angular: Vec3<S>) -> Self {
                 Self { linear, angular }
             }
-            /// Returns the six numbers, linear first.
+            /// Returns the six numbers, the linear part first.
             #[inline(always)]
             pub fn to_array(self) -> [S; 6] {
                 let (l, a) = (self.linear, self.angular);

@@ -82,7 +82,7 @@ impl<S: Scalar> core::ops::Mul for Quaternion<S> {
     }
 }
 
-/// Returns p where the mask holds, q elsewhere.
+/// Returns p in lanes in which the mask holds, and q in other lanes.
 #[inline(always)]
 fn choose<S: Scalar>(m: S::Mask, p: [S; 4], q: [S; 4]) -> [S; 4] {
     [S::select(m, p[0], q[0]), S::select(m, p[1], q[1]), S::select(m, p[2], q[2]), S::select(m, p[3], q[3])]

@@ -94,7 +94,7 @@ pub trait Scalar:
     }
     /// Returns self < other.
     fn lt(self, other: Self) -> Self::Mask;
-    /// Returns a where the mask holds, b elsewhere.
+    /// Returns a in lanes in which the mask holds, and b in other lanes.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Returns whether both masks hold.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;

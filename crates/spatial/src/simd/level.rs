@@ -148,7 +148,8 @@ pub fn level() -> Level {
 /// `assert_supported`.
 #[inline(always)]
 pub(crate) fn assert_supported(level: Level) {
-    /// Best level of this processor; 0 before the first query. (It includes all lower levels of its architecture.)
+    /// Best level of this processor; 0 before the first query. (A processor with this level also has all lower levels
+    /// of its architecture.)
     static BEST: AtomicU8 = AtomicU8::new(0);
     #[cold]
     fn find(level: Level) {

@@ -125,7 +125,7 @@ impl<S: Block<Number: Number>> Kernel for Sines<S> {
     }
 }
 
-/// Checks operations between lanes: moves of each number to each lane, and the sum of all lanes.
+/// Check of operations between lanes: numbers are moved from each lane to each lane, and all lanes are summed.
 struct Moves;
 
 impl Kernel for Moves {

@@ -279,7 +279,7 @@ impl Line {
         model.friction[self.dof] += friction * k;
     }
 
-    /// Adds an inertia that moves with the length.
+    /// Adds an inertia that moves with this length, as armature of its coordinate.
     pub(super) fn inertia(self, model: &mut Model, armature: f64) {
         model.armature[self.dof] += self.slope * self.slope * armature;
     }

@@ -29,7 +29,7 @@ pub(super) struct Includes<'o> {
     /// Number of includes that have been read.
     count: usize,
     pub(super) warnings: Vec<Warning>,
-    /// Error of the first model of a world that was left out because its file was not found.
+    /// Error about the first model of a world that was left out because the file of this model was not found.
     pub(super) missing: Option<Error>,
 }
 

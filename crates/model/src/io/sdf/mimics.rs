@@ -13,7 +13,7 @@ use std::collections::HashMap;
 #[derive(Default)]
 pub(super) struct Axes<'a> {
     bodies: HashMap<(usize, &'static str), BodyId>,
-    /// Joint, its `<mimic>` element, and the body that follows.
+    /// For each follower, its joint, its `<mimic>` element, and its body.
     followers: Vec<(usize, &'a Element, BodyId)>,
 }
 

@@ -31,7 +31,7 @@ pub(super) struct Changes {
 /// New inertia of a body, distributed over the links of the body.
 pub(super) struct LinkChange {
     body: usize,
-    /// Name of the link that takes the difference.
+    /// Name of the link that takes the difference between the body's new and old inertia.
     pub(super) link: String,
     /// Pose, in the body, of the link that takes the difference.
     placement: Se3<f64>,
@@ -235,8 +235,8 @@ fn joints(model: &Model, was: &Model) -> Result<Vec<JointChange>, String> {
     Ok(changes)
 }
 
-/// Returns whether two numbers are equal up to rounding. The tolerance of numbers below 0.001, such as sums of small
-/// armatures, is the tolerance of 0.001.
+/// Returns whether two numbers are equal up to rounding. Numbers below 0.001, such as sums of small armatures, have the
+/// same tolerance as 0.001.
 pub(super) fn close(a: f64, b: f64, rounding: f64) -> bool {
     let tolerance = rounding * a.abs().max(b.abs()).max(1e-3);
     a == b || tolerance.is_finite() && (a - b).abs() <= tolerance

@@ -62,7 +62,7 @@ impl<T: Number, const N: usize> Register<T, N> for [T; N] {
     }
 }
 
-/// Moves of numbers between the lanes of a vector of four.
+/// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
     use super::{Lanes, Witness};
 

@@ -79,7 +79,7 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn abs(a: Self) -> Self;
     /// Returns a < b.
     fn lt(a: Self, b: Self) -> Self::Mask;
-    /// Returns a where the mask holds, b elsewhere.
+    /// Returns a in lanes in which the mask holds, and b in other lanes.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Returns whether both masks hold.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;

@@ -84,7 +84,7 @@ pair! {
     vabsq_f32 vcltq_f32 vbslq_f32 vandq_u32 vorrq_u32 vmaxvq_u32;
 }
 
-/// Moves of numbers between the lanes of a vector of four.
+/// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 

@@ -85,7 +85,7 @@ pair! {
     f32x4_splat f32x4_add f32x4_sub f32x4_mul f32x4_div f32x4_sqrt f32x4_neg f32x4_abs f32x4_lt;
 }
 
-/// Moves of numbers between the lanes of a vector of four.
+/// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 

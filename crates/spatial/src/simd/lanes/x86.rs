@@ -172,7 +172,7 @@ instructions! {
     }}
 }
 
-/// Moves of numbers between the lanes of a vector of four.
+/// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 
