@@ -251,7 +251,7 @@ impl Line {
         }
     }
 
-    /// Returns the same length for degree of freedom k of the joint.
+    /// Returns the length that depends on degree of freedom k of the joint in the same way.
     pub(super) fn at(self, k: usize) -> Self {
         Self { dof: self.dof + k, ..self }
     }

@@ -357,7 +357,7 @@ impl Law<'_> {
         matches!(self.affine(), Ok([gain, _, kp, kv]) if gain == kp && kv < 0.0)
     }
 
-    /// Returns a description of the effect that a model has no activations and only one control for each actuator.
+    /// Returns the effect that is lost because a model has no activations and only one control for each actuator.
     fn left_out(&self) -> &'static str {
         let inputs = self.input.unwrap_or(if self.gain == "pid" { "pos vel" } else { "voltage" });
         match self.dynamics {

@@ -227,8 +227,8 @@ impl<'a> Scopes<'a> {
         get(&full).or_else(inner).or_else(|| get(&format!("{full}::{MODEL}"))).map(Some)
     }
 
-    /// Returns the end of a message about an unknown name. It contains the nearest name of the items with a tag in a
-    /// scope.
+    /// Returns the end of a message about an unknown name: the nearest name among the items in a scope that have a
+    /// given tag.
     pub(super) fn near(&self, scope: usize, name: &str, tag: &str) -> String {
         let prefix = &self.scopes[scope].prefix;
         let fits = |item: &&Item| tag.is_empty() || item.element.tag == tag;

@@ -16,8 +16,8 @@ impl Model {
     /// - A missing limit consists of zeros in `urdf_rs::Robot`. Zeros of a continuous joint are treated as no limit.
     ///   Zeros of a revolute or prismatic joint stay, and cause a warning.
     /// - A planar joint without an axis has the axis 1 0 0, without a warning about this default.
-    /// - Versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions, frames and joints of
-    ///   Drake, and unknown or unsupported names are missing. They have no effect and cause no warning.
+    /// - `urdf_rs::Robot` lacks versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions,
+    ///   frames and joints of Drake, and unknown or unsupported names. They have no effect and cause no warning.
     ///
     /// Needs the feature `urdf-rs`.
     ///
