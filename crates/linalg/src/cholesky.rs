@@ -57,9 +57,9 @@ fn backward<S: Scalar>(L: &[S], b: &mut [S], end: usize) {
 
 /// Factorization M = L Lᵀ of any symmetric positive definite matrix.
 ///
-/// [`factorize`](Self::factorize) and [`inverse`](Self::inverse) cost O(n³), [`solve`](Self::solve) O(n²).
+/// [`factorize`](Self::factorize) and [`inverse`](Self::inverse) cost O(n³), [`solve`](Self::solve) costs O(n²).
 /// [`new`](Self::new) allocates all memory. Source: Golub and Van Loan, algorithm 4.2.1. For the inertia matrix of a
-/// robot, [`Ltdl`](crate::Ltdl) has the same methods and uses the zeros.
+/// robot, [`Ltdl`](crate::Ltdl) has the same methods and skips the zeros of the matrix.
 ///
 /// ```
 /// use condyle_linalg::Cholesky;
@@ -100,7 +100,7 @@ impl<S: Scalar> Cholesky<S> {
 
     /// Factorizes M = L Lᵀ, in O(n³). Only the lower triangle is read.
     ///
-    /// M: n × n, symmetric, positive definite. If it is not positive definite, some entries of L are not finite.
+    /// M: n × n, symmetric, positive definite. If M is not positive definite, at least one entry of L is not finite.
     /// Allocates nothing.
     ///
     /// # Panics
@@ -111,8 +111,8 @@ impl<S: Scalar> Cholesky<S> {
         self.factorize_while(M, || true);
     }
 
-    /// Factorizes as [`factorize`](Self::factorize) does, and calls `go_on` before each column. Stops if it returns
-    /// `false`. Returns whether the factorization is complete.
+    /// Factorizes as [`factorize`](Self::factorize) does, and calls `go_on` before each column. Stops if `go_on`
+    /// returns `false`. Returns whether the factorization is complete.
     #[doc(hidden)]
     #[inline(always)]
     #[track_caller]
@@ -163,8 +163,8 @@ impl<S: Scalar> Cholesky<S> {
         self.inverse_while(X, || true);
     }
 
-    /// Inverts as [`inverse`](Self::inverse) does, and calls `go_on` before each column. Stops if it returns `false`.
-    /// Returns whether X is complete.
+    /// Inverts as [`inverse`](Self::inverse) does, and calls `go_on` before each column. Stops if `go_on` returns
+    /// `false`. Returns whether X is complete.
     #[doc(hidden)]
     #[inline(always)]
     #[track_caller]

@@ -1,14 +1,14 @@
-//! Functions that this crate compiles for each SIMD level and other crates call.
+//! Macros for functions that this crate compiles for each SIMD level, and that other crates call.
 
 /// Defines functions that are generic over the register type V and over COLUMNS, the number of columns of a tile. The
-/// [gate](condyle_spatial::gate) turns each into a function without generic parameters.
+/// [gate](condyle_spatial::gate) turns each of them into a function without generic parameters.
 macro_rules! compiled {
     ($($functions:tt)*) => { $crate::compiled::functions! { [Long, 8] $($functions)* } };
 }
 pub(crate) use compiled;
 
-/// Defines functions as [`compiled`] does, with registers of at most four numbers. It suits small matrices, and work
-/// that mostly copies rows, because many rows are shorter than eight numbers.
+/// Defines functions as [`compiled`] does, with registers of at most four numbers. Short registers suit small matrices
+/// and functions that mostly copy rows, because many rows are shorter than eight numbers.
 macro_rules! narrow {
     ($($functions:tt)*) => { $crate::compiled::functions! { [Short, 4] $($functions)* } };
 }

@@ -7,20 +7,20 @@ use crate::tile::{SLACK, View, holds};
 use crate::vectors::copy;
 
 narrow! {
-    /// Copies A to OUT, on `rows` rows and `columns` columns.
+    /// Copies A to OUT; A has `rows` rows and `columns` columns.
     pub fn copy_matrix<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
         copy_block::<V>(out, ldo, a, shape);
     }
 
-    /// Writes the symmetric matrix whose lower triangle is in A, of `size` rows, cyclically shifted. Row i of A becomes
-    /// row (i + `turn`) mod `size` of OUT, and likewise for columns. Both have padding rows; the padding of OUT
-    /// changes.
+    /// Writes to OUT the symmetric matrix whose lower triangle is in A, and shifts rows and columns cyclically. Row i
+    /// becomes row (i + `turn`) mod `size`; columns are shifted in the same way. A and OUT have `size` rows and padding
+    /// rows. The padding of OUT changes.
     pub fn copy_symmetric_turned<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize, turn: usize) {
         turned::<V>(out, ldo, a, [size - turn, turn]);
     }
 
     /// Copies A to OUT on `rows` rows and `columns` columns, unless OUT is empty. Returns Σ aᵢⱼ², where some entries
-    /// may count two or three times. This is exact enough to detect divergence.
+    /// may count two or three times. This sum is exact enough to detect divergence.
     pub fn copy_with_squares<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) -> f64 {
         match out.is_empty() {
             true => squares::<V, false>(out, 0, a, shape),
@@ -30,15 +30,15 @@ narrow! {
 }
 
 compiled! {
-    /// Copies the lower triangle of A to OUT; both are square with `size` rows.
+    /// Copies the lower triangle of A to OUT. Both matrices are square with `size` rows.
     pub fn copy_lower<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
         lower::<V>(out, ldo, a, size);
     }
 
-    /// Writes to OUT the symmetric matrix whose lower triangle is in A, of `size` rows.
+    /// Writes to OUT the symmetric matrix of `size` rows whose lower triangle is in A.
     pub fn copy_symmetric<V, COLUMNS>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
-        // Transposes the lower triangle to the right of the diagonal, in blocks of columns; entries above the diagonal
-        // come along.
+        // Transposes the lower triangle into the upper one, a block of columns at a time. Entries above the diagonal of
+        // A are transposed, too; `lower` then overwrites them in OUT.
         let (width, mut j) = (V::N.min(size), 0);
         while j < size {
             let from = j.min(size - width);
@@ -60,7 +60,7 @@ compiled! {
     }
 }
 
-/// Copies A to OUT on `rows` rows and `columns` columns, without a function call.
+/// Copies A to OUT, without a function call; A has `rows` rows and `columns` columns.
 #[inline(always)]
 pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
     let [rows, columns] = shape;
@@ -74,12 +74,13 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
         }
         return;
     }
-    // Two registers of rows of all columns, then the next two; the last registers may overlap those before.
+    // Copies two registers of rows in all columns, then the next two. The last registers may overlap the registers
+    // before them.
     let (last, mut i) = (rows - V::N, 0);
     loop {
         let (k, mut at, mut from) = ((i + V::N).min(last), 0, 0);
         for _ in 0..columns {
-            // SAFETY: registers in columns that were found to be in bounds.
+            // SAFETY: each register is in a column that was found to be in bounds.
             unsafe {
                 move_register::<V>(out, at + i, a.data, from + i);
                 move_register::<V>(out, at + k, a.data, from + k);
@@ -96,7 +97,7 @@ pub fn copy_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [u
 /// Copies a register from offset `from` in `x` to offset `at` in `to`.
 ///
 /// # Safety
-/// Both slices have N numbers from their offset on.
+/// `to` has N numbers from offset `at` on, and `x` has N numbers from offset `from` on.
 #[inline(always)]
 unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: usize) {
     debug_assert!(at + V::N <= to.len() && from + V::N <= x.len());
@@ -104,11 +105,11 @@ unsafe fn move_register<V: Vector>(to: &mut [f64], at: usize, x: &[f64], from: u
     unsafe { V::load(x.get_unchecked(from..from + V::N)).store(to.get_unchecked_mut(at..at + V::N)) };
 }
 
-/// Copies the transpose of a block of N rows and columns, or minus it, from offset `from` in `x` to offset `at` in
-/// `to`.
+/// Copies the transpose of a block of N rows and columns, or minus the transpose, from offset `from` in `x` to offset
+/// `at` in `to`.
 ///
 /// # Safety
-/// Both have a register of numbers in each of N columns, from their offset on.
+/// Both slices have N numbers in each of N columns: `to` from offset `at` on, `x` from offset `from` on.
 #[inline(always)]
 unsafe fn move_transposed<V: Vector, const NEGATED: bool>(
     to: &mut [f64],
@@ -135,17 +136,17 @@ unsafe fn move_transposed<V: Vector, const NEGATED: bool>(
     }
 }
 
-/// Returns the first row of the block after the block that starts at row i, for `size` rows; `size` if there is no
-/// further block.
+/// Returns the first row of the block after the block that starts at row i. Returns `size`, the number of rows, if
+/// there is no further block.
 #[inline(always)]
 fn next_block<V: Vector>(i: usize, size: usize) -> usize {
     if i + V::N >= size { size } else { (i + V::N).min(size - V::N) }
 }
 
-/// Copies a block of N rows and columns to offset `at[0]` in `to`, and its transpose to offset `at[1]`.
+/// Copies a block of N rows and columns to offset `at[0]` in `to`, and the transpose of the block to offset `at[1]`.
 ///
 /// # Safety
-/// As for [`move_transposed`].
+/// Both offsets meet the conditions of [`move_transposed`].
 #[inline(always)]
 unsafe fn move_both<V: Vector>(to: &mut [f64], at: [usize; 2], ldo: usize, x: &[f64], from: usize, ldx: usize) {
     for k in 0..V::N {
@@ -156,7 +157,8 @@ unsafe fn move_both<V: Vector>(to: &mut [f64], at: [usize; 2], ldo: usize, x: &[
     unsafe { move_transposed::<V, false>(to, at[1], ldo, x, from, ldx) };
 }
 
-/// Implements [`copy_symmetric_turned`]: A = [VV ·; QV QQ] with `split` and `turn` rows becomes [QQ QV; VQ VV].
+/// Implements [`copy_symmetric_turned`]. The lower triangle of A is [VV ·; QV QQ], where V has `split` rows and Q has
+/// `turn` rows. The result is the full matrix [QQ QV; VQ VV] with VQ = QVᵀ.
 #[inline(always)]
 fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [usize; 2]) {
     let (size, View { data: x, stride }) = (split + turn, a);
@@ -175,7 +177,7 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
         }
         return;
     }
-    // In square blocks; the last block overlaps the one before.
+    // The triangles VV and QQ are copied in square blocks. The last block may overlap the block before it.
     for (to, from, size) in [(turn, 0, split), (0, split, turn)] {
         let (to, from, mut j) = (to * (ldo + 1), from * (stride + 1), 0);
         while j < size {
@@ -183,8 +185,8 @@ fn turned<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, [split, turn]: [u
             // SAFETY: both matrices have `size` columns, each with `size` rows and N − 1 padding rows.
             unsafe { move_transposed::<V, false>(out, at, ldo, x, from, stride) };
             for k in 0..V::N {
-                // Overwrites the transposed part below the diagonal; after the last row comes padding, or entries that
-                // are written later.
+                // Copies the column from the diagonal down, because the transposed block is valid only above the
+                // diagonal. Numbers after the last row are padding, or are written again later.
                 // SAFETY: as above.
                 unsafe { move_register::<V>(out, at + k * (ldo + 1), x, from + k * (stride + 1)) };
             }
@@ -234,7 +236,7 @@ fn squares<V: Vector, const COPY: bool>(out: &mut [f64], ldo: usize, a: View<'_>
         let (k, mut at, mut from) = ((i + V::N).min(last), 0, 0);
         for _ in 0..columns {
             for (sum, i) in sums.iter_mut().zip([i, k]) {
-                // SAFETY: a register in a column that was found to be in bounds.
+                // SAFETY: the register is in a column that was found to be in bounds.
                 unsafe {
                     let x = V::load(a.data.get_unchecked(from + i..from + i + V::N));
                     *sum = x.mul_add(x, *sum);
@@ -261,19 +263,19 @@ fn lower<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, size: usize) {
     assert!(inside, "a matrix ends before the last of its entries");
     for j in 0..size {
         let (at, from, rows) = (j * ldo + j, j * a.stride + j, size - j);
-        // SAFETY: column j from its diagonal on, which was found to be in bounds.
+        // SAFETY: both slices hold column j from the diagonal on. It was found to be in bounds.
         let (to, x) = unsafe { (out.get_unchecked_mut(at..at + rows), a.data.get_unchecked(from..from + rows)) };
         copy::<V>(to, x);
     }
 }
 
-/// Computes OUT = Aᵀ, for an A with `rows` rows and `columns` columns, without a function call.
+/// Computes OUT = Aᵀ without a function call; A has `rows` rows and `columns` columns.
 #[inline(always)]
 pub fn transpose_block<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, shape: [usize; 2]) {
     transposed::<V, false>(out, ldo, a, shape);
 }
 
-/// Computes OUT = Aᵀ, or −Aᵀ.
+/// Computes OUT = Aᵀ, or OUT = −Aᵀ with NEGATED.
 #[inline(always)]
 fn transposed<V: Vector, const NEGATED: bool>(out: &mut [f64], ldo: usize, a: View<'_>, [rows, columns]: [usize; 2]) {
     if columns == 0 {
@@ -290,7 +292,7 @@ fn transposed<V: Vector, const NEGATED: bool>(out: &mut [f64], ldo: usize, a: Vi
     }
     let inside = holds(a.data, a.stride, [rows, columns]) && holds(out, ldo, [columns, rows]);
     assert!(inside, "a matrix ends before the last of its entries");
-    // In square blocks; the last block overlaps the one before.
+    // A is transposed in square blocks. The last block may overlap the block before it.
     let mut j = 0;
     loop {
         let mut i = 0;

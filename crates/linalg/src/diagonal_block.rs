@@ -1,10 +1,11 @@
-//! Diagonal block of a Cholesky factor, and the rows below it. Columns stay in registers while they are solved.
+//! Factorizes a diagonal block of a Cholesky factor, and solves for the rows below the block. Columns stay in registers
+//! until they are finished.
 #![allow(unsafe_code)]
 
 use crate::registers::Vector;
 use crate::tile::{View, has_strip, next_strip, tile_rows};
 
-/// Diagonal block of L with `width` ≤ COLUMNS columns: its columns, and the inverses of its diagonal entries.
+/// Diagonal block of L: its first `width` ≤ COLUMNS columns, and the inverses of its diagonal entries.
 pub(crate) struct DiagonalBlock<const COLUMNS: usize> {
     pub(crate) L: [[f64; COLUMNS]; COLUMNS],
     pub(crate) inverse: [f64; COLUMNS],
@@ -12,7 +13,7 @@ pub(crate) struct DiagonalBlock<const COLUMNS: usize> {
 }
 
 impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
-    /// Creates a block of `width` columns, to be written.
+    /// Creates a block of `width` columns, which are written later.
     #[inline(always)]
     pub(crate) fn new(width: usize) -> Self {
         Self { L: [[0.0; COLUMNS]; COLUMNS], inverse: [0.0; COLUMNS], width }
@@ -30,8 +31,9 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         block
     }
 
-    /// Factorizes the block of H that begins in row j0 of `columns`. First it subtracts a bᵀ over the j0 columns before
-    /// them. S registers hold COLUMNS rows. The entries above the diagonal lose their meaning.
+    /// Factorizes the block of H that begins in row j0 of `columns`, after subtracting a bᵀ. This product is a sum over
+    /// the j0 columns before the block. S registers hold the COLUMNS rows of a column. The entries above the diagonal
+    /// are overwritten.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.
@@ -71,7 +73,7 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         Ok(())
     }
 
-    /// Computes C ← (C − a bᵀ) L⁻ᵀ on the given rows of C. The product a bᵀ is over `length` columns.
+    /// Computes C ← (C − a bᵀ) L⁻ᵀ on the given rows of C. The product a bᵀ is a sum over `length` columns.
     #[inline(always)]
     pub(crate) fn solve_rows<V: Vector>(
         &self,
@@ -94,7 +96,7 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
         }
     }
 
-    /// Computes C ← (C − a bᵀ) L⁻ᵀ on S registers of rows of C from row i on.
+    /// Computes C ← (C − a bᵀ) L⁻ᵀ on S registers of rows of C, from row i on.
     #[inline(always)]
     fn solve_strip<V: Vector, const S: usize>(
         &self,
@@ -118,14 +120,15 @@ impl<const COLUMNS: usize> DiagonalBlock<COLUMNS> {
                     x[j][s] = x[j][s].mul(V::splat(self.inverse[j]));
                 }
                 let at = j * ldc + i;
-                // SAFETY: column j of the strip, which `difference` found to be in bounds.
+                // SAFETY: the slice is column j of the strip, which `difference` found to be in bounds.
                 store(&x[j], unsafe { c.get_unchecked_mut(at..at + S * V::N) }, 0);
             }
         }
     }
 }
 
-/// Returns C − a bᵀ, over `length` columns, on S registers of rows of C from row i on and on its first `width` columns.
+/// Returns C − a bᵀ on the first `width` columns of C, for S registers of rows from row i on. The product a bᵀ is a sum
+/// over `length` columns.
 #[inline(always)]
 fn difference<V: Vector, const S: usize, const COLUMNS: usize>(
     c: &[f64],
@@ -141,7 +144,7 @@ fn difference<V: Vector, const S: usize, const COLUMNS: usize>(
     for j in 0..COLUMNS {
         if j < width {
             let at = j * ldc + i;
-            // SAFETY: column j of the strip, which the assertion found to be in bounds.
+            // SAFETY: the slice is column j of the strip, which the assertion found to be in bounds.
             let column = unsafe { c.get_unchecked(at..at + S * V::N) };
             for s in 0..S {
                 tile[j][s] = V::load(&column[s * V::N..]).sub(tile[j][s]);

@@ -1,23 +1,25 @@
 //! Elimination tree: the entries of the factor of a matrix whose zeros follow a tree.
 //!
 //! If each row of the matrix corresponds to one column of the tree, the elimination tree is that tree. If several
-//! columns share a row, branches are coupled. The rows are then eliminated in order of least coupling, and the factor
-//! follows the elimination tree of that order (Liu, *The role of elimination trees in sparse factorization*, 1990).
+//! columns share a row, branches are coupled. The rows are then eliminated in an order of minimum degree, and the
+//! factor follows the elimination tree of this order (Liu, *The role of elimination trees in sparse factorization*,
+//! 1990).
 
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 use core::iter::successors;
 
-/// Tree of columns, and the rows of a symmetric matrix to which they correspond. An entry of the matrix may differ from
-/// zero if one of its two columns is on the other's path to the root.
+/// Tree of columns, and the row of a symmetric matrix to which each column corresponds. An entry of the matrix may
+/// differ from zero if one of its two columns is on the path from the other column to the root.
 ///
-/// A robot's model is such a tree: a column is a degree of freedom of a joint, and a row of M is a coordinate.
+/// A robot's model is such a tree: a column is a degree of freedom of a joint, and a row of the inertia matrix is a
+/// coordinate.
 pub trait ColumnTree {
     /// Returns the number of rows of the matrix.
     fn rows(&self) -> usize;
-    /// Returns the number of columns: the number of rows, or more if several columns share a row.
+    /// Returns the number of columns. It exceeds the number of rows if several columns share a row.
     fn columns(&self) -> usize;
-    /// Returns the column before c on the path to the root; its index is smaller than c.
+    /// Returns the parent of column c on the path to the root. The index of the parent is smaller than c.
     fn parent(&self, c: usize) -> Option<usize>;
     /// Returns the row to which column c corresponds.
     fn row(&self, c: usize) -> usize;
@@ -42,26 +44,28 @@ impl ColumnTree for [Option<usize>] {
 /// Parent of a root.
 pub const NONE: usize = usize::MAX;
 
-/// Pattern of the factor L: the entries that may differ from zero. It is a tree of positions, which are numbered depth
+/// Pattern of the factor L: the entries that may differ from zero. The pattern is a tree of positions, numbered depth
 /// first, parents before children.
 #[derive(Clone, Debug)]
 pub struct EliminationTree {
-    /// Row of the matrix at each position. Length: n.
+    /// Row of the matrix that is moved to each position. Length: n.
     pub order: Vec<usize>,
-    /// Exchanges that move rows to their positions, in order; empty if each column has its own row.
+    /// Exchanges that move rows to their positions, in the order of execution; empty if each column has its own row.
     pub swaps: Vec<(usize, usize)>,
     /// Parent of each position on the path to the root, or [`NONE`]. Length: n.
     pub parent: Vec<usize>,
-    /// Number of positions between each position and the root. Length: n.
+    /// Number of steps from each position to the root of its tree. Length: n.
     pub depth: Vec<usize>,
-    /// First of the consecutive positions that are on the path to the root and end with this position. Length: n.
+    /// First position of a run of consecutive positions on the path to the root that ends with this position. Length:
+    /// n.
     pub run: Vec<usize>,
-    /// Start of each row in `Ltdl::rows`, a multiple of the step; the last entry is the total length. Length: n + 1.
+    /// Start of each row in `Ltdl::rows`, a multiple of the step. The last entry is the total length. Length: n + 1.
     pub first: Vec<usize>,
 }
 
 impl EliminationTree {
-    /// Computes the elimination tree for the columns; the factor's rows are stored in steps of `step` numbers.
+    /// Computes the elimination tree of a tree of columns. The factor's rows are padded to a multiple of `step`
+    /// numbers.
     pub fn new(columns: &(impl ColumnTree + ?Sized), step: usize) -> Self {
         let n = columns.rows();
         if columns.columns() == n {
@@ -69,7 +73,7 @@ impl EliminationTree {
                 (0..n).map(|c| (columns.row(c), columns.parent(c).unwrap_or(NONE))).unzip();
             return Self::depth_first(&order, &parent, step);
         }
-        // for each row, the rows with which it shares an entry of the matrix
+        // For each row, collects the rows with which it shares an entry of the matrix.
         let mut coupled = vec![BTreeSet::new(); n];
         for c in 0..columns.columns() {
             let k = columns.row(c);
@@ -86,7 +90,7 @@ impl EliminationTree {
         for (k, &row) in order.iter().enumerate() {
             place[row] = k;
         }
-        // Liu (1990), from the last position to the first
+        // Finds the parents by the algorithm of Liu (1990), from the last position to the first.
         let mut parent = vec![NONE; n];
         for i in (0..n).rev() {
             for k in coupled[order[i]].iter().map(|&k| place[k]).filter(|&k| k > i) {
@@ -102,7 +106,7 @@ impl EliminationTree {
         Self::depth_first(&order, &parent, step)
     }
 
-    /// Numbers the positions of a tree depth first, which does not change the rows of the factor.
+    /// Numbers the positions of a tree depth first. This does not change the rows of the factor.
     fn depth_first(order: &[usize], parent: &[usize], step: usize) -> Self {
         let n = order.len();
         let mut children = vec![Vec::new(); n];
@@ -125,7 +129,7 @@ impl EliminationTree {
             tree.depth.push(if parent == NONE { 0 } else { tree.depth[parent] + 1 });
             tree.run.push(if parent != NONE && parent + 1 == place { tree.run[parent] } else { place });
             tree.first.push(tree.first[place] + (tree.depth[place] + 1).next_multiple_of(step));
-            stack.extend(children[k].iter().map(|&child| (child, place))); // the first child on top
+            stack.extend(children[k].iter().map(|&child| (child, place))); // puts the first child on top
         }
         let mut at: Vec<usize> = (0..n).collect(); // row at each position, while the exchanges are recorded
         for place in 0..n {
@@ -139,12 +143,12 @@ impl EliminationTree {
     }
 }
 
-/// Returns the rows in an order of minimum degree. The last row is coupled with the fewest others; the row before it is
-/// then coupled with the fewest remaining rows, and so on. Source: Tinney and Walker, *Direct solutions of sparse
-/// network equations by optimally ordered triangular factorization* (1967).
+/// Returns the rows in an order of minimum degree. The last row is the one coupled with the fewest other rows. The row
+/// before it is the one coupled with the fewest of the remaining rows, and so on. Source: Tinney and Walker, *Direct
+/// solutions of sparse network equations by optimally ordered triangular factorization* (1967).
 ///
-/// Among equal rows, the one with the fewest initial couplings comes later. So a shared row comes before the rows of
-/// one branch.
+/// Among rows with equally many couplings, the row with the fewest initial couplings comes last. So a row that branches
+/// share comes before the rows of one branch.
 fn minimum_degree(mut coupled: Vec<BTreeSet<usize>>) -> Vec<usize> {
     let at_first: Vec<usize> = coupled.iter().map(BTreeSet::len).collect();
     let mut left: BTreeSet<usize> = (0..coupled.len()).collect();

@@ -1,4 +1,4 @@
-//! Cholesky factor of the leading part of a symmetric matrix, and solves with it.
+//! Cholesky factor of the leading part of a symmetric matrix, and solutions of systems with this factor.
 #![allow(non_snake_case)] // L, X, B
 
 use crate::compiled::compiled;
@@ -7,10 +7,11 @@ use crate::registers::Vector;
 use crate::tile::{SLACK, Store, View, column_block};
 
 compiled! {
-    /// Eliminates the first m columns of a symmetric H, whose lower triangle is given. `shape` = [rows, columns, m];
-    /// rows below the square part are right-hand sides.
+    /// Eliminates the first m columns of a symmetric H, whose lower triangle is given. `shape` = [rows, columns, m].
+    /// The rows below the square part of H are right-hand sides.
     ///
-    /// H = [Hᵤᵤ ·; Hₓᵤ Hₓₓ] becomes [L ·; X Hₓₓ − X Xᵀ] with L Lᵀ = Hᵤᵤ and X = Hₓᵤ L⁻ᵀ. H has padding rows.
+    /// H = [Hᵤᵤ ·; Hₓᵤ Hₓₓ] becomes [L ·; X Hₓₓ − X Xᵀ] with L Lᵀ = Hᵤᵤ and X = Hₓᵤ L⁻ᵀ. A dot stands for entries that
+    /// are not used. H has padding rows.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.
@@ -39,9 +40,9 @@ compiled! {
         Ok(())
     }
 
-    /// Eliminates as [`eliminate`] does, for rows G = [Gᵤ Gₓ] that are not stored below H, given the eliminated H. G
-    /// becomes [Y Gₓ − Y Xᵀ] with Y = Gᵤ L⁻ᵀ. `shape` = [rows of G, columns, m]; `h` is [L; X], from column 0 on. G and
-    /// H have padding rows.
+    /// Eliminates as [`eliminate`] does, for rows G = [Gᵤ Gₓ] that are not stored below H. H was eliminated before: `h`
+    /// is [L; X], from column 0 on. G becomes [Y Gₓ − Y Xᵀ] with Y = Gᵤ L⁻ᵀ. `shape` = [rows of G, columns, m]. G and H
+    /// have padding rows.
     pub fn eliminate_rows<V, COLUMNS>(g: &mut [f64], stride: usize, shape: [usize; 3], h: View<'_>) {
         let ([rows, size, m], mut j0) = (shape, 0);
         while j0 < m {
@@ -59,7 +60,8 @@ compiled! {
         }
     }
 
-    /// Computes x ← L⁻¹ x, with L in an eliminated H and the inverse of L's diagonal. x has padding.
+    /// Computes x ← L⁻¹ x. H was eliminated before and contains L; the inverse of the diagonal of L is given. x has
+    /// padding.
     pub fn forward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
         let (m, mut j) = (inverse_diagonal.len(), 0);
         while j < m {
@@ -87,7 +89,7 @@ compiled! {
         }
     }
 
-    /// Computes x ← L⁻ᵀ x, with arguments as for [`forward_solve`]. The padding of x becomes zero.
+    /// Computes x ← L⁻ᵀ x, with the same arguments as [`forward_solve`]. The padding of x becomes zero.
     pub fn backward_solve<V, COLUMNS>(h: View<'_>, inverse_diagonal: &[f64], x: &mut [f64]) {
         let m = inverse_diagonal.len();
         x[m..m + V::N].fill(0.0);
@@ -96,7 +98,7 @@ compiled! {
             block -= 1;
             let j = block * V::N;
             let width = V::N.min(m - j);
-            // Sums over the rows below the block, for all columns of the block together.
+            // Computes the sums over the rows below the block, for all columns of the block together.
             let mut products = [0.0; SLACK];
             if j + V::N < m {
                 let (mut sums, mut i) = ([V::splat(0.0); SLACK], j + V::N);
@@ -124,8 +126,8 @@ compiled! {
         }
     }
 
-    /// Computes X ← X L⁻¹. X is in the rows `first`..`rows` of H's first m columns, L in the lower triangle above them.
-    /// `shape` = [first, rows, m]. H has padding rows.
+    /// Computes X ← X L⁻¹. X is in the rows `first`..`rows` of the first m columns of H. L is in the lower triangle
+    /// above X. `shape` = [first, rows, m]. H has padding rows.
     ///
     /// `upper` (m + [`SLACK`] rows, m columns) is scratch memory for Lᵀ.
     pub fn solve_right<V, COLUMNS>(h: &mut [f64], stride: usize, shape: [usize; 3], upper: &mut [f64]) {
@@ -136,7 +138,7 @@ compiled! {
                 upper[i * ldu + j] = h[j * stride + i];
             }
         }
-        // From the last columns to the first: X[:, j] ← (X[:, j] − Σ_{p > j} X[:, p] L[p, j]) / L[j, j].
+        // Solves from the last column to the first: X[:, j] ← (X[:, j] − Σ_{p > j} X[:, p] L[p, j]) / L[j, j].
         let mut block = m.div_ceil(COLUMNS);
         while block > 0 {
             block -= 1;
@@ -159,8 +161,8 @@ compiled! {
     }
 }
 
-/// Computes H[i, j] −= Σ_{p < length} H[i, p] H[j, p] for i ≥ j, on `width` ≤ COLUMNS columns from column j ≥ `length`
-/// on.
+/// Computes H[i, j] −= Σ_{p < length} H[i, p] H[j, p] for i ≥ j, on `width` ≤ COLUMNS columns from column j on, with j
+/// ≥ `length`.
 #[inline(always)]
 fn subtract_outer<V: Vector, const COLUMNS: usize>(
     h: &mut [f64],
@@ -179,7 +181,7 @@ fn subtract_outer<V: Vector, const COLUMNS: usize>(
     column_block::<V, COLUMNS>(columns, stride, j..rows, 0, width, factor, b, length, Store::Subtract);
 }
 
-/// Computes y −= Σ X[i.., p] B[j, p] over the columns p, on `rows` rows, in whole registers. Padding follows these
+/// Computes y −= Σ X[i.., p] B[j, p] over the columns p, on `rows` rows, in whole registers. Padding must follow these
 /// rows.
 #[inline(always)]
 fn subtract_multiples<V: Vector>(

@@ -2,14 +2,15 @@
 
 use condyle_spatial::{Dense, DenseMatrix, Scalar};
 
-/// Computes X = M⁻¹ for at most `MOST` rows. For k = 0, 1, …, with the pivot d = 1/A_kk and its column c:
+/// Computes X = M⁻¹ for at most `MOST` rows, in place in a copy A of M. For k = 0, 1, …, with the pivot d = 1/A_kk and
+/// column c of the pivot:
 ///
 /// ```text
 /// A_ij ← A_ij − c_i d c_j,    A_ik ← c_i d,    A_kk ← −d:     from M to −M⁻¹
 /// ```
 ///
 /// Only the lower triangle of A is read. For lanes, only this triangle is computed. For single numbers, whole columns
-/// are computed, column k included, because columns are registers and the loop then has no gap.
+/// are computed, also column k: a column is one register, and the loop needs no exception for k.
 #[inline(always)]
 pub fn gauss_jordan<S: Scalar, const MOST: usize>(
     M: &DenseMatrix<S, impl Dense<S>>,

@@ -3,13 +3,13 @@
 //!
 //! Matrices are column-major: entry (i, j) of a matrix with stride `ld` has index j · ld + i. Kernels work in whole
 //! registers and may read and write up to [`SLACK`] numbers after the last row of a matrix with padding. The content of
-//! this padding does not matter. Nothing allocates.
+//! this padding does not matter. No kernel allocates.
 //!
-//! Each dense kernel is compiled here once for each [SIMD level](condyle_spatial::level), and a call runs the version
-//! for the level in use. [`at_level`] compiles other work with vector loops for the level.
+//! Each dense kernel is compiled in this crate once for each [SIMD level](condyle_spatial::level). A call runs the
+//! version for the level in use. [`at_level`] compiles other work with vector loops for the level.
 //!
 //! # Features
-//! `threads` and `std` are on by default; without `std` the crate needs `alloc` and the feature `libm`.
+//! The features `threads` and `std` are on by default. Without `std`, the crate needs `alloc` and the feature `libm`.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(feature = "std"), no_std)]
 #![allow(non_snake_case)]
@@ -75,7 +75,8 @@ pub fn check(argument: &str, found: usize, expected: usize) {
     }
 }
 
-/// Panics unless an index is below the number of things that it refers to: `check_index("frame", frame, 12, "frames")`.
+/// Panics unless an index is below the number of items to which it may refer. Example: `check_index("frame", frame, 12,
+/// "frames")`.
 #[doc(hidden)]
 #[inline(always)]
 #[track_caller]
@@ -85,7 +86,7 @@ pub fn check_index(argument: &str, found: usize, count: usize, things: &str) {
     }
 }
 
-/// Panics for [`check_index`]; not inlined.
+/// Panics on behalf of [`check_index`]. This function is not inlined.
 #[cold]
 #[inline(never)]
 #[track_caller]
@@ -93,7 +94,8 @@ fn wrong_index(argument: &str, found: usize, count: usize, things: &str) -> ! {
     panic!("{argument}: expected an index below {count}, the number of {things}, found {found}");
 }
 
-/// Panics for [`check`]; not inlined, because hundreds of functions check several arguments each.
+/// Panics on behalf of [`check`]. This function is not inlined, because hundreds of functions check several arguments
+/// each.
 #[cold]
 #[inline(never)]
 #[track_caller]

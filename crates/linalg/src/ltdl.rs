@@ -1,8 +1,9 @@
 //! Sparse factorization M = Lᵀ D L of the joint-space inertia matrix, without fill-in.
 //!
 //! Source: Featherstone, *Efficient factorization of the joint-space inertia matrix for branched kinematic trees*
-//! (2005). Mᵢⱼ is zero unless one of the coordinates i, j is an ancestor of the other. Eliminated from the tips to the
-//! root, the matrix keeps its zeros: row k of L has entries only at the coordinates between k and the root.
+//! (2005). Mᵢⱼ is zero unless one of the coordinates i, j is an ancestor of the other. The matrix keeps its zeros if
+//! the elimination goes from the tips to the root. Row k of L has entries only at the coordinates between k and the
+//! root.
 //!
 //! If joints share a coordinate (mimic), the tree is the elimination tree of `elimination_tree.rs`.
 
@@ -11,13 +12,13 @@ use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
 use crate::{check, check_index};
 use condyle_spatial::{Array, Dense, DenseMatrix, Scalar, alike};
 
-/// Returns the step to which row lengths are rounded up, so that the innermost loop has no remainder. The padding after
-/// a row's end has no meaning.
+/// Returns the step: row lengths are rounded up to a multiple of it, so that the innermost loop has no remainder. The
+/// padding after a row's end has no meaning.
 const fn step<S: Scalar>() -> usize {
     if S::LANES == 1 { 4 } else { 1 }
 }
 
-/// Computes y += Σ xₖ sₖ for N vectors x, so that y is loaded and stored once. Works in whole steps.
+/// Computes y += Σ xₖ sₖ for N vectors x, so that y is loaded and stored once. Lengths are multiples of the step.
 #[inline(always)]
 fn update<S: Scalar, const N: usize>(s: [S; N], x: [&[S]; N], y: &mut [S]) {
     if step::<S>() == 1 {
@@ -84,10 +85,10 @@ fn eliminate<S: Scalar, const N: usize>(
 /// Factorization M = Lᵀ D L of a robot's inertia matrix: L is unit lower triangular with the zeros of the tree, D is
 /// diagonal.
 ///
-/// With depth d of the tree (number of columns on the path to the root) and n = nv, [`factorize`](Self::factorize)
-/// costs O(n d²), [`solve`](Self::solve) O(n d), and [`inverse`](Self::inverse) O(n² d). A chain has d = n.
-/// [`new`](Self::new) allocates all memory. Source: Featherstone (2005). [`Cholesky`](crate::Cholesky) has the same
-/// methods for any positive definite matrix.
+/// Costs depend on n = nv and on the depth d of the tree, the largest number of columns on a path to the root.
+/// [`factorize`](Self::factorize) costs O(n d²), [`solve`](Self::solve) O(n d), and [`inverse`](Self::inverse) O(n² d).
+/// A chain has d = n. [`new`](Self::new) allocates all memory. Source: Featherstone (2005).
+/// [`Cholesky`](crate::Cholesky) has the same methods for any positive definite matrix.
 ///
 /// ```
 /// use condyle_linalg::Ltdl;
@@ -104,8 +105,8 @@ fn eliminate<S: Scalar, const N: usize>(
 #[repr(C)]
 pub struct Ltdl<S> {
     tree: EliminationTree,
-    /// Row of L from the root on, then its D, for each position. Length: nonzeros, with each row rounded up to whole
-    /// steps. Written by: `factorize`.
+    /// For each position, the row of L from the root on, and then the entry of D. Each row is padded to whole steps.
+    /// Length: padded rows together. Written by: `factorize`.
     rows: Array<S>,
     /// 1/D. Length: nv. Written by: `factorize`.
     D_inv: Array<S>,
@@ -141,20 +142,21 @@ impl<S: Scalar> Ltdl<S> {
         &self.D_inv
     }
 
-    /// Returns the number of entries of L and D that may differ from zero, without the ones on L's diagonal.
+    /// Returns the number of entries of L and D that may differ from zero, without the diagonal of L.
     pub fn nonzeros(&self) -> usize {
         self.tree.depth.iter().map(|d| d + 1).sum()
     }
 
-    /// Returns the coordinates ordered from the root to the tips. They are eliminated from last to first.
+    /// Returns the coordinates, ordered from the root to the tips. The elimination goes from the last coordinate to the
+    /// first.
     ///
     /// The order is 0, 1, 2, … unless joints share coordinates.
     pub fn order(&self) -> &[usize] {
         &self.tree.order
     }
 
-    /// Returns row k of L in the [`order`](Self::order), from the entry left of the diagonal to the root: (position,
-    /// value).
+    /// Returns row k of L, in the [`order`](Self::order) of positions, as pairs (position, value). The row goes from
+    /// the entry left of the diagonal to the root.
     ///
     /// # Panics
     /// If k is not less than nv.
@@ -171,11 +173,11 @@ impl<S: Scalar> Ltdl<S> {
         self.tree.first.iter().zip(&self.tree.depth).map(|(&first, &depth)| self.rows[first + depth])
     }
 
-    /// Factorizes M = Lᵀ D L, in O(n d²). Of two symmetric entries, only the one in the lower triangle with respect to
-    /// [`order`](Self::order) is read.
+    /// Factorizes M = Lᵀ D L, in O(n d²). Of two symmetric entries, the one below the diagonal in the
+    /// [`order`](Self::order) of positions is read.
     ///
-    /// M: nv × nv, symmetric, positive definite (as `crba` returns it). If M is not positive definite, some D are not
-    /// positive. Allocates nothing. Source: Featherstone (2005).
+    /// M: nv × nv, symmetric, positive definite (as `crba` returns it). If M is not positive definite, at least one
+    /// entry of D is not positive. Allocates nothing. Source: Featherstone (2005).
     ///
     /// # Panics
     /// If `M` is not nv × nv.
@@ -185,7 +187,7 @@ impl<S: Scalar> Ltdl<S> {
         self.factorize_while(M, || true);
     }
 
-    /// Factorizes as [`factorize`](Self::factorize) does, and calls `go_on` before every few rows. Stops if it returns
+    /// Factorizes as [`factorize`](Self::factorize) does, and calls `go_on` every few rows. Stops if `go_on` returns
     /// `false`. Returns whether the factorization is complete.
     #[doc(hidden)]
     #[inline(always)]
@@ -210,8 +212,8 @@ impl<S: Scalar> Ltdl<S> {
             if !go_on() {
                 return false;
             }
-            // Handle several positions of a run at once where possible: rows above them are then loaded and stored once
-            // for all.
+            // Eliminates several positions of a run at once where possible. The rows above these positions are then
+            // loaded and stored once for all.
             end -= match end - run[end - 1] {
                 4.. => eliminate::<S, 4>(tree, rows, D_inv, end - 4),
                 2.. => eliminate::<S, 2>(tree, rows, D_inv, end - 2),
@@ -294,8 +296,8 @@ impl<S: Scalar> Ltdl<S> {
 
     /// Computes X = M⁻¹, the full symmetric matrix, in O(n² d).
     ///
-    /// In L X = D⁻¹ L⁻ᵀ, the right side is upper triangular, so row k of X follows from the rows above:
-    /// X_kj = −Σ L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
+    /// The right-hand side of L X = D⁻¹ L⁻ᵀ is upper triangular. So row k of X follows from the rows above: X_kj = −Σ
+    /// L_ke X_ej for j < k, and X_kk = 1/D_k − Σ L_ke X_ke. X: nv × nv, overwritten. Allocates nothing.
     ///
     /// # Panics
     /// If `X` is not nv × nv.
@@ -305,7 +307,7 @@ impl<S: Scalar> Ltdl<S> {
         self.inverse_while(X, || true);
     }
 
-    /// Inverts as [`inverse`](Self::inverse) does, and calls `go_on` before each row. Stops if it returns `false`.
+    /// Inverts as [`inverse`](Self::inverse) does, and calls `go_on` before each row. Stops if `go_on` returns `false`.
     /// Returns whether X is complete.
     #[doc(hidden)]
     #[inline(always)]

@@ -1,4 +1,4 @@
-//! Sums of outer products of rows with blocks of zeros.
+//! Sums of outer products of rows that contain blocks of zeros.
 #![allow(unsafe_code)]
 
 use crate::compiled::compiled;
@@ -7,7 +7,7 @@ use crate::tile::{SLACK, Store, add_outer, next_strip, store_tile};
 use crate::vectors::copy_scaled;
 use alloc::vec::Vec;
 
-/// Rows of numbers, stored one after another, with a [`mask`] of nonzero blocks for each row.
+/// Rows of numbers, stored one after another. Each row has a [`mask`] of its nonzero blocks.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SparseRows {
     /// Numbers of all rows; each row is padded with zeros up to the stride.
@@ -17,7 +17,7 @@ pub struct SparseRows {
 }
 
 impl SparseRows {
-    /// Sets the number of rows. Allocates only if the number is larger than ever before.
+    /// Sets the number of rows. Allocates only if this number is larger than in all earlier calls.
     pub fn resize(&mut self, rows: usize, stride: usize) {
         self.numbers.resize(rows * stride, 0.0);
         self.masks.resize(rows, 0);
@@ -32,7 +32,7 @@ impl SparseRows {
     }
 }
 
-/// Returns the mask of a row's nonzero blocks: bit k stands for the [`block`] columns from k·`block` on.
+/// Returns the mask of a row's nonzero blocks: bit k stands for the [`block`] columns from column k·`block` on.
 #[inline(always)]
 pub fn mask(row: &[f64]) -> u64 {
     let (fours, rest) = row.as_chunks::<4>();
@@ -47,16 +47,16 @@ pub fn mask(row: &[f64]) -> u64 {
     mask | u64::from(any(&last)) << (fours.len() >> wide)
 }
 
-/// Returns whether one of four numbers is nonzero. NaN counts as nonzero.
+/// Returns whether at least one of four numbers is nonzero. NaN counts as nonzero.
 #[inline(always)]
 fn any(x: &[f64; 4]) -> bool {
     (x[0] != 0.0) | (x[1] != 0.0) | (x[2] != 0.0) | (x[3] != 0.0)
 }
 
-/// Computes y −= Σ aᵢ xᵢ in whole registers. Numbers at the end that do not fill a register are not changed.
+/// Computes y −= Σ aᵢ xᵢ in whole registers. Numbers at the end of y that do not fill a register are not changed.
 ///
 /// # Panics
-/// If an x and y have different lengths.
+/// If an entry of `x` is not as long as `y`.
 #[inline(always)]
 pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a: [f64; N]) {
     let n = y.len();
@@ -68,41 +68,41 @@ pub fn subtract_rows<V: Vector, const N: usize>(y: &mut [f64], x: [&[f64]; N], a
     for (i, y) in y.chunks_exact_mut(V::N).enumerate() {
         let mut sum = V::load(y);
         for k in 0..N {
-            // SAFETY: all rows have n numbers, as y does.
+            // SAFETY: all rows have n numbers, and so does y.
             sum = V::load(unsafe { x[k].get_unchecked(i * V::N..(i + 1) * V::N) }).mul_add(factors[k], sum);
         }
         sum.store(y);
     }
 }
 
-/// Returns the number of columns per bit of a [`mask`], for rows of `stride` numbers: a power of two.
+/// Returns the number of columns for which one bit of a [`mask`] stands, in rows of `stride` numbers. It is a power of
+/// two.
 #[inline(always)]
 pub fn block(stride: usize) -> usize {
     4 * stride.div_ceil(4 * 64).next_power_of_two()
 }
 
-/// Run of outer products: `count` consecutive left rows, each multiplied by the corresponding one of `count`
-/// consecutive right rows.
+/// Run of outer products: left row k times right row k, for `count` consecutive left rows and right rows.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     /// Index of the first left row and of the first right row.
     rows: [usize; 2],
     count: usize,
-    /// Mask that all left rows have, and mask that all right rows have.
+    /// Masks of the run: one for all left rows, one for all right rows.
     masks: [u64; 2],
 }
 
-/// Position of a run in the numbers of all rows.
+/// Position of a run in the memory of all rows.
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
     /// Offsets of the first left row and of the first right row.
     at: [usize; 2],
-    /// Number of numbers from the start of the first left row to the end of the last.
+    /// Length of all left rows of the run together.
     length: usize,
     masks: [u64; 2],
 }
 
-/// Sum Σ left rightᵀ of outer products, computed without the zero blocks. Each row has one number more than the sum has
+/// Sum Σ left rightᵀ of outer products; blocks of zeros are skipped. Each row has one number more than the sum has
 /// columns. In left rows, this number belongs to the gradient, which is the last row of the sum.
 #[derive(Debug, Clone, Default)]
 pub struct OuterProducts {
@@ -115,18 +115,18 @@ pub struct OuterProducts {
     /// Number of rows.
     count: usize,
     runs: Vec<Run>,
-    /// Positions of the runs (scratch).
+    /// Positions of the runs in memory (scratch).
     places: Vec<Place>,
 }
 
 impl OuterProducts {
-    /// Allocates memory for `numbers` numbers of all rows together, and for `products` products.
+    /// Allocates memory for `numbers` numbers in all rows together, and for `products` products.
     pub fn with_capacity(numbers: usize, products: usize) -> Self {
         let places = Vec::with_capacity(products);
         Self { rows: vec![0.0; numbers], runs: Vec::with_capacity(products), places, ..Self::default() }
     }
 
-    /// Resets the sum to zero, with `size` columns and rows that are `stride` apart.
+    /// Resets the sum to zero, with `size` columns. Rows are `stride` numbers apart.
     pub fn clear(&mut self, size: usize, stride: usize) {
         (self.size, self.stride, self.count) = (size, stride, 0);
         self.runs.clear();
@@ -158,7 +158,7 @@ impl OuterProducts {
         row
     }
 
-    /// Adds the product of left row `rows[0]` and right row `rows[1]` to the sum; `masks` are the masks of both rows.
+    /// Adds the product of left row `rows[0]` and right row `rows[1]` to the sum; `masks` are the masks of these rows.
     #[inline(always)]
     pub fn multiply(&mut self, rows: [usize; 2], masks: [u64; 2]) {
         match self.runs.last_mut() {
@@ -187,8 +187,8 @@ impl OuterProducts {
         }
     }
 
-    /// Adds the lower triangle of the sum, and the gradient below it, to H. Some entries above the diagonal change as
-    /// well. H has padding rows.
+    /// Adds the lower triangle of the sum to H, and the gradient to the row below. Some entries above the diagonal
+    /// change as well. H has padding rows.
     pub fn add_to(&mut self, h: &mut [f64], ldh: usize) {
         let Self { rows, stride, size, runs, places, .. } = self;
         places.clear();
@@ -223,8 +223,8 @@ compiled! {
             while i <= size {
                 let strip = next_strip::<V>(size + 1 - i);
                 let masks = [bits(wide, i, strip * V::N), columns];
-                // SAFETY: the positions refer to existing rows of `stride` numbers, and the strip extends at most
-                // `SLACK` past the sum's size.
+                // SAFETY: the positions refer to existing rows of `stride` numbers. The strip ends at most `SLACK`
+                // numbers after the sum's size.
                 unsafe {
                     match strip {
                         1 => add_strip::<V, 1, COLUMNS>(h, ldh, sum, masks, [i, j]),
@@ -239,14 +239,15 @@ compiled! {
     }
 }
 
-/// Returns the bits of a [`mask`] for `length` numbers from index `from` on; each bit stands for 2ʷⁱᵈᵉ numbers.
+/// Returns the mask bits for `length` numbers from index `from` on. Each bit of a [`mask`] stands for 2ʷⁱᵈᵉ numbers.
 #[inline(always)]
 fn bits(wide: u32, from: usize, length: usize) -> u64 {
     let (first, last) = (from >> wide, (from + length - 1) >> wide);
     (2_u64 << (last - first)).wrapping_sub(1) << first
 }
 
-/// Adds the runs with nonzero blocks in this tile to H[i.., j..]; the tile has S registers of rows.
+/// Adds one tile of the sum to H[i.., j..]; the tile has S registers of rows. Runs without nonzero blocks in this tile
+/// are skipped.
 ///
 /// # Safety
 /// Each left row has S registers of numbers from i on, and each right row COLUMNS numbers from j on.
@@ -265,7 +266,7 @@ unsafe fn add_strip<V: Vector, const S: usize, const COLUMNS: usize>(
         }
         let [left, right] = run.at;
         debug_assert!((left + i + S * V::N).max(right + j + COLUMNS) + run.length <= sum.rows.len() + sum.stride);
-        // SAFETY: by the caller for the first row; the others are `stride` apart.
+        // SAFETY: the caller guarantees this for the first row; the other rows are `stride` apart.
         let from = |at: usize, count| unsafe { core::slice::from_raw_parts(sum.rows.as_ptr().add(at), count) };
         let mut row = 0;
         while row < run.length {

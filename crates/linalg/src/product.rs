@@ -5,7 +5,7 @@ use crate::registers::Vector;
 use crate::tile::{SLACK, Store, View, column_block, holds, tile_rows};
 
 compiled! {
-    /// Computes C = A Bᵀ, for `shape` = [rows of A, rows of B, columns of both]. C has padding rows.
+    /// Computes C = A Bᵀ, for `shape` = [rows of A, rows of B, columns of A and B]. C has padding rows.
     pub fn product<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 3], a: View<'_>, b: View<'_>) {
         whole::<V, COLUMNS, false>(c, ldc, shape, a, b, Store::Set);
     }
@@ -21,8 +21,8 @@ compiled! {
         whole::<V, COLUMNS, true>(c, ldc, shape, a, b, Store::Add);
     }
 
-    /// Computes the lower triangle of C += (A Bᵀ)ᵀ for square A and B with `size` rows. The upper triangle of A Bᵀ is
-    /// left in `scratch` (stride `lds`, `size` columns, padding rows).
+    /// Computes the lower triangle of C += (A Bᵀ)ᵀ for square A and B with `size` rows. `scratch` (stride `lds`, `size`
+    /// columns, padding rows) then contains the upper triangle of A Bᵀ.
     pub fn add_transposed_product_lower<V, COLUMNS>(
         c: &mut [f64],
         ldc: usize,
@@ -45,7 +45,7 @@ compiled! {
         }
     }
 
-    /// Computes C = A Bᵀ for an upper triangular B with n rows and an A with `rows` rows; `shape` = [rows, n]. C has
+    /// Computes C = A Bᵀ for an A with `rows` rows and an upper triangular B with n rows; `shape` = [rows, n]. C has
     /// padding rows.
     pub fn product_with_upper<V, COLUMNS>(c: &mut [f64], ldc: usize, shape: [usize; 2], a: View<'_>, b: View<'_>) {
         let [rows, n] = shape;
@@ -58,8 +58,8 @@ compiled! {
         from_diagonal::<V, COLUMNS, true>(c, ldc, [n, n], a, b);
     }
 
-    /// Computes C = A Bᵀ for a C without padding rows, with `shape` as for [`product`]. If A and B have common rows,
-    /// the corresponding entries of C on both sides of the diagonal have the same bits.
+    /// Computes C = A Bᵀ for a C without padding rows, with `shape` as for [`product`]. If some rows of A are also rows
+    /// of B, symmetric entries of C for these rows have the same bits.
     pub fn product_without_slack<V, COLUMNS>(
         c: &mut [f64],
         ldc: usize,
@@ -84,7 +84,7 @@ compiled! {
                     continue;
                 }
                 if rows >= V::N {
-                    i = i.min(rows - V::N); // the last strip overlaps the one before
+                    i = i.min(rows - V::N); // the last strip overlaps the strip before it
                 }
                 let tile = tile_rows::<V, 1, COLUMNS>(a, i, b, j, length);
                 for jj in 0..COLUMNS {
@@ -109,8 +109,8 @@ compiled! {
         }
     }
 
-    /// Computes C += A on `rows` rows and `columns` columns, in whole registers. C and A have padding rows; the padding
-    /// of C changes.
+    /// Computes C += A on `rows` rows and `columns` columns, in whole registers. Both matrices have padding rows; the
+    /// padding of C changes.
     pub fn add_matrix<V, COLUMNS>(c: &mut [f64], ldc: usize, a: View<'_>, shape: [usize; 2]) {
         let [rows, columns] = shape;
         for j in 0..columns {
@@ -123,8 +123,8 @@ compiled! {
     }
 }
 
-/// Computes X = A₁ + s B₁ and Y = A₂ + s (X + B₂), without a function call, for A = [A₁; A₂] and B = [B₁; B₂]. `shape`
-/// = [rows of X, columns]. `of_x` and `of_y` are the offsets in OUT at which copies of X and of Y are written.
+/// Computes X = A₁ + s B₁ and Y = A₂ + s (X + B₂) for A = [A₁; A₂] and B = [B₁; B₂], without a function call. `shape` =
+/// [rows of X, columns]. Copies of X are written to OUT at the offsets `of_x`, and copies of Y at the offsets `of_y`.
 #[inline(always)]
 pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
     out: &mut [f64],
@@ -156,7 +156,7 @@ pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
                 }
                 continue;
             }
-            // SAFETY: a register of rows, i ≤ rows − N, in a column that was found to be in bounds.
+            // SAFETY: the register starts at row i ≤ rows − N of a column that was found to be in bounds.
             unsafe {
                 let load = |x: &[f64], at: usize| V::load(x.get_unchecked(at..at + V::N));
                 let x = load(b.data, from_b).mul_add(step, load(a.data, from_a));
@@ -174,11 +174,11 @@ pub fn add_in_turn<V: Vector, const MX: usize, const MY: usize>(
         if i >= last {
             return;
         }
-        i = (i + V::N).min(last); // the last register may overlap the one before
+        i = (i + V::N).min(last); // the last register may overlap the register before it
     }
 }
 
-/// Computes OUT = A + B on `rows` rows and `columns` columns, without a function call.
+/// Computes OUT = A + B without a function call, on `rows` rows and `columns` columns.
 #[inline(always)]
 pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'_>, shape: [usize; 2]) {
     let [rows, columns] = shape;
@@ -197,7 +197,7 @@ pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'
             continue;
         }
         loop {
-            // SAFETY: a register of rows, i ≤ rows − N, in a column that was found to be in bounds.
+            // SAFETY: the register starts at row i ≤ rows − N of a column that was found to be in bounds.
             unsafe {
                 let load = |x: &[f64], at: usize| V::load(x.get_unchecked(at..at + V::N));
                 let sum = load(a.data, from_a + i).add(load(b.data, from_b + i));
@@ -211,8 +211,8 @@ pub fn add_blocks<V: Vector>(out: &mut [f64], ldo: usize, a: View<'_>, b: View<'
     }
 }
 
-/// Computes C ← A Bᵀ in blocks of columns. With LOWER, each block begins at its diagonal. `how` selects whether the
-/// product is set, added or subtracted.
+/// Computes C ← A Bᵀ in blocks of columns; with LOWER, only the rows from the block's diagonal on. `how` selects
+/// whether the product is set, added or subtracted.
 #[inline(always)]
 fn whole<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     c: &mut [f64],
@@ -230,8 +230,8 @@ fn whole<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     }
 }
 
-/// Computes C ← A Bᵀ, where the sums for column j of C begin with term j. With LOWER, only the rows from the diagonal
-/// on.
+/// Computes C ← A Bᵀ, where the sums for a block of columns of C start with the term of the block's first column. With
+/// LOWER, computes only the rows from the diagonal on.
 #[inline(always)]
 fn from_diagonal<V: Vector, const COLUMNS: usize, const LOWER: bool>(
     c: &mut [f64],

@@ -1,4 +1,4 @@
-//! Vector registers for the dense kernels, and selection of the registers of this machine.
+//! Vector registers for the dense kernels, and selection of the registers that this machine has.
 
 use condyle_spatial::Scalar;
 use condyle_spatial::block::{Block, Real, Witness};
@@ -6,21 +6,22 @@ use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// Register of [`Level::Avx512`]; on other processors the same as `Short`.
+/// Register of [`Level::Avx512`]. On other processors, it is the same type as `Short`.
 pub(crate) type Long = <f64 as Real>::Long<Gate>;
 /// Register of [`Level::Avx2`], [`Level::Neon`] or [`Level::Simd128`].
 pub(crate) type Short = <f64 as Real>::Short<Gate>;
 
-/// Witness of this crate, which allows it to name register types.
+/// Witness of this crate. With it, the crate may name register types.
 pub(crate) struct Gate;
 
-// SAFETY: registers are used only in functions called at their level, and in kernels entered through `enter`.
+// SAFETY: registers are used only in functions that are called at the level of the registers, and in kernels entered
+// through `enter`.
 #[allow(unsafe_code)]
 unsafe impl Witness for Gate {}
 
 /// Register of N numbers.
 pub trait Vector: Copy {
-    /// Number of numbers in a register.
+    /// Number of `f64` numbers in a register.
     const N: usize;
 
     /// Loads the first N numbers of `x`.
@@ -121,10 +122,10 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// Work with vector loops, generic over the register type; see [`at_level`].
+/// Work with vector loops, generic over the register type. [`at_level`] runs it.
 pub trait Vectorized: Sized {
-    /// Does the work. It must be `#[inline(always)]`, and so must each function that it calls with registers. Then
-    /// everything is compiled for the instructions of the function in which [`at_level`] calls it.
+    /// Does the work. This function must be `#[inline(always)]`, and so must each function that it calls with
+    /// registers. Then all of them are compiled for the instructions of the function in which [`at_level`] calls `run`.
     fn run<V: Vector>(self);
 }
 
@@ -157,8 +158,8 @@ pub fn at_level(work: impl Vectorized) {
     }
 }
 
-/// Runs work as [`at_level`] does, with registers of at most four numbers. It suits work that mostly copies rows,
-/// because many rows are shorter than eight numbers.
+/// Runs work as [`at_level`] does, with registers of at most four numbers. Such registers suit work that mostly copies
+/// rows, because many rows are shorter than eight numbers.
 pub fn at_narrow_level(work: impl Vectorized) {
     match level() {
         Level::Baseline => work.run::<Pair>(),
@@ -166,7 +167,7 @@ pub fn at_narrow_level(work: impl Vectorized) {
     }
 }
 
-/// Adapter that runs work on registers V as a kernel.
+/// Adapter that makes a [`Kernel`] of work, to run on registers V.
 struct On<W, V>(W, PhantomData<V>);
 
 impl<W: Vectorized, V: Vector> Kernel for On<W, V> {

@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 pub struct Runs {
     /// First source index, first target index, and length of each run.
     runs: Vec<[usize; 3]>,
-    /// Ends (index after the last) over all runs, in the source row and in the target row.
+    /// Index after the last one of all runs, in the source row and in the target row.
     ends: [usize; 2],
 }
 
@@ -26,7 +26,7 @@ impl Runs {
         self.ends = [0; 2];
     }
 
-    /// Adds the pair of source index `from` and target index `to`.
+    /// Adds the pair of source index `from` and target index `to` to the map.
     #[inline(always)]
     pub fn push(&mut self, from: usize, to: usize) {
         match self.runs.last_mut() {
@@ -41,11 +41,11 @@ impl Runs {
         self.runs.iter().copied()
     }
 
-    /// Writes a times the numbers of a row to their target indices, in whole registers. Up to [`SLACK`] numbers after a
-    /// run may change; the run after it overwrites them.
+    /// Multiplies the numbers of a row by a and writes them to their target indices in `to`, in whole registers. Up to
+    /// [`SLACK`] numbers after a run may change; the next run overwrites them.
     ///
     /// # Panics
-    /// If one of the rows does not contain all indices and [`SLACK`] numbers of padding after them.
+    /// If `row` or `to` does not contain all indices and [`SLACK`] numbers of padding after them.
     #[inline(always)]
     pub fn copy_scaled<V: Vector>(&self, row: &[f64], a: f64, to: &mut [f64]) {
         assert!(self.ends[0] + SLACK <= row.len() && self.ends[1] + SLACK <= to.len(), "rows without padding");
@@ -53,8 +53,8 @@ impl Runs {
         for &[from, place, length] in &self.runs {
             let mut i = 0;
             while i < length {
-                // SAFETY: i is in the run. The run ends `SLACK` numbers before the end of both rows, and a register has
-                // at most `SLACK` + 1 numbers.
+                // SAFETY: i is in the run. The run ends at least `SLACK` numbers before the end of `row` and of `to`,
+                // and a register has at most `SLACK` + 1 numbers.
                 unsafe {
                     let x = V::load(row.get_unchecked(from + i..from + i + V::N));
                     x.mul(a).store(to.get_unchecked_mut(place + i..place + i + V::N));

@@ -1,5 +1,5 @@
-//! Elimination of the first columns of a small matrix plus a sum of squares. The squares are added to each tile when
-//! the tile is computed.
+//! Elimination of the first columns of a small matrix H plus a sum of outer products x xᵀ. These products are added to
+//! each tile when the tile is computed.
 #![allow(unsafe_code, non_snake_case)] // H, X
 
 use crate::compiled::narrow;
@@ -10,10 +10,11 @@ use crate::tile::{View, add_outer, has_strip, holds};
 const COLUMNS: usize = 4;
 
 narrow! {
-    /// Eliminates columns as [`eliminate`](crate::eliminate) does, for the matrix H + Σ xₖ xₖᵀ with the columns x of X.
+    /// Eliminates columns as [`eliminate`](crate::eliminate) does, for the matrix H + Σ xₖ xₖᵀ, where xₖ are the
+    /// columns of X.
     ///
     /// `shape` = [rows, columns, m] of H. `length` = [numbers in a column of X, number of columns of X]. After these
-    /// numbers, X has zeros until four registers after the last row of H. H has padding rows.
+    /// numbers, each column of X has zeros that end four registers after the last row of H. H has padding rows.
     ///
     /// # Errors
     /// Returns the first column whose pivot is not positive or not finite, and the pivot.
@@ -59,7 +60,7 @@ narrow! {
     }
 }
 
-/// Squares that are added: the columns of X.
+/// Sum Σ x xᵀ over the columns x of X, which is added to H.
 #[derive(Clone, Copy)]
 struct Sum<'a> {
     x: View<'a>,
@@ -67,8 +68,8 @@ struct Sum<'a> {
     reach: usize,
 }
 
-/// Computes H ← H + Σ x xᵀ − Σ h hᵀ, with h the first m columns of H. It covers `columns` columns from j on, and the
-/// rows from j to `rows`.
+/// Computes H ← H + Σ x xᵀ − Σ h hᵀ, where h are the first m columns of H, on `columns` columns from column j on. The
+/// rows are j..`rows`.
 ///
 /// # Safety
 /// H has padding rows after `rows`, and X has four registers of padding.
@@ -94,10 +95,10 @@ unsafe fn add_tiles<V: Vector>(
     }
 }
 
-/// Computes one tile for [`add_tiles`]: S registers of rows from row i on.
+/// Computes one tile of [`add_tiles`]: S registers of rows from row i on.
 ///
 /// # Safety
-/// As for [`add_tiles`].
+/// The conditions of [`add_tiles`] hold.
 #[inline(always)]
 unsafe fn add_tile<V: Vector, const S: usize>(
     h: &mut [f64],
@@ -154,14 +155,15 @@ fn subtract_outer<V: Vector, const S: usize>(tile: &mut [[V; S]; COLUMNS], strip
     }
 }
 
-/// Computes column j of L and X from its sum and the columns before it, on S registers of rows from row i on. The first
-/// call for a column starts on the diagonal and sets `factor`, the inverse of the diagonal entry.
+/// Computes column j of L and X, on S registers of rows from row i on, from its sum of products and the columns before
+/// it. The first call for a column starts on the diagonal and sets `factor`, the inverse of the diagonal entry.
 ///
 /// # Errors
-/// Returns the column and its pivot, if the pivot is not positive or not finite.
+/// Returns the column and its pivot if the pivot is not positive or not finite.
 ///
 /// # Safety
-/// The first j columns and column j have S registers of numbers from row i on; so does X if i < `sum.reach`.
+/// The columns 0 to j of H have S registers of numbers from row i on. The columns of X have them, too, if i <
+/// `sum.reach`.
 #[inline(always)]
 unsafe fn eliminate_strip<V: Vector, const S: usize>(
     h: &mut [f64],
@@ -197,7 +199,7 @@ unsafe fn eliminate_strip<V: Vector, const S: usize>(
         at += stride;
     }
     let at = at + i;
-    // SAFETY: by the caller; column j begins where j columns end.
+    // SAFETY: guaranteed by the caller; the slice of column j begins after the first j columns.
     let column = unsafe { h.get_unchecked_mut(at..at + S * V::N) };
     if i == j {
         sums[0].store(column);

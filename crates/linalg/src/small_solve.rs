@@ -1,24 +1,24 @@
-//! The solution of a small symmetric system, whose columns are registers.
+//! Solution of a small symmetric system, whose columns are registers.
 
 use condyle_spatial::{Dense, DenseMatrix, Scalar};
 
-/// Solves M x = b for at most `MOST` rows; x stands in place of b.
+/// Solves M x = b for at most `MOST` rows; b is overwritten with x.
 ///
-/// M = L D Lᵀ, column by column, with y = L⁻¹ b on the way:
+/// Computes M = L D Lᵀ column by column and, in the same loop, y = L⁻¹ b:
 ///
 /// ```text
 /// l = A_k / d_k,    A_j ← A_j − l_j A_k  (j > k),    y ← y − y_k l,    z_k = y_k / d_k
 /// x_k = z_k − Σ l_ik x_i  (i > k)
 /// ```
 ///
-/// Whole columns are computed, also the entries above the diagonal that nothing reads, so that loops have no remainder.
-/// M must be positive definite: there are no pivots. Source: Golub and Van Loan, *Matrix Computations* (4th edition),
-/// section 4.1.
+/// Whole columns are computed, so that loops have no remainder; the entries above the diagonal are never read. M must
+/// be positive definite: there is no pivoting. Source: Golub and Van Loan, *Matrix Computations* (4th edition), section
+/// 4.1.
 #[inline(always)]
 pub fn small_solve<S: Scalar, const MOST: usize>(M: &DenseMatrix<S, impl Dense<S>>, b: &mut [S]) {
     let n = b.len();
     assert!(M.shape() == (n, n) && n <= MOST, "M: expected {n} × {n}, at most {MOST}, found {:?}", M.shape());
-    let mut A = [[S::zero(); MOST]; MOST]; // column by column, then L
+    let mut A = [[S::zero(); MOST]; MOST]; // the columns of M, then of L
     for (column, from) in A.iter_mut().zip(M.as_slice().chunks_exact(n.max(1))) {
         column[..n].copy_from_slice(from);
     }

@@ -1,15 +1,16 @@
-//! Tile on which all dense kernels are built: a strip of rows by a few columns, accumulated in registers.
+//! Tile on which all dense kernels are built: the product for a strip of rows and a few columns, summed in registers.
 #![allow(unsafe_code)]
 
 use crate::registers::Vector;
 
-/// Maximum number of rows a strip may extend past the last row, and of columns a tile may extend past the last column.
+/// Maximum number of rows by which a strip may exceed the last row, and of columns by which a tile may exceed the last
+/// column.
 pub const SLACK: usize = 8;
 
-/// Column-major matrix, or the part of it from one of its entries on.
+/// Column-major matrix, or the part of a matrix that starts at one of its entries.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// Numbers, starting with the first entry of the view.
+    /// Numbers of the matrix, starting with the first entry of the view.
     pub data: &'a [f64],
     /// Distance from one column to the next.
     pub stride: usize,
@@ -22,14 +23,14 @@ impl<'a> View<'a> {
         Self { data, stride }
     }
 
-    /// Returns the view from entry (i, j) on; it is empty if this entry does not exist.
+    /// Returns the view that starts at entry (i, j). The view is empty if this entry does not exist.
     #[inline]
     pub fn at(self, i: usize, j: usize) -> Self {
         Self { data: self.data.get(j * self.stride + i..).unwrap_or_default(), ..self }
     }
 }
 
-/// Returns whether a matrix has the given numbers of rows and columns, with at least one column.
+/// Returns whether `data` contains a matrix with the given numbers of rows and columns, with at least one column.
 #[inline(always)]
 pub(crate) fn holds(data: &[f64], stride: usize, [rows, columns]: [usize; 2]) -> bool {
     match (columns - 1).checked_mul(stride) {
@@ -58,18 +59,18 @@ impl<'a> Walk<'a> {
     /// Returns the rows of the current column, and advances to the next column.
     ///
     /// # Safety
-    /// It is called at most `length` times, with the `count` of [`new`](Self::new).
+    /// The function is called at most `length` times, with the `count` that was passed to [`new`](Self::new).
     #[inline(always)]
     unsafe fn next(&mut self, count: usize) -> &'a [f64] {
         debug_assert!(self.at + count <= self.data.len());
-        // SAFETY: by the caller, and by the check in `new`.
+        // SAFETY: guaranteed by the caller and by the check in `new`.
         let rows = unsafe { core::slice::from_raw_parts(self.data.as_ptr().add(self.at), count) };
         self.at += self.stride;
         rows
     }
 }
 
-/// Computes tile = a[i.., ..length] · b[j.., ..length]ᵀ, with S registers of rows.
+/// Computes tile = a[i.., ..length] · b[j.., ..length]ᵀ, where the tile has S registers of rows.
 #[inline(always)]
 pub(crate) fn tile_rows<V: Vector, const S: usize, const COLUMNS: usize>(
     a: View<'_>,
@@ -84,14 +85,14 @@ pub(crate) fn tile_rows<V: Vector, const S: usize, const COLUMNS: usize>(
     }
     let (mut a, mut b) = (Walk::new(a, i, S * V::N, length), Walk::new(b, j, COLUMNS, length));
     for _ in 0..length {
-        // SAFETY: called `length` times, with the row counts given to `new`.
+        // SAFETY: `next` is called `length` times, with the row counts given to `new`.
         let (strip, row) = unsafe { (a.next(S * V::N), b.next(COLUMNS)) };
         add_outer(&mut tile, strip, row);
     }
     tile
 }
 
-/// Computes tile += strip · rowᵀ, with S registers of rows.
+/// Computes tile += strip · rowᵀ, where the strip has S registers of rows.
 #[inline(always)]
 pub(crate) fn add_outer<V: Vector, const S: usize, const COLUMNS: usize>(
     tile: &mut [[V; S]; COLUMNS],
@@ -110,9 +111,9 @@ pub(crate) fn add_outer<V: Vector, const S: usize, const COLUMNS: usize>(
     }
 }
 
-/// Returns the number of registers of rows in the next strip, given the number of `rows` left. With 32 vector
-/// registers, it is three, unless this would leave a single register; otherwise two. (With 16 registers, strips of
-/// three were measured to spill.)
+/// Returns the number of registers in the next strip, given the number of `rows` that are left. With 32 vector
+/// registers, the result is three, unless only one register would be left for the strip after it; otherwise two. (With
+/// 16 registers, strips of three spilled in measurements.)
 #[inline(always)]
 pub(crate) fn next_strip<V: Vector>(rows: usize) -> usize {
     match rows.div_ceil(V::N) {
@@ -134,13 +135,13 @@ pub(crate) enum Store {
     Subtract,
 }
 
-/// Returns whether a matrix has S registers of rows in `columns` columns (at least one), from offset `at` on.
+/// Returns whether each of `columns` columns (at least one) has S registers of rows from offset `at` on.
 #[inline(always)]
 pub(crate) fn has_strip<V: Vector, const S: usize>(data: &[f64], stride: usize, at: usize, columns: usize) -> bool {
     at <= data.len() && holds(&data[at..], stride, [S * V::N, columns])
 }
 
-/// Stores the first `columns` columns of a tile in C, from entry (i, j) on.
+/// Stores the first `columns` columns of a tile in C, with the tile's first entry at (i, j).
 #[inline(always)]
 pub(crate) fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
     c: &mut [f64],
@@ -155,7 +156,7 @@ pub(crate) fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
     for jj in 0..COLUMNS {
         if jj < columns {
             let at = at + jj * ldc;
-            // SAFETY: column jj of the strip, which the assertion found to be in bounds.
+            // SAFETY: the slice is column jj of the strip, which the assertion found to be in bounds.
             let column = unsafe { c.get_unchecked_mut(at..at + S * V::N) };
             for s in 0..S {
                 let place = &mut column[s * V::N..];
@@ -170,8 +171,8 @@ pub(crate) fn store_tile<V: Vector, const S: usize, const COLUMNS: usize>(
     }
 }
 
-/// Computes C[i, j] ← A[i, ..length] · B[j, ..length]ᵀ for the given rows and for `columns` columns from j on, in
-/// strips of up to three registers. `how` selects whether the product is set, added or subtracted.
+/// Computes C[i, j] ← A[i, ..length] · B[j, ..length]ᵀ for the given rows i and for `columns` columns from column j on.
+/// Strips have up to three registers. `how` selects whether the product is set, added or subtracted.
 #[inline(always)]
 pub(crate) fn column_block<V: Vector, const COLUMNS: usize>(
     c: &mut [f64],

@@ -1,4 +1,4 @@
-//! Products X = −A B of square matrices, where the zeros of B's columns follow a tree.
+//! Products X = −A B of square matrices. The zeros in the columns of B follow a tree.
 #![allow(unsafe_code)]
 
 use crate::axpy::axpy;
@@ -15,15 +15,15 @@ use core::ops::Range;
 /// Computes C = −A B, where column j of B is zero except in the rows of `nonzero_rows[j]`.
 ///
 /// Four columns with the same rows, for example columns of one limb, are computed together. A group of their entries
-/// stays in registers while the sums accumulate. For other columns, four columns of A are used at a time, so that the
-/// sums are loaded and stored a quarter as often.
+/// stays in registers while the sums accumulate. For other columns, terms of four columns of A are added at once, so
+/// that sums are loaded and stored a quarter as often.
 #[inline(always)]
 pub fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
     minus_block_product(A, B, C, nonzero_rows, 0..nonzero_rows.len());
 }
 
-/// Computes the diagonal block `block` of C = −A B. In the columns of the block, B must be zero outside the block's
-/// rows.
+/// Computes the diagonal block `block` of C = −A B. In the columns of this block, B must be zero outside the rows of
+/// the block.
 #[inline(always)]
 pub fn minus_block_product<S: Scalar>(
     A: &[S],
@@ -51,8 +51,8 @@ pub fn minus_block_product<S: Scalar>(
     }
 }
 
-/// Computes `minus_product` for two matrices B and one symmetric A. It is for lanes, whose matrices are too large for
-/// the first-level cache.
+/// Computes [`minus_product`] for two matrices B and one symmetric A. It is used for lanes, because their matrices are
+/// too large for the first-level cache.
 #[inline(always)]
 fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
     let (n, mut j) = (nonzero_rows.len(), 0);
@@ -63,7 +63,7 @@ fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2]
         let B = [&B[0][columns.clone()], &B[1][columns.clone()]];
         let C = [&mut C0[columns.clone()], &mut C1[columns]];
         let rows = Inside::new(rows, n);
-        // sums and operands fill 32 registers of eight numbers, or 16 of four
+        // The counts are chosen so that sums and operands fill 32 registers of eight numbers, or 16 registers of four.
         match (many, size_of::<S>()) {
             (4, 64..) => twice::<S, 4, 2>(A, B, C, rows),
             (4, _) => twice::<S, 4, 1>(A, B, C, rows),
@@ -77,7 +77,7 @@ fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2]
     }
 }
 
-/// Row indices, checked to be below n.
+/// Row indices that were checked to be below n.
 #[derive(Clone, Copy)]
 struct Inside<'a> {
     rows: &'a [usize],
@@ -85,7 +85,7 @@ struct Inside<'a> {
 }
 
 impl<'a> Inside<'a> {
-    /// Checks each row index.
+    /// Checks that each row index is below n.
     #[inline(always)]
     fn new(rows: &'a [usize], n: usize) -> Self {
         let mut last = 0;
@@ -100,7 +100,7 @@ impl<'a> Inside<'a> {
 /// Returns entry k of a column of n numbers.
 ///
 /// # Safety
-/// k is one of the rows of an [`Inside`] with this n.
+/// k is one of the rows of an [`Inside`] whose n is this n.
 #[inline(always)]
 unsafe fn entry<T: Copy>(column: &[T], k: usize) -> T {
     debug_assert!(k < column.len());
@@ -108,8 +108,8 @@ unsafe fn entry<T: Copy>(column: &[T], k: usize) -> T {
     unsafe { *column.get_unchecked(k) }
 }
 
-/// Computes the sums of `subtract_column` for N rows of M columns at a time. A is symmetric, so N of its columns are
-/// read from start to end.
+/// Computes the sums of `subtract_column` for M columns and N rows at a time. A is symmetric, so its columns are read
+/// as rows.
 #[inline(always)]
 fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&mut [S]; 2], rows: Inside<'_>) {
     let (Inside { rows, n }, [B0, B1], [C0, C1]) = (rows, B, C);
@@ -151,7 +151,7 @@ fn twice<S: Scalar, const M: usize, const N: usize>(A: &[S], B: [&[S]; 2], C: [&
     }
 }
 
-/// Computes c −= A b on the rows `of_c` of c, where b is zero except in `rows`.
+/// Computes c −= A b on the rows `of_c` of c, where b is zero except in the rows `rows`.
 #[inline(always)]
 pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize], of_c: Range<usize>) {
     let (n, A) = (c.len(), &A[of_c.start..]);
@@ -171,7 +171,8 @@ pub fn subtract_column<S: Scalar>(A: &[S], b: &[S], c: &mut [S], rows: &[usize],
     }
 }
 
-/// Computes the sums of `subtract_column` for four columns, in the same order and therefore with the same bits.
+/// Computes the sums of `subtract_column` for four columns. The order of the terms is the same, so the bits are the
+/// same.
 #[inline(always)]
 fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: &[usize], [n, start, end]: [usize; 3]) {
     let (b0, b1, b2, b3) = (&B[..n], &B[n..2 * n], &B[2 * n..3 * n], &B[3 * n..4 * n]);
@@ -224,7 +225,7 @@ pub fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzer
 }
 
 kernel! {
-    /// Computes the products for any scalar.
+    /// Computes [`minus_products`] for any scalar, one entry after another.
     fn one_by_one<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
         if S::LANES > 1 {
             minus_product_twice(A, B, X, nonzero_rows);
@@ -234,7 +235,7 @@ kernel! {
     }
 }
 
-/// Computes the products for `f64`, in the vector registers of the level.
+/// Computes [`minus_products`] for `f64`, in the vector registers of the SIMD level.
 fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[NonzeroRows]) {
     if level() >= Level::Avx512 && nonzero_rows.len() >= 8 {
         Long::enter(InRegisters::<Long> { A, B, X, nonzero_rows, vector: PhantomData });
@@ -245,14 +246,14 @@ fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[N
 
 /// Number of columns of B that are computed together.
 const SIDE: usize = 4;
-/// Number of operations in flight at any time; fewer sums than this save no time.
+/// Number of operations that the processor executes at the same time; computing fewer sums than this saves no time.
 const UNDER_WAY: usize = 8;
 
-/// Products in vector registers.
+/// Implements [`minus_products`] in vector registers.
 ///
-/// As many entries of four columns of X as fit in registers stay there while their sums accumulate. The last group of
-/// rows ends at the last row and overlaps the group before, so some entries are computed twice. Each entry is the same
-/// sum in the same order as in `minus_product`.
+/// The entries of four columns of X stay in registers while their sums accumulate, as many as fit. The last group of
+/// rows ends at the last row and overlaps the group before it, so some entries are computed twice. Each entry is the
+/// same sum in the same order as in `minus_product`.
 struct InRegisters<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],
@@ -265,8 +266,8 @@ impl<V: Block<Number = f64>> Kernel for InRegisters<'_, V> {
     #[inline(always)]
     fn run(mut self) {
         let n = self.nonzero_rows.len();
-        // number of vectors of a column that stay in registers: the one with the fewest operations; if equal, the
-        // largest
+        // Selects the number of vectors of a column that stay in registers: the number with the fewest operations. Of
+        // equally good numbers, the largest one is selected.
         let (mut best, mut least) = (1, usize::MAX);
         for many in 1..=3 {
             let cost = n.div_ceil(many * V::LANES) * UNDER_WAY.max(many * SIDE);
@@ -288,7 +289,7 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
         let mut j = 0;
         while j < self.nonzero_rows.len() {
             let NonzeroRows { rows, same_pattern } = &self.nonzero_rows[j];
-            // columns j, …, j + same − 1 of the first matrix, then of the second
+            // The columns j, …, j + same − 1 of the first matrix are followed by those columns of the second matrix.
             let (same, mut k) = (*same_pattern, 0);
             let rows = Inside::new(rows, self.nonzero_rows.len());
             while k < 2 * same {
@@ -304,7 +305,7 @@ impl<V: Block<Number = f64>> InRegisters<'_, V> {
         }
     }
 
-    /// Computes M columns of X; `which` gives the matrix and the column index of each.
+    /// Computes M columns of X; `which` contains the index of the matrix and the index of the column for each.
     #[inline(always)]
     fn columns<const M: usize, const N: usize>(&mut self, which: [(usize, usize); M], rows: Inside<'_>) {
         let (Inside { rows, n }, wide) = (rows, N * V::LANES);

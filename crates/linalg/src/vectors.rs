@@ -22,7 +22,7 @@ compiled! {
             }
             return;
         }
-        // SAFETY: the last register begins N rows before the end, and the others before it.
+        // SAFETY: the last register begins N rows before the end, and the other registers begin before it.
         let sum = |y: &[f64], i: usize| unsafe { scaled_rows::<V>(y, alpha, a, x, i) };
         let (last, mut i) = (rows - V::N, 0);
         let end = sum(y, last); // computed before rows that it shares with another register are written
@@ -34,7 +34,7 @@ compiled! {
     }
 }
 
-/// Returns y + α A x for one register of rows from row i on.
+/// Returns y + α A x for one register of rows, which starts at row i.
 ///
 /// # Safety
 /// y and the columns of A have a register of numbers from row i on. A has as many columns as x has numbers.
@@ -47,18 +47,18 @@ unsafe fn scaled_rows<V: Vector>(y: &[f64], alpha: f64, a: View<'_>, x: &[f64], 
     for x in x {
         // SAFETY: by the caller.
         let column = V::load(unsafe { a.data.get_unchecked(at..at + V::N) });
-        sum = sum.add(column.mul(alpha.mul(V::splat(*x)))); // rounds as if computed one by one
+        sum = sum.add(column.mul(alpha.mul(V::splat(*x)))); // rounds as if the terms were added one by one
         at += a.stride;
     }
     sum
 }
 
 compiled! {
-    /// Computes y += A x for an A with `rows` rows. y has `rows` numbers and padding.
+    /// Computes y += A x for an A with `rows` rows. y has `rows` numbers, followed by padding.
     pub fn add_product_vector<V, COLUMNS>(y: &mut [f64], rows: usize, a: View<'_>, x: &[f64]) {
         let mut i = 0;
         while i < rows {
-            // Up to four registers of rows at a time; the last one may extend into the padding.
+            // Computes up to four registers of rows at a time. The last register may extend into the padding.
             if rows - i > 3 * V::N {
                 strip::<V, 4>(&mut y[i..], a, i, x);
             } else if rows - i > 2 * V::N {
@@ -72,8 +72,8 @@ compiled! {
         }
     }
 
-    /// Computes y = Aᵀ x for an A with `rows` rows. Rows of A and numbers of x after them, up to a whole register, must
-    /// have zero products. A has as many columns as y has numbers, and padding columns.
+    /// Computes y = Aᵀ x for an A with `rows` rows. Products of padding rows of A with padding of x, up to the end of a
+    /// register, must be zero. A has as many columns as y has numbers, and padding columns.
     pub fn transposed_product_vector<V, COLUMNS>(y: &mut [f64], rows: usize, a: View<'_>, x: &[f64]) {
         let mut k = 0;
         while k < y.len() {
@@ -130,8 +130,8 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
     x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
-/// Returns ‖x‖∞; NaN if an entry is NaN. The bits of absolute values, read as integers, have the same order, and NaN is
-/// the largest.
+/// Returns ‖x‖∞; NaN if an entry is NaN. The absolute values are compared as integers with the same bits: the order is
+/// the same, and NaN is the largest.
 #[inline]
 pub fn max_abs(x: &[f64]) -> f64 {
     let abs = |x: f64| x.abs().to_bits() as i64;
@@ -151,7 +151,7 @@ pub fn max_abs(x: &[f64]) -> f64 {
 pub fn copy<V: Vector>(to: &mut [f64], x: &[f64]) {
     let length = x.len();
     let to = &mut to[..length];
-    // the last numbers may overlap numbers that were copied before
+    // The last numbers may overlap numbers that were copied before.
     match length {
         0 => {}
         1 => to[0] = x[0],
@@ -189,7 +189,7 @@ pub fn copy_scaled<V: Vector>(to: &mut [f64], x: &[f64], a: f64) {
         }
         return;
     }
-    // Two registers at a time; the last ones may overlap those before.
+    // Copies two registers at a time. The last registers may overlap the registers before them.
     let (a, last, mut i) = (V::splat(a), length - V::N, 0);
     loop {
         let k = (i + V::N).min(last);

@@ -1,12 +1,12 @@
-//! Parts on which several threads work.
+//! Tests of slices that are split into parts, on which several threads work.
 
 use condyle_linalg::threads::Parts;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Four threads compete for every stage of every part. Each stage is done once and in order, and each thread sees the
-/// data that the previous one wrote.
+/// Four threads compete for every stage of every part. Each stage of a part is executed once and in order, and each
+/// thread sees the data that the previous thread wrote.
 #[test]
 fn each_stage_of_each_part_is_done_once() {
     let (cuts, stages) = ([0, 3, 3, 4, 9, 16, 40], 5);

@@ -1,4 +1,4 @@
-//! Factorizations and products with the zeros of a tree, compared with dense ones.
+//! Tests of factorizations and products that use the zeros of a tree, compared with dense ones.
 #![allow(non_snake_case)]
 
 use condyle_linalg::sparsity::NonzeroRows;
@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 /// Rounding error of sums of about ten products of numbers near 1, and of solves with matrices of condition number 10.
 const ROUNDING: f64 = 1e-13;
 
-/// Parents of the columns: a trunk of three columns that carries two limbs of five.
+/// Parents of the columns: a trunk of three columns that carries two limbs of five columns each.
 const PARENTS: [Option<usize>; 13] = {
     let mut parents = [None; 13];
     let mut c = 1;
@@ -20,7 +20,7 @@ const PARENTS: [Option<usize>; 13] = {
     parents
 };
 
-/// Tree of the same columns, where the first column of each limb shares one row.
+/// Tree with the parents `PARENTS`, where the first columns of both limbs share one row.
 struct Shared;
 
 impl ColumnTree for Shared {
@@ -47,13 +47,13 @@ fn number(i: usize) -> f64 {
     (1.0 + 7.3 * i as f64).sin()
 }
 
-/// Returns whether one of two columns is on the other's path to the root.
+/// Returns whether column c is on the path from column d to the root, or d on the path from c.
 fn related(tree: &(impl ColumnTree + ?Sized), c: usize, d: usize) -> bool {
     let (low, high) = (c.min(d), c.max(d));
     core::iter::successors(Some(high), |&c| tree.parent(c)).any(|c| c == low)
 }
 
-/// Returns a positive definite matrix with the zeros of a tree.
+/// Returns a positive definite matrix whose zeros follow a tree.
 fn matrix(tree: &(impl ColumnTree + ?Sized)) -> DMatrix<f64> {
     let n = tree.rows();
     let mut M = DMatrix::from_diagonal_element(n, n, 10.0);

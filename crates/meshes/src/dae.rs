@@ -1,8 +1,8 @@
-//! DAE (COLLADA 1.4 and 1.5): reads the triangles of a scene, with the poses of its nodes and the diffuse colours of
-//! its materials.
+//! Reader of DAE (COLLADA 1.4 and 1.5). It reads the triangles of a scene, with the poses of its nodes and the diffuse
+//! colours of its materials.
 //!
-//! The unit of the file is applied, its upward axis is not. RViz and Pinocchio do the same, and robots are made for
-//! them.
+//! The unit of length of the file is applied, but its upward axis is not. RViz and Pinocchio do the same, and the files
+//! of robots are made for these programs.
 
 use super::part::{Part, Triangle, Words, full};
 use nalgebra::{Matrix4, Point3, Rotation3, Translation3, Unit, Vector3};
@@ -13,7 +13,7 @@ use std::collections::HashMap;
 const DEEPEST: usize = 64;
 const MOST_NODES: usize = 100_000;
 
-/// Reads the triangles of a DAE: one part for each material of each geometry that its scene shows.
+/// Reads the triangles of a DAE: one part for each material of each geometry that the scene shows.
 pub(super) fn read(text: &str) -> Result<Vec<Part>, String> {
     let document = Document::parse(text).map_err(|error| error.to_string())?;
     let root = document.root_element();
@@ -57,7 +57,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         self.ids.get(url.strip_prefix('#')?).copied()
     }
 
-    /// Adds the geometries of a node and of all nodes below it; `to_world` is the pose of its parent.
+    /// Adds the geometries of a node and of all nodes below it. `to_world` is the pose of the parent node.
     fn visit(&mut self, node: Node<'a, 'i>, mut to_world: Matrix4<f64>, depth: usize) -> Result<(), String> {
         self.nodes += 1;
         if depth > DEEPEST || self.nodes > MOST_NODES {
@@ -82,7 +82,7 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    /// Adds the triangles of a geometry; `instance` maps the symbols of materials to materials.
+    /// Adds the triangles of a geometry. `instance` maps the symbols of materials to materials.
     fn geometry(
         &mut self,
         geometry: Node<'a, 'i>,
@@ -106,7 +106,8 @@ impl<'a, 'i> Scene<'a, 'i> {
         Ok(())
     }
 
-    /// Returns points and triangles of a primitive, with polygons split into fans; `None` if it has no vertices.
+    /// Returns the points and triangles of a primitive. Polygons are split into fans of triangles. Returns `None` if
+    /// the primitive has no vertices.
     fn primitive(&self, primitive: Node<'a, 'i>) -> Result<Option<Soup>, String> {
         let (mut stride, mut offset, mut vertices) = (1, 0, None);
         for input in primitive.children().filter(|node| node.tag_name().name() == "input") {
@@ -182,7 +183,7 @@ impl<'a, 'i> Scene<'a, 'i> {
     }
 }
 
-/// Returns the transform that an element of a node describes; `None` if the element is no transform.
+/// Returns the transform that a child element of a node describes; `None` if this element is not a transform.
 fn transform(node: Node) -> Result<Option<Matrix4<f64>>, String> {
     let name = node.tag_name().name();
     if !matches!(name, "matrix" | "translate" | "rotate" | "scale") {
@@ -229,7 +230,8 @@ mod tests {
         assert_eq!(parts.len(), 2);
         assert_eq!((parts[0].triangles.len(), parts[0].color), (2, Some([0.1, 0.2, 0.3])));
         assert_eq!((parts[1].triangles.len(), parts[1].color), (1, None));
-        // (1, 0, 0): scaled by 2, rotated to y, raised by 2, and all multiplied by the unit 0.5
+        // The point (1, 0, 0) is scaled by 2, rotated to the y axis and raised by 2. Then all coordinates are
+        // multiplied by the unit 0.5.
         let p = parts[1].points[1];
         assert!(p.iter().zip([0.0, 1.0, 1.0]).all(|(a, b)| (a - b).abs() < 1e-12), "{p:?}");
     }

@@ -1,26 +1,27 @@
-//! Polygons cut into triangles as MuJoCo's reader of OBJ (tinyobjloader, without mapbox's earcut) cuts them. Where the
-//! corners of a face are not in a plane, its cuts decide on the volume of the mesh.
+//! Cuts polygons into triangles in the same way as MuJoCo's reader of OBJ (tinyobjloader, without mapbox's earcut). If
+//! the corners of a face are not in a plane, the volume of the mesh depends on the cuts.
 
 use super::part::Triangle;
 
-/// Maximum number of tests whether a corner is inside an ear, for all faces of a file: about a second.
+/// Maximum number of tests whether a corner is inside an ear, for all faces of a file together. These tests take about
+/// a second.
 const MAX_TESTS: usize = 1 << 26;
 
-/// Maximum number of corners of a face that MuJoCo's reader cuts; it leaves larger ones out.
+/// Maximum number of corners of a face that MuJoCo's reader cuts. Faces with more corners are left out.
 const MAX_CORNERS: usize = 100;
 
-/// Faces of a file that are cut; counts the tests.
+/// Cutter for the faces of one file, which counts its tests.
 #[derive(Default)]
 pub(super) struct Ears {
     tests: usize,
-    /// Number of faces of which triangles are left out.
+    /// Number of faces with triangles that are left out.
     pub(super) lost: usize,
 }
 
 impl Ears {
-    /// Returns the triangles of a face. A quadrilateral is cut along its shorter diagonal. Ears are cut off larger
-    /// polygons, in the plane of two axes. As in MuJoCo, what then has no ear is left out, and so are faces with more
-    /// than 100 corners.
+    /// Returns the triangles of a face. A quadrilateral is cut along its shorter diagonal. From larger polygons, ears
+    /// are cut off, in the plane of two axes. As in MuJoCo, a remaining polygon without an ear is left out, and so are
+    /// faces with more than 100 corners.
     pub(super) fn cut(&mut self, points: &[[f64; 3]], mut face: Vec<u32>) -> Result<Vec<Triangle>, String> {
         let at = |corner: u32| points[corner as usize].map(|x| x as f32);
         if let [a, b, c, d] = face[..] {
@@ -68,12 +69,13 @@ impl Ears {
     }
 }
 
-/// Returns the square of a distance.
+/// Returns the squared distance between two points.
 fn squared(p: [f32; 3], q: [f32; 3]) -> f32 {
     (0..3).map(|k| (q[k] - p[k]) * (q[k] - p[k])).sum()
 }
 
-/// Returns two axes along which a polygon is seen: without the one that the first real corner is turned about most.
+/// Returns the two axes along which a polygon is projected. The third axis has the largest component of the normal at
+/// the first corner whose sides are not parallel.
 fn plane(corners: &[[f32; 3]]) -> [usize; 2] {
     let n = corners.len();
     for k in 0..n {
@@ -91,7 +93,8 @@ fn plane(corners: &[[f32; 3]]) -> [usize; 2] {
     [1, 2]
 }
 
-/// Whether an ear turns as the origin sees its first side turn: the reader's test of an outward corner.
+/// Returns whether the corner of an ear is outward, by the test of MuJoCo's reader: the ear turns in the same direction
+/// as the ear's first side, seen from the origin.
 fn is_outward([a, b, c]: [[f32; 2]; 3]) -> bool {
     let turn = (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]);
     let area = (a[0] * b[1] - a[1] * b[0]) * 0.5;
@@ -99,7 +102,7 @@ fn is_outward([a, b, c]: [[f32; 2]; 3]) -> bool {
     product >= 0.0 || product.is_nan()
 }
 
-/// Whether a point is inside a triangle: a ray from it crosses an odd number of sides.
+/// Returns whether a point is inside a triangle: a ray from the point crosses an odd number of sides.
 fn is_inside(triangle: [[f32; 2]; 3], [x, y]: [f32; 2]) -> bool {
     let [a, b, c] = triangle;
     [(a, c), (b, a), (c, b)].into_iter().fold(false, |is_inside, (p, q)| {
@@ -112,10 +115,11 @@ fn is_inside(triangle: [[f32; 2]; 3], [x, y]: [f32; 2]) -> bool {
 mod tests {
     use super::{Ears, MAX_TESTS};
 
-    /// Corners of a face: two axes and a height.
+    /// Corners of a face; each has coordinates along two axes and a height.
     type Corners = &'static [[f64; 3]];
 
-    /// Faces, and the triangles in `mesh_face` of MuJoCo 4.0.0's model of them, closed by a cone, with corners from 0.
+    /// Faces, and their triangles in `mesh_face` of MuJoCo 4.0.0. For MuJoCo, each face was closed to a solid by a
+    /// cone. Corners are counted from 0.
     const FACES: &[(Corners, &[[u32; 3]])] = &[
         (
             &[[3.0, 1.0, 0.0], [5.0, 1.0, 0.5], [6.0, 3.0, 0.0], [4.0, 5.0, 1.0], [2.0, 3.0, -0.5]],
@@ -174,7 +178,8 @@ mod tests {
         (0..corners).map(corner).map(|(y, x)| [x, y, 0.0]).collect()
     }
 
-    /// MuJoCo 4.0.0 has 98 triangles in `mesh_face` of a face with 100 corners, and none of one with 101.
+    /// For a face with 100 corners, MuJoCo 4.0.0 has 98 triangles in `mesh_face`; for a face with 101 corners, it has
+    /// no triangle.
     #[test]
     fn faces_with_many_corners_are_left_out() {
         for (corners, triangles, lost) in [(100, 98, 0), (101, 0, 1)] {

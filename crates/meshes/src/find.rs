@@ -1,4 +1,4 @@
-//! Search for the file of a mesh: next to its robot's file, in a package, or in the folder that an MJCF names.
+//! Search for the file of a mesh: next to the robot's file, in a package, or in the folder that an MJCF names.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -14,7 +14,7 @@ pub struct Places {
 impl Places {
     /// Returns the file of a path, or of a `package://`, `model://` or `file://` address. A package is searched in
     /// `packages`, ROS_PACKAGE_PATH and AMENT_PREFIX_PATH. Each folder above the robot's file may also be the package
-    /// or contain it.
+    /// or contain the package.
     pub fn find(&self, address: &str) -> Result<PathBuf, String> {
         let inside = ["package://", "model://"].iter().find_map(|scheme| address.strip_prefix(scheme));
         let Some(inside) = inside else { return self.plain(address.strip_prefix("file://").unwrap_or(address)) };
@@ -33,7 +33,7 @@ impl Places {
         folders.extend(folder.iter().flat_map(|folder| folder.ancestors()).map(Path::to_owned));
         for folder in folders {
             let itself = folder.file_name().is_some_and(|name| name == package).then(|| folder.join(path));
-            // an address without a package, such as `package:///meshes/a.stl`, is relative to the folder itself
+            // An address without a package, such as `package:///meshes/a.stl`, is relative to the folder itself.
             for file in [itself, Some(folder.join(package).join(path))].into_iter().flatten() {
                 if file.is_file() {
                     return Ok(file);

@@ -1,29 +1,29 @@
 //! Convex hulls by quickhull: Barber, Dobkin, Huhdanpaa (1996). Points are rounded to a grid with 2⁴⁰ steps along the
-//! longest side of their box. On the grid every test compares integers exactly, so flat, doubled and nearly flat points
-//! need no tolerance.
+//! longest side of their box. On the grid, every test compares integers exactly. So flat, duplicate and nearly flat
+//! points need no tolerance.
 
 use super::part::Triangle;
 
-/// Number of steps of the grid along the longest side of the box; chosen because a determinant then fits in an `i128`.
+/// Number of steps of the grid along the longest side of the box. It is chosen so that a determinant fits in an `i128`.
 const STEPS: f64 = (1u64 << 40) as f64;
 
 /// Coordinates of a point on the grid.
 type Point = [i64; 3];
 
-/// A triangle of a hull under construction.
+/// Triangle of a hull that is not yet finished.
 struct Face {
     corners: Triangle,
-    /// Neighbouring faces: entry k is the face across the edge that begins at corner k.
+    /// Neighbouring faces: entry k is the face on the other side of the edge that begins at corner k.
     across: [u32; 3],
-    /// Normal (b − a) × (c − a), outwards.
+    /// Normal (b − a) × (c − a) of a face with corners a, b, c; it points outwards.
     normal: [i128; 3],
-    /// Points strictly outside; each point is listed by one face only.
+    /// Points strictly outside of this face; each point is listed by one face only.
     outside: Vec<u32>,
     is_part: bool,
 }
 
-/// Returns the triangles of the convex hull of points, counter-clockwise seen from outside; `None` if all points lie in
-/// one plane.
+/// Returns the triangles of the convex hull of points, with corners counter-clockwise if seen from outside. Returns
+/// `None` if all points lie in one plane.
 ///
 /// ```
 /// let corner = |i: u32| [0, 1, 2].map(|k| f64::from(i >> k & 1));
@@ -49,7 +49,7 @@ pub fn hull(points: &[[f64; 3]]) -> Option<Vec<Triangle>> {
     Some(hull.faces.into_iter().filter(|face| face.is_part).map(|face| face.corners).collect())
 }
 
-/// Rounds points to grid coordinates in their box; `None` if all points coincide or one is not finite.
+/// Rounds points to the grid in their box. Returns `None` if all points coincide or if one of them is not finite.
 fn grid(points: &[[f64; 3]]) -> Option<Vec<Point>> {
     let bound = |f: fn(f64, f64) -> f64, k: usize| points.iter().map(|p| p[k]).reduce(f).unwrap_or(0.0);
     let low = [0, 1, 2].map(|k| bound(f64::min, k));
@@ -71,7 +71,8 @@ fn dot(a: [i128; 3], b: [i128; 3]) -> i128 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Returns a tetrahedron of points far from each other; the other points are shared out among its faces.
+/// Returns a tetrahedron whose corners are points far from each other. The other points are distributed among its
+/// faces.
 fn start(grid: Vec<Point>) -> Option<Hull> {
     let all = || 0..grid.len() as u32;
     let at = |p: u32| grid[p as usize];
@@ -84,7 +85,7 @@ fn start(grid: Vec<Point>) -> Option<Hull> {
     let normal = cross(edge, minus(at(c), at(a)));
     let height = |p: u32| dot(normal, minus(at(p), at(a)));
     let d = all().max_by_key(|&p| height(p).abs()).filter(|&p| height(p) != 0)?;
-    // d must lie below the face of a, b and c
+    // The point d must lie below the face with corners a, b and c.
     let [b, c] = if height(d) < 0 { [b, c] } else { [c, b] };
     let face = |corners, across| Face { corners, across, normal: [0; 3], outside: Vec::new(), is_part: true };
     let mut faces = vec![
@@ -113,13 +114,14 @@ struct Hull {
 }
 
 impl Hull {
-    /// Returns n · (p − a), which is positive outside of a face.
+    /// Returns n · (p − a), with the normal n and a corner a of a face. The result is positive if the point p is
+    /// outside of the face.
     fn above(&self, face: &Face, p: u32) -> i128 {
         dot(face.normal, minus(self.grid[p as usize], self.grid[face.corners[0] as usize]))
     }
 
-    /// Gives each point to the first face, from index `first` on, that has it outside; points inside all faces are
-    /// dropped.
+    /// Distributes points among the faces from index `first` on: each point is listed by the first face that has the
+    /// point outside. Points inside all faces are dropped.
     fn share_out(&mut self, points: Vec<u32>, first: usize) {
         for p in points {
             if let Some(f) = (first..self.faces.len()).find(|&f| self.above(&self.faces[f], p) > 0) {
@@ -128,7 +130,7 @@ impl Hull {
         }
     }
 
-    /// Adds a point outside of a face: the faces that see the point are replaced by a cone over their rim.
+    /// Adds a point outside of a face. The faces that see the point are replaced by a cone from the point to their rim.
     fn add(&mut self, p: u32, seen_by: u32) {
         let (mut visible, mut rim) = (vec![seen_by], Vec::new());
         self.faces[seen_by as usize].is_part = false;
@@ -139,7 +141,7 @@ impl Hull {
                 let next = self.faces[f as usize].across[e];
                 let face = &self.faces[next as usize];
                 if !face.is_part {
-                    continue; // it sees the point too
+                    continue; // this face sees the point, too
                 }
                 if self.above(face, p) > 0 {
                     self.faces[next as usize].is_part = false;
@@ -150,8 +152,8 @@ impl Hull {
                 }
             }
         }
-        // the rim is a closed loop: sort its edges by their first corner, and connect each to the edge that begins at
-        // its end
+        // The rim is a closed loop. Its edges are sorted by their first corner, so that the edge that begins at the end
+        // of another edge is found quickly.
         let first = self.faces.len();
         rim.sort_unstable();
         let begins = |rim: &[(u32, u32, u32)], corner: u32| first + rim.partition_point(|edge| edge.0 < corner);
@@ -187,7 +189,7 @@ mod tests {
         triangles.iter().map(|t| determinant(t.map(|p| points[p as usize]))).sum()
     }
 
-    /// Yields pseudo-random numbers from 0 to 1, the same in each run.
+    /// Yields pseudo-random numbers from 0 to 1; they are the same in each run.
     fn numbers() -> impl Iterator<Item = f64> {
         let mut x = 1u64;
         std::iter::from_fn(move || {
@@ -201,7 +203,7 @@ mod tests {
         let mut random = numbers();
         for case in 0..60 {
             let count = 4 + case * 5;
-            // every third case is on a coarse lattice: many points are collinear, coplanar or equal
+            // Every third case is on a coarse lattice, where many points are collinear, coplanar or equal.
             let mut number = || {
                 let x = random.next().unwrap();
                 if case % 3 == 0 { (4.0 * x).round() } else { x }
@@ -236,8 +238,8 @@ mod tests {
             }
         }
         let triangles = hull(&ball).unwrap();
-        assert_eq!(triangles.len(), 2 * 5000 - 4); // Euler: every point is a corner
-        let sphere = 8.0 * std::f64::consts::PI; // 6 · 4/3 π
+        assert_eq!(triangles.len(), 2 * 5000 - 4); // Euler's formula: every point is a corner
+        let sphere = 8.0 * std::f64::consts::PI; // 6 times the volume 4/3 π
         assert!((volume(&ball, &triangles) / sphere - 1.0).abs() < 5e-3);
     }
 

@@ -1,8 +1,8 @@
-//! The meshes that a page shows: their files are found, read, simplified and written into the page.
+//! Meshes for the web pages that show robots. Mesh files are found, read, simplified and written into the page.
 //!
 //! A page has at most 60 000 triangles, whatever the files of its robot contain: edges of the largest parts collapse
-//! first. Points have 16 bits along each side of their box. Meshes that cannot be found or read are left out with a
-//! note, because a page works without them.
+//! first. The coordinates of points have 16 bits along each side of the part's box. Meshes that cannot be found or read
+//! are left out with a note, because a page is useful without them.
 //!
 //! Without the feature `page`, the crate only reads triangles (STL, OBJ) and computes convex hulls.
 //!
@@ -53,21 +53,21 @@ pub enum Format {
     Dae,
 }
 
-/// Returns the points of a mesh, and its triangles as indices of points, counter-clockwise seen from outside. The mesh
-/// is not simplified. For an OBJ with several objects or groups, it returns the triangles of the first one and the
-/// points of all, as MuJoCo does. As in MuJoCo, faces with more than 100 corners are left out, and so are parts of
-/// faces from which no ear can be cut.
+/// Returns the points of a mesh, and its triangles as indices of points, counter-clockwise if seen from outside. The
+/// mesh is not simplified. For an OBJ with several objects or groups, returns the triangles of the first object or
+/// group and all points, as MuJoCo does. As in MuJoCo, faces with more than 100 corners are left out, and so are parts
+/// of faces from which no ear can be cut.
 ///
 /// # Errors
-/// The fault of the file, with the line for an OBJ or an STL in text form.
+/// Returns a description of the fault, with the line number for an OBJ or an STL in text form.
 pub fn triangles(format: Format, bytes: &[u8]) -> Result<Triangles, String> {
     cut_triangles(format, bytes).map(|(triangles, _)| triangles)
 }
 
-/// Does as [`triangles`], and returns the number of OBJ faces of which triangles are left out.
+/// Does the same as [`triangles`], and also returns the number of OBJ faces with triangles that are left out.
 ///
 /// # Errors
-/// As [`triangles`].
+/// Returns the same errors as [`triangles`].
 #[doc(hidden)]
 pub fn cut_triangles(format: Format, bytes: &[u8]) -> Result<(Triangles, usize), String> {
     let (mut points, mut triangles, mut lost) = (Vec::new(), Vec::new(), 0);
@@ -83,7 +83,7 @@ pub fn cut_triangles(format: Format, bytes: &[u8]) -> Result<(Triangles, usize),
     Ok(((points, triangles), lost))
 }
 
-/// Decodes a text without the byte order mark that some editors write at its start.
+/// Decodes a text, and removes the byte order mark that some editors write at its start.
 fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
     String::from_utf8_lossy(bytes.strip_prefix("\u{feff}".as_bytes()).unwrap_or(bytes))
 }
@@ -103,7 +103,7 @@ impl Format {
         }
     }
 
-    /// Reads the parts of a file; all coordinates are finite.
+    /// Reads the parts of a file, and checks that all coordinates are finite.
     pub(crate) fn read(self, bytes: &[u8], library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
         let parts = match self {
             Self::Stl => stl::read(bytes)?,

@@ -1,4 +1,4 @@
-//! The meshes that an MJCF shows, with the defaults of their classes.
+//! Meshes that an MJCF shows; attributes may come from the defaults of classes.
 
 use super::part::Words;
 use nalgebra::{Isometry3, Matrix3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
@@ -6,11 +6,11 @@ use roxmltree::{Document, Node};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// A mesh in a body's frame.
+/// Mesh that is shown in the frame of a body.
 pub struct Visual {
     /// Name of the body; `None` for the world.
     pub body: Option<String>,
-    /// Address of the mesh file, as [`crate::Meshes::get`] takes it.
+    /// Address of the mesh file, in the form that [`crate::Meshes::get`] accepts.
     pub file: String,
     /// Scale along the axes of the mesh.
     pub scale: [f64; 3],
@@ -20,7 +20,7 @@ pub struct Visual {
     pub color: Option<[f64; 4]>,
 }
 
-/// First group of collision geometries; by convention, all groups from this one on are for collisions.
+/// First group of collision geometries. By convention, this group and all later groups are for collisions.
 const COLLISION: u32 = 3;
 /// Maximum depth of nested bodies or classes.
 const DEEPEST: usize = 256;
@@ -29,7 +29,7 @@ type Attributes<'a> = HashMap<(&'a str, &'a str), &'a str>;
 
 struct File<'a> {
     classes: HashMap<&'a str, Attributes<'a>>,
-    /// File and scale of each mesh, and colour of each material, by name.
+    /// File and scale of each mesh, by name. `materials` contains the colour of each material, by name.
     meshes: HashMap<String, (String, [f64; 3])>,
     materials: HashMap<&'a str, [f64; 4]>,
     degrees: bool,
@@ -37,7 +37,7 @@ struct File<'a> {
     found: Vec<Visual>,
 }
 
-/// Returns the meshes of an MJCF; files that it includes are not read.
+/// Returns the meshes of an MJCF. Files that the MJCF includes are not read.
 pub fn visuals(text: &str) -> Vec<Visual> {
     let Ok(document) = Document::parse(text) else { return Vec::new() };
     let root = document.root_element();
@@ -85,7 +85,8 @@ fn four(text: &str) -> Option<[f64; 4]> {
 }
 
 impl<'a> File<'a> {
-    /// Stores the attributes of a class, and of the classes nested in it, which inherit them.
+    /// Stores the attributes of a class and of the classes nested in it, which inherit the attributes of the outer
+    /// class.
     fn class(&mut self, node: Node<'a, '_>, name: &'a str, mut class: Attributes<'a>, depth: usize) {
         for kind in node.children().filter(|kind| kind.is_element() && !kind.has_tag_name("default")) {
             if let Some(tag) = ["geom", "mesh"].into_iter().find(|tag| kind.has_tag_name(*tag)) {
@@ -98,14 +99,15 @@ impl<'a> File<'a> {
         self.classes.insert(name, class);
     }
 
-    /// Returns an attribute of an element, or the default of its class.
+    /// Returns an attribute of an element, or the default from the class of the element.
     fn attribute(&self, node: Node<'a, '_>, name: &'a str, around: &'a str) -> Option<&'a str> {
         let tag = if node.has_tag_name("mesh") { "mesh" } else { "geom" };
         let class = self.classes.get(node.attribute("class").unwrap_or(around));
         node.attribute(name).or_else(|| class?.get(&(tag, name)).copied())
     }
 
-    /// Adds the meshes of a body and of the bodies below it; `pose` is the pose of the enclosing <frame> in the body.
+    /// Adds the meshes of a body and of the bodies below it. `pose` is the pose in the body of the <frame> around the
+    /// elements.
     fn body(&mut self, node: Node<'a, '_>, name: Option<&'a str>, around: &'a str, pose: Isometry3<f64>, depth: usize) {
         if depth > DEEPEST {
             return;
@@ -160,7 +162,7 @@ impl<'a> File<'a> {
                     _ => Vector3::z_axis(),
                 };
                 let turn = UnitQuaternion::from_axis_angle(&axis, x);
-                // a capital letter is a rotation about the fixed axis, from before all rotations
+                // A capital letter is a rotation about a fixed axis, so it is applied after all earlier rotations.
                 turned = if letter.is_ascii_uppercase() { turn * turned } else { turned * turn };
             }
             Some(turned)

@@ -1,10 +1,10 @@
-//! OBJ (Wavefront): faces of any number of corners, with the diffuse colours of their material file.
+//! Reader of OBJ (Wavefront): faces with any number of corners, and the diffuse colours of their material files.
 
 use super::ears::Ears;
 use super::part::{Part, Triangle, Words, full};
 use std::collections::HashMap;
 
-/// A colour, and the triangles that have it.
+/// Colour, and the triangles that have this colour.
 type Group = (Option<[f64; 3]>, Vec<Triangle>);
 
 /// Contents of an OBJ.
@@ -12,25 +12,26 @@ struct Mesh {
     points: Vec<[f64; 3]>,
     /// Triangles by material.
     groups: Vec<Group>,
-    /// Number of faces of which triangles are left out.
+    /// Number of faces with triangles that are left out.
     lost: usize,
 }
 
-/// The triangles of an OBJ, a part for each material; `library` gives the text of a material file by its name.
+/// Returns the triangles of an OBJ, in one part for each material. `library` returns the text of a material file, given
+/// its name.
 pub(super) fn read(text: &str, library: &dyn Fn(&str) -> Option<String>) -> Result<Vec<Part>, String> {
     let Mesh { points, groups, .. } = parse(text, library, false)?;
     let part = |(color, triangles): Group| Part::of(&points, triangles, color);
     Ok(groups.into_iter().filter(|group| !group.1.is_empty()).map(part).collect())
 }
 
-/// All points of an OBJ, the triangles of its first object or group, and the number of faces of which triangles are
-/// left out.
+/// Returns all points of an OBJ, the triangles of its first object or group, and the number of faces with triangles
+/// that are left out.
 pub(super) fn first(text: &str) -> Result<(super::Triangles, usize), String> {
     let Mesh { points, groups, lost } = parse(text, &|_| None, true)?;
     Ok(((points, groups.into_iter().flat_map(|group| group.1).collect()), lost))
 }
 
-/// Reads an OBJ: all of it, or its first object or group.
+/// Reads all objects and groups of an OBJ, or only the first one.
 fn parse(text: &str, library: &dyn Fn(&str) -> Option<String>, only_first: bool) -> Result<Mesh, String> {
     let (mut points, mut colours) = (Vec::new(), HashMap::new());
     let mut groups: Vec<Group> = vec![(None, Vec::new())];
@@ -54,7 +55,8 @@ fn parse(text: &str, library: &dyn Fn(&str) -> Option<String>, only_first: bool)
                 let mut corner = || -> Option<Result<u32, String>> {
                     let word = words.next()?;
                     let index = word.split('/').next().and_then(|i| i.parse::<i64>().ok()).unwrap_or(0);
-                    // from 1, or back from the last one
+                    // Positive indices count from 1 at the first point, and negative indices count back from the last
+                    // point.
                     let from_zero = if index > 0 { index - 1 } else { points.len() as i64 + index };
                     let known = index != 0 && (0..points.len() as i64).contains(&from_zero);
                     Some(if known { Ok(from_zero as u32) } else { Err(wrong(&format!("no vertex is `{word}`"))) })
@@ -81,7 +83,7 @@ fn parse(text: &str, library: &dyn Fn(&str) -> Option<String>, only_first: bool)
     Ok(Mesh { points, groups, lost: ears.lost })
 }
 
-/// The diffuse colours of a material file, by name.
+/// Returns the diffuse colours of a material file, by the name of the material.
 fn materials(text: &str) -> HashMap<String, [f64; 3]> {
     let (mut found, mut name) = (HashMap::new(), String::new());
     for line in text.lines() {
@@ -115,11 +117,11 @@ mod tests {
     fn first_object_with_the_points_of_all() {
         let text = TEXT.replace("usemtl none", "o second\nv 5 5 5");
         let ((points, triangles), lost) = first(&text).unwrap();
-        assert_eq!((points.len(), triangles), (5, vec![[0, 1, 3], [1, 2, 3]])); // both diagonals are as long
+        assert_eq!((points.len(), triangles), (5, vec![[0, 1, 3], [1, 2, 3]])); // both diagonals have the same length
         assert_eq!(lost, 0);
         let long = first(&TEXT.replace("v 0 1 0", "v -9 9 0")).unwrap();
-        assert_eq!(long.0.1[..2], [[0, 1, 2], [0, 2, 3]]); // along the shorter diagonal
-        assert_eq!(first(TEXT).unwrap().0.1.len(), 3); // a material is no object
+        assert_eq!(long.0.1[..2], [[0, 1, 2], [0, 2, 3]]); // cut along the shorter diagonal
+        assert_eq!(first(TEXT).unwrap().0.1.len(), 3); // a material does not begin an object
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Collection of the meshes of a page.
+//! Collection of the meshes that a web page shows.
 
 use super::Format;
 use super::find::Places;
@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Maximum number of triangles of a page, and of one of its parts, whose corner indices have 16 bits.
+/// Maximum number of triangles of a page, and of one of its parts. Corner indices of a part have 16 bits.
 const MOST: usize = 60_000;
 const MOST_OF_PART: usize = 20_000;
 /// Smallest number of triangles to which a part is reduced, and maximum number of parts.
@@ -19,16 +19,16 @@ const MOST_PARTS: usize = MOST / FEWEST;
 const LARGEST: u64 = 64 << 20;
 const LARGEST_SUM: u64 = 512 << 20;
 
-/// Meshes that are collected for a page.
+/// Collection of meshes for a page.
 #[derive(Default)]
 pub struct Meshes {
     places: Places,
     parts: Vec<Part>,
-    /// Indices of the parts of each file; empty if the file could not be read.
+    /// Indices of the parts of each file. The range is empty if the file could not be read.
     files: HashMap<PathBuf, Range<usize>>,
     read: u64,
     wanted: usize,
-    /// First reason why a mesh is left out, and number of meshes that are left out.
+    /// First reason for which a mesh is left out, and number of meshes that are left out.
     missing: Option<(String, usize)>,
 }
 
@@ -41,12 +41,12 @@ pub struct Drawn {
 }
 
 impl Meshes {
-    /// Creates an empty collection whose files are searched in `places`.
+    /// Creates an empty collection. Files will be searched in `places`.
     pub fn new(places: Places) -> Self {
         Self { places, ..Self::default() }
     }
 
-    /// Returns the parts to draw for a mesh; empty if its file is missing or invalid.
+    /// Returns the parts to draw for a mesh. The list is empty if the file of the mesh is missing or invalid.
     pub fn get(&mut self, address: &str) -> Vec<Drawn> {
         self.wanted += 1;
         let parts = match self.load(address) {
@@ -59,10 +59,10 @@ impl Meshes {
         self.drawn(parts)
     }
 
-    /// Returns the parts to draw for a mesh in memory; `library` returns the text of a material file, given its name.
+    /// Returns the parts to draw for a mesh in memory. `library` returns the text of a material file, given its name.
     ///
     /// # Errors
-    /// The fault of the file, with the line for an OBJ or an STL in text form.
+    /// Returns a description of the fault, with the line number for an OBJ or an STL in text form.
     pub fn add(
         &mut self,
         format: Format,
@@ -109,7 +109,7 @@ impl Meshes {
         })
     }
 
-    /// Simplifies and stores those parts of a mesh that have triangles.
+    /// Simplifies the parts of a mesh, and stores those parts that still have triangles.
     fn keep(
         &mut self,
         format: Format,
@@ -129,14 +129,14 @@ impl Meshes {
         Ok(first..self.parts.len())
     }
 
-    /// Returns one line about the meshes that are left out; `None` if none is left out.
+    /// Returns one line about the meshes that are left out; `None` if no mesh is left out.
     pub fn note(&self) -> Option<String> {
         let (what, count) = self.missing.as_ref()?;
         Some(format!("{count} of {} meshes are left out: {what}", self.wanted))
     }
 
-    /// Returns all parts, simplified for a page. Points and triangles are base64 of 16-bit numbers; a number n means
-    /// the coordinate `low + side n / 65535`.
+    /// Returns all parts, simplified for a page. Points and triangles are 16-bit numbers in base64. A number n of a
+    /// point means the coordinate `low + side n / 65535`.
     pub fn written(self) -> Vec<Value> {
         let most = level(self.parts.iter().map(|part| part.triangles.len()).collect());
         let small = |part: Part| {
@@ -146,7 +146,8 @@ impl Meshes {
     }
 }
 
-/// Returns the maximum number of triangles of a part for which all parts together have at most [`MOST`].
+/// Returns the maximum number of triangles per part. With this maximum, all parts together have at most [`MOST`]
+/// triangles.
 fn level(mut counts: Vec<usize>) -> usize {
     counts.sort_unstable();
     let mut left = MOST;
@@ -167,12 +168,12 @@ fn encode(part: &Part) -> Value {
         if side[k] > 0.0 { (65535.0 * (p[k] - low[k]) / side[k]).round() as u16 } else { 0 }
     };
     let points = part.points.iter().flat_map(|p| [0, 1, 2].map(|k| number(p, k)));
-    // Corner indices are below 3 MOST_OF_PART, which fits in 16 bits.
+    // Corner indices are below 3 `MOST_OF_PART`, so they fit in 16 bits.
     let corners = part.triangles.iter().flatten().map(|&c| c as u16);
     json!({"low": low, "side": side, "points": base64(points), "triangles": base64(corners)})
 }
 
-/// Encodes numbers in base64, low byte first.
+/// Encodes 16-bit numbers in base64, with the low byte first.
 fn base64(numbers: impl Iterator<Item = u16>) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let bytes: Vec<u8> = numbers.flat_map(u16::to_le_bytes).collect();

@@ -1,4 +1,4 @@
-//! Parts, which are triangles of one colour, and helpers of the mesh readers.
+//! Parts of meshes, which are triangles of one colour, and helpers of the mesh readers.
 
 use std::collections::HashMap;
 
@@ -11,9 +11,9 @@ pub(super) type Triangle = [u32; 3];
 /// Triangles of one colour.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Part {
-    /// Points (m, before the scale that a robot's file gives the mesh).
+    /// Points (m), before a scale in the robot's file is applied.
     pub points: Vec<[f64; 3]>,
-    /// Triangles as indices of points, counter-clockwise seen from outside.
+    /// Triangles as indices of points, counter-clockwise if seen from outside.
     pub triangles: Vec<Triangle>,
     /// Red, green and blue, each from 0 to 1; `None` if the file has no colour.
     #[cfg_attr(not(feature = "page"), allow(dead_code))]
@@ -34,7 +34,7 @@ impl Part {
     }
 }
 
-/// Returns an error if a file has more triangles than allowed.
+/// Returns an error if a file has more triangles than `MOST`.
 pub(super) fn full(triangles: usize) -> Result<(), String> {
     if triangles <= MOST { Ok(()) } else { Err(format!("has more than {MOST} triangles")) }
 }

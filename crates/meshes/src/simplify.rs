@@ -1,21 +1,21 @@
-//! Simplification of meshes. Points that coincide are merged, then edges collapse where that changes the shape least
-//! (Garland and Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997).
+//! Simplification of meshes. Points that coincide are merged. Then edges collapse, first those whose collapse changes
+//! the shape least (Garland and Heckbert, "Surface simplification using quadric error metrics", SIGGRAPH 1997).
 
 use super::part::Part;
 use nalgebra::Vector3;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap, HashSet};
 
-/// Number of grid cells along the longest side, and maximum number of triangles before edges collapse. If more are
-/// left, the cells become coarser.
+/// Number of grid cells along the longest side, and maximum number of triangles before edges collapse. If more
+/// triangles are left, the cells become coarser.
 const CELLS: f64 = 32768.0;
 const MOST: usize = 200_000;
-/// Weight of the border edges of an open surface, relative to its planes.
+/// Weight of the planes through border edges of an open surface, relative to the planes of triangles.
 const BORDER: f64 = 10.0;
-/// Minimum cosine of the angle by which a triangle may turn when a corner moves.
+/// Minimum cosine of the angle by which a triangle may turn when one of its corners moves.
 const TURN: f64 = 0.2;
 
-/// Returns a simplified part with at most `target` triangles; `target` must be at least 12.
+/// Returns a simplified part with at most `target` triangles. `target` must be at least 12.
 pub(super) fn simplify(part: &Part, target: usize) -> Part {
     let mut cells = CELLS;
     let mut welded = weld(part, cells);
@@ -26,7 +26,7 @@ pub(super) fn simplify(part: &Part, target: usize) -> Part {
     if welded.triangles.len() > target {
         welded = Surface::new(&welded).collapse(target);
     }
-    // Many small pieces have no edges left to collapse; coarser cells merge the pieces.
+    // Many small pieces without common points have no edges left to collapse. Coarser cells merge these pieces.
     cells = cells.min(256.0);
     while welded.triangles.len() > target && cells > 1.0 {
         cells /= 2.0;
@@ -35,7 +35,7 @@ pub(super) fn simplify(part: &Part, target: usize) -> Part {
     welded
 }
 
-/// Merges the points of each cell into their mean, and drops triangles that become degenerate or duplicates.
+/// Merges the points in each cell of a grid into their mean. Drops triangles that become degenerate or duplicates.
 fn weld(part: &Part, cells: f64) -> Part {
     let (low, high) = bounds(&part.points);
     let longest = (0..3).map(|k| high[k] - low[k]).fold(0.0, f64::max);
@@ -68,7 +68,7 @@ fn weld(part: &Part, cells: f64) -> Part {
     Part::of(&points, triangles, part.color)
 }
 
-/// Returns the lower and upper corner of the box around points.
+/// Returns the lower corner and the upper corner of the box around points.
 pub(super) fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     let limits = |f: fn(f64, f64) -> f64, from| [0, 1, 2].map(|k| points.iter().map(|p| p[k]).fold(from, f));
     if points.is_empty() {
@@ -77,14 +77,15 @@ pub(super) fn bounds(points: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     (limits(f64::min, f64::INFINITY), limits(f64::max, f64::NEG_INFINITY))
 }
 
-/// Sum of squared distances from planes, (x, 1)ᵀ Q (x, 1): the upper half of Q, row by row.
+/// Sum of squared distances from planes, (x, 1)ᵀ Q (x, 1), as a function of a point x. The numbers are the upper half
+/// of the symmetric Q, row by row.
 #[derive(Clone)]
 struct Quadric([f64; 10]);
 
 impl Quadric {
     const ZERO: Self = Self([0.0; 10]);
 
-    /// Adds the plane through a point with a unit normal.
+    /// Adds the squared distance from a plane, given a point of the plane and its unit normal.
     fn add_plane(&mut self, normal: Vector3<f64>, point: Vector3<f64>, weight: f64) {
         let [x, y, z, w] = [normal.x, normal.y, normal.z, -normal.dot(&point)];
         let products = [x * x, x * y, x * z, x * w, y * y, y * z, y * w, z * z, z * w, w * w];
@@ -102,8 +103,8 @@ impl Quadric {
         (slopes[0] * x + slopes[1] * y + slopes[2] * z + ww).max(0.0)
     }
 
-    /// Returns the point with the smallest sum, by cofactors. If no unique one exists, the result is far away or not
-    /// finite.
+    /// Returns the point with the smallest sum, computed by cofactors. If this point is not unique, the result is far
+    /// away or not finite.
     fn least(&self) -> Vector3<f64> {
         let [xx, xy, xz, xw, yy, yz, yw, zz, zw, _] = self.0;
         let [a, b, c] = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
@@ -113,21 +114,21 @@ impl Quadric {
     }
 }
 
-/// An edge in the queue: its cost as bits, its two ends, and the number of changes of each end when the cost was
+/// Edge in the queue: the bits of its cost, its two ends, and how often each end had changed when the cost was
 /// computed.
 type Edge = (u64, [u32; 2], [u32; 2]);
 
-/// A surface whose edges are collapsed, scaled to a box of side 1.
+/// Surface whose edges are collapsed, scaled to a box with longest side 1.
 struct Surface {
     low: Vector3<f64>,
     side: f64,
     color: Option<[f64; 3]>,
     points: Vec<Vector3<f64>>,
     quadrics: Vec<Quadric>,
-    /// Number of changes of each point; costs from before the last change are outdated.
+    /// Number of changes of each point. A cost from before the last change is outdated.
     changes: Vec<u32>,
     triangles: Vec<Option<[u32; 3]>>,
-    /// Triangles at each point; some of them may be deleted.
+    /// Triangles at each point, including deleted ones.
     around: Vec<Vec<u32>>,
     left: usize,
     edges: BinaryHeap<Reverse<Edge>>,
@@ -166,7 +167,8 @@ impl Surface {
         }
         for (&[a, b], &(count, unit)) in &faces {
             if count == 1 {
-                // add the plane through the border edge, perpendicular to its only triangle
+                // Adds a plane for a border edge: it contains the edge and is perpendicular to the edge's only
+                // triangle.
                 let (from, to) = (surface.points[a as usize], surface.points[b as usize]);
                 let along = to - from;
                 let normal = along.cross(&unit);
@@ -186,12 +188,12 @@ impl Surface {
         surface
     }
 
-    /// Returns the cost of collapsing an edge, and the point where its ends merge.
+    /// Returns the cost of collapsing an edge, and the point to which its two ends move.
     fn best(&self, a: u32, b: u32) -> (f64, Vector3<f64>) {
         let quadric = self.quadrics[a as usize].plus(&self.quadrics[b as usize]);
         let (p, q) = (self.points[a as usize], self.points[b as usize]);
         let middle = 0.5 * (p + q);
-        // The optimum of a flat part may not exist or may be far away.
+        // If the surface is flat here, the optimum may not exist or may be far away.
         let near = Some(quadric.least()).filter(|x| (x - middle).norm() <= (p - q).norm());
         let cost = |x: Vector3<f64>| (quadric.at(x), x);
         let ends = [middle, p, q]
@@ -202,14 +204,14 @@ impl Surface {
     }
 
     fn push(&mut self, a: u32, b: u32) {
-        // among edges without cost, the shortest comes first
+        // Among edges without cost, the shortest edge comes first.
         let length = (self.points[a as usize] - self.points[b as usize]).norm_squared();
         let cost = self.best(a, b).0 + 1e-9 * length;
         self.edges.push(Reverse((cost.to_bits(), [a, b], [a, b].map(|end| self.changes[end as usize]))));
     }
 
-    /// Returns whether the triangles around one end keep their orientation; triangles that vanish with the edge do not
-    /// count.
+    /// Returns whether the triangles around one end of an edge keep their orientation when this end moves. Triangles
+    /// that vanish with the edge do not count.
     fn keeps(&self, moved: u32, other: u32, to: Vector3<f64>) -> bool {
         self.around[moved as usize].iter().filter_map(|&t| self.triangles[t as usize]).all(|t| {
             if t.contains(&other) {
@@ -225,7 +227,7 @@ impl Surface {
         })
     }
 
-    /// Collapses edges until `target` triangles are left or no edge can collapse.
+    /// Collapses edges until `target` triangles are left or no more edges can collapse.
     fn collapse(mut self, target: usize) -> Part {
         while self.left > target {
             let Some(Reverse((_, [a, b], changes))) = self.edges.pop() else { break };
@@ -278,7 +280,7 @@ mod tests {
     use super::{bounds, simplify};
     use crate::part::Part;
 
-    /// Returns a sphere of radius 1 as unconnected triangles.
+    /// Returns a sphere of radius 1 whose triangles have no common points.
     fn sphere(n: usize) -> Part {
         let at = |i: usize, j: usize| {
             let (a, b) =
@@ -335,7 +337,7 @@ mod tests {
         assert!(simplify(&Part::default(), 12).triangles.is_empty());
         let point = Part { points: vec![[1.0; 3]; 3], triangles: vec![[0, 1, 2]], color: None };
         assert!(simplify(&point, 12).triangles.is_empty());
-        // many pieces without shared points: coarser cells reduce their number
+        // The pieces have no common points. Coarser cells reduce their number.
         let mut pieces = Part::default();
         for k in 0..5000u32 {
             let x = f64::from(k % 70);

@@ -2,15 +2,15 @@
 
 use super::part::{Part, Words, full};
 
-/// Number of bytes before the triangles of a binary file, and of each triangle: a normal, three corners, two bytes of
-/// attributes.
+/// Number of bytes before the triangles of a binary file, and number of bytes of each triangle: a normal, three
+/// corners, and two bytes of attributes.
 const HEAD: usize = 84;
 const TRIANGLE: usize = 50;
 
 /// Reads the triangles of an STL.
 pub(super) fn read(bytes: &[u8]) -> Result<Vec<Part>, String> {
     let mut part = Part::default();
-    // Binary files may begin with `solid` too; their length distinguishes them.
+    // Binary files may also begin with `solid`; the length of the file distinguishes them.
     let count = bytes.get(80..HEAD).and_then(|n| <[u8; 4]>::try_from(n).ok()).map(u32::from_le_bytes);
     let length = count.and_then(|n| usize::try_from(n).ok()?.checked_mul(TRIANGLE)?.checked_add(HEAD));
     if let (Some(count), Some(length)) = (count, length)
@@ -84,7 +84,7 @@ mod tests {
         for bad in [&b""[..], b"solid \xff", b"facet"] {
             assert!(read(bad).is_err());
         }
-        // reading any prefix of a file returns a result or an error, but never panics
+        // Reading any prefix of a file returns a result or an error, but never panics.
         let whole = binary(2, 2);
         for end in 0..whole.len() {
             let _ = read(&whole[..end]);

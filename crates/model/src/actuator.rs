@@ -3,41 +3,42 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Actuator of a robot, as its file describes it. [`Limits`](crate::Limits) already include its ranges; the values of
-/// the joint already include its armature and damping.
+/// Actuator of a robot, as its file describes it. The [`Limits`](crate::Limits) of a model already include the ranges
+/// of its actuators. The joints of a model already include the armature and damping of its actuators.
 ///
-/// Let u be the control, and the length l the gear times the position that the actuator drives. The actuator acts with
-/// the force
+/// Let u be the control. Let the length l be the gear times the position of the driven joint, tendon or frame. The
+/// actuator acts with the force
 ///
 /// ```text
 /// f = gain u + bias − kp l − kv l̇
 /// ```
 ///
-/// A motor has the gain 1, and all other numbers are 0. A position servo has the gain kp, a velocity servo the gain kv.
-/// The effort at the joint is gear · f.
+/// A motor has the gain 1, and its other numbers are 0. A position servo has the gain kp, a velocity servo has the gain
+/// kv. The effort at the joint is gear · f.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Actuator<B = usize> {
     /// Name, or an empty string.
     pub name: String,
-    /// Joint, tendon or frame that is driven.
+    /// Joint, tendon or frame that the actuator drives.
     pub transmission: Transmission<B>,
     /// Gear: the effort at the joint for each unit of force (1, m). Hinges, slides and tendons use only the first
-    /// number. A ball joint uses three: an axis in its body. A frame uses six, linear first, along its axes. A free
-    /// joint uses six too: a force along the world's axes and a torque along the body's.
+    /// number. A ball joint uses three numbers: an axis in the frame of its body. A frame uses six numbers, linear
+    /// first, along the frame's axes. A free joint uses six numbers, too: a force along the axes of the world and a
+    /// torque along the axes of the body.
     pub gear: [f64; 6],
     /// Gain: force for each unit of control.
     pub gain: f64,
-    /// Bias: force without control, at length 0 and at rest (N, N m).
+    /// Bias: force if the control, the length and the velocity are 0 (N, N m).
     pub bias: f64,
     /// Gain of position kp (N/m, N m/rad); 0 for a motor.
     pub kp: f64,
     /// Gain of velocity kv (N s/m, N m s/rad); 0 for a motor.
     pub kv: f64,
-    /// Minimum and maximum control; infinite where there is no limit.
+    /// Minimum and maximum control; infinite if there is no limit.
     #[cfg_attr(feature = "serde", serde(with = "range"))]
     pub control: (f64, f64),
-    /// Minimum and maximum force before the gear (N, N m); infinite where there is no limit.
+    /// Minimum and maximum force before the gear is applied (N, N m); infinite if there is no limit.
     #[cfg_attr(feature = "serde", serde(with = "range"))]
     pub force: (f64, f64),
 }
@@ -68,7 +69,7 @@ pub enum Transmission<B = usize> {
 }
 
 impl<B: Clone> Actuator<B> {
-    /// Maps bodies and frames to their new identifiers; returns `None` if none of the driven bodies is left.
+    /// Maps bodies and frames to their new identifiers. Returns `None` if none of the driven bodies is left.
     pub(crate) fn renamed<C>(
         &self,
         body: impl Fn(&B) -> Option<C>,
@@ -90,7 +91,7 @@ impl<B: Clone> Actuator<B> {
     }
 }
 
-/// Serialization of ranges: `null` is an infinite side.
+/// Serialization of ranges; `null` stands for an infinite bound.
 #[cfg(feature = "serde")]
 mod range {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};

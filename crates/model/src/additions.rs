@@ -21,11 +21,11 @@ use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 /// State of one joint in a keyframe: its body, position and velocity.
 type JointState = (BodyId, Vec<f64>, Vec<f64>);
 
-/// Additions of a builder. A [`BodyId`] identifies a body, an index in the builder a frame.
+/// Additions of a builder. Bodies are identified by a [`BodyId`], frames by their index in the builder.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Additions {
     springs: Vec<(BodyId, [f64; 3], Vec<f64>)>,
-    /// Ratio of the compensated weight of each body, by its index in the builder.
+    /// Compensated ratio of the weight of each body, by the body's index in the builder.
     compensation: BTreeMap<usize, f64>,
     compensated_parts: Vec<CompensatedPart>,
     actuators: Vec<Actuator<BodyId>>,
@@ -35,11 +35,12 @@ pub(crate) struct Additions {
     warnings: Vec<Warning>,
 }
 
-/// Part of a body whose weight is compensated with another ratio than the rest of the body.
+/// Part of a body, with another compensated ratio of its weight than the rest of the body.
 #[derive(Clone, Debug)]
 struct CompensatedPart {
     body: BodyId,
-    /// Ratio of the part's weight; `None` if the part is no part of the body's inertia, and compensated entirely.
+    /// Compensated ratio of the part's weight. `None` if the body's inertia does not include the part; its weight is
+    /// then compensated entirely.
     ratio: Option<f64>,
     /// Mass (kg).
     mass: f64,
@@ -56,19 +57,20 @@ enum Draft {
 }
 
 impl ModelBuilder {
-    /// Adds a spring to a body's joint: see [`Spring`]. `rest` has as many numbers as q for the joint.
+    /// Adds a spring to the joint of a body: see [`Spring`]. `rest` has as many numbers as the joint has in q.
     pub fn spring(&mut self, body: BodyId, stiffness: [f64; 3], rest: &[f64]) {
         self.additions.springs.push((body, stiffness, rest.to_vec()));
     }
 
-    /// Compensates a ratio of a body's weight: see [`GravityCompensation`]. The weight includes all that is merged into
-    /// the body, except parts with another ratio ([`compensate_gravity_of_part`](Self::compensate_gravity_of_part)).
+    /// Compensates a ratio of a body's weight: see [`GravityCompensation`]. The weight includes everything that is
+    /// merged into the body, except parts for which [`compensate_gravity_of_part`](Self::compensate_gravity_of_part)
+    /// sets another ratio.
     pub fn compensate_gravity(&mut self, body: BodyId, ratio: f64) {
         self.additions.compensation.insert(body.0, ratio);
     }
 
-    /// Compensates another ratio of the weight of a part of a body. The part's inertia is included in the body's
-    /// inertia, and is given in a frame at `placement` in the body's frame.
+    /// Compensates another ratio of the weight of one part of a body. `inertia` is the inertia of this part, in a frame
+    /// at `placement` in the body's frame. It must also be included in the inertia of the body.
     pub fn compensate_gravity_of_part(&mut self, body: BodyId, placement: Se3<f64>, inertia: Inertia<f64>, ratio: f64) {
         self.add_compensated_part(body, placement, inertia, Some(ratio));
     }
@@ -78,7 +80,7 @@ impl ModelBuilder {
         self.additions.compensated_parts.push(CompensatedPart { body, ratio, mass, mass_com });
     }
 
-    /// Adds an actuator. It does not change limits, armature and damping, which belong to the joints
+    /// Adds an actuator. The actuator does not change limits, armature and damping, which belong to the joints
     /// ([`JointOptions`]).
     ///
     /// [`JointOptions`]: crate::JointOptions
@@ -87,27 +89,28 @@ impl ModelBuilder {
     }
 
     /// Adds a named state: the positions and velocities of the joints of some bodies. The other joints are at their
-    /// neutral position and at rest. `control` has a number for each actuator, in the order in which they are added;
-    /// missing numbers are 0.
+    /// neutral position and at rest. `control` has one number for each actuator, in the order in which the actuators
+    /// are added. Missing numbers are 0.
     pub fn keyframe(&mut self, name: &str, joints: Vec<(BodyId, Vec<f64>, Vec<f64>)>, control: Vec<f64>) {
         self.additions.keyframes.push((name.to_owned(), joints, control));
     }
 
-    /// Adds a constraint by which a point of one body and a point of another one coincide. Each point is the origin of
-    /// a frame at a placement in its body. The frames are named `name#1` and `name#2`.
+    /// Adds a constraint that keeps a point of one body and a point of another body together. Each point is the origin
+    /// of a frame, which is given by its body and its placement there. The frames are named `name#1` and `name#2`.
     pub fn constraint_point(&mut self, name: &str, at: [(BodyId, Se3<f64>); 2]) {
         let frames = self.constraint_frames(name, at);
         self.additions.constraints.push((name.to_owned(), Draft::Point(frames)));
     }
 
-    /// Adds a constraint by which a frame of one body and a frame of another one coincide. The frames are named
+    /// Adds a constraint that keeps a frame of one body and a frame of another body together. The frames are named
     /// `name#1` and `name#2`.
     pub fn constraint_rigid(&mut self, name: &str, at: [(BodyId, Se3<f64>); 2]) {
         let frames = self.constraint_frames(name, at);
         self.additions.constraints.push((name.to_owned(), Draft::Rigid(frames)));
     }
 
-    /// Adds a constraint between the positions of joints: q_f = Σ cᵢ q_lⁱ, or q_f = c₀ if `leader` is `None`.
+    /// Adds a constraint between the positions q_f of a follower and q_l of a leader: q_f = Σ cᵢ q_lⁱ, or q_f = c₀ if
+    /// `leader` is `None`.
     pub fn constraint_coupling(
         &mut self,
         name: &str,
@@ -126,9 +129,9 @@ impl ModelBuilder {
         [first, first + 1]
     }
 
-    /// Adds the additions of a model. `place` maps each body of the model to a body of the builder and a placement
-    /// there; the model's frames begin at index `first_frame`. Additions of bodies that are locked at q are left out,
-    /// or act on the body that carries them.
+    /// Adds the additions of a model to this builder. `place` maps each body of the model to a body of the builder and
+    /// a placement there. The model's frames begin at index `first_frame`. Additions of bodies that are locked at q are
+    /// left out, or act on the bodies that carry the locked ones.
     pub(crate) fn append_additions(
         &mut self,
         model: &Model,
@@ -168,7 +171,7 @@ impl ModelBuilder {
                 if let Transmission::Tendon { joints, .. } = &old.transmission {
                     let held = joints.iter().filter(|(i, _)| locked.contains(i));
                     let length: f64 = held.map(|&(i, coefficient)| coefficient * model.joint_position(i, q)).sum();
-                    actuator.bias -= actuator.kp * actuator.gear[0] * length; // the locked part of −kp l
+                    actuator.bias -= actuator.kp * actuator.gear[0] * length; // the share of −kp l of the locked joint
                 }
                 self.actuator(actuator);
                 kept.push(k);
@@ -224,7 +227,7 @@ impl ModelBuilder {
 }
 
 impl Additions {
-    /// Scales the masses of parts whose weight is compensated.
+    /// Scales the masses of parts that have their own compensated ratio.
     #[cfg(feature = "loaders")]
     pub(crate) fn scale_masses(&mut self, by: f64) {
         for part in &mut self.compensated_parts {
@@ -232,7 +235,7 @@ impl Additions {
         }
     }
 
-    /// Moves the additions into the built model; `number` maps each body of the builder to its index in the model.
+    /// Moves the additions into the built model. `number` maps each body of the builder to its index in the model.
     pub(crate) fn add_to(self, model: &mut Model, number: &[usize]) -> Result<(), Error> {
         let Self { springs, compensation, compensated_parts, actuators, keyframes, constraints, warnings } = self;
         model.warnings.extend(warnings);
@@ -253,7 +256,7 @@ impl Additions {
                 let body = &model.bodies[index(b)];
                 let (nq, nv) = (body.joint.nq(), body.joint.nv());
                 if body.mimic.is_some() {
-                    continue; // its coordinate is its leader's
+                    continue; // its coordinate belongs to its leader
                 }
                 if joint_q.len() != nq || joint_v.len() != nv {
                     let (q, v) = (joint_q.len(), joint_v.len());
@@ -280,7 +283,8 @@ impl Additions {
     }
 }
 
-/// Returns the gravity compensation of each body of the built model; `number` maps the builder's bodies to its bodies.
+/// Returns the gravity compensation of each body of the built model. `number` maps each body of the builder to its
+/// index in the model.
 fn merged_compensation(
     ratios: &BTreeMap<usize, f64>,
     parts: &[CompensatedPart],
@@ -305,7 +309,8 @@ fn merged_compensation(
 }
 
 impl Model {
-    /// Returns the position of a joint with one degree of freedom (rad, m). For a continuous joint it is the angle.
+    /// Returns the position of a joint with one degree of freedom (rad, m). The position of a continuous joint is its
+    /// angle.
     fn joint_position(&self, body: usize, q: &[f64]) -> f64 {
         let body = &self.bodies[body];
         let q = &q[body.idx_q..];

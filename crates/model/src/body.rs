@@ -1,23 +1,24 @@
-//! Parts of a model: bodies, frames, limits.
+//! Bodies, frames and limits of a model.
 
 use crate::joint::{Joint, Mimic};
 use alloc::string::String;
 use alloc::vec::Vec;
 use condyle_spatial::{Inertia, Se3};
 
-/// A moving body and the joint that carries it. The body is a link and everything that fixed joints attach to it.
+/// Moving body, and the joint that carries it. The body consists of a link and everything that fixed joints attach to
+/// this link.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Body {
-    /// Name of the joint. Pinocchio uses it as the name of joint and body together.
+    /// Name of the joint. Pinocchio uses this name for the joint and the body together.
     pub joint_name: String,
     /// Name of the link.
     pub name: String,
-    /// Index of the body that carries the joint; smaller than this body's own index.
+    /// Index of the body that carries the joint. It is smaller than the index of this body.
     pub parent: usize,
     /// Joint from the parent to this body.
     pub joint: Joint,
-    /// pXj: the joint's frame at position zero, in the parent's frame.
+    /// pXj: pose of the joint's frame at position zero, in the parent's frame.
     pub placement: Se3<f64>,
     /// Inertia in the body's frame.
     pub inertia: Inertia<f64>,
@@ -25,41 +26,41 @@ pub struct Body {
     pub idx_q: usize,
     /// Index in v of the joint's first degree of freedom.
     pub idx_v: usize,
-    /// Relation to the leading joint, if this joint follows another one instead of having its own coordinate.
+    /// Relation to the leading joint, if this joint follows another joint and has no coordinate of its own.
     pub mimic: Option<Mimic>,
 }
 
-/// A frame fixed to a body.
+/// Frame that is fixed to a body.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frame {
     /// Name of the link or joint, or a name chosen by the user.
     pub name: String,
-    /// Origin of the frame: a link, a joint, or the user.
+    /// Item from which the frame comes: a link, a joint, the user, or a constraint.
     pub kind: FrameKind,
     /// Index of the body to which the frame is fixed; 0 is the world.
     pub body: usize,
-    /// bXf: the frame in the body's frame.
+    /// bXf: pose of the frame in the body's frame.
     pub placement: Se3<f64>,
 }
 
-/// Origin of a frame.
+/// Item in the description of a robot from which a frame comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[non_exhaustive]
 pub enum FrameKind {
     /// Link of the robot's file.
     Link,
-    /// Joint of the robot's file; the frame is fixed to the child.
+    /// Joint of the robot's file. The frame is fixed to the child link of the joint.
     Joint,
     /// Frame added by the user.
     User,
-    /// Frame of a [`ModelConstraint`](crate::ModelConstraint), which has two.
+    /// One of the two frames of a [`ModelConstraint`](crate::ModelConstraint).
     Constraint,
 }
 
-/// Body or frame to which [`Model::with_frame`](crate::Model::with_frame) attaches a frame; a name can be converted
-/// (`"tool".into()`).
+/// Body or frame to which [`Model::with_frame`](crate::Model::with_frame) attaches a new frame. A name can be converted
+/// to it (`"tool".into()`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FrameParent<'a> {
@@ -67,7 +68,8 @@ pub enum FrameParent<'a> {
     Body(usize),
     /// Index of a frame.
     Frame(usize),
-    /// Name of a frame (searched in this order: links, frames of the user, joints), else of a body.
+    /// Name of a frame or body. It is searched among links, frames of the user, and joints, in this order, and then
+    /// among bodies.
     Named(&'a str),
 }
 
@@ -77,7 +79,7 @@ impl<'a> From<&'a str> for FrameParent<'a> {
     }
 }
 
-/// Limits of position, velocity and effort; infinite where there is no limit.
+/// Limits of position, velocity and effort. A missing limit is infinite.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Limits {
@@ -105,7 +107,7 @@ impl Limits {
     }
 }
 
-/// Limits, losses and rotor inertia of a joint. By default, limits are missing and the other values are 0.
+/// Limits, losses and rotor inertia of a joint. By default, limits are missing and all other values are 0.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JointOptions {
     /// Lower and upper limit of position (rad, m), for joints with one coordinate.
@@ -116,12 +118,12 @@ pub struct JointOptions {
     pub effort: Option<(f64, f64)>,
     /// Viscous damping d₀ (N m s/rad, N s/m).
     pub damping: f64,
-    /// Coefficients d₁ and d₂ of a damping that depends on the speed: d(v) = d₀ + d₁|v| + d₂v². Their units are the
-    /// unit of d₀ per rad/s or m/s, and per the square of rad/s or m/s.
+    /// Coefficients d₁ and d₂ of a damping that depends on the speed: d(v) = d₀ + d₁|v| + d₂v². The unit of d₁ is the
+    /// unit of d₀ per rad/s or m/s. The unit of d₂ is the unit of d₀ per square of rad/s or m/s.
     pub damping_polynomial: [f64; 2],
     /// Coulomb friction (N m, N).
     pub friction: f64,
-    /// Inertia of the rotor as seen at the joint (kg m², kg). For a free joint it also acts as an apparent mass without
-    /// weight, along the axes of its parent: see [`Model::with_armature`](crate::Model::with_armature).
+    /// Inertia of the rotor as seen at the joint (kg m², kg). For a free joint, it also acts as an apparent mass
+    /// without weight, along the axes of the joint's parent: see [`Model::with_armature`](crate::Model::with_armature).
     pub armature: f64,
 }

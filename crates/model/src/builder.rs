@@ -20,22 +20,22 @@ use condyle_spatial::{Act, Inertia, Se3, Vec3};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodyId(pub(crate) usize);
 
-/// World, which carries the first joints.
+/// World, which carries the first joints of a robot.
 pub const WORLD: BodyId = BodyId(0);
 
-/// Maximum number of degrees of freedom of all joints of a model; the algorithms use square matrices of this size.
+/// Maximum number of degrees of freedom of a model; chosen because the algorithms use square matrices of this size.
 const MAX_DEGREES: usize = 4096;
-/// Maximum number of coordinates of a model in which joints follow others; its inertia matrix is factored as a dense
-/// matrix.
+/// Maximum number of coordinates of a model in which joints follow others; chosen because the inertia matrix of such a
+/// model is factored as a dense matrix.
 const MAX_SHARED: usize = 1024;
 
 #[derive(Clone, Debug)]
 struct Draft {
     body: Body,
     options: JointOptions,
-    /// Whether the body is an intermediate one between the joints of a chain and has no mass on purpose.
+    /// Whether the body connects two joints of a chain, so that it has no mass on purpose.
     between: bool,
-    /// Index of the body whose joint leads this one, and their relation.
+    /// Index of the body with the leading joint, and the relation between the two joints.
     mimic: Option<(usize, Mimic)>,
 }
 
@@ -64,7 +64,7 @@ pub struct ModelBuilder {
 }
 
 impl ModelBuilder {
-    /// Creates a robot without bodies, under the gravity (0, 0, −9.81) m/s².
+    /// Creates a robot without bodies. Its gravity is (0, 0, −9.81) m/s².
     pub fn new(name: &str) -> Self {
         let world = Body {
             joint_name: "universe".to_owned(),
@@ -86,8 +86,8 @@ impl ModelBuilder {
         }
     }
 
-    /// Adds a body and its joint, both with this name and without limits. The joint is at `placement` in the parent's
-    /// frame. `inertia` is in the body's frame, which is the joint's frame at position zero.
+    /// Adds a body and its joint, without limits. Both have the name `name`. The joint is at `placement` in the
+    /// parent's frame. `inertia` is in the body's frame, which is the joint's frame at position zero.
     pub fn body(
         &mut self,
         name: &str,
@@ -124,7 +124,7 @@ impl ModelBuilder {
         BodyId(self.drafts.len() - 1)
     }
 
-    /// Fixes additional inertia to a body: `inertia` is in a frame that is at `placement` in the body's frame.
+    /// Adds inertia to a body. `inertia` is in a frame that is at `placement` in the body's frame.
     ///
     /// # Panics
     /// If the body does not belong to this builder.
@@ -139,7 +139,7 @@ impl ModelBuilder {
         self.frame_of_kind(name, FrameKind::User, body, placement);
     }
 
-    /// Adds a frame of a link, of a joint, or of the user. Two frames of different kinds may have the same name.
+    /// Adds a frame that comes from a link, a joint, or the user. Two frames of different kinds may have the same name.
     pub fn frame_of_kind(&mut self, name: &str, kind: FrameKind, body: BodyId, placement: Se3<f64>) {
         self.frames.push(Frame { name: name.to_owned(), kind, body: body.0, placement });
     }
@@ -153,15 +153,15 @@ impl ModelBuilder {
         self.additions.scale_masses(by);
     }
 
-    /// Marks a body as an intermediate one between the joints of a chain, which has no mass.
+    /// Marks a body that connects two joints of a chain and has no mass on purpose.
     pub(crate) fn between(&mut self, body: BodyId) {
         self.drafts[body.0].between = true;
     }
 
-    /// Lets a joint follow another one, instead of having its own coordinate; see [`Mimic`]. If the leader follows a
-    /// third joint, ratios and offsets are composed. Limits of position and velocity, damping, friction and armature of
-    /// the follower act on its leader's coordinate; its limits of effort have no effect. Limits that would leave the
-    /// leader no motion are ignored, with a warning.
+    /// Lets a joint follow another joint, so that it has no coordinate of its own; see [`Mimic`]. If the leader follows
+    /// a third joint, ratios and offsets are composed. Limits of position and velocity, damping, friction and armature
+    /// of the follower act on the leader's coordinate. Limits of effort of the follower have no effect. Limits that
+    /// would not let the leader move are ignored, with a warning.
     ///
     /// # Panics
     /// If the follower does not belong to this builder.
@@ -171,7 +171,7 @@ impl ModelBuilder {
         self.drafts[follower.0].mimic = Some((leader.0, mimic));
     }
 
-    /// Sets the acceleration of free fall (m/s²), in the world's frame.
+    /// Sets the acceleration of gravity (m/s²), in the world's frame.
     pub fn gravity(&mut self, gravity: Vec3<f64>) {
         self.gravity = gravity;
     }
@@ -180,20 +180,21 @@ impl ModelBuilder {
     /// were added.
     ///
     /// # Errors
-    /// [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`], [`Error::Frame`] and [`Error::Gravity`]:
-    /// - equal names, or invalid axes;
-    /// - negative masses, damping, friction, armature, speeds or efforts;
-    /// - limits that exclude each other, or invalid placements;
-    /// - numbers that are not finite, or whose products may not be finite (above 1e30);
-    /// - invalid leaders of mimic joints.
+    /// Returns [`Error::Duplicate`], [`Error::Body`], [`Error::Joint`], [`Error::Frame`] or [`Error::Gravity`] in these
+    /// cases:
+    /// - Two names are equal, or an axis is invalid.
+    /// - A mass, damping, friction, armature, speed limit or effort limit is negative.
+    /// - Two limits exclude each other, or a placement is invalid.
+    /// - A number is not finite, or is so large (above 1e30) that products may not be finite.
+    /// - The leader of a mimic joint is invalid.
     ///
-    /// Every other function that returns a model makes the same checks. [`Error::Size`]: more than 4096 degrees of
-    /// freedom, or more than 1024 coordinates if joints follow others.
+    /// Every other function that returns a model makes the same checks. Returns [`Error::Size`] if the model has more
+    /// than 4096 degrees of freedom, or more than 1024 coordinates if joints follow others.
     pub fn build(self) -> Result<Model, Error> {
         self.build_with(&mut |_| Ok(()))
     }
 
-    /// Builds the model; `complete` may change it before it is checked.
+    /// Builds the model. `complete` may change the model before the model is checked.
     pub(crate) fn build_with(
         mut self,
         complete: &mut dyn FnMut(&mut Model) -> Result<(), Error>,
@@ -208,7 +209,8 @@ impl ModelBuilder {
         for frame in &mut self.frames {
             frame.body = number[frame.body];
         }
-        // coordinates: first of the joints that have their own, in order; then of the joints that follow one
+        // Coordinates are assigned first to the joints that have their own, in order. Then each follower gets the
+        // coordinate of its leader.
         let mut coordinates = Coordinates::default();
         let mut bodies: Vec<Body> = Vec::with_capacity(order.len());
         let mut warnings = Vec::new();
@@ -265,7 +267,7 @@ impl ModelBuilder {
         Ok(model)
     }
 
-    /// Returns the bodies depth first; siblings keep the order in which they were added.
+    /// Returns the bodies in depth-first order. Siblings keep the order in which they were added.
     fn depth_first(&self) -> Vec<usize> {
         let mut children = vec![Vec::new(); self.drafts.len()];
         for (i, draft) in self.drafts.iter().enumerate().skip(1) {
@@ -279,7 +281,7 @@ impl ModelBuilder {
         order
     }
 
-    /// Checks the number of degrees of freedom.
+    /// Checks that a model does not have too many degrees of freedom.
     pub(crate) fn check_size(&self) -> Result<(), Error> {
         let degrees = |draft: &Draft| draft.body.joint.nv();
         let joints = || self.drafts.iter().skip(1);
@@ -295,7 +297,8 @@ impl ModelBuilder {
         Ok(())
     }
 
-    /// Names the world `universe`, or `universe_2`, … if a body or joint has that name.
+    /// Names the world `universe`. If a body or joint already has this name, the name is `universe_2`, `universe_3`,
+    /// and so on.
     fn name_world(&mut self) {
         let taken = |name: &str, drafts: &[Draft]| {
             drafts.iter().skip(1).any(|d| d.body.name == name || d.body.joint_name == name)
@@ -313,10 +316,10 @@ impl ModelBuilder {
         }
     }
 
-    /// Replaces a leader that is a follower itself by its own leader: q_f = r₁ (r₂ q + o₂) + o₁.
+    /// Replaces each leader that is a follower itself by the leader of that follower: q_f = r₁ (r₂ q + o₂) + o₁.
     fn compose_mimics(&mut self) -> Result<(), Error> {
         for i in 1..self.drafts.len() {
-            // joints on the path to the last leader; after it, each joint's mimic is already composed
+            // `way` lists the joints on the path to the last leader, whose mimics are not yet composed.
             let mut way = Vec::new();
             let mut at = i;
             while let Some((leader, _)) = self.drafts[at].mimic {
@@ -380,10 +383,11 @@ impl ModelBuilder {
     }
 }
 
-/// Relative rounding of the limits of position of joints that follow others; a smaller range is no motion.
+/// Relative rounding error of the limits of position of followers. A leader with a smaller range is treated as unable
+/// to move.
 const MIMIC_ROUNDING: f64 = 1e-9;
 
-/// Numbers of a model for each coordinate.
+/// Numbers that a model has for each coordinate.
 #[derive(Default)]
 struct Coordinates {
     nq: usize,
@@ -416,9 +420,9 @@ impl Coordinates {
         self.armature.resize(self.nv, options.armature);
     }
 
-    /// Adds the limits and losses of a joint that follows a leader: with x = ratio q + offset, its limits of position
-    /// and velocity also limit the leader. Its limits of effort have no effect. Returns messages about limits that
-    /// leave the leader no motion, and are ignored.
+    /// Adds the limits and losses of a joint that follows a leader. With x = ratio q + offset, the follower's limits of
+    /// position and velocity also limit the leader. The follower's limits of effort have no effect. Limits that would
+    /// not let the leader move are ignored; returns messages about these limits.
     fn follow(
         &mut self,
         leader: &Body,

@@ -1,4 +1,4 @@
-//! Models made from models: chains of joints, appended robots, locked joints, joints that follow others.
+//! Models made from other models: chains of joints, appended robots, locked joints, and joints that follow others.
 
 use crate::body::{FrameKind, JointOptions};
 use crate::builder::{BodyId, ModelBuilder, WORLD};
@@ -11,10 +11,11 @@ use condyle_linalg::{check, check_index};
 use condyle_spatial::{Inertia, Se3, Vec3};
 
 impl ModelBuilder {
-    /// Adds a body after several joints, each at a placement in the frame of the joint before it: a composite joint.
+    /// Adds a composite joint: a body after several joints, each at a placement in the frame of the joint before it.
     ///
-    /// Its coordinates are the coordinates of the joints, in order. Bodies without mass connect the joints; they are
-    /// named after the last body: `name#1`, `name#2`, …. Returns the last body, which carries `inertia`.
+    /// The coordinates of the composite joint are the coordinates of the joints, in order. Bodies without mass connect
+    /// the joints; their names are the name of the last body with a number: `name#1`, `name#2`, …. Returns the last
+    /// body, which carries `inertia`.
     ///
     /// - universal joint about unit vectors a and b: `[(Revolute { a }, placement), (Revolute { b }, identity)]`;
     /// - ball joint with roll-pitch-yaw angles (z, y, x): [`spherical_zyx`](Self::spherical_zyx).
@@ -32,9 +33,10 @@ impl ModelBuilder {
         self.body(name, at, *last, *placement, inertia)
     }
 
-    /// Adds a body on a ball joint that turns by q₀ about z, then q₁ about the new y, then q₂ about the new x; v = q̇.
+    /// Adds a body on a ball joint with three angles: it turns by q₀ about z, then by q₁ about the new y, then by q₂
+    /// about the new x. The velocity is v = q̇.
     ///
-    /// M is singular at q₁ = ±π/2. [`Joint::Spherical`] has no singularity.
+    /// The inertia matrix is singular at q₁ = ±π/2. [`Joint::Spherical`] has no singularity.
     ///
     /// ```
     /// use condyle_model::{Inertia, ModelBuilder, Se3, Sym3, Vec3, WORLD};
@@ -53,7 +55,8 @@ impl ModelBuilder {
         self.chain(name, parent, &joints, inertia)
     }
 
-    /// Adds a whole robot; its world is at `placement` in the frame of `parent`. `prefix` is put before all its names.
+    /// Adds a whole robot. The world of this robot is at `placement` in the frame of `parent`. `prefix` is put before
+    /// all names of the robot.
     ///
     /// ```
     /// use condyle_model::{ModelBuilder, Se3, Vec3, WORLD, robots};
@@ -70,8 +73,8 @@ impl ModelBuilder {
         self.append_locked(parent, placement, model, prefix, &[], &[]);
     }
 
-    /// Adds a whole robot, as `append` does, with some bodies fixed at their poses at q. Returns for each body of the
-    /// robot the body of this builder to which it belongs, and the placement there.
+    /// Adds a whole robot, as [`append`](Self::append) does, but with some bodies fixed at their poses at q. Returns,
+    /// for each body of the robot, a body of this builder to which the robot's body is fixed, and its placement there.
     fn append_locked(
         &mut self,
         parent: BodyId,
@@ -95,7 +98,7 @@ impl ModelBuilder {
             }
             let options = match body.mimic {
                 None => model.joint_options(body.idx_q, body.idx_v),
-                Some(_) => JointOptions::default(), // the leader's options include those of the follower
+                Some(_) => JointOptions::default(), // the leader's options include the follower's
             };
             let names = (format!("{prefix}{}", body.name), format!("{prefix}{}", body.joint_name));
             let id = self.body_with((&names.0, &names.1), on, body.joint, pXp * body.placement, body.inertia, options);
@@ -118,7 +121,7 @@ impl ModelBuilder {
             let (on, pXb) = place[frame.body];
             self.frame_of_kind(&format!("{prefix}{}", frame.name), frame.kind, on, pXb * frame.placement);
         }
-        // the frame of a locked body stays, named after its joint, as after a fixed joint
+        // The frame of a locked body stays. It is named after the body's joint, as after a fixed joint.
         for &i in locked {
             let (name, (on, pXb)) = (format!("{prefix}{}", model.bodies[i].joint_name), place[i]);
             if !model.frames.iter().any(|f| f.kind == FrameKind::Joint && f.name == model.bodies[i].joint_name) {
@@ -131,11 +134,12 @@ impl ModelBuilder {
 }
 
 impl Model {
-    /// Returns the same robot with some joints locked at q; `bodies` are the bodies that they carry.
+    /// Returns the same robot with some joints locked at q. `bodies` are the bodies that these joints carry.
     ///
     /// Each of these bodies is merged into the body that carries it, and stays as a frame. A joint that follows a
-    /// locked one is locked, too. A locked joint keeps its part of the length of a tendon. A coupling of a locked joint
-    /// holds the other joint; where this is not possible, the model warns. Warnings about the robot's file are kept.
+    /// locked joint is locked, too. If a tendon moves with a locked joint, this joint's share of the tendon's length is
+    /// kept. A coupling of a locked joint holds the other joint; if this is not possible, the model has a warning.
+    /// Warnings about the robot's file are kept.
     ///
     /// ```
     /// use condyle_model::robots;
@@ -148,8 +152,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The errors of [`ModelBuilder::build`]; [`Error::Position`] if a number of `q` is not finite, or if a rotation in
-    /// it does not have length 1.
+    /// Returns the errors of [`ModelBuilder::build`]. Returns [`Error::Position`] if a number of `q` is not finite, or
+    /// if a rotation in `q` does not have length 1.
     ///
     /// # Panics
     /// If `q` does not have nq numbers, or a body does not exist or is the world.
@@ -169,11 +173,11 @@ impl Model {
         builder.build()
     }
 
-    /// Returns this robot with another one attached, whose world is at `placement` in the frame of a body of this robot
-    /// (0 is the world). `prefix` is put before all names of the other robot. Gravity and name of this robot are kept,
-    /// and warnings about the files of both robots.
+    /// Returns this robot with another robot attached. The world of the other robot is at `placement` in the frame of a
+    /// body of this robot (0 is the world). `prefix` is put before all names of the other robot. Gravity and name of
+    /// this robot are kept, and so are the warnings about the files of both robots.
     ///
-    /// The bodies of the other robot are numbered after all bodies that `body` carried before, as in Pinocchio's
+    /// The bodies of the other robot are numbered after all bodies that `body` already carries, as in Pinocchio's
     /// `appendModel`.
     ///
     /// ```
@@ -186,7 +190,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The errors of [`ModelBuilder::build`]: two bodies, joints or frames with the same name.
+    /// Returns the errors of [`ModelBuilder::build`], for example if two bodies, joints or frames have the same name.
     ///
     /// # Panics
     /// If `body` does not exist.
@@ -198,9 +202,9 @@ impl Model {
         builder.build()
     }
 
-    /// Returns the same robot with one joint that follows another one, instead of having its own coordinate. Each joint
-    /// is given by the index of its body. Limits and losses of the follower act on its leader, as
-    /// [`ModelBuilder::mimic`] states.
+    /// Returns the same robot with one joint that follows another joint and has no coordinate of its own. Each joint is
+    /// given by the index of its body. Limits and losses of the follower act on the leader, as described at
+    /// [`ModelBuilder::mimic`].
     ///
     /// ```
     /// use condyle_model::{Mimic, robots};
@@ -211,8 +215,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The errors of [`ModelBuilder::build`]: [`Error::Joint`] if a joint has more than one degree of freedom, if the
-    /// leader itself follows another joint, or if another joint follows the follower.
+    /// Returns the errors of [`ModelBuilder::build`]. Returns [`Error::Joint`] if one of the joints has more than one
+    /// degree of freedom, if the leader itself follows another joint, or if another joint follows the follower.
     ///
     /// # Panics
     /// If a body does not exist or is the world.
@@ -233,7 +237,8 @@ impl Model {
         check_index(name, i, self.bodies.len(), "bodies");
     }
 
-    /// Returns a builder of this robot, and for each body its identifier and placement there.
+    /// Returns a builder of this robot. For each body, also returns the identifier of a body in the builder, and the
+    /// placement there.
     fn to_builder(&self) -> (ModelBuilder, Vec<(BodyId, Se3<f64>)>) {
         let mut builder = ModelBuilder::new(&self.name);
         builder.gravity(self.gravity);

@@ -1,4 +1,5 @@
-//! Space of positions: a product of vector spaces and Lie groups, with q ⊕ v for tangent vectors v.
+//! Space of positions: a product of vector spaces and Lie groups. q ⊕ v is the position q moved by the tangent vector
+//! v.
 
 use crate::joint::GroupJacobian;
 use crate::model::Model;
@@ -9,10 +10,11 @@ use condyle_spatial::Scalar;
 use condyle_spatial::simd::Kernel;
 use nalgebra::DMatrix;
 
-/// Greatest magnitude (rad, m) of a random position in a coordinate without limits.
+/// Largest magnitude (rad, m) of a random coordinate without limits.
 const UNLIMITED: f64 = 3.0;
 
-/// Returns the position in which every body is at its joint's frame: coordinates are zero, rotations are the identity.
+/// Returns the position in which every body is at the frame of its joint: coordinates are zero, and rotations are the
+/// identity.
 ///
 /// ```
 /// use condyle_model::{neutral, robots};
@@ -26,8 +28,8 @@ pub fn neutral<R>(model: &Model<R>) -> Vec<f64> {
     q
 }
 
-/// Returns a uniformly distributed random position: between the limits of a coordinate, within ±3 (rad, m) without
-/// limits, and over the whole group for rotations. The result depends only on the model and the generator.
+/// Returns a uniformly distributed random position. Coordinates are between their limits, or within ±3 (rad, m) if they
+/// have no limits. Rotations are drawn from the whole group. The result depends only on the model and the generator.
 ///
 /// ```
 /// use condyle_model::{random_configuration, robots};
@@ -44,7 +46,7 @@ pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Ve
         let mut lower = bound(&model.limits.lower[iq.clone()], -UNLIMITED);
         let mut upper = bound(&model.limits.upper[iq.clone()], UNLIMITED);
         for (k, i) in iq.clone().enumerate() {
-            // a limit beyond ±3 on one side only
+            // If the only limit of a coordinate lies outside of ±3, the range is this limit.
             lower[k] = if lower[k] > upper[k] && model.limits.upper[i] == upper[k] { upper[k] } else { lower[k] };
             upper[k] = upper[k].max(lower[k]);
         }
@@ -53,7 +55,7 @@ pub fn random_configuration<R>(model: &Model<R>, rng: &mut impl rand::Rng) -> Ve
     q
 }
 
-/// Computes q ⊕ v: the position after moving with the velocity v for one unit of time.
+/// Computes q ⊕ v: the position reached from q by moving with the velocity v for one unit of time.
 ///
 /// q: nq numbers; v: nv numbers; out: nq numbers. Does not allocate.
 ///
@@ -77,7 +79,7 @@ pub fn integrate<S: Scalar, R>(model: &Model<R>, q: &[S], v: &[S], out: &mut [S]
     S::enter(Integrate { model, q, v, out });
 }
 
-/// Kernel of q ⊕ v, compiled for the SIMD level of its scalar.
+/// Kernel that computes q ⊕ v, compiled for the SIMD level of its scalar.
 struct Integrate<'a, S, R> {
     model: &'a Model<R>,
     q: &'a [S],
@@ -95,7 +97,7 @@ impl<S: Scalar, R> Kernel for Integrate<'_, S, R> {
     }
 }
 
-/// Computes q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁; for rotations, the shortest one.
+/// Computes q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁. For rotations, it is the shortest such vector.
 ///
 /// q0, q1: nq numbers; out: nv numbers. Does not allocate.
 ///
@@ -111,9 +113,11 @@ pub fn difference<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], out: &mut 
     }
 }
 
-/// Computes q₀ ⊕ t (q₁ ⊖ q₀): the position on the path with constant velocity from q₀ at t = 0 to q₁ at t = 1.
+/// Computes q₀ ⊕ t (q₁ ⊖ q₀): the position at t on the path with constant velocity, which is at q₀ for t = 0 and at q₁
+/// for t = 1.
 ///
-/// q0, q1, out: nq numbers; tangent: scratch of nv numbers, which contains t (q₁ ⊖ q₀) afterwards. Does not allocate.
+/// q0, q1, out: nq numbers; tangent: scratch of nv numbers, which contains t (q₁ ⊖ q₀) after the call. Does not
+/// allocate.
 ///
 /// ```
 /// use condyle_model::{interpolate, robots};
@@ -134,9 +138,9 @@ pub fn interpolate<S: Scalar, R>(model: &Model<R>, q0: &[S], q1: &[S], t: S, tan
     integrate(model, q0, tangent, out);
 }
 
-/// Returns ‖q₁ ⊖ q₀‖, in which lengths (m) and angles (rad) have equal weight.
+/// Returns ‖q₁ ⊖ q₀‖. Lengths (m) and angles (rad) have equal weight.
 ///
-/// q0, q1: nq numbers; tangent: scratch of nv numbers, which contains q₁ ⊖ q₀ afterwards. Does not allocate.
+/// q0, q1: nq numbers; tangent: scratch of nv numbers, which contains q₁ ⊖ q₀ after the call. Does not allocate.
 ///
 /// # Panics
 /// If an argument has the wrong length.
@@ -185,11 +189,11 @@ pub fn normalize<S: Scalar, R>(model: &Model<R>, q: &mut [S]) {
     }
 }
 
-/// Maps the columns of X, tangent vectors at q ⊕ v, to the tangent space at q: applies the inverse of ∂(q ⊕ v)/∂q, in
-/// place.
+/// Maps the columns of X from the tangent space at q ⊕ v to the tangent space at q. Applies the inverse of ∂(q ⊕ v)/∂q
+/// to X, in place.
 ///
-/// Components of a vector space do not change; for a group, the body's frame is turned back by exp(v). v: nv numbers;
-/// X: nv rows. Does not allocate.
+/// Components of a vector space do not change. Components of a group are turned from the body's frame at q ⊕ v to the
+/// body's frame at q, by exp(v). v: nv numbers; X: nv rows. Does not allocate.
 ///
 /// # Panics
 /// If `v` does not have nv numbers or `X` does not have nv rows.
@@ -216,7 +220,7 @@ pub fn transport<S: Scalar, R>(model: &Model<R>, v: &[S], X: &mut DMatrix<S>) {
     }
 }
 
-/// Argument with respect to which a Jacobian of [`integrate`] is taken.
+/// Argument of [`integrate`] with respect to which a Jacobian is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IntegrateArgument {
     /// Position q.
@@ -234,7 +238,8 @@ impl IntegrateArgument {
     }
 }
 
-/// Computes ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v, nv × nv, block-diagonal, between tangent spaces; it does not depend on q.
+/// Computes the Jacobian ∂(q ⊕ v)/∂q or ∂(q ⊕ v)/∂v between tangent spaces. J is nv × nv and block-diagonal, and does
+/// not depend on q.
 ///
 /// v: nv numbers; J is overwritten. Does not allocate.
 ///
@@ -245,7 +250,7 @@ pub fn integrate_jacobian<S: Scalar, R>(model: &Model<R>, v: &[S], argument: Int
     block_diagonal(model, ("v", v), argument.jacobian(), S::one(), J);
 }
 
-/// Argument with respect to which a Jacobian of [`difference`] is taken.
+/// Argument of [`difference`] with respect to which a Jacobian is taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DifferenceArgument {
     /// Position q₀, which is subtracted.
@@ -255,7 +260,7 @@ pub enum DifferenceArgument {
 }
 
 impl DifferenceArgument {
-    /// Returns the sign s for which the Jacobian is s · J_log(s · d).
+    /// Returns the sign s with which the Jacobian is s · J_log(s · d).
     fn sign<S: Scalar>(self) -> S {
         match self {
             Self::From => -S::one(),
@@ -264,7 +269,8 @@ impl DifferenceArgument {
     }
 }
 
-/// Computes ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁, nv × nv, block-diagonal, between tangent spaces, given d = q₁ ⊖ q₀.
+/// Computes the Jacobian ∂(q₁ ⊖ q₀)/∂q₀ or ∂(q₁ ⊖ q₀)/∂q₁ between tangent spaces, given d = q₁ ⊖ q₀. J is nv × nv and
+/// block-diagonal.
 ///
 /// d: nv numbers; J is overwritten. Does not allocate.
 ///
@@ -275,7 +281,7 @@ pub fn difference_jacobian<S: Scalar, R>(model: &Model<R>, d: &[S], argument: Di
     block_diagonal(model, ("d", d), GroupJacobian::Log, argument.sign(), J);
 }
 
-/// Computes sign · J(sign · v), joint by joint; `name` is the caller's name of the tangent vector v.
+/// Computes sign · J(sign · v), joint by joint. `name` is the name of the tangent vector v in error messages.
 #[track_caller]
 fn block_diagonal<S: Scalar, R>(
     model: &Model<R>,
@@ -291,15 +297,15 @@ fn block_diagonal<S: Scalar, R>(
     group_blocks(model, v, which, sign, J);
 }
 
-/// Computes the blocks of [`integrate_jacobian`] for joints whose positions are not a vector space; the rest of J is
-/// kept.
+/// Computes the blocks of [`integrate_jacobian`] for joints whose positions are not a vector space. The rest of J is
+/// not changed.
 #[doc(hidden)]
 pub fn integrate_jacobian_groups<S: Scalar>(model: &Model, v: &[S], argument: IntegrateArgument, J: &mut DMatrix<S>) {
     group_blocks(model, v, argument.jacobian(), S::one(), J);
 }
 
-/// Computes the blocks of [`difference_jacobian`] for joints whose positions are not a vector space; the rest of J is
-/// kept.
+/// Computes the blocks of [`difference_jacobian`] for joints whose positions are not a vector space. The rest of J is
+/// not changed.
 #[doc(hidden)]
 pub fn difference_jacobian_groups<S: Scalar>(model: &Model, d: &[S], argument: DifferenceArgument, J: &mut DMatrix<S>) {
     group_blocks(model, d, GroupJacobian::Log, argument.sign(), J);

@@ -1,9 +1,10 @@
-//! Named constraints that a robot's file has in addition to its tree: loops that two bodies close, and coupled joints.
+//! Named constraints that a robot's file has in addition to its tree: loops, which connect two bodies, and coupled
+//! joints.
 
 use alloc::string::String;
 
-/// Constraint in addition to the tree of a model. Tree algorithms ignore it. Constrained dynamics closes loops if the
-/// caller asks for it, and does not enforce couplings.
+/// Constraint in addition to the tree of a model. Algorithms for trees ignore it. Constrained dynamics closes loops if
+/// the caller asks for it, and does not enforce couplings.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ModelConstraint {
@@ -28,8 +29,8 @@ pub enum ModelConstraintKind {
         /// Indices of the frames.
         frames: [usize; 2],
     },
-    /// The position of a joint is a polynomial in the position of another one, q_f = Σ cᵢ q_lⁱ; without a leader it is
-    /// c₀.
+    /// The position q_f of a joint is a polynomial in the position q_l of another joint, q_f = Σ cᵢ q_lⁱ. Without a
+    /// leader, q_f is c₀.
     Coupling {
         /// Index of the body whose joint follows.
         follower: usize,

@@ -3,12 +3,12 @@
 use crate::model::Model;
 
 /// Two models are equal if they describe the same robot with equal numbers: names, bodies, joints, frames, limits,
-/// losses, springs, armature, gravity, inertias, actuators, keyframes and constraints. All other fields follow from
-/// these.
+/// losses, springs, armature, gravity, inertias, actuators, keyframes and constraints. All other fields are computed
+/// from these.
 ///
-/// A clone is equal to its model, and so is a model after writing and reading in a format that keeps all digits.
-/// Warnings of the loader are not compared. The setting of [`with_limbs`](Model::with_limbs) is not compared either,
-/// although last digits of results depend on it. No model contains NaN.
+/// A clone is equal to its model. A model that is written and read again is equal to its original, if the format keeps
+/// all digits. Warnings of the loader are not compared. The setting of [`with_limbs`](Model::with_limbs) is not
+/// compared either, although the last digits of results depend on it. No model contains NaN.
 impl<R: PartialEq> PartialEq for Model<R> {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name

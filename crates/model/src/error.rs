@@ -5,26 +5,26 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Error in the description of a robot, or in a name that was looked up in it.
+/// Error in the description of a robot, or in a name that was searched in the description.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// The file could not be read, or it cannot be a robot's file: it is not a regular file, or it is too large.
     #[error("{file}: {what}")]
     File {
-        /// Path as given, or `<string>`.
+        /// Path as the caller gave it, or `<string>`.
         file: String,
-        /// Message of the operating system, or the size with the limit.
+        /// Message of the operating system, or the size of the file and the limit.
         what: String,
     },
-    /// The file of a `package://` address was found in no folder.
+    /// The file at a `package://` address was not found in any folder.
     #[error("{address}: no such file in a package `{package}`; {}", where_looked(looked))]
     Package {
-        /// Address as given.
+        /// Address as it was given.
         address: String,
         /// Name of the package.
         package: String,
-        /// Paths at which the file was looked for.
+        /// Paths at which the file was searched.
         looked: Vec<String>,
     },
     /// The text is not XML.
@@ -40,39 +40,40 @@ pub enum Error {
     /// An element of a URDF, MJCF or SDF is invalid.
     #[error("{file}{}: {element}: {what}", colon(*.line))]
     Element {
-        /// Path of the file, or `<string>`; the included file if the element is in one.
+        /// Path of the file that contains the element, or `<string>`. It may be an included file.
         file: String,
-        /// Line on which the element, or its invalid part, begins; from 1, or 0 if the text is no file.
+        /// Number of the line on which the element, or the invalid part of it, begins, counted from 1; 0 if the text is
+        /// not from a file.
         line: u32,
-        /// Element, for example ``joint `elbow` ``.
+        /// Element with its name, for example ``joint `elbow` ``.
         element: String,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
     /// A model would be larger than allowed.
     #[error("{found} {what}, at most {limit} are allowed in a model")]
     Size {
-        /// Counted things, for example `degrees of freedom`.
+        /// Name of the counted items, for example `degrees of freedom`.
         what: &'static str,
         /// Number that the model would have.
         found: usize,
         /// Maximum allowed number.
         limit: usize,
     },
-    /// A body given to a builder is invalid.
+    /// A body that was given to a builder is invalid.
     #[error("body `{body}`: {what}")]
     Body {
         /// Name of the body.
         body: String,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
-    /// A joint given to a builder is invalid.
+    /// A joint that was given to a builder is invalid.
     #[error("joint `{joint}`: {what}")]
     Joint {
         /// Name of the joint.
         joint: String,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
     /// A frame is invalid.
@@ -80,13 +81,13 @@ pub enum Error {
     Frame {
         /// Name of the frame.
         frame: String,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
-    /// A gravity is infinite or not a number.
+    /// A component of gravity is infinite or not a number.
     #[error("gravity: ({}, {}, {}) m/s² is not finite", gravity[0], gravity[1], gravity[2])]
     Gravity {
-        /// Acceleration as given (m/s²).
+        /// Acceleration as it was given (m/s²).
         gravity: [f64; 3],
     },
     /// A position is not a valid position of the robot.
@@ -94,7 +95,7 @@ pub enum Error {
     Position {
         /// Name of the joint.
         joint: String,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
     /// A velocity is not a valid velocity of the robot.
@@ -102,7 +103,7 @@ pub enum Error {
     Velocity {
         /// Name of the joint.
         joint: String,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
     /// A list in a model's file is too short or too long.
@@ -120,21 +121,21 @@ pub enum Error {
     Constraint {
         /// Index of the constraint, from 0.
         constraint: usize,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
     /// The ground of a simulation is invalid.
     #[error("ground: {what}")]
     Ground {
-        /// Fault, with the names and the numbers.
+        /// Description of the fault, with the names and the numbers.
         what: String,
     },
-    /// A strict loader found something that is a warning otherwise.
+    /// A strict loader treats a warning as an error.
     #[error("{}{warning}", file_of(file, warning))]
     Strict {
         /// Path of the file, or `<string>`.
         file: String,
-        /// Warning that a loader reports if it is not strict.
+        /// Warning that a loader would report if it were not strict.
         warning: Warning,
     },
     /// Two bodies, joints or frames of one kind have the same name.
@@ -148,7 +149,7 @@ pub enum Error {
     /// No frame has this name.
     #[error("unknown frame `{name}`{}", near_or(nearest, "; no frame has a similar name"))]
     UnknownFrame {
-        /// Name as given.
+        /// Name as it was given.
         name: String,
         /// Most similar existing name; empty if no name is similar.
         nearest: String,
@@ -156,14 +157,14 @@ pub enum Error {
     /// No joint has this name.
     #[error("unknown joint `{name}`{}", near_or(nearest, "; no joint has a similar name"))]
     UnknownJoint {
-        /// Name as given.
+        /// Name as it was given.
         name: String,
         /// Most similar existing name; empty if no name is similar.
         nearest: String,
     },
 }
 
-/// Returns the begin of the message of [`Error::Strict`]: the file, unless the warning names it.
+/// Returns the beginning of the message of [`Error::Strict`]: the file, unless the warning itself names the file.
 fn file_of(file: &str, warning: &Warning) -> String {
     if warning.place().is_some() { String::new() } else { format!("{file}: ") }
 }
@@ -176,12 +177,13 @@ fn where_looked(looked: &[String]) -> String {
     format!("looked for {}", looked.join(", "))
 }
 
-/// Returns a line number after a colon, or nothing for 0.
+/// Returns a colon and a line number, or an empty text if the line number is 0.
 fn colon(line: u32) -> String {
     if line == 0 { String::new() } else { format!(":{line}") }
 }
 
-/// Returns the end of a message about an unknown name: the nearest name, or `otherwise` if no name is near.
+/// Returns the end of a message about an unknown name: the nearest known name, or `otherwise` if no known name is
+/// similar.
 pub(crate) fn near_or(nearest: &str, otherwise: &str) -> String {
     if nearest.is_empty() { otherwise.to_owned() } else { format!("; nearest is `{nearest}`") }
 }

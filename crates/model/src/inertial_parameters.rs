@@ -1,13 +1,13 @@
-//! The ten inertial parameters of a body, their physical validity, and a parametrisation in which all values are
-//! physical.
+//! The ten inertial parameters of a body, a test whether they are physical, and a parametrisation in which all values
+//! are physical.
 //!
-//! In the body's frame, about its origin, in Pinocchio's order, they are
+//! The parameters are relative to the origin and the axes of the body's frame, in Pinocchio's order:
 //!
 //! ```text
 //! π = (m, m c_x, m c_y, m c_z, I_xx, I_xy, I_yy, I_xz, I_yz, I_zz)
 //! ```
 //!
-//! A mass distribution with positive density has these parameters if and only if its pseudo-inertia is positive
+//! A mass distribution with positive density can have these parameters if and only if its pseudo-inertia J is positive
 //! definite. The pseudo-inertia contains the second moments of the points (x, y, z, 1). Source: Wensing, Kim, Slotine,
 //! *Linear matrix inequalities for physically consistent inertial parameter identification*, 2018.
 //!
@@ -15,9 +15,9 @@
 //! J = [Σ, m c; m cᵀ, m],   Σ = ½ tr(Ī) 1 − Ī
 //! ```
 //!
-//! Its Cholesky factor, with the logarithm of the diagonal, is a smooth one-to-one map between ℝ¹⁰ and the physical
-//! inertias. An identification with these parameters therefore needs no constraints. Source: Rucker and Wensing,
-//! *Smooth parameterization of rigid-body inertia*, 2022.
+//! The log-Cholesky parameters θ are the Cholesky factor U of J, with the logarithms of its diagonal. They are a smooth
+//! one-to-one map between ℝ¹⁰ and the physical inertias, so an identification with these parameters needs no
+//! constraints. Source: Rucker and Wensing, *Smooth parameterization of rigid-body inertia*, 2022.
 //!
 //! ```text
 //! θ = (α, d₁, d₂, d₃, s₁₂, s₂₃, s₁₃, t₁, t₂, t₃),   J = U Uᵀ,   U = eᵅ [e^d₁ s₁₂  s₁₃  t₁]
@@ -26,13 +26,13 @@
 //!                                                                      [ 0    0    0   1 ]
 //! ```
 //!
-//! Therefore m = e²ᵅ, and t is the centre of mass.
+//! Therefore the mass is m = e²ᵅ, and t is the centre of mass.
 
 use condyle_spatial::elementary::{exp, ln};
 use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 use nalgebra::{SMatrix, SVector};
 
-/// Reason why an inertia is not physical: no body of positive density has it.
+/// Reason why an inertia is not physical, so that no body of positive density has this inertia.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NotPhysical {
@@ -42,19 +42,19 @@ pub enum NotPhysical {
         /// Mass m (kg).
         mass: f64,
     },
-    /// The second moment of mass along some axis is not positive: a principal moment about the centre of mass is not
-    /// smaller than the sum of the other two.
+    /// The second moment of mass along one axis is not positive: a principal moment about the centre of mass is not
+    /// smaller than the sum of the other two principal moments.
     #[error(
         "along some axis the second moment of mass about the centre of mass is {moment} kg m²: \
          a principal moment of inertia is not below the sum of the other two"
     )]
     Spread {
-        /// First pivot of Σ about the centre of mass that is not positive (kg m²).
+        /// First pivot that is not positive of Σ about the centre of mass (kg m²).
         moment: f64,
     },
 }
 
-/// Returns π: mass, mass times centre of mass, and the inertia about the origin, as ten numbers.
+/// Returns the ten parameters π: mass, mass times centre of mass, and inertia about the origin.
 ///
 /// ```
 /// use condyle_model::{Inertia, Sym3, Vec3, inertial_parameters};
@@ -68,19 +68,19 @@ pub fn from_inertia<S: Scalar>(I: Inertia<S>) -> [S; 10] {
     [I.mass, h.x, h.y, h.z, J.xx, J.xy, J.yy, J.xz, J.yz, J.zz]
 }
 
-/// Returns the inertia with the ten parameters π; the inverse of [`from_inertia`].
+/// Returns the inertia with the ten parameters π. This is the inverse of [`from_inertia`].
 pub fn to_inertia<S: Scalar>([m, hx, hy, hz, xx, xy, yy, xz, yz, zz]: [S; 10]) -> Inertia<S> {
     Inertia { mass: m, mass_com: Vec3::new(hx, hy, hz), rotational: Sym3 { xx, xy, yy, xz, yz, zz } }
 }
 
-/// Returns Σ = ½ tr(Ī) 1 − Ī, the second moments ∫ x xᵀ dm of the mass about the origin (kg m²).
+/// Returns Σ = ½ tr(Ī) 1 − Ī: the second moments ∫ x xᵀ dm of the mass about the origin (kg m²).
 fn second_moments<S: Scalar>(J: Sym3<S>) -> Sym3<S> {
     let half_trace = (J.xx + J.yy + J.zz) * S::splat(0.5);
     (-J).add_diagonal(half_trace)
 }
 
-/// Returns J = [Σ, m c; m cᵀ, m], the second moments of the points (x, y, z, 1): symmetric 4 × 4, in kg m², kg m and
-/// kg.
+/// Returns J = [Σ, m c; m cᵀ, m]: the second moments of the points (x, y, z, 1). J is symmetric, 4 × 4, with entries in
+/// kg m², kg m and kg.
 ///
 /// J is linear in the parameters, and positive definite if and only if the inertia is physical. Source: Wensing, Kim,
 /// Slotine (2018).
@@ -112,7 +112,7 @@ struct Factor {
     t: Vec3<f64>,
 }
 
-/// Computes the factor from the last column to the first; it exists if all pivots are positive.
+/// Computes the factor from the last column to the first column. The factor exists if all pivots are positive.
 fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
     let positive = |moment: f64| if moment > 0.0 { Ok(moment.sqrt()) } else { Err(NotPhysical::Spread { moment }) };
     let mass = I.mass;
@@ -129,12 +129,13 @@ fn factor(I: Inertia<f64>) -> Result<Factor, NotPhysical> {
     Ok(Factor { scale: mass.sqrt(), diagonal: Vec3::new(x, y, z), above: Vec3::new(xy, yz, xz), t })
 }
 
-/// Checks whether a body of positive density can have this inertia: J ≻ 0, by the pivots of its Cholesky factor.
+/// Checks whether a body of positive density can have this inertia: all pivots of the Cholesky factor of J must be
+/// positive.
 ///
-/// Point masses, rods and plates have no volume; they are limit cases and are refused.
+/// Point masses, rods and plates have no volume. They are limit cases and are refused.
 ///
 /// # Errors
-/// [`NotPhysical`], with the first number that is not positive.
+/// Returns [`NotPhysical`] with the first number that is not positive.
 ///
 /// ```
 /// use condyle_model::{Inertia, Sym3, Vec3, inertial_parameters::check};
@@ -147,10 +148,11 @@ pub fn check(I: Inertia<f64>) -> Result<(), NotPhysical> {
     factor(I).map(|_| ())
 }
 
-/// Returns θ, the log-Cholesky parameters of a physical inertia. Any ten numbers are valid, and different θ are
+/// Returns the log-Cholesky parameters θ of a physical inertia. Any ten numbers are valid, and different θ give
 /// different inertias.
 ///
-/// α = ½ ln m; dᵢ: logarithms (of m); s: m; t: centre of mass (m). Source: Rucker and Wensing (2022).
+/// In θ, α is ½ ln m; dᵢ are logarithms of numbers in m; s has the unit m; t is the centre of mass (m). Source: Rucker
+/// and Wensing (2022).
 ///
 /// ```
 /// use condyle_model::{inertial_parameters::{from_log_cholesky, log_cholesky}, robots};
@@ -161,7 +163,7 @@ pub fn check(I: Inertia<f64>) -> Result<(), NotPhysical> {
 /// ```
 ///
 /// # Errors
-/// [`NotPhysical`], if [`check`] refuses the inertia.
+/// Returns [`NotPhysical`] if [`check`] refuses the inertia.
 pub fn log_cholesky(I: Inertia<f64>) -> Result<[f64; 10], NotPhysical> {
     let Factor { scale, diagonal, above, t } = factor(I)?;
     let d = diagonal.to_array().map(|x| ln(x / scale));
@@ -169,7 +171,7 @@ pub fn log_cholesky(I: Inertia<f64>) -> Result<[f64; 10], NotPhysical> {
     Ok([ln(scale), d[0], d[1], d[2], s.x, s.y, s.z, t.x, t.y, t.z])
 }
 
-/// Returns the rows of U / eᵅ, and e²ᵅ.
+/// Returns the first three rows of U / eᵅ, and e²ᵅ.
 fn rows<S: Scalar>(theta: &[S; 10]) -> ([[S; 4]; 3], S) {
     let &[alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] = theta;
     let o = S::zero();
@@ -180,11 +182,11 @@ fn dot<S: Scalar>(a: [S; 4], b: [S; 4]) -> S {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul_add(b[2], a[3] * b[3])))
 }
 
-/// Returns the inertia with the log-Cholesky parameters θ, which is physical for all θ; the inverse of
+/// Returns the inertia with the log-Cholesky parameters θ. It is physical for all θ. This is the inverse of
 /// [`log_cholesky`].
 ///
-/// Ī = tr(Σ) 1 − Σ with Σ the upper left block of U Uᵀ. Source: Rucker and Wensing (2022). Valid for α within ±32 and
-/// dᵢ within ±64, up to a rounding error that grows with their size.
+/// Ī = tr(Σ) 1 − Σ, where Σ is the upper left block of U Uᵀ. Source: Rucker and Wensing (2022). The result is valid for
+/// α within ±32 and dᵢ within ±64, up to a rounding error that grows with their magnitude.
 pub fn from_log_cholesky<S: Scalar>(theta: [S; 10]) -> Inertia<S> {
     let ([x, y, z], mass) = rows(&theta);
     let moments = Sym3 { xx: dot(x, x), xy: dot(x, y), yy: dot(y, y), xz: dot(x, z), yz: dot(y, z), zz: dot(z, z) };
@@ -207,14 +209,15 @@ pub fn from_log_cholesky<S: Scalar>(theta: [S; 10]) -> Inertia<S> {
 pub fn log_cholesky_jacobian<S: Scalar>(theta: [S; 10]) -> SMatrix<S, 10, 10> {
     let (u, mass) = rows(&theta);
     let mut J = SMatrix::<S, 10, 10>::from_element(S::zero());
-    // e²ᵅ scales all parameters: ∂π/∂α = 2 π
+    // e²ᵅ is a factor of all parameters, so ∂π/∂α = 2 π.
     let pi = from_inertia(from_log_cholesky(theta));
     J.set_column(0, &SVector::<S, 10>::from_fn(|k, _| pi[k] + pi[k]));
-    // each other θ is the entry (row, column) of U / eᵅ, or the logarithm of a diagonal entry
+    // Each other number of θ is the entry (row, column) of U / eᵅ, or the logarithm of this entry if it is on the
+    // diagonal.
     const ENTRIES: [(usize, usize); 9] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
     for (k, &(row, column)) in ENTRIES.iter().enumerate() {
         let rate = if row == column { u[row][column] } else { S::one() } * mass;
-        // dΣ = e²ᵅ (e_row u_columnᵀ + u_column e_rowᵀ)
+        // The derivative of Σ is dΣ = e²ᵅ (e_row u_columnᵀ + u_column e_rowᵀ).
         let change = Vec3::new(u[0][column], u[1][column], u[2][column]).scale(rate);
         let unit = Vec3::from(core::array::from_fn(|r| if r == row { S::one() } else { S::zero() }));
         let moments = Sym3::outer_sum(unit, change);

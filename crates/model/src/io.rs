@@ -1,4 +1,4 @@
-//! Files of robots: URDF, MJCF, SDF, SRDF, and serde formats.
+//! Reading and writing files of robots: URDF, MJCF, SDF, SRDF, and formats of serde.
 
 #[cfg(feature = "serde")]
 mod description;
@@ -22,7 +22,8 @@ mod xml;
 #[cfg(feature = "loaders")]
 use condyle_spatial::{Mat3, Vec3};
 
-/// Returns R = Rz(yaw) Ry(pitch) Rx(roll), the convention of URDF and SDF (rad).
+/// Returns the rotation matrix R = Rz(yaw) Ry(pitch) Rx(roll), given angles (rad). This is the convention of URDF and
+/// SDF.
 #[cfg(feature = "loaders")]
 fn from_rpy(rpy: [f64; 3]) -> Mat3<f64> {
     let [(sr, cr), (sp, cp), (sy, cy)] = rpy.map(f64::sin_cos);

@@ -1,9 +1,9 @@
-//! Joints. All code that depends on the kind of a joint is in this file and its folder: the group of positions in
-//! `joint/group.rs`, and kinematics for the passes of algorithms in `joint/kinematics.rs`.
+//! Joints. All code that depends on the kind of a joint is in this file and its folder. `joint/group.rs` contains the
+//! groups of positions. `joint/kinematics.rs` contains the kinematics that the passes of algorithms use.
 //!
-//! A joint moves along some of the six unit motions of the body's frame. These motions are the same in that frame for
-//! all positions: the motion subspace is constant in the body. When a model is built, the axis of a revolute or
-//! prismatic joint is turned to z. Internally, S is therefore the same for all such joints.
+//! A joint moves along some of the six unit motions of the body's frame. In that frame, these motions are the same for
+//! all positions: the motion subspace S is constant in the body. When a model is built, the axis of a revolute or
+//! prismatic joint is turned to z. So S is internally the same for all joints of a kind.
 
 mod group;
 pub mod kinematics;
@@ -37,32 +37,33 @@ pub enum Joint {
         /// Axis: a unit vector in the body's frame.
         axis: Vec3<f64>,
     },
-    /// A screw: q = \[θ\], v = \[θ̇\], with `pitch` metres along the axis for each radian about it.
+    /// Screw: q = \[θ\], v = \[θ̇\], with `pitch` metres along the axis for each radian about the axis.
     Helical {
         /// Axis: a unit vector in the body's frame.
         axis: Vec3<f64>,
         /// Pitch (m/rad).
         pitch: f64,
     },
-    /// A ball: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
+    /// Ball joint: q = quaternion (x, y, z, w), v = angular velocity in the body's frame.
     Spherical,
     /// Motion in the xy plane: q = [x, y, cos θ, sin θ], v = [ẋ, ẏ in the body's frame, θ̇].
     Planar,
     /// Three lengths: q = [x, y, z], v = q̇.
     Translation,
-    /// A free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame.
+    /// Free body: q = [position, quaternion (x, y, z, w)], v = [linear, angular] in the body's frame.
     FreeFlyer,
 }
 
-/// Relation of a joint to the joint that it follows: its position is ratio · q + offset, where q is the leader's
-/// position.
+/// Relation of a joint to the joint that it follows. The position of the follower is ratio · q + offset, where q is the
+/// position of the leader.
 ///
 /// Both joints have one degree of freedom, and the leader has its own coordinate. A continuous leader has q = [cos θ,
-/// sin θ]; the ratio must then be an integer, and the follower turns by ratio · θ + offset. If the leader has one
-/// number and the follower is continuous, the follower turns by ratio · q + offset.
+/// sin θ]. Its ratio must be an integer, and the follower turns by ratio · θ + offset. If the follower is continuous
+/// and the leader has one number, the follower turns by ratio · q + offset.
 ///
-/// The follower's armature is added to the leader's coordinate as ratio² · armature, and its spring acts there, too.
-/// Its limits, damping and friction are ignored: as in Pinocchio, the coordinate has only the leader's values.
+/// As described at [`ModelBuilder::mimic`](crate::ModelBuilder::mimic), the follower's limits of position and velocity,
+/// damping, friction and armature act on the leader's coordinate. The armature is added as ratio² · armature. The
+/// follower's spring acts on this coordinate, too. Its limits of effort have no effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
@@ -90,7 +91,7 @@ impl Joint {
         }
     }
 
-    /// Returns the number of entries of the position.
+    /// Returns the number of entries in a position of the joint.
     #[inline]
     pub fn nq(self) -> usize {
         match self {
@@ -102,14 +103,14 @@ impl Joint {
         }
     }
 
-    /// Returns the number of degrees of freedom, which is the number of entries of the velocity.
+    /// Returns the number of degrees of freedom, which is the number of entries in a velocity of the joint.
     #[inline]
     pub fn nv(self) -> usize {
         self.axes().len()
     }
 
-    /// Returns the unit motions of the frame (linear x, y, z, angular x, y, z) along which the joint moves: the columns
-    /// of S. (A helical joint also moves along z, by its pitch.)
+    /// Returns the indices of the unit motions (linear x, y, z, angular x, y, z) along which the joint moves: the
+    /// columns of S. (A helical joint also moves along z, by its pitch.)
     #[doc(hidden)]
     #[inline(always)]
     pub fn axes(self) -> &'static [usize] {
@@ -134,7 +135,7 @@ impl Joint {
         }
     }
 
-    /// Returns the same joint with a unit vector as its axis; the error describes an invalid axis or pitch.
+    /// Returns the same joint with a unit vector as its axis. The error describes an invalid axis or pitch.
     pub(crate) fn normalized(self) -> Result<Self, String> {
         let Some(axis) = self.axis() else { return Ok(self) };
         let norm = axis.norm_squared().sqrt();
@@ -152,11 +153,11 @@ impl Joint {
         }
     }
 
-    /// Returns the rotation bRz whose third column is the joint's axis: from the frame used in algorithms to the body's
-    /// frame.
+    /// Returns the rotation bRz from the frame used in algorithms to the body's frame. Its third column is the joint's
+    /// axis.
     ///
-    /// For x, y and z it is a permutation of axes, hence exact; otherwise it is the shortest rotation of z, or of −z,
-    /// to the axis.
+    /// If the axis is x, y or z, the result is a permutation of axes and hence exact. Otherwise, it is the shortest
+    /// rotation of z, or of −z, to the axis.
     #[doc(hidden)]
     pub fn axis_rotation(self) -> Mat3<f64> {
         let Some(a) = self.axis() else { return Mat3::identity() };
@@ -170,7 +171,7 @@ impl Joint {
         if a == unit(0.0, 1.0, 0.0) {
             return Mat3 { x: unit(0.0, 0.0, 1.0), y: unit(1.0, 0.0, 0.0), z: a };
         }
-        // Duff et al. (2017): a basis with third axis a, without cancellation for any a.
+        // Computes a basis with third axis a, without cancellation for any a. Source: Duff et al. (2017).
         let sign = 1f64.copysign(a.z);
         let s = -1.0 / (sign + a.z);
         let t = a.x * a.y * s;
@@ -181,11 +182,12 @@ impl Joint {
         }
     }
 
-    /// Returns the kind of joint that computes a follower, or the reason why it cannot follow. Its position has the
-    /// form of the leader's position: (cos, sin), or one number.
+    /// Returns the kind of joint with which a follower is computed, or the reason why it cannot follow. The follower's
+    /// position has the same form as the leader's position: (cos, sin), or one number.
     ///
-    /// The (cos, sin) of a leader determines its angle up to whole turns, and integer multiples of the angle, too. With
-    /// any other ratio, the follower would jump whenever the leader completes a turn.
+    /// The (cos, sin) of a leader determines the leader's angle up to whole turns. So it also determines integer
+    /// multiples of the angle up to whole turns. With any other ratio, the follower would jump whenever the leader
+    /// completes a turn.
     pub(crate) fn as_follower(self, leader: Self, mimic: Mimic) -> Result<Self, String> {
         let turns = "a continuous joint's position is known up to whole turns only";
         match (leader, self) {
@@ -212,7 +214,7 @@ impl Joint {
         matches!(self, Self::Revolute { .. } | Self::Continuous { .. })
     }
 
-    /// Returns whether the group of positions is commutative, so that q ⊕ v has the Jacobian 1.
+    /// Returns whether the group of positions is commutative. If it is, q ⊕ v has the Jacobian 1.
     #[doc(hidden)]
     pub fn commutes(self) -> bool {
         !matches!(self, Self::Spherical | Self::Planar | Self::FreeFlyer)
@@ -223,13 +225,13 @@ impl Joint {
         !matches!(self, Self::Continuous { .. })
     }
 
-    /// Returns whether two joints are computed by the same operations.
+    /// Returns whether both joints are computed by the same operations.
     pub(crate) fn is_computed_as(self, other: Self) -> bool {
         let pitch = |joint| if let Self::Helical { pitch, .. } = joint { pitch } else { 0.0 };
         core::mem::discriminant(&self) == core::mem::discriminant(&other) && pitch(self) == pitch(other)
     }
 
-    /// Returns the k-th number of a follower's position; q begins with the leader's position.
+    /// Returns the k-th number of a follower's position. `q` begins with the leader's position.
     #[inline(always)]
     pub(crate) fn mimic_position<S: Scalar>(self, mimic: Mimic, q: &[S], k: usize) -> S {
         match self {
@@ -238,8 +240,8 @@ impl Joint {
         }
     }
 
-    /// Returns the part of a follower's offset that belongs to its placement: a pose that is applied to its turned
-    /// frame.
+    /// Returns the pose that represents a follower's offset, if the offset belongs to its placement. The pose is
+    /// applied to the turned frame of the joint.
     pub(crate) fn mimic_offset(self, mimic: Mimic) -> Se3<f64> {
         match self {
             Self::Continuous { .. } => {
@@ -250,7 +252,7 @@ impl Joint {
         }
     }
 
-    /// Returns column k of S in the world's frame, for a joint whose body is at oX.
+    /// Returns column k of S in the world's frame, for a joint whose body is at the pose oX.
     #[doc(hidden)]
     #[inline(always)]
     pub fn column<S: Scalar>(self, oX: &Se3<S>, k: usize) -> Motion<S> {
@@ -268,7 +270,7 @@ impl Joint {
         }
     }
 
-    /// Returns S of a joint that turns about z.
+    /// Returns the column S of a joint that turns about z, in the world's frame.
     #[doc(hidden)]
     #[inline(always)]
     pub fn column_about_z<S: Scalar>(oX: &Se3<S>) -> Motion<S> {
@@ -276,8 +278,8 @@ impl Joint {
     }
 }
 
-/// Returns cos kθ and sin kθ for an integer k, given cos θ and sin θ: (cos θ + i sin θ)ᵏ by repeated squaring. It is
-/// rarely used, so it is not inlined into the passes.
+/// Returns cos kθ and sin kθ for an integer k, given cos θ and sin θ. Computes (cos θ + i sin θ)ᵏ by repeated squaring.
+/// The function is rarely used, so it is not inlined into the passes.
 #[cold]
 #[inline(never)]
 fn multiple<S: Scalar>([cos, sin]: [S; 2], k: f64) -> [S; 2] {
@@ -305,7 +307,7 @@ impl<S: Scalar> Kernel for Multiple<'_, S> {
     }
 }
 
-/// Returns X_T, followed by a rotation about z.
+/// Returns the pose X_T, followed by a rotation about z.
 #[inline(always)]
 fn rotated_about_z<S: Scalar>(X_T: Se3<S>, sin: S, cos: S) -> Se3<S> {
     let Mat3 { x, y, z } = X_T.rotation;

@@ -13,8 +13,8 @@ pub struct Keyframe {
     pub q: Vec<f64>,
     /// Velocity v, nv numbers.
     pub v: Vec<f64>,
-    /// Control of each of the model's [`actuators`](crate::Model::actuators), in their order; 0 where the file has
-    /// none.
+    /// Control of each of the model's [`actuators`](crate::Model::actuators), in their order; 0 if the file contains no
+    /// control.
     #[cfg_attr(feature = "serde", serde(default))]
     pub control: Vec<f64>,
 }

@@ -1,7 +1,7 @@
-//! Layouts: views of model and state in the passes of algorithms.
+//! Layouts: the views that the passes of algorithms have of a model and a state.
 //!
-//! Each algorithm is written once, for a [`Layout`]. It accesses its parent, the sums of its children and its
-//! coordinates only through the methods below. The same source therefore runs on
+//! Each algorithm is written once, for a [`Layout`]. It accesses a body's parent, sums over children, and coordinates
+//! only through the methods of the traits in this module. So the same source code runs on:
 //!
 //! - one state: the scalar is `f64` (or `f32`, or a dual number), and constants are `f64`;
 //! - several knots of a horizon in parallel lanes: the scalar holds one number for each knot, and constants are
@@ -9,10 +9,10 @@
 //! - several limbs (branches of the tree) of one robot in parallel lanes: a body of the pass represents one body of
 //!   each limb, all with the same kind of joint.
 //!
-//! The first two cases use [`Single`]. A *column* is a degree of freedom of a joint, a *coordinate* an entry of v.
-//! Several joints may share a coordinate (mimic joints): v_joint = G v with one entry in each row of G.
+//! The first two cases use [`Single`]. A *column* is a degree of freedom of a joint, and a *coordinate* is an entry of
+//! v. Several joints may share a coordinate (mimic joints): v_joint = G v, with one nonzero entry in each row of G.
 //! [`joint_velocity`](Layout::joint_velocity) applies G, [`add_joint_effort`](Layout::add_joint_effort) applies Gᵀ, and
-//! methods like [`set_row`](Columns::set_row) apply Gᵀ · G. No algorithm needs to know more about it.
+//! methods like [`set_row`](Columns::set_row) apply Gᵀ · G. Algorithms need no other knowledge of shared coordinates.
 
 use crate::joint::Joint;
 use crate::joint::turns::Turns;
@@ -29,57 +29,60 @@ pub trait Layout {
 
     /// Returns the hash of the tree and of the placements of its joints and frames.
     fn geometry_hash(&self) -> u64;
-    /// Returns the bodies in order, parents first; it excludes the world, body 0.
+    /// Returns the bodies in order, parents first. Body 0, the world, is excluded.
     fn bodies(&self) -> Range<usize>;
     /// Returns the kind of the joint that carries body i, with its axis turned to z.
     fn joint(&self, i: usize) -> Joint;
     /// Returns the joints that turn about z.
     fn turns(&self) -> &Turns;
-    /// Returns X_T: the joint's frame in the parent's frame.
+    /// Returns X_T: the pose of the joint's frame in the parent's frame.
     fn placement(&self, i: usize) -> Se3<Self::S>;
-    /// Returns the body's inertia in its frame.
+    /// Returns the inertia of body i in the body's frame.
     fn inertia(&self, i: usize) -> Inertia<Self::S>;
-    /// Returns the acceleration of the world that represents gravity, −g.
+    /// Returns the acceleration −g of the world, which represents gravity.
     fn minus_gravity(&self) -> Vec3<Self::S>;
     /// Returns the armature of degree of freedom k of joint i.
     fn armature(&self, i: usize, k: usize) -> Self::S;
-    /// Returns the external force on body i, which is given in the body's public frame; `None` if no forces are given.
+    /// Returns the external force on body i; `None` if no forces are given. `f_ext` contains the forces in the public
+    /// frames of the bodies.
     fn force(&self, f_ext: &[Force<Self::S>], i: usize) -> Option<Force<Self::S>>;
 
-    /// Returns the parent's entry of an array indexed by body.
+    /// Returns the entry of the parent of body i in an array indexed by body.
     fn parent<T: Copy>(&self, of: &[T], i: usize) -> T;
-    /// Adds x to the parent's entry of an array indexed by body.
+    /// Adds x to the entry of the parent of body i in an array indexed by body.
     fn add_to_parent<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// Returns the index of body i on the stack of a depth-first pass: the number of bodies on its path from the world,
-    /// which has index 0. The stack keeps the data of a body until its subtree is closed.
+    /// Returns the index of body i on the stack of a depth-first pass. The index is the number of bodies on the path
+    /// from the world to the body; the world has index 0. The stack keeps the data of a body until its subtree is
+    /// closed.
     fn stack_index(&self, i: usize) -> usize;
-    /// Returns the bodies whose subtrees end with body i, children before parents.
+    /// Returns the bodies whose subtrees end with body i, each before its parent.
     fn closed_by(&self, i: usize) -> &[usize];
-    /// Returns the parent's entry of the stack.
+    /// Returns the entry of the parent of body i on the stack.
     fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T;
-    /// Adds x to the parent's entry of the stack.
+    /// Adds x to the entry of the parent of body i on the stack.
     fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T);
 
-    /// Sums x over the lanes of body i; each lane may hold a part of the sum over its children.
+    /// Sums x over the lanes of body i, because each lane may hold a part of the sum over the body's children.
     fn sum_lanes<T>(&self, i: usize, x: &mut T);
 
     /// Returns the k-th number of the position of joint i.
     fn position(&self, q: &[Self::S], i: usize, k: usize) -> Self::S;
     /// Returns the k-th number of the velocity (or acceleration) of joint i.
     fn joint_velocity(&self, v: &[Self::S], i: usize, k: usize) -> Self::S;
-    /// Adds the effort along degree of freedom k of joint i to its coordinate: the transpose of `joint_velocity`.
+    /// Adds the effort along degree of freedom k of joint i to the coordinate of this joint. This is the transpose of
+    /// `joint_velocity`.
     fn add_joint_effort(&self, tau: &mut [Self::S], i: usize, k: usize, effort: Self::S);
 
-    /// Returns the index of joint i's first column, for arrays indexed by column.
+    /// Returns the index of the first column of joint i, for arrays indexed by column.
     fn column(&self, i: usize) -> usize;
     /// Adds armature times acceleration to the efforts of all coordinates.
     fn add_armature_torque(&self, a: &[Self::S], tau: &mut [Self::S]);
 }
 
-/// Columns from the root to a joint, and their matrix entries together with the joint's own columns.
+/// Columns from the root to a joint, and matrix entries of these columns with the joint's own columns.
 ///
-/// Matrices have a row and a column for each coordinate, and are stored column by column.
+/// Matrices have a row and a column for each coordinate. They are stored column by column.
 pub trait Columns: Layout {
     /// Identifier of a column among the columns from the root to a joint.
     type Column: Copy;
@@ -88,21 +91,21 @@ pub trait Columns: Layout {
     /// Scalar type of matrices.
     type Number: Scalar;
 
-    /// Returns the columns of all joints from the root to joint i, its own columns last.
+    /// Returns the columns of all joints from the root to joint i. The columns of joint i itself come last.
     fn support(&self, i: usize) -> &[Self::Column];
     /// Returns column k of joint i.
     fn own_column(&self, i: usize, k: usize) -> Self::OwnColumn;
     /// Returns the entry of a column in an array indexed by column.
     fn at<T: Copy>(&self, of: &[T], column: Self::Column) -> T;
-    /// Copies entries of an array indexed by column to the indices at which `at` reads them, if these differ.
+    /// Copies entries of an array indexed by column to the indices from which `at` reads them, if these indices differ.
     fn broadcast<T: Copy>(&self, of: &mut [T]);
     /// Prepares a matrix for `set_row` and `set_column`. Entries that are never set are 0.
     fn clear(&self, matrix: &mut [Self::Number]);
-    /// Sets the entry in the row of a joint's own column and in column e of its support, or adds to it if several
-    /// columns share it. It must be called once for each pair of columns. The pair of the first body's last column with
-    /// itself must be the last call.
+    /// Sets the entry in the row of a joint's own column and in column e of its support. If several columns share the
+    /// entry, adds to it. The function must be called once for each pair of columns. The pair of the first body's last
+    /// column with itself must be the last call.
     fn set_row(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
-    /// Sets the entry in row e and in the joint's own column, as `set_row` does.
+    /// Sets the entry in row e and in the column of a joint's own column, as `set_row` does.
     fn set_column(&self, matrix: &mut [Self::Number], own: Self::OwnColumn, e: Self::Column, value: Self::S);
     /// Adds the armature of all coordinates to the diagonal of a matrix.
     fn add_armature(&self, matrix: &mut [Self::Number]);
@@ -110,16 +113,17 @@ pub trait Columns: Layout {
 
 /// Matrix entries for any pair of columns.
 pub trait Pairs: Columns<Number = <Self as Layout>::S> {
-    /// Sets the entry (row, column) of a matrix after `clear`, or adds to it if several columns share it. It must be
-    /// called once for each pair of columns.
+    /// Sets the entry (row, column) of a matrix after `clear`. If several columns share the entry, adds to it. The
+    /// function must be called once for each pair of columns.
     fn set_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
     /// Adds to the entry (row, column) of a matrix.
     fn add_entry(&self, matrix: &mut [Self::S], row: Self::Column, column: Self::Column, value: Self::S);
 }
 
-/// Layout with one body at a time, of one state or of several knots of a horizon in the lanes of the scalar.
+/// Layout that computes one body at a time, for one state or for several knots of a horizon in the lanes of the scalar.
 pub struct Single<'m, S, R> {
-    /// Data that passes need in each step; stored here so that it is not read from the model again after every store.
+    /// Data that passes need in each step. They are stored here so that they are not read from the model again after
+    /// every store.
     nodes: &'m [Node<R>],
     closed: &'m [usize],
     turns: &'m Turns,
@@ -181,7 +185,7 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
     }
     #[inline(always)]
     fn force(&self, f_ext: &[Force<S>], i: usize) -> Option<Force<S>> {
-        let &f = f_ext.get(i)?; // not by `map`, which would not be inlined
+        let &f = f_ext.get(i)?; // `map` would not be inlined
         Some(Se3::new(self.nodes[i].axis_rotation, Vec3::zero()).lift().act_inv(f))
     }
 

@@ -1,6 +1,7 @@
-//! Robot models: trees of bodies and joints, their files, and the views that algorithms have of them.
+//! Robot models: trees of bodies and joints, the files of robots, and the views that algorithms have of a model.
 //!
-//! A [`Model`] is created by a [`ModelBuilder`], or by a reader of URDF, MJCF or SDF. It is checked and then immutable:
+//! A [`Model`] is created by a [`ModelBuilder`], or by a reader of URDF, MJCF or SDF. A model is checked and then
+//! immutable:
 //!
 //! ```
 //! use condyle_model::{integrate, neutral, robots};
@@ -12,39 +13,41 @@
 //!
 //! # Limits of files
 //!
-//! A file is refused before memory or time is spent on it if it is not a regular file (but a folder, a device or a
-//! pipe), or exceeds a limit. The error contains the number and the limit. At most are allowed:
+//! A file is refused if it is not a regular file (but a folder, a device or a pipe), or if it exceeds a limit. It is
+//! refused before memory or time is spent on it. The error contains the number and the limit. These maximum numbers are
+//! allowed:
 //!
-//! - 67 108 864 bytes in the files of a robot, including the files that it includes;
+//! - 67 108 864 bytes in all files of a robot, including the files that these files include;
 //! - 1 048 576 tags in these files, including end tags and comments;
 //! - 4 194 304 equals signs in these files;
-//! - 256 levels of nested elements, where an included file counts at the depth of its include;
+//! - 256 levels of nested elements; the depth of an included file is added to the depth of its include;
 //! - 256 attributes of an element;
 //! - 16 384 included files of an SDF;
-//! - 67 108 864 bytes in the full names of an SDF, which contain the names of the enclosing models;
-//! - the above numbers of tags and equals signs in an MJCF, including the copies of `<replicate>` and `<attach>`;
-//! - 256 `<attach>` elements of an MJCF and of the files that it attaches;
-//! - 536 870 912 bytes in the mesh files that determine masses of an MJCF;
-//! - 1 048 576 attributes of all default classes of an MJCF, including inherited ones;
+//! - 67 108 864 bytes in the full names of an SDF; a full name contains the names of all models around an item;
+//! - the same numbers of tags and equals signs in an MJCF, including the copies of `<replicate>` and `<attach>`;
+//! - 256 `<attach>` elements in an MJCF and in the files that it attaches;
+//! - 536 870 912 bytes in the mesh files from which masses of an MJCF are computed;
+//! - 1 048 576 attributes in all default classes of an MJCF, including inherited ones;
 //! - 4096 named positions (`<group_state>`) of an SRDF;
 //! - 4 194 304 numbers in the keyframes of an MJCF;
-//! - 1 048 576 joints of the tendons that actuators of an MJCF drive;
+//! - 1 048 576 joints in the tendons that the actuators of an MJCF drive;
 //! - 4096 actuators of an MJCF with `dampratio`;
-//! - 4096 degrees of freedom of any model;
-//! - 1024 coordinates of a model whose joints follow others.
+//! - 4096 degrees of freedom in any model;
+//! - 1024 coordinates in a model whose joints follow others.
 //!
-//! A `package://` address cannot leave its package, except through links in it. The files that an MJCF or SDF includes
-//! may be anywhere. The search for the nearest name in an error compares the first 128 characters of names, and stops
-//! after a moment if there are many names.
+//! A `package://` address cannot leave its package, except through links in the package. The files that an MJCF or SDF
+//! includes may be anywhere. The search for the nearest name in an error compares the first 128 characters of names,
+//! and stops after a moment if there are many names.
 //!
-//! Some public modules for the algorithm crates are hidden from the documentation: the view that passes have of a model
-//! (`layout`), the tree of turned frames and columns (`tree`), and the schedule of limbs (`limbs`).
+//! Some public modules, which are meant for the crates with algorithms, are hidden from the documentation: the view
+//! that passes have of a model (`layout`), the tree of turned frames and columns (`tree`), and the schedule of limbs
+//! (`limbs`).
 //!
 //! # Features
-//! All features except `urdf-rs` are on by default. `loaders`: files of robots, and [`robots`]. `meshes`: masses and
-//! inertias of meshes in MJCF. `serde`: serialization of models. `threads`: the threads of rayon. `std`: the standard
-//! library, which all features except `serde` need. Without `std` the crate needs `alloc` and, for floating-point
-//! functions, the feature `libm`. `urdf-rs`: models from `urdf_rs::Robot`.
+//! All features except `urdf-rs` are on by default. `loaders` is for files of robots, and for [`robots`]. `meshes` is
+//! for masses and inertias of meshes in MJCF. `serde` is for serialization of models. `threads` uses the threads of
+//! rayon. `std` uses the standard library; all other features except `serde` need it. Without `std`, the crate needs
+//! `alloc` and, for floating-point functions, the feature `libm`. `urdf-rs` is for models from `urdf_rs::Robot`.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]

@@ -1,12 +1,12 @@
-//! Limbs, the branches of one robot, in parallel lanes: this module decides which bodies share a step of a pass, and in
-//! which lane each is.
+//! Limbs of one robot, which are branches of its tree, in parallel lanes. This module decides which bodies share a step
+//! of a pass, and in which lane each body is.
 //!
-//! Bodies of different legs, arms or fingers do not depend on each other. One pass can therefore process four of them
-//! at once, each in a lane of a vector register. All four must have the same kind of joint, but may have different
-//! axes, because these are already turned to z. [`schedule`] selects the bodies of each step, [`steps`] collects the
-//! data that a pass needs, and [`column_map`] contains the indices of matrix entries.
+//! Bodies of different legs, arms or fingers do not depend on each other. So one pass can process four such bodies at
+//! once, each in a lane of a vector register. All four must have the same kind of joint. Their axes may differ, because
+//! they are turned to z. [`schedule`] selects the bodies of each step, [`steps`] collects the data that a pass needs,
+//! and [`column_map`] contains the indices of matrix entries.
 //!
-//! Robots with less than about two bodies per step, such as chains, are computed one body after the other.
+//! For robots with fewer than about two bodies per step, such as chains, one body after the other is computed.
 
 pub mod column_map;
 pub mod schedule;
@@ -19,16 +19,16 @@ use column_map::ColumnMap;
 use schedule::Schedule;
 use steps::{StateMap, Step};
 
-/// Number of bodies in parallel lanes.
+/// Number of bodies that are computed in parallel lanes.
 pub const LANES: usize = 4;
 
 /// Schedule of the steps, and the data that a pass needs. Step 0 is the world.
 #[derive(Clone, Debug)]
 pub struct Plan {
     schedule: Schedule,
-    /// Bodies as a pass sees them.
+    /// Steps of a pass: the bodies of each step, in the form that passes need.
     pub steps: Vec<Step>,
-    /// Indices of all steps except the world, the last step first.
+    /// Indices of all steps except the world. The last step comes first.
     pub closed: Vec<usize>,
     /// Steps whose joints turn about z.
     pub turns: Turns,
@@ -39,7 +39,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Creates the plan for a robot; `None` if it has too few limbs.
+    /// Creates the plan for a robot. Returns `None` if the robot has too few limbs.
     pub(crate) fn new(tree: &Tree<f64>) -> Option<Self> {
         if tree.nodes.iter().any(|node| node.mimic.is_some() && !node.joint.follows_by_sums()) {
             return None;
@@ -57,7 +57,7 @@ impl Plan {
         self.schedule.place[body]
     }
 
-    /// Returns whether a step has the same body in all lanes: the world, or the body that carries all others.
+    /// Returns whether a step has the same body in all lanes: the world, or the one body that carries all others.
     #[inline(always)]
     pub fn in_all_lanes(&self, step: usize) -> bool {
         self.schedule.in_all_lanes(step)

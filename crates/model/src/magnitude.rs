@@ -1,4 +1,4 @@
-//! Magnitudes of a model's numbers: products of the largest numbers must not overflow.
+//! Check of the magnitudes of a model's numbers: products of the largest numbers must not overflow.
 
 use crate::error::Error;
 use crate::joint::Joint;
@@ -7,12 +7,12 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use condyle_spatial::{Inertia, Se3, Sym3, Vec3};
 
-/// Largest mass, length, inertia, gravity, armature, pitch or ratio of a model, in SI units; chosen because the inertia
-/// about a point at this distance, its third power, can be squared.
+/// Largest mass, length, inertia, gravity, armature, pitch or ratio in a model, in SI units. It is chosen so that the
+/// inertia about a point at this distance, which is its third power, can be squared.
 const LARGEST: f64 = 1e30;
 
 impl Model {
-    /// Checks that no number is so large that the dynamics overflow.
+    /// Checks that no number of a model is so large that the dynamics overflow.
     pub(crate) fn check_magnitudes(&self) -> Result<(), Error> {
         for body in &self.bodies {
             let Inertia { mass, mass_com, rotational: Sym3 { xx, xy, yy, xz, yz, zz } } = body.inertia;

@@ -1,4 +1,4 @@
-//! Immutable description of a robot.
+//! Immutable model of a robot.
 
 use crate::actuator::Actuator;
 use crate::body::{Body, Frame, FrameKind, Limits};
@@ -20,16 +20,16 @@ use condyle_linalg::sparsity::NonzeroRows;
 use condyle_spatial::{Se3, Vec3};
 use core::fmt;
 
-/// A robot: bodies, joints, frames, inertias, limits. It is checked when it is built, immutable, and can be shared
-/// between threads.
+/// Robot with bodies, joints, frames, inertias and limits. It is checked when it is built, is then immutable, and can
+/// be shared between threads.
 ///
 /// Body 0 is the world. The other bodies are numbered depth first, parents first. Siblings of a URDF are sorted by the
-/// names of their joints, as in Pinocchio; siblings of a builder keep the order in which they were added. `R` is the
+/// names of their joints, as in Pinocchio. Siblings of a builder keep the order in which they were added. `R` is the
 /// type of the constants: `f64`, or a dual number for derivatives with respect to inertias
 /// ([`with_inertias`](Self::with_inertias)).
 ///
-/// A model of plain numbers can be written to a file and read from it (serde). A file may be edited: when it is read,
-/// it is checked as in [`ModelBuilder::build`](crate::ModelBuilder::build).
+/// A model whose constants are `f64` can be written to a file and read from it (serde). A file may be edited: when it
+/// is read, the model is checked as in [`ModelBuilder::build`](crate::ModelBuilder::build).
 ///
 /// ```
 /// let arm = condyle_model::robots::arm7();
@@ -52,16 +52,16 @@ pub struct Model<R = f64> {
     pub(crate) keyframes: Vec<Keyframe>,
     pub(crate) constraints: Vec<ModelConstraint>,
     pub(crate) armature: Vec<R>,
-    /// First coordinates of the free joints with armature along their linear coordinates. Written by: `validate`.
+    /// First coordinate of each free joint that has armature along its linear coordinates. Written by: `validate`.
     pub(crate) free_armature: Vec<usize>,
     pub(crate) gravity: Vec3<R>,
-    /// Tree of the robot, as passes see it.
+    /// Tree of the robot, in the form that passes need.
     pub(crate) tree: Tree<R>,
-    /// Plan by which single calls compute several bodies at once, if they do.
+    /// Plan with which single calls compute several bodies at once; `None` if they compute one body after the other.
     pub(crate) limbs: Option<Plan>,
-    /// Hash of all data on which constraints on frames are planned: see `geometry_hash`.
+    /// Hash of all data on which plans of constraints depend: see `geometry_hash`.
     pub(crate) geometry: u64,
-    /// Whether each body is an intermediate one between the joints of a chain, without mass on purpose.
+    /// For each body, whether it connects two joints of a chain and has no mass on purpose.
     pub(crate) between: Vec<bool>,
     pub(crate) warnings: Vec<Warning>,
     /// Bodies whose joints make M singular.
@@ -70,7 +70,7 @@ pub struct Model<R = f64> {
 
 condyle_spatial::alike!(Model);
 
-/// Copies the model into an `Arc`. An object that owns an `Arc` of a model, such as a simulation, can thus be created
+/// Copies the model into an `Arc`. So an object that owns an `Arc` of a model, such as a simulation, can be created
 /// from `&model`.
 impl<R: Clone> From<&Model<R>> for Arc<Model<R>> {
     fn from(model: &Model<R>) -> Self {
@@ -89,7 +89,7 @@ impl<R> Model<R> {
     pub fn nq(&self) -> usize {
         self.tree.nq
     }
-    /// Returns nv, the number of degrees of freedom: the number of entries of v, a, τ and of a tangent vector.
+    /// Returns nv, the number of degrees of freedom. It is the number of entries of v, a, τ and of a tangent vector.
     #[inline(always)]
     pub fn nv(&self) -> usize {
         self.tree.nv
@@ -109,28 +109,30 @@ impl<R> Model<R> {
     pub fn limits(&self) -> &Limits {
         &self.limits
     }
-    /// Returns the viscous damping of each degree of freedom (N m s/rad, N s/m): stored, but not applied by default.
+    /// Returns the viscous damping of each degree of freedom (N m s/rad, N s/m). It is stored, but not applied by
+    /// default.
     #[inline]
     pub fn damping(&self) -> &[f64] {
         &self.damping
     }
-    /// Returns the Coulomb friction of each degree of freedom (N m, N): stored, but not applied by default.
+    /// Returns the Coulomb friction of each degree of freedom (N m, N). It is stored, but not applied by default.
     #[inline]
     pub fn friction(&self) -> &[f64] {
         &self.friction
     }
-    /// Returns the coefficients d₁ and d₂ of each degree of freedom's damping d(v) = d₀ + d₁|v| + d₂v², where d₀ is
-    /// [`damping`](Self::damping): stored, but not applied by default.
+    /// Returns the coefficients d₁ and d₂ of the damping of each degree of freedom. The damping is d(v) = d₀ + d₁|v| +
+    /// d₂v², where d₀ is [`damping`](Self::damping). It is stored, but not applied by default.
     #[inline]
     pub fn damping_polynomial(&self) -> &[[f64; 2]] {
         &self.damping_polynomial
     }
-    /// Returns the springs of joints: stored, but not applied by default.
+    /// Returns the springs of joints. They are stored, but not applied by default.
     #[inline]
     pub fn springs(&self) -> &[Spring] {
         &self.springs
     }
-    /// Returns the bodies whose weight is compensated, entirely or in part: stored, but not applied by default.
+    /// Returns the bodies whose weight is compensated, entirely or in part. The compensation is stored, but not applied
+    /// by default.
     #[inline]
     pub fn gravity_compensation(&self) -> &[GravityCompensation] {
         &self.gravity_compensation
@@ -145,7 +147,8 @@ impl<R> Model<R> {
     pub fn keyframes(&self) -> &[Keyframe] {
         &self.keyframes
     }
-    /// Returns the constraints in addition to the tree: loops and coupled joints. Tree algorithms ignore them.
+    /// Returns the constraints that the robot has in addition to its tree: loops and coupled joints. Algorithms for
+    /// trees ignore them.
     #[inline]
     pub fn constraints(&self) -> &[ModelConstraint] {
         &self.constraints
@@ -155,12 +158,12 @@ impl<R> Model<R> {
     pub fn armature(&self) -> &[R] {
         &self.armature
     }
-    /// Returns the acceleration of free fall, in the world's frame (m/s²).
+    /// Returns the acceleration of gravity, in the world's frame (m/s²).
     #[inline(always)]
     pub fn gravity(&self) -> &Vec3<R> {
         &self.gravity
     }
-    /// Returns the mass of all bodies, including parts fixed to the world (kg).
+    /// Returns the total mass of all bodies and of links that are fixed to the world (kg).
     pub fn total_mass(&self) -> f64 {
         self.bodies.iter().map(|b| b.inertia.mass).sum()
     }
@@ -174,7 +177,7 @@ impl<R> Model<R> {
     /// joints, constraints.
     ///
     /// # Errors
-    /// [`Error::UnknownFrame`], with the nearest name.
+    /// Returns [`Error::UnknownFrame`], with the nearest name.
     pub fn frame(&self, name: &str) -> Result<usize, Error> {
         let find = |kind| self.frames.iter().position(|f| f.name == name && f.kind == kind);
         [FrameKind::Link, FrameKind::User, FrameKind::Joint, FrameKind::Constraint]
@@ -189,7 +192,7 @@ impl<R> Model<R> {
     /// Returns the index of the body that the joint with this name carries.
     ///
     /// # Errors
-    /// [`Error::UnknownJoint`], with the nearest name.
+    /// Returns [`Error::UnknownJoint`], with the nearest name.
     pub fn joint(&self, name: &str) -> Result<usize, Error> {
         self.bodies.iter().skip(1).position(|b| b.joint_name == name).map(|i| i + 1).ok_or_else(|| {
             let nearest = nearest(name, self.bodies.iter().skip(1).map(|b| b.joint_name.as_str()));
@@ -198,10 +201,10 @@ impl<R> Model<R> {
     }
 }
 
-/// Methods for the view that passes have of the model.
+/// Methods that give passes their view of the model.
 #[doc(hidden)]
 impl<R> Model<R> {
-    /// Returns the bodies as passes see them.
+    /// Returns the bodies in the form that passes need.
     #[inline(always)]
     pub fn nodes(&self) -> &[Node<R>] {
         &self.tree.nodes
@@ -211,49 +214,50 @@ impl<R> Model<R> {
     pub fn columns(&self) -> &[Column] {
         &self.tree.columns
     }
-    /// Returns the columns from the root to a body's joint, its own last.
+    /// Returns the columns from the root to the joint of a body. The columns of this joint come last.
     #[inline(always)]
     pub fn support(&self, node: &Node<R>) -> &[usize] {
         self.tree.support(node)
     }
-    /// Returns the number of pairs of a body and a column from the root to its joint.
+    /// Returns the number of all pairs of a body and a column on the path from the root to the body's joint.
     #[inline(always)]
     pub fn support_len(&self) -> usize {
         self.tree.support.len()
     }
-    /// Returns, for each coordinate, the coordinates in which efforts are needed to move it.
+    /// Returns, for each coordinate, the coordinates in which efforts are needed to accelerate it.
     #[inline(always)]
     pub fn nonzero_rows(&self) -> &[NonzeroRows] {
         &self.tree.nonzero_rows
     }
-    /// Returns the floating bodies, which have a free joint in the world.
+    /// Returns the floating bodies: bodies that a free joint connects to the world.
     pub fn floating(&self) -> impl Iterator<Item = usize> {
         let floats = |&i: &usize| self.nodes()[i].parent == 0 && self.nodes()[i].joint == Joint::FreeFlyer;
         (1..self.nodes().len()).filter(floats)
     }
-    /// Returns the first coordinates of the free joints with armature along their linear coordinates: an apparent mass
-    /// in the axes of the parent.
+    /// Returns the first coordinate of each free joint that has armature along its linear coordinates. This armature is
+    /// an apparent mass along the axes of the parent.
     #[inline(always)]
     pub fn free_armature(&self) -> &[usize] {
         &self.free_armature
     }
-    /// Returns the bodies, children before parents, in the order in which their subtrees are closed.
+    /// Returns the bodies in the order in which their subtrees are closed, children before parents.
     #[inline(always)]
     pub fn closed(&self) -> &[usize] {
         &self.tree.closed
     }
-    /// Returns the plan by which single calls compute several bodies at once, if they do.
+    /// Returns the plan with which single calls compute several bodies at once; `None` if they compute one body after
+    /// the other.
     #[inline(always)]
     pub fn limbs(&self) -> Option<&Plan> {
         self.limbs.as_ref()
     }
-    /// Returns a hash of the parents, kinds of joints and coordinates, which distinguishes trees.
+    /// Returns a hash of the parents, kinds of joints and coordinates. Different trees have different hashes.
     #[inline(always)]
     pub fn tree_hash(&self) -> u64 {
         self.tree.hash
     }
-    /// Returns a hash of the tree and of the placements of its joints and frames. It does not depend on inertias,
-    /// armature, gravity, limits and names, and it is kept when a robot is written and read again.
+    /// Returns a hash of the tree and of the placements of its joints and frames. The hash does not depend on inertias,
+    /// armature, gravity, limits and names. It stays the same when a robot is written and read again.
     #[inline(always)]
     pub fn geometry_hash(&self) -> u64 {
         self.geometry
@@ -275,7 +279,8 @@ impl Model {
     }
 }
 
-/// Tree of the inertia matrix M: columns are the degrees of freedom of the joints, rows are the coordinates.
+/// Tree of the inertia matrix M. Its columns are the degrees of freedom of the joints, and its rows are the
+/// coordinates.
 impl<R> ColumnTree for Model<R> {
     fn rows(&self) -> usize {
         self.nv()

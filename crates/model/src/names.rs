@@ -1,4 +1,4 @@
-//! Names that are similar to an unknown one.
+//! Search for the known name that is most similar to an unknown name.
 
 #[cfg(feature = "loaders")]
 use crate::error::near_or;
@@ -6,12 +6,12 @@ use alloc::borrow::ToOwned;
 use alloc::string::String;
 use alloc::vec::Vec;
 
-/// Number of characters of a name that are compared, and maximum number of compared pairs of characters. The distance
-/// needs as many pairs as the product of the lengths.
+/// Number of characters of a name that are compared, and maximum number of pairs of characters that are compared in one
+/// search. The distance of two names needs as many pairs as the product of their lengths.
 const COMPARED: [usize; 2] = [128, 1 << 22];
 
-/// Returns the most similar name by [`distance`], among the names that can be compared within the limit. The result is
-/// empty if even this name differs in more than half of its characters.
+/// Returns the most similar name by [`distance`], among the names that can be compared within the limit. Returns an
+/// empty text if even this name differs in more than half of its characters.
 pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> String {
     let [length, mut left] = COMPARED;
     let begin = |name: &str| name.chars().take(length).collect::<Vec<char>>();
@@ -32,10 +32,11 @@ pub(crate) fn nearest<'a>(name: &str, names: impl Iterator<Item = &'a str>) -> S
     best.1.to_owned()
 }
 
-/// Returns the optimal string alignment distance: the number of edits that turn a into b. An edit inserts, removes or
-/// replaces a character, or swaps two neighbours; no character is edited twice.
+/// Returns the optimal string alignment distance: the number of edits that turn `a` into `b`. An edit inserts, removes
+/// or replaces a character, or swaps two neighbouring characters. No character is edited twice.
 fn distance(a: &[char], b: &[char]) -> usize {
-    // d_ij is the distance between the first i of a and the first j of b; only three of its rows are needed
+    // d_ij is the distance between the first i characters of `a` and the first j characters of `b`. Only three rows of
+    // d are stored.
     let (mut before, mut last, mut row) = (Vec::new(), Vec::new(), (0..=b.len()).collect::<Vec<usize>>());
     for i in 1..=a.len() {
         (before, last, row) = (last, row, before);
@@ -53,7 +54,7 @@ fn distance(a: &[char], b: &[char]) -> usize {
     row[b.len()]
 }
 
-/// Returns the end of a message about an unknown name: the nearest name, if there is one.
+/// Returns the end of a message about an unknown name: the nearest name, or nothing if `nearest` is empty.
 #[cfg(feature = "loaders")]
 pub(crate) fn near(nearest: &str) -> String {
     near_or(nearest, "")

@@ -1,4 +1,4 @@
-//! Checks of states from outside: numbers must be finite, and rotations must have length 1.
+//! Checks of states that come from a caller: numbers must be finite, and rotations must have length 1.
 
 use crate::error::Error;
 use crate::model::Model;
@@ -8,26 +8,27 @@ use condyle_spatial::Scalar;
 use core::fmt;
 use core::ops::Range;
 
-/// Maximum difference between 1 and the length of a quaternion, or of a pair (cos, sin), in a position; chosen because
-/// the error is 1.5e-4 if √½ is written as 0.707. Integration in single precision causes a smaller error.
+/// Maximum difference between 1 and the length of a quaternion, or of a pair (cos, sin), in a position. It is chosen
+/// because the difference is 1.5e-4 if √½ is written as 0.707. Integration in single precision causes a smaller
+/// difference.
 const UNIT_ROUNDING: f64 = 1e-3;
 
 /// Maximum [`rotation_error`](condyle_spatial::Mat3::rotation_error) of a rotation matrix that is computed from a valid
-/// position; chosen because R = 1 + 2 (w [u] + [u]²) of a quaternion of length 1 + e is off by up to 8 e.
+/// position. It is chosen because the error of R = 1 + 2 (w [u] + [u]²) is up to 8 e for a quaternion of length 1 + e.
 #[doc(hidden)]
 pub const ROTATION_ROUNDING: f64 = 10.0 * UNIT_ROUNDING;
 
-/// Part of a position that is invalid: a number that is not finite, or a rotation that does not have length 1.
+/// Invalid part of a position: a number that is not finite, or a rotation that does not have length 1.
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PositionFault {
     /// Index of the body that the joint moves.
     pub body: usize,
-    /// Index in q of the part's first number.
+    /// Index in q of the first number of the invalid part.
     pub first: usize,
-    /// Index in q after the part's last number.
+    /// Index in q after the last number of the invalid part.
     pub end: usize,
-    /// The number, or the length of the rotation.
+    /// Value of the number, or length of the rotation.
     pub value: f64,
 }
 
@@ -41,7 +42,7 @@ impl fmt::Display for PositionFault {
     }
 }
 
-/// Fault of one number: the argument, the index in it, and the value.
+/// Fault of one number: the name of the argument, the index of the number in it, and the value.
 struct NotFinite(&'static str, usize, f64);
 
 impl fmt::Display for NotFinite {
@@ -52,8 +53,8 @@ impl fmt::Display for NotFinite {
 }
 
 impl Model {
-    /// Checks that a position is valid for the robot: finite numbers, and quaternions and (cos, sin) of length 1, up to
-    /// 1e-3. Algorithms accept any numbers without a check.
+    /// Checks that a position is valid for the robot. Numbers must be finite, and quaternions and pairs (cos, sin) must
+    /// have length 1, up to 1e-3. Algorithms accept any numbers without a check.
     ///
     /// ```
     /// use condyle_model::{neutral, robots};
@@ -67,7 +68,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Position`].
+    /// Returns [`Error::Position`] if the position is invalid.
     ///
     /// # Panics
     /// If `q` does not have nq numbers.
@@ -80,8 +81,8 @@ impl Model {
         }
     }
 
-    /// Checks that a state is valid for the robot: a valid position (see [`check_position`](Self::check_position)), and
-    /// finite velocities.
+    /// Checks that a state is valid for the robot. The position must be valid (see
+    /// [`check_position`](Self::check_position)), and velocities must be finite.
     ///
     /// ```
     /// use condyle_model::{neutral, robots};
@@ -95,7 +96,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Position`] and [`Error::Velocity`].
+    /// Returns [`Error::Position`] or [`Error::Velocity`] if the state is invalid.
     ///
     /// # Panics
     /// If `q` does not have nq numbers or `v` does not have nv numbers.
@@ -112,7 +113,7 @@ impl Model {
         Err(Error::Velocity { joint, what: NotFinite("v", k, v[k]).to_string() })
     }
 
-    /// Returns the first invalid part of a position, without allocating; q must have nq numbers.
+    /// Returns the first invalid part of a position, without allocating. `q` must have nq numbers.
     #[doc(hidden)]
     pub fn position_fault(&self, q: &[f64]) -> Option<PositionFault> {
         self.position_parts().find_map(|(body, mut range, unit)| {
@@ -122,18 +123,18 @@ impl Model {
         })
     }
 
-    /// Returns the first quaternion or pair (cos, sin) of a position that does not have length 1; q must have nq
+    /// Returns the first quaternion or pair (cos, sin) of a position that does not have length 1. `q` must have nq
     /// numbers.
     #[doc(hidden)]
     pub fn rotation_fault(&self, q: &[f64]) -> Option<PositionFault> {
         self.position_parts().find_map(|(body, _, unit)| unit_fault(body, unit?, q))
     }
 
-    /// Checks that [`normalize`](crate::normalize) can scale all rotations of a position to length 1: every squared
-    /// length must be finite, not 0, and not subnormal.
+    /// Checks that [`normalize`](crate::normalize) can scale all rotations of a position to length 1. The square of
+    /// each length must be finite, not 0, and not subnormal.
     ///
     /// # Errors
-    /// [`Error::Position`].
+    /// Returns [`Error::Position`] if a rotation cannot be scaled.
     #[doc(hidden)]
     pub fn check_normalizable(&self, q: &[f64]) -> Result<(), Error> {
         for (body, _, unit) in self.position_parts() {
@@ -149,7 +150,7 @@ impl Model {
         Ok(())
     }
 
-    /// Returns each rotation of a position that must have length 1: the joint's name, and the range in q.
+    /// Returns, for each rotation of a position that must have length 1, the name of its joint and its range in q.
     #[doc(hidden)]
     pub fn rotations(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
         self.position_parts().filter_map(|(body, _, unit)| Some((self.bodies[body].joint_name.as_str(), unit?)))
@@ -160,8 +161,8 @@ impl Model {
         self.bodies[body].joint_name.clone()
     }
 
-    /// Returns each joint with its own coordinates: its body, its range in q, and the part of the range that must have
-    /// length 1.
+    /// Returns, for each joint that has its own coordinates, its body, its range in q, and the part of this range that
+    /// must have length 1.
     fn position_parts(&self) -> impl Iterator<Item = (usize, Range<usize>, Option<Range<usize>>)> {
         let own = self.bodies.iter().enumerate().skip(1).filter(|(_, body)| body.mimic.is_none());
         own.map(|(i, body)| {
@@ -171,11 +172,11 @@ impl Model {
     }
 }
 
-/// Returns the fault of a rotation in a range of q; `None` if it has length 1.
+/// Returns the fault of a rotation in a range of q; `None` if the rotation has length 1.
 #[doc(hidden)]
 pub fn unit_fault(body: usize, unit: Range<usize>, q: &[f64]) -> Option<PositionFault> {
     let value = Scalar::sqrt(q[unit.clone()].iter().map(|x| x * x).sum::<f64>());
-    // a NaN is a fault, too
+    // A NaN is also a fault.
     let valid = (value - 1.0).abs() <= UNIT_ROUNDING;
     (!valid).then_some(PositionFault { body, first: unit.start, end: unit.end, value })
 }

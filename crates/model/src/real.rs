@@ -1,12 +1,14 @@
-//! Real parts of scalars of any type, so that a model of dual numbers is checked like a model of plain numbers.
+//! Real parts of scalars of any type. With them, a model of dual numbers is checked in the same way as a model of plain
+//! numbers.
 
 use condyle_spatial::{Inertia, Scalar, Sym3, Vec3};
 use core::any::Any;
 
-/// Returns the real part of a scalar with one lane.
+/// Returns the real part of a scalar x that has one lane.
 ///
-/// Scalars can only be compared. The real part is the largest number y for which x < y is false. It is found by
-/// bisection of the bits of numbers, which have the same order as the numbers.
+/// Scalars can only be compared, so the real part is found by comparisons: it is the largest number y for which x < y
+/// is false. A bisection over the bits of numbers finds y, because the bits, after a conversion, have the same order as
+/// the numbers.
 fn real<S: Scalar>(x: S) -> f64 {
     if let Some(&x) = (&x as &dyn Any).downcast_ref::<f64>() {
         return x;
@@ -31,7 +33,7 @@ fn place(x: f64) -> u64 {
     if x.is_sign_negative() { !bits } else { bits | 1 << 63 }
 }
 
-/// Returns the number with a rank.
+/// Returns the number that has a given rank.
 fn number(bits: u64) -> f64 {
     f64::from_bits(if bits >> 63 == 0 { !bits } else { bits & !(1 << 63) })
 }

@@ -1,7 +1,7 @@
-//! Tree of bodies as passes see it: turned frames, columns, ancestors.
+//! Tree of bodies in the form that passes need: with turned frames, columns and ancestors.
 //!
-//! A *column* is a degree of freedom of a joint; a *coordinate* is an entry of v. Joints that mimic others share a
-//! coordinate, so several columns may have the same one.
+//! A *column* is a degree of freedom of a joint; a *coordinate* is an entry of v. A joint that mimics another joint
+//! shares the coordinate of that joint, so several columns may have the same coordinate.
 
 use crate::body::Body;
 use crate::joint::turns::Turns;
@@ -12,10 +12,11 @@ use condyle_spatial::{Act, Inertia, Mat3, Se3, Vec3};
 use core::iter::successors;
 use core::ops::Range;
 
-/// A body as passes see it: its joint's axis is turned to z, and all data that a pass needs are stored together.
+/// Body in the form that passes need: the axis of its joint is turned to z, and all data that a pass needs are stored
+/// together.
 #[derive(Clone, Debug)]
 pub struct Node<R> {
-    /// Kind of joint by which the body is computed.
+    /// Kind of joint with which the body is computed.
     pub joint: Joint,
     /// Index of the parent.
     pub parent: usize,
@@ -23,38 +24,38 @@ pub struct Node<R> {
     pub idx_q: usize,
     /// Index in v of the joint's first degree of freedom.
     pub idx_v: usize,
-    /// Relation to the leading joint, if the joint follows another one.
+    /// Relation to the leading joint, if the joint follows another joint.
     pub mimic: Option<Mimic>,
     /// Index of the joint's first column.
     pub column: usize,
-    /// Index in `Tree::support` of the first column from the root to this joint.
+    /// Index in `Tree::support` of the first column on the path from the root to this joint.
     pub support: usize,
-    /// Number of columns from the root to this joint, including its own.
+    /// Number of columns on the path from the root to this joint, including the columns of this joint.
     pub depth: usize,
-    /// Depth of the body: the number of bodies on the path from the world to it, itself included.
+    /// Depth of the body: the number of bodies on the path from the world to this body, including this body.
     pub level: usize,
     /// Range (first, end) in `Tree::closed` of the bodies whose subtrees end with this body.
     pub closed: (usize, usize),
-    /// X_T, between turned frames.
+    /// X_T: pose of the joint's frame in the parent's frame, where both frames are turned.
     pub placement: Se3<R>,
     /// Inertia in the turned frame.
     pub inertia: Inertia<R>,
-    /// bRz: the turned frame in the body's frame.
+    /// bRz: rotation from the turned frame to the body's frame.
     pub axis_rotation: Mat3<f64>,
 }
 
-/// A degree of freedom of a joint, and the coordinate to which it belongs.
+/// Degree of freedom of a joint, and the coordinate to which it belongs.
 #[derive(Clone, Debug)]
 pub struct Column {
     /// Index of the coordinate.
     pub coordinate: usize,
-    /// Ratio of the joint's velocity to the coordinate's velocity.
+    /// Ratio of the velocity of the joint to the velocity of the coordinate.
     pub ratio: f64,
     /// Next column on the path to the root.
     pub parent: Option<usize>,
-    /// Index after the last column of its subtree.
+    /// Index after the last column of this column's subtree.
     pub end: usize,
-    /// Number of columns between it and the root.
+    /// Number of columns on the path from the root to this column, without this column.
     pub depth: usize,
 }
 
@@ -63,13 +64,13 @@ condyle_spatial::alike!(Column);
 /// Coordinates of one joint, or of several consecutive joints whose positions are vectors.
 #[derive(Clone, Debug)]
 pub(crate) struct Space {
-    /// Joint of these coordinates, or one of several.
+    /// Joint of these coordinates, or one of these joints.
     pub joint: Joint,
     pub q: Range<usize>,
     pub v: Range<usize>,
 }
 
-/// Bodies and joints of a robot, as passes need them.
+/// Bodies and joints of a robot, in the form that passes need.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree<R> {
     pub nq: usize,
@@ -77,31 +78,31 @@ pub(crate) struct Tree<R> {
     /// Bodies. Shape: bodies, including the world.
     pub nodes: Vec<Node<R>>,
     pub columns: Vec<Column>,
-    /// Columns from the root to the joint of each body, body by body.
+    /// Columns on the path from the root to the joint of each body, one body after the other.
     pub support: Vec<usize>,
     /// Bodies, children before parents.
     pub closed: Vec<usize>,
     /// Joints that turn about z.
     pub turns: Turns,
-    /// For each coordinate, the coordinates in which efforts are needed to move it: its ancestors and descendants in
-    /// the tree, and itself. Shape: nv.
+    /// For each coordinate, the coordinates in which efforts are needed to accelerate it: its ancestors and descendants
+    /// in the tree, and the coordinate itself. Shape: nv.
     pub nonzero_rows: Vec<NonzeroRows>,
-    /// Spaces of all coordinates, in order; consecutive vector spaces are merged.
+    /// Spaces of all coordinates, in order. Consecutive vector spaces are merged.
     pub spaces: Vec<Space>,
-    /// Hash of the parents, joints and coordinates, which distinguishes trees.
+    /// Hash of the parents, joints and coordinates. Different trees have different hashes.
     pub hash: u64,
 }
 
-/// Returns a hash of numbers: Fowler, Noll, Vo (1991), FNV-1a, with words instead of bytes.
+/// Returns a hash of numbers. The method is FNV-1a (Fowler, Noll, Vo 1991), with words instead of bytes.
 pub(crate) fn hash(words: impl Iterator<Item = u64>) -> u64 {
     words.fold(0xcbf2_9ce4_8422_2325, |hash, word| {
         let hash = (hash ^ word).wrapping_mul(0x100_0000_01b3);
-        hash ^ (hash >> 29) // so that the last bits of a number change the first ones of the hash
+        hash ^ (hash >> 29) // so that the last bits of a number change the first bits of the hash
     })
 }
 
 impl Tree<f64> {
-    /// Creates the tree of bodies in depth-first order, whose coordinates are already numbered.
+    /// Creates the tree of bodies, which are in depth-first order and whose coordinates are already numbered.
     pub(crate) fn new(bodies: &[Body], nq: usize, nv: usize) -> Self {
         let mut tree = Self {
             nq,
@@ -175,7 +176,7 @@ impl Tree<f64> {
             });
             self.support.extend(path);
         }
-        // in depth-first order, a subtree's columns end where the columns of its last descendant end
+        // In depth-first order, the columns of a subtree end with the columns of its last descendant.
         for c in (0..self.columns.len()).rev() {
             self.columns[c].end = self.columns[c].end.max(c + 1);
             if let Some(p) = self.columns[c].parent {
@@ -184,8 +185,8 @@ impl Tree<f64> {
         }
     }
 
-    /// Finds the bodies whose subtrees end with each body. In depth-first order, a body without children closes its own
-    /// subtree, and the subtrees of all ancestors of which it is the last descendant.
+    /// Finds, for each body, the bodies whose subtrees end with it. In depth-first order, a body without children
+    /// closes its own subtree. It also closes the subtrees of all ancestors of which it is the last descendant.
     fn close_subtrees(&mut self) {
         let mut open = Vec::new();
         for i in 1..self.nodes.len() {
@@ -227,7 +228,7 @@ impl Tree<f64> {
 }
 
 impl<R> Tree<R> {
-    /// Returns the first coordinates of the free joints.
+    /// Returns the first coordinate of each free joint.
     pub(crate) fn free_joints(&self) -> impl Iterator<Item = usize> {
         self.nodes[1..].iter().filter(|node| node.joint == Joint::FreeFlyer).map(|node| node.idx_v)
     }
@@ -238,7 +239,7 @@ impl<R> Tree<R> {
         self.columns.len() != self.nv
     }
 
-    /// Returns the columns from the root to a body's joint, its own last.
+    /// Returns the columns on the path from the root to the joint of a body. The columns of this joint come last.
     #[inline(always)]
     pub(crate) fn support(&self, node: &Node<R>) -> &[usize] {
         &self.support[node.support..node.support + node.depth]
@@ -250,8 +251,8 @@ impl<R> Tree<R> {
         own.map(|n| (n.joint, n.idx_q..n.idx_q + n.joint.nq(), n.idx_v..n.idx_v + n.joint.nv()))
     }
 
-    /// Returns the same tree with constants of another type; one function converts placements, another returns the
-    /// inertia of a body.
+    /// Returns the same tree with constants of another type. One function converts placements, and another function
+    /// returns the inertia of a body.
     pub(crate) fn map<T>(
         &self,
         lift: impl Fn(Se3<R>) -> Se3<T>,

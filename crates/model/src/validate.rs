@@ -1,5 +1,5 @@
-//! Validation of every model, however it is created. Invalid numbers are errors. Physically impossible inertias, and
-//! degrees of freedom along which M is singular, are warnings.
+//! Validation that every model passes, however it is created. Invalid numbers are errors. Physically impossible
+//! inertias, and degrees of freedom along which M is singular, are warnings.
 
 use crate::body::{Body, Frame, JointOptions, Limits};
 use crate::configuration::random_configuration;
@@ -16,21 +16,23 @@ use condyle_spatial::{Act, ArticulatedInertia, Inertia, Motion, Se3, Sym3};
 use nalgebra::{DMatrix, Matrix3};
 use rand::{SeedableRng, rngs::StdRng};
 
-/// Relative rounding of a body's moments of inertia in files, which have six digits.
+/// Relative rounding error of the moments of inertia of a body in a file, because files have six digits.
 const MOMENT_ROUNDING: f64 = 1e-6;
-/// Moments about the centre of mass below this fraction of the mass times the square of its distance from the origin
-/// are rounding errors.
+/// Smallest moment about the centre of mass, as a fraction of the mass times the squared distance of this centre from
+/// the origin. Smaller moments are rounding errors.
 const COM_ROUNDING: f64 = 1e-12;
-/// Pivots below this fraction of the sum of their products are rounding errors and count as 0.
+/// Smallest pivot, as a fraction of the sum of the products in it. Smaller pivots are rounding errors and are treated
+/// as 0.
 const PIVOT_ROUNDING: f64 = 1e-13;
-/// Minimum pivot (kg m², kg); the reciprocal of a smaller one may overflow.
+/// Minimum pivot (kg m², kg). The reciprocal of a smaller pivot may overflow.
 const LEAST_PIVOT: f64 = 1e-200;
-/// Number of random positions at which M is tested. A joint is singular if it is singular at all of them.
+/// Number of random positions at which M is tested. A joint is singular if it is singular at all of these positions.
 const SAMPLES: usize = 3;
-/// Maximum radius of gyration of a body without a warning (m). The largest ships and cranes have less; public robots
-/// with more have a wrong unit.
+/// Maximum radius of gyration of a body without a warning (m). The largest ships and cranes have smaller radii. Public
+/// robots with larger radii use a wrong unit.
 const LARGEST_RADIUS: f64 = 100.0;
-/// Minimum radius of gyration of a body with an inertia, without a warning (m). A point mass does not have one.
+/// Minimum radius of gyration without a warning (m), for a body with a rotational inertia. A point mass has no
+/// rotational inertia.
 const LEAST_RADIUS: f64 = 1e-7;
 
 /// Checks a body's inertia and placement.
@@ -91,7 +93,7 @@ impl JointOptions {
     }
 }
 
-/// Adds warnings about a body's inertia. Intermediate bodies of a chain have no mass on purpose.
+/// Adds warnings about the inertia of a body. Bodies that connect joints of a chain have no mass on purpose.
 fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     let (I, name) = (body.inertia, || body.name.clone());
     if I == Inertia::zero() {
@@ -127,8 +129,8 @@ fn check_inertia(body: &Body, between: bool, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Adds warnings about limits with which a joint of one degree of freedom cannot work. A follower does not have its own
-/// limits.
+/// Adds warnings about limits with which a joint with one degree of freedom cannot work. A follower does not have its
+/// own limits.
 fn check_limits(body: &Body, limits: &Limits, warnings: &mut Vec<Warning>) {
     if body.mimic.is_some() || body.joint.nv() != 1 {
         return;
@@ -147,11 +149,11 @@ fn check_limits(body: &Body, limits: &Limits, warnings: &mut Vec<Warning>) {
 }
 
 impl Model {
-    /// Checks all numbers of the model, and recomputes its warnings. Every function that creates a model ends with this
-    /// check.
+    /// Checks all numbers of the model, and computes its warnings again. Every function that creates a model ends with
+    /// this check.
     ///
     /// # Errors
-    /// [`Error::Body`], [`Error::Frame`], [`Error::Joint`] and [`Error::Gravity`].
+    /// Returns [`Error::Body`], [`Error::Frame`], [`Error::Joint`] or [`Error::Gravity`] if a number is invalid.
     pub(crate) fn validate(&mut self) -> Result<(), Error> {
         self.bodies.iter().try_for_each(check_body)?;
         self.frames.iter().try_for_each(check_frame)?;
@@ -175,7 +177,8 @@ impl Model {
         }
         self.find_singular();
         warnings.extend(self.singular.iter().map(|&i| Warning::Singular { joint: self.bodies[i].joint_name.clone() }));
-        // warnings that are not computed from the model: about files, and about limits of followers that are ignored
+        // Warnings about files, and about limits of followers that are ignored, are kept, because they are not computed
+        // from the model.
         let followers = self.bodies.iter().filter(|body| body.mimic.is_some());
         let followers: BTreeSet<&str> = followers.map(|body| &*body.joint_name).collect();
         let is_limit = |w: &Warning| matches!(w, Warning::Limit { joint, .. } if followers.contains(&**joint));
@@ -184,7 +187,7 @@ impl Model {
         Ok(())
     }
 
-    /// Returns the options of a joint at index q of positions and index v of velocities.
+    /// Returns the options of the joint whose position begins at index `q` and whose velocity begins at index `v`.
     pub(crate) fn joint_options(&self, q: usize, v: usize) -> JointOptions {
         JointOptions {
             position: Some((self.limits.lower[q], self.limits.upper[q])),
@@ -211,7 +214,8 @@ impl Model {
         self.singular = (1..self.bodies.len()).filter(|&i| always[i]).collect();
     }
 
-    /// Finds singular joints by the pivots D = Sᵀ Iᴬ S of the articulated bodies; joints with pivot 0 are skipped.
+    /// Finds singular joints by the pivots D = Sᵀ Iᴬ S of the articulated bodies. Degrees of freedom with pivot 0 are
+    /// not eliminated.
     fn singular_by_bodies(&self, Placed { oX, S }: &Placed) -> Vec<bool> {
         let l = Single::<f64, f64>::new(self);
         let mut singular = vec![false; self.bodies.len()];
@@ -234,7 +238,7 @@ impl Model {
         singular
     }
 
-    /// Finds singular joints by the pivots of M, for robots whose joints share coordinates.
+    /// Finds singular joints by the pivots of M. It is used for robots whose joints share coordinates.
     fn singular_by_matrix(&self, placed: &Placed) -> Vec<bool> {
         let mut M = self.inertia_matrix(placed);
         let diagonal = M.diagonal();
@@ -257,9 +261,9 @@ impl Model {
     }
 }
 
-/// Poses of the bodies and columns of S in the world's frame, at one position.
+/// Poses of the bodies, and columns of S in the world's frame, at one position.
 struct Placed {
-    /// Poses oXi. Shape: bodies.
+    /// Poses oXi of the bodies. Shape: bodies.
     oX: Vec<Se3<f64>>,
     /// Columns of S. Shape: columns.
     S: Vec<Motion<f64>>,
@@ -278,8 +282,8 @@ impl Placed {
 }
 
 impl Model {
-    /// Finds the free joints with armature along their linear coordinates. There, armature is a mass in the axes of the
-    /// parent, so its three numbers must be equal.
+    /// Finds the free joints that have armature along their linear coordinates. This armature is a mass along the axes
+    /// of the parent, so its three numbers must be equal.
     fn find_free_armature(&mut self) -> Result<(), Error> {
         self.free_armature.clear();
         for body in self.bodies[1..].iter().filter(|body| body.joint == Joint::FreeFlyer) {
@@ -298,7 +302,7 @@ impl Model {
         Ok(())
     }
 
-    /// Computes M by composite rigid bodies: Featherstone (2008), table 6.2, in the world's frame.
+    /// Computes M in the world's frame by the method of composite rigid bodies. Source: Featherstone (2008), table 6.2.
     fn inertia_matrix(&self, Placed { oX, S }: &Placed) -> DMatrix<f64> {
         let l = Single::<f64, f64>::new(self);
         let mut M = DMatrix::zeros(self.tree.nv, self.tree.nv);
@@ -329,13 +333,13 @@ impl<R> Model<R> {
         &self.warnings
     }
 
-    /// Returns the bodies whose joints make M singular, because nothing that they carry has inertia along them. Forward
-    /// dynamics and M⁻¹ refuse such a robot; armature on these joints solves the problem.
+    /// Returns the bodies whose joints make M singular, because nothing that they carry has inertia along these joints.
+    /// Forward dynamics and M⁻¹ refuse such a robot; an armature on these joints solves the problem.
     pub fn singular_joints(&self) -> &[usize] {
         &self.singular
     }
 
-    /// Panics with the joint's name if M has no inverse.
+    /// Panics with the name of a joint if M has no inverse.
     #[doc(hidden)]
     #[inline]
     #[track_caller]

@@ -1,4 +1,4 @@
-//! Copies of a robot with a change.
+//! Copies of a robot in which one property is changed.
 
 use crate::body::Limits;
 use crate::error::Error;
@@ -11,14 +11,14 @@ use condyle_linalg::check;
 use condyle_spatial::{Act, Constant, Inertia, Mat3, Scalar, Se3, Sym3, Vec3};
 use core::any::Any;
 
-/// Threshold of rounding errors: a few units in the last place of 1.
+/// Largest number that is treated as a rounding error: a few units in the last place of 1.
 const RESIDUE: f64 = 1e-15;
 
 impl<R: Scalar> Model<R> {
-    /// Returns the same robot under another gravity (m/s², in the world's frame).
+    /// Returns the same robot with another gravity (m/s², in the world's frame).
     ///
     /// # Errors
-    /// [`Error::Gravity`] if it is not finite; a gravity with several lanes is not checked.
+    /// Returns [`Error::Gravity`] if the gravity is not finite. A gravity with several lanes is not checked.
     pub fn with_gravity(mut self, gravity: Vec3<R>) -> Result<Self, Error> {
         if R::LANES == 1 {
             check_gravity(real_vector(gravity))?;
@@ -27,8 +27,8 @@ impl<R: Scalar> Model<R> {
         Ok(self)
     }
 
-    /// Returns the same robot with an armature that has the type of its constants. The armature is not checked, because
-    /// code generation makes it an argument.
+    /// Returns the same robot with another armature, whose numbers have the type of the robot's constants. The armature
+    /// is not checked, because code generation makes it an argument.
     ///
     /// # Panics
     /// If `armature` does not have nv numbers.
@@ -45,13 +45,13 @@ impl<R: Scalar> Model<R> {
 impl Model {
     /// Returns the same robot with another armature, one number for each degree of freedom (kg m², kg).
     ///
-    /// Armature adds armature · q̈ to the efforts. Along the linear coordinates of a free joint, it is an apparent mass
-    /// without weight, as in MuJoCo. It resists the acceleration v̇ + ω × v of the body's origin, in the axes of the
-    /// joint's parent.
+    /// An armature adds armature · q̈ to the efforts. Along the linear coordinates of a free joint, it is an apparent
+    /// mass without weight, as in MuJoCo. This mass resists the acceleration v̇ + ω × v of the body's origin, along the
+    /// axes of the joint's parent.
     ///
     /// # Errors
-    /// [`Error::Joint`] if a number is negative or not finite, or if the three numbers along the linear coordinates of
-    /// a free joint differ.
+    /// Returns [`Error::Joint`] if a number is negative or not finite, or if the three numbers along the linear
+    /// coordinates of a free joint differ.
     ///
     /// # Panics
     /// If `armature` does not have nv numbers.
@@ -64,10 +64,10 @@ impl Model {
     }
 
     /// Returns the same robot with another viscous damping, one number for each degree of freedom (N m s/rad, N s/m).
-    /// The [coefficients](Self::damping_polynomial) of a damping that depends on the speed are kept.
+    /// The [coefficients](Self::damping_polynomial) of damping that depends on the speed are kept.
     ///
     /// # Errors
-    /// [`Error::Joint`] if a number is negative or not finite.
+    /// Returns [`Error::Joint`] if a number is negative or not finite.
     ///
     /// # Panics
     /// If `damping` does not have nv numbers.
@@ -82,7 +82,7 @@ impl Model {
     /// Returns the same robot with other coefficients d₁ and d₂ of the damping d(v) = d₀ + d₁|v| + d₂v².
     ///
     /// # Errors
-    /// [`Error::Joint`] if a number is not finite.
+    /// Returns [`Error::Joint`] if a number is not finite.
     ///
     /// # Panics
     /// If `polynomial` does not have nv pairs.
@@ -97,7 +97,7 @@ impl Model {
     /// Returns the same robot with another Coulomb friction, one number for each degree of freedom (N m, N).
     ///
     /// # Errors
-    /// [`Error::Joint`] if a number is negative or not finite.
+    /// Returns [`Error::Joint`] if a number is negative or not finite.
     ///
     /// # Panics
     /// If `friction` does not have nv numbers.
@@ -120,8 +120,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Length`] if the number of limits is not nq for positions, or not nv for the others; [`Error::Joint`] if
-    /// a lower limit is above an upper one, or a limit of velocity is negative.
+    /// Returns [`Error::Length`] if there are not nq limits of position, or not nv of each other limit. Returns
+    /// [`Error::Joint`] if a lower limit is above an upper limit, or if a limit of velocity is negative.
     pub fn with_limits(mut self, limits: Limits) -> Result<Self, Error> {
         for (name, found, expected) in [
             ("limits.lower", limits.lower.len(), self.nq()),
@@ -139,10 +139,11 @@ impl Model {
         Ok(self)
     }
 
-    /// Returns the same robot with constants of another type; a function of (body, inertia) returns its inertias.
+    /// Returns the same robot with constants of another type. The inertia of each body is returned by a function of
+    /// (body, inertia).
     ///
-    /// With dual numbers, every algorithm then computes derivatives with respect to inertial parameters.
-    /// [`Body::inertia`](crate::Body::inertia) contains their real parts, which are checked.
+    /// If the new type is a dual number, every algorithm computes derivatives with respect to inertial parameters.
+    /// [`Body::inertia`](crate::Body::inertia) contains the real parts of the new inertias, which are checked.
     /// [`warnings`](Self::warnings) and [`singular_joints`](Self::singular_joints) refer to the new inertias. Inertias
     /// with several lanes are not checked: the model keeps the results for the plain inertias.
     ///
@@ -160,7 +161,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Body`] if a mass is negative or a number is not finite.
+    /// Returns [`Error::Body`] if a mass is negative or a number is not finite.
     pub fn with_inertias<T: Scalar + Constant<T>>(
         &self,
         mut inertia: impl FnMut(usize, Inertia<f64>) -> Inertia<T>,
@@ -205,8 +206,8 @@ impl Model {
         Ok(model)
     }
 
-    /// Returns the same robot without rounding errors next to 0, 1 and −1 in its poses, and next to 0 in its inertias.
-    /// Generated code would otherwise compute with the residues of right angles.
+    /// Returns the same robot without rounding errors: numbers next to 0, 1 and −1 in its poses, and numbers next to 0
+    /// in its inertias, become exact. Otherwise, generated code would compute with the rounding errors of right angles.
     #[doc(hidden)]
     #[must_use]
     pub fn without_residues(mut self) -> Self {
@@ -231,13 +232,15 @@ impl Model {
         self
     }
 
-    /// Returns the same robot; single calls process its limbs in parallel lanes, or one body after the other.
+    /// Returns the same robot with a setting for single calls: they process its limbs in parallel lanes, or one body
+    /// after the other.
     ///
     /// With enough limbs (four legs, two legs and two arms, fingers), single calls of some functions process four
     /// bodies of one state at a time, if the processor has AVX2 or NEON. These functions are `rnea`, `aba`, `crba`,
-    /// `minv`, the derivatives of the first two, and `constrained_dynamics`; they are two to three times as fast. A
-    /// `Batch` never does so, because its lanes contain states. The two modes sum in different orders, so their results
-    /// differ in the last digits. Without limbs, a single call returns the same bits as a batch.
+    /// `minv`, the derivatives of `rnea` and `aba`, and `constrained_dynamics`; they are two to three times as fast. A
+    /// `Batch` never processes limbs in lanes, because its lanes contain states. The two ways of computing sum in
+    /// different orders, so their results differ in the last digits. Without limbs in lanes, a single call returns the
+    /// same bits as a batch.
     ///
     /// ```
     /// let quadruped = condyle_model::robots::quadruped();

@@ -1,4 +1,5 @@
-//! Warnings about a robot: valid but unusual, left out, or assumed.
+//! Warnings about a robot: its description is valid, but something in it is unusual, left out, or replaced by a
+//! default.
 
 use crate::error::near_or;
 use crate::names::nearest;
@@ -7,7 +8,8 @@ use alloc::string::String;
 use core::fmt;
 use core::str::FromStr;
 
-/// Fact about a model or its file that a user should know. Loaders collect warnings; strict loaders refuse the model.
+/// Fact about a model or its file that a user should know. Loaders collect warnings. Strict loaders refuse a model with
+/// warnings.
 ///
 /// ```
 /// use condyle_model::{Model, SdfOptions, WarningKind};
@@ -36,14 +38,14 @@ pub enum Warning {
         /// Smallest moment (kg m²).
         moment: f64,
     },
-    /// One principal moment is larger than the sum of the others: no mass distribution has such an inertia.
+    /// One principal moment is larger than the sum of the other two. No mass distribution has such an inertia.
     Triangle {
         /// Name of the body.
         body: String,
         /// Principal moments (kg m²), smallest first.
         moments: [f64; 3],
     },
-    /// A joint moves nothing with inertia: M is singular, and forward dynamics has no solution.
+    /// A joint moves nothing that has inertia. So M is singular, and forward dynamics has no solution.
     Singular {
         /// Name of the joint.
         joint: String,
@@ -52,50 +54,50 @@ pub enum Warning {
     Unlikely {
         /// Name of the body.
         body: String,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
     /// The limits of a joint are possible, but the joint cannot work with them.
     Limit {
         /// Name of the joint.
         joint: String,
-        /// Fault, with the numbers.
+        /// Description of the fault, with the numbers.
         what: String,
     },
     /// An element or attribute of a file is unknown, misspelt or misplaced. It has no effect.
     Unknown {
         /// Position in the file; `None` if there is no file.
         place: Option<Place>,
-        /// Element, for example ``joint `elbow` ``.
+        /// Element with its name, for example ``joint `elbow` ``.
         element: String,
-        /// Unknown name, and the nearest known one.
+        /// Unknown name, and the nearest known name.
         what: String,
     },
     /// A model cannot represent a feature of the file.
     LeftOut {
         /// Position in the file; `None` if there is no file.
         place: Option<Place>,
-        /// Element, for example ``joint `loop` ``.
+        /// Element with its name, for example ``joint `loop` ``.
         element: String,
-        /// Feature that is left out, and the effect of its absence.
+        /// Feature that is left out, and the effect of the missing feature.
         what: String,
     },
     /// A value is missing in the file, and a default is used.
     Assumed {
         /// Position in the file; `None` if there is no file.
         place: Option<Place>,
-        /// Element, for example ``link `base` ``.
+        /// Element with its name, for example ``link `base` ``.
         element: String,
-        /// Missing value, and its default.
+        /// Name of the missing value, and its default.
         what: String,
     },
-    /// A joint that could follow another one is left free.
+    /// A joint that could follow another joint moves freely.
     Mimic {
         /// Position in the file; `None` if there is no file.
         place: Option<Place>,
-        /// Element, for example ``joint `finger` ``.
+        /// Element with its name, for example ``joint `finger` ``.
         element: String,
-        /// Message that names the joint that it would follow.
+        /// Message that names the joint that could be followed.
         what: String,
     },
 }
@@ -104,7 +106,7 @@ pub enum Warning {
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Place {
-    /// Path of the file, or `<string>`; the included file if the element is in one.
+    /// Path of the file that contains the element, or `<string>`. It may be an included file.
     pub file: String,
     /// Line, counted from 1.
     pub line: u32,
@@ -116,7 +118,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// Kind of a [`Warning`]; a strict reader can allow some kinds. Names can be parsed: `"left_out".parse()`.
+/// Kind of a [`Warning`]. A strict reader can allow some kinds. Names of kinds can be parsed: `"left_out".parse()`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[allow(missing_docs)]
 #[non_exhaustive]
@@ -206,12 +208,13 @@ impl Warning {
         }
     }
 
-    /// Returns whether the warning is about the source of a model. All others follow from the model's numbers.
+    /// Returns whether the warning is about the source of a model. All other warnings are computed from the model's
+    /// numbers.
     pub(crate) fn is_about_source(&self) -> bool {
         matches!(self.kind(), WarningKind::Unknown | WarningKind::LeftOut | WarningKind::Assumed | WarningKind::Mimic)
     }
 
-    /// Returns the subject of the warning: the name of the body or joint, or the element.
+    /// Returns the name of the body or joint, or the element, to which the warning refers.
     pub fn subject(&self) -> &str {
         match self {
             Self::Massless { body }
@@ -256,7 +259,7 @@ impl fmt::Display for Warning {
     }
 }
 
-/// Returns a number with 9 significant digits, more than files have.
+/// Returns a number rounded to 9 significant digits, which are more digits than files have.
 fn rounded(x: f64) -> f64 {
     format!("{x:.8e}").parse().unwrap_or(x)
 }

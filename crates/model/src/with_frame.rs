@@ -9,11 +9,13 @@ use alloc::string::String;
 use condyle_spatial::Se3;
 
 impl Model {
-    /// Returns the same robot with an additional frame of the user, the last one of [`frames`](Self::frames).
+    /// Returns the same robot with an additional frame of the user. The new frame is the last one of
+    /// [`frames`](Self::frames).
     ///
-    /// `parent` is the body or frame to which the new frame is attached, or its name. `placement` is pXf, the new frame
-    /// in the parent's frame. All indices of bodies, frames and coordinates are kept, so scratch memory for this robot
-    /// fits the new one. Objects that are planned from frames, such as a constraint set, do not fit.
+    /// `parent` is the body or frame to which the new frame is attached, or its name. `placement` is pXf, the pose of
+    /// the new frame in the parent's frame. All indices of bodies, frames and coordinates are kept, so scratch memory
+    /// for this robot also fits the new robot. Objects that are planned from frames, such as a constraint set, do not
+    /// fit.
     ///
     /// ```
     /// use condyle_model::{FrameParent, Se3, Vec3, robots};
@@ -25,9 +27,10 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// [`Error::UnknownFrame`] if the parent is a name that neither a frame nor a body has. [`Error::Frame`] if the
-    /// parent's index is too large, the name is empty, or the placement is invalid or not finite. [`Error::Duplicate`]
-    /// if a frame already has this name, because [`frame`](Self::frame) would not find the new one.
+    /// Returns [`Error::UnknownFrame`] if the parent is a name that neither a frame nor a body has. Returns
+    /// [`Error::Frame`] if the parent's index is too large, the name is empty, or the placement is invalid or not
+    /// finite. Returns [`Error::Duplicate`] if a frame already has this name, because [`frame`](Self::frame) would not
+    /// find the new one.
     pub fn with_frame<'a>(
         &self,
         name: &str,
@@ -52,7 +55,7 @@ impl Model {
         Ok(model)
     }
 
-    /// Returns the body of a parent, and the parent's frame in the body's frame.
+    /// Returns the body to which a parent belongs, and the pose of the parent's frame in the body's frame.
     fn frame_parent(
         &self,
         parent: FrameParent<'_>,

@@ -1,11 +1,11 @@
-//! Models made from models, and named positions.
+//! Tests of models that are made from other models, and of named positions.
 
 use condyle_model::{Error, FrameKind, Joint, Mimic, Model, ModelBuilder, Se3, Vec3, WORLD, robots};
 use condyle_model::{Inertia, Sym3};
 
 const SRDF: &str = include_str!("../../dynamics/tests/data/quadruped.srdf");
 
-/// Returns the text with one replacement.
+/// Returns the text of the SRDF with one replacement.
 fn with(what: &str, by: &str) -> String {
     assert_eq!(SRDF.matches(what).count(), 1, "{what}");
     SRDF.replace(what, by)
@@ -47,7 +47,7 @@ fn positions_have_names() {
     assert_eq!(positions[0].1, standing);
 }
 
-/// Unknown names have no effect, or are errors of a strict reader.
+/// Unknown names have no effect. For a strict reader, they are errors.
 #[test]
 fn positions_with_unknown_names() {
     let text = |state: &str| format!("<robot name='r'><disable_collisions link1='a'/>\n{state}</robot>");
@@ -134,7 +134,7 @@ fn an_appended_robot_is_numbered_after_earlier_children() {
     let knee = quadruped.joint("LF_KFE").unwrap();
     let on_the_knee = quadruped.append(knee, at, &arm, "arm_").unwrap();
     assert_eq!(on_the_knee.joint("arm_joint1").unwrap(), knee + 1);
-    // the frames of the carrying robot keep their indices
+    // the frames of the robot that carries the other one keep their indices
     for (k, frame) in quadruped.frames().iter().enumerate() {
         assert_eq!(both.frames()[k].name, frame.name);
     }
@@ -156,7 +156,7 @@ fn a_joint_that_follows_has_no_coordinate_of_its_own() {
     let said = |model: &Model, follower, leader| {
         model.with_mimic(follower, leader, Mimic { ratio: 1.0, offset: 0.0 }).unwrap_err().to_string()
     };
-    // a leader may follow another joint: q5 = 3 (-2 q2 + 0.1) + 1
+    // a leader may itself follow another joint: q5 = 3 (-2 q2 + 0.1) + 1
     let chained = coupled.with_mimic(5, 4, Mimic { ratio: 3.0, offset: 1.0 }).unwrap();
     let followers: Vec<_> = chained.bodies().iter().filter_map(|b| b.mimic).collect();
     assert_eq!(followers, [Mimic { ratio: -2.0, offset: 0.1 }, Mimic { ratio: -6.0, offset: 3.0 * 0.1 + 1.0 }]);

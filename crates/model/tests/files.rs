@@ -1,7 +1,8 @@
-//! Files that are large or deep, and paths that are not files: the result is an error with the number and the limit, or
-//! a model, without a long wait.
+//! Tests of files that are large or deeply nested, and of paths that are not files. The result is an error with the
+//! number and the limit, or a model, without a long wait.
 //!
-//! No time is asserted. Before these cases were refused or took linear time, they took between half a minute and days.
+//! No test measures time. Without the limits, and without algorithms in linear time, these files would take between
+//! half a minute and days.
 
 use condyle_model::{Error, Joint, Mimic, MjcfOptions, Model, ModelBuilder, SdfOptions, Se3, UrdfOptions, Vec3, WORLD};
 use condyle_model::{Inertia, Sym3};
@@ -102,7 +103,7 @@ fn attributes_and_namespaces() {
     refused(urdf(&wide), "the element on line 2 has 100001 attributes, at most 256 are allowed");
     let spaces = format!("<robot{}>{}</robot>", many(3000, "xmlns:a"), "<link name='a'/>".repeat(3000));
     refused(urdf(&spaces), "the element on line 1 has 3000 attributes, at most 256 are allowed");
-    // prefixes are part of names, so their declarations cost nothing
+    // a prefix is part of a name, so its declaration is dropped and takes no time
     let spaces: String = (0..100_000).map(|i| format!("<a xmlns:a{i}='a'/>")).collect();
     assert!(urdf(&format!("<robot>{spaces}<link name='a'/></robot>")).is_ok());
     // a comment may contain equals signs, and common files declare a dozen namespaces
@@ -124,7 +125,7 @@ fn long_texts() {
     refused(sdf(&signs), &format!("4194305 equals signs, at most 4194304 {end}"));
 }
 
-/// Unknown names are listed up to a limit, because each is compared with the known ones.
+/// Unknown names are listed up to a limit, because each of them is compared with all known names.
 #[test]
 fn unknown_names() {
     let tags = "<linkjoint linkjoint='1'/>".repeat(500_000);
@@ -134,7 +135,7 @@ fn unknown_names() {
     assert!(last.ends_with("more than 1000 names are unknown or left out: the rest is not listed"), "{last}");
 }
 
-/// The nearest name is found among long names, and among many names.
+/// The nearest name is found even among long names and among many names.
 #[test]
 fn long_names() {
     let a = "a".repeat(100_000);
@@ -149,7 +150,7 @@ fn long_names() {
     assert!(matches!(model.frame(&b), Err(Error::UnknownFrame { nearest, .. }) if nearest == a));
 }
 
-/// A line break or tab in a name becomes a space, as in every XML attribute; a character reference is kept.
+/// A line break or tab in a name becomes a space, as in every XML attribute. A character reference is kept.
 #[test]
 fn names_with_line_breaks() {
     for (written, read) in
@@ -164,7 +165,7 @@ fn names_with_line_breaks() {
     }
 }
 
-/// Frames attached to frames, and poses relative to poses: each is visited once.
+/// Frames that are attached to frames, and poses that are relative to poses, are visited only once each.
 #[test]
 fn attached_frames() {
     let row = |last: &str| {
@@ -182,7 +183,7 @@ fn attached_frames() {
     refused(sdf(&own_pose), "is attached to itself");
 }
 
-/// Inherited attributes of classes are counted, too.
+/// Inherited attributes of classes are counted like other attributes.
 #[test]
 fn default_classes() {
     let row: String = (0..250).map(|i| format!("<default class='c{i}'>")).collect();
@@ -194,7 +195,7 @@ fn default_classes() {
     refused(mjcf(&format!("<mujoco><default>{geoms}{wide}</default></mujoco>")), said);
 }
 
-/// A folder that is removed after its test.
+/// Folder that is removed after its test.
 struct Folder(PathBuf);
 
 impl Folder {
@@ -211,7 +212,7 @@ impl Drop for Folder {
     }
 }
 
-/// Reads a file as each kind of robot, and as an included part of one.
+/// Reads a file as each kind of robot, and as a file that another file includes.
 fn as_robots(path: &Path, folder: &Path) -> [Result<Model, Error>; 4] {
     let main = folder.join("main.xml");
     std::fs::write(&main, format!("<mujoco><include file='{}'/></mujoco>", path.display())).unwrap();
@@ -227,7 +228,7 @@ fn as_robots(path: &Path, folder: &Path) -> [Result<Model, Error>; 4] {
 fn large_files() {
     let folder = Folder::new("large");
     let path = folder.0.join("large.xml");
-    File::create(&path).unwrap().set_len(10_000_000_000).unwrap(); // without blocks: it takes no space on the disk
+    File::create(&path).unwrap().set_len(10_000_000_000).unwrap(); // without blocks, it takes no space on the disk
     for (k, result) in as_robots(&path, &folder.0).into_iter().enumerate() {
         let main = if k == 3 { std::fs::metadata(folder.0.join("main.xml")).unwrap().len() } else { 0 };
         let found = 10_000_000_000 + main;
@@ -241,7 +242,7 @@ fn large_files() {
     });
 }
 
-/// Files that belong to one robot are counted together.
+/// All files of one robot are counted together.
 #[test]
 fn large_parts() {
     let folder = Folder::new("parts");
@@ -251,10 +252,10 @@ fn large_parts() {
     write("main.xml", "<mujoco><include file='a.xml'/><include file='b.xml'/><include file='c.xml'/></mujoco>");
     let read = || Model::from_mjcf(folder.0.join("main.xml"), &MjcfOptions::default());
     refused(read(), "1200011 tags, at most 1048576 are allowed in the files of a robot");
-    // one file with two paths is one file
+    // one file with two different paths is recognized as the same file
     write("main.xml", "<mujoco><include file='a.xml'/><include file='./a.xml'/></mujoco>");
     refused(read(), "<include>: `./a.xml` is already part of the model");
-    // an included file counts at the depth of its include
+    // the depth of an included file is added to the depth of its include
     let nested = |inside: &str| format!("<mujoco>{}{inside}{}</mujoco>", "<a>".repeat(200), "</a>".repeat(200));
     write("main.xml", &nested("<include file='a.xml'/>"));
     write("a.xml", &nested(""));

@@ -1,10 +1,10 @@
-//! Robots with one misspelt name: each reader reports it, for every element and attribute.
+//! Tests with robots in which one name is misspelt. Each reader reports this name, for every element and attribute.
 
 use condyle_model::{Error, MjcfOptions, Model, SdfOptions, UrdfOptions};
 use roxmltree::Document;
 use std::ops::Range;
 
-/// Robots that contain most elements and attributes with an effect.
+/// Robots that contain most of the elements and attributes that have an effect.
 const URDF: &str = r#"<robot name="r" version="1.0">
   <link name="a"><inertial><origin xyz="0 0 1" rpy="0 0 0.1"/><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
   <link name="b"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
@@ -37,7 +37,7 @@ const MJCF: &str = r#"<mujoco model="m"><compiler angle="radian" autolimits="tru
   <keyframe><key name="home" qpos="0.1 0.2"/></keyframe>
 </mujoco>"#;
 
-/// Returns the messages of a reader: the warnings, or the error.
+/// Returns the messages of a reader: the warnings about a model, or the error.
 fn said(read: &dyn Fn(&str) -> Result<Model, Error>, text: &str) -> Vec<String> {
     match read(text) {
         Ok(model) => model.warnings().iter().map(ToString::to_string).collect(),
@@ -45,7 +45,8 @@ fn said(read: &dyn Fn(&str) -> Result<Model, Error>, text: &str) -> Vec<String> 
     }
 }
 
-/// Returns the byte ranges of an element's names in the text: of its start and end tag together, and of each attribute.
+/// Returns the byte ranges of all names in the text. The start tag and end tag of an element are returned together, and
+/// each attribute is returned separately.
 fn names(text: &str) -> Vec<Vec<Range<usize>>> {
     let document = Document::parse(text).unwrap();
     let mut places = Vec::new();
@@ -64,7 +65,7 @@ fn names(text: &str) -> Vec<Vec<Range<usize>>> {
     places
 }
 
-/// Checks that each name with an additional letter is reported.
+/// Checks that a name is reported if a letter is added to it, for each name in the text.
 fn check(read: &dyn Fn(&str) -> Result<Model, Error>, text: &str) {
     let plain = said(read, text);
     assert!(read(text).is_ok(), "{plain:?}");

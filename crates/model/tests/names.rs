@@ -1,8 +1,8 @@
-//! The nearest name in the error about an unknown name.
+//! Test of the nearest name in an error about an unknown name.
 
 use condyle_model::{Error, Inertia, Joint, ModelBuilder, Se3, WORLD};
 
-/// Returns all words of the given letters up to a length, shorter words first.
+/// Returns all words of the given letters up to a length, in the order of their lengths.
 fn words(letters: &str, length: usize) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut from = 0;
@@ -16,8 +16,8 @@ fn words(letters: &str, length: usize) -> Vec<String> {
     words.split_off(1)
 }
 
-/// The result is the first name with the smallest optimal string alignment distance, among names that differ in at most
-/// half of their characters.
+/// The nearest name is the first name with the smallest optimal string alignment distance. Only names that differ in at
+/// most half of their characters count.
 #[test]
 fn nearest_names_are_those_of_strsim() {
     let mut builder = ModelBuilder::new("words");

@@ -1,4 +1,4 @@
-//! URDF: everything that changes the robot is read or reported.
+//! Tests of URDF: everything in a file that changes the robot is read or reported.
 #![allow(non_snake_case)]
 
 use condyle_model::{
@@ -10,7 +10,7 @@ const INERTIAL: &str = "<inertial><origin xyz='0.1 0 0'/><mass value='2'/>
 <inertia ixx='0.02' ixy='0' ixz='0' iyy='0.03' iyz='0' izz='0.04'/></inertial>";
 const LIMIT: &str = "<limit lower='-1' upper='1' effort='3' velocity='2'/>";
 
-/// Returns a robot of two links and a joint between them, with additional content.
+/// Returns a robot with two links and a joint between them, and with additional content.
 fn robot(kind: &str, joint: &str, more: &str) -> String {
     let ends = "<parent link='a'/><child link='b'/>";
     let links = format!("<link name='a'/><link name='b'>{INERTIAL}</link>");
@@ -26,7 +26,7 @@ fn model(text: &str) -> Model {
     read(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
-/// Returns the warnings of a robot, without the file's name.
+/// Returns the warnings about a robot, without the name of the file.
 #[track_caller]
 fn warnings(text: &str) -> Vec<String> {
     model(text).warnings().iter().map(|w| w.to_string().replace("<string>:", "")).collect()
@@ -52,7 +52,8 @@ fn plain_robots_have_no_warnings() {
     }
 }
 
-/// Drake 1.51.1: a link `world` that no element describes is the world. The mass is the mass of the moving link.
+/// As in Drake 1.51.1, a link `world` that the file does not contain is the world. The mass is the mass of the moving
+/// link.
 #[test]
 fn joints_on_the_world() {
     let joint = "<joint name='j' type='revolute'><parent link='world'/><child link='b'/>";
@@ -93,7 +94,7 @@ fn limits_without_a_number() {
     assert_eq!(limits("<limit lower='-1' upper='1' effort='inf' velocity='3'/>"), (3.0, -inf, inf));
 }
 
-/// Robots with such limits exist, and other readers accept them.
+/// Robots with such limits exist, and other readers accept them, so each of these limits only causes a warning.
 #[test]
 fn implausible_limits() {
     let said = |limit: &str| warnings(&robot("revolute", limit, ""));
@@ -140,7 +141,7 @@ fn limits_warn_in_every_format() {
     assert!(built.with_limits(limits).unwrap().warnings().is_empty());
 }
 
-/// Fields of version 1.2 that a model cannot represent.
+/// The fields of version 1.2 that a model cannot represent cause warnings.
 #[test]
 fn limits_of_acceleration() {
     let with = |more: &str| robot("revolute", &LIMIT.replace("/>", &format!(" {more}/>")), "");
@@ -157,8 +158,8 @@ fn limits_of_acceleration() {
     assert!(warnings(&versioned).is_empty());
 }
 
-/// Compares with Drake 1.51: X_WB of a body that is 1 and 2 m along the joint's x and y, and rotated by 0.3 about its
-/// axis. The origin is at (1, 2, 3).
+/// Compares with X_WB in Drake 1.51. The body is moved by 1 m and 2 m along the joint's x and y, and rotated by 0.3
+/// about the joint's axis. The origin of the joint is at (1, 2, 3).
 #[test]
 fn planes_of_planar_joints() {
     let frame = |axis: &str| {
@@ -175,7 +176,7 @@ fn planes_of_planar_joints() {
     for (axis, expected) in PLANAR {
         close(&frame(axis), expected);
     }
-    // the link keeps its axes, and the inertia its pose
+    // the link keeps its axes, and the inertia keeps its pose in the link
     let tilted = model(&robot("planar", "<axis xyz='1 0 0'/>", ""));
     let link = &tilted.frames()[tilted.frame("b").unwrap()];
     let back = link.placement.inverse();
@@ -191,7 +192,7 @@ fn planes_of_planar_joints() {
     assert_eq!(limited, [format!("3: joint `j`: {unit}")]);
 }
 
-/// Axis; translation, first and third column of the rotation.
+/// Axis of the joint, then the translation and the first and third column of the rotation.
 const PLANAR: [(&str, &[f64]); 7] = [
     (
         "<axis xyz='1 0 0'/>",
@@ -317,7 +318,7 @@ fn unknown_elements_and_attributes() {
     }
 }
 
-/// Elements without effect on dynamics, kinematics and limits are known.
+/// Elements without effect on dynamics, kinematics and limits are known, so they cause no warnings.
 #[test]
 fn elements_without_effect() {
     let joint = "<calibration rising='1'/><safety_controller k_velocity='10' k_position='15' soft_lower_limit='-1' \
@@ -385,7 +386,7 @@ fn rotors_of_transmissions() {
     assert_eq!(said(&actuator("<rotorInertia>0.001</rotorInertia>")), [alone]);
     let negative = "4: transmission `t`: has a rotor inertia of -1 kg m², which is below 0: M does not have it";
     assert_eq!(said(&actuator(&format!("{reduction}<rotorInertia>-1</rotorInertia>"))), [negative]);
-    // Drake reads its elements in an actuator only
+    // Drake reads its own elements only inside an `<actuator>`
     let drakes = "<drake:rotor_inertia value='1'/>";
     assert_eq!(armature(drakes), 0.0);
     let misplaced = "5: <drake:rotor_inertia>: misplaced element <drake:rotor_inertia> in <transmission>";
@@ -413,7 +414,8 @@ fn rotors_of_transmissions() {
     assert_eq!(said("<mechanicalReducton>50</mechanicalReducton>"), [near]);
 }
 
-/// Returns a robot with a third link whose joint follows `j`, and a fourth one whose joint follows the third.
+/// Returns a robot with two more links. The joint of the third link follows `j`, and the joint of the fourth link
+/// follows the joint of the third.
 fn followers(first: &str, second: &str) -> String {
     let link = |name: &str, on: &str, joint: &str, mimic: &str| {
         format!(
@@ -447,8 +449,8 @@ fn mimics() {
     assert_eq!(warnings(&followers("joint='x'", "joint='k'"))[0], missing);
 }
 
-/// Limits and losses of a follower act on its leader. With x = −2 q + 0.5 the limits −1 and 1 of x are −0.25 and 0.75
-/// of q. The power of the damping d of x is d ẋ² = 4 d q̇².
+/// Limits and losses of a follower act on its leader. With x = −2 q + 0.5, the limits −1 and 1 of x are the limits
+/// −0.25 and 0.75 of q. The damping d of x has the power d ẋ² = 4 d q̇².
 #[test]
 fn limits_and_losses_of_followers() {
     let free = followers("joint='j' multiplier='-2' offset='0.5'", "joint='j' multiplier='0'");
@@ -461,7 +463,7 @@ fn limits_and_losses_of_followers() {
     assert_eq!((limits.lower[0], limits.upper[0], limits.velocity[0]), (-0.25, 0.75, 1.0));
     assert_eq!((limits.effort_lower[0], limits.effort_upper[0]), (-3.0, 3.0));
     assert_eq!((found.damping()[0], found.friction()[0]), (12.5, 8.25));
-    // a copy is the same robot, and so are the other formats
+    // a copy of the robot is equal to it, and so is the robot in other formats
     let copied = found.clone().with_gravity(*found.gravity()).unwrap();
     assert_eq!((copied.damping(), copied.limits()), (found.damping(), limits));
     let mut two = ModelBuilder::new("two");
@@ -485,7 +487,7 @@ fn limits_and_losses_of_followers() {
     let found = Model::from_sdf_str(&sdf, &SdfOptions { mimic: true, ..SdfOptions::default() }).unwrap();
     assert_eq!((found.damping(), found.friction()), (&[15.0][..], &[12.0][..]));
     assert_eq!((found.limits().lower[0], found.limits().upper[0], found.limits().velocity[0]), (-0.25, 0.75, 1.0));
-    // limits that leave no motion, as in the grippers of many robots, are ignored
+    // limits that would not let the leader move, as in the grippers of many robots, are ignored
     let apart = read(&followers("joint='j' offset='5'", "joint='j'").replacen(
         "velocity='2'/><mimic",
         "velocity='0'/><mimic",
@@ -502,7 +504,7 @@ fn limits_and_losses_of_followers() {
     assert_eq!(apart.clone().with_gravity(gravity).unwrap().warnings(), apart.warnings());
 }
 
-/// The time for a chain of followers is proportional to its length.
+/// The time for reading a chain of followers is proportional to the length of the chain.
 #[test]
 fn long_chains_of_mimics() {
     let hinge = Joint::Revolute { axis: Vec3::new(0.0, 0.0, 1.0) };
@@ -542,7 +544,7 @@ fn names_that_the_library_uses() {
 fn equal_elements_are_one() {
     let axis = "<axis xyz='0 1 0'/>";
     assert_eq!(model(&robot("continuous", &format!("{axis}{axis}"), "")).nv(), 1);
-    // the first of several counts, as in urdfdom
+    // if an element occurs several times, the first one counts, as in urdfdom
     let two = robot("continuous", &format!("{axis}\n<axis xyz='1 0 0'/>"), "");
     assert_eq!(model(&two).bodies()[1].joint, Joint::Continuous { axis: Vec3::new(0.0, 1.0, 0.0) });
     assert_eq!(warnings(&two), ["4: joint `j`: a second <axis> is left out"]);
@@ -583,10 +585,10 @@ fn implausible_inertias() {
     let said = "body `b`: 100000000000000000000 kg and 1e-1 kg m² are a radius of gyration of 3.2e-11 m, expected at least 1e-7 m";
     assert_eq!(at(1e20, 0.1, Vec3::zero()), [said]);
     assert!(at(1.0, 1e-12, Vec3::zero()).is_empty());
-    assert!(of(1.0, 0.0).is_empty()); // a point
+    assert!(of(1.0, 0.0).is_empty()); // a point mass
 }
 
-/// Joints and frames that Drake adds to the format.
+/// Joints and frames that Drake adds to the format are read.
 #[test]
 fn extensions_of_drake() {
     let drakes = |kind: &str, inside: &str| {
@@ -603,7 +605,7 @@ fn extensions_of_drake() {
         assert!(found.damping().iter().all(|&x| x == 0.5) && found.friction().iter().all(|&x| x == 0.25), "{kind}");
         assert_eq!(warnings(&text), [""; 0]);
     }
-    // Drake turns about x of the joint's frame, then about the new y, whatever the axis is
+    // Drake's universal joint turns about x of the joint's frame, then about the new y, whatever the `<axis>` is
     let universal = model(&drakes("universal", "<origin xyz='1 2 3'/>"));
     let about = |x, y| Joint::Revolute { axis: Vec3::new(x, y, 0.0) };
     let bodies: Vec<_> = universal.bodies()[1..].iter().map(|b| (&*b.name, &*b.joint_name, b.joint)).collect();

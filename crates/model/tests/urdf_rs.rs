@@ -1,12 +1,12 @@
-//! Robots read by urdf-rs are equal to the robots of our own reader.
+//! Robots that urdf-rs has read are equal to robots that the reader of this crate has read.
 
 use condyle_model::{Error, Joint, Model, UrdfOptions, robots};
 use std::path::Path;
 
-/// Faults that urdf-rs does not detect.
+/// Parts of error messages for faults that urdf-rs does not detect.
 const UNSEEN: [&str; 3] = ["limit", "belongs to xacro", "drake:"];
 
-/// Compares everything that a robot of urdf-rs contains; warnings have another file name.
+/// Compares everything that a robot of urdf-rs contains. Only the file names in warnings may differ.
 fn compare(name: &str, text: &str, robot: &urdf_rs::Robot) -> bool {
     for root_joint in [None, Some(Joint::FreeFlyer)] {
         for mimic in [false, true] {
@@ -15,7 +15,7 @@ fn compare(name: &str, text: &str, robot: &urdf_rs::Robot) -> bool {
             let (ours, theirs) = match (ours, theirs) {
                 (Ok(ours), Ok(theirs)) => (ours, theirs),
                 (Err(_), Err(_)) => return false,
-                // zeros represent a missing effort, and information that urdf-rs drops cannot cause an error
+                // urdf-rs represents a missing effort by zeros, and information that it drops cannot cause an error
                 (Err(ours), Ok(_)) if UNSEEN.iter().any(|what| ours.to_string().contains(what)) => return false,
                 (ours, theirs) => panic!("{name}: {:?} {:?}", ours.map(drop), theirs.map(drop)),
             };
@@ -23,7 +23,7 @@ fn compare(name: &str, text: &str, robot: &urdf_rs::Robot) -> bool {
             let drakes = |f: &&condyle_model::Frame| f.kind != condyle_model::FrameKind::User;
             assert!(ours.frames().iter().filter(drakes).eq(theirs.frames()), "{name}");
             for joint in ours.bodies()[1..].iter().filter(|b| matches!(b.joint, Joint::Continuous { .. })) {
-                let v = joint.idx_v; // there, a limit of 0 means no limit
+                let v = joint.idx_v; // in urdf-rs, a limit of 0 means no limit
                 let is_none = |x: f64, y: f64| x == 0.0 && y.is_infinite();
                 let (a, b) = (ours.limits(), theirs.limits());
                 assert!(a.velocity[v] == b.velocity[v] || is_none(a.velocity[v], b.velocity[v]), "{name}");
@@ -46,7 +46,7 @@ fn embedded_robots() {
     }
 }
 
-/// URDFs in the folders of `CONDYLE_ROBOTS`, if it is set.
+/// Reads the URDFs in the folders that `CONDYLE_ROBOTS` lists, if this variable is set.
 #[test]
 fn robots_of_others() {
     let folders = std::env::var_os("CONDYLE_ROBOTS").unwrap_or_default();

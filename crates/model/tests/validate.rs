@@ -1,4 +1,4 @@
-//! Physically impossible inertias, and joints along which the inertia matrix is singular.
+//! Tests of physically impossible inertias, and of joints along which the inertia matrix is singular.
 
 use condyle_model::{Inertia, Joint, Model, ModelBuilder, Se3, Sym3, Vec3, WORLD, Warning, neutral};
 
@@ -54,7 +54,7 @@ fn impossible_inertias_are_named() {
     assert!(body(flat(0.1, 0.1, 0.2)).is_empty()); // a flat plate
 }
 
-/// Returns a robot with one joint of each kind whose position has a part of length 1, and a hinge.
+/// Returns a robot with a hinge and with one joint of each kind whose position contains a rotation of length 1.
 fn turning() -> Model {
     let mut builder = ModelBuilder::new("turning");
     let axis = Vec3::new(0.0, 0.0, 1.0);

@@ -1,5 +1,5 @@
-//! Robots written into a copy of their file: only differences are edited, all other bytes are kept, and the file
-//! reproduces the model.
+//! Tests of robots that are written into a copy of their file: only differences are edited, all other bytes are kept,
+//! and the new file reproduces the model.
 #![allow(non_snake_case)] // I is an inertia
 
 use condyle_model::{Inertia, MjcfOptions, Model, Sym3, UrdfOptions, Vec3, robots};
@@ -13,7 +13,7 @@ fn folder(test: &str) -> PathBuf {
     folder
 }
 
-/// Returns the text of a file after `change` was written into it.
+/// Returns the text of the file into which a changed robot was written, or the error. `change` makes the changed robot.
 fn written(test: &str, text: &str, change: impl Fn(&Model) -> Model) -> Result<String, String> {
     let is_urdf = text.contains("<robot");
     let read = |path: &PathBuf| match is_urdf {
@@ -52,7 +52,7 @@ fn close(a: Inertia<f64>, b: Inertia<f64>, what: &str) {
     assert!(same, "{what}: {a:?} and {b:?}");
 }
 
-/// Returns another physically possible inertia.
+/// Returns an inertia that is physically possible and different for each i.
 fn other(i: usize) -> Inertia<f64> {
     let x = 1.0 + 0.1 * i as f64;
     let about = Sym3 { xx: 0.03 * x, xy: 0.001, yy: 0.04, xz: -0.002, yz: 0.003, zz: 0.05 };
@@ -60,7 +60,7 @@ fn other(i: usize) -> Inertia<f64> {
 }
 
 fn with_other_inertias(model: &Model) -> Model {
-    // intermediate bodies of a chain have no mass, and no element in the file
+    // bodies that connect joints of a chain have no mass and no element in the file
     let keeps = |i: usize| i == 0 || model.bodies()[i].name.contains('#');
     model.with_inertias(|i, I| if keeps(i) { I } else { other(i) }).expect("a model")
 }
@@ -147,7 +147,7 @@ fn armature_is_written_as_the_inertia_of_a_rotor() {
     let begin = "xmlns:k=\"about:k\">";
     let expected = LEG.replace(begin, &format!("{begin}{}{}", of("hip", "0.5"), of("ankle", "0.125")));
     assert_eq!(written("armature", LEG, armature).unwrap(), expected);
-    // an existing transmission gets a rotor, or its rotor changes according to its gear ratio
+    // an existing transmission gets a rotor; if it has one, the rotor changes according to the gear ratio
     let hip =
         "<transmission name='t'><joint name='hip'/><actuator name='m'><mechanicalReduction>5</mechanicalReduction>";
     let ankle = "<transmission name='u'><joint name='ankle'/><actuator name='n'><drake:gear_ratio value='2'/>";
@@ -214,13 +214,14 @@ fn links_that_fixed_joints_merge_keep_their_inertias() {
     let more = |m: &Model| m.with_inertias(|i, I| if i == 0 { I } else { I + other(i) }).unwrap();
     let new = written("merged", &text, more).unwrap();
     assert!(new.contains(&bolts), "{new}");
-    // the rest would be negative or physically impossible, so the moving link takes all
+    // the inertia of the other links would make the rest negative or impossible, so the moving link takes the whole
+    // inertia
     let new = written("merged", &text, with_other_inertias).unwrap();
     assert_eq!(new.matches("<mass value='0'/>").count(), 2, "{new}");
     let small = |m: &Model| m.with_inertias(|i, I| if i == 1 { other(1).scale(0.1) } else { I }).unwrap();
     let new = written("merged", &text, small).unwrap();
     assert!(!new.contains(&bolts) && new.matches("<mass value='0'/>").count() == 2, "{new}");
-    // a moving link without mass leaves the difference to the heaviest link
+    // if the moving link has no mass, the heaviest link takes the difference
     let light = text.replace("value = \"2.0\"", "value = \"0\"");
     let heavier = |m: &Model| m.with_inertias(|i, I| if i == 1 { I.scale(2.0) } else { I }).unwrap();
     let new = written("merged", &light, heavier).unwrap();
@@ -247,7 +248,7 @@ fn a_root_joint_is_found_in_the_model() {
     for (a, b) in model.bodies().iter().zip(file.bodies()) {
         close(a.inertia, b.inertia, &a.name);
     }
-    // the new file may replace the original
+    // the new file may replace the original file
     model.write_urdf(&path, &path).unwrap();
     fs::remove_dir_all(folder).unwrap();
 }
@@ -318,7 +319,7 @@ fn inertias_of_an_mjcf_come_back() {
         m.with_inertias(|i, I| if keeps(i) { I } else { I + other(i) }).unwrap()
     };
     let new = written("fingers", HAND, more).unwrap();
-    // an inertia from geoms becomes an <inertial>; the fixed body keeps its own
+    // an inertia from geoms becomes an <inertial>, and the fixed body keeps its own
     assert!(new.contains("<body name='palm'>\n      <inertial pos=\""), "{new}");
     assert!(new.contains("mass='0.25' diaginertia='0.01 0.02 0.025' euler='0 45 0'"), "{new}");
     let small = |m: &Model| m.with_inertias(|i, I| if i == 1 { other(1).scale(0.1) } else { I }).unwrap();
@@ -326,7 +327,7 @@ fn inertias_of_an_mjcf_come_back() {
     assert!(new.contains("<inertial pos='0 0 0' mass='0' diaginertia='0 0 0'/>"), "{new}");
 }
 
-/// An `<inertial>` in a `<frame>` is edited there, in the axes of the frame.
+/// An `<inertial>` inside a `<frame>` is edited where it is, along the axes of the frame.
 #[test]
 fn an_inertial_inside_frames_is_edited() {
     let inertial = "<inertial pos='0.1 0 0' mass='1' diaginertia='0.1 0.2 0.25'/>";
@@ -339,7 +340,7 @@ fn an_inertial_inside_frames_is_edited() {
     written("frames", &text, with_other_inertias).unwrap();
 }
 
-/// Numbers that differ from the file by rounding only are not written.
+/// Numbers that differ from the file only by rounding are not written.
 #[test]
 fn rounding_is_no_difference() {
     let rounded = |_: &Model| {
@@ -363,7 +364,7 @@ fn losses_of_an_mjcf_are_written() {
     assert_eq!(written("losses", HAND, change).unwrap(), expected);
 }
 
-/// Each error names the thing, both numbers, and the attribute of the file that is the cause.
+/// Each error names the differing quantity, both numbers, and the attribute of the file that is the cause.
 #[test]
 fn numbers_that_depend_on_the_inertia_name_their_cause() {
     let text = |joint: &str, rest: &str| {

@@ -1,5 +1,5 @@
-//! Xacro files: the programs that are called, their arguments, and their limits. The programs here are scripts in a
-//! separate folder, which is the PATH of a second process of this test.
+//! Tests of xacro files: the programs that are called, their arguments, and their limits. In these tests, the programs
+//! are scripts in a separate folder. A second process of the test has this folder as its PATH.
 #![cfg(unix)]
 
 use condyle_model::{Model, UrdfOptions};
@@ -9,7 +9,7 @@ use std::process::Command;
 
 const ROBOT: &str = "<robot name='$*'><link name='$ROS_PACKAGE_PATH'/></robot>";
 
-/// Variable that contains the arguments of the second process.
+/// Environment variable that contains the arguments for the second process.
 const ARGUMENTS: &str = "CONDYLE_TEST_XACRO_ARGUMENTS";
 
 fn folder(name: &str) -> PathBuf {
@@ -18,7 +18,8 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-/// Reads `robot.xacro` in a process that finds only these programs; returns name and link, or the error.
+/// Reads `robot.xacro` in a process that finds only the given programs. Returns the name of the robot and of its link,
+/// or the error.
 fn read(name: &str, programs: &[(&str, &str)], arguments: &str) -> String {
     let folder = folder(name);
     for (name, script) in programs {
@@ -35,8 +36,8 @@ fn read(name: &str, programs: &[(&str, &str)], arguments: &str) -> String {
     said.split_once('[').unwrap().1.rsplit_once(']').unwrap().0.to_owned()
 }
 
-/// Reads in the process that [`read`] starts. The tests start a process of their own because programs are found by its
-/// PATH.
+/// Reads the file in the process that [`read`] starts. A separate process is needed because programs are found by the
+/// PATH of the process.
 #[test]
 fn in_a_process() {
     let Ok(arguments) = std::env::var(ARGUMENTS) else {
@@ -76,7 +77,7 @@ fn programs() {
     assert_eq!(said, format!("robot.xacro: {missing}: {how}"));
     let said = read("line", &[("xacro", "echo; echo '<robot><link/></robot>'")], "");
     assert_eq!(said, "robot.xacro (expanded):2: <link>: has no name");
-    // the output may be as long as a robot's files
+    // the output may be as long as the files of a robot may be
     let large = "read() { echo \"<!-- $1$1 -->\"; }; echo \"<robot name='r'><link name='a'/>\"; \
                  i=0; while [ $i -lt 20000 ]; do read 0123456789012345678901234567890123456789; i=$((i+1)); done; echo '</robot>'";
     assert_eq!(read("large", &[("xacro", large)], ""), "r|a");

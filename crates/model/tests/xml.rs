@@ -1,8 +1,8 @@
-//! XML as in real files: encodings, declarations, comments, document types, prefixes and entities.
+//! Tests of XML as in real files: encodings, declarations, comments, document types, prefixes and entities.
 
 use condyle_model::{Error, MjcfOptions, Model, SdfOptions, UrdfOptions};
 
-/// Robot with one joint, whose name contains a character that encodings represent differently.
+/// Robot with one joint. The name of the joint contains a character that encodings represent differently.
 const ROBOT: &str = "<robot name='r'><link name='a'/><link name='b'/>
 <joint name='Gelenk für b' type='continuous'><parent link='a'/><child link='b'/></joint></robot>";
 
@@ -10,7 +10,7 @@ fn urdf(text: &str) -> Result<Model, Error> {
     Model::from_urdf_str(text, &UrdfOptions::default())
 }
 
-/// Reads the bytes of a file.
+/// Writes bytes to a file, and reads a URDF from this file.
 fn file(name: &str, bytes: &[u8]) -> Result<Model, Error> {
     let path = std::env::temp_dir().join(format!("condyle-xml-{name}-{}.urdf", std::process::id()));
     std::fs::write(&path, bytes).unwrap();
@@ -24,7 +24,7 @@ fn refused(text: &str, said: &str) {
     assert_eq!(urdf(text).unwrap_err().to_string(), format!("<string>:{said}"), "{text}");
 }
 
-/// Returns the bytes of a text whose characters are one byte each.
+/// Returns the bytes of a text in which each character is one byte (ISO-8859-1).
 fn latin(text: &str) -> Vec<u8> {
     text.chars().map(|c| u8::try_from(u32::from(c)).unwrap()).collect()
 }
@@ -48,11 +48,11 @@ fn encodings() {
             assert_eq!(joint(file(name, &units(&text, unit)).unwrap()), "Gelenk für b");
         }
     }
-    // a string is already decoded, whatever it declares
+    // a string is already decoded, so the encoding that it declares is ignored
     assert_eq!(joint(urdf(&declare("ISO-8859-1")).unwrap()), "Gelenk für b");
 }
 
-/// An invalid byte has no effect in a comment; in a name it is an error with its line.
+/// An invalid byte has no effect in a comment. In a name, it is an error with a line number.
 #[test]
 fn bytes_that_are_not_in_the_encoding() {
     let robot = latin(ROBOT);
@@ -110,7 +110,8 @@ fn lines() {
     );
 }
 
-/// Elements and attributes of other programs have prefixes, declared or not; they have no effect.
+/// Elements and attributes of other programs have prefixes, whether the prefixes are declared or not. They have no
+/// effect.
 #[test]
 fn prefixes() {
     let with = |inside: &str| ROBOT.replace("</robot>", &format!("{inside}</robot>"));
@@ -129,7 +130,7 @@ fn prefixes() {
     refused(&renamed, &format!("2: x:wheel `w`: belongs to xacro: {expand}"));
 }
 
-/// The text for other parsers has the same elements on the same lines.
+/// The text for other parsers has the same elements on the same lines as the original text.
 #[test]
 fn texts_for_other_parsers() {
     let text = "<!------ a -->\n<?xml version='1.0'?><!DOCTYPE robot><robot name='a&amp;&lt;&quot;'>\n<gz:a b:c='1'\n/>\n\
@@ -195,7 +196,7 @@ fn texts_that_are_no_documents() {
     refuse("</", "</ is never closed");
 }
 
-/// MuJoCo 4.0.0 reads each of these texts, and finds the first root element alone in them (`mj_loadXML`).
+/// MuJoCo 4.0.0 reads each of these texts, and finds only the first root element in it (`mj_loadXML`).
 #[test]
 fn things_outside_of_the_root_element_warn() {
     let mujoco = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>";

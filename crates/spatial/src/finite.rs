@@ -1,4 +1,4 @@
-//! Serialization of limits. JSON has no infinity: an infinite limit is written as `null`.
+//! Serialization of limits for JSON, which has no infinity: an infinite limit is written as `null`.
 //!
 //! ```
 //! use serde::{Deserialize, Serialize};
@@ -23,7 +23,7 @@ fn vector_or<'de, D: Deserializer<'de>>(from: D, otherwise: f64) -> Result<Vec<f
     Ok(limits.into_iter().map(|x| x.unwrap_or(otherwise)).collect())
 }
 
-/// Lower limits; `null` stands for −∞.
+/// Serialization of lower limits; `null` stands for −∞.
 pub mod lower {
     use super::*;
 
@@ -44,7 +44,7 @@ pub mod lower {
     }
 }
 
-/// Upper limits; `null` stands for ∞.
+/// Serialization of upper limits; `null` stands for ∞.
 pub mod upper {
     pub use super::lower::serialize;
     use super::*;
@@ -58,7 +58,7 @@ pub mod upper {
     }
 }
 
-/// A single upper limit; `null` stands for ∞.
+/// Serialization of a single upper limit; `null` stands for ∞.
 pub mod greatest {
     use super::*;
 

@@ -2,11 +2,11 @@
 //!
 //! [`Scalar`] is the number type: `f64`, `f32`, a dual number of [num-dual](https://docs.rs/num-dual), or several
 //! numbers in SIMD lanes. [`Motion`] and [`Force`] are the two kinds of spatial vector. [`Inertia`] maps motions to
-//! forces, and a pose [`Se3`] changes their coordinates. [`lie`] has rotations, exponentials, logarithms and their
-//! Jacobians.
+//! forces. A pose [`Se3`] changes the coordinates of motions, forces and inertias. [`lie`] contains exponentials and
+//! logarithms of rotations and poses, and their Jacobians.
 //!
-//! As six numbers, motions and forces have their linear part first and their angular part second. `aXb` is the pose of
-//! frame b in frame a, and `aXb.act(x)` maps x from coordinates in b to coordinates in a.
+//! If motions and forces are written as six numbers, the linear part comes first and the angular part second. `aXb` is
+//! the pose of frame b in frame a. `aXb.act(x)` maps x from coordinates in b to coordinates in a.
 //!
 //! ```
 //! use condyle_spatial::{Act, Force, Mat3, Motion, Se3, Vec3};
@@ -18,10 +18,10 @@
 //! ```
 //!
 //! # Features
-//! `std` (on by default): SIMD instructions are detected at run time, and num-dual's numbers are scalars. Without it,
-//! the crate needs `alloc` and the feature `libm` for floating-point functions.
+//! `std` (on by default): SIMD instructions are detected at run time, and num-dual's numbers are scalars. Without
+//! `std`, the crate needs `alloc`, and the feature `libm` for floating-point functions.
 //!
-//! `serde` (on by default): serialization of all types that are stored in files.
+//! `serde` (on by default): types that are stored in files can be serialized.
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![cfg_attr(not(any(feature = "std", test)), no_std)]
 #![allow(non_snake_case)]

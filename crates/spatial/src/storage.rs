@@ -1,8 +1,8 @@
 //! Storage of workspaces: arrays and matrices whose memory layout is the same for `f64` and for `Fused`.
 //!
 //! The standard library and nalgebra do not guarantee that `Vec<f64>` and `Vec<Fused>` have the same layout. A
-//! workspace that contains them could not be reinterpreted ([`Alike`](crate::simd::alike::Alike)). The types here are
-//! `repr(C)`.
+//! workspace with such fields could not be reinterpreted ([`Alike`](crate::simd::alike::Alike)). The types in this
+//! module are `repr(C)`.
 #![allow(unsafe_code)]
 
 use crate::alike;
@@ -17,7 +17,7 @@ use core::ops::{Deref, DerefMut};
 use core::ptr::NonNull;
 use nalgebra::{Dyn, IsContiguous, Owned, RawStorage, RawStorageMut, Storage, U1, VecStorage};
 
-/// Array of fixed length on the heap: a boxed slice, stored as pointer and length in this order for every `T`.
+/// Array of fixed length on the heap. It is a boxed slice, stored as pointer and length, in this order for every `T`.
 #[repr(C)]
 pub struct Array<T> {
     start: NonNull<T>,
@@ -31,11 +31,11 @@ unsafe impl<T: Send> Send for Array<T> {}
 unsafe impl<T: Sync> Sync for Array<T> {}
 
 impl<T> Array<T> {
-    /// Converts the array back into the boxed slice it was created from.
+    /// Converts the array back into the boxed slice from which it was created.
     #[inline]
     fn into_boxed_slice(self) -> Box<[T]> {
         let this = ManuallyDrop::new(self);
-        // SAFETY: pointer and length come from a boxed slice (`From<Vec<T>>`), which `this` will not drop.
+        // SAFETY: pointer and length come from a boxed slice (`From<Vec<T>>`), and dropping `this` is prevented.
         unsafe { Box::from_raw(core::ptr::slice_from_raw_parts_mut(this.start.as_ptr(), this.len)) }
     }
 }
@@ -60,7 +60,7 @@ impl<T> Deref for Array<T> {
 impl<T> DerefMut for Array<T> {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut [T] {
-        // SAFETY: as for `deref`, and `self` is borrowed exclusively.
+        // SAFETY: as for `deref`; in addition, `self` is borrowed exclusively.
         unsafe { core::slice::from_raw_parts_mut(self.start.as_ptr(), self.len) }
     }
 }
@@ -133,8 +133,8 @@ impl<'a, T> IntoIterator for &'a mut Array<T> {
     }
 }
 
-// SAFETY: the struct is `repr(C)` and consists of a thin pointer, a number and a zero-sized field. Dropping it as an
-// array of B drops entries that are alike, and frees memory of the same layout.
+// SAFETY: the struct is `repr(C)` and consists of a thin pointer, a number and a zero-sized field. If it is dropped as
+// an array of B, entries that are alike are dropped, and memory of the same layout is freed.
 #[doc(hidden)]
 unsafe impl<A: Alike<B>, B> Alike<Array<B>> for Array<A> {}
 
@@ -149,7 +149,7 @@ impl<A: Alike<B>, B> Rename<Array<B>> for Array<A> {
 
 /// Matrix in a workspace or in a result: nalgebra's matrix type, column-major, over an [`Array`].
 ///
-/// It is indexed, multiplied, compared and viewed like a `DMatrix`. `clone_owned` copies it into a `DMatrix`.
+/// It has the indices, products, comparisons and views of a `DMatrix`. `clone_owned` copies it into a `DMatrix`.
 ///
 /// ```
 /// use condyle_spatial::{Matrix, matrix};
@@ -164,7 +164,8 @@ pub type Matrix<T> = nalgebra::Matrix<T, Dyn, Dyn, MatrixStorage<T>>;
 
 /// Matrix whose entries are stored column by column without gaps: a [`Matrix`] or nalgebra's `DMatrix`.
 ///
-/// A view does not qualify, because there may be gaps between its rows or columns. Passing one does not compile:
+/// A view does not qualify, because there may be gaps between its rows or columns. Code that passes a view does not
+/// compile:
 ///
 /// ```compile_fail,E0277
 /// use condyle_spatial::{Dense, DenseMatrix};
@@ -223,7 +224,7 @@ const _: () = {
     assert!(size_of::<Matrix<Fused>>() == size_of::<MatrixStorage<Fused>>());
 };
 
-// SAFETY: there are rows · columns numbers, column by column, and their number cannot change.
+// SAFETY: there are rows · columns numbers, stored column by column, and the number of entries cannot change.
 unsafe impl<T> RawStorage<T, Dyn, Dyn> for MatrixStorage<T> {
     type RStride = U1;
     type CStride = Dyn;
@@ -250,7 +251,7 @@ unsafe impl<T> RawStorage<T, Dyn, Dyn> for MatrixStorage<T> {
     }
 }
 
-// SAFETY: as above; the pointer refers to numbers that `self` owns.
+// SAFETY: as above. The pointer refers to numbers that `self` owns.
 unsafe impl<T> RawStorageMut<T, Dyn, Dyn> for MatrixStorage<T> {
     #[inline(always)]
     fn ptr_mut(&mut self) -> *mut T {
@@ -262,7 +263,7 @@ unsafe impl<T> RawStorageMut<T, Dyn, Dyn> for MatrixStorage<T> {
     }
 }
 
-// SAFETY: all numbers are initialised, and copies have the same length.
+// SAFETY: all numbers are initialised, and a copy has the same length.
 unsafe impl<T: nalgebra::Scalar> Storage<T, Dyn, Dyn> for MatrixStorage<T> {
     #[inline]
     fn into_owned(self) -> Owned<T, Dyn, Dyn> {

@@ -71,20 +71,20 @@ proptest! {
     fn inertia_is_symmetric_and_positive(I in inertia(), u in motion(), v in motion()) {
         prop_assert!((u.dot(I * v) - v.dot(I * u)).abs() < ROUNDING);
         prop_assert!(v.dot(I * v) > 0.0);
-        // a rotation produces no power: v · (v ×* I v) = 0
+        // a rotation of the body produces no power: v · (v ×* I v) = 0
         prop_assert!(v.dot(v.cross(I * v)).abs() < 10.0 * ROUNDING);
     }
 
     #[test]
     fn gyroscopic_torque(c in vec3(), mass in 0.1..2.0, w in vec3(), d in prop::array::uniform3(0.1..2.0)) {
-        // about the centre of mass, for a body that rotates about it: n = ω × J ω, no force
+        // about the centre of mass, for a body that rotates about it: the moment is n = ω × J ω, and the force is zero
         let J = Sym3 { xx: d[0], yy: d[1], zz: d[2], ..Sym3::zero() };
         let at_com = Inertia::from_com(mass, Vec3::zero(), J);
         let v = Motion::new(Vec3::zero(), w);
         let f = v.cross(at_com * v);
         prop_assert!(distance(f.linear.to_array(), [0.0; 3]) < ROUNDING);
         prop_assert!(distance(f.angular.to_array(), w.cross(J * w).to_array()) < ROUNDING);
-        // about another point: the centripetal force m ω × (ω × c), which acts at c
+        // about another point, the centripetal force m ω × (ω × c) is added, which acts at c
         let away = Inertia::from_com(mass, c, J);
         let f = v.cross(away * v);
         let pull = w.cross(w.cross(c)).scale(mass);
@@ -94,7 +94,7 @@ proptest! {
 
     #[test]
     fn inertia_is_a_sum_of_points(points in prop::collection::vec((0.1..2.0, vec3()), 3), v in motion()) {
-        // momentum of a point at c: m (v + ω × c), with its moment about the origin
+        // the momentum of a mass point at c is m (v + ω × c), with a moment about the origin
         let mut I = Inertia::zero();
         let mut momentum = Force::zero();
         for (m, c) in points {
@@ -110,7 +110,7 @@ proptest! {
         let IA = ArticulatedInertia::from(I);
         prop_assert!(distance((IA * v).to_array(), (I * v).to_array()) < 10.0 * ROUNDING);
         let U = IA * s;
-        let eliminated = IA.minus_outer(U, 1.0 / s.dot(U)); // no force acts along s, so the body moves freely there
+        let eliminated = IA.minus_outer(U, 1.0 / s.dot(U)); // no force acts along s, so the body moves freely along s
         prop_assert!(distance((eliminated * s).to_array(), [0.0; 6]) < 100.0 * ROUNDING);
         for k in 0..6 {
             let expected = (IA * unit(k)).to_array()[k] - U.to_array()[k] * U.to_array()[k] / s.dot(U);
@@ -124,7 +124,7 @@ proptest! {
         let U = IA * s;
         let Ia = IA.minus_outer(U, 1.0 / s.dot(U));
         let there = X.act(Ia);
-        // X (Iᴬ v) = (X Iᴬ X⁻¹) (X v), and the inverse transformation
+        // X (Iᴬ v) = (X Iᴬ X⁻¹) (X v), and the inverse transformation undoes this
         prop_assert!(distance((there * X.act(v)).to_array(), X.act(Ia * v).to_array()) < 1000.0 * ROUNDING);
         prop_assert!(distance((X.act_inv(there) * v).to_array(), (Ia * v).to_array()) < 1000.0 * ROUNDING);
     }

@@ -1,4 +1,4 @@
-//! Dual numbers over lanes, and tanh and exp on dual numbers, compared with num-dual.
+//! Tests of dual numbers over lanes, and of tanh and exp on dual numbers, compared with num-dual.
 
 use condyle_spatial::Scalar;
 use condyle_spatial::elementary::{exp, tanh};
@@ -36,7 +36,8 @@ fn lane_duals_agree_with_num_dual() {
     }
 }
 
-/// The error bound of exp grows with the magnitude of its argument.
+/// tanh agrees with num-dual, and exp with the standard library. The error bound of exp grows with the magnitude of its
+/// argument.
 #[test]
 fn tanh_and_exp_agree_with_the_library() {
     for k in -4000..=4000 {

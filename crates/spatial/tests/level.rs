@@ -1,15 +1,15 @@
-//! Environment variable that selects the SIMD level.
+//! Tests of the environment variable that selects the SIMD level.
 
 use condyle_spatial::level::{Level, level};
 use std::process::Command;
 
-/// Program that uses vectors; `refused_levels` runs it.
+/// Uses vectors; `refused_levels` runs this test as a program.
 #[test]
 fn program() {
     println!("level {}, then {}", level(), level());
 }
 
-/// Returns what the program writes to standard output and standard error with this value of the variable.
+/// Runs the program with a value of the environment variable, and returns its standard output and standard error.
 fn run(value: &str) -> [String; 2] {
     let mut program = Command::new(std::env::current_exe().unwrap());
     let output = program.args(["--exact", "program", "--nocapture"]).env("CONDYLE_LEVEL", value).output().unwrap();
@@ -17,7 +17,7 @@ fn run(value: &str) -> [String; 2] {
     [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap())
 }
 
-/// An invalid value is reported once, and the best level is used.
+/// An invalid value of the variable is reported once, and the best level is used.
 #[test]
 fn refused_levels() {
     let best = Level::ALL.into_iter().rfind(|level| level.is_supported()).unwrap();

@@ -1,5 +1,5 @@
-//! Rotations and rigid motions: exponentials against logarithms and matrix exponentials, Jacobians against dual
-//! numbers.
+//! Tests of rotations and rigid motions: exponentials are compared with logarithms and matrix exponentials, Jacobians
+//! with dual numbers.
 #![allow(non_snake_case)]
 
 mod common;
@@ -14,7 +14,8 @@ use proptest::prelude::*;
 
 /// Rounding error of a dozen operations on numbers between 1 and 4.
 const ROUNDING: f64 = 2e-14;
-/// Rounding error of nalgebra's matrix exponential, which scales and squares; it is larger than ours.
+/// Rounding error of nalgebra's matrix exponential. It is larger than the error of `exp6`, because nalgebra scales the
+/// matrix and squares the result.
 const MATRIX_EXPONENTIAL: f64 = 1e-12;
 
 fn four(q: Quaternion<f64>) -> [f64; 4] {
@@ -51,7 +52,7 @@ proptest! {
         prop_assert!(distance(lie::log3(lie::exp3(w)).to_array(), w.to_array()) < ROUNDING);
     }
 
-    /// Beyond π, the shortest rotation has the opposite sense.
+    /// If the angle exceeds π, the shortest rotation turns in the opposite direction.
     #[test]
     fn log3_is_the_shortest(n in axis(), angle in PI + 1e-9..TAU) {
         let w = lie::log3(lie::exp3(n.scale(angle)));
@@ -102,10 +103,10 @@ proptest! {
         prop_assert!(distance(p.to_array(), X.translation.to_array()) < ROUNDING);
     }
 
-    /// exp(w + ε d) = exp(w) exp(ε J d).
+    /// The Jacobian J of exp satisfies exp(w + ε d) = exp(w) exp(ε J d).
     #[test]
     fn jexp3_is_the_derivative(w in rotation_vector(), stretch in 0.0..2.0, d in vec3()) {
-        let w = w.scale(stretch); // to 2π
+        let w = w.scale(stretch); // up to angles of 2π
         let q = lie::exp3(dual(w, d));
         let still = Quaternion { vector: real(q.vector), scalar: q.scalar.re };
         let turn = Quaternion { vector: eps(q.vector), scalar: q.scalar.eps };
@@ -113,7 +114,7 @@ proptest! {
         prop_assert!(distance((lie::jexp3(w) * d).to_array(), d_body.to_array()) < ROUNDING);
     }
 
-    /// log(exp(w) exp(ε d)) = w + ε J d.
+    /// The Jacobian J of log satisfies log(exp(w) exp(ε d)) = w + ε J d.
     #[test]
     fn jlog3_is_the_derivative(w in rotation_vector(), d in vec3()) {
         let turned = lie::exp3(dual(w, Vec3::zero())) * lie::exp3(dual(Vec3::zero(), d));
@@ -161,7 +162,7 @@ proptest! {
         }
     }
 
-    /// Covers all four branches: the largest component is x, y, z or w.
+    /// Covers all four branches of the conversion: the largest component is x, y, z or w.
     #[test]
     fn quaternion_and_rotation(q in prop::array::uniform4(-1.0..1.0), large in 0..4_usize) {
         let mut q = q;
@@ -183,7 +184,7 @@ proptest! {
         prop_assert!(distance(four(a * a.conjugate()), four(Quaternion::identity())) < ROUNDING);
     }
 
-    /// Includes half turns, whose rotation matrix is symmetric, so that iterative methods stall.
+    /// Includes half turns. Their rotation matrices are symmetric, so that iterative methods do not advance.
     #[test]
     fn nalgebra_isometry(X in pose(), x in vec3()) {
         let peer = nalgebra::Isometry3::from(X);
@@ -213,7 +214,7 @@ fn second_derivatives_at_zero() {
     let J: Mat3<Dual64> = lie::jexp3(dual(Vec3::zero(), e.into()));
     let moved = J * dual(d.into(), Vec3::zero());
     assert!(distance(eps(moved).to_array(), cross.map(|x| -0.5 * x)) < ROUNDING);
-    // log ∘ exp is the identity: its first derivative is 1, its second 0
+    // log ∘ exp is the identity: its first derivative is 1, its second derivative is 0
     let w: [Second; 3] = core::array::from_fn(|k| Dual::new(Dual64::new(0.0, d[k]), Dual64::new(e[k], 0.0)));
     let back = lie::log3(lie::exp3(Vec3::from(w))).to_array();
     assert!(distance(back.map(|x| x.re.eps), d) < ROUNDING);
@@ -234,8 +235,8 @@ fn stumpff_exactly(k: u32, n: i128) -> f64 {
     sum as f64 / ONE as f64
 }
 
-/// Below 1, the error is the rounding error relative to cₖ. Above 1, the recurrence adds the rounding errors of sine
-/// and cosine twice, relative to 1.
+/// Below t = 1, the error is the rounding error relative to cₖ. Above 1, the recurrence adds the rounding errors of
+/// sine and cosine twice, relative to 1.
 #[test]
 fn stumpff_functions() {
     const ABSOLUTE: f64 = 4.0 * f64::EPSILON;
@@ -260,7 +261,7 @@ fn stumpff_functions() {
 fn stumpff_is_continuous_at_the_switch() {
     let (below, above) = (lie::stumpff(1f64.next_down()), lie::stumpff(1.0));
     assert!(distance(below, above) < 4.0 * f64::EPSILON);
-    // so are its derivatives: c_k' = (k c_{k+2} − c_{k+1}) / 2
+    // the derivatives follow c_k' = (k c_{k+2} − c_{k+1}) / 2, so they are continuous, too
     for t in [1f64.next_down(), 1.0, 1e-300, 0.0, 9.0] {
         let c = lie::stumpff(Dual64::new(t, 1.0));
         for k in 0..4 {

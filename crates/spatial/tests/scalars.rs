@@ -1,4 +1,4 @@
-//! One generic function on every kind of number: its values and derivatives agree.
+//! Tests of one generic function with every kind of number: values and derivatives agree.
 #![allow(non_snake_case)]
 
 use condyle_spatial::{Constant, Scalar, Vec3, lie};
@@ -8,7 +8,7 @@ use num_dual::{Dual, Dual2_64, Dual3_64, Dual64, DualSVec64, HyperDual64, HyperH
 const ROUNDING: f64 = 1e-14;
 /// Rounding error of the same operations in single precision.
 const ROUNDING_F32: f64 = 1e-5;
-/// Error of central differences with a step of 1e-5: step² and rounding/step.
+/// Error of central differences with a step of 1e-5: the sum of step² and rounding error/step.
 const DIFFERENCES: f64 = 1e-8;
 /// Error of central second differences with a step of 1e-4.
 const SECOND_DIFFERENCES: f64 = 1e-6;
@@ -103,7 +103,7 @@ fn second_derivatives() {
     }
 }
 
-/// Checks every half axis and every quadrant, with the derivatives ∂/∂y = x/r², ∂/∂x = −y/r².
+/// Checks atan2 on every half axis and in every quadrant, with the derivatives ∂/∂y = x/r², ∂/∂x = −y/r².
 #[test]
 fn atan2_of_duals() {
     for (y, x) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 2.0), (0.0, -2.0), (1.0, 2.0), (2.0, -1.0), (-2.0, -1.0), (-1.0, 2.0)]
@@ -125,7 +125,7 @@ fn atan2_of_duals() {
     }
 }
 
-/// Rotates forward and back in single precision, at all angles.
+/// Converts rotation vectors to quaternions and back in single precision, for angles up to π.
 #[test]
 fn single_precision() {
     for k in 0..64 {

@@ -1,4 +1,4 @@
-//! Arrays and matrices, and types that are alike.
+//! Tests of arrays and matrices in workspaces, and of types that are alike.
 #![allow(non_snake_case, unsafe_code)] // M
 
 use condyle_spatial::gate::{self, Fused, Rename, Witness};
@@ -7,7 +7,7 @@ use condyle_spatial::{Array, Matrix, Motion, matrix};
 use nalgebra::{DMatrix, RawStorage, Storage, dmatrix};
 use std::rc::Rc;
 
-/// Each entry has a different owner, so that its reference count shows whether it was dropped.
+/// Each entry is a reference-counted pointer, whose count shows whether the entry was dropped.
 #[test]
 fn arrays_drop_and_clone_each_entry_once() {
     let owners: Vec<Rc<usize>> = (0..5).map(Rc::new).collect();
@@ -24,7 +24,7 @@ fn arrays_drop_and_clone_each_entry_once() {
     assert!(owners.iter().all(|owner| Rc::strong_count(owner) == 1));
 }
 
-/// A vector with unused capacity is shrunk.
+/// The unused capacity of a vector is dropped when the vector becomes an array.
 #[test]
 fn arrays_take_vectors_with_room() {
     let mut entries = Vec::with_capacity(10);
@@ -132,7 +132,7 @@ fn matrices_may_be_empty() {
     }
 }
 
-/// Functions of nalgebra that move entries out one by one leave the dropping to their caller.
+/// Some functions of nalgebra move entries out one by one, and leave it to the caller to drop the rest.
 #[test]
 fn matrices_forget_their_elements() {
     let owner = Rc::new(0);

@@ -1,4 +1,5 @@
-//! Work sharing without the feature `threads`: the calling thread does all work, with the same bits.
+//! Replacement for shared work without the feature `threads`: the calling thread does all work, and results have the
+//! same bits.
 
 /// Returns the number of threads that share work: one.
 pub fn threads() -> usize {

@@ -1,15 +1,16 @@
-//! Parts of a horizon that go through stages. Whichever thread comes first does a stage of a part.
+//! Parts of a horizon that go through stages. The first free thread does the next stage of a part.
 #![allow(unsafe_code)]
 
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-/// State of a part: 2·stage while it waits for the stage, and 2·stage + `AT_WORK` while a thread works on it.
+/// Bit of a part's state that is set while a thread works on the part. The state is 2·stage while the part waits for
+/// the stage, and 2·stage + `AT_WORK` during the stage.
 const AT_WORK: u8 = 1;
 
-/// Parts of two slices of equal length, split at the same indices. Each part goes through the stages 0, 1, … in turn;
-/// one thread at a time works on it.
+/// Parts of two slices of equal length, which are split at the same indices. Each part goes through the stages 0, 1, …
+/// in turn, and only one thread at a time works on a part.
 #[derive(Debug)]
 pub struct Parts<'a, A, B> {
     first: *mut A,
@@ -26,7 +27,7 @@ pub struct Parts<'a, A, B> {
 unsafe impl<A: Send, B: Send> Sync for Parts<'_, A, B> {}
 
 impl<'a, A, B> Parts<'a, A, B> {
-    /// Splits two slices at the indices `cuts`; all parts wait for stage 0. `states` is scratch memory, which grows if
+    /// Splits two slices at the indices `cuts`. All parts wait for stage 0. `states` is scratch memory, which grows if
     /// it is too short.
     ///
     /// # Panics
@@ -48,8 +49,8 @@ impl<'a, A, B> Parts<'a, A, B> {
         self.states.len()
     }
 
-    /// Executes a stage on a part, if the part waits for this stage. Returns whether it did. The closure gets the index
-    /// of the part's first item and the part of each slice.
+    /// Executes a stage on a part if the part waits for this stage, and returns whether it did. The closure receives
+    /// the index of the part's first item, and the items of the part in both slices.
     pub fn work(&self, part: usize, stage: u8, work: impl FnOnce(usize, &mut [A], &mut [B])) -> bool {
         let (state, waiting) = (&self.states[part], 2 * stage);
         if state.compare_exchange(waiting, waiting + AT_WORK, Ordering::Acquire, Ordering::Relaxed).is_err() {
@@ -57,8 +58,9 @@ impl<'a, A, B> Parts<'a, A, B> {
         }
         let mut at_work = AtWork { abandoned: &self.abandoned, panics: true };
         let (start, end) = (self.cuts[part], self.cuts[part + 1]);
-        // SAFETY: the cuts ascend within both slices, and parts do not overlap. No other thread has this part: of all
-        // threads that find it waiting, only one succeeds, and it waits again only after that thread has finished.
+        // SAFETY: the cuts ascend within both slices, so parts do not overlap. No other thread works on this part: only
+        // one of the threads that find the part waiting succeeds, and the part waits again only after this thread has
+        // finished.
         let (first, second) = unsafe {
             let first = core::slice::from_raw_parts_mut(self.first.add(start), end - start);
             (first, core::slice::from_raw_parts_mut(self.second.add(start), end - start))
@@ -69,18 +71,19 @@ impl<'a, A, B> Parts<'a, A, B> {
         true
     }
 
-    /// Returns whether a stage of a part has yet to begin: the part waits for it, or an earlier stage is not finished.
+    /// Returns whether a stage of a part has yet to begin: the part waits for this stage, or an earlier stage is not
+    /// finished.
     pub fn awaits(&self, part: usize, stage: u8) -> bool {
         self.states[part].load(Ordering::Relaxed) <= 2 * stage
     }
 
-    /// Returns whether a thread has panicked during its work, so that its part will not advance.
+    /// Returns whether a thread has panicked during its work, so that the thread's part will not advance.
     pub fn is_abandoned(&self) -> bool {
         self.abandoned.load(Ordering::Relaxed)
     }
 }
 
-/// Guard that informs the other threads if the work panics.
+/// Guard that informs the other threads if the work on a part panics.
 struct AtWork<'a> {
     abandoned: &'a AtomicBool,
     panics: bool,

@@ -1,14 +1,15 @@
-//! Work sharing with rayon's threads, also in a process that was forked from a process with such threads.
+//! Shared work on rayon's threads, also after fork() in a process that already had such threads.
 //!
-//! fork() copies the memory of a process, but only one of its threads: the caller. The child has a copy of the parent's
-//! thread pool without its threads, and waiting for this pool never ends. So each process starts its own pool.
+//! fork() copies the memory of a process, but only one of its threads: the calling thread. The child process has a copy
+//! of the parent's thread pool without the threads, and waiting for this pool never ends. So each process starts its
+//! own pool.
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::error::Error;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Process that uses rayon's global pool: the first one that asks for threads. 0 before that.
+/// Id of the process that uses rayon's global pool: the first process that asked for threads. It is 0 before that.
 static FIRST: AtomicU32 = AtomicU32::new(0);
 
 /// Number of threads of the global pool; 1 if the pool could not be started.
@@ -27,7 +28,7 @@ struct Forked {
     next: OnceLock<Box<Forked>>,
 }
 
-/// Thread pool in which work is shared.
+/// Thread pool on which a thread shares work.
 enum Pool {
     /// Pool to which the calling thread belongs.
     Current,
@@ -56,10 +57,10 @@ fn pool() -> Pool {
     forked.pool.as_ref().map_or(Pool::Missing, Pool::Forked)
 }
 
-/// Starts the global pool unless it exists, and returns the number of its threads.
+/// Starts the global pool unless it exists, and returns the number of threads in the pool.
 fn start_global() -> usize {
     match ThreadPoolBuilder::new().build_global() {
-        Err(error) if error.source().is_some() => 1, // the system refuses threads
+        Err(error) if error.source().is_some() => 1, // the operating system refuses threads
         _ => rayon::current_num_threads(),
     }
 }
@@ -72,8 +73,8 @@ impl Forked {
     }
 }
 
-/// Returns the number of threads that share work. Inside a rayon pool, these are the threads of that pool; else of the
-/// global pool, or in a forked process of the pool that replaces it.
+/// Returns the number of threads that share work. Inside a rayon pool, these are the threads of that pool. Otherwise
+/// they are the threads of the global pool or, in a forked process, of the pool that replaces it.
 pub fn threads() -> usize {
     match pool() {
         Pool::Current | Pool::Global => rayon::current_num_threads(),
@@ -91,8 +92,8 @@ pub fn join(one: impl FnOnce() + Send, other: impl FnOnce() + Send) {
 }
 
 /// Executes [`join`] for all types of closures. It is compiled only once, because rayon's code for each type takes some
-/// kilobytes. A calling thread outside the pool runs its closure itself: waking another thread takes some 50 µs, and
-/// the data in this core's cache stays useful.
+/// kilobytes. A calling thread outside the pool runs its closure itself: waking another thread takes about 50 µs, and
+/// the data is still in the cache of the caller's core.
 fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
     match pool() {
         Pool::Current => {
@@ -113,7 +114,7 @@ fn join_dyn(one: &mut (dyn FnMut() + Send), other: &mut (dyn FnMut() + Send)) {
     }
 }
 
-/// Waits briefly for another thread, and yields the processor in case both threads need the same one.
+/// Waits briefly for another thread, and yields the processor in case both threads need the same processor.
 pub fn pause() {
     for _ in 0..32 {
         std::hint::spin_loop();

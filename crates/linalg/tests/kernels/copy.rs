@@ -1,4 +1,4 @@
-//! Copies and transposes of matrices.
+//! Tests of copies and transposes of matrices.
 
 use crate::at_each_level;
 use condyle_linalg::{

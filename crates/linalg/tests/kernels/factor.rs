@@ -1,4 +1,4 @@
-//! Elimination and solves.
+//! Tests of elimination and of solutions with the factor.
 
 use crate::at_each_level;
 use condyle_linalg::{SLACK, View, backward_solve, eliminate, eliminate_rows, forward_solve, solve_right};
@@ -53,7 +53,7 @@ fn elimination_and_solves_match_nalgebra_for_every_edge() {
     });
 }
 
-/// Rows that are eliminated separately give the same result as rows below the matrix.
+/// Eliminating rows with `eliminate_rows` gives the same result as storing the rows below the matrix.
 #[test]
 fn rows_apart_are_rows_below() {
     at_each_level(|| {

@@ -1,4 +1,4 @@
-//! Dense kernels, at every SIMD level that this processor has.
+//! Tests of the dense kernels, at every SIMD level that this processor has.
 #![allow(non_snake_case)]
 
 mod copy;

@@ -1,4 +1,4 @@
-//! Sums of outer products of rows with zeros.
+//! Tests of sums of outer products of rows that contain zeros.
 
 use crate::at_each_level;
 use condyle_linalg::{OuterProducts, SLACK, SparseRows, Vector, Vectorized, at_level};
@@ -6,7 +6,7 @@ use condyle_linalg::{OuterProducts, SLACK, SparseRows, Vector, Vectorized, at_le
 /// Rounding error of sums of 20 numbers near 1.
 const TOLERANCE: f64 = 1e-12;
 
-/// Squares of the first rows, and products of each later row with the next one.
+/// Work that adds the squares of the first rows, and the product of each later row with the next row.
 struct Fill<'a> {
     sum: &'a mut OuterProducts,
     rows: &'a SparseRows,

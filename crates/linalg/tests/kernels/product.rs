@@ -1,4 +1,4 @@
-//! Products of matrices.
+//! Tests of products of matrices.
 
 use crate::at_each_level;
 use condyle_linalg::{
@@ -14,7 +14,7 @@ fn entry(i: usize, j: usize) -> f64 {
     ((i * 31 + j * 17 + 5) % 23) as f64 / 23.0 - 0.4
 }
 
-/// Returns a copy with padding rows.
+/// Returns a copy of a matrix with padding rows, and the stride of the copy.
 fn padded(a: &DMatrix<f64>) -> (Vec<f64>, usize) {
     let stride = a.nrows() + SLACK;
     let mut out = vec![0.0; stride * a.ncols()];
@@ -24,7 +24,7 @@ fn padded(a: &DMatrix<f64>) -> (Vec<f64>, usize) {
     (out, stride)
 }
 
-/// Checks each product of A with B.
+/// Checks each kind of product of A with B.
 fn check_products(a: &DMatrix<f64>, b: &DMatrix<f64>) {
     let (rows, columns, length) = (a.nrows(), b.nrows(), a.ncols());
     let (shape, expected) = ([rows, columns, length], a * b.transpose());
@@ -76,7 +76,7 @@ fn products_match_nalgebra_for_every_edge() {
     });
 }
 
-/// Sums of some rows and columns, each written to two places.
+/// Work that computes sums of matrices; each sum is written to two offsets.
 struct Sums<'a>(&'a mut [f64], usize, [View<'a>; 2], [usize; 2]);
 
 impl Vectorized for Sums<'_> {

@@ -1,4 +1,4 @@
-//! Elimination of a matrix plus a sum of products, in one function.
+//! Tests of `eliminate_sum`, which eliminates columns of a matrix plus a sum of outer products.
 
 use crate::at_each_level;
 use condyle_linalg::{SLACK, View, add_product_lower, eliminate, eliminate_sum};

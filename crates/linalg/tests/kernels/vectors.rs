@@ -1,4 +1,4 @@
-//! Products of matrices and vectors.
+//! Tests of products of matrices and vectors.
 
 use crate::at_each_level;
 use condyle_linalg::{SLACK, View, add_product_vector, add_scaled_product, transposed_product_vector};

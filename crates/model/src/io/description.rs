@@ -1,5 +1,5 @@
-//! Models in serde formats. A file contains the fields that a user may edit. All other fields follow from these; they
-//! are computed and checked when a file is read.
+//! Models in formats of serde. A file contains the fields that a user may edit. All other fields are computed from them
+//! and checked when a file is read.
 
 use crate::actuator::Actuator;
 use crate::body::{Body, Frame, Limits};
@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 use condyle_spatial::{Inertia, Se3, Vec3};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// Fields of a model that a file contains, each as in [`Model`].
+/// Fields of a model that a file contains. Each field is as in [`Model`].
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -73,7 +73,7 @@ impl<'de> Deserialize<'de> for Model {
 }
 
 impl Description {
-    /// Builds and checks the model.
+    /// Builds and checks the model that a file describes.
     fn model(self) -> Result<Model, Error> {
         let mut builder = ModelBuilder::new(&self.name);
         builder.gravity(self.gravity);
@@ -103,9 +103,9 @@ impl Description {
         (model.springs, model.gravity_compensation) = (self.springs, self.gravity_compensation);
         (model.actuators, model.keyframes, model.constraints) = (self.actuators, self.keyframes, self.constraints);
         for keyframe in model.keyframes.iter_mut().filter(|keyframe| keyframe.control.is_empty()) {
-            keyframe.control = vec![0.0; model.actuators.len()]; // of a version that had no controls
+            keyframe.control = vec![0.0; model.actuators.len()]; // the file is of a version without controls
         }
-        // `name#1`, …, without mass, stand between the joints of a chain, unless they were warned of
+        // Bodies `name#1`, … without mass connect the joints of a chain, unless there is a warning about them.
         let warned: BTreeSet<&str> = warnings
             .iter()
             .filter_map(|w| if let Warning::Massless { body } = w { Some(&**body) } else { None })
@@ -117,7 +117,7 @@ impl Description {
         Ok(model)
     }
 
-    /// Adds the bodies, which must be listed depth first.
+    /// Adds the bodies, which must be listed in depth-first order.
     fn add_bodies(&self, builder: &mut ModelBuilder) -> Result<Vec<BodyId>, Error> {
         let Some(world) = self.bodies.first() else {
             return Err(Error::Length { name: "bodies", expected: 1, found: 0 });
@@ -137,7 +137,7 @@ impl Description {
             let options = Default::default();
             ids.push(builder.body_with(names, parent, body.joint, body.placement, body.inertia, options));
         }
-        builder.check_size()?; // before leaders are searched among all bodies
+        builder.check_size()?; // must come before leaders are searched among all bodies
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             let Some(mimic) = body.mimic else { continue };
             let leads = |b: &Body| b.mimic.is_none() && b.idx_v == body.idx_v;
@@ -150,7 +150,7 @@ impl Description {
         Ok(ids)
     }
 
-    /// Checks the number of entries for each coordinate.
+    /// Checks the lengths of the lists that have one entry for each coordinate.
     fn check_coordinates(&self, nq: usize, nv: usize) -> Result<(), Error> {
         let Limits { lower, upper, velocity, effort_lower, effort_upper } = &self.limits;
         for (name, numbers, expected) in [

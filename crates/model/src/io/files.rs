@@ -1,13 +1,13 @@
-//! Files to which a robot's file refers: paths, and `package://name/path` addresses of ROS.
+//! Search for files that a robot's file names by a path, or by a `package://name/path` address of ROS.
 
 use crate::error::Error;
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
-/// First part of the address of a file in a package.
+/// Beginning of the address of a file in a package.
 const SCHEME: &str = "package://";
 
-/// Returns the path of the file at a path or a `package://` address.
+/// Returns the path of the file that a path or a `package://` address names.
 pub(crate) fn locate(path: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error> {
     match path.to_str().and_then(|p| p.strip_prefix(SCHEME)) {
         None => Ok(path.to_owned()),
@@ -23,7 +23,7 @@ pub(crate) fn locate(path: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error
 #[allow(dead_code)]
 pub(crate) fn resolve(address: &str, folder: &Path, packages: &[PathBuf]) -> Result<PathBuf, Error> {
     let path = address.strip_prefix("file://").unwrap_or(address);
-    Ok(folder.join(locate(Path::new(path), packages)?)) // an absolute path does not change
+    Ok(folder.join(locate(Path::new(path), packages)?)) // an absolute path is not changed
 }
 
 /// Returns all folders in which packages may be, in order of priority.
@@ -40,7 +40,7 @@ fn folders(packages: &[PathBuf], ros: Option<OsString>, ament: Option<OsString>)
 pub(crate) struct Search<'a> {
     /// Folder of the file that includes the models; `None` for a string.
     pub(crate) folder: Option<&'a Path>,
-    /// Folders that contain packages or models, or are one themselves.
+    /// Folders that contain packages or models, or that are a package or model themselves.
     pub(crate) packages: &'a [PathBuf],
 }
 
@@ -50,9 +50,9 @@ const MODEL_PATHS: [&str; 4] = ["GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PAT
 /// Returns the file, or the folder with a `model.config`, at the address of a model: `model://`, `package://`,
 /// `file://`, or a path.
 ///
-/// A path may be relative to the folder of the file that contains the address. Otherwise, addresses and paths are
-/// searched in `packages`, in that folder and the one above it, in the `models` folder of both, and in the folders of
-/// Gazebo's and ROS's variables.
+/// A path may be relative to the folder of the file that contains the address. Otherwise, the address is searched in
+/// `packages`, in the folder of that file and its parent folder, and in the `models` folder of both. Finally, it is
+/// searched in the folders listed in environment variables of Gazebo and ROS.
 pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Error> {
     let (scheme, path) = address.split_once("://").map_or(("", address), |(scheme, path)| (scheme, path));
     let missing = |what: &str| Error::File { file: address.to_owned(), what: what.to_owned() };
@@ -83,8 +83,8 @@ pub(crate) fn find_model(address: &str, search: &Search) -> Result<PathBuf, Erro
     find(&prefix, path, &all, |path| path.exists())
 }
 
-/// Returns the first existing file: in a package within a folder, or in a folder that is the package itself. The path
-/// cannot leave the package, except through links in it.
+/// Returns the first existing file: in a package within one of the folders, or in a folder that is the package itself.
+/// The path cannot leave the package, except through links in the package.
 fn find(scheme: &str, address: &str, folders: &[PathBuf], fits: fn(&Path) -> bool) -> Result<PathBuf, Error> {
     let (package, path) = address.split_once('/').unwrap_or((address, ""));
     let down = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);

@@ -1,9 +1,9 @@
-//! Known elements and attributes of a format, by parent. All others in a file are misspelt or misplaced, and have no
-//! effect. Each causes a warning with file, line and the nearest known name.
+//! Known elements and attributes of a format, by parent element. All other names in a file are misspelt or misplaced,
+//! and have no effect. Each of them causes a warning with the file, the line and the nearest known name.
 //!
-//! Names with a prefix belong to other programs and are not checked, unless the prefix occurs in the format's table or
-//! resembles one that does. If a table does not have a prefix, its format does not have extensions: a name with a
-//! prefix is unknown there.
+//! A name with a prefix (`prefix:name`) belongs to another program and is not checked, unless the prefix occurs in the
+//! format's table or is similar to a prefix that does. If there are no prefixes in a table, the format has no
+//! extensions, and a name with a prefix is unknown.
 
 use super::xml::Element;
 use crate::names::{near, nearest};
@@ -12,19 +12,19 @@ use std::collections::HashMap;
 
 /// Known elements and attributes of a format.
 ///
-/// They are written as a text with one line for each type of element:
+/// The names are written as a text with one line for each type of element:
 ///
 /// ```text
 /// type: attribute attribute … ; child child=type child* …
 /// ```
 ///
 /// The type of a child is its tag, unless `=type` names another type. A child whose type has no line has neither
-/// attributes nor children. `*` marks a known child without effect on a robot: its content is not checked, except that
+/// attributes nor children. `*` marks a known child without effect on a robot. Its content is not checked, except that
 /// elements of a robot are misplaced there. The line of the type `*` lists these elements as its children. `**` marks a
 /// child whose content is not checked at all.
 pub(crate) struct Known {
     types: HashMap<&'static str, Type>,
-    /// Prefixes of names in the table.
+    /// Prefixes of names that occur in the table.
     prefixes: Vec<&'static str>,
 }
 
@@ -36,22 +36,23 @@ struct Type {
     children: Vec<(&'static str, &'static str)>,
 }
 
-/// Maximum number of warnings about one file; chosen because each one searches for the nearest name.
+/// Maximum number of warnings about one file; chosen because each warning takes a search for the nearest name.
 const MAX_WARNINGS: usize = 1000;
 
-/// Type of a child in which only elements of a robot are misplaced; its line lists them.
+/// Type of a child whose content is not checked, except that elements of a robot are misplaced there. The line of this
+/// type lists these elements.
 pub(crate) const OPEN: &str = "*";
 /// Type of a child whose content is not checked.
 const FREE: &str = "**";
 /// Prefixes of attributes that XML itself uses.
 const XML: [&str; 2] = ["xml", "xsi"];
 
-/// Features that a format has and a model cannot represent: the type of an element, its attribute or child, and the
-/// effect of its absence.
+/// Features of a format that a model cannot represent: the type of an element, its attribute or child, and the effect
+/// of the missing feature.
 pub(crate) type LeftOut = [(&'static str, &'static str, &'static str)];
 
 impl Known {
-    /// Reads the text of a table.
+    /// Reads the text of a table, as described at [`Known`].
     pub(crate) fn new(text: &'static str) -> Self {
         let (mut types, mut prefixes) = (HashMap::new(), Vec::new());
         for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
@@ -75,8 +76,8 @@ impl Known {
         Self { types, prefixes }
     }
 
-    /// Adds warnings about unknown parts of an element, whose type is its tag, and about features that a model cannot
-    /// represent.
+    /// Adds warnings about unknown attributes and children of an element, whose type is its tag. Also adds warnings
+    /// about features that a model cannot represent.
     pub(crate) fn check(&self, root: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
         warnings.extend(root.outside());
         if let Some((&name, _)) = self.types.get_key_value(root.tag.as_str()) {
@@ -89,7 +90,7 @@ impl Known {
         }
     }
 
-    /// Adds warnings about an element of a given type.
+    /// Adds the warnings of [`check`](Self::check) about an element, given the type of the element.
     pub(crate) fn check_as(&self, name: &str, element: &Element, left_out: &LeftOut, warnings: &mut Vec<Warning>) {
         match name {
             FREE => return,
@@ -127,7 +128,7 @@ impl Known {
         }
     }
 
-    /// Adds warnings about elements of a robot inside an element without effect on a robot.
+    /// Adds warnings about elements of a robot that are inside an element without effect on a robot.
     fn check_open(&self, element: &Element, warnings: &mut Vec<Warning>) {
         let Some(robots) = self.types.get(OPEN) else { return };
         let is_free = |tag: &str| self.types.values().any(|t| t.children.contains(&(tag, FREE)));
@@ -149,7 +150,7 @@ impl Known {
         prefix.is_some_and(|prefix| nearest(prefix, self.prefixes.iter().copied()).is_empty())
     }
 
-    /// Returns the message that an element is unknown, or misplaced in its parent.
+    /// Returns the message about an element: it is unknown, or it is misplaced in its parent.
     fn misplaced(&self, known: &Type, parent: &Element, tag: &str) -> String {
         let near = near(&similar(tag, &known.children.iter().map(|(tag, _)| *tag).collect::<Vec<_>>()));
         let elsewhere = self.types.values().any(|t| t.children.iter().any(|(known, _)| *known == tag));
@@ -158,12 +159,13 @@ impl Known {
     }
 }
 
-/// Returns whether no more warnings are added.
+/// Returns whether the maximum number of warnings is reached, so that no more warnings are added.
 fn is_full(warnings: &[Warning]) -> bool {
     warnings.len() >= MAX_WARNINGS
 }
 
-/// Returns the nearest of the known names; if none is near, the nearest to the name without its prefix.
+/// Returns the nearest known name. If no known name is near, returns the name that is nearest to the given name without
+/// its prefix.
 fn similar(name: &str, known: &[&str]) -> String {
     let of = |name: &str| nearest(name, known.iter().copied());
     let found = of(name);

@@ -1,4 +1,4 @@
-//! Reader of MJCF, the format of MuJoCo: kinematics, inertias, limits.
+//! Reader of MJCF, the format of MuJoCo. It reads kinematics, inertias, limits, actuators, keyframes and constraints.
 
 mod actuator;
 mod assets;
@@ -48,17 +48,17 @@ const ELEMENTS: &str = include_str!("mjcf/elements.txt");
 /// Options for reading an MJCF.
 #[derive(Clone, Debug, Default)]
 pub struct MjcfOptions {
-    /// Whether a warning ([`Model::warnings`]) is an error.
+    /// Whether each warning ([`Model::warnings`]) becomes an error.
     pub strict: bool,
-    /// Kinds of warnings that are not errors, even if `strict` is set.
+    /// Kinds of warnings that do not become errors, even if `strict` is set.
     pub allow: Vec<WarningKind>,
-    /// Folders that contain packages, or are packages, for `package://` addresses; see
+    /// Folders that contain packages, or are packages themselves, for `package://` addresses; see
     /// [`UrdfOptions`](crate::UrdfOptions).
     pub packages: Vec<PathBuf>,
     /// Whether a `<joint>` of `<equality>` with a linear `polycoef` lets joint1 follow joint2
-    /// ([`Mimic`](crate::Mimic)), instead of becoming a [constraint](Model::constraints).
+    /// ([`Mimic`](crate::Mimic)). Otherwise, the element becomes a [constraint](Model::constraints).
     pub mimic: bool,
-    /// Whether a mesh that cannot be read gets no mass and a warning in [`Model::warnings`], instead of causing an
+    /// Whether a mesh that cannot be read has no mass and causes a warning in [`Model::warnings`]. Otherwise, it is an
     /// error.
     pub weightless_meshes: bool,
 }
@@ -67,52 +67,53 @@ impl Model {
     /// Reads an MJCF file and the files that it includes.
     ///
     /// Joints keep MuJoCo's order, so q and v correspond to its `qpos` and `qvel`, with two differences. Quaternions
-    /// are x, y, z, w, and the velocity of a free joint is in the body's frame (in MuJoCo its linear velocity is in the
+    /// are x, y, z, w. The velocity of a free joint is in the body's frame (in MuJoCo, its linear velocity is in the
     /// world's frame). A hinge has one coordinate, with or without limits
     /// ([`Joint::Revolute`](crate::Joint::Revolute)). Several joints of one body become a chain, with intermediate
-    /// bodies `name#1`, `name#2`, … without mass. A body without joints is merged into its parent. It stays as a frame,
-    /// as sites do ([`FrameKind::User`]).
+    /// bodies `name#1`, `name#2`, … without mass. A body without joints is merged into its parent and stays as a frame
+    /// of kind [`FrameKind::User`], as sites do.
     ///
     /// The frame of a model's body is at the body's last joint. The frame of the MJCF body is a separate frame of kind
-    /// [`FrameKind::Link`] with the body's name; both frames differ by the joint's `pos`. A free joint's q is the pose
-    /// of the MJCF body in the world; with `align` it is the pose of the frame of inertia, as in MuJoCo. Named
-    /// `<frame>`s and cameras (of mode `fixed`) are frames of kind [`FrameKind::User`], too. If a site has the same
-    /// name, they are named `frame:name` or `camera:name`.
+    /// [`FrameKind::Link`] with the body's name. The two frames differ by the joint's `pos`. The q of a free joint is
+    /// the pose of the MJCF body in the world; with `align`, it is the pose of the frame of inertia, as in MuJoCo.
+    /// `<frame>` elements with a name, and cameras of mode `fixed`, are frames of kind [`FrameKind::User`], too. If a
+    /// site has the same name, they are named `frame:name` or `camera:name`.
     ///
     /// The reader supports `<compiler>` (everything that affects a model), default classes, `<include>`, `<replicate>`,
     /// `<frame>`, `<inertial>`, masses of geoms, gravity and flags. It also supports `<attach>` of files with their own
-    /// settings. Included files are searched in the main file's folder, then in the folder of the file that includes
-    /// them. With the feature `meshes`, masses and inertias of meshes follow MuJoCo's rules (`inertia` of `<mesh>`),
-    /// and so do primitives that are fitted to meshes.
+    /// settings. Included files are searched in the main file's folder, and then in the folder of the file that
+    /// includes them. With the feature `meshes`, masses and inertias of meshes follow MuJoCo's rules (`inertia` of
+    /// `<mesh>`). Primitives that are fitted to meshes follow these rules, too.
     ///
     /// Springs ([`springs`](Self::springs)), damping, friction and armature are equal to the values in the compiled
     /// MuJoCo model. `springdamper` and `dampratio` are evaluated with the inertia in the initial configuration of the
-    /// file. Actuators add gear² times their armature and damping. A `<fixed>` tendon that moves with one coordinate
-    /// adds its spring, losses, armature and range to that coordinate. `gravcomp` becomes a [gravity
-    /// compensation](Self::gravity_compensation). As in MuJoCo, values below 0 act only if another one is above 0.
+    /// file. Actuators add gear² times their armature and damping. A `<fixed>` tendon that moves with a single
+    /// coordinate adds its spring, losses, armature and range to that coordinate. `gravcomp` becomes a [gravity
+    /// compensation](Self::gravity_compensation). As in MuJoCo, negative values of `gravcomp` act only if another value
+    /// is positive.
     ///
-    /// Limits of effort are sums over the actuators of a joint, clipped to its `actuatorfrcrange`. An actuator
-    /// contributes its `forcerange` times gear. If its force depends only on the control, it also contributes the
-    /// control range times gain and gear. A joint without actuators has its `actuatorfrcrange`, or no limit; forces at
-    /// sites limit no joint. For several actuators of a ball joint, or a tendon over several joints, the limits are a
-    /// box around the reachable efforts. [`actuators`](Self::actuators) lists the actuators of joints, fixed tendons
-    /// and sites, except muscles, plugins and dampers.
+    /// Limits of effort are sums over the actuators of a joint, clipped to the joint's `actuatorfrcrange`. An actuator
+    /// contributes its `forcerange` times gear. If the force of an actuator depends only on the control, the actuator
+    /// also contributes the control range times gain and gear. A joint without actuators has its `actuatorfrcrange`, or
+    /// no limit. Forces at sites do not limit joints. For several actuators of a ball joint, or a tendon over several
+    /// joints, the limits are a box around the reachable efforts. [`actuators`](Self::actuators) lists the actuators of
+    /// joints, fixed tendons and sites, except muscles, plugins and dampers.
     ///
-    /// Active `connect`, `weld` and `joint` elements of `<equality>` become [`constraints`](Self::constraints). Without
-    /// a name, a constraint is named by its kind and number: `weld1`. With [`MjcfOptions::mimic`], joints follow others
-    /// in the tree instead. Ranges, losses, springs and efforts of a follower then act on its leader's coordinate.
-    /// Keyframes without a name are named by their number: `key0`, `key1`, ….
+    /// Active `connect`, `weld` and `joint` elements of `<equality>` become [`constraints`](Self::constraints). A
+    /// constraint without a name is named by its kind and number: `weld1`. With [`MjcfOptions::mimic`], joints follow
+    /// others in the tree instead. Ranges, losses, springs and efforts of a follower then act on the coordinate of its
+    /// leader. Keyframes without a name are named by their number: `key0`, `key1`, ….
     ///
     /// An unknown, misspelt or misplaced name is a [warning](Model::warnings). So is each effect that a model cannot
     /// represent: tendons over several coordinates, activations and delays of actuators, the range of a ball joint,
-    /// forces of a medium, bodies moved by a program (`mocap`). Sensors, visuals and contacts are ignored.
+    /// forces of a medium, and bodies moved by a program (`mocap`). Sensors, visuals and contacts are ignored.
     /// `composite`, `flexcomp`, flexes and plugins of bodies are errors. A mesh with mass that cannot be read is an
-    /// error, unless it is on a body fixed to the world, or [`MjcfOptions::weightless_meshes`] is set. Contradictions,
+    /// error, unless its body is fixed to the world or [`MjcfOptions::weightless_meshes`] is set. Contradictions,
     /// repeated names and invalid keywords are errors, as in MuJoCo. A URDF cannot be attached.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and the
-    /// errors of [`ModelBuilder::build`]. The limits of files are listed in the [crate
+    /// Returns [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], or
+    /// an error of [`ModelBuilder::build`]. The limits of files are listed in the [crate
     /// documentation](crate#limits-of-files).
     pub fn from_mjcf(path: impl AsRef<Path>, options: &MjcfOptions) -> Result<Self, Error> {
         let mut files = Files::new(Known::new(ELEMENTS));
@@ -120,7 +121,7 @@ impl Model {
         model(&files, options)
     }
 
-    /// Reads an MJCF from a string, which may not include files; see [`from_mjcf`](Self::from_mjcf).
+    /// Reads an MJCF from a string. This MJCF may not include files; see [`from_mjcf`](Self::from_mjcf).
     ///
     /// ```
     /// use condyle_model::{MjcfOptions, Model};
@@ -138,18 +139,18 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The errors of [`from_mjcf`](Self::from_mjcf).
+    /// Returns the errors of [`from_mjcf`](Self::from_mjcf).
     pub fn from_mjcf_str(text: &str, options: &MjcfOptions) -> Result<Self, Error> {
         let mut files = Files::new(Known::new(ELEMENTS));
         files.parse(text, "<string>", None)?;
         model(&files, options)
     }
 
-    /// Reads a text that describes a compiled model of MuJoCo. Errors and warnings have no line, because the user does
-    /// not see the text.
+    /// Reads a text that describes a compiled model of MuJoCo. Errors and warnings have no line number, because the
+    /// user does not see the text.
     ///
     /// # Errors
-    /// The errors of [`from_mjcf`](Self::from_mjcf).
+    /// Returns the errors of [`from_mjcf`](Self::from_mjcf).
     #[doc(hidden)]
     pub fn from_compiled_mjcf(text: &str, options: &MjcfOptions) -> Result<Self, Error> {
         let mut files = Files::new(Known::new(ELEMENTS));
@@ -157,10 +158,10 @@ impl Model {
         model(&files, options)
     }
 
-    /// Reads a text instead of a file: the path names it in errors, and its folder is searched for included files.
+    /// Reads a text instead of a file. `path` is named in errors, and its folder is searched for included files.
     ///
     /// # Errors
-    /// The errors of [`from_mjcf`](Self::from_mjcf).
+    /// Returns the errors of [`from_mjcf`](Self::from_mjcf).
     #[doc(hidden)]
     pub fn from_mjcf_text(text: &str, path: impl AsRef<Path>, options: &MjcfOptions) -> Result<Self, Error> {
         let mut files = Files::new(Known::new(ELEMENTS));
@@ -169,16 +170,16 @@ impl Model {
     }
 }
 
-/// Returns the function that computes the pose of a `<frame>` in its surroundings, by the settings of its file.
+/// Returns a function that computes the pose of a `<frame>` in the element around it, by the settings of its file.
 ///
 /// # Errors
-/// The errors of [`Model::from_mjcf`].
+/// Returns the errors of [`Model::from_mjcf`].
 pub(super) fn frame_poses(root: &Element) -> Result<impl Fn(&Element) -> Result<Se3<f64>, Error>, Error> {
     let compiler = Compiler::read(root)?;
     Ok(move |frame: &Element| compiler.pose(&Attributes::plain(frame)))
 }
 
-/// A file with its own settings.
+/// File that has its own settings.
 struct Source<'a> {
     root: &'a Element,
     compiler: Compiler,
@@ -223,19 +224,19 @@ struct Reader<'a> {
     gravity: Vec3<f64>,
     /// Files with their own settings, the main one first.
     sources: &'a [Source<'a>],
-    /// Number of bodies so far, which is MuJoCo's index of the last one.
+    /// Number of bodies that have been read, which is MuJoCo's index of the last body.
     bodies: usize,
-    /// Named elements, by kind and name.
+    /// Elements with a name, by kind and name.
     names: HashMap<(&'static str, String), &'a Element>,
     joints: Joints<'a>,
     /// Pose of each body of the builder in the world, in the initial configuration of the file.
     poses: Vec<Se3<f64>>,
     solids: Solids,
-    /// Mass of all bodies so far (kg).
+    /// Mass of all bodies that have been read (kg).
     mass: f64,
-    /// Whether the weight of a body is compensated.
+    /// Whether the weight of at least one body is compensated.
     compensates: bool,
-    /// Named frames and cameras so far.
+    /// Frames and cameras with a name that have been read.
     placed: Vec<Placed<'a>>,
     warnings: Vec<Warning>,
 }
@@ -280,12 +281,13 @@ impl<'a> Reader<'a> {
         &self.source(element).compiler
     }
 
-    /// Returns the element with the defaults of its class, or of the surrounding class if it names no class.
+    /// Returns the element with the defaults of its class. If the element names no class, the class of the surrounding
+    /// element is used.
     fn of(&self, element: &'a Element, around: &'a str) -> Result<Attributes<'a>, Error> {
         self.source(element).defaults.of(element, around)
     }
 
-    /// Returns the element's name, or a name that is not yet used.
+    /// Returns the element's name; if it has none, returns a name that is not yet used.
     fn name(&mut self, kind: &'static str, element: &'a Element, otherwise: &str) -> Result<String, Error> {
         let own = element.attribute("name").filter(|n| !n.is_empty());
         let mut name = own.unwrap_or(otherwise).to_owned();
@@ -299,7 +301,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Returns the names of elements of one kind; an error if two have the same.
+/// Returns the elements of one kind by name. Returns an error if two elements have the same name.
 fn names<'e>(elements: impl Iterator<Item = &'e Element>) -> Result<HashMap<&'e str, &'e Element>, Error> {
     let mut names: HashMap<&str, &Element> = HashMap::new();
     for element in elements {
@@ -310,7 +312,7 @@ fn names<'e>(elements: impl Iterator<Item = &'e Element>) -> Result<HashMap<&'e 
     Ok(names)
 }
 
-/// Returns the error that the name of an element is taken by another one.
+/// Returns the error that another element already has the name of an element.
 fn taken(element: &Element, other: &Element) -> Error {
     element.wrong(format!("the name is taken by the {} on line {}", other.tag, other.line))
 }

@@ -1,4 +1,4 @@
-//! Reader of SDF, the format of Gazebo: kinematics, inertias, limits, springs, loops.
+//! Reader of SDF, the format of Gazebo. It reads kinematics, inertias, limits, springs and loops.
 
 mod convert;
 mod include;
@@ -26,72 +26,75 @@ use std::path::{Path, PathBuf};
 /// Options for reading an SDF.
 #[derive(Clone, Debug, Default)]
 pub struct SdfOptions {
-    /// Joint between the world and each root link, which is a link that no joint carries. The first joint is named
-    /// `root_joint`, the others `root_joint#2` and so on. `None` fixes root links to the world.
+    /// Joint between the world and each root link. Root links are the links that no joint carries. The first such joint
+    /// is named `root_joint`, and the others are named `root_joint#2` and so on. `None` fixes root links to the world.
     pub root_joint: Option<Joint>,
-    /// Whether a warning ([`Model::warnings`]) is an error.
+    /// Whether each warning ([`Model::warnings`]) becomes an error.
     pub strict: bool,
-    /// Kinds of warnings that are not errors, even if `strict` is set.
+    /// Kinds of warnings that do not become errors, even if `strict` is set.
     pub allow: Vec<WarningKind>,
-    /// Folders that contain packages or models, or are one themselves, for `package://` and `model://` addresses; see
-    /// [`UrdfOptions`](crate::UrdfOptions).
+    /// Folders that contain packages or models, or that are a package or model themselves, for `package://` and
+    /// `model://` addresses; see [`UrdfOptions`](crate::UrdfOptions).
     pub packages: Vec<PathBuf>,
-    /// Whether an axis with a `<mimic>` follows another one ([`Mimic`](crate::Mimic)), instead of being free.
+    /// Whether an axis with a `<mimic>` follows another axis ([`Mimic`](crate::Mimic)). Otherwise, the axis moves
+    /// freely.
     pub mimic: bool,
-    /// Name of the only model to read. `None` reads all models of the file into one robot.
+    /// Name of the model that is read. `None` reads all models of the file into one robot.
     pub model: Option<String>,
 }
 
 impl Model {
-    /// Reads an SDF file of version 1.0 or 1.2 to 1.12.
+    /// Reads an SDF file. Its version may be 1.0, or 1.2 to 1.12.
     ///
-    /// An older version is converted by the rules of the format's own library. Up to version 1.4 an axis is in the
-    /// model's frame. Up to 1.6 it is in the joint's frame, unless `use_parent_model_frame` is true. In later versions
-    /// it is `expressed_in` a frame.
+    /// An older version is converted by the rules of the format's own library. Up to version 1.4, an axis is in the
+    /// model's frame. Up to version 1.6, it is in the joint's frame, unless `use_parent_model_frame` is true. In later
+    /// versions, it is in the frame that `expressed_in` names.
     ///
     /// **Models.** All models of a file, or of its first world, become one robot; [`SdfOptions::model`] selects one
-    /// instead. If there are several models, all names begin with the name of the model: `robot::arm`. So do names in
-    /// nested models. An `<include>` is replaced by its model. Its address may be a path relative to the file, or begin
-    /// with `model://`, `package://` or `file://`. Models are searched in:
+    /// model instead. If there are several models, all names begin with the name of the model: `robot::arm`. Names in
+    /// nested models also begin with the names of the models around them. An `<include>` is replaced by the included
+    /// model. The address of this model may be a path relative to the file, or begin with `model://`, `package://` or
+    /// `file://`. Models are searched in:
     /// - [`SdfOptions::packages`];
-    /// - the folder of the file, the folder above it, and the folder `models` in both;
-    /// - the folders listed in GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH, SDF_PATH, GAZEBO_MODEL_PATH and ROS's
-    ///   variables.
+    /// - the folder of the file, its parent folder, and the folder `models` in both of them;
+    /// - the folders listed in GZ_SIM_RESOURCE_PATH, IGN_GAZEBO_RESOURCE_PATH, SDF_PATH, GAZEBO_MODEL_PATH and the
+    ///   environment variables of ROS.
     ///
-    /// If a model of a world is not found, it is left out with a warning; elsewhere this is an error.
+    /// If an included model of a world is not found, it is left out with a warning. If an included model inside a model
+    /// is not found, this is an error.
     ///
     /// **Tree.** Joints are visited breadth first, in the order of the file: from the world, then from each root link.
-    /// If the parent of a joint cannot be reached otherwise, the joint is visited from its child. Its position stays
-    /// the same, except for a ball joint. Links that are joined to the world, links of static models, and root links
-    /// without a root joint stay at their poses in the file. With a root joint, q is the pose of the root link in the
-    /// world.
+    /// If the parent link of a joint cannot be reached otherwise, the joint is visited from its child link. The
+    /// position of such a joint stays the same, except for a ball joint. Links that are joined to the world, links of
+    /// static models, and root links without a root joint stay at their poses in the file. With a root joint, q is the
+    /// pose of the root link in the world.
     ///
-    /// **Loops.** A joint that would give a link a second parent closes a loop. It becomes a constraint with its name
-    /// in [`constraints`](Self::constraints). A fixed joint constrains two frames, and a ball joint two points. A
-    /// revolute joint constrains two points, 1 m apart on its axis; the second constraint is named `name#2`. One of its
-    /// six rows is redundant, so solve them with a damping. For a universal joint only the point is constrained.
-    /// Prismatic and screw joints are left out. A gearbox becomes a coupling of two joints. Motions that are not
-    /// constrained are reported in [`warnings`](Self::warnings).
+    /// **Loops.** A joint that would give a link a second parent closes a loop. It becomes a constraint with the
+    /// joint's name in [`constraints`](Self::constraints). A fixed joint constrains two frames, and a ball joint
+    /// constrains two points. A revolute joint makes two constraints, for two points 1 m apart on its axis; the second
+    /// constraint is named `name#2`. One of the six rows of these two constraints is redundant, so solve them with a
+    /// damping. A universal joint constrains only its point. Prismatic and screw joints are left out. A gearbox becomes
+    /// a coupling of two joints. Motions that are not constrained are reported in [`warnings`](Self::warnings).
     ///
     /// **Joints.** `revolute` has one coordinate, with or without limits ([`Joint::Revolute`]). `continuous` has q =
     /// [cos, sin], as in a URDF. `ball` is [`Joint::Spherical`]. `universal` and `revolute2` become two revolute
-    /// joints, the first named `name#1`, with a body `child#1` between them. `screw` is [`Joint::Helical`], with its
-    /// `screw_thread_pitch` or the older `thread_pitch`. The frame of the model's body is the joint's frame; the child
-    /// link is a separate frame ([`FrameKind::Link`](crate::FrameKind::Link)), which differs from it by the joint's
-    /// `<pose>`. Siblings are numbered in the order of the file. Damping, friction and springs are stored. Drake's
-    /// `drake:rotor_inertia` and `drake:gear_ratio` determine the armature.
+    /// joints, with a body `child#1` between them; the first joint is named `name#1`. `screw` is [`Joint::Helical`],
+    /// with `screw_thread_pitch` or the older `thread_pitch`. The frame of the model's body is the frame of the joint.
+    /// The child link is a separate frame ([`FrameKind::Link`](crate::FrameKind::Link)); the two frames differ by the
+    /// joint's `<pose>`. Siblings are numbered in the order of the file. Damping, friction and springs are stored.
+    /// Drake's `drake:rotor_inertia` and `drake:gear_ratio` determine the armature.
     ///
-    /// **Poses** may be `relative_to` links, joints, frames and models. `<frame>`s and nested models become
-    /// [`FrameKind::User`](crate::FrameKind::User).
+    /// **Poses** may be `relative_to` links, joints, frames and models. `<frame>` elements and nested models become
+    /// frames of kind [`FrameKind::User`](crate::FrameKind::User).
     ///
-    /// **Inertias.** A link without `<inertial>` has SDF's default of 1 kg and 1 kg m², and a warning. With
-    /// `auto="true"` the inertia is computed from the collision shapes: boxes, spheres, ellipsoids, cylinders, cones
-    /// and capsules. The weight of a link whose `<gravity>` is false is compensated:
+    /// **Inertias.** A link without `<inertial>` has SDF's default values, 1 kg and 1 kg m², and causes a warning. With
+    /// `auto="true"`, the inertia is computed from the collision shapes: boxes, spheres, ellipsoids, cylinders, cones
+    /// and capsules. If `<gravity>` of a link is false, its weight is compensated:
     /// [`gravity_compensation`](Self::gravity_compensation).
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], and the
-    /// errors of [`ModelBuilder::build`](crate::ModelBuilder::build). The limits of files are listed in the [crate
+    /// Returns [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), [`Error::Strict`], or
+    /// an error of [`ModelBuilder::build`](crate::ModelBuilder::build). The limits of files are listed in the [crate
     /// documentation](crate#limits-of-files).
     pub fn from_sdf(path: impl AsRef<Path>, options: &SdfOptions) -> Result<Self, Error> {
         let mut includes = Includes::new(&options.packages);
@@ -99,7 +102,7 @@ impl Model {
         model(&root, includes, options)
     }
 
-    /// Reads an SDF from a string, which cannot include files by relative paths; see [`from_sdf`](Self::from_sdf).
+    /// Reads an SDF from a string. This SDF cannot include files by relative paths; see [`from_sdf`](Self::from_sdf).
     ///
     /// ```
     /// use condyle_model::{Model, SdfOptions};
@@ -119,7 +122,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The errors of [`from_sdf`](Self::from_sdf).
+    /// Returns the errors of [`from_sdf`](Self::from_sdf).
     pub fn from_sdf_str(text: &str, options: &SdfOptions) -> Result<Self, Error> {
         let mut includes = Includes::new(&options.packages);
         let root = includes.string(text)?;
@@ -127,7 +130,7 @@ impl Model {
     }
 }
 
-/// Builds the robot of a file whose includes are already replaced.
+/// Builds the robot of a file in which all includes have been replaced.
 fn model(root: &Element, includes: Includes, options: &SdfOptions) -> Result<Model, Error> {
     let Includes { mut warnings, missing, .. } = includes;
     let (world, others) = (root.child("world"), root.all("world").skip(1));

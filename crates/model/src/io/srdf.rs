@@ -1,4 +1,4 @@
-//! Named positions from SRDF, MoveIt's description of the semantics of a robot.
+//! Reader of named positions in SRDF, the format in which MoveIt describes the semantics of a robot.
 
 use super::known::Known;
 use super::xml::{Amount, Element, numbers};
@@ -10,7 +10,7 @@ use crate::model::Model;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Table of [`Known`]: elements of MoveIt, Pinocchio and HPP.
+/// Table of [`Known`] elements: elements of MoveIt, Pinocchio and HPP.
 const KNOWN: &str = "\
 robot: name version ; group* group_state end_effector* virtual_joint* passive_joint* disable_collisions* enable_collisions* \
     disable_default_collisions* link_sphere_approximation* joint_property* chain_property* rotor_params* gripper* handle* \
@@ -19,23 +19,26 @@ group_state: name group ; joint
 joint: name value
 ";
 
-/// Maximum number of `<group_state>`s in a file; chosen because each one is stored as a whole position of the robot.
+/// Maximum number of `<group_state>`s in a file; chosen because each of them is stored as a whole position of the
+/// robot.
 const MAX_STATES: usize = 4096;
 
 impl Model {
-    /// Reads the named positions of an SRDF file, its `<group_state>`s: (name, q) in the order of the file.
+    /// Reads the named positions of an SRDF file, which are its `<group_state>`s. Returns (name, q) in the order of the
+    /// file.
     ///
-    /// A `<joint>` of a state has as many numbers as q has for it, or one angle if the joint is continuous. Joints that
-    /// are not mentioned stay as in [`neutral`]. States with the same name, such as `home` of an arm and of its hand,
-    /// form one position. An SRDF is often shared by robots with fewer joints: joints that this robot does not have are
-    /// ignored, or are errors if `strict`. Joints that follow others do not have their own number. All other elements
-    /// of the file (groups, pairs that cannot collide, …) are ignored. Unknown, misspelt or misplaced names are ignored
-    /// too, unless `strict`.
+    /// A `<joint>` of a state has as many numbers as the joint has in q, or one angle if the joint is continuous.
+    /// Joints that are not mentioned are at their [`neutral`] positions. States with the same name, such as `home` of
+    /// an arm and `home` of its hand, form one position. An SRDF is often shared by robots with fewer joints: joints
+    /// that this robot does not have are ignored, or are errors if `strict` is set. Joints that follow others do not
+    /// have their own number. All other elements of the file (groups, pairs that cannot collide, …) are ignored.
+    /// Unknown, misspelt or misplaced names are ignored, too, unless `strict` is set.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Xml`] and [`Error::Element`], with file, line and element: invalid numbers, a wrong
-    /// number of numbers for a joint, rotations whose length is not 1. [`Error::Strict`]: an unknown name, if `strict`.
-    /// The limits of files are listed in the [crate documentation](crate#limits-of-files).
+    /// Returns [`Error::File`], [`Error::Xml`] or [`Error::Element`], with file, line and element. Examples are invalid
+    /// numbers, a wrong count of numbers for a joint, and rotations whose length is not 1. Returns [`Error::Strict`]
+    /// for an unknown name if `strict` is set. The limits of files are listed in the [crate
+    /// documentation](crate#limits-of-files).
     pub fn reference_configurations(
         &self,
         path: impl AsRef<Path>,
@@ -60,7 +63,7 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The errors of [`reference_configurations`](Self::reference_configurations).
+    /// Returns the errors of [`reference_configurations`](Self::reference_configurations).
     pub fn reference_configurations_str(&self, text: &str, strict: bool) -> Result<Vec<(String, Vec<f64>)>, Error> {
         self.group_states(&Element::parse(text, "<string>", &mut Amount::default())?, strict)
     }
@@ -108,7 +111,7 @@ impl Model {
     }
 }
 
-/// Sets the position of a joint from a `<joint>` of a state, unless the joint follows another one.
+/// Sets the position of a joint from a `<joint>` of a state, unless the joint follows another joint.
 fn set(body: &Body, element: &Element, q: &mut [f64]) -> Result<(), Error> {
     let x = numbers(text(element, "value")?).map_err(|what| element.wrong(format!("value: {what}")))?;
     if body.mimic.is_some() {

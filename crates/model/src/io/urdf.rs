@@ -1,4 +1,4 @@
-//! Reader of URDF: kinematics, inertias, limits. It never opens meshes.
+//! Reader of URDF. It reads kinematics, inertias and limits, and never opens meshes.
 
 mod elements;
 mod joints;
@@ -22,59 +22,63 @@ use std::path::{Path, PathBuf};
 /// Options for reading a URDF.
 #[derive(Clone, Debug, Default)]
 pub struct UrdfOptions {
-    /// Joint between the world and the root link, named `root_joint`, or `root_joint_2`, … if the file has a joint of
-    /// that name. `None` fixes the root link to the world.
+    /// Joint between the world and the root link. It is named `root_joint`, or `root_joint_2`, … if the file has a
+    /// joint with that name. `None` fixes the root link to the world.
     pub root_joint: Option<Joint>,
-    /// Whether joints with a `<mimic>` share the coordinate of their leader, instead of having their own; see
-    /// [`Mimic`](crate::Mimic).
+    /// Whether joints with a `<mimic>` share the coordinate of their leader; see [`Mimic`](crate::Mimic). Otherwise,
+    /// they have their own coordinates.
     pub mimic: bool,
-    /// Whether a warning ([`Model::warnings`]) is an error.
+    /// Whether each warning ([`Model::warnings`]) becomes an error.
     pub strict: bool,
-    /// Kinds of warnings that are not errors, even if `strict` is set.
+    /// Kinds of warnings that do not become errors, even if `strict` is set.
     pub allow: Vec<WarningKind>,
-    /// Folders that contain packages, or are packages, for `package://` addresses. They are searched before the folders
-    /// in the environment variable `ROS_PACKAGE_PATH`, and before `/share` in the folders of `AMENT_PREFIX_PATH`.
+    /// Folders that contain packages, or are packages themselves, for `package://` addresses. They are searched before
+    /// the folders in the environment variable `ROS_PACKAGE_PATH`, and before `/share` in the folders of
+    /// `AMENT_PREFIX_PATH`.
     pub packages: Vec<PathBuf>,
-    /// Arguments of a file whose name ends in `.xacro`, by name and value (`name:=value`).
+    /// Arguments for a file whose name ends in `.xacro`, by name and value (`name:=value`).
     pub arguments: Vec<(String, String)>,
 }
 
 impl Model {
-    /// Reads a URDF file, given by its path or as `package://name/path/in/the/package` ([`UrdfOptions::packages`]).
+    /// Reads a URDF file. `path` is a path, or an address `package://name/path/in/the/package`
+    /// ([`UrdfOptions::packages`]).
     ///
     /// The child of a fixed joint is merged into the body that carries the joint, and stays as a frame. Siblings are
-    /// numbered in the order of their joints' names (bytes), as in Pinocchio. Versions 1.0 to 1.2 are supported. A file
-    /// without a version has version 1.0, in which an `<origin>` has no quaternion.
+    /// numbered in the order of their joints' names (compared as bytes), as in Pinocchio. Versions 1.0 to 1.2 are
+    /// supported. A file without a version number has version 1.0, in which an `<origin>` cannot have a quaternion.
     ///
-    /// - A planar joint moves in the plane normal to its axis, as the format and Drake define it; a missing axis is 1 0
+    /// - A planar joint moves in the plane normal to its axis, as the format and Drake define it. A missing axis is 1 0
+    ///   0. The z axis of the joint's frame is rotated to the axis by the shortest rotation. In Pinocchio, the plane is
+    ///   always normal to z.
     ///   0. The z axis of its frame is rotated to the axis by the shortest rotation. Pinocchio's plane is always normal
     ///   to z.
-    /// - A joint whose parent is `world` is attached to the world if no link has this name, as in Drake, with a
-    ///   warning.
-    /// - A revolute or prismatic joint needs a limit with effort and velocity. A continuous joint may have either. A
-    ///   negative effort or velocity is not a limit, and neither are position limits in reverse order; both cause a
-    ///   warning.
-    /// - A `<transmission>` with a rotor's inertia J (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a
-    ///   reduction n (`mechanicalReduction`, `drake:gear_ratio`) results in the armature n² J. A reduction alone causes
-    ///   a warning.
-    /// - Drake's `<frame>`s become frames; its joints `ball`, `screw`, `planar` and `universal` are supported. A
-    ///   universal joint becomes two revolute joints about x and y, the first named `name#1`, with a body `child#1`
-    ///   between them.
-    /// - A spherical, ball or universal joint has its losses along each of its coordinates.
+    /// - If the parent of a joint is `world` and no link has this name, the joint is attached to the world, as in
+    ///   Drake. This causes a warning.
+    /// - A revolute or prismatic joint needs a limit with effort and velocity; for a continuous joint, both are
+    ///   optional. A negative effort or velocity is not a limit, and position limits in reverse order are not limits
+    ///   either. Both cause a warning.
+    /// - A `<transmission>` with the inertia J of a rotor (`rotorInertia`, `motorInertia`, `drake:rotor_inertia`) and a
+    ///   reduction n (`mechanicalReduction`, `drake:gear_ratio`) results in the armature n² J. A reduction without an
+    ///   inertia causes a warning.
+    /// - `<frame>` elements of Drake become frames. The joints `ball`, `screw`, `planar` and `universal` of Drake are
+    ///   supported. A universal joint becomes two revolute joints about x and y, with a body `child#1` between them;
+    ///   the first joint is named `name#1`.
+    /// - The losses of a spherical, ball or universal joint act along each of its coordinates.
     ///
     /// An unknown, misspelt or misplaced name causes a warning, and so does each feature that a model cannot represent
     /// ([`Model::warnings`]). Some elements are ignored without a warning: shapes, materials, sensors, controllers,
     /// calibrations, soft limits of a `<safety_controller>`, and entries of `<gazebo>` about contact, looks and
     /// numerics. Mesh files need not exist.
     ///
-    /// A file whose name ends in `.xacro` is expanded first, by the program `xacro` or else `xacrodoc`. One of them
-    /// must be installed; it may take a minute. It receives [`UrdfOptions::arguments`] and the folders of packages
-    /// (`ROS_PACKAGE_PATH`). xacro evaluates Python expressions, so expand only files that you trust. Line numbers in
-    /// messages refer to the expanded text.
+    /// A file whose name ends in `.xacro` is expanded first, by the program `xacro` or, if it is missing, by
+    /// `xacrodoc`. One of these programs must be installed. The expansion may take a minute. The program receives
+    /// [`UrdfOptions::arguments`] and the folders of packages (`ROS_PACKAGE_PATH`). xacro evaluates Python expressions,
+    /// so expand only files that you trust. Line numbers in messages refer to the expanded text.
     ///
     /// # Errors
-    /// [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element), and the
-    /// errors of [`ModelBuilder::build`](crate::ModelBuilder::build). The limits of files are listed in the [crate
+    /// Returns [`Error::Package`], [`Error::File`], [`Error::Xml`], [`Error::Element`] (with file, line and element),
+    /// or an error of [`ModelBuilder::build`](crate::ModelBuilder::build). The limits of files are listed in the [crate
     /// documentation](crate#limits-of-files).
     pub fn from_urdf(path: impl AsRef<Path>, options: &UrdfOptions) -> Result<Self, Error> {
         let path = files::locate(path.as_ref(), &options.packages)?;
@@ -88,14 +92,14 @@ impl Model {
         Reader::new(&Element::parse(&text, &name, &mut amount)?)?.model(options)
     }
 
-    /// Returns the URDF that a xacro file expands to.
+    /// Returns the URDF to which a xacro file expands.
     #[doc(hidden)]
     pub fn expand_xacro(path: &Path, options: &UrdfOptions) -> Result<String, Error> {
-        Amount::default().read(path)?; // checks size and kind of the file
+        Amount::default().read(path)?; // checks the size and kind of the file
         xacro::expand(path, &options.arguments, &options.packages)
     }
 
-    /// Reads a URDF from a string; `file` is its name in errors and warnings.
+    /// Reads a URDF from a string. Errors and warnings name it `file`.
     #[doc(hidden)]
     pub fn from_urdf_text(text: &str, file: &str, options: &UrdfOptions) -> Result<Self, Error> {
         Reader::new(&Element::parse(text, file, &mut Amount::default())?)?.model(options)
@@ -119,14 +123,14 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The errors of [`from_urdf`](Self::from_urdf).
+    /// Returns the errors of [`from_urdf`](Self::from_urdf).
     pub fn from_urdf_str(text: &str, options: &UrdfOptions) -> Result<Self, Error> {
         check_arguments("<string>", options)?;
         Self::from_urdf_text(text, "<string>", options)
     }
 }
 
-/// Returns an error if there are arguments for a file that is not xacro.
+/// Returns an error if there are arguments but the file is not a xacro file.
 fn check_arguments(file: &str, options: &UrdfOptions) -> Result<(), Error> {
     let what = || "has arguments of xacro, but its name does not end in `.xacro`".to_owned();
     if options.arguments.is_empty() { Ok(()) } else { Err(Error::File { file: file.to_owned(), what: what() }) }

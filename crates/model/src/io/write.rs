@@ -1,9 +1,11 @@
-//! Writing of robots into a copy of their file: inertias, limits, losses and armature. All other bytes are kept.
+//! Writing of a robot's inertias, limits, losses and armature into a copy of the robot's file. All other bytes are
+//! copied.
 //!
-//! A format edits the original text at the elements that differ. Then the new text is read again, because only the
-//! reader defines what a file means. Other elements may contribute to a number: links that fixed joints merge, or the
-//! armature of an actuator. Their contribution is the difference between the number written and the number read; it is
-//! subtracted once. If the file then does not reproduce the model, it is not written.
+//! The original text is edited at the elements that differ. Then the new text is read again, because only the reader
+//! defines what a file means. A number of a body or joint may have contributions from several elements: from links that
+//! fixed joints merge, or from the armature of an actuator. The contribution of the other elements is the difference
+//! between the number read and the number written; it is subtracted once. If the new file still does not reproduce the
+//! model, it is not written.
 
 mod changes;
 mod differences;
@@ -22,27 +24,27 @@ use edits::Edits;
 use std::collections::HashMap;
 use std::path::Path;
 
-/// File format: its reader, and the elements that contain its numbers.
+/// File format, given by its reader and by the elements that contain the numbers of a robot.
 trait Format {
-    /// Reads a text instead of the original file.
+    /// Reads a text as if it were the original file.
     fn read(&self, text: &str) -> Result<Model, Error>;
     /// Returns the mass (kg) of each link for which the file specifies an inertia, by name.
     fn masses(&self, root: &Element) -> HashMap<String, f64>;
-    /// Edits the elements of a text.
+    /// Edits the elements in a text according to the changes.
     fn edit(&self, edits: &mut Edits, root: &Element, changes: &Changes) -> Result<(), String>;
 }
 
 impl Model {
-    /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the URDF `original`. The
-    /// rest of the file is copied.
+    /// Writes the inertias, limits, damping, friction and armature of this robot into a copy of the URDF `original`.
+    /// The rest of the file is copied.
     ///
-    /// Only numbers that differ from the original are edited, so an unchanged robot results in the same bytes.
-    /// `original` may be `path`. Reading the new file reproduces this model, up to rounding.
+    /// Only numbers that differ from the original are edited, so an unchanged robot results in the same bytes. `path`
+    /// may be the same as `original`. Reading the new file reproduces this model, up to rounding.
     ///
-    /// The inertia of a body is the sum over its links, which fixed joints merge. The link that the body's joint
-    /// carries takes the whole difference; if that link has no mass, the heaviest link does. The result must be a
-    /// physical inertia with at least a thousandth of the body's mass. Otherwise this link takes the whole inertia and
-    /// the others get none.
+    /// The inertia of a body is the sum over its links, which fixed joints merge. One link takes the whole difference:
+    /// the link that the body's joint carries or, if that link has no mass, the heaviest link. The new inertia of this
+    /// link must be physical, with at least a thousandth of the body's mass. Otherwise, this link takes the whole
+    /// inertia of the body, and the other links have no inertia.
     ///
     /// ```
     /// use condyle_model::{Model, UrdfOptions, robots};
@@ -58,13 +60,13 @@ impl Model {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
-    /// An armature is written as the rotor inertia of the joint's `<transmission>`, with Drake's tags.
+    /// An armature is written as the rotor inertia in the joint's `<transmission>`, with Drake's tags.
     ///
     /// # Errors
-    /// [`Error::File`], with the quantity and both numbers, if the file cannot represent it or the robots are
-    /// different. Joints, frames and gravity must be equal to the original's. A URDF has one number for the efforts in
-    /// both directions, and no infinite limits. The file must be in UTF-8, and must not be xacro. Also the errors of
-    /// [`from_urdf`](Self::from_urdf).
+    /// Returns [`Error::File`] if the file cannot represent a number, or if the robots differ in something else; the
+    /// message contains the quantity and both values. Joints, frames and gravity must be the same as in the original. A
+    /// URDF has one number for the efforts in both directions, and no infinite limits. The file must be in UTF-8, and
+    /// must not be a xacro file. Also returns the errors of [`from_urdf`](Self::from_urdf).
     pub fn write_urdf(&self, path: impl AsRef<Path>, original: impl AsRef<Path>) -> Result<(), Error> {
         let original = Original::read(original.as_ref())?;
         let root = urdf::root(&original.root).and_then(|root| self.bodies.iter().skip(1).find(|b| b.name == root));
@@ -73,30 +75,30 @@ impl Model {
         write(self, path.as_ref(), &original, &urdf::Urdf { options })
     }
 
-    /// Writes this robot's inertias, limits, damping, friction and armature into a copy of the MJCF `original`. The
-    /// rest of the file is copied; see [`write_urdf`](Self::write_urdf).
+    /// Writes the inertias, limits, damping, friction and armature of this robot into a copy of the MJCF `original`.
+    /// The rest of the file is copied; see [`write_urdf`](Self::write_urdf).
     ///
-    /// Attributes of elements override the attributes of their classes, so defaults stay unchanged. A changed inertia
-    /// is written as an `<inertial>`, even if geoms determined it before. Limits of effort are written as
-    /// `actuatorfrcrange` of the joint. The weight that `gravcomp` compensates is proportional to the mass, so it
-    /// follows the new masses.
+    /// Attributes of elements override the attributes of their classes, so default classes stay unchanged. A changed
+    /// inertia is written as an `<inertial>`, even if geoms determined the inertia before. Limits of effort are written
+    /// as `actuatorfrcrange` of the joint. The weight that `gravcomp` compensates is proportional to the mass, so it
+    /// changes with the mass.
     ///
     /// # Errors
-    /// The errors of [`write_urdf`](Self::write_urdf). The file itself must contain the bodies and joints that differ:
-    /// if they are in an included file, or made by `replicate` or `attach`, there is no element to edit. An MJCF has no
-    /// speed limits. Its compiler must not replace inertias (`inertiafromgeom`) or scale them (`settotalmass`). Also
-    /// the errors of [`from_mjcf`](Self::from_mjcf).
+    /// Returns the errors of [`write_urdf`](Self::write_urdf). The file itself must contain the bodies and joints that
+    /// differ: if they are in an included file, or made by `replicate` or `attach`, there is no element to edit. An
+    /// MJCF has no speed limits. The `<compiler>` must not replace inertias (`inertiafromgeom`) or scale them
+    /// (`settotalmass`). Also returns the errors of [`from_mjcf`](Self::from_mjcf).
     pub fn write_mjcf(&self, path: impl AsRef<Path>, original: impl AsRef<Path>) -> Result<(), Error> {
         let original = Original::read(original.as_ref())?;
         let mimic = self.bodies.iter().any(|b| b.mimic.is_some());
         let mut format = mjcf::Mjcf { path: original.path, options: MjcfOptions { mimic, ..MjcfOptions::default() } };
-        // meshes without a file get no mass
+        // Meshes whose file is missing have no mass.
         format.options.weightless_meshes = format.read(&original.text).is_err();
         write(self, path.as_ref(), &original, &format)
     }
 }
 
-/// The original file, which is copied.
+/// Original file, of which a copy is edited.
 struct Original<'a> {
     path: &'a Path,
     text: String,
@@ -120,7 +122,7 @@ impl<'a> Original<'a> {
         Error::File { file: self.path.display().to_string(), what }
     }
 
-    /// Returns the original text with the changed numbers.
+    /// Returns the original text, in which the changed numbers are replaced.
     fn edited(&self, format: &impl Format, changes: &Changes) -> Result<String, Error> {
         let mut edits = Edits::new(&self.text);
         format.edit(&mut edits, &self.root, changes).map_err(|what| self.wrong(what))?;

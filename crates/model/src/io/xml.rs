@@ -1,6 +1,6 @@
-//! XML as the readers need it: elements that know their file and line.
+//! XML elements for the readers. Each element knows its file and its line number.
 //!
-//! The size of a text is checked first, so that it can exhaust neither memory, time nor the stack.
+//! The size of a text is checked before it is parsed. So a text cannot exhaust memory, time or the stack.
 
 mod encoding;
 mod parse;
@@ -19,16 +19,17 @@ use std::rc::Rc;
 
 /// Maximum number of bytes of all files of one robot together.
 const MAX_BYTES: usize = 64 << 20;
-/// Maximum number of tags of all files together; comments and end tags count, too.
+/// Maximum number of tags in all files together. Comments and end tags count, too.
 const MAX_TAGS: usize = 1 << 20;
-/// Maximum number of equals signs of all files together; it limits the number of attributes, and the memory for them.
+/// Maximum number of equals signs in all files together. It limits the number of attributes and the memory for
+/// attributes.
 const MAX_EQUALS: usize = 1 << 22;
 /// Maximum number of attributes of an element.
 const MAX_ATTRIBUTES: usize = 256;
-/// Maximum depth of nested elements; chosen because a chain in MJCF needs one level for each body.
+/// Maximum depth of nested elements; chosen because an MJCF of a chain needs one level for each body.
 pub(crate) const MAX_DEPTH: usize = 256;
 
-/// Element with its content. A prefix is part of a name (`gz:note`); declarations of prefixes are dropped.
+/// XML element with its content. A prefix is part of a name (`gz:note`). Declarations of prefixes are dropped.
 #[derive(Clone, Debug)]
 pub(crate) struct Element {
     pub(crate) tag: String,
@@ -37,13 +38,13 @@ pub(crate) struct Element {
     pub(crate) children: Vec<Element>,
     /// Path of the file, or `<string>`.
     pub(crate) file: Rc<str>,
-    /// Line number, from 1; 0 if the user does not see the text.
+    /// Line number, counted from 1; 0 if the user does not see the text.
     pub(crate) line: u32,
-    /// Byte index of its `<` in the text of the file.
+    /// Byte index of the element's `<` in the text of the file.
     pub(crate) at: usize,
-    /// Index of the element's file, among the files with their own settings; 0 is the main file.
+    /// Index of the element's file among the files with their own settings. Index 0 is the main file.
     pub(crate) source: usize,
-    /// Line and description of the first thing outside of a root element, which has no effect.
+    /// Line number and description of the first item outside of a root element. Such items have no effect.
     pub(crate) stray: Option<Box<(u32, String)>>,
 }
 
@@ -56,7 +57,7 @@ pub(crate) struct Amount {
 }
 
 impl Amount {
-    /// Reads the text of a file; an error if it is not a regular file or too large.
+    /// Reads the text of a file. Returns an error if it is not a regular file, or if it is too large.
     pub(crate) fn read(&self, path: &Path) -> Result<String, Error> {
         let wrong = |what: String| Error::File { file: path.display().to_string(), what };
         if let Some(text) = path.to_str().map(str::trim_start).filter(|text| text.starts_with('<')) {
@@ -66,7 +67,7 @@ impl Amount {
             return Err(Error::File { file, what: what.to_owned() });
         }
         let said = |e: std::io::Error| wrong(e.to_string());
-        // check this before opening, because opening a pipe waits for its writer
+        // This is checked before the file is opened, because opening a pipe waits for a writer.
         let kind = std::fs::metadata(path).map_err(said)?;
         if !kind.is_file() {
             let found = if kind.is_dir() { "a folder" } else { "a device, pipe or socket" };
@@ -85,7 +86,7 @@ impl Amount {
         Ok(encoding::decode(bytes))
     }
 
-    /// Counts copies of an element that a file requests, as if the file contained them.
+    /// Counts the copies of an element that a file requests as if the file contained them.
     pub(crate) fn add_copies(&mut self, element: &Element, count: usize) -> Result<(), Error> {
         let (mut tags, mut equals, mut waiting) = (0usize, 0usize, vec![element]);
         while let Some(e) = waiting.pop() {
@@ -102,7 +103,7 @@ impl Amount {
         Ok(())
     }
 
-    /// Counts bytes, tags and equals signs of a text; the error names the exceeded limit.
+    /// Counts the bytes, tags and equals signs of a text. The error names the limit that is exceeded.
     fn add(&mut self, text: &str) -> Result<(), String> {
         let (bytes, count) = (text.as_bytes(), |byte| count(text.as_bytes(), byte));
         (self.bytes, self.tags, self.equals) =
@@ -126,7 +127,7 @@ impl Model {
     /// Reads the text of a robot's file, in any encoding that the readers support.
     ///
     /// # Errors
-    /// [`Error::File`].
+    /// Returns [`Error::File`].
     #[doc(hidden)]
     pub fn file_text(path: &Path) -> Result<String, Error> {
         Amount::default().read(path)
@@ -156,7 +157,7 @@ impl Element {
         self.children.iter().filter(move |c| c.tag == tag)
     }
 
-    /// Returns a name for messages, for example ``joint `elbow` ``.
+    /// Returns the name of the element for messages, for example ``joint `elbow` ``.
     pub(crate) fn label(&self) -> String {
         match self.attribute("name").filter(|n| !n.is_empty()) {
             Some(name) => format!("{} `{name}`", self.tag),
@@ -164,7 +165,8 @@ impl Element {
         }
     }
 
-    /// Returns the message that an attribute or child is missing, with the nearest name that the element has.
+    /// Returns the message that an attribute or child of the element is missing. It suggests the most similar name that
+    /// the element has.
     pub(crate) fn missing(&self, name: &str) -> String {
         let attributes = self.attributes.iter().map(|(name, _)| &**name);
         let names = attributes.chain(self.children.iter().map(|child| &*child.tag));
@@ -182,7 +184,8 @@ impl Element {
         self.wrong_inside(self, what)
     }
 
-    /// Returns the model that was read from this root; an error if the reader is strict and a warning is not allowed.
+    /// Returns the model that was read from this root element. Returns an error if the reader is strict and there is a
+    /// warning that is not allowed.
     pub(crate) fn accepted(&self, model: Model, is_strict: bool, allow: &[WarningKind]) -> Result<Model, Error> {
         match model.warnings.iter().find(|warning| !allow.contains(&warning.kind())) {
             Some(warning) if is_strict => Err(Error::Strict { file: self.file.to_string(), warning: warning.clone() }),
@@ -190,12 +193,12 @@ impl Element {
         }
     }
 
-    /// Returns file and line of this element; `None` if the user does not see the text.
+    /// Returns the file and line number of this element; `None` if the user does not see the text.
     pub(crate) fn place(&self) -> Option<Place> {
         (self.line > 0).then(|| Place { file: self.file.to_string(), line: self.line })
     }
 
-    /// Forgets the lines of this element and of its content, for a text that the user does not see.
+    /// Removes the line numbers of this element and of its content, for a text that the user does not see.
     pub(crate) fn forget_lines(&mut self) {
         self.line = 0;
         self.children.iter_mut().for_each(Self::forget_lines);
@@ -206,19 +209,20 @@ impl Element {
         Warning::Unknown { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns the warning of what is outside of this root element.
+    /// Returns the warning about the first item outside of this root element, if there is such an item.
     pub(crate) fn outside(&self) -> Option<Warning> {
         let (line, what) = &**self.stray.as_ref()?;
         let place = self.place().map(|place| Place { line: *line, ..place });
         Some(Warning::Unknown { place, element: self.label(), what: what.clone() })
     }
 
-    /// Returns the warning of something in this element that a model cannot hold.
+    /// Returns a warning about a feature of this element that a model cannot represent.
     pub(crate) fn left_out(&self, what: impl Into<String>) -> Warning {
         Warning::LeftOut { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns a warning as [`left_out`](Self::left_out) does, with the line of an element inside this one.
+    /// Returns the same warning as [`left_out`](Self::left_out), but with the line number of an element inside this
+    /// one.
     pub(crate) fn left_out_inside(&self, inside: &Self, what: impl Into<String>) -> Warning {
         Warning::LeftOut { place: inside.place(), element: self.label(), what: what.into() }
     }
@@ -228,27 +232,27 @@ impl Element {
         Warning::Assumed { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns a warning about a joint that could follow another one but is left free.
+    /// Returns a warning about a joint that could follow another joint but moves freely.
     pub(crate) fn mimic(&self, what: impl Into<String>) -> Warning {
         Warning::Mimic { place: self.place(), element: self.label(), what: what.into() }
     }
 
-    /// Returns an error that names this element, and the line of an element inside it.
+    /// Returns an error that names this element, with the line number of an element inside it.
     pub(crate) fn wrong_inside(&self, inside: &Self, what: impl Into<String>) -> Error {
         Error::Element { file: inside.file.to_string(), line: inside.line, element: self.label(), what: what.into() }
     }
 }
 
-/// Advice about macros of xacro, which no reader expands.
+/// Advice for files with macros of xacro. No reader expands such macros.
 const EXPAND: &str = "expand the file first (`xacro robot.urdf.xacro > robot.urdf`)";
 
-/// Returns whether a text that was given instead of a robot's text is a path.
+/// Returns whether a text is a path, given by mistake instead of the text of a robot's file.
 fn is_path(text: &str) -> bool {
     let known = |extension: &OsStr| ["urdf", "xml", "mjcf", "sdf", "xacro"].iter().any(|known| extension == *known);
     !text.contains('<') && Path::new(text.trim()).extension().is_some_and(known)
 }
 
-/// Parses finite numbers separated by spaces.
+/// Parses finite numbers that are separated by spaces.
 pub(crate) fn numbers(text: &str) -> Result<Vec<f64>, String> {
     let number = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite());
     let wrong = |word: &str| match word.contains("${") {
@@ -273,7 +277,7 @@ pub(crate) fn bound(text: &str) -> Result<f64, String> {
     x.ok_or_else(|| format!("`{}` is no number", text.trim()))
 }
 
-/// Writes numbers separated by spaces, as in a file.
+/// Writes numbers that are separated by spaces, as in a file.
 pub(crate) fn words(numbers: &[f64]) -> String {
     numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(" ")
 }

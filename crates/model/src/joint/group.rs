@@ -1,4 +1,4 @@
-//! Lie group of a joint's positions: `q ⊕ δ` multiplies by the exponential of δ, with δ in the body's frame.
+//! Lie group of the positions of a joint. `q ⊕ δ` multiplies q by the exponential of δ, where δ is in the body's frame.
 
 use super::{Joint, rotated_about_z};
 use condyle_spatial::Quaternion;
@@ -6,7 +6,7 @@ use condyle_spatial::lie::{self, MotionMap};
 use condyle_spatial::{Motion, Scalar, Se3, Vec3};
 
 impl Joint {
-    /// Sets the position at which the body is at its joint's frame.
+    /// Sets the position at which the body is at the frame of its joint.
     pub(crate) fn neutral(self, q: &mut [f64]) {
         q.fill(0.0);
         match self {
@@ -18,7 +18,7 @@ impl Joint {
         }
     }
 
-    /// Returns the range of coordinates that form a vector of length 1.
+    /// Returns the range of the coordinates that form a vector of length 1; `None` if there are no such coordinates.
     pub(crate) fn unit_part(self) -> Option<core::ops::Range<usize>> {
         match self {
             Self::Continuous { .. } => Some(0..2),
@@ -29,8 +29,8 @@ impl Joint {
         }
     }
 
-    /// Sets a uniformly distributed random position: lengths and angles between their limits, rotations over the whole
-    /// group.
+    /// Sets a uniformly distributed random position. Lengths and angles are between their limits, and rotations are
+    /// drawn from the whole group.
     pub(crate) fn random(self, rng: &mut impl rand::Rng, lower: &[f64], upper: &[f64], q: &mut [f64]) {
         use rand::RngExt;
         for ((q, &lower), &upper) in q.iter_mut().zip(lower).zip(upper) {
@@ -38,7 +38,7 @@ impl Joint {
         }
         let (sin, cos) = (core::f64::consts::TAU * rng.random::<f64>()).sin_cos();
         let mut rotate = |q: &mut [f64]| {
-            // Shoemake (1992): a quaternion uniform on the sphere
+            // A quaternion that is uniform on the sphere. Source: Shoemake (1992).
             let (u, a) = (rng.random::<f64>(), (core::f64::consts::TAU * rng.random::<f64>()).sin_cos());
             let (r, s) = ((1.0 - u).sqrt(), u.sqrt());
             q.copy_from_slice(&[r * sin, r * cos, s * a.0, s * a.1]);
@@ -52,7 +52,7 @@ impl Joint {
         }
     }
 
-    /// Computes q ⊕ v: the position after moving with v for one unit of time.
+    /// Computes q ⊕ v: the position reached from q by moving with v for one unit of time.
     #[inline(always)]
     pub(crate) fn integrate<S: Scalar>(self, q: &[S], v: &[S], out: &mut [S]) {
         match self {
@@ -70,7 +70,7 @@ impl Joint {
             _ => {
                 let (R, p) = self.pose(q);
                 let (dR, dp) = lie::exp6(self.twist(v));
-                // of the quaternions r and −r, use the one that is nearer to q
+                // Of the quaternions r and −r, which are the same rotation, uses the one that is nearer to q.
                 let sign = S::select(dR.scalar.lt(S::zero()), -S::one(), S::one());
                 let dR = Quaternion { vector: dR.vector.scale(sign), scalar: dR.scalar * sign };
                 self.set_pose((R * dR).normalize(), p + R.to_rotation() * dp, out);
@@ -78,7 +78,7 @@ impl Joint {
         }
     }
 
-    /// Computes q₁ ⊖ q₀: the v with q₀ ⊕ v = q₁.
+    /// Computes q₁ ⊖ q₀: the tangent vector v with q₀ ⊕ v = q₁.
     pub(crate) fn difference<S: Scalar>(self, q0: &[S], q1: &[S], out: &mut [S]) {
         match self {
             Self::Revolute { .. } | Self::Prismatic { .. } | Self::Helical { .. } | Self::Translation => {
@@ -100,8 +100,8 @@ impl Joint {
         }
     }
 
-    /// Returns a Jacobian of the joint's group at the tangent vector v, as a map of twists; `None` if it is the
-    /// identity.
+    /// Returns a Jacobian of the joint's group at the tangent vector v, as a map of twists. Returns `None` if the
+    /// Jacobian is the identity.
     #[doc(hidden)]
     pub fn jacobian<S: Scalar>(self, which: GroupJacobian, v: &[S]) -> Option<MotionMap<S>> {
         if self.commutes() {
@@ -128,7 +128,7 @@ impl Joint {
         m.into()
     }
 
-    /// Returns X_J(q) of a joint whose group is not commutative.
+    /// Returns the pose X_J(q) of a joint whose group is not commutative.
     #[inline(always)]
     fn pose<S: Scalar>(self, q: &[S]) -> (Quaternion<S>, Vec3<S>) {
         match self {
@@ -142,7 +142,7 @@ impl Joint {
         }
     }
 
-    /// Sets q to a pose; the inverse of `pose`.
+    /// Sets q to a pose. This is the inverse of `pose`.
     #[inline(always)]
     fn set_pose<S: Scalar>(self, R: Quaternion<S>, p: Vec3<S>, q: &mut [S]) {
         let (u, w) = (R.vector, R.scalar);
@@ -155,7 +155,7 @@ impl Joint {
     }
 }
 
-/// Jacobian of a joint's group, for integration and differences.
+/// Jacobian of a joint's group; integration and differences use these Jacobians.
 #[derive(Clone, Copy)]
 pub enum GroupJacobian {
     /// Derivative ∂(q ⊕ v)/∂v.

@@ -5,24 +5,24 @@ use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;
 use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, alike};
 
-/// Sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. Entries of other bodies, and entries after
-/// the last body, have no meaning.
+/// Sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. Entries of bodies without such an angle, and
+/// entries after the last body, have no meaning.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct JointSinCos<S> {
-    /// Sines. Shape: bodies, rounded up to whole steps. Written by: `Joint::sin_cos`.
+    /// Sine of the angle of each joint. Shape: bodies, rounded up to whole steps. Written by: `Joint::sin_cos`.
     pub sin: Array<S>,
-    /// Cosines. Shape: as sin. Written by: `Joint::sin_cos`.
+    /// Cosine of the angle of each joint. Shape: as `sin`. Written by: `Joint::sin_cos`.
     pub cos: Array<S>,
 }
 
 alike!(JointSinCos { sin, cos });
 
 impl<S: Scalar> JointSinCos<S> {
-    /// Number of entries that are computed at once: two vectors.
+    /// Number of entries that are computed at once; they fill two vectors.
     pub const STEP: usize = if S::LANES == 1 { 8 } else { 2 };
 
-    /// Allocates entries for a number of bodies, including the world.
+    /// Allocates entries for `bodies` bodies, including the world.
     pub fn new(bodies: usize) -> Self {
         let n = bodies.next_multiple_of(Self::STEP);
         Self { sin: vec![S::zero(); n].into(), cos: vec![S::zero(); n].into() }
@@ -31,7 +31,7 @@ impl<S: Scalar> JointSinCos<S> {
 
 #[doc(hidden)]
 impl Joint {
-    /// Computes the sine and cosine of the angles of all joints that turn about z, at once.
+    /// Computes the sines and cosines of the angles of all joints that turn about z, several at once.
     #[inline(always)]
     pub fn sin_cos<L: Layout>(l: &L, q: &[L::S], JointSinCos { sin, cos }: &mut JointSinCos<L::S>) {
         let (Turns { runs, followers, circles }, sin, cos) = (l.turns(), &mut sin[..], &mut cos[..]);
@@ -47,7 +47,7 @@ impl Joint {
         }
     }
 
-    /// Computes the sine and cosine of the angles of the given joints, in their order.
+    /// Computes the sines and cosines of the angles of the given joints, in the order of these joints.
     #[inline(always)]
     pub fn sin_cos_of<L: Layout>(l: &L, joints: &[usize], q: &[L::S], sin: &mut [L::S], cos: &mut [L::S]) {
         for (k, &i) in joints.iter().enumerate() {
@@ -63,14 +63,14 @@ impl Joint {
         }
     }
 
-    /// Returns the sine and cosine that are stored in q.
+    /// Returns the sine and cosine of a joint whose position in q is (cos, sin).
     #[inline(always)]
     fn sin_cos_in<L: Layout>(l: &L, i: usize, q: &[L::S]) -> (L::S, L::S) {
         let at = if let Self::Planar = l.joint(i) { 2 } else { 0 };
         (l.position(q, i, at + 1), l.position(q, i, at))
     }
 
-    /// Returns λXi = X_T X_J(q) for joint i of a pass.
+    /// Returns the pose λXi = X_T X_J(q) of joint i of a pass, in the parent's frame.
     #[inline(always)]
     pub fn placement<L: Layout>(l: &L, i: usize, q: &[L::S]) -> Se3<L::S> {
         let (sin, cos) = match l.joint(i) {
@@ -81,13 +81,13 @@ impl Joint {
         Self::placement_with(l, i, q, sin, cos)
     }
 
-    /// Returns λXi = X_T X_J(q) for joint i of a pass, given its sine and cosine.
+    /// Returns the pose λXi = X_T X_J(q) of joint i of a pass, given the sine and cosine of its angle.
     #[inline(always)]
     pub fn placement_with<L: Layout>(l: &L, i: usize, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         Self::placement_on(l, i, l.placement(i), q, sin, cos)
     }
 
-    /// Returns X_T X_J(q) for any X_T.
+    /// Returns X_T X_J(q) of joint i, for any pose X_T.
     #[inline(always)]
     pub fn placement_on<L: Layout>(l: &L, i: usize, X_T: Se3<L::S>, q: &[L::S], sin: L::S, cos: L::S) -> Se3<L::S> {
         match l.joint(i) {
@@ -115,7 +115,7 @@ impl Joint {
         }
     }
 
-    /// Returns S v of joint i in the body's frame, for coordinates v of velocity or acceleration.
+    /// Returns the motion S v of joint i in the body's frame, where v contains velocities or accelerations.
     #[inline(always)]
     pub fn motion<L: Layout>(l: &L, i: usize, v: &[L::S]) -> JointMotion<L::S> {
         match l.joint(i) {
@@ -135,7 +135,7 @@ impl Joint {
         }
     }
 
-    /// Adds Sᵀ f of joint i to the coordinates τ.
+    /// Adds the joint effort Sᵀ f of joint i to the coordinates τ.
     #[inline(always)]
     pub fn project<L: Layout>(l: &L, i: usize, f: Force<L::S>, tau: &mut [L::S]) {
         match l.joint(i) {

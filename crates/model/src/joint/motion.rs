@@ -2,7 +2,7 @@
 
 use condyle_spatial::{Mat3, Motion, Scalar, Vec3};
 
-/// Velocity S q̇ or acceleration S q̈ of a joint in the body's frame, in the form that is cheapest to compute with.
+/// Velocity S q̇ or acceleration S q̈ of a joint in the body's frame, in the form with which computations are cheapest.
 #[derive(Clone, Copy)]
 pub enum JointMotion<S> {
     /// Motion about z.
@@ -26,7 +26,7 @@ impl<S: Scalar> core::ops::Add<JointMotion<S>> for Motion<S> {
     }
 }
 
-/// Rotation of a body and acceleration of its origin, as needed for the equations of Newton and Euler.
+/// Rotation of a body and acceleration of its origin, in the form that the equations of Newton and Euler need.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct ClassicalMotion<S> {
@@ -34,12 +34,12 @@ pub struct ClassicalMotion<S> {
     pub w: Vec3<S>,
     /// Angular acceleration ω̇.
     pub dw: Vec3<S>,
-    /// Classical acceleration of the origin.
+    /// Classical acceleration of the body's origin.
     pub a: Vec3<S>,
 }
 
 impl<S: Scalar> ClassicalMotion<S> {
-    /// Returns K = ω̇× + ω× ω×: a point r of the body has the acceleration a + K r.
+    /// Returns K = ω̇× + ω× ω×, with which a point r of the body has the acceleration a + K r.
     #[inline(always)]
     pub fn centripetal(&self) -> Mat3<S> {
         let (w, dw, minus) = (self.w, self.dw, -self.w);
@@ -62,8 +62,8 @@ impl<S: Scalar> JointMotion<S> {
         Motion::zero() + self
     }
 
-    /// Returns the motion of a body, given its motion without the joint, and the joint's velocity and acceleration aJ:
-    /// ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J.
+    /// Returns the motion of a body: ω + ω_J,  ω̇ + ω̇_J + ω × ω_J,  a + a_J + (2 ω + ω_J) × v_J. `self` is the motion
+    /// that the body would have without the joint. The joint's velocity and its acceleration aJ are given.
     #[inline(always)]
     pub fn added_to(
         self,

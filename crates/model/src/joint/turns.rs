@@ -3,20 +3,20 @@
 use super::Joint;
 use alloc::vec::Vec;
 
-/// Joints that turn about z, collected once so that passes need not inspect each joint.
+/// Joints that turn about z. They are collected once, so that passes need not inspect each joint.
 #[derive(Clone, Debug, Default)]
 pub struct Turns {
-    /// Runs of consecutive joints with consecutive angles in q: the first joint, the index of its angle, and the number
-    /// of joints.
+    /// Runs of consecutive joints with consecutive angles in q. Each run has its first joint, the index of this joint's
+    /// angle, and the number of joints.
     pub(super) runs: Vec<[usize; 3]>,
-    /// Joints whose angles are computed from the angles of other joints.
+    /// Joints that follow others, so that their angles are computed from the angles of other joints.
     pub(super) followers: Vec<usize>,
     /// Joints whose cosines and sines are stored in q.
     pub(super) circles: Vec<usize>,
 }
 
 impl Turns {
-    /// Collects the joints that turn about z. `joints` yields for each body, from body 1 on: its joint, the index of
+    /// Collects the joints that turn about z. For each body, from body 1 on, `joints` yields its joint, the index of
     /// its position in q, and whether it follows another joint.
     pub(crate) fn of(joints: impl Iterator<Item = (Joint, usize, bool)>) -> Self {
         let mut turns = Self::default();

@@ -1,12 +1,12 @@
-//! Map of columns: the columns of other steps that share matrix entries with the columns of a step, and the indices of
-//! these entries.
+//! Map of columns. It contains, for each step, the columns of other steps that share matrix entries with the columns of
+//! this step, and the indices of these entries.
 //!
-//! The ancestors of a step's bodies are usually in the same lanes, until a limb is attached to a body in another lane.
-//! The columns from there to the root are copied, once per call, to indices after all columns. Then all descendants
-//! find the columns that they need in their own lanes.
+//! Usually, the ancestors of a step's bodies are in the same lanes as these bodies. But if a limb is attached to a body
+//! in another lane, this body and its ancestors are in that lane. Their columns are copied, once per call, to indices
+//! after all columns. Then all bodies of the limb find the columns that they need in their own lanes.
 //!
-//! Data of a column may change from body to body on the way outwards, such as the columns of the factor of M⁻¹. They
-//! have a slot for each entry of the support.
+//! Some data of a column change from body to body on the way from the root to the tips, such as the columns of the
+//! factor of M⁻¹. These data have a slot for each entry of the support.
 
 use super::LANES;
 use super::schedule::Schedule;
@@ -19,31 +19,34 @@ use core::iter::successors;
 /// Indices of columns and of matrix entries.
 #[derive(Clone, Debug)]
 pub struct ColumnMap {
-    /// Columns from the root to each step's joints, step by step.
+    /// Columns from the root to the joints of each step, one step after the other.
     pub support: Vec<LaneColumn>,
-    /// Pairs of each such column with the step's own columns.
+    /// Pairs of each column in `support` with the own columns of its step.
     pub pairs: Vec<Pair>,
-    /// Copies of columns, stored after the columns of all steps: their sources, and the changes of lanes.
+    /// Copies of columns, which are stored after the columns of all steps. For each copy, the sources and the changes
+    /// of lanes.
     pub copies: Vec<Vec<(usize, Move)>>,
-    /// Predecessor of each entry of the support: the entry of the step before it on the way outwards.
+    /// Predecessor of each entry of the support: the entry from which it gets its data, of the step before it on the
+    /// way from the root.
     pub predecessors: Vec<Predecessor>,
-    /// Blocks of all columns; a block consists of consecutive columns.
+    /// Blocks of all columns. Each block consists of consecutive columns.
     pub blocks: Vec<ColumnBlock>,
     /// Sizes of the matrices that contain Z.
     pub sizes: Sizes,
 }
 
-/// A column in each lane, among the columns from the root to a step's joints.
+/// Column in each lane, on the path from the root to the joints of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneColumn {
-    /// Index in arrays indexed by column.
+    /// Index of the column in arrays indexed by column.
     pub column: usize,
-    /// Index in `ColumnMap::pairs` of its pairs with the step's own columns, which are consecutive.
+    /// Index in `ColumnMap::pairs` of the first pair of this column with the step's own columns. All pairs of the
+    /// column are consecutive.
     pub pair: usize,
 }
 
-/// Indices of the entries of a pair of columns, one in each lane, in a matrix stored by columns. Lanes without such a
-/// pair point to an entry that the first lane sets after all others.
+/// Indices of the entries of a pair of columns in a matrix that is stored by columns, one index for each lane. In lanes
+/// without such a pair, the index points to an entry that the first lane sets after all other entries.
 #[derive(Clone, Copy, Debug)]
 pub struct Pair {
     /// Index of the entry in the row of the step's own column.
@@ -56,23 +59,24 @@ pub struct Pair {
     pub in_Zt: [u32; LANES],
 }
 
-/// Source from which an entry of the support gets the data that change on the way outwards.
+/// Entry, or entries, from which an entry of the support gets its data. These data change on the way from the root to
+/// the tips.
 #[derive(Clone, Debug)]
 pub enum Predecessor {
-    /// One entry, in the same lanes; for the step's own columns, the entry itself.
+    /// One entry in the same lanes. For the step's own columns, it is the entry itself.
     InPlace(usize),
-    /// Several entries, or other lanes.
+    /// Several entries, or entries in other lanes.
     Moved(Vec<(usize, Move)>),
 }
 
-/// A run of columns, each of which is the parent of the next.
+/// Run of columns in which each column is the parent of the next one.
 #[derive(Clone, Debug)]
 pub struct ColumnBlock {
     /// First column of the run.
     pub first: usize,
     /// Number of columns.
     pub count: usize,
-    /// All columns from the root to the last column of the run.
+    /// All columns on the path from the root to the last column of the run.
     pub path: Vec<usize>,
 }
 
@@ -81,9 +85,9 @@ pub struct ColumnBlock {
 pub struct Sizes {
     /// Number of rows of both matrices.
     pub rows: usize,
-    /// Length of a row of Z D⁻¹, which contains the columns from the root on.
+    /// Length of a row of Z D⁻¹. A row contains the columns on the path from the root.
     pub ZD: usize,
-    /// Length of a row of Zᵀ, which contains all columns, rounded up to whole vectors.
+    /// Length of a row of Zᵀ. A row contains all columns and is padded to whole vectors.
     pub Zt: usize,
 }
 
@@ -93,12 +97,12 @@ impl Sizes {
         Self { rows: tree.nv, ZD: depth, Zt: tree.nv.next_multiple_of(2 * LANES) }
     }
 
-    /// Returns the index after all rows of Z D⁻¹, to which lanes without a body write.
+    /// Returns the index after all rows of Z D⁻¹. Lanes without a body write to this index.
     pub fn end_of_ZD(self) -> usize {
         self.rows * self.ZD
     }
 
-    /// Returns the index after all rows of Zᵀ, to which lanes without a body write.
+    /// Returns the index after all rows of Zᵀ. Lanes without a body write to this index.
     pub fn end_of_Zt(self) -> usize {
         self.rows * self.Zt
     }
@@ -124,28 +128,29 @@ fn blocks(tree: &Tree<f64>) -> Vec<ColumnBlock> {
     blocks
 }
 
-/// A column on the path from the root to the body of a lane.
+/// Column on the path from the root to the body in a lane.
 #[derive(Clone, Copy)]
 struct Ancestor {
-    /// Index in arrays indexed by column.
+    /// Index of the column in arrays indexed by column.
     column: usize,
-    /// Lane of the column.
+    /// Lane in which the column is.
     lane: usize,
     coordinate: usize,
-    /// Entry of the support of the step before.
+    /// Entry of the support that the preceding step has for this column.
     entry: usize,
 }
 
-/// An entry of the support under construction: the index in arrays indexed by column, and the coordinate in each lane.
+/// Entry of the support that is not yet finished: the index of its column in arrays indexed by column, and the
+/// coordinate in each lane.
 type Draft = (usize, [Option<usize>; LANES]);
 
 impl ColumnMap {
-    /// Creates the map for the steps of a schedule, and sets the ranges of their support.
+    /// Creates the map for the steps of a schedule, and sets the range of each step's support.
     pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule, steps: &mut [Step]) -> Self {
         let sizes = Sizes::new(tree);
         let (support, pairs, copies, predecessors) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut map = Self { support, pairs, copies, predecessors, blocks: blocks(tree), sizes };
-        // its last column is set last, in the first lane
+        // The entry of the first body's last column with itself is set last, in the first lane.
         let first = schedule.bodies.get(1).map_or(0, |bodies| bodies[0]);
         let last = tree.nodes[first].idx_v + tree.nodes[first].joint.nv().saturating_sub(1);
         let unused = (last * (tree.nv + 1)) as u32;
@@ -186,7 +191,8 @@ impl ColumnMap {
         map
     }
 
-    /// Returns the columns before the columns of step s; columns in other lanes are copied.
+    /// Returns the columns on the paths from the root to step s, without the columns of step s. Columns in other lanes
+    /// are copied.
     fn ancestors(
         &mut self,
         tree: &Tree<f64>,
@@ -214,7 +220,7 @@ impl ColumnMap {
                     Some(entry) => Predecessor::InPlace(entry),
                     None => Predecessor::Moved(moves(entries)),
                 });
-                // a column that is in all lanes is in this lane, too
+                // A column that is in all lanes is also in this lane.
                 let in_all = |column: usize| schedule.shared && column < steps[1].joint.nv();
                 let columns = [0, 1, 2, 3]
                     .map(|lane| here[lane].map(|a| (a.column, if in_all(a.column) { lane } else { a.lane })));
@@ -228,15 +234,15 @@ impl ColumnMap {
     }
 }
 
-/// Returns the index from which all lanes read, if it is one index and each lane reads its own lane. `from` contains
-/// (index, lane) for each lane.
+/// Returns the index from which all lanes read, if there is one such index and each lane reads from its own lane.
+/// `from` contains (index, lane) for each lane.
 fn in_place(from: [Option<(usize, usize)>; LANES]) -> Option<usize> {
     let (first, _) = from.iter().flatten().next()?;
     let stays = |(lane, from): (usize, &Option<(usize, usize)>)| from.is_none_or(|from| from == (*first, lane));
     from.iter().enumerate().all(stays).then_some(*first)
 }
 
-/// Returns the indices from which lanes read, and the changes of lanes; for use if `in_place` returns `None`.
+/// Returns the indices from which lanes read, and the changes of lanes. It is used if `in_place` returns `None`.
 fn moves(from: [Option<(usize, usize)>; LANES]) -> Vec<(usize, Move)> {
     let mut places: Vec<usize> = from.iter().flatten().map(|x| x.0).collect();
     places.sort_unstable();

@@ -1,40 +1,41 @@
-//! Schedule of the bodies: the bodies of each step.
+//! Schedule of a pass: it assigns bodies to steps and lanes.
 //!
-//! This is list scheduling. Each step takes up to four bodies whose parents are done, and prefers bodies with the
-//! longest path to their tips. It assigns each body to its parent's lane; a body waits for that lane if there is time.
-//! The body that carries all others is in all lanes. Each lane sums up the forces of its own limbs on this body.
+//! The method is list scheduling. Each step takes up to four bodies whose parents are done, and prefers bodies with the
+//! longest path to a tip. It assigns each body to the lane of its parent; if there is time, a body waits until this
+//! lane is free. If one body carries all others, this body is in all lanes. Each lane sums up the forces of its own
+//! limbs on this body.
 
 use super::LANES;
 use crate::tree::Node;
 use alloc::vec::Vec;
 
-/// Minimum number of bodies per step, including the world, for which parallel lanes are faster; two legs of six joints
-/// under one trunk just reach it.
+/// Minimum number of bodies per step, including the world, with which parallel lanes are faster. Two legs with six
+/// joints each under one trunk just reach this number.
 const WORTH: usize = 2;
 
 /// Bodies of each step, and the step of each body.
 #[derive(Clone, Debug)]
 pub(super) struct Schedule {
-    /// Bodies of each step, one in each lane; 0 is an empty lane.
+    /// Bodies of each step, one in each lane; 0 means an empty lane.
     pub bodies: Vec<[usize; LANES]>,
     /// Step and lane of each body.
     pub place: Vec<(usize, usize)>,
-    /// Whether the first step has one body in all lanes.
+    /// Whether the first step has the same body in all lanes.
     pub shared: bool,
 }
 
 impl Schedule {
-    /// Creates the schedule for a robot; `None` if it has too few limbs.
+    /// Creates the schedule for a robot. Returns `None` if the robot has too few limbs.
     pub(super) fn new(nodes: &[Node<f64>]) -> Option<Self> {
-        // First serve the bodies with the longest paths, which determines the number of steps. Then let bodies wait for
-        // a lane if there is time.
+        // The first schedule serves bodies with the longest paths first, which determines the number of steps. In the
+        // second schedule, bodies wait for a lane if there is time.
         let hasty = Self::until(nodes, 0);
         let patient = Self::until(nodes, hasty.bodies.len() - 1);
         let schedule = if patient.bodies.len() > hasty.bodies.len() { hasty } else { patient };
         (nodes.len() >= WORTH * (schedule.bodies.len() - 1)).then_some(schedule)
     }
 
-    /// Creates a schedule. It first serves bodies that cannot wait if `last` is to be the last step.
+    /// Creates a schedule. Bodies that cannot wait, if `last` is to be the last step, are served first.
     fn until(nodes: &[Node<f64>], last: usize) -> Self {
         let n = nodes.len();
         let mut children = vec![Vec::new(); n];
@@ -86,13 +87,13 @@ impl Schedule {
         schedule
     }
 
-    /// Returns whether a step has the same body in all lanes: the world, or the body that carries all others.
+    /// Returns whether a step has the same body in all lanes: the world, or the one body that carries all others.
     #[inline(always)]
     pub(super) fn in_all_lanes(&self, step: usize) -> bool {
         step == 0 || (step == 1 && self.shared)
     }
 
-    /// Returns the step of the parent of the body in a lane, and the lane from which that body reads its parent.
+    /// Returns the step of the parent of the body in a lane, and the lane from which the body reads its parent's data.
     pub(super) fn parent(&self, nodes: &[Node<f64>], step: usize, lane: usize) -> (usize, usize) {
         let (parent, its) = self.place[nodes[self.bodies[step][lane]].parent];
         (parent, if self.in_all_lanes(parent) { lane } else { its })

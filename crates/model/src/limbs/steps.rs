@@ -1,4 +1,4 @@
-//! Steps of a pass: their bodies in lanes, and the indices from which their numbers are read.
+//! Steps of a pass: their bodies in lanes, and the indices from which the numbers of these bodies are read.
 
 use super::LANES;
 use super::schedule::Schedule;
@@ -8,27 +8,27 @@ use alloc::vec::Vec;
 use condyle_spatial::moves::Move;
 use condyle_spatial::{Inertia, Mat3, Se3, Sym3, Vec3};
 
-/// Four bodies as a pass sees them. Data in lanes come first, so that no vector crosses a cache line.
+/// Step of a pass: four bodies in lanes. Data in lanes come first, so that no vector crosses a cache line.
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub struct Step {
-    /// X_T, between turned frames.
+    /// X_T: pose of the joint's frame in the parent's frame, where both frames are turned.
     pub placement: Se3<[f64; LANES]>,
     /// Inertia in the turned frame.
     pub inertia: Inertia<[f64; LANES]>,
-    /// bRz: the turned frame in the body's frame.
+    /// bRz: rotation from the turned frame to the body's frame.
     pub axis_rotation: Mat3<[f64; LANES]>,
-    /// Kind of the bodies' joints.
+    /// Kind of joint that all bodies of the step have.
     pub joint: Joint,
-    /// Indices of the bodies; 0 in an empty lane.
+    /// Indices of the bodies; 0 means an empty lane.
     pub bodies: [usize; LANES],
-    /// Index of the first number of their positions, in arrays in lanes.
+    /// Index of the first number of the bodies' positions, in arrays of lanes.
     pub idx_q: usize,
-    /// Index of the first number of their velocities, in arrays in lanes.
+    /// Index of the first number of the bodies' velocities, in arrays of lanes.
     pub idx_v: usize,
-    /// Steps and lanes of their parents.
+    /// Steps and lanes in which the parents of the bodies are.
     pub parents: Parents,
-    /// Range (first, end) in `ColumnMap::support` of the columns from the root to their joints.
+    /// Range (first, end) in `ColumnMap::support` of the columns from the root to the joints of the step.
     pub support: (usize, usize),
     /// Whether none of the bodies has children.
     pub tip: bool,
@@ -37,9 +37,9 @@ pub struct Step {
 /// Steps and lanes of the parents of a step's bodies.
 #[derive(Clone, Debug)]
 pub enum Parents {
-    /// One step contains all parents, each in its child's lane.
+    /// One step contains all parents, and each parent is in the lane of its child.
     InPlace(usize),
-    /// Several steps, or other lanes, contain the parents.
+    /// Several steps contain the parents, or the parents are in other lanes.
     Moved {
         /// Steps from which data are read, and the changes of lanes.
         from: Vec<(usize, Move)>,
@@ -48,11 +48,11 @@ pub enum Parents {
     },
 }
 
-/// Indices from which the four numbers of a position or a velocity are read: each is the robot's number times `ratio`,
-/// plus `offset`.
+/// Indices from which the four numbers of a position or a velocity are read. Each number is a number of the robot times
+/// `ratio`, plus `offset`.
 #[derive(Clone, Copy, Debug)]
 pub struct Source {
-    /// Indices in the robot's q or v; one past the end in a lane without a joint.
+    /// Indices in the robot's q or v. In a lane without a joint, it is the index after the last number.
     pub from: [usize; LANES],
     /// Ratios of joints that follow others; otherwise 1.
     pub ratio: [f64; LANES],
@@ -60,20 +60,20 @@ pub struct Source {
     pub offset: [f64; LANES],
 }
 
-/// Indices from which the numbers in lanes are read, and to which they are written.
+/// Indices from which numbers in lanes are read, and to which they are written.
 #[derive(Clone, Debug)]
 pub struct StateMap {
     /// Sources of the positions of all steps.
     pub positions: Vec<Source>,
     /// Sources of the degrees of freedom of all steps.
     pub coordinates: Vec<Source>,
-    /// Index in lanes of the number of each coordinate.
+    /// For each coordinate, the index of its number in arrays of lanes.
     pub leaders: Vec<usize>,
-    /// Joints that follow others: coordinate, index of the number in lanes, ratio.
+    /// Joints that follow others, each with its coordinate, the index of its number in arrays of lanes, and its ratio.
     pub followers: Vec<(usize, usize, f64)>,
 }
 
-/// Creates the steps of a schedule; their columns are mapped later.
+/// Creates the steps of a schedule. The columns of these steps are mapped later.
 pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule) -> (Vec<Step>, StateMap) {
     let mut state =
         StateMap { positions: Vec::new(), coordinates: Vec::new(), leaders: vec![0; tree.nv], followers: Vec::new() };
@@ -85,7 +85,7 @@ pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule) -> (Vec<Step>, StateMap
         if s > 0 {
             state.add(tree, schedule, s, joint);
         }
-        // if a body is in all lanes, only the first lane has its inertia
+        // If a body is in all lanes, only the first lane has the body's inertia.
         let carried = |lane: usize| match bodies[lane] {
             0 => Inertia::zero(),
             _ if schedule.in_all_lanes(s) && lane > 0 => Inertia::zero(),
@@ -113,7 +113,7 @@ pub(super) fn new(tree: &Tree<f64>, schedule: &Schedule) -> (Vec<Step>, StateMap
 }
 
 impl StateMap {
-    /// Adds all positions and degrees of freedom of step s.
+    /// Adds the sources of all positions and degrees of freedom of step s.
     fn add(&mut self, tree: &Tree<f64>, schedule: &Schedule, s: usize, joint: Joint) {
         let bodies = schedule.bodies[s];
         let mut neutral = vec![0.0; joint.nq()];
@@ -143,7 +143,7 @@ impl StateMap {
 
 /// Returns the steps and lanes of the parents of step s.
 fn parents(tree: &Tree<f64>, schedule: &Schedule, s: usize) -> Parents {
-    // for each lane with a body: its parent's step and lane
+    // For each lane with a body, the step and lane of its parent.
     let at: Vec<(usize, (usize, usize))> = (0..LANES)
         .filter(|&lane| schedule.bodies[s][lane] > 0)
         .map(|lane| (lane, schedule.parent(&tree.nodes, s, lane)))
@@ -160,7 +160,7 @@ fn parents(tree: &Tree<f64>, schedule: &Schedule, s: usize) -> Parents {
         let mut pairs: Vec<_> =
             at.iter().filter(|(_, (s, _))| *s == source).map(|(lane, (_, its))| (*its, *lane)).collect();
         from.push((source, Move::new(&pairs)));
-        // towards the root: no two lanes may be added to the same lane at once
+        // In passes towards the root, two lanes must not be added to the same lane at once.
         while !pairs.is_empty() {
             let (mut now, mut later) = (Vec::<(usize, usize)>::new(), Vec::new());
             for (its, lane) in pairs {

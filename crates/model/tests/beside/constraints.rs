@@ -1,8 +1,8 @@
-//! Loops, couplings, followers and keyframes.
+//! Tests of MJCF: loops, couplings, followers and keyframes.
 
 use super::*;
 
-/// Compares with `eq_data`: anchors in body1 and body2, and the relative orientation.
+/// Compares with MuJoCo's `eq_data`: anchors in body1 and body2, and the relative orientation.
 #[test]
 fn loops_and_couplings() {
     let text = "<mujoco><worldbody><body name='a' pos='1 2 3' quat='1 2 3 4'><joint name='p' axis='0 1 0' ref='15' pos='.1 .2 .3'/>
@@ -16,7 +16,7 @@ fn loops_and_couplings() {
     let found = read(text).unwrap();
     let names: Vec<&str> = found.constraints().iter().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["connect1", "w", "weld2", "joint1", "weld3", "joint2"]);
-    // returns the two frames of a constraint, relative to the bodies or sites in `of`
+    // returns the poses of the two frames of a constraint, relative to the bodies or sites in `of`
     let placed = |k: usize, of: [&str; 2]| {
         let frames = match found.constraints()[k].kind {
             ModelConstraintKind::Point { frames } | ModelConstraintKind::Rigid { frames } => frames,
@@ -38,14 +38,14 @@ fn loops_and_couplings() {
     let [first, second] = placed(1, ["c", "e"]);
     close(&place(first), &[-1.54, -2.964, 0.848]);
     close(&place(second), &[0.1, 0.2, 0.3]);
-    // the quaternion (0, −0.7071, −0.4243, −0.5657) maps x, y and z to
+    // the quaternion (0, −0.7071, −0.4243, −0.5657) maps x, y and z to these columns
     let turned = [first.rotation.x, first.rotation.y, first.rotation.z].map(|axis| axis.to_array());
     close(turned.as_flattened(), &[0.0, 0.6, 0.8, 0.6, -0.64, 0.48, 0.8, 0.48, -0.36]);
     assert!(matches!(found.constraints()[1].kind, ModelConstraintKind::Rigid { .. }));
     let [first, second] = placed(2, ["a", "world"]);
     close(&place(first), &[0.1, 0.2, 0.3]);
     close(&place(second), &[0.3, 0.2, 0.1]);
-    // torquescale 0 leaves rotation free
+    // with `torquescale` 0, the rotation is free
     assert!(matches!(found.constraints()[2].kind, ModelConstraintKind::Point { .. }));
     for X in placed(4, ["u", "v"]) {
         close(&place(X), &[0.0; 3]);
@@ -65,12 +65,12 @@ fn loops_and_couplings() {
     assert_eq!(coefficients, [0.25, 0.0, 0.0, 0.0, 0.0]);
     let kinds: Vec<_> = found.warnings().iter().map(|warning| warning.kind()).collect();
     assert_eq!(kinds, [WarningKind::Mimic, WarningKind::LeftOut]); // nothing enforces the couplings
-    // here both bodies are parts of one body
+    // both bodies of the constraint are merged into one body of the model
     let held = model("", &format!("{HINGE}<body name='c'/>"), "<equality><weld body1='b' body2='c'/></equality>");
     assert_eq!(said(&held), ["<string>:1: <weld>: both ends are fixed to one body, which no constraint can move"]);
 }
 
-/// A chain of followers has one leader; a circle of followers becomes a constraint.
+/// In a chain of followers, all followers have the same leader. A circle of followers becomes a constraint.
 #[test]
 fn followers_of_followers() {
     let ball = "<geom size='0.1'/>";
@@ -87,9 +87,9 @@ fn followers_of_followers() {
     let found = Model::from_mjcf_str(&text(chain), &options).unwrap();
     let mimic = |i: usize| found.bodies()[i].mimic.map(|mimic| [mimic.ratio, mimic.offset]);
     assert_eq!((found.nv(), mimic(1), mimic(2)), (1, None, Some([-2.0, 0.1])));
-    close(&mimic(3).unwrap(), &[-6.0, 0.8]); // c = 0.5 + 3 (0.1 − 2 a)
+    close(&mimic(3).unwrap(), &[-6.0, 0.8]); // position of c: 0.5 + 3 (0.1 − 2 a)
     assert!(said(&found).is_empty() && found.constraints().is_empty());
-    // damping and efforts of followers act on the leader: v_b = −2 v_a, v_c = −6 v_a
+    // damping and efforts of followers act on the leader, with v_b = −2 v_a and v_c = −6 v_a
     close(found.damping(), &[1.0 + 4.0 + 36.0]);
     close(&effort(&found), &[-1.0 - 2.0 - 12.0, 2.0 + 2.0 + 6.0]);
     let circle = format!("{chain}<joint joint1='a' joint2='c'/>");
@@ -108,7 +108,7 @@ fn followers_of_followers() {
     assert_eq!(said(&constant), [format!("<string>:1: joint `e`: {what}")]);
 }
 
-/// With x = 2 q + 0.1, the range of −20° to 60° of x is −0.2245 to 0.4736 of q.
+/// With x = 2 q + 0.1, the range of x from −20° to 60° is the range of q from −0.2245 to 0.4736.
 #[test]
 fn ranges_of_followers() {
     let text = "<mujoco><worldbody><body><joint name='a'/><geom size='1'/></body><body><joint name='b' range='-20 60'/>
@@ -118,7 +118,7 @@ fn ranges_of_followers() {
     close(&[found.limits().lower[0], found.limits().upper[0]], &ends);
 }
 
-/// Compares with `key_qpos`, and with `mj_objectVelocity` along the body's axes.
+/// Compares with MuJoCo's `key_qpos`, and with `mj_objectVelocity` along the body's axes.
 #[test]
 fn keyframes() {
     let ball = "<geom size='0.1'/>";
@@ -140,7 +140,7 @@ fn keyframes() {
     let refused = |keys: &str, expected: &str| assert_eq!(read(&text(keys)).unwrap_err().to_string(), expected);
     refused("<key qpos='1 2'/>", "<string>:2: <key>: qpos: expected 12 numbers, found 2");
     refused("<key name='k' qvel='1'/>", "<string>:2: key `k`: qvel: expected 10 numbers, found 1");
-    // as in MuJoCo, a list may contain the numbers of the first joints only
+    // as in MuJoCo, a list may contain only the numbers of the first joints
     let short = read(&text("<key name='k' qpos='1 2 3 2 0 0 2' qvel='0 0 0 0 0 1'/>")).unwrap();
     close(&short.keyframes()[0].q, &[1.0, 2.0, 3.0, 0.0, 0.0, half, half, 0.0, 0.0, 0.0, 1.0, 0.25]);
     close(&short.keyframes()[0].v, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
@@ -156,8 +156,8 @@ fn keyframes() {
     assert_eq!((&found.keyframes()[0].q[..], &found.keyframes()[0].v[..]), (&[2.0][..], &[4.0][..]));
 }
 
-/// `key_ctrl` and `key_act`, at `actuator_ctrladr` 0, 1, 2, 4, 5, 6, 8, 9, 12, and `actuator_actadr` 0 and 5 of
-/// integrators.
+/// Compares with MuJoCo's `key_ctrl` and `key_act`. The controls are at `actuator_ctrladr` 0, 1, 2, 4, 5, 6, 8, 9, 12.
+/// The activations of integrators are at `actuator_actadr` 0 and 5.
 #[test]
 fn controls_of_keyframes() {
     let text = |actuators: &str, keys: &str| {
@@ -177,7 +177,7 @@ fn controls_of_keyframes() {
     let many = numbers.replace("13'", "13 14'");
     refused(&format!("<key {many}/>"), "<string>:3: <key>: ctrl: expected at most 13 numbers, found 14");
     refused("<key act='1 2 3 4 5 6 7'/>", "<string>:3: <key>: act: expected at most 6 numbers, found 7");
-    // the activations of a plugin are its own
+    // a plugin defines its number of activations itself
     let plugin = format!("<plugin joint='j' plugin='p'/>{all}");
     let found = read(&text(&plugin, &format!("<key {}/>", numbers.replace("'1 ", "'0 1 ")))).unwrap();
     close(&found.keyframes()[0].control, &[1.0, 0.0, 3.0, 6.0, 7.0, 0.0, 13.0]);

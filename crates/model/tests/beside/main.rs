@@ -1,5 +1,5 @@
-//! Actuators, springs, tendons, constraints and keyframes of MJCF. Expected numbers are from MuJoCo 4.0: fields of its
-//! compiled model, or results of `mj_forward`, as the comments state.
+//! Tests of actuators, springs, tendons, constraints and keyframes of MJCF. Expected numbers are from MuJoCo 4.0:
+//! fields of its compiled model, or results of `mj_forward`, as the comments state.
 
 #![allow(non_snake_case)]
 
@@ -20,7 +20,7 @@ fn read(text: &str) -> Result<Model, Error> {
     Model::from_mjcf_str(text, &MjcfOptions::default())
 }
 
-/// Returns a file with one body on a joint, and sections before and after the tree.
+/// Returns an MJCF with one body on a joint, and with sections before and after the tree.
 fn one(before: &str, joint: &str, after: &str) -> String {
     format!(
         "<mujoco>{before}<worldbody><body name='b'>{joint}{INERTIAL}<site name='s'/></body></worldbody>{after}</mujoco>"

@@ -1,4 +1,4 @@
-//! Errors, limits of files, and changed models.
+//! Tests of MJCF: errors, limits of files, and models that are changed.
 
 use super::*;
 
@@ -78,7 +78,7 @@ fn errors() {
     }
 }
 
-/// A file that multiplies its content is refused at once.
+/// A file whose content is multiplied beyond a limit is refused at once.
 #[test]
 fn limits_of_multiplied_content() {
     let keys = format!("<keyframe>{}</keyframe>", "<key/>".repeat(300_000));
@@ -97,7 +97,7 @@ fn limits_of_multiplied_content() {
     assert_eq!(said, format!("<string>:1: <motor>: {what}"));
 }
 
-/// Additions to the tree stay with their parts when a robot is changed.
+/// When a robot is changed, its springs, actuators, constraints and keyframes stay with their bodies and joints.
 #[test]
 fn models_that_are_changed() {
     let ball = "<geom size='0.1'/>";
@@ -130,8 +130,8 @@ fn models_that_are_changed() {
     assert_eq!(carried(&two, 1), carried(&found, 0));
 }
 
-/// Compares with `qfrc_actuator` at the positions 0.3 and 0.4 and the control 0.9: the locked joint has a part of the
-/// tendon's length, 1.0.
+/// Compares with MuJoCo's `qfrc_actuator` at the positions 0.3 and 0.4 and the control 0.9. The locked joint keeps its
+/// share of the tendon's length 1.0.
 #[test]
 fn a_locked_joint_of_a_tendon() {
     let text =
@@ -150,7 +150,7 @@ fn a_locked_joint_of_a_tendon() {
     }
 }
 
-/// A locked follower holds its leader if the polynomial is linear; else there is a warning. Other warnings stay.
+/// A locked follower holds its leader if the polynomial is linear. Otherwise, there is a warning. Other warnings stay.
 #[test]
 fn a_locked_joint_of_a_coupling() {
     let text = |equality: &str| {
@@ -163,7 +163,7 @@ fn a_locked_joint_of_a_coupling() {
     let lock = |equality: &str, joint: usize| read(&text(equality)).unwrap().lock(&[joint], &[0.5, 2.1]).unwrap();
     let coupled = "<joint name='e' joint1='b' joint2='a' polycoef='0.1 2'/>";
     for (joint, held) in [(1, 1.1), (2, 1.0)] {
-        let locked = lock(coupled, joint); // b = 0.1 + 2 a, at a = 0.5 or at b = 2.1
+        let locked = lock(coupled, joint); // b = 0.1 + 2 a, locked at a = 0.5 or at b = 2.1
         let ModelConstraintKind::Coupling { follower: 1, leader: None, coefficients } = locked.constraints()[0].kind
         else {
             panic!()
@@ -181,7 +181,7 @@ fn a_locked_joint_of_a_coupling() {
     assert_eq!(both.warnings().len(), 4);
 }
 
-/// The text of a compiled model is not seen by the user, so errors and warnings about it have no line.
+/// The user does not see the text of a compiled model, so errors and warnings about this text have no line number.
 #[test]
 fn a_text_without_lines() {
     let text = one("", "<joint name='j' dampng='1'/>", "");

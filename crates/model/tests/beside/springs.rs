@@ -1,8 +1,8 @@
-//! Springs, damping, tendons and gravity compensation.
+//! Tests of MJCF: springs, damping, tendons and gravity compensation.
 
 use super::*;
 
-/// Compares with `jnt_stiffness`, `qpos_spring` and `dof_damping`.
+/// Compares with MuJoCo's `jnt_stiffness`, `qpos_spring` and `dof_damping`.
 #[test]
 fn springs_of_joints() {
     let found = model("", "<joint axis='0 1 0' stiffness='5 1 2' springref='10' ref='30' damping='3 1 2'/>", "");
@@ -15,15 +15,16 @@ fn springs_of_joints() {
     assert_eq!(found.springs()[0].rest, [10.0]);
     let found = model("", "<joint type='ball' stiffness='5' springref='10'/>", "");
     assert_eq!(found.springs()[0].rest, [0.0, 0.0, 0.0, 1.0]);
-    // springdamper replaces the linear coefficients
+    // `springdamper` replaces the linear coefficients
     let both = "<joint axis='0 1 0' springdamper='0.5 1' stiffness='9' damping='3 1 2' armature='0.1'/>";
     let found = model("", both, "");
     close(&[found.springs()[0].stiffness[0], found.damping()[0]], &[0.6, 0.6]);
     assert_eq!(found.damping_polynomial(), [[1.0, 2.0]]);
 }
 
-/// Compares with `jnt_stiffness`, `dof_damping` and `actuator_biasprm` of robots whose joints carry others. The inertia
-/// is the inverse of J M⁻¹ Jᵀ, with rotors of joints and tendons, in the initial configuration of the file.
+/// Compares with MuJoCo's `jnt_stiffness`, `dof_damping` and `actuator_biasprm`, for robots whose joints carry other
+/// joints. The inertia is the inverse of J M⁻¹ Jᵀ, with the rotors of joints and tendons, in the initial configuration
+/// of the file.
 #[test]
 fn springs_and_gains_from_inertia() {
     let text = format!(
@@ -61,8 +62,8 @@ fn springs_and_gains_from_inertia() {
     close(&rest[3..], &[0.02980901962620916, 0.34071865342161006, 0.08189960831908934, 0.9361168066628592]);
 }
 
-/// Compares with `qfrc_spring`, `qfrc_damper` and `ten_length`: a tendon over one joint is a spring, a damper and a
-/// limit of that joint.
+/// Compares with MuJoCo's `qfrc_spring`, `qfrc_damper` and `ten_length`. A tendon over one joint is a spring, a damper
+/// and a limit of this joint.
 #[test]
 fn tendons_over_one_joint() {
     let fixed = |attributes: &str| {
@@ -81,7 +82,7 @@ fn tendons_over_one_joint() {
         -(found.damping()[0] + found.damping_polynomial()[0][0] * v + found.damping_polynomial()[0][1] * v * v) * v
     };
     close(&[d(0.7)], &[-27.104]);
-    // by default it rests where the joint rests
+    // by default, the tendon's spring is at rest where the joint's spring is at rest
     let found = model("", "<joint name='j' axis='0 1 0' springref='20'/>", &fixed("stiffness='3'"));
     close(&found.springs()[0].rest, &[0.3490658503988659]);
     let found = model("", HINGE, &fixed("range='-1 0.5'"));
@@ -99,7 +100,7 @@ fn tendons_over_one_joint() {
     assert_eq!(said(&slack), [format!("<string>:1: fixed `t`: {what}")]);
 }
 
-/// Compares with `mj_fullM`: only effects that a diagonal cannot represent cause warnings.
+/// Compares with MuJoCo's `mj_fullM`. Only effects that the diagonal of M cannot represent cause warnings.
 #[test]
 fn tendons_over_several_joints() {
     let text = |first: &str, second: &str, attributes: &str| {
@@ -111,7 +112,7 @@ fn tendons_over_several_joints() {
             </mujoco>"
         )
     };
-    // MuJoCo's M has no entry for joints on different branches
+    // MuJoCo's M has no entry for two joints on different branches
     let found = read(&text("a", "b", "armature='1'")).unwrap();
     assert_eq!((found.armature(), said(&found).len()), (&[0.0, 4.0, 9.0][..], 0));
     let found = read(&text("r", "b", "armature='1'")).unwrap();
@@ -149,7 +150,7 @@ fn weight_is_compensated() {
     close(&carried(&found).mass_com.to_array(), &[0.5, 0.0, 1.0]); // 2 · 2 · (0.1, 0, 0) + 0.5 · 2 · (0.1, 0, 1)
     let scaled = read(&text.replace("<worldbody>", "<compiler settotalmass='12'/><worldbody>")).unwrap();
     close(&[carried(&scaled).mass], &[10.0]);
-    // as in MuJoCo, compensations below 0 act only if there is one above 0
+    // as in MuJoCo, a negative `gravcomp` acts only if another one is positive
     let negative = text.replace("gravcomp='0.5'", "gravcomp='-0.5'");
     close(&[carried(&read(&negative).unwrap()).mass], &[3.0]);
     let alone = read(&negative.replace("gravcomp='2'", "").replace("gravcomp='1'", "")).unwrap();
@@ -163,7 +164,7 @@ fn weight_is_compensated() {
     assert_eq!(said(&found), [format!("<string>:1: joint `j`: {what}")]);
 }
 
-/// Compares with `qfrc_passive`, and tests the effect of `disable` on forces and limits.
+/// Compares with MuJoCo's `qfrc_passive`, and tests the effect of `disable` on forces and limits.
 #[test]
 fn switches() {
     let joint = "<joint name='j' axis='0 1 0' stiffness='1' damping='2' frictionloss='3' range='-10 10'/>";
@@ -194,8 +195,8 @@ fn switches() {
     }
 }
 
-/// `gravcomp` is a ratio in MuJoCo: after its masses are doubled, `body_mass · body_gravcomp` is doubled too. A part
-/// with another ratio keeps its own.
+/// `gravcomp` is a ratio in MuJoCo: if its masses are doubled, `body_mass · body_gravcomp` is doubled, too. A part of
+/// the body with another ratio keeps this ratio.
 #[test]
 fn compensation_follows_the_inertia() {
     let text = format!(
@@ -209,7 +210,7 @@ fn compensation_follows_the_inertia() {
         [carried.mass, carried.mass_com.x, carried.mass_com.y, carried.mass_com.z]
     };
     close(&carried(&found), &[1.0, 0.1, 0.0, 0.0]); // 0.5 · 2 kg at (0.1, 0, 0)
-    // the moving link is heavier by 4 kg at its centre, as `write_mjcf` writes it
+    // the moving link has 4 kg more at its centre, as `write_mjcf` writes it
     let more = Inertia::from_com(4.0, Vec3::new(0.1, 0.0, 0.0), Sym3::diagonal(0.1));
     let heavier = found.with_inertias(|i, I| if i == 1 { I + more } else { I }).unwrap();
     close(&carried(&heavier), &[3.0, 0.3, 0.0, 0.0]); // 0.5 · 6 kg
@@ -219,7 +220,7 @@ fn compensation_follows_the_inertia() {
     heavier.write_mjcf(&path, &path).unwrap();
     let written = Model::from_mjcf(&path, &MjcfOptions::default()).unwrap();
     close(&carried(&written), &carried(&heavier));
-    // without the rest of the inertia, the part keeps none either, and the ratio is another one
+    // without the rest of the inertia, the part has no inertia either, and the compensated mass changes
     let light = found.with_inertias(|i, I| if i == 1 { I.scale(0.3) } else { I }).unwrap();
     let said = light.write_mjcf(&path, &path).unwrap_err().to_string();
     let what = "cannot be written, for its links have different ratios: the file gives";
@@ -227,7 +228,7 @@ fn compensation_follows_the_inertia() {
     std::fs::remove_file(path).unwrap();
 }
 
-/// A locked body keeps its own ratio, and so does the base of a robot that is attached to another one.
+/// A locked body keeps its own ratio, and so does the base of a robot that is attached to another robot.
 #[test]
 fn compensation_of_merged_bodies() {
     let text = |ratio: [&str; 2]| {
@@ -238,7 +239,7 @@ fn compensation_of_merged_bodies() {
             ratio[0], ratio[1]
         )
     };
-    // 2 kg each, the second one 1 m above the first one, each with its centre at x = 0.1 m
+    // each body has 2 kg with its centre at x = 0.1 m, and the second body is 1 m above the first one
     for (ratio, mass, moment) in [(["0.5", "1"], 3.0, 2.0), (["0.5", "0"], 1.0, 0.0), (["0", "0.25"], 0.5, 0.5)] {
         let found = read(&text(ratio)).unwrap();
         let locked = found.lock(&[2], &[0.0; 2]).unwrap();

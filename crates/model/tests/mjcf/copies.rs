@@ -1,4 +1,4 @@
-//! Files in files, and copies of parts of a tree.
+//! Tests of MJCF: files in files, and copies of parts of a tree.
 
 use super::*;
 
@@ -21,12 +21,12 @@ fn replicas_turn_and_move_on() {
     ]) {
         near(&body.name, &flat(&body.placement), &expected, 1e-12);
     }
-    // inner suffixes come first; a suffix has as many digits as the count
+    // suffixes of inner copies come first, and a suffix has as many digits as the count
     let nested = replicate("count='2'", &replicate("count='10' sep='_'", LINK));
     assert_eq!(names(&model("", &nested, ""))[..2], ["b_000", "b_010"]);
     assert_eq!(names(&model("", &nested, ""))[19], "b_091");
     assert_eq!(names(&model("", &replicate("count='0'", LINK), "")), [""; 0]);
-    // unnamed elements stay unnamed
+    // elements without a name stay without a name
     let class = "<default><default class='c'><joint armature='3'/></default></default>";
     let unnamed = model(class, &replicate("count='2' childclass='c'", "<body><joint/><geom size='0.1'/></body>"), "");
     assert_eq!((names(&unnamed), unnamed.armature()), (vec!["body1", "body2"], &[3.0, 3.0][..]));
@@ -41,7 +41,7 @@ fn elements_that_refer_to_a_replica_are_copied() {
         <motor name='n' joint='k'/><motor name='o' tendon='t'/></actuator>";
     let actuators = model("", &tree, after);
     let actuators: Vec<_> = actuators.actuators().iter().map(|a| a.name.as_str()).collect();
-    assert_eq!(actuators, ["n", "m0", "o0", "m1", "o1"]); // MuJoCo's order
+    assert_eq!(actuators, ["n", "m0", "o0", "m1", "o1"]); // in MuJoCo's order
     let mixed = "<equality><joint joint1='j' joint2='k'/></equality>";
     assert!(refused("", &tree, mixed).contains("joint1: no joint is named `j`"));
 }
@@ -73,7 +73,7 @@ fn parts_of_the_same_file_attached_again() {
     assert_eq!(names(&twice), ["b", "p-b"]);
     near("place", &flat(&twice.bodies()[2].placement)[..3], &[1.0, 2.0, 3.0], 1e-12);
     assert_eq!(twice.actuators().iter().map(|a| a.name.as_str()).collect::<Vec<_>>(), ["m", "p-m"]);
-    // frames around the attached part are not copied, but the class around it is
+    // frames around the attached part are not copied, but the class of these frames is kept
     let framed =
         "<frame pos='5 0 0' childclass='c'><frame name='f' pos='0 1 0'><body name='x'><joint/><geom size='0.1'/></body>
         </frame></frame><frame pos='0 0 7'><attach frame='f' prefix='p-'/></frame>";
@@ -116,7 +116,7 @@ fn attached_files_keep_their_own_settings() {
     let model = attached("<attach model='c' body='d' prefix='x-'/>").unwrap();
     assert_eq!(names(&model), ["b", "x-d", "x-e"]);
     let masses: Vec<_> = model.bodies()[1..].iter().map(|b| b.inertia.mass).collect();
-    assert_eq!(masses, [2.0, 0.5, 1.0]); // bounded by the settings of the child
+    assert_eq!(masses, [2.0, 0.5, 1.0]); // bounded by the settings of the attached file
     assert_eq!((model.limits().lower[1], model.limits().upper[1]), (-1.0, 1.0));
     assert_eq!((model.damping(), model.armature()), (&[0.0, 0.5, 0.5][..], &[9.0, 0.0, 2.0][..]));
     near("place", &flat(&model.bodies()[2].placement)[..4], &[0.0, 1.0, 0.0, 0.0], 1e-12);
@@ -150,7 +150,7 @@ fn includes_next_to_the_including_file() {
         ("in/deep/part.xml", b"<mujocoinclude><site name='s' pos='0 0 2'/></mujocoinclude>"),
         ("deep/part.xml", b"<mujocoinclude><site name='s' pos='0 0 5'/></mujocoinclude>"),
     ];
-    // the main file's folder has priority
+    // the folder of the main file has priority
     near("site", &placement(&Folder::new("first", &files).read("top.xml").unwrap(), "s")[..3], &[0.0, 0.0, 5.0], 0.0);
     let beside = Folder::new("beside", &files[..3]).read("top.xml").unwrap();
     near("site", &placement(&beside, "s")[..3], &[0.0, 0.0, 2.0], 0.0);

@@ -1,4 +1,4 @@
-//! Sites, cameras and named frames.
+//! Tests of MJCF: sites, cameras, and frames with a name.
 
 use super::*;
 use condyle_model::FrameKind;

@@ -1,11 +1,11 @@
-//! Masses and inertias of geoms and meshes, and of bodies that are fixed to the world.
+//! Tests of MJCF: masses and inertias of geoms and meshes, and of bodies that are fixed to the world.
 
 use super::*;
 
 /// Tolerance for meshes: MuJoCo computes their principal axes only up to 1e-7.
 const MESH: f64 = 1e-7;
 
-/// Returns a file with a dented mesh, and a body with this mesh.
+/// Returns an MJCF with a dented mesh, and a body with this mesh.
 fn mesh(attributes: &str, geom: &str, before: &str) -> String {
     let points = "vertex='0 0 0  1 0 0  0 2 0  0 0 3  0.4 0.4 0.4'";
     let faces = "face='0 2 1  0 1 3  0 3 2  1 2 4  2 3 4  3 1 4'";
@@ -57,7 +57,7 @@ fn rules_of_meshes() {
     );
     let moved = "inertia='exact' scale='1 -2 3' refpos='0.1 0 0' refquat='0 1 0 0'";
     weighs(&mesh(moved, "type='mesh'", ""), &mirrored, MESH);
-    // an explicit mass, and points without triangles
+    // a mesh with an explicit mass, and a mesh with points but no triangles
     let given = read(&mesh("", "type='mesh' mass='6'", "")).unwrap();
     assert_eq!(given.total_mass(), 6.0);
     weighs(&mesh("inertia='exact'", "type='mesh'", "").replace("face=", "user="), &convex, MESH);
@@ -102,7 +102,7 @@ fn shells() {
     ] {
         let geom = format!("<body><joint/><geom type='{kind}' size='0.1 0.2 0.3' shellinertia='true'/></body>");
         let found = inertia(&model("", &geom, "").bodies()[1]);
-        // the layer of an ellipsoid is 1 µm thick, and its moments are differences
+        // the layer of an ellipsoid is 1 µm thick, so its moments are differences of nearly equal numbers
         near(
             kind,
             &[found[0], found[4], found[5], found[6]],
@@ -193,7 +193,8 @@ fn files_of_meshes() {
     }
 }
 
-/// `body_mass` and `body_ipos` of MuJoCo 4.0.0. As a fan from its first corner, the face would give 17500 kg.
+/// Compares with `body_mass` and `body_ipos` of MuJoCo 4.0.0. If the face were cut as a fan from its first corner, the
+/// mass would be 17500 kg.
 #[test]
 fn faces_of_five_corners_that_are_in_no_plane() {
     let mut obj = "v 3 1 0\nv 5 1 0.5\nv 6 3 0\nv 4 5 1\nv 2 3 -0.5\nv 4 2 -5\nf 1 2 3 4 5\n".to_owned();
@@ -231,7 +232,8 @@ fn invalid_meshes() {
     let inside_out = mesh("inertia='exact' scale='1 1 1'", "type='mesh'", "").replace("0 2 1  0 1 3", "0 1 2  0 3 1");
     let inside_out = inside_out.replace("0 3 2  1 2 4  2 3 4  3 1 4", "0 2 3  1 4 2  2 4 3  3 4 1");
     assert!(read(&inside_out).unwrap_err().to_string().contains("is negative: its triangles are inside out"));
-    // a body that is fixed to the world is read nevertheless, and a body with an <inertial> needs no mesh
+    // a body with an invalid mesh can be read if it is fixed to the world, and a body with an <inertial> does not need
+    // its mesh
     let fixed = model(flat, "<body name='w'><geom type='mesh' mesh='m'/></body>", "");
     assert!(said(&fixed, WarningKind::LeftOut)[0].contains("the mass of a mesh on body `w` is left out"));
     assert_eq!(model(flat, &body("", "<geom type='mesh' mesh='m'/>"), "").warnings(), []);
@@ -245,7 +247,7 @@ fn bodies_fixed_to_the_world_have_mass() {
     let fixed = format!("<body><geom size='0.1' mass='7'/>{}</body>", body("", ""));
     assert_eq!(model("", &fixed, "").total_mass(), 9.0);
     near("scaled", &[model("<compiler settotalmass='3'/>", &fixed, "").total_mass()], &[3.0], 1e-15);
-    // geoms of the world itself have no mass
+    // geoms that belong to the world itself have no mass
     assert_eq!(model("", &format!("<geom size='1'/>{}", body("", "")), "").total_mass(), 2.0);
     let field = "<asset><hfield name='h' nrow='2' ncol='2' size='1 2 3 4'/></asset>";
     assert_eq!(model(field, "<body><joint/><geom type='hfield' hfield='h'/></body>", "").total_mass(), 44000.0);

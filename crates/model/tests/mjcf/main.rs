@@ -1,5 +1,5 @@
-//! Structure of MJCF: names, frames, copies, files, geoms and meshes. Expected numbers are from MuJoCo 4.0: its
-//! compiled model, or `mj_forward`.
+//! Tests of the structure of MJCF: names, frames, copies, files, geoms and meshes. Expected numbers are from MuJoCo
+//! 4.0: its compiled model, or `mj_forward`.
 
 #![allow(non_snake_case)]
 
@@ -18,7 +18,7 @@ fn read(text: &str) -> Result<Model, Error> {
     Model::from_mjcf_str(text, &MjcfOptions::default())
 }
 
-/// Returns a robot with text before its tree, in it, and after it.
+/// Returns an MJCF with given texts before its tree, inside the tree, and after the tree.
 fn robot(before: &str, inside: &str, after: &str) -> String {
     format!("<mujoco>{before}<worldbody>{inside}</worldbody>{after}</mujoco>")
 }
@@ -34,7 +34,7 @@ fn refused(before: &str, inside: &str, after: &str) -> String {
     read(&robot(before, inside, after)).expect_err(inside).to_string()
 }
 
-/// Returns the warnings of a kind.
+/// Returns the texts of a model's warnings of one kind.
 fn said(model: &Model, kind: WarningKind) -> Vec<String> {
     model.warnings().iter().filter(|w| w.kind() == kind).map(ToString::to_string).collect()
 }
@@ -53,7 +53,7 @@ fn near(what: &str, found: &[f64], expected: &[f64], tolerance: f64) {
     }
 }
 
-/// Returns the placement of a frame in its body: position, then the rotation by rows.
+/// Returns the placement of a frame in its body: the position, then the rotation, row by row.
 #[track_caller]
 fn placement(model: &Model, name: &str) -> Vec<f64> {
     flat(&model.frames()[model.frame(name).unwrap()].placement)
@@ -64,7 +64,7 @@ fn flat(X: &Se3<f64>) -> Vec<f64> {
     [X.translation, R.x, R.y, R.z].iter().flat_map(|v| v.to_array()).collect()
 }
 
-/// Returns mass, centre of mass, and the inertia about it (xx, yy, zz, xy, xz, yz).
+/// Returns the mass, the centre of mass, and the inertia about the centre of mass (xx, yy, zz, xy, xz, yz).
 fn inertia(body: &Body) -> Vec<f64> {
     let (m, com, I) =
         (body.inertia.mass, body.inertia.mass_com.scale(1.0 / body.inertia.mass), body.inertia.rotational);
@@ -74,7 +74,7 @@ fn inertia(body: &Body) -> Vec<f64> {
     [&[m, x, y, z][..], &about, &mixed].concat()
 }
 
-/// A folder of files, which is removed when it is dropped.
+/// Folder of files, which is removed when the value is dropped.
 struct Folder(PathBuf);
 
 impl Folder {

@@ -1,4 +1,4 @@
-//! Unknown and misplaced names, and names that contradict each other.
+//! Tests of MJCF: unknown and misplaced names, and attributes that contradict each other.
 
 use super::*;
 
@@ -29,7 +29,7 @@ fn unknown_names_warn_with_the_nearest_one() {
     }
 }
 
-/// Elements of a robot have no effect in elements that do not change it.
+/// Elements of a robot have no effect inside elements that do not change the robot.
 #[test]
 fn misplaced_elements() {
     for (before, after, expected) in [
@@ -45,7 +45,7 @@ fn misplaced_elements() {
     }
 }
 
-/// Keywords that MuJoCo 4.0 refuses.
+/// MuJoCo 4.0 refuses these keywords, and so does the reader.
 #[test]
 fn keywords() {
     for (before, inside, after, expected) in [
@@ -135,7 +135,7 @@ fn contradictions_are_errors() {
     }
     assert!(refused("", "", "<deformable><flex name='f'/></deformable>").contains("flex `f`: is not supported"));
     assert!(refused("<option><flag spring='off'/></option>", "", "").contains("spring: `off` is neither enable nor"));
-    // a class has one orientation, the last one in it; pos at the origin does not contradict fromto
+    // a class has a single orientation, which is the last one in it; a pos of 0 0 0 does not contradict fromto
     let before = "<default><geom euler='90 0 0'/><default class='c'><geom quat='0 1 0 0'/></default></default>";
     let inside = "<body><joint/><geom class='c' type='box' size='0.1 0.2 0.3' pos='1 0 0' mass='1'/></body>";
     near("class", &inertia(&model(before, inside, "").bodies()[1])[4..7], &[0.13 / 3.0, 0.1 / 3.0, 0.05 / 3.0], 1e-12);

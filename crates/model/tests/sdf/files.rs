@@ -1,4 +1,4 @@
-//! Models in models, and files in files.
+//! Tests of SDF: models in models, and files in files.
 
 use super::*;
 
@@ -17,7 +17,7 @@ fn models_in_models() {
     let m = read(&format!("<sdf version='1.9'>{text}</sdf>")).unwrap();
     let names: Vec<_> = m.bodies().iter().skip(1).map(|b| (b.joint_name.as_str(), b.name.as_str())).collect();
     assert_eq!(names, [("shoulder", "inner::arm"), ("inner::wrist", "inner::hand")]);
-    // the tip is at the pose of the model; the frame of inner is fixed to its first link, the arm
+    // the tip is at the pose of the inner model, and the frame of the inner model is fixed to its first link, the arm
     let base = frame(&m, "base", FrameKind::Link);
     let tip = m.bodies()[1].placement * frame(&m, "inner::tip", FrameKind::User);
     close(&tip.translation.to_array(), &[1.0, 2.0, 3.0]);
@@ -29,13 +29,13 @@ fn models_in_models() {
     let wrong = text.replace("attached_to='arm'", "attached_to='amr'");
     let error = read(&format!("<sdf version='1.9'>{wrong}</sdf>")).unwrap_err().to_string();
     assert!(error.contains("frame `tip`: no link, joint or frame is named `amr`; nearest is `arm`"), "{error}");
-    // names from outside are not known inside
+    // inside a model, names from outside the model are unknown
     let wrong = text.replace("<pose relative_to='tip'>", "<pose relative_to='base'>");
     let error = read(&format!("<sdf version='1.9'>{wrong}</sdf>")).unwrap_err().to_string();
     assert!(error.contains("link `hand`: no link, joint or frame is named `base`"), "{error}");
 }
 
-/// A frame is fixed to the same link as its model's frame, not to the world.
+/// A frame without `attached_to` is fixed to the same link as the frame of its model, not to the world.
 #[test]
 fn the_frame_of_a_model_moves_with_its_link() {
     let inside =
@@ -99,7 +99,7 @@ fn included_files() {
     assert_eq!(frame(&m, "part::arm", FrameKind::Link).translation, Vec3::new(0.0, -0.1, 1.4));
     assert_eq!(said(&m).iter().filter(|w| w.contains("no joint carries it")).count(), 0, "{:?}", said(&m));
 
-    // merged: the names are in the outer model, and its frame keeps its pose
+    // with `merge`, the names are in the outer model, and the frame of the inner model keeps its pose
     write(
         &folder,
         "robots/robot.sdf",
@@ -131,13 +131,13 @@ fn included_files() {
     assert!(error("<uri>model://empty</uri>").contains("names no <sdf> file"));
     write(&folder, "models/empty/model.config", "<model><sdf>gone.sdf</sdf></model>");
     assert!(error("<uri>model://empty</uri>").contains("there is no file"));
-    // errors inside an included file name that file
+    // errors in an included file name this file
     write(&folder, "models/bad/model.sdf", "<sdf version='1.5'>\n<model name='a'><link/></model></sdf>");
     assert!(error("<uri>model://bad</uri>").contains("bad/model.sdf:2: <link>: has no name"));
     fs::remove_dir_all(&folder).unwrap();
 }
 
-/// A world may lack its sun, but not all of its models.
+/// Some models of a world may be missing, such as the sun, but not all of them.
 #[test]
 fn worlds_with_missing_models() {
     let world = |inside: &str| {
@@ -155,7 +155,7 @@ fn worlds_with_missing_models() {
     assert!(world("").unwrap_err().to_string().contains("no_sun_here"));
 }
 
-/// Files that include each other, deep nesting and long names: each is an error at once.
+/// Files that include each other, deeply nested models and long names are refused at once.
 #[test]
 fn files_that_grow() {
     let folder = folder("grow");

@@ -1,4 +1,5 @@
-//! SDF: versions, models in models, files that include others, features that a model cannot represent, and errors.
+//! Tests of SDF: versions, models in models, files that include others, features that a model cannot represent, and
+//! errors.
 //!
 //! Expected poses and inertias are from Drake 1.51, which reads SDF with the format's own library.
 #![allow(non_snake_case)]
@@ -22,7 +23,7 @@ fn read(text: &str) -> Result<Model, Error> {
     Model::from_sdf_str(text, &SdfOptions::default())
 }
 
-/// Reads a model of a version, given the content of `<model>`.
+/// Reads an SDF of a given version, given the content of its `<model>`.
 fn model(version: &str, inside: &str) -> Model {
     let text = format!("<sdf version='{version}'><model name='m'>{inside}</model></sdf>");
     read(&text).unwrap_or_else(|e| panic!("{e}\n{text}"))
@@ -32,7 +33,7 @@ fn link(name: &str) -> String {
     format!("<link name='{name}'>{INERTIAL}</link>")
 }
 
-/// Returns a link with a pose.
+/// Returns a `<link>` with a pose.
 fn link_at(name: &str, pose: &str) -> String {
     format!("<link name='{name}'><pose>{pose}</pose>{INERTIAL}</link>")
 }

@@ -1,4 +1,5 @@
-//! Trees of SDF: placement, static models, several models, roots, loops, gearboxes, springs, followers.
+//! Tests of the tree of an SDF: placement, static models, several models, root links, loops, gearboxes, springs,
+//! followers.
 
 use super::*;
 
@@ -17,7 +18,7 @@ fn placement_frames() {
     assert_eq!(z("placement_frame='b'", ""), Err(expected.to_owned()));
 }
 
-/// Neither a static model nor the models in it move.
+/// A static model does not move, and neither do the models inside it.
 #[test]
 fn static_models() {
     let turn = |name: &str, ends| joint(name, "revolute", ends, "<axis><xyz>0 0 1</xyz></axis>");
@@ -33,7 +34,7 @@ fn static_models() {
     let free = SdfOptions { root_joint: Some(Joint::FreeFlyer), ..SdfOptions::default() };
     let text = format!("<sdf version='1.9'><model name='m'>{inside}</model></sdf>");
     assert_eq!(Model::from_sdf_str(&text, &free).unwrap().nv(), 0);
-    // a robot on a static model
+    // a joint connects a robot to a link of a static model
     let robot = format!("<model name='r'>{}</model>", link("base"));
     let ground = format!("<model name='ground'><static>1</static>{}</model>", link("plane"));
     let on = turn("on", ["ground::plane", "r::base"]);
@@ -73,7 +74,7 @@ fn several_models() {
     assert!(warned.iter().any(|w| w.ends_with("world `second`: is not the first world of the file, and is left out")));
 }
 
-/// Each link that no joint carries is a root.
+/// Each link that no joint carries is the root of its own tree.
 #[test]
 fn several_roots() {
     let turn = joint("j", "revolute", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");
@@ -90,7 +91,7 @@ fn several_roots() {
     };
     assert_eq!(names(&text), ["root_joint", "j", "root_joint#2"]);
     assert_eq!(names(&text.replace("'j'", "'root_joint'")), ["root_joint#2", "root_joint", "root_joint#3"]);
-    // the other links are connected to the world
+    // one of the root links is joined to the world, so only the others are free
     let anchored = text.replace("</model>", &format!("{}</model>", joint("w", "fixed", ["world", "a"], "")));
     assert_eq!(names(&anchored), ["j", "root_joint"]);
     let warned = said(&read(&anchored).unwrap());
@@ -98,7 +99,8 @@ fn several_roots() {
     assert!(warned[0].contains("link `c`"), "{warned:?}");
 }
 
-/// If the parent of a joint is not reached otherwise, the child carries the parent, and the axis is reversed.
+/// If the parent link of a joint is not reached otherwise, the child link carries the parent link, and the axis is
+/// reversed.
 #[test]
 fn joints_walked_from_their_child() {
     let turn = |name: &str, ends| joint(name, "revolute", ends, "<axis><xyz>0 1 0</xyz></axis>");
@@ -112,7 +114,8 @@ fn joints_walked_from_their_child() {
     assert!(said(&model("1.9", &ball))[0].contains("its position is that of the parent, seen from the child"));
 }
 
-/// A ring of links: the last visited joint becomes a constraint, whose frames coincide at the links' poses in the file.
+/// In a ring of links, the joint that is visited last becomes a constraint. The two frames of this constraint coincide
+/// at the links' poses in the file.
 #[test]
 fn loops() {
     let ring = |kind: &str, inside: &str| {
@@ -126,7 +129,7 @@ fn loops() {
         else {
             panic!("no frames");
         };
-        // at q = 0 each body is at its joint
+        // at q = 0, each body is at its joint, so placements can be multiplied
         frames.map(|f| {
             let frame = &m.frames()[f];
             (frame.body, m.bodies()[frame.body].placement * frame.placement)
@@ -148,7 +151,7 @@ fn loops() {
     let m = ring("revolute", axis);
     assert_eq!(names(&m), ["close", "close#2"]);
     let [X, Y] = [ends(&m, 0)[0].1, ends(&m, 1)[0].1];
-    let c = Vec3::new(0.0, 0.0, 1.0); // the origin of c, which is rotated about y by 0.2
+    let c = Vec3::new(0.0, 0.0, 1.0); // origin of c, which is rotated about y by 0.2
     close(
         &(X.translation - c).to_array(),
         &[0.2 * 0.2f64.cos() + 0.1 * 0.2f64.sin(), 0.0, 0.1 * 0.2f64.cos() - 0.2 * 0.2f64.sin()],
@@ -166,7 +169,7 @@ fn loops() {
     assert!(said(&cross)[0].ends_with("only its point is held, and it may turn about all axes"));
 }
 
-/// θ₂ = −ratio θ₁: each angle is about its axis, relative to the reference body.
+/// A gearbox couples two angles, θ₂ = −ratio θ₁. Each angle is about its own axis, relative to the reference body.
 #[test]
 fn gearboxes() {
     let geared = |axes: [&str; 2], reference: &str| {
@@ -219,7 +222,7 @@ fn springs_and_links_without_weight() {
         let compensation = m.gravity_compensation()[0];
         let carried = compensation.carried(m.bodies()[1].inertia);
         assert_eq!((compensation.body, carried.mass), (1, 2.0));
-        // 2 kg at (0.1, 0, −0.5) from the joint
+        // the compensated mass is 2 kg at (0.1, 0, −0.5) from the joint
         close(&carried.mass_com.to_array(), &[0.2, 0.0, -1.0]);
         assert!(said(&m).is_empty());
     }
@@ -229,7 +232,7 @@ fn springs_and_links_without_weight() {
     assert!(fixed.gravity_compensation().is_empty());
 }
 
-/// A follower of a follower follows the first leader.
+/// If a joint follows a follower, it follows the leader of that follower.
 #[test]
 fn chains_of_followers() {
     let turn = |name: &str, ends, inside: &str| {
@@ -262,7 +265,7 @@ fn chains_of_followers() {
     assert!(chain(&mimic("l")).unwrap_err().to_string().ends_with("mimic: follows itself, through others"));
 }
 
-/// If a link and a joint have the same name, as in older files, references mean the link.
+/// If a link and a joint have the same name, as in older files, references to this name mean the link.
 #[test]
 fn joints_named_as_links() {
     let turn = joint("b", "revolute", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");

@@ -1,8 +1,8 @@
-//! Values of SDF: inertias, unknown names, invalid numbers, elements of Drake.
+//! Tests of values in SDF: inertias, unknown names, invalid numbers, and elements of Drake.
 
 use super::*;
 
-/// Compares mass, mass times centre, and moments about the link (xx yy zz xy xz yz) with Drake's numbers.
+/// Compares mass, mass times centre, and moments about the link's origin (xx yy zz xy xz yz) with Drake's numbers.
 #[test]
 fn inertias_of_shapes() {
     let of = |inertial: &str, collisions: &str| {
@@ -56,7 +56,7 @@ fn inertias_of_shapes() {
         let worst = found.iter().zip(expected).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
         assert!(worst < 1e-11, "{shape}: {found:?}");
     }
-    // names in a shape that gives mass are checked
+    // names in the collision are checked if its shape gives the link mass
     for (inside, near) in [
         ("<posse>1 1 1 0 0 0</posse><density>5</density>", "<posse> in <collision>; nearest is `pose`"),
         ("<densitty>5</densitty>", "<densitty> in <collision>; nearest is `density`"),
@@ -68,7 +68,7 @@ fn inertias_of_shapes() {
         let (_, warned) = of("<inertial><mass>1</mass></inertial>", &shape).unwrap();
         assert_eq!(warned.iter().any(|w| w.contains("in <collision>")), inside.contains("inertial"), "{warned:?}");
     }
-    // a shape without a density uses the link's density, or the density of water; an explicit mass scales the result
+    // a shape without a density has the density of the link, or of water; an explicit mass scales the result
     let density = |inertial: &str| of(inertial, &collision("", "<box><size>1 1 1</size></box>")).unwrap();
     assert_eq!(density("<inertial auto='1'><density>700</density></inertial>").0[0], 700.0);
     let (found, warned) = density(auto);
@@ -77,7 +77,7 @@ fn inertias_of_shapes() {
     let (found, warned) = density("<inertial auto='true'><mass>6</mass></inertial>");
     close(&found, &[6.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0]);
     assert!(warned.is_empty());
-    // a shape may be relative to a frame
+    // the pose of a shape may be relative to a frame
     let (found, _) =
         of(auto, &collision("<pose relative_to='f'>1 0 0 0 0 0</pose>", "<box><size>1 1 1</size></box>")).unwrap();
     close(&found[1..4], &[0.0, 0.0, 1000.0]);
@@ -113,8 +113,8 @@ fn missing_inertias() {
     warned(&frame, "inertial: the pose is in the link's frame, not relative to `a`");
 }
 
-/// Misspelt and misplaced elements cause warnings, and so do known ones that a model cannot represent. Visual elements
-/// and sensors do not.
+/// Misspelt and misplaced elements cause warnings, and so do known elements that a model cannot represent. Visual
+/// elements and sensors cause no warnings.
 #[test]
 fn what_a_model_does_not_hold() {
     let turn = |inside: &str| joint("j", "revolute", ["a", "b"], inside);
@@ -232,13 +232,13 @@ fn invalid_values() {
         let error = read(&text).expect_err(what).to_string();
         assert!(error.contains(what), "{error}\n{what}");
     }
-    // empty elements mean the default, and a type may have capitals
+    // an empty element means the default value, and a type may have capital letters
     let m = model("1.9", "<static/><link name='a'><pose/><gravity/></link><link name='b'/>
       <joint name='j' type='Revolute'><parent>a</parent><child>b</child><axis><xyz/><limit><upper/></limit></axis></joint>");
     assert_eq!((m.nv(), m.limits().upper[0]), (1, f64::INFINITY));
 }
 
-/// Text after a number is dropped with a warning; text without a number is an error.
+/// Text after a number is dropped with a warning. Text without a number is an error.
 #[test]
 fn numbers_followed_by_text() {
     let limit = |text: &str| {
@@ -265,7 +265,8 @@ fn numbers_followed_by_text() {
     assert!(limit("fast").unwrap_err().to_string().ends_with("joint `j`: velocity: `fast` is no number"));
 }
 
-/// Elements of Drake: a rotor adds armature, ratio² times its inertia; one of Drake's own joints is an error.
+/// A rotor with Drake's elements adds the armature ratio² times its inertia. A joint that only Drake defines is an
+/// error.
 #[test]
 fn elements_of_drake() {
     let of = |inside: &str, model: &str| {
@@ -290,7 +291,7 @@ fn elements_of_drake() {
     assert!(error.ends_with("drake:joint `k`: joints of Drake's own are not supported: `planar`"), "{error}");
 }
 
-/// A screw without a pitch turns once per metre.
+/// A screw without a pitch makes one turn per metre.
 #[test]
 fn a_screw_without_a_pitch() {
     let screw = joint("j", "screw", ["a", "b"], "<axis><xyz>0 0 1</xyz></axis>");
@@ -300,7 +301,7 @@ fn a_screw_without_a_pitch() {
     assert!(said(&m)[0].ends_with("has no screw_thread_pitch: 1 m for each turn, as SDF has it"));
 }
 
-/// Elements of a robot have no effect in elements that do not change it.
+/// Elements of a robot have no effect inside elements that do not change the robot.
 #[test]
 fn misplaced_elements() {
     let world = |version: &str, physics: &str, visual: &str| {

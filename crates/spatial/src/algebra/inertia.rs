@@ -6,14 +6,14 @@ use crate::algebra::vector::{Mat3, Sym3, Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
 
-/// Inertia of a rigid body: the ten numbers in which its dynamics is linear.
+/// Inertia of a rigid body: ten numbers, in which the body's equations of motion are linear.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Inertia<S> {
     /// Mass m (kg).
     pub mass: S,
-    /// Mass times centre of mass, h = m c, in the frame (kg m).
+    /// Mass times centre of mass, h = m c, in the frame of the inertia (kg m).
     pub mass_com: Vec3<S>,
     /// Rotational inertia Ī about the origin of the frame (kg m²).
     pub rotational: Sym3<S>,
@@ -47,12 +47,12 @@ impl<S: Scalar> Mul<Motion<S>> for Inertia<S> {
 }
 
 impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
-    /// Rotates, then shifts the origin: h' = R h + m p, Ī' = R Ī Rᵀ − p× Rh× − Rh× p× − m p× p×.
+    /// Rotates the inertia, then shifts its origin: h' = R h + m p, Ī' = R Ī Rᵀ − p× Rh× − Rh× p× − m p× p×.
     #[inline(always)]
     fn act(&self, I: Inertia<S>) -> Inertia<S> {
         let p = self.translation;
         let h = self.rotation * I.mass_com;
-        // −[p]ₓ[h]ₓ − [h]ₓ[p]ₓ − m [p]ₓ[p]ₓ = −[p]ₓ[w]ₓ − [w]ₓ[p]ₓ with w = h + m p / 2
+        // The sum of products is −[p]ₓ[h]ₓ − [h]ₓ[p]ₓ − m [p]ₓ[p]ₓ = −[p]ₓ[w]ₓ − [w]ₓ[p]ₓ with w = h + m p / 2.
         let w = p.scale_add(I.mass * S::splat(0.5), h);
         let shift = -Sym3::outer_sum(p, w).add_diagonal(-(S::splat(2.0) * p.dot(w)));
         Inertia {
@@ -66,8 +66,8 @@ impl<S: Scalar> Act<Inertia<S>> for Se3<S> {
     }
 }
 
-/// Inertia of an articulated body as felt at its handle: a symmetric 6×6 matrix, in blocks [[linear, coupling],
-/// [couplingᵀ, rotational]].
+/// Inertia of an articulated body as felt at its handle, the body to which a force is applied: a symmetric 6×6 matrix
+/// with the blocks [[linear, coupling], [couplingᵀ, rotational]].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct ArticulatedInertia<S> {
@@ -117,9 +117,9 @@ impl<S: Scalar> ArticulatedInertia<S> {
 }
 
 impl<S: Scalar> Act<ArticulatedInertia<S>> for Se3<S> {
-    /// Rotates, then shifts the origin. The body's origin at p moves with the linear motion of the frame's origin plus
-    /// ω × p. A force f at p has the moment p × f about the frame's origin. With M, B, C the rotated linear, coupling
-    /// and rotational parts:
+    /// Rotates the inertia, then shifts its origin. The body's origin at p moves with the linear motion of the frame's
+    /// origin plus ω × p. A force f at p has the moment p × f about the frame's origin. With M, B, C the rotated
+    /// linear, coupling and rotational blocks:
     ///
     /// ```text
     /// M' = M,   B' = B − M [p]ₓ,   C' = C + [p]ₓ B' + ([p]ₓ B)ᵀ
@@ -130,7 +130,7 @@ impl<S: Scalar> Act<ArticulatedInertia<S>> for Se3<S> {
         let (linear, rotational) = (I.linear.rotate(R), I.rotational.rotate(R));
         let B = R * I.coupling * R.transpose();
         let Mat3 { x, y, z } = linear.full();
-        // M [p]ₓ, column by column; the columns of [p]ₓ are (0, p_z, −p_y), (−p_z, 0, p_x), (p_y, −p_x, 0)
+        // Computes M [p]ₓ column by column. The columns of [p]ₓ are (0, p_z, −p_y), (−p_z, 0, p_x), (p_y, −p_x, 0).
         let Mp = Mat3 {
             x: y.scale_add(p.z, -z.scale(p.y)),
             y: z.scale_add(p.x, -x.scale(p.z)),

@@ -1,8 +1,9 @@
 //! Rotations and rigid motions as Lie groups: exponentials, logarithms, Jacobians.
 //!
-//! Results are exact near 0 and near π, on any scalar: functions with a removable singularity are written with the
-//! entire functions of [`stumpff`]. Rotation vectors are in rad; a twist is a [`Motion`], linear first. Jacobians are
-//! *right* Jacobians, exp(x + δ) = exp(x) exp(J δ), because tangent vectors of a configuration are in the body's frame.
+//! Results are exact near 0 and near π, on any scalar: functions with a removable singularity are computed from the
+//! entire functions of [`stumpff`]. Rotation vectors are in rad. A twist is a [`Motion`], linear part first. Jacobians
+//! J are *right* Jacobians, exp(x + δ) = exp(x) exp(J δ), because tangent vectors of a configuration are in the body's
+//! frame.
 
 use crate::algebra::motion::Motion;
 pub use crate::algebra::quaternion::Quaternion;
@@ -13,9 +14,9 @@ use crate::scalar::Scalar;
 /// Computes the entire functions cₖ(t) = Σⱼ (−t)ʲ / (k + 2j)!, k = 0 … 5, at t = θ²:
 /// cos θ, sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, (cos θ − 1 + θ²/2)/θ⁴, (sin θ − θ + θ³/6)/θ⁵.
 ///
-/// Source: Stumpff (1959). For t < 1, c₄ and c₅ are computed by their series, and the others by the recurrence
-/// cₖ = 1/k! − t cₖ₊₂, to full relative precision (without cancellation). For t ≥ 1, sine and cosine and the same
-/// recurrence upwards give errors within 1e-15.
+/// Source: Stumpff (1959). For t < 1, c₄ and c₅ are computed by their series. The others follow from the recurrence cₖ
+/// = 1/k! − t cₖ₊₂ with full relative precision, because nothing cancels. For t ≥ 1, c₀ and c₁ are computed by cosine
+/// and sine, and the others by the same recurrence upwards, with errors within 1e-15.
 ///
 /// ```
 /// let c = condyle_spatial::lie::stumpff(0.0_f64);
@@ -27,7 +28,7 @@ pub fn stumpff<S: Scalar>(t: S) -> [S; 6] {
     if S::all(small) {
         return stumpff_near(t);
     }
-    // Each branch gets a harmless argument in the lanes that use the other branch.
+    // Each branch gets a harmless argument in the lanes for which the other branch is used.
     let far = stumpff_far(S::select(small, S::one(), t));
     if !S::any(small) {
         return far;
@@ -67,7 +68,7 @@ fn stumpff_far<S: Scalar>(t: S) -> [S; 6] {
     [l0, l1, l2, l3, l4, l5]
 }
 
-/// Computes k! cₖ(t) for t < 1 with Horner's rule: 1 − t/((k+1)(k+2)) (1 − t/((k+3)(k+4)) (…)). Further terms would be
+/// Computes k! cₖ(t) for t < 1 with Horner's rule: 1 − t/((k+1)(k+2)) (1 − t/((k+3)(k+4)) (…)). The omitted terms are
 /// below double precision.
 #[inline(always)]
 fn stumpff_series<S: Scalar, const K: u32>(t: S) -> S {
@@ -79,21 +80,21 @@ fn stumpff_series<S: Scalar, const K: u32>(t: S) -> S {
     sum
 }
 
-/// Computes the exponential of a rotation vector w: the rotation by |w| about w.
+/// Computes the exponential of a rotation vector w: the rotation by the angle |w| about the axis w.
 #[inline(always)]
 pub fn exp3<S: Scalar>(w: Vec3<S>) -> Quaternion<S> {
     let [cos, sinc, ..] = stumpff(w.norm_squared() * S::splat(0.25)); // at half the angle
     Quaternion { vector: w.scale(sinc * S::splat(0.5)), scalar: cos }
 }
 
-/// Returns the rotation vector of a rotation, of length at most π.
+/// Returns the rotation vector of a rotation. Its length is at most π.
 #[inline(always)]
 pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
-    // q and −q are the same rotation: take the one with w ≥ 0.
+    // q and −q are the same rotation; the logarithm is taken of the quaternion with w ≥ 0
     let negative = q.scalar.lt(S::zero());
     let v = q.vector.scale(S::select(negative, S::splat(-1.0), S::one()));
     let w = S::select(negative, -q.scalar, q.scalar);
-    // θ = 2 atan(n/w), n = |v|; θ/n → (2/w)(1 − r/3 + r²/5 − …), r = n²/w², near 0
+    // With n = |v|, the angle is θ = 2 atan(n/w). Near 0, θ/n = (2/w)(1 − r/3 + r²/5 − …) with r = n²/w².
     let n2 = v.norm_squared();
     let small = n2.lt(S::splat(1e-3));
     let half = if S::all(small) {
@@ -111,7 +112,7 @@ pub fn log3<S: Scalar>(q: Quaternion<S>) -> Vec3<S> {
     v.scale(half * S::splat(2.0))
 }
 
-/// Sums the series of θ/(2n).
+/// Computes θ/(2n) near 0 from its series.
 #[inline(always)]
 fn log3_near<S: Scalar>(n2: S, w: S) -> S {
     let r = n2 * (w * w).recip();
@@ -125,7 +126,8 @@ fn log3_near<S: Scalar>(n2: S, w: S) -> S {
 /// Returns the coefficient a = 1/θ² − (cot(θ/2))/(2θ) of w×² in the inverse Jacobians, and its derivative a' with
 /// respect to t = θ².
 ///
-/// With c at θ/2, a = (c₂ − c₃)/(4 c₁). From cₖ' = (k cₖ₊₂ − cₖ₊₁)/2 follows a' = a²/2 − (c₃ − 3 c₄ + 3 c₅)/(32 c₁).
+/// With cₖ at the angle θ/2, a = (c₂ − c₃)/(4 c₁). From cₖ' = (k cₖ₊₂ − cₖ₊₁)/2 follows a' = a²/2 − (c₃ − 3 c₄ + 3
+/// c₅)/(32 c₁).
 #[inline(always)]
 fn inverse_coefficient<S: Scalar>(t: S) -> [S; 2] {
     let c = stumpff(t * S::splat(0.25));
@@ -156,16 +158,16 @@ pub fn jlog3<S: Scalar>(w: Vec3<S>) -> Mat3<S> {
     rotation_series(w, S::splat(0.5), inverse_coefficient(w.norm_squared())[0])
 }
 
-/// Computes the exponential of a twist: the pose after moving with the twist for one unit of time.
+/// Computes the exponential of a twist: the pose reached by moving with the twist for one unit of time.
 ///
-/// Returns the rotation as a quaternion, as configurations store it, and the translation V v, V = 1 + c₂ w× + c₃ w×².
+/// Returns the rotation as a quaternion, as in configurations, and the translation V v with V = 1 + c₂ w× + c₃ w×².
 #[inline(always)]
 pub fn exp6<S: Scalar>(m: Motion<S>) -> (Quaternion<S>, Vec3<S>) {
     let c = stumpff(m.angular.norm_squared());
     (exp3(m.angular), rotation_series(m.angular, c[2], c[3]) * m.linear)
 }
 
-/// Returns the twist of a pose (rotation, translation), of angle at most π: [V⁻¹ p; w].
+/// Returns the twist of a pose (rotation, translation): [V⁻¹ p; w], with V as in [`exp6`]. Its angle is at most π.
 #[inline(always)]
 pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<S> {
     let w = log3(rotation);
@@ -173,22 +175,23 @@ pub fn log6<S: Scalar>(rotation: Quaternion<S>, translation: Vec3<S>) -> Motion<
     Motion { linear: V_inverse * translation, angular: w }
 }
 
-/// Linear map of motions: [[A, B], [0, A]] on [linear; angular]. The angular result depends only on the angular part.
+/// Linear map of motions: [[A, B], [0, A]] on [linear; angular]. The angular part of the result depends only on the
+/// angular part of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionMap<S> {
-    /// A: maps linear to linear, and angular to angular.
+    /// A: maps the linear part to the linear part, and the angular part to the angular part.
     pub diagonal: Mat3<S>,
-    /// B: maps angular to linear.
+    /// B: maps the angular part to the linear part.
     pub coupling: Mat3<S>,
 }
 
 impl<S: Scalar> MotionMap<S> {
-    /// Returns the map of the pose aXb: motions in b to motions in a.
+    /// Returns the map that the pose aXb defines: from motions in b to motions in a.
     #[inline(always)]
     pub fn adjoint(aXb: Se3<S>) -> Self {
         Self { diagonal: aXb.rotation, coupling: aXb.translation.skew() * aXb.rotation }
     }
-    /// Returns the six columns: the images of the unit motions, in order.
+    /// Returns the six columns: the images of the six unit motions, in order.
     #[inline(always)]
     pub fn columns(self) -> [Motion<S>; 6] {
         let (A, B, o) = (self.diagonal, self.coupling, Vec3::zero());
@@ -219,8 +222,7 @@ impl<S: Scalar> core::ops::Mul for MotionMap<S> {
     }
 }
 
-/// Returns the map with A = 1 + a w× + b w×² for the twist (v, w), where B is the derivative of A with respect to w
-/// along v.
+/// Returns the map with A = 1 + a w× + b w×² for the twist (v, w). B is the derivative of A with respect to w along v.
 ///
 /// `da` and `db` are the derivatives a', b' with respect to |w|². B = y× + w× x× + x× w×,
 /// with y = a v + 2 a' (v·w) w and x = b v + b' (v·w) w.
@@ -242,7 +244,7 @@ fn series_map<S: Scalar>(
 /// linear part.
 ///
 /// Source: Barfoot and Furgale (2014), equations 100 and 102. The derivative of J along a vector is a shorter form of
-/// both.
+/// both equations.
 #[inline(always)]
 pub fn jexp6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
     let [_, _, c2, c3, c4, c5] = stumpff(m.angular.norm_squared());
@@ -252,7 +254,7 @@ pub fn jexp6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
 }
 
 /// Returns the inverse of [`jexp6`], the right Jacobian of [`log6`], at the twist m: [[J, J'], [0, J]] with J =
-/// [`jlog3`] and J' as above.
+/// [`jlog3`]. J' is the derivative of J along the linear part.
 #[inline(always)]
 pub fn jlog6<S: Scalar>(m: Motion<S>) -> MotionMap<S> {
     let [a, da] = inverse_coefficient(m.angular.norm_squared());

@@ -3,7 +3,7 @@
 use crate::algebra::vector::{Vec3, impl_linear};
 use crate::scalar::{Constant, Scalar};
 
-/// Cross product of spatial algebra, selected by type: v × m for motions, v ×* f for a motion and a force.
+/// Cross product of spatial algebra; the types select it: v × m for two motions, v ×* f for a motion and a force.
 pub trait Cross<T> {
     /// Returns v × x: the rate of change of x if x is fixed in a body that moves with v.
     fn cross(self, x: T) -> T;
@@ -42,7 +42,7 @@ macro_rules! impl_six {
             pub fn new(linear: Vec3<S>, angular: Vec3<S>) -> Self {
                 Self { linear, angular }
             }
-            /// Returns the six numbers, linear first.
+            /// Returns the six numbers, the linear part first.
             #[inline(always)]
             pub fn to_array(self) -> [S; 6] {
                 let (l, a) = (self.linear, self.angular);
@@ -61,7 +61,7 @@ impl_six!(Motion);
 impl_six!(Force);
 
 impl<S: Scalar> Force<S> {
-    /// Returns [f; p × f]: the force f (N) that acts at a point p (m), with its moment about the frame's origin.
+    /// Returns [f; p × f]: a force f (N) that acts at the point p (m), and its moment about the frame's origin.
     ///
     /// ```
     /// use condyle_spatial::{Act, Force, Mat3, Se3, Vec3};
@@ -77,7 +77,7 @@ impl<S: Scalar> Force<S> {
 }
 
 impl<S: Scalar> Motion<S> {
-    /// Returns v + ω × p: the velocity (m/s) of the body's point at p (m) in the frame.
+    /// Returns v + ω × p: the velocity (m/s) of the body's point at p (m), in coordinates of the frame.
     #[inline(always)]
     pub fn velocity_at(self, point: Vec3<S>) -> Vec3<S> {
         self.angular.cross_add(point, self.linear)

@@ -1,5 +1,5 @@
-//! Operators of vectors with scalars, indices, sums and norms: short forms of methods of [`Vec3`], [`Motion`] and
-//! [`Force`].
+//! Operators of vectors: products with scalars, indices, sums and norms. They are short forms of methods of [`Vec3`],
+//! [`Motion`] and [`Force`].
 
 use crate::algebra::motion::{Force, Motion};
 use crate::algebra::quaternion::Quaternion;
@@ -9,8 +9,8 @@ use crate::scalar::Scalar;
 use core::iter::Sum;
 use core::ops::{Div, DivAssign, Index, IndexMut, Mul, MulAssign};
 
-/// Implements product with and quotient by a scalar, for a struct that has `scale`. A number on the left is an `f64`,
-/// so that literals need no type.
+/// Implements the product with a scalar and the quotient by a scalar, for a struct that has `scale`. A number to the
+/// left of `*` is an `f64`, so that literals need no type.
 macro_rules! impl_scalar_product {
     ($type:ident) => {
         impl<S: Scalar> Mul<S> for $type<S> {
@@ -56,7 +56,7 @@ impl_scalar_product!(Mat3);
 impl_scalar_product!(Motion);
 impl_scalar_product!(Force);
 
-/// Implements indices in flattened order, zero as default, and sums.
+/// Implements indices in flattened order, sums, and zero as the default value.
 macro_rules! impl_components {
     ($type:ident, $n:literal: $($i:literal => $($field:ident).+),*) => {
         impl<S> Index<usize> for $type<S> {
@@ -102,7 +102,7 @@ impl_components!(
 );
 impl_components!(Force, 6: 0 => linear.x, 1 => linear.y, 2 => linear.z, 3 => angular.x, 4 => angular.y, 5 => angular.z);
 
-/// Panics because of an index that is too large.
+/// Panics because an index is too large.
 #[cold]
 #[inline(never)]
 #[track_caller]

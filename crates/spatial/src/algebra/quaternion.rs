@@ -50,12 +50,14 @@ impl<S: Scalar> Quaternion<S> {
             z: Vec3::new(xz + wy, yz - wx, one - xx - yy),
         }
     }
-    /// Returns the quaternion of a rotation matrix. Its largest component is computed first (Shepperd 1978).
+    /// Returns the quaternion of a rotation matrix. The largest component of the quaternion is computed first (Shepperd
+    /// 1978).
     #[inline(always)]
     pub fn from_rotation(R: Mat3<S>) -> Self {
         let (a, b, c) = (R.x.x, R.y.y, R.z.z);
         let one = S::one();
-        // four times the products of one component with all four (x, y, z, w)
+        // Four times the products of components: `w` is 4w², `xy` is 4xy, and so on. The products of one component with
+        // all four are the quaternion times a factor.
         let (w, x, y, z) = (one + a + b + c, one + a - b - c, one - a + b - c, one - a - b + c);
         let (wx, wy, wz) = (R.y.z - R.z.y, R.z.x - R.x.z, R.x.y - R.y.x);
         let (xy, xz, yz) = (R.x.y + R.y.x, R.x.z + R.z.x, R.y.z + R.z.y);
@@ -80,7 +82,7 @@ impl<S: Scalar> core::ops::Mul for Quaternion<S> {
     }
 }
 
-/// Returns p where the mask holds, q elsewhere.
+/// Returns p in lanes in which the mask holds, and q in other lanes.
 #[inline(always)]
 fn choose<S: Scalar>(m: S::Mask, p: [S; 4], q: [S; 4]) -> [S; 4] {
     [S::select(m, p[0], q[0]), S::select(m, p[1], q[1]), S::select(m, p[2], q[2]), S::select(m, p[3], q[3])]

@@ -10,14 +10,14 @@ use core::ops::Mul;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[repr(C)]
 pub struct Se3<S> {
-    /// Rotation aRb: its columns are the axes of b in a.
+    /// Rotation aRb. Its columns are the axes of b in coordinates of a.
     pub rotation: Mat3<S>,
-    /// Origin of b in a (m).
+    /// Origin of b in coordinates of a (m).
     pub translation: Vec3<S>,
 }
 impl_lift!(Se3 { rotation, translation });
 
-/// Action of a pose on the coordinates of a `T`.
+/// Action of a pose on the coordinates of a value of type `T`.
 pub trait Act<T> {
     /// Maps coordinates in b to coordinates in a, for the pose aXb.
     fn act(&self, x: T) -> T;
@@ -90,7 +90,7 @@ impl<S: Scalar> Act<Force<S>> for Se3<S> {
     }
 }
 
-/// Action on a point.
+/// Action of a pose on a point.
 impl<S: Scalar> Act<Vec3<S>> for Se3<S> {
     /// Returns R x + p.
     #[inline(always)]

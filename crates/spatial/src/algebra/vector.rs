@@ -1,10 +1,10 @@
-//! Vectors and matrices in three dimensions, small enough to stay in registers on any scalar.
+//! Vectors and matrices in three dimensions. They are small enough to stay in registers for any scalar.
 
 use crate::scalar::{Constant, Scalar};
 use core::ops::Mul;
 
-/// Implements component-wise `+`, `−`, negation, `+=`, `−=`, product with a scalar, and lifting of constants. The
-/// fields of the struct must have these operations.
+/// Implements `+`, `−`, negation, `+=`, `−=`, the product with a scalar and lifting of constants, for each component.
+/// The fields of the struct must have these operations.
 macro_rules! impl_linear {
     ($type:ident { $($field:ident),* }) => {
         impl<S: Scalar> core::ops::Add for $type<S> {
@@ -51,7 +51,7 @@ macro_rules! impl_linear {
             pub fn scale(self, s: S) -> Self {
                 Self { $($field: crate::algebra::vector::Scale::scale(self.$field, s)),* }
             }
-            /// Returns self · s + o, with one rounding if the instruction set has fused products.
+            /// Returns self · s + o. The result is rounded once if the instruction set has fused products.
             #[inline(always)]
             pub fn scale_add(self, s: S, o: Self) -> Self {
                 Self { $($field: crate::algebra::vector::Scale::scale_add(self.$field, s, o.$field)),* }
@@ -78,7 +78,7 @@ macro_rules! impl_linear {
 }
 pub(crate) use impl_linear;
 
-/// Implements `lift` for a struct of model constants.
+/// Implements `lift`, the conversion to another scalar, for a struct of model constants.
 macro_rules! impl_lift {
     ($type:ident { $($field:ident),* }) => {
         impl<R: Copy> $type<R> {
@@ -95,7 +95,7 @@ macro_rules! impl_lift {
 }
 pub(crate) use impl_lift;
 
-/// Zero of a component type, for the macro above.
+/// Zero of a component type; used by `impl_linear`.
 pub(crate) trait Zero {
     fn zero() -> Self;
 }
@@ -106,7 +106,7 @@ impl<S: Scalar> Zero for S {
     }
 }
 
-/// Product of a component with a scalar, for the macro above.
+/// Product of a component with a scalar; used by `impl_linear`.
 pub(crate) trait Scale<S> {
     fn scale(self, s: S) -> Self;
     fn scale_add(self, s: S, o: Self) -> Self;
@@ -193,7 +193,7 @@ impl<S> From<[S; 3]> for Vec3<S> {
     }
 }
 
-/// 3×3 matrix, stored by columns. For a rotation aRb, the columns are the axes of b in a.
+/// 3×3 matrix, stored by columns. If it is a rotation aRb, the columns are the axes of b in coordinates of a.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[allow(missing_docs)]
@@ -248,12 +248,12 @@ impl<S: Scalar> Mat3<S> {
     }
 }
 
-/// Maximum `rotation_error` of a rotation: the rounding error of a file with seven digits.
+/// Maximum `rotation_error` of a rotation. It is the rounding error of a file with seven digits.
 const ROTATION_ROUNDING: f64 = 1e-6;
 
 impl Mat3<f64> {
-    /// Returns whether the matrix is a rotation: its columns are unit vectors, orthogonal and right-handed, all up to
-    /// 1e-6 (see [`rotation_error`](Self::rotation_error)). Returns `false` if a number is not finite.
+    /// Returns whether the matrix is a rotation: its columns are orthogonal unit vectors and right-handed, up to errors
+    /// of 1e-6 (see [`rotation_error`](Self::rotation_error)). Returns `false` if a number is not finite.
     ///
     /// ```
     /// use condyle_spatial::{Mat3, Vec3};
@@ -264,8 +264,8 @@ impl Mat3<f64> {
         self.rotation_error() < ROTATION_ROUNDING
     }
 
-    /// Returns the distance from a rotation: the largest of |xᵀx − 1|, |yᵀy − 1|, |xᵀy| and ‖x × y − z‖, with columns
-    /// x, y, z. Returns NaN or infinity if a number is not finite.
+    /// Returns the distance from a rotation: the largest of |xᵀx − 1|, |yᵀy − 1|, |xᵀy| and ‖x × y − z‖, where x, y, z
+    /// are the columns. Returns NaN or infinity if a number is not finite.
     ///
     /// ```
     /// use condyle_spatial::Mat3;
@@ -369,7 +369,7 @@ impl<S: Scalar> Sym3<S> {
     #[inline(always)]
     pub fn rotate(self, R: Mat3<S>) -> Self {
         let B = (R * self.full()).transpose(); // the columns of B are the rows of R A
-        let Rt = R.transpose(); // and the columns of Rᵀ are the rows of R
+        let Rt = R.transpose(); // the columns of Rᵀ are the rows of R
         Self {
             xx: B.x.dot(Rt.x),
             xy: B.x.dot(Rt.y),
@@ -379,7 +379,7 @@ impl<S: Scalar> Sym3<S> {
             zz: B.z.dot(Rt.z),
         }
     }
-    /// Returns the same matrix as a full matrix.
+    /// Returns the matrix as a [`Mat3`], with all nine entries.
     #[inline(always)]
     pub fn full(self) -> Mat3<S> {
         Mat3 {

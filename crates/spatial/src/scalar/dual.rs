@@ -1,6 +1,6 @@
 //! `Scalar` for the number types of num-dual: exact derivatives of every function that is generic over [`Scalar`].
 //!
-//! The dual types nest: `Dual<Dual64>` carries second derivatives, and so on. Comparisons use the real part only.
+//! Dual types can be nested: `Dual<Dual64>` carries second derivatives, and so on. Comparisons use only the real part.
 
 use super::{Constant, Scalar};
 use nalgebra::Const;
@@ -37,8 +37,7 @@ macro_rules! impl_dual {
             }
             #[inline]
             fn atan2(self, x: Self) -> Self {
-                // Uses the smaller coordinate divided by the larger. num-dual's own `atan2` divides by x even if x is
-                // 0.
+                // Divides the smaller coordinate by the larger one. num-dual's own `atan2` divides by x even if x is 0.
                 let steep = Scalar::abs(x.re).lt(Scalar::abs(self.re));
                 let mut angle = if steep { -(x / self).atan() } else { (self / x).atan() };
                 angle.re = Scalar::atan2(self.re, x.re);

@@ -1,24 +1,24 @@
-//! tanh and exp of a [`Scalar`], computed with its arithmetic: one source for floats, lanes and dual numbers. The
-//! logarithm is the platform's and takes an `f64`.
+//! tanh and exp of a [`Scalar`], computed with the arithmetic of the scalar. So floats, lanes and dual numbers use the
+//! same source code. The logarithm comes from the platform and takes an `f64`.
 
 use crate::scalar::Scalar;
 
-/// |x| from which tanh x is ±1 to the last bit of a double.
+/// Smallest |x| from which on tanh x is ±1 to the last bit of a double.
 const SATURATED: f64 = 20.0;
-/// log₂ of the divisor of an argument before a series is summed.
+/// Binary logarithm of the number by which an argument is divided before a series is summed.
 const HALVINGS: u32 = 6;
-/// Factor of an argument before a series is summed.
+/// Factor with which an argument is multiplied before a series is summed.
 const SCALE: f64 = 1.0 / (1u32 << HALVINGS) as f64;
 
-/// Computes tanh x, with an error of a few units in the last place of x. It evaluates the continued fraction at x/64
-/// and then applies tanh 2y = 2 tanh y / (1 + tanh² y) six times, which amplifies no relative error. The result is ±1
-/// without slope beyond ±20.
+/// Computes tanh x, with an error of a few units in the last place of x. It evaluates a continued fraction at x/64 and
+/// then applies tanh 2y = 2 tanh y / (1 + tanh² y) six times. This doubling does not amplify relative errors. Beyond
+/// ±20, the result is ±1 and its derivative is 0.
 #[inline(always)]
 pub fn tanh<S: Scalar>(x: S) -> S {
     let inside = x.abs().lt(S::splat(SATURATED));
     let y = S::select(inside, x, S::zero()) * S::splat(SCALE);
     let t = y * y;
-    // Lambert (1768): y/(1 + y²/(3 + y²/(5 + … y²/13))), as one fraction
+    // Evaluates Lambert's (1768) y/(1 + y²/(3 + y²/(5 + … y²/13))) as one fraction.
     let above = (t + S::splat(378.0)).mul_add(t, S::splat(17_325.0)).mul_add(t, S::splat(135_135.0));
     let below = t.mul_add(S::splat(28.0), S::splat(3150.0));
     let below = below.mul_add(t, S::splat(62_370.0)).mul_add(t, S::splat(135_135.0));

@@ -17,8 +17,8 @@ macro_rules! impl_float {
             }
             #[inline(always)]
             fn mul_add(self, b: Self, c: Self) -> Self {
-                // Without the FMA instruction, a fused product is a library call, which takes thirty times as long as
-                // two roundings.
+                // Without the FMA instruction, a fused product is a library call. Such a call takes thirty times as
+                // long as a product and a sum, rounded separately.
                 if cfg!(any(target_feature = "fma", target_arch = "aarch64")) {
                     Platform::fused(self, b, c)
                 } else {

@@ -1,4 +1,4 @@
-//! Dual numbers over SIMD lanes: one pass computes derivatives in several directions, or of several states, one per
+//! Dual numbers over SIMD lanes. One pass computes derivatives in several directions, or of several states: one per
 //! lane.
 
 use super::operators::operators;
@@ -6,10 +6,10 @@ use super::{Constant, Scalar};
 use crate::simd::kernel::Kernel;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Dual number x + x′ε with ε² = 0, where x and x′ are vectors: each lane has a value and its derivative.
+/// Dual number x + x′ε with ε² = 0, where x and x′ are vectors. Each lane has a value and the derivative of this value.
 ///
-/// num-dual's types cannot be used: their components need an order, a conversion into one number, and functions that
-/// branch on it. Lanes have none of these. The rules of differentiation are the same.
+/// num-dual's types cannot be used here. Their components need an order, a conversion into one number, and functions
+/// that branch on this number; lanes have none of these. The rules of differentiation are the same as num-dual's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct LaneDual<S> {
@@ -20,7 +20,7 @@ pub struct LaneDual<S> {
 }
 
 impl<S: Scalar> LaneDual<S> {
-    /// Returns f(x) and f′(x) x′, for value = f(x) and slope = f′(x).
+    /// Returns f(x) and f′(x) x′, given `value` = f(x) and `slope` = f′(x).
     #[inline(always)]
     fn chain(self, value: S, slope: S) -> Self {
         Self { re: value, eps: slope * self.eps }

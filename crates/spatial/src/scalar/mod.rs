@@ -1,4 +1,4 @@
-//! Number types on which an algorithm can run.
+//! Number types with which an algorithm can compute.
 
 #[cfg(any(feature = "std", test))]
 mod dual;
@@ -18,9 +18,9 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 /// Number type: `f64`, `f32`, a dual number of num-dual, or several numbers in SIMD lanes.
 ///
-/// Scalars have no order, so generic code cannot branch on a value. A branch would be wrong for lanes (each lane has
-/// its own answer) and for dual numbers (each branch has its own derivative). Compare with [`lt`](Self::lt) and choose
-/// with [`select`](Self::select) instead.
+/// Scalars have no order, so generic code cannot branch on a value. A branch would be wrong for lanes, because each
+/// lane has its own answer. It would also be wrong for dual numbers, because each branch has its own derivative.
+/// Compare with [`lt`](Self::lt) and choose with [`select`](Self::select) instead.
 ///
 /// ```
 /// use condyle_spatial::Scalar;
@@ -50,7 +50,8 @@ pub trait Scalar:
     type Mask: Copy;
     /// Number of lanes of one value.
     const LANES: usize;
-    /// Whether the crates that define algorithms contain compiled code for this scalar: `f64` and its lanes.
+    /// Whether the crates that define algorithms contain compiled code for this scalar. It is `true` for `f64` and its
+    /// lanes.
     #[doc(hidden)]
     const COMPILED: bool = false;
 
@@ -61,9 +62,9 @@ pub trait Scalar:
         kernel.run();
     }
 
-    /// Returns the constant `x`, in every lane, without derivative.
+    /// Returns the constant `x` in every lane, with derivative zero.
     fn splat(x: f64) -> Self;
-    /// Returns self · b + c, with one rounding if the instruction set in use has fused products.
+    /// Returns self · b + c. The result is rounded once if the instruction set in use has fused products.
     fn mul_add(self, b: Self, c: Self) -> Self;
     /// Returns 1 / self.
     fn recip(self) -> Self;
@@ -71,7 +72,7 @@ pub trait Scalar:
     fn sqrt(self) -> Self;
     /// Returns (sin self, cos self).
     fn sin_cos(self) -> (Self, Self);
-    /// Replaces angles by their sines and writes their cosines. The bits are the same as with
+    /// Replaces angles by their sines, and writes their cosines to `cosines`. The bits are the same as with
     /// [`sin_cos`](Self::sin_cos).
     #[doc(hidden)]
     #[inline(always)]
@@ -84,8 +85,8 @@ pub trait Scalar:
     fn atan2(self, x: Self) -> Self;
     /// Returns |self|.
     fn abs(self) -> Self;
-    /// Returns the same number. For a recorded value, the result keeps its sign: the sign is not moved out of products,
-    /// so that equal sums are written equally.
+    /// Returns the same number. If it is recorded, for example to generate code, its sign is not moved out of products.
+    /// So equal sums are written in the same way.
     #[doc(hidden)]
     #[inline(always)]
     fn kept(self) -> Self {
@@ -93,20 +94,21 @@ pub trait Scalar:
     }
     /// Returns self < other.
     fn lt(self, other: Self) -> Self::Mask;
-    /// Returns a where the mask holds, b elsewhere.
+    /// Returns a in lanes in which the mask holds, and b in other lanes.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Returns whether both masks hold.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
     /// Returns whether at least one of the masks holds.
     fn or(a: Self::Mask, b: Self::Mask) -> Self::Mask;
-    /// Returns whether a mask holds in every lane; `false` if that is unknown because a program is being recorded.
+    /// Returns whether a mask holds in every lane. Returns `false` if the answer is unknown because a program is being
+    /// recorded.
     #[doc(hidden)]
     #[inline(always)]
     fn all(mask: Self::Mask) -> bool {
         Self::select(mask, Self::one(), Self::zero()) == Self::one()
     }
-    /// Returns whether a mask holds in at least one lane; `true` if that is unknown because a program is being
-    /// recorded.
+    /// Returns whether a mask holds in at least one lane. Returns `true` if the answer is unknown because a program is
+    /// being recorded.
     #[doc(hidden)]
     #[inline(always)]
     fn any(mask: Self::Mask) -> bool {
@@ -127,8 +129,8 @@ pub trait Scalar:
 
 /// Constant of a model, which an algorithm converts to its scalar `S`.
 ///
-/// Model constants are `f64` and can be used with any scalar. They can also have the scalar's own type: a model whose
-/// inertias are dual numbers gives the derivatives with respect to inertias.
+/// Model constants are `f64` and can be used with any scalar. They can also have the type of the scalar: a model whose
+/// inertias are dual numbers gives derivatives with respect to these inertias.
 pub trait Constant<S>: Copy + Debug + Send + Sync + 'static {
     /// Converts this constant to the scalar.
     fn lift(self) -> S;

@@ -1,4 +1,4 @@
-//! Assignment operators, derived from `+` and `−`.
+//! Assignment operators such as `+=`, derived from `+` and `−`.
 
 macro_rules! operators {
     ($type:ty $(, $($of:tt)*)?) => {

@@ -1,6 +1,6 @@
-//! Floating-point functions of the platform: from the standard library, or from the crate libm without it.
+//! Floating-point functions of the platform: they come from the standard library or, without it, from the crate libm.
 
-/// Float with the functions that are not basic arithmetic.
+/// Float with functions that go beyond basic arithmetic.
 pub(super) trait Platform: Copy {
     /// Returns self · b + c, rounded once.
     fn fused(self, b: Self, c: Self) -> Self;

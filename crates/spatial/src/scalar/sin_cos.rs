@@ -1,10 +1,10 @@
-//! Sine and cosine for every kind of number without derivative: one sequence of sums and products without branches. So
-//! a lane and a single number give the same bits.
+//! Sine and cosine for every kind of number without derivative. They are one sequence of sums and products without
+//! branches, so a lane and a single number give the same bits.
 //!
-//! x = n π/2 + r with |r| ≤ π/4. n π/2 is subtracted in three parts (Cody and Waite, *Software manual for the
-//! elementary functions*, 1980). Each part except the last is short enough that its product with n is exact. Sine and
-//! cosine of r are polynomials with the coefficients of Moshier's Cephes library. In `f64`, for |x| up to 1e5, the
-//! error is at most 2.3e-16. The sine of −0 is 0.
+//! The argument is split into x = n π/2 + r with |r| ≤ π/4. n π/2 is subtracted in three parts (Cody and Waite,
+//! *Software manual for the elementary functions*, 1980). The product of n with each part except the last is exact,
+//! because these parts are short. Sine and cosine of r are polynomials with the coefficients of Moshier's Cephes
+//! library. In `f64`, for |x| up to 1e5, the error is at most 2.3e-16. The sine of −0 is 0.
 
 use super::Scalar;
 use super::number::Number;
@@ -12,9 +12,10 @@ use super::platform::Platform;
 
 /// Constants for one floating-point precision.
 struct Precision<const T: usize> {
-    /// Parts of π/2, the largest first.
+    /// Three parts whose sum is π/2, the largest first.
     parts: [f64; 3],
-    /// 1.5 times the largest number that can have a fraction. Adding and subtracting it rounds to an integer.
+    /// 1.5 times the largest number that can have a fraction. Adding this number and subtracting it again rounds to an
+    /// integer.
     magic: f64,
     /// Coefficients of (sin r − r)/r³ as a polynomial in r², highest power first.
     sin: [f64; T],
@@ -67,7 +68,7 @@ fn reduced<S: Scalar, const T: usize, const N: usize>(x: [S; N], of: &Precision<
     let (one, magic, to_quadrants) = (S::one(), S::splat(of.magic), S::splat(core::f64::consts::FRAC_2_PI));
     let (mut n, mut r, mut z) = (x, x, x);
     for k in 0..N {
-        n[k] = (x[k] * to_quadrants + magic) - magic; // rounded
+        n[k] = (x[k] * to_quadrants + magic) - magic; // rounded to an integer
         for part in of.parts {
             r[k] = n[k].mul_add(S::splat(-part), r[k]); // r = x − n π/2
         }
@@ -78,9 +79,9 @@ fn reduced<S: Scalar, const T: usize, const N: usize>(x: [S; N], of: &Precision<
         let (r, z) = (r[k], z[k]);
         let s = (sin[k] * z).mul_add(r, r); // r + r³ P(r²)
         let c = (cos[k] * z).mul_add(z, z.mul_add(S::splat(-0.5), one)); // 1 − r²/2 + r⁴ Q(r²)
-        // the quadrant m, n modulo 4, between −2 and 2
+        // m is the quadrant: n modulo 4, between −2 and 2.
         let m = (n[k].mul_add(S::splat(0.25), magic) - magic).mul_add(S::splat(-4.0), n[k]);
-        // cos(m π/2) and sin(m π/2): one is 0 and the other ±1, so products with them are exact
+        // One of cos(m π/2) and sin(m π/2) is 0 and the other is ±1, so products with them are exact.
         let along = one - m.abs();
         let across = m.mul_add(along, m);
         sin[k] = across.mul_add(c, along * s);
@@ -92,7 +93,7 @@ fn reduced<S: Scalar, const T: usize, const N: usize>(x: [S; N], of: &Precision<
 macro_rules! number {
     ($float:ident: $precision:ident up to $largest:literal) => {
         impl Number for $float {
-            /// Bound up to which the parts of π/2 are exact enough.
+            /// Largest |x| for which the three parts of π/2 are exact enough.
             const LARGEST: f64 = $largest;
 
             #[inline(always)]

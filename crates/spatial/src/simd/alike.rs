@@ -9,18 +9,18 @@ use crate::algebra::vector::{Mat3, Sym3, Vec3};
 use crate::simd::fused::Fused;
 use core::mem::ManuallyDrop;
 
-/// Type whose values in memory may be read and written as `B`.
+/// Type whose values in memory may be read and written as values of type `B`.
 ///
-/// Kernels take only arguments of such types. The compiler rejects a `Vec<S>` in a workspace, whose layout is not
-/// guaranteed, and accepts an [`Array`](crate::storage::Array). The macro [`alike!`](crate::alike) implements this
-/// trait for a struct.
+/// Kernels take only arguments of such types. The compiler accepts an [`Array`](crate::storage::Array) in a workspace.
+/// It rejects a `Vec<S>`, whose layout is not guaranteed. The macro [`alike!`](crate::alike) implements this trait for
+/// a struct.
 ///
 /// # Safety
-/// Both types have the same size, the same alignment, and the same fields at the same offsets; each pair of fields is
-/// alike too. So a valid value of one type is a valid value of the other.
+/// Both types have the same size, the same alignment, and fields at the same offsets. The fields at each offset have
+/// the same type or are alike. So a valid value of one type is a valid value of the other.
 pub unsafe trait Alike<B>: Rename<B> {}
 
-/// Value that can be converted to a `B` without change of its bits: an argument of a kernel.
+/// Value that can be converted to a `B` without changing its bits. Arguments of kernels have this trait.
 pub trait Rename<B> {
     /// Returns the value as a `B`.
     fn renamed(self) -> B;
@@ -29,11 +29,11 @@ pub trait Rename<B> {
 /// Reinterprets a value as another type.
 ///
 /// # Safety
-/// `A` and `B` are the same type, as generic code has checked; or they are [`Alike`].
+/// `A` and `B` are the same type, as the generic caller has checked; or they are [`Alike`].
 #[inline(always)]
 pub unsafe fn same<A, B>(a: A) -> B {
     assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
-    // SAFETY: by the caller; `a` is not dropped, so the value exists once.
+    // SAFETY: guaranteed by the caller. `a` is not dropped, so the value exists only once.
     unsafe { core::mem::transmute_copy(&ManuallyDrop::new(a)) }
 }
 
@@ -59,7 +59,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a mut B> for &'a mut A {
 impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
     #[inline(always)]
     fn renamed(self) -> &'a [B] {
-        // SAFETY: as for a reference to one value; the size, and so the distance between entries, is the same.
+        // SAFETY: as for a reference to one value. The entries have the same size, and so the same distance.
         unsafe { &*(core::ptr::from_ref(self) as *const [B]) }
     }
 }
@@ -68,7 +68,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
 impl<'a, A: Alike<B>, B> Rename<&'a mut [B]> for &'a mut [A] {
     #[inline(always)]
     fn renamed(self) -> &'a mut [B] {
-        // SAFETY: as for a reference to one value; the size, and so the distance between entries, is the same.
+        // SAFETY: as for a reference to one value. The entries have the same size, and so the same distance.
         unsafe { &mut *(core::ptr::from_mut(self) as *mut [B]) }
     }
 }
@@ -117,11 +117,12 @@ impl Rename<f64> for Fused {
     }
 }
 
-/// Implements [`Alike`] for a struct over a scalar: the struct over `f64` is alike the struct over [`Fused`].
+/// Implements [`Alike`] for a struct over a scalar: it declares that the struct over `f64` is alike the struct over
+/// [`Fused`].
 ///
-/// First name the fields that depend on the scalar; after `same`, name those that do not. The compiler checks three
-/// things: no field is missing, each field is alike or the same, and each has the same offset. Offsets are equal if the
-/// struct is `repr(C)`.
+/// Name first the fields that depend on the scalar and, after `same`, the other fields. The compiler checks three
+/// things: no field is missing, each field is alike or the same, and each field has the same offset in both structs.
+/// Offsets are equal if the struct is `repr(C)`.
 ///
 /// A type that does not depend on a scalar is declared to be alike itself.
 ///
@@ -151,7 +152,7 @@ impl Rename<f64> for Fused {
 #[doc(hidden)]
 macro_rules! alike {
     ($($type:ty),+ $(,)?) => {$(
-        // SAFETY: it is the same type.
+        // SAFETY: both types are the same.
         #[doc(hidden)]
         #[allow(unsafe_code)]
         unsafe impl $crate::simd::alike::Alike<$type> for $type {}
@@ -164,7 +165,8 @@ macro_rules! alike {
         }
     )+};
     ($name:ident { $($field:ident),* $(,)? } $(same { $($same:ident),* $(,)? })?) => {
-        // SAFETY: the fields are alike or the same and have equal offsets, else the checks below would not compile.
+        // SAFETY: the fields are alike or the same and have equal offsets; otherwise the checks below would not
+        // compile.
         #[doc(hidden)]
         #[allow(unsafe_code)]
         unsafe impl $crate::simd::alike::Alike<$name<$crate::simd::Fused>> for $name<f64> {}

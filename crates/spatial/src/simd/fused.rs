@@ -1,4 +1,4 @@
-//! Single number that rounds as a lane does.
+//! Single number that is rounded in the same way as a number in a lane.
 #![allow(unsafe_code)]
 
 use crate::scalar::Scalar;
@@ -10,7 +10,8 @@ use crate::simd::level::{Level, SHORT, VECTORS, assert_supported, level};
 use crate::simd::pack::Block;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
-/// Single `f64` that rounds like a lane: products and sums are fused wherever lanes fuse them (not in WebAssembly).
+/// Single `f64` that is rounded in the same way as a number in a lane: products and sums are fused if lanes fuse them.
+/// WebAssembly does not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
 pub struct Fused(pub f64);
@@ -19,7 +20,7 @@ impl Fused {
     /// Reinterprets a slice of `f64` as a slice of `Fused`.
     #[inline(always)]
     pub fn of(x: &[f64]) -> &[Self] {
-        // SAFETY: it is a transparent wrapper.
+        // SAFETY: `Fused` is a transparent wrapper of `f64`.
         unsafe { core::slice::from_raw_parts(x.as_ptr().cast(), x.len()) }
     }
 
@@ -108,7 +109,7 @@ impl Scalar for Fused {
         let (sin, cos) = self.0.far();
         (Self(sin), Self(cos))
     }
-    /// Uses two vectors of four at a time. Code on `Fused` runs only at a level that has these vectors.
+    /// Uses two vectors of four numbers at a time. Code on `Fused` runs only at a SIMD level that has these vectors.
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
         assert_supported(SHORT);

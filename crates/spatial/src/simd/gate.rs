@@ -1,20 +1,22 @@
-//! Gate to vector instructions: decides where a kernel is compiled, for which scalars, and with which instructions.
+//! Gate to vector instructions. It decides in which crate a kernel is compiled, for which scalars, and with which
+//! instructions.
 //!
-//! [`kernel!`](crate::kernel) wraps a pass, a tile or a factorization, whose body is generic and always inlined, into a
-//! function:
+//! [`kernel!`](crate::kernel) makes a function of a pass, a tile or a factorization, whose body is generic and always
+//! inlined:
 //!
-//! - For the common scalars, `f64` and its lanes, it is compiled once, in the crate that defines it. It uses the vector
-//!   instructions of the scalar. Users of the library call this compiled code.
-//! - A single `f64` uses fused products and sums where the processor has them: it is converted to [`Fused`], which has
-//!   the same 64 bits. Arguments, workspaces included, are reinterpreted as types over `Fused` ([`Alike`]).
-//! - A single `f32` is compiled there too, without vector instructions, so that users' debug builds do not slow it
-//!   down.
-//! - For all other scalars (dual numbers, lanes of `f32`, a user's own type) it is compiled in the crate that uses it.
+//! - For the common scalars, `f64` and its lanes, the function is compiled once, in the crate that defines it, with the
+//!   vector instructions of the scalar. Users of the library call this compiled code.
+//! - A single `f64` uses fused products and sums if the processor has them: the number is converted to [`Fused`], which
+//!   has the same 64 bits. Arguments, including workspaces, are reinterpreted as types over `Fused` ([`Alike`]).
+//! - For a single `f32`, the function is also compiled in the crate that defines it, without vector instructions. So
+//!   users' debug builds do not slow it down.
+//! - For all other scalars (dual numbers, lanes of `f32`, a user's own type), the function is compiled in the crate
+//!   that uses it.
 //!
 //! [`register_kernel!`](crate::register_kernel) does the same for work on `f64` that uses the vector registers of the
-//! level within one state. [`level_function!`](crate::level_function) is for small functions that are called often,
-//! such as the tiles of dense kernels. It passes arguments in registers; the two others pass them as one value in
-//! memory.
+//! SIMD level for a single state. [`level_function!`](crate::level_function) is for small functions that are called
+//! often, such as the tiles of dense kernels. It passes arguments in registers; the two other macros pass them as one
+//! value in memory.
 #![allow(unsafe_code)]
 
 pub use crate::simd::alike::{Alike, Rename, same};
@@ -24,9 +26,9 @@ pub use crate::simd::level::{Level, level};
 pub use crate::simd::pack::{Real, Witness};
 use core::any::TypeId;
 
-/// Vector of four numbers, with AVX2, NEON or SIMD128.
+/// Vector of four numbers, for AVX2, NEON or SIMD128.
 pub type Short<W> = <f64 as Real>::Short<W>;
-/// Vector of eight numbers, with AVX-512; elsewhere the same as `Short`.
+/// Vector of eight numbers, for AVX-512; on other processors the same type as `Short`.
 pub type Long<W> = <f64 as Real>::Long<W>;
 
 /// Returns whether two types are the same.
@@ -35,8 +37,8 @@ pub fn is<A: 'static, B: 'static>() -> bool {
     TypeId::of::<A>() == TypeId::of::<B>()
 }
 
-/// Expands to the first block where the processor may have vectors ([`VECTORS`](crate::simd::level::VECTORS)), else to
-/// the second. So no vector code is compiled for a microcontroller, which has no vectors.
+/// Expands to the first block on targets whose processors may have vectors ([`VECTORS`](crate::simd::level::VECTORS)),
+/// otherwise to the second block. So no vector code is compiled for a microcontroller without vectors.
 #[cfg(any(
     all(target_arch = "x86_64", feature = "std"),
     target_arch = "aarch64",
@@ -59,9 +61,9 @@ macro_rules! if_vectors {
     ({ $($with:tt)* } else { $($without:tt)* }) => { $($without)* };
 }
 
-/// Defines a function that runs a pass, generic over the scalar `S`. If the pass uses a model, it is also generic over
-/// the type `R` of the model's constants. See [`gate`](crate::simd::gate). The function returns nothing: results are
-/// written to its arguments.
+/// Defines a function that runs a pass, generic over the scalar `S`. If the pass uses a model, the function is also
+/// generic over the type `R` of the model's constants. The function returns nothing: results are written to its
+/// arguments. See [`gate`](crate::simd::gate).
 #[macro_export]
 #[doc(hidden)]
 macro_rules! kernel {
@@ -93,7 +95,7 @@ macro_rules! kernel {
                 use $crate::simd::gate::{Fused, Level, level};
 
                 struct Gate;
-                // SAFETY: each scalar's code is entered through its `enter`.
+                // SAFETY: the code for each scalar is entered through the scalar's `enter`.
                 unsafe impl $crate::simd::gate::Witness for Gate {}
                 type Short = $crate::simd::gate::Short<Gate>;
                 type Long = $crate::simd::gate::Long<Gate>;
@@ -106,8 +108,8 @@ macro_rules! kernel {
             $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
         }
     };
-    // the function compiled for one scalar, called if `$S` is this scalar; with `numbers if`, also for `f64` if the
-    // condition holds
+    // Calls the function that is compiled for one scalar if `$S` is this scalar. With `numbers if`, calls it for `f64`,
+    // too, if the condition holds.
     (
         @call $scalar:ident, $chosen:expr, $S:ident $($R:ident)?, ($($arg:ident: $type:ty),*)
         $(, numbers if $fused:expr)?
@@ -145,9 +147,9 @@ macro_rules! kernel {
     };
 }
 
-/// Defines a function on `f64` whose body is generic over the vector registers `V`. `V` are the widest registers of the
-/// SIMD level, and the body is compiled for them in the crate that defines it. Call it only at levels above the
-/// baseline. The function returns nothing.
+/// Defines a function on `f64` whose body is generic over the vector registers `V`. `V` becomes the widest registers of
+/// the SIMD level. The body is compiled for these registers in the crate that defines it. The function may only be
+/// called at levels above the baseline, and it returns nothing.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! register_kernel {
@@ -171,7 +173,7 @@ macro_rules! register_kernel {
                 use $crate::simd::gate::{Level, level};
 
                 struct Gate;
-                // SAFETY: code for the registers is entered through their `enter`.
+                // SAFETY: the code for a kind of register is entered through the `enter` of these registers.
                 unsafe impl $crate::simd::gate::Witness for Gate {}
                 type Short = $crate::simd::gate::Short<Gate>;
                 type Long = $crate::simd::gate::Long<Gate>;
@@ -182,16 +184,16 @@ macro_rules! register_kernel {
                     <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
                 }
             } else {
-                // never called on such targets, but correct
+                // This code is never executed on targets without vectors, but it would be correct.
                 <f64 as $crate::Scalar>::enter(Work::<_, f64>(work, ::core::marker::PhantomData));
             });
         }
     };
 }
 
-/// Defines a function that is compiled for each SIMD level in the crate that defines it. `item` is its implementation.
-/// `long`, `short` and `baseline` are the functions to call for registers of eight numbers, of four numbers, and of the
-/// registers that every processor has.
+/// Defines a function that is compiled for each SIMD level in the crate that defines it. `item` is the implementation.
+/// `long`, `short` and `baseline` name the function to call for each kind of register: eight numbers, four numbers, and
+/// the registers that every processor has.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! level_function {
@@ -225,7 +227,7 @@ macro_rules! level_function {
                     $short($($arg),*)
                 }
                 match level() {
-                    // SAFETY: the processor has the level in use.
+                    // SAFETY: the processor has the SIMD level in use.
                     #[cfg(target_arch = "x86_64")]
                     Level::Avx512 => return unsafe { long($($arg),*) },
                     Level::Baseline => {}

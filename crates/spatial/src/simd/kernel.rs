@@ -3,8 +3,8 @@
 
 use crate::simd::level::{SHORT, assert_supported};
 
-/// Work that is compiled for a SIMD level. `run` is always inlined, so it is compiled for the level of the function
-/// that calls it.
+/// Work that is compiled for a SIMD level. `run` is always inlined, so it is compiled for the SIMD level of the
+/// function that calls it.
 pub trait Kernel: Sized {
     /// Does the work.
     fn run(self);
@@ -12,7 +12,8 @@ pub trait Kernel: Sized {
 
 /// Runs a kernel with the instructions of [`Real::Short`](crate::simd::pack::Real::Short).
 ///
-/// On x86-64, these belong to [`Level::Avx2`](crate::simd::level::Level::Avx2). Other processors have only one level.
+/// On x86-64, these instructions belong to [`Level::Avx2`](crate::simd::level::Level::Avx2). Other processors have only
+/// one level.
 ///
 /// # Panics
 /// If the processor does not have these instructions.

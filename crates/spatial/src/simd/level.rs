@@ -1,16 +1,17 @@
-//! SIMD levels: which vector instructions this machine has, and which of them are used.
+//! SIMD levels: the vector instructions that this machine has, and the vector instructions that are used.
 //!
 //! A build contains code for every SIMD level of its architecture. The first call chooses the best level that the
 //! processor has. The environment variable `CONDYLE_LEVEL` (`baseline`, `simd128`, `neon`, `avx2`, `avx512`) or [`pin`]
-//! chooses a lower one.
+//! chooses a lower level.
 //!
 //! A level decides where products and sums are fused. With the same level, different machines of one architecture give
-//! the same results to the last bit. (On Arm, products are fused wherever an algorithm asks for it, at the baseline
-//! too.)
+//! the same results to the last bit. (On Arm, products are fused at every level, also at the baseline, if an algorithm
+//! asks for it.)
 //!
 //! A WebAssembly module cannot query the processor. It has SIMD128 if it was compiled with `-C
-//! target-feature=+simd128`, and then runs only in browsers with SIMD128: every browser since 2023. A program without
-//! the standard library cannot query the processor either. It runs at the baseline, and on 64-bit Arm with NEON.
+//! target-feature=+simd128`, and then it runs only in browsers with SIMD128: every browser since 2023. A program
+//! without the standard library cannot query the processor either. Such a program runs at the baseline or, on 64-bit
+//! Arm, with NEON.
 
 #[cfg(feature = "std")]
 mod requested;
@@ -23,12 +24,12 @@ pub use requested::{Refused, requested};
 /// SIMD level: a set of vector instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
-    /// One number at a time, with instructions that every processor of the architecture has: SSE2, or fused products on
-    /// Arm.
+    /// One number at a time, with instructions that every processor of the architecture has: SSE2 on x86-64, fused
+    /// products on Arm.
     Baseline = 1,
-    /// SIMD128 of WebAssembly: four numbers at once in two registers, without fused products.
+    /// SIMD128 of WebAssembly: four numbers at once, in two registers, without fused products.
     Simd128 = 2,
-    /// NEON, which every 64-bit Arm has: four numbers at once in two registers, with fused products.
+    /// NEON, which every 64-bit Arm processor has: four numbers at once, in two registers, with fused products.
     Neon = 3,
     /// AVX2 and FMA: four numbers at once, with fused products.
     Avx2 = 4,
@@ -36,7 +37,7 @@ pub enum Level {
     Avx512 = 5,
 }
 
-/// Level with vectors of four numbers, for the architecture that this is compiled for.
+/// SIMD level with vectors of four numbers, on the architecture for which this crate is compiled.
 pub(crate) const SHORT: Level = if cfg!(target_arch = "aarch64") {
     Level::Neon
 } else if cfg!(target_arch = "wasm32") {
@@ -103,7 +104,7 @@ impl fmt::Display for Level {
 /// Error: this processor does not have the level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unsupported(
-    /// Missing level.
+    /// Level that this processor does not have.
     pub Level,
 );
 
@@ -118,10 +119,11 @@ impl core::error::Error for Unsupported {}
 /// Level in use; 0 before the first query.
 static LEVEL: AtomicU8 = AtomicU8::new(0);
 
-/// Returns the level in use: the pinned one, else `CONDYLE_LEVEL`, else the best level of this processor.
+/// Returns the SIMD level in use: the level set by [`pin`], otherwise the level in `CONDYLE_LEVEL`, otherwise the best
+/// level of this processor.
 ///
-/// If `CONDYLE_LEVEL` is invalid or unsupported ([`requested`]), standard error gets one report and the best level is
-/// used.
+/// If `CONDYLE_LEVEL` is invalid or unsupported ([`requested`]), this is reported once on standard error, and the best
+/// level is used.
 ///
 /// ```
 /// let level = condyle_spatial::level::level();
@@ -142,10 +144,12 @@ pub fn level() -> Level {
     }
 }
 
-/// Panics if this processor does not have a level. Each function that enters code compiled for a level calls it.
+/// Panics if this processor does not have a level. Each function that enters code compiled for a level calls
+/// `assert_supported`.
 #[inline(always)]
 pub(crate) fn assert_supported(level: Level) {
-    /// Best level of this processor; 0 before the first query. (It includes all lower levels of its architecture.)
+    /// Best level of this processor; 0 before the first query. (A processor with this level also has all lower levels
+    /// of its architecture.)
     static BEST: AtomicU8 = AtomicU8::new(0);
     #[cold]
     fn find(level: Level) {
@@ -168,7 +172,7 @@ fn choose() -> Level {
     };
     #[cfg(not(feature = "std"))]
     let level = best;
-    // another thread may have chosen or pinned a level meanwhile
+    // Another thread may have chosen or pinned a level in the meantime.
     match LEVEL.compare_exchange(0, level as u8, Ordering::Relaxed, Ordering::Relaxed) {
         Ok(_) => {
             #[cfg(feature = "std")]

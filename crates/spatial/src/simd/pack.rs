@@ -1,7 +1,8 @@
 //! Conversion between rows of numbers and SIMD vectors: one row per lane, one vector per column.
 //!
-//! L rows of L numbers are L vectors, and the result is their transpose. It takes log₂ L exchange steps between ever
-//! larger parts. In each step, a vector keeps one half and takes the other half from its partner.
+//! L rows of L numbers are stored as L vectors, and the result is the transpose. The transposition takes log₂ L steps,
+//! which exchange ever larger parts. In each step, a vector keeps one half of its numbers and takes the other half from
+//! another vector.
 #![allow(unsafe_code)]
 
 use crate::algebra::motion::Force;
@@ -22,8 +23,8 @@ pub trait Block: Scalar {
     fn transpose(rows: &mut [Self]);
 }
 
-/// Converts rows of numbers to vectors: number i of row k becomes lane k of `to[i]`. Each row has the length of `to`;
-/// the rows are stored one after another in `from`. If there are fewer rows than lanes, the last row fills the
+/// Converts rows of numbers to vectors: number i of row k becomes lane k of `to[i]`. The rows are stored one after
+/// another in `from`, and each row is as long as `to`. If there are fewer rows than lanes, the last row fills the
 /// remaining lanes.
 #[inline]
 pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
@@ -33,7 +34,8 @@ pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
     }
     let mut last = [S::Number::zero(); MOST];
     if n < S::LANES && 2 * n >= S::LANES && rows > 0 {
-        // extends each row by the beginning of the next one to the length of a vector, and the last row by zeros
+        // Extends each row to the length of a vector: a row by the beginning of the next row, and the last row by
+        // zeros.
         for (k, row) in each[..rows - 1].iter_mut().enumerate() {
             *row = &from[k * n..][..S::LANES];
         }
@@ -43,7 +45,8 @@ pub fn gather<S: Block>(from: &[S::Number], rows: usize, to: &mut [S]) {
     gather_rows(&each[..rows], to);
 }
 
-/// Converts rows of numbers to vectors as [`gather`] does. The rows may be anywhere in memory, and longer than `to`.
+/// Converts rows of numbers to vectors as [`gather`] does. The rows may be anywhere in memory, and they may be longer
+/// than `to`.
 #[inline]
 pub fn gather_rows<S: Block>(from: &[&[S::Number]], to: &mut [S]) {
     S::enter(Gather(from, to));
@@ -72,23 +75,23 @@ pub fn scatter_rows<S: Block>(from: &[S], to: &mut [&mut [S::Number]]) {
     );
 }
 
-/// Writes lane k of a matrix of vectors to a matrix of numbers in `to[k]`, row by row. `stride` is the distance between
-/// the starts of consecutive rows.
+/// Writes lane k of a matrix of vectors to `to[k]`, as a matrix of numbers, row by row. `stride` is the distance
+/// between the starts of consecutive rows.
 #[inline]
 pub fn scatter_matrix<S: Block>(from: &Strided<'_, S>, to: &mut [&mut [S::Number]], stride: usize) {
     S::enter(Scatter(*from, to, stride));
 }
 
-/// Matrix of vectors with strides, and a sign.
+/// Matrix of vectors that is stored with strides, and a sign.
 #[derive(Clone, Copy, Debug)]
 pub struct Strided<'a, S> {
-    /// Storage of the entries.
+    /// Numbers of all entries in memory.
     pub vectors: &'a [S],
-    /// Distances from one row to the next, and from one column to the next.
+    /// Distance from one row to the next, and distance from one column to the next.
     pub strides: [usize; 2],
-    /// Numbers of rows and columns.
+    /// Number of rows and number of columns.
     pub shape: [usize; 2],
-    /// Whether the value is minus the stored matrix.
+    /// Whether the value of the matrix is minus the stored matrix.
     pub negative: bool,
 }
 
@@ -128,15 +131,15 @@ impl<S: Block> Kernel for Gather<'_, S> {
             if i + S::LANES >= n {
                 return;
             }
-            i = (i + S::LANES).min(n - S::LANES); // the last tile overlaps the one before
+            i = (i + S::LANES).min(n - S::LANES); // the last tile overlaps the tile before it
         }
     }
 }
 
-/// Writes lane k of the `LANES` vectors of a tile, or minus it, to `to[k][at..]`.
+/// Writes lane k of the `LANES` vectors of a tile to `to[k][at..]`; if `negative` is set, with the opposite sign.
 ///
 /// # Safety
-/// Each slice in `to` has at least `LANES` numbers from index `at`.
+/// Each slice in `to` has at least `LANES` numbers from index `at` on.
 #[inline(always)]
 unsafe fn write_tile<S: Block>(mut tile: [S; MOST], negative: bool, to: &mut [&mut [S::Number]], at: usize) {
     if negative {
@@ -152,7 +155,7 @@ unsafe fn write_tile<S: Block>(mut tile: [S; MOST], negative: bool, to: &mut [&m
     };
     if to.len() == S::LANES {
         for k in 0..S::LANES {
-            write(&mut to[k], tile[k]); // from registers
+            write(&mut to[k], tile[k]); // writes from registers
         }
     } else {
         let in_memory = tile;
@@ -190,8 +193,8 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
         );
         let mut offsets = [0; MOST]; // offsets of the vectors of a tile
         if columns < S::LANES && stride == columns && rows * columns >= S::LANES {
-            // Narrow rows without gaps are treated as one long row. Each tile except the last begins at the start of a
-            // row.
+            // Rows that are short and have no gaps between them are treated as one long row. Each tile except the last
+            // begins at the start of a row.
             let mut walk = |mut i: usize, mut j: usize| {
                 for k in 0..S::LANES {
                     offsets[k] = i * down + j * along;
@@ -206,7 +209,7 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
             let (mut i, mut first) = (0, 0);
             loop {
                 for k in 0..S::LANES {
-                    // SAFETY: the tile ends at the last entry or before it, and the last entry exists.
+                    // SAFETY: the tile ends at the last entry or before the last entry, and the last entry exists.
                     block[k] = *unsafe { from.get_unchecked(i * down + tile[k]) };
                 }
                 // SAFETY: as above; the last entry has a slot in each slice of `to`.
@@ -217,7 +220,7 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
                 i += S::LANES / columns;
                 first = i * columns;
                 if first + S::LANES > n {
-                    first = n - S::LANES; // the last tile overlaps the one before
+                    first = n - S::LANES; // the last tile overlaps the tile before it
                     (i, tile) = (0, walk(first / columns, first % columns));
                 }
             }
@@ -246,10 +249,11 @@ impl<S: Block> Kernel for Scatter<'_, '_, S> {
     }
 }
 
-/// Writes a matrix; `BESIDE`: whether consecutive columns are adjacent in memory.
+/// Writes a matrix. `BESIDE` says whether consecutive columns are adjacent in memory.
 ///
 /// # Safety
-/// The matrix is at least as wide as a vector. Its last entry exists and has a slot in `to`.
+/// The matrix has at least as many columns as a vector has lanes. Its last entry exists and has a slot in each slice of
+/// `to`.
 #[inline(always)]
 unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut [&mut [S::Number]], stride: usize) {
     let Strided { vectors, strides: [down, along], shape: [rows, columns], negative } = of;
@@ -257,8 +261,9 @@ unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut 
     for k in 0..S::LANES {
         offsets[k] = k * along;
     }
-    // Tiles of a long row begin at a cache line, because stores across two lines take longer. The first tile is an
-    // exception: it may overlap the next one. Rows that follow each other begin anywhere.
+    // Tiles of a long row begin at a cache line, because a store across two cache lines takes longer. Only the first
+    // tile begins elsewhere and may overlap the next tile. If rows follow each other without gaps, tiles begin
+    // anywhere.
     let beyond_line = to[0].as_ptr().addr() / size_of::<S::Number>() % S::LANES;
     let mut shared = if rows == 1 && columns >= 2 * S::LANES { beyond_line } else { 0 };
     for i in 0..rows {
@@ -274,22 +279,24 @@ unsafe fn write_rows<S: Block, const BESIDE: bool>(of: Strided<'_, S>, to: &mut 
             if j + S::LANES >= columns {
                 break;
             }
-            j = (j + S::LANES - shared).min(columns - S::LANES); // the last tile overlaps the one before
+            j = (j + S::LANES - shared).min(columns - S::LANES); // the last tile overlaps the tile before it
             shared = 0;
         }
     }
 }
 
-/// Returns the numbers in the lanes of vectors, vector by vector.
+/// Returns the numbers in the lanes of vectors, one vector after another.
 pub fn lanes<S: Block>(of: &[S]) -> &[S::Number] {
     assert!(size_of::<S>() == S::LANES * size_of::<S::Number>());
-    // SAFETY: a vector consists only of its numbers, as the assertion also checks, and its alignment suffices for them.
+    // SAFETY: a vector consists only of its numbers, as the assertion checks, and is aligned at least as strictly as a
+    // number.
     unsafe { core::slice::from_raw_parts(of.as_ptr().cast(), of.len() * S::LANES) }
 }
 
 /// Reinterprets forces as numbers, six per force.
 pub fn flat<S>(forces: &[Force<S>]) -> &[S] {
-    // SAFETY: a force is `repr(C)`, of two `repr(C)` vectors of three numbers each: six numbers and nothing else.
+    // SAFETY: a force is `repr(C)` and consists of two `repr(C)` vectors of three numbers each: six numbers and nothing
+    // else.
     unsafe { core::slice::from_raw_parts(forces.as_ptr().cast(), 6 * forces.len()) }
 }
 
@@ -337,9 +344,9 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
     }
 }
 
-/// Unsafe marker that is required to name vector types. Vector operations are instructions that a processor may lack,
-/// and they do not check for it. Code that is generic over its scalar is entered through [`Scalar::enter`], which does
-/// check.
+/// Unsafe marker trait that a type must have to name vector types. Vector operations are instructions that a processor
+/// may lack, and they do not check whether it has them. [`Scalar::enter`], through which code that is generic over its
+/// scalar is entered, does check.
 ///
 /// ```compile_fail
 /// use condyle_spatial::{Scalar, block::Real};
@@ -360,11 +367,11 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
 /// ```
 ///
 /// # Safety
-/// The implementer uses vectors only where the processor has their instructions: in kernels that were entered through
-/// `Scalar::enter`, and in functions that were called at the level of the vectors.
+/// The implementing crate uses vectors only where the processor has their instructions: in kernels that were entered
+/// through `Scalar::enter`, and in functions that were called at the SIMD level of the vectors.
 pub unsafe trait Witness: 'static {}
 
-/// Number type with its vector types.
+/// Number type for which vector types exist.
 pub trait Real: Block<Number = Self> {
     /// Vector of [`Level::Avx2`](crate::simd::level::Level::Avx2), [`Level::Neon`](crate::simd::level::Level::Neon) or
     /// [`Level::Simd128`](crate::simd::level::Level::Simd128).

@@ -1,12 +1,12 @@
 //! Random inputs and comparisons for the tests of this crate.
-#![allow(dead_code)] // each test file uses a part of it
+#![allow(dead_code)] // each test file uses only some of these functions
 
 use condyle_spatial::{Force, Inertia, Mat3, Motion, Quaternion, Se3, Sym3, Vec3, lie};
 use core::f64::consts::PI;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-/// Returns a configuration with a fixed seed, so that every run tests the same cases.
+/// Returns the settings of proptest, with a fixed seed, so that every run tests the same cases.
 pub(crate) fn config() -> ProptestConfig {
     ProptestConfig { cases: 1024, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() }
 }
@@ -26,7 +26,8 @@ pub(crate) fn axis() -> impl Strategy<Value = Vec3<f64>> {
     ]
 }
 
-/// Draws an angle in [0, π), with more samples near both ends. At π itself, rounding decides the sense of a rotation.
+/// Draws an angle in [0, π), with more samples near both ends. π itself is excluded, because rounding would decide the
+/// direction of the rotation.
 pub(crate) fn angle() -> impl Strategy<Value = f64> {
     prop_oneof![
         4 => 0.0..PI,
@@ -64,14 +65,14 @@ pub(crate) fn pose() -> impl Strategy<Value = Se3<f64>> {
     (rotation(), vec3()).prop_map(|(rotation, translation)| Se3 { rotation, translation })
 }
 
-/// Draws the inertia of a body of four mass points.
+/// Draws the inertia of a body that consists of four mass points.
 pub(crate) fn inertia() -> impl Strategy<Value = Inertia<f64>> {
     prop::collection::vec((0.1..2.0, vec3()), 4).prop_map(|points| {
         points.into_iter().fold(Inertia::zero(), |I, (m, c)| I + Inertia::from_com(m, c, Sym3::zero()))
     })
 }
 
-/// Returns the 9 numbers of a 3×3 matrix, column by column.
+/// Returns the nine numbers of a 3×3 matrix, column by column.
 pub(crate) fn flat(A: Mat3<f64>) -> [f64; 9] {
     let [x, y, z] = A.columns().map(Vec3::to_array);
     [x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2]]

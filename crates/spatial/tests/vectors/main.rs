@@ -1,4 +1,4 @@
-//! Vectors of numbers: each lane gives the same bits as a single number.
+//! Tests of vectors of numbers: each lane gives the same bits as a single number.
 
 mod packers;
 
@@ -18,12 +18,12 @@ unsafe impl Witness for Here {}
 
 type Four = <f64 as Real>::Short<Here>;
 
-/// Single number.
+/// Number type of the lanes, with functions for the tests.
 trait Number: Real<Mask = bool> {
     /// Returns self · b + c, rounded once.
     fn fused(self, b: Self, c: Self) -> Self;
     fn bits(self) -> u64;
-    /// Returns special values and some others; their count is a multiple of all lane counts.
+    /// Returns special values and ordinary ones. Their count is a multiple of every number of lanes.
     fn some() -> Vec<Self>;
 }
 
@@ -33,7 +33,7 @@ macro_rules! number {
             fn fused(self, b: Self, c: Self) -> Self {
                 $float::mul_add(self, b, c)
             }
-            /// Returns the bits of the number; all NaNs are equal.
+            /// Returns the bits of the number. The bits are the same for all NaNs.
             fn bits(self) -> u64 {
                 if self.is_nan() { u64::MAX } else { self.to_bits().into() }
             }
@@ -97,7 +97,7 @@ impl<S: Block<Number: Number>> Operations<S> {
 }
 
 /// Checks sines and cosines of an odd number of vectors. The bits equal the results for each vector alone, and single
-/// numbers agree up to rounding. Small and large angles are mixed.
+/// numbers agree up to rounding. The vectors mix small and large angles.
 struct Sines<S>(PhantomData<S>);
 
 impl<S: Block<Number: Number>> Kernel for Sines<S> {
@@ -125,7 +125,7 @@ impl<S: Block<Number: Number>> Kernel for Sines<S> {
     }
 }
 
-/// Checks operations between lanes: moves of each number to each lane, and the sum of all lanes.
+/// Check of operations between lanes: numbers are moved from each lane to each lane, and all lanes are summed.
 struct Moves;
 
 impl Kernel for Moves {

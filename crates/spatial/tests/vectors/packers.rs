@@ -1,4 +1,4 @@
-//! Conversion of rows of numbers to vectors and back.
+//! Tests of the conversion of rows of numbers to vectors and back.
 
 use crate::Here;
 use condyle_spatial::Scalar;
@@ -10,7 +10,7 @@ use core::marker::PhantomData;
 /// Maximum number of lanes of a vector.
 const MOST: usize = 16;
 
-/// Converts rows to vectors and back, with incomplete groups of rows and numbers.
+/// Check that converts rows to vectors and back, with incomplete groups of rows and of numbers.
 struct Back<S>(PhantomData<S>);
 
 impl<S: Block<Number: From<u16> + PartialEq>> Kernel for Back<S> {
@@ -45,7 +45,7 @@ impl<S: Block<Number: From<u16> + PartialEq>> Back<S> {
             scatter(&again, S::LANES, &mut back);
             (0..S::LANES).for_each(|k| assert!(back[k * n..][..n] == rows[k.min(some - 1) * n..][..n]));
         }
-        // as a matrix, and as minus its transpose, with fewer or more columns than lanes
+        // as a matrix, and as minus the transpose of the matrix, with fewer or more columns than lanes
         for (columns, more) in [(n, 3), (1, 3), (n, 0), (1, 0), (2, 0), (2, 3)] {
             if !n.is_multiple_of(columns) {
                 continue;

@@ -1,4 +1,4 @@
-//! Actuators: their parameters, with the defaults of their classes.
+//! Actuators of MJCF: their parameters, with the defaults of their classes.
 
 use super::attributes::{Attributes, MAIN};
 use super::law::{KINDS, Law, Laws, fill};
@@ -10,7 +10,8 @@ use std::rc::Rc;
 /// Interval of all real numbers.
 pub(super) const ALL: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 
-/// Range, and whether it is a limit; without a flag, it is a limit if its numbers are in ascending order.
+/// Range, and a flag that says whether the range is a limit. Without a flag, the range is a limit if its numbers are in
+/// ascending order.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Range {
     pub(super) numbers: [f64; 2],
@@ -18,7 +19,7 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// Reads the attributes of a range; missing ones keep the values of the class.
+    /// Reads the attributes of a range. Missing attributes keep the values of the class.
     pub(super) fn read(mut self, a: &Attributes, range: &str, limited: &str) -> Result<Self, Error> {
         self.numbers = a.array(range)?.unwrap_or(self.numbers);
         if a.get(limited).is_some() {
@@ -41,7 +42,7 @@ impl Range {
     }
 }
 
-/// Parameters of an actuator that do not depend on its kind.
+/// Parameters that all kinds of actuators have.
 #[derive(Clone)]
 pub(super) struct Mechanics {
     pub(super) gear: [f64; 6],
@@ -82,7 +83,7 @@ impl Mechanics {
         Ok(())
     }
 
-    /// Returns armature and coefficients of damping as seen at the driven joint or tendon, multiplied by gear².
+    /// Returns armature and coefficients of damping at the driven joint or tendon, which are multiplied by gear².
     pub(super) fn at_joint(&self) -> [f64; 4] {
         let [gear, ..] = self.gear;
         let [d0, d1, d2] = self.damping;
@@ -106,7 +107,7 @@ impl Mechanics {
     }
 }
 
-/// Default class: parameters of an actuator that does not specify them.
+/// Default class of actuators: the parameters of an actuator that does not specify them.
 #[derive(Clone, Default)]
 struct Class<'a> {
     mechanics: Rc<Mechanics>,
@@ -129,7 +130,7 @@ impl<'a> Classes<'a> {
         Ok(classes)
     }
 
-    /// Adds a class that starts from another one, and its nested classes.
+    /// Adds a class and its nested classes. A nested class inherits the parameters of the class around it.
     fn add(&mut self, element: &'a Element, name: &'a str, mut class: Class<'a>) -> Result<(), Error> {
         for e in element.children.iter().filter(|e| KINDS.contains(&&*e.tag)) {
             let mechanics = Rc::make_mut(&mut class.mechanics);
@@ -176,15 +177,15 @@ impl Law<'_> {
     pub(super) fn activation(&self, control: [f64; 2], limit: [f64; 2]) -> [f64; 2] {
         match self.dynamics {
             "none" => control,
-            // the activation begins at 0 and approaches the control
+            // The activation begins at 0 and approaches the control.
             "filter" | "filterexact" => clipped([control[0].min(0.0), control[1].max(0.0)], limit),
             "muscle" => [0.0, 1.0],
             _ => limit,
         }
     }
 
-    /// Returns the interval of forces for an interval of activations. It is finite if the force depends on neither
-    /// length nor velocity.
+    /// Returns the interval of forces for an interval of activations. The interval of forces is finite if the force
+    /// depends on neither length nor velocity.
     pub(super) fn force(&self, activation: [f64; 2]) -> [f64; 2] {
         let bias = if self.bias == "affine" { &self.biasprm[..3] } else { &[0.0; 3] };
         if self.gain != "fixed" || !matches!(self.bias, "none" | "affine") || bias[1] != 0.0 || bias[2] != 0.0 {
@@ -201,7 +202,7 @@ impl Law<'_> {
             ("fixed", "none") => Ok([g, 0.0, 0.0, 0.0]),
             ("fixed", "affine") => Ok([g, b0, -b1, -b2]),
             ("pid", _) => Ok([-b1, b0, -b1, -b2]),
-            // f = K/R (u − K l̇), with gainprm R, K
+            // With R and K in `gainprm`, f = K/R (u − K l̇).
             ("dcmotor", _) => Ok([self.gainprm[1] / g, 0.0, 0.0, self.gainprm[1] * self.gainprm[1] / g]),
             ("affine", _) => Err("its gain depends on length or velocity"),
             ("muscle", _) | (_, "muscle") => Err("it is a muscle"),

@@ -1,4 +1,4 @@
-//! Meshes and height fields of `<asset>`.
+//! Meshes and height fields in `<asset>`.
 
 use super::attributes::Attributes;
 use super::mesh::Solid;
@@ -17,18 +17,18 @@ use {
     std::path::{Path, PathBuf},
 };
 
-/// Maximum size of the meshes' files of a robot together (bytes).
+/// Maximum size of all mesh files of a robot together (bytes).
 #[cfg(feature = "meshes")]
 const MAX_MESHES: u64 = 512 << 20;
 
-/// The assets of a file, by name.
+/// Assets of a file, by name.
 pub(super) struct Assets<'a> {
     meshes: HashMap<String, &'a Element>,
     fields: HashMap<String, &'a Element>,
 }
 
 impl<'a> Assets<'a> {
-    /// Finds the assets of a file. One without a name has the name of its file, without folder and extension.
+    /// Finds the assets of a file. An asset without a name is named after its file, without folder and extension.
     pub(super) fn read(root: &'a Element) -> Result<Self, Error> {
         let all = |tag: &'static str| root.all("asset").flat_map(move |section| section.all(tag));
         for tag in ["mesh", "hfield"] {
@@ -42,12 +42,12 @@ impl<'a> Assets<'a> {
         Ok(Self { meshes: of("mesh").collect(), fields: of("hfield").collect() })
     }
 
-    /// Returns the `<mesh>` that a geom names, if it names one.
+    /// Returns the `<mesh>` that a geom names; `None` if the geom names no mesh.
     pub(super) fn mesh(&self, a: &Attributes) -> Result<Option<&'a Element>, Error> {
         Self::find(&self.meshes, a, "mesh")
     }
 
-    /// Returns half the sides of the box that has the mass of a height field (m): its base, and half of its height.
+    /// Returns half the sides of a box (m) that has the mass of a height field: its base, and half of its height.
     pub(super) fn field(&self, a: &Attributes) -> Result<Option<[f64; 3]>, Error> {
         let Some(field) = Self::find(&self.fields, a, "hfield")? else { return Ok(None) };
         let size = Attributes::plain(field).array("size")?;
@@ -62,13 +62,13 @@ impl<'a> Assets<'a> {
     }
 }
 
-/// The name of a file without folder and extension.
+/// Returns the name of a file without folder and extension.
 fn stem(file: &str) -> Option<String> {
     let name = file.rsplit(['/', '\\']).next()?;
     Some(name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned())
 }
 
-/// Inertias of meshes that have been read, and the number of bytes of their files.
+/// Inertias of meshes that have been read, and the size of their files together (bytes).
 #[derive(Default)]
 pub(super) struct Solids {
     #[cfg(feature = "meshes")]
@@ -79,7 +79,7 @@ pub(super) struct Solids {
 
 #[cfg(not(feature = "meshes"))]
 impl Solids {
-    /// Says that meshes are not read.
+    /// Returns the error that this build cannot read meshes.
     pub(super) fn get<T, U>(&mut self, _: &T, _: &Element, _: &[U]) -> Result<Solid, String> {
         Err("this build reads no meshes (feature `meshes`)".to_owned())
     }
@@ -87,7 +87,7 @@ impl Solids {
 
 #[cfg(feature = "meshes")]
 impl Solids {
-    /// Returns the inertia of a `<mesh>`, or what is wrong with it.
+    /// Returns the inertia of a `<mesh>`, or a description of its fault.
     pub(super) fn get(&mut self, source: &Source, mesh: &Element, packages: &[PathBuf]) -> Result<Solid, String> {
         let key = std::ptr::from_ref(mesh);
         if let Some(known) = self.known.get(&key) {
@@ -135,7 +135,7 @@ impl Solids {
         };
         let points: Vec<_> = points.iter().map(placed).collect();
         if scale.x * scale.y * scale.z < 0.0 {
-            triangles.iter_mut().for_each(|t| t.swap(1, 2)); // a mirror turns triangles inside out
+            triangles.iter_mut().for_each(|t| t.swap(1, 2)); // a mirrored mesh has its triangles inside out
         }
         let exact = if source.compiler.exact_meshes { "exact" } else { "legacy" };
         let rule = if builtin == Some("plate") { "shell" } else { a.get("inertia").unwrap_or(exact) };
@@ -143,7 +143,8 @@ impl Solids {
         Ok(Solid { lost, ..Solid::new(&points, triangles, rule)? })
     }
 
-    /// The points and triangles of a mesh's file, and the number of faces of which triangles are left out.
+    /// Returns the points and triangles in the file of a mesh, and the number of faces with triangles that are left
+    /// out.
     fn file(
         &mut self,
         source: &Source,
@@ -153,7 +154,8 @@ impl Solids {
     ) -> Result<(condyle_meshes::Triangles, usize), String> {
         let folder = source.folder.ok_or_else(|| format!("a string has no folder to find `{file}` in"))?;
         let name = if source.compiler.strip_path { file.rsplit(['/', '\\']).next().unwrap_or(file) } else { file };
-        // as MuJoCo: in the folder of meshes, or else in the folder of the file with the element
+        // Searches in the same folders as MuJoCo: first in the folder of meshes, then in the folder of the file that
+        // contains the element.
         let beside = Path::new(&*a.element.file).parent().unwrap_or(folder);
         let meshes = &source.compiler.mesh_folder;
         let mut paths = Vec::new();
@@ -175,7 +177,7 @@ impl Solids {
             Some((_, "vnd.mujoco.msh")) => None,
             _ if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("msh")) => None,
             _ => {
-                // COLLADA is read for pages alone: MuJoCo has no reader of it
+                // COLLADA is read only for web pages, because MuJoCo cannot read it.
                 let known = Format::of(path).filter(|format| [Format::Obj, Format::Stl].contains(format));
                 Some(known.ok_or_else(|| said("is no STL, OBJ or MSH".to_owned()))?)
             }
@@ -188,8 +190,8 @@ impl Solids {
     }
 }
 
-/// The points and triangles of MuJoCo's own format: numbers of points, normals, coordinates of textures and triangles,
-/// then they.
+/// Returns the points and triangles in a file of MuJoCo's own format. The file contains the numbers of points, normals,
+/// coordinates of textures and triangles, and then these items.
 #[cfg(feature = "meshes")]
 fn msh(bytes: &[u8]) -> Result<condyle_meshes::Triangles, String> {
     let words: Vec<[u8; 4]> = bytes.chunks_exact(4).map(|w| [w[0], w[1], w[2], w[3]]).collect();

@@ -8,8 +8,8 @@ use condyle_spatial::Vec3;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-/// Attributes of one kind of element in a class. Each has one or more texts: a text replaces only the first numbers of
-/// the texts before it, if it has fewer.
+/// Attributes of one kind of element in a class. Each attribute has one or more texts. If a text has fewer numbers than
+/// the texts before it, it replaces only their first numbers.
 type Inherited<'a> = HashMap<&'a str, Rc<[&'a str]>>;
 
 /// Attributes of a class, by kind of element.
@@ -42,12 +42,12 @@ impl<'a> Defaults<'a> {
         Ok(defaults)
     }
 
-    /// Adds a class that starts from another one, and its nested classes.
+    /// Adds a class and its nested classes. `class` contains the attributes that the class inherits.
     fn add(&mut self, element: &'a Element, name: &'a str, mut class: Class<'a>) -> Result<(), Error> {
         for kind in element.children.iter().filter(|c| c.tag != "default") {
             let inherited = class.entry(&kind.tag).or_default();
             if ORIENTATIONS.iter().any(|name| kind.attribute(name).is_some()) {
-                inherited.retain(|name, _| !ORIENTATIONS.contains(name)); // the last one counts
+                inherited.retain(|name, _| !ORIENTATIONS.contains(name)); // the last orientation counts
             }
             for (name, value) in &kind.attributes {
                 let count = value.split_whitespace().count();
@@ -73,13 +73,14 @@ impl<'a> Defaults<'a> {
         Ok(())
     }
 
-    /// Returns the element with the defaults of its class, or of the surrounding class if it names no class.
+    /// Returns the element with the defaults of its class. If the element names no class, the class of the surrounding
+    /// element is used.
     pub(super) fn of<'e>(&'e self, element: &'e Element, around: &'e str) -> Result<Attributes<'e>, Error> {
         let name = self.known(element, element.attribute("class").unwrap_or(around))?;
         Ok(Attributes { element, class: self.classes[name].get(element.tag.as_str()) })
     }
 
-    /// Returns the element with the defaults that its class has for another kind of element.
+    /// Returns an element with the defaults that its class has for another kind of element.
     pub(super) fn of_kind<'e>(
         &'e self,
         element: &'e Element,
@@ -90,7 +91,7 @@ impl<'a> Defaults<'a> {
         Ok(Attributes { element, class: self.classes[name].get(kind) })
     }
 
-    /// Returns the name of a class if the class exists.
+    /// Returns the name of a class if this class exists, otherwise an error.
     pub(super) fn known<'e>(&self, element: &Element, name: &'e str) -> Result<&'e str, Error> {
         if self.classes.contains_key(name) {
             return Ok(name);
@@ -102,7 +103,7 @@ impl<'a> Defaults<'a> {
     }
 }
 
-/// Attributes of an element; an attribute that the element lacks is taken from its class.
+/// Attributes of an element. An attribute that the element lacks is taken from its class.
 pub(super) struct Attributes<'a> {
     pub(super) element: &'a Element,
     class: Option<&'a Inherited<'a>>,
@@ -118,14 +119,14 @@ impl<'a> Attributes<'a> {
         self.element.attribute(name).or_else(|| self.class?.get(name)?.last().copied())
     }
 
-    /// Returns the texts of an attribute, the texts of the class first: each may replace only the first numbers of a
-    /// list.
+    /// Returns the texts of an attribute; the texts of the class come first. Each text may replace only the first
+    /// numbers of a list.
     pub(super) fn layers(&self, name: &str) -> impl Iterator<Item = &'a str> + use<'a> {
         let class = self.class.and_then(|class| class.get(name));
         class.into_iter().flat_map(|texts| texts.iter().copied()).chain(self.element.attribute(name))
     }
 
-    /// Converts the value of an attribute with `f`; `None` if the attribute is missing.
+    /// Converts the value of an attribute with `f`. Returns `None` if the attribute is missing.
     fn read<T>(&self, name: &str, f: impl Fn(&str) -> Result<T, String>) -> Result<Option<T>, Error> {
         let read = |text| f(text).map_err(|what| self.element.wrong(format!("{name}: {what}")));
         self.get(name).map(read).transpose()
@@ -147,7 +148,7 @@ impl<'a> Attributes<'a> {
         Ok(self.array(name)?.map(Vec3::from))
     }
 
-    /// Returns `true` or `false`; `None` if the attribute is missing or has the third value.
+    /// Returns `true` or `false`; `None` if the attribute is missing or has the value `third`.
     pub(super) fn flag(&self, name: &str, third: Option<&str>) -> Result<Option<bool>, Error> {
         let flag = |text: &str| match text {
             "true" => Ok(Some(true)),

@@ -1,5 +1,5 @@
-//! Parts of a file besides the tree of bodies, read in the order in which they depend on each other. Tendons and
-//! actuators add armature, springs may follow from inertia, and limits of effort are sums.
+//! Sections of a file other than the tree of bodies. They are read in the order in which they depend on each other:
+//! tendons and actuators add armature, springs may depend on inertia, and limits of effort are sums over actuators.
 
 use super::Source;
 use super::keyframe;
@@ -13,8 +13,8 @@ use crate::model::Model;
 use crate::warning::Warning;
 use condyle_spatial::Se3;
 
-/// Adds all parts of the file besides the tree to the model, and returns warnings about parts that are left out.
-/// `poses` contains the pose of each body in the world, in the initial configuration of the file.
+/// Adds everything in the file except the tree to the model. Returns warnings about items that are left out. `poses`
+/// contains the pose of each body in the world, in the initial configuration of the file.
 pub(super) fn add<'a>(
     model: &mut Model,
     root: &'a Element,
@@ -28,7 +28,7 @@ pub(super) fn add<'a>(
     let mut tendons = Tendons::read(root, sources, joints)?;
     let drives = Drives::read(root, sources, joints, &tendons, &on)?;
     drives.load(model, joints, &mut tendons, &lines, &on);
-    // armature of each column, from joints and tendons
+    // The armature of each column is the sum of the armatures of joints and tendons.
     let mut armature = vec![0.0; model.tree.columns.len()];
     for joint in &joints.all {
         armature[joint.columns(model)].fill(joint.armature);
@@ -56,7 +56,7 @@ pub(super) fn add<'a>(
         model.limits.upper.fill(f64::INFINITY);
     }
     if !on.spring && !on.damper {
-        model.gravity_compensation.clear(); // MuJoCo then has no passive forces
+        model.gravity_compensation.clear(); // without springs and dampers, MuJoCo has no passive forces
     }
     keyframe::add(model, root, joints, (&drives.inputs()?, &driven), &mut warnings)?;
     Ok(warnings)

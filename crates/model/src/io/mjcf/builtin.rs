@@ -1,4 +1,4 @@
-//! Shapes that MuJoCo creates itself (`builtin` of `<mesh>`), with the same points.
+//! Shapes that MuJoCo itself creates (`builtin` of `<mesh>`), with the same points as in MuJoCo.
 
 use condyle_meshes::Triangles;
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -7,10 +7,11 @@ use std::collections::HashMap;
 /// Maximum number of points of a shape.
 const MAX_POINTS: f64 = (1 << 20) as f64;
 
-/// Returns the points and triangles of a shape; if the shape is the convex hull of its points, the triangles are empty.
+/// Returns the points and triangles of a shape. The list of triangles is empty if the shape is the convex hull of its
+/// points.
 pub(super) fn shape(kind: &str, params: &[f64]) -> Result<Triangles, String> {
     let wrong = || format!("builtin: a {kind} with params {} cannot be", crate::io::xml::words(params));
-    // converts a number of steps to an integer; decimals are ignored
+    // Converts a number of steps to an integer; decimals are ignored.
     let steps = |x: f64, least: f64, most: f64| {
         let x = x.trunc();
         if x >= least && x <= most { Ok(x as usize) } else { Err(wrong()) }
@@ -34,9 +35,9 @@ pub(super) fn shape(kind: &str, params: &[f64]) -> Result<Triangles, String> {
     }
 }
 
-/// Returns an icosahedron on the unit sphere; each triangle is divided into four, `divisions` times.
+/// Returns an icosahedron on the unit sphere. Each triangle is divided into four triangles, `divisions` times.
 fn sphere(divisions: usize) -> Triangles {
-    // in single precision, as in MuJoCo
+    // The numbers are rounded to single precision, as in MuJoCo.
     let phi = ((1.0 + 5f64.sqrt()) / 2.0) as f32;
     let norm = (1.0 + f64::from(phi * phi)).sqrt();
     let corner = |p: [f32; 3]| p.map(|x| (f64::from(x) / norm) as f32);
@@ -79,7 +80,7 @@ fn sphere(divisions: usize) -> Triangles {
     (points.into_iter().map(|p| p.map(f64::from)).collect(), triangles)
 }
 
-/// Returns a unit hemisphere on a disc: rings of 4, 8, 12, … points, and the centre of the disc.
+/// Returns a unit hemisphere on a disc. Its points are rings of 4, 8, 12, … points, and the centre of the disc.
 fn hemisphere(rings: usize) -> Triangles {
     let equator = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
     let (mut points, mut triangles) = (vec![[0.0, 0.0, 1.0]], Vec::new());
@@ -165,7 +166,7 @@ fn supertorus(n: usize, radius: f64, s: f64, t: f64) -> Triangles {
     (points, triangles)
 }
 
-/// Returns directions of a field of view (degrees), denser in the middle.
+/// Returns directions inside a field of view (degrees). They are denser in the middle.
 fn wedge(count: [usize; 2], view: [f64; 2], gamma: f64) -> Vec<[f64; 3]> {
     let edge = |axis: usize, i: usize| {
         let x = -1.0 + 2.0 * i as f64 / count[axis] as f64;
@@ -179,7 +180,7 @@ fn wedge(count: [usize; 2], view: [f64; 2], gamma: f64) -> Vec<[f64; 3]> {
     (0..count[0]).flat_map(|i| (0..count[1]).map(move |j| (i, j))).map(|(i, j)| point(i, j)).collect()
 }
 
-/// Returns a square of points at z = −1.
+/// Returns a square plate of points at z = −1.
 fn plate([x, y]: [usize; 2]) -> Triangles {
     let along = |i: usize, count: usize| -1.0 + (i as f64 + 0.5) * (2.0 / count as f64);
     let points = (0..x).flat_map(|i| (0..y).map(move |j| [along(i, x), along(j, y), -1.0])).collect();
@@ -190,7 +191,7 @@ fn plate([x, y]: [usize; 2]) -> Triangles {
     (points, triangles.collect())
 }
 
-/// Returns a polygon at z = −1, and a scaled polygon or a tip at z = 1.
+/// Returns the points of a cone: a polygon at z = −1, and a scaled polygon or a tip at z = 1.
 fn cone(edges: usize, radius: f64) -> Vec<[f64; 3]> {
     let ring = |r: f64, z: f64| {
         (0..edges).map(move |i| {

@@ -1,11 +1,11 @@
-//! Settings of `<compiler>`, and the poses whose meaning depends on them.
+//! Settings of `<compiler>`, and poses whose meaning depends on these settings.
 
 use super::attributes::Attributes;
 use crate::error::Error;
 use crate::io::xml::Element;
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3, lie};
 
-/// Rule by which bodies get their inertia from their geoms.
+/// Rule that says when a body gets its inertia from its geoms.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum FromGeoms {
     Never,
@@ -15,12 +15,12 @@ pub(super) enum FromGeoms {
 
 /// Settings of `<compiler>`.
 pub(super) struct Compiler {
-    /// Unit of angle in radians.
+    /// Unit of angle, in radians.
     pub(super) angle: f64,
     eulerseq: Vec<u8>,
     pub(super) autolimits: bool,
     pub(super) from_geoms: FromGeoms,
-    /// First and last group of the geoms that count for inertia.
+    /// First and last group of the geoms that contribute to inertia.
     pub(super) groups: [f64; 2],
     /// Minimum mass of a body (kg) and minimum principal moment of inertia (kg m²).
     pub(super) bounds: [f64; 2],
@@ -28,14 +28,17 @@ pub(super) struct Compiler {
     pub(super) balance: bool,
     /// Total mass to which all masses are scaled (kg).
     pub(super) total_mass: Option<f64>,
-    /// Whether a free joint is in the frame of inertia of its body.
+    /// Whether a free joint is placed at the frame of inertia of its body.
     pub(super) align_free: bool,
-    /// Folder of meshes, and whether it replaces the folders in their addresses.
+    /// Folder of meshes. The next field says whether only the names of mesh files are used, without the folders in
+    /// their addresses.
     pub(super) mesh_folder: String,
     pub(super) strip_path: bool,
-    /// Whether a primitive is fitted to the bounding box of a mesh, instead of to the box with the mesh's inertia.
+    /// Whether a primitive is fitted to the bounding box of a mesh. Otherwise, it is fitted to a box with the inertia
+    /// of the mesh.
     pub(super) fit_box: bool,
-    /// Whether a mesh without its own rule uses `exact` instead of `legacy`; an attribute of MuJoCo before 3.2.4.
+    /// Whether a mesh without its own rule uses the rule `exact` instead of `legacy`. This is an attribute of MuJoCo
+    /// before 3.2.4.
     pub(super) exact_meshes: bool,
 }
 
@@ -65,7 +68,7 @@ impl Compiler {
         Ok(compiler)
     }
 
-    /// Applies the attributes of an element.
+    /// Applies the attributes of a `<compiler>` element to these settings.
     fn merge(&mut self, element: &Element) -> Result<(), Error> {
         let a = Attributes::plain(element);
         self.angle = match a.get("angle") {
@@ -130,7 +133,8 @@ impl Compiler {
         if own.len() > 1 {
             return Err(a.element.wrong(format!("has {} orientations: {}", own.len(), own.join(", "))));
         }
-        // an element's own orientation has priority over its class; within a class, quat has the lowest priority
+        // The orientation of an element has priority over the orientation in its class. Within a class, `quat` has the
+        // lowest priority.
         let inherited = || ORIENTATIONS.into_iter().rev().find(|n| a.get(n).is_some());
         match own.first().copied().or_else(inherited) {
             None | Some("quat") => {
@@ -157,14 +161,14 @@ impl Compiler {
         }
     }
 
-    /// Returns the rotation by three angles about the axes of `eulerseq`.
+    /// Returns the rotation by three angles about the axes that `eulerseq` lists.
     pub(super) fn euler(&self, angles: [f64; 3]) -> Mat3<f64> {
         let mut R = Mat3::identity();
         for (axis, angle) in self.eulerseq.iter().zip(angles) {
             let mut v = [0.0; 3];
             v[usize::from(axis.to_ascii_lowercase() - b'x')] = 1.0;
             let turn = turn(v.into(), angle * self.angle);
-            // lower case: about the axes that have turned already
+            // A lower-case letter is a rotation about an axis that the earlier rotations have turned.
             R = if axis.is_ascii_lowercase() { R * turn } else { turn * R };
         }
         R
@@ -186,7 +190,8 @@ pub(super) fn z_to(v: Vec3<f64>) -> Mat3<f64> {
     turn(axis.scale(1.0 / sin), sin.atan2(v.z))
 }
 
-/// Returns the pose of a geom between two points, and half the distance (m); its z axis points to the first point.
+/// Returns the pose of a geom that extends between two points, and half the distance between them (m). The z axis of
+/// the geom points to the first point.
 pub(super) fn from_to(a: &Attributes, kind: &str) -> Result<Option<(Se3<f64>, f64)>, Error> {
     let Some([x0, y0, z0, x1, y1, z1]) = a.array("fromto")? else { return Ok(None) };
     if !matches!(kind, "capsule" | "cylinder" | "ellipsoid" | "box") {

@@ -1,4 +1,4 @@
-//! Equality constraints: loops, and joints that follow others.
+//! Equality constraints of MJCF: loops, and joints that follow others.
 
 use super::Source;
 use super::attributes::{Attributes, MAIN};
@@ -12,10 +12,10 @@ use crate::warning::Warning;
 use condyle_spatial::{Quaternion, Se3, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// Body of the builder, and a pose in its frame.
+/// Body of the builder, and a pose in the frame of this body.
 type At = (BodyId, Se3<f64>);
 
-/// Bodies and sites of a file by name, and the poses of bodies in its initial configuration.
+/// Bodies and sites of a file by name, and the poses of bodies in the initial configuration of the file.
 struct Places<'p> {
     named: HashMap<(bool, String), At>,
     /// Pose of each body of the builder in the world.
@@ -38,7 +38,7 @@ impl<'p> Places<'p> {
         }
     }
 
-    /// Returns the pose in the world, in the initial configuration of the file.
+    /// Returns the pose in the world of a pose in a body's frame, in the initial configuration of the file.
     fn drawn(&self, (BodyId(body), X): At) -> Se3<f64> {
         self.poses[body] * X
     }
@@ -128,7 +128,7 @@ pub(super) fn add(
     Ok(warnings)
 }
 
-/// Joints that follow other joints, which may be followers too.
+/// Joints that follow other joints. A leader may be a follower, too.
 #[derive(Default)]
 struct Followers {
     leaders: HashMap<usize, usize>,
@@ -136,8 +136,8 @@ struct Followers {
 }
 
 impl Followers {
-    /// Lets a joint follow another one. Returns whether this is possible: the joint must not follow yet, and must not
-    /// lead the other one.
+    /// Lets a joint follow another joint. Returns whether this is possible: the follower must not follow a joint
+    /// already, and the leader must not follow it.
     fn add(&mut self, follower: usize, leader: usize) -> bool {
         if self.leaders.contains_key(&follower) || self.refused.contains(&follower) {
             return false;
@@ -155,7 +155,7 @@ impl Followers {
     }
 }
 
-/// Returns the two frames that a loop connects, and whether it also fixes their relative orientation.
+/// Returns the two frames that a loop connects, and whether the loop also fixes their relative orientation.
 fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     let a = Attributes::plain(e);
     let rigid = e.tag == "weld" && a.number("torquescale")? != Some(0.0);
@@ -173,11 +173,12 @@ fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     let (b2, X2) = places.find(e, "body2")?.unwrap_or(world);
     let [W1, W2] = [places.drawn((b1, X1)), places.drawn((b2, X2))];
     if e.tag == "connect" {
-        // the anchor is a point of body1, and the point of body2 that coincides with it in the initial configuration
+        // The anchor is a point of body1. It is also the point of body2 that is at the same place in the initial
+        // configuration.
         let anchor = point(anchor.ok_or_else(|| e.lacks("anchor"))?);
         return Ok(([(b1, X1 * anchor), (b2, X2 * (W2.inverse() * W1 * anchor))], rigid));
     }
-    // the anchor is a point of body2
+    // The anchor is a point of body2.
     let anchor = point(anchor.unwrap_or(Vec3::zero()));
     let relative = match a.array::<7>("relpose")? {
         Some([x, y, z, w, qx, qy, qz]) if [w, qx, qy, qz] != [0.0; 4] => {
@@ -190,11 +191,11 @@ fn loop_ends(e: &Element, places: &Places) -> Result<([At; 2], bool), Error> {
     Ok(([(b1, X1 * relative), (b2, X2 * anchor)], rigid))
 }
 
-/// Returns the coefficients of the polynomial y − y₀ = Σ pᵢ (x − x₀)ⁱ in powers of x, by Horner's rule.
+/// Returns the coefficients of the polynomial y(x) with y − y₀ = Σ pᵢ (x − x₀)ⁱ in powers of x, by Horner's rule.
 fn shifted(p: [f64; 5], x0: f64, y0: f64) -> [f64; 5] {
     let mut c = [0.0; 5];
     for &coefficient in p.iter().rev() {
-        // c ← c · (x − x₀) + coefficient
+        // Computes c ← c · (x − x₀) + coefficient.
         for k in (1..5).rev() {
             c[k] = c[k - 1] - x0 * c[k];
         }

@@ -1,5 +1,5 @@
-//! `<replicate>` and `<attach>`: each is replaced by copies of a part of the tree with their own names. Elements of
-//! other sections that refer only to the copied part are copied too, as in MuJoCo.
+//! Expansion of `<replicate>` and `<attach>`: each element is replaced by copies of a part of the tree, with new names.
+//! Elements of other sections that refer only to the copied part are copied, too, as in MuJoCo.
 
 use super::attributes::Attributes;
 use super::compiler::Compiler;
@@ -11,10 +11,10 @@ use condyle_spatial::Vec3;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Maximum number of `<attach>` elements of a robot; chosen because each one searches the file that it attaches.
+/// Maximum number of `<attach>` elements of a robot; chosen because the attached file is searched for each of them.
 const MAX_ATTACHMENTS: usize = 256;
 
-/// Replaces every `<replicate>` and `<attach>` of a file in a folder by copies.
+/// Replaces each `<replicate>` and `<attach>` of a file by copies. `folder` is the folder of the file.
 pub(super) fn expand(files: &mut Files, root: &mut Element, folder: Option<&Path>) -> Result<(), Error> {
     let mut attached = HashSet::new();
     if !looks_for(root, &mut attached) {
@@ -32,8 +32,8 @@ pub(super) fn expand(files: &mut Files, root: &mut Element, folder: Option<&Path
     Ok(())
 }
 
-/// Returns whether an element contains `<replicate>` or `<attach>`. Adds the attached parts of the same file to
-/// `attached`, and `None` for a part of another file.
+/// Returns whether an element contains `<replicate>` or `<attach>`. For each `<attach>`, adds the name of the attached
+/// part to `attached`, or `None` if the part is in another file.
 fn looks_for(element: &Element, attached: &mut HashSet<Option<Name>>) -> bool {
     let mut any = element.tag == "replicate";
     if element.tag == "attach" {
@@ -44,12 +44,13 @@ fn looks_for(element: &Element, attached: &mut HashSet<Option<Name>>) -> bool {
     element.children.iter().fold(any, |any, child| looks_for(child, attached) || any)
 }
 
-/// Returns kind and name of the attached part of a file; `None` if everything in the file's world is attached.
+/// Returns the kind and name of the part that an `<attach>` names; `None` if everything in the world of the attached
+/// file is meant.
 fn part(attach: &Element) -> Option<(&'static str, &str)> {
     ["body", "frame"].into_iter().find_map(|kind| Some((kind, attach.attribute(kind)?)))
 }
 
-/// Reads the files that may be attached; returns their names and indices.
+/// Reads the files that may be attached. Returns their names and indices.
 fn models(files: &mut Files, root: &Element, folder: Option<&Path>) -> Result<Vec<(String, usize)>, Error> {
     let mut models = Vec::new();
     for asset in root.all("asset").flat_map(|section| section.all("model")) {
@@ -73,14 +74,14 @@ struct Expansion<'f> {
     compiler: Compiler,
     models: Vec<(String, usize)>,
     sections: Sections,
-    /// Bodies and frames of this file that are attached again in the same file.
+    /// Names of the bodies and frames of this file that `<attach>` elements of this file copy.
     wanted: HashSet<Name>,
-    /// Parts of `wanted` that have been found, each with the class of its surroundings.
+    /// Elements whose names are in `wanted`, each with the class of the element around it.
     found: HashMap<Name, (Element, Option<String>)>,
 }
 
 impl Expansion<'_> {
-    /// Expands the content of an element at depth `level`; `class` is the class of its surroundings.
+    /// Expands the content of an element at depth `level`. `class` is the class of the element around it.
     fn inside(&mut self, element: &mut Element, class: Option<&str>, level: usize) -> Result<(), Error> {
         let own = element.attribute("childclass").map(str::to_owned);
         let class = own.as_deref().or(class);
@@ -102,7 +103,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Stores a copy of an element that is attached again, with the class of its surroundings.
+    /// Stores a copy of an element that is attached elsewhere in the file, with the class of the element around it.
     fn remember(&mut self, element: &Element, class: Option<&str>) -> Result<(), Error> {
         let kind = if element.tag == "body" { "body" } else { "frame" };
         let name = element.attribute("name").map(|name| (kind, name.to_owned()));
@@ -113,7 +114,8 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Stores parts of a copy, as [`remember`](Self::remember) does for an element.
+    /// Stores the elements inside a copy that are attached elsewhere, as [`remember`](Self::remember) does for one
+    /// element.
     fn remember_inside(&mut self, copy: &Element, class: Option<&str>) -> Result<(), Error> {
         if self.wanted.is_empty() || !matches!(&*copy.tag, "body" | "frame") {
             return Ok(());
@@ -123,7 +125,7 @@ impl Expansion<'_> {
         copy.children.iter().try_for_each(|child| self.remember_inside(child, class))
     }
 
-    /// Adds the copies of a `<replicate>`, each in a frame.
+    /// Adds the copies of a `<replicate>`, each inside a frame.
     fn replicate(
         &mut self,
         element: &Element,
@@ -165,7 +167,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Copies elements of the sections; `referring` lists the elements that refer to a copied part.
+    /// Copies elements of the sections. `referring` lists the elements, which refer to a copied part of the tree.
     fn copy_referring(&mut self, referring: &[(usize, usize)], rename: &dyn Fn(&str) -> String) -> Result<(), Error> {
         for &at in referring {
             if let Some(copy) = self.sections.get(at).map(|e| copied(e, rename, 3)).transpose()? {
@@ -176,7 +178,7 @@ impl Expansion<'_> {
         Ok(())
     }
 
-    /// Adds the part of this file or of another one that an `<attach>` names.
+    /// Adds the part that an `<attach>` names. It is in this file or in another one.
     fn attach(
         &mut self,
         element: &Element,
@@ -249,7 +251,7 @@ impl Expansion<'_> {
     }
 }
 
-/// Returns an empty frame that replaces an element.
+/// Returns an empty frame that replaces an `<attach>` or `<replicate>`.
 fn wrapper(element: &Element, class: Option<&str>) -> Element {
     let (file, line, source) = (element.file.clone(), element.line, element.source);
     let attributes = class.map(|class| ("childclass".to_owned(), class.to_owned())).into_iter().collect();
@@ -266,7 +268,7 @@ fn wrapper(element: &Element, class: Option<&str>) -> Element {
     }
 }
 
-/// Returns a body or frame with `class` as its own class, unless it specifies another one.
+/// Returns a body or frame with the class `class`, unless it specifies another class.
 fn with_class(mut element: Element, class: Option<&str>) -> Element {
     if let Some(class) = class.filter(|_| element.attribute("childclass").is_none()) {
         element.attributes.push(("childclass".to_owned(), class.to_owned()));
@@ -274,7 +276,7 @@ fn with_class(mut element: Element, class: Option<&str>) -> Element {
     element
 }
 
-/// Returns a body or frame inside an element, with the class of its surroundings.
+/// Finds a body or frame inside an element, and returns it with the class of the element around it.
 fn find<'e>(
     element: &'e Element,
     kind: &str,
@@ -288,7 +290,7 @@ fn find<'e>(
     })
 }
 
-/// Returns the names in a part of the tree.
+/// Returns all names of elements in a part of the tree.
 fn names(elements: &[Element]) -> Vec<Name> {
     let (mut names, mut waiting) = (Vec::new(), elements.iter().collect::<Vec<_>>());
     while let Some(e) = waiting.pop() {
@@ -301,7 +303,7 @@ fn names(elements: &[Element]) -> Vec<Name> {
     names
 }
 
-/// Returns a copy of an element for depth `level`, with renamed names and references.
+/// Returns a copy of an element for depth `level`. Names and references to names are changed by `rename`.
 fn copied(element: &Element, rename: &dyn Fn(&str) -> String, level: usize) -> Result<Element, Error> {
     if level > MAX_DEPTH {
         let what = format!("stands at level {level}, copies counted: at most {MAX_DEPTH} are allowed");

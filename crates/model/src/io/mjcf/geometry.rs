@@ -1,4 +1,4 @@
-//! Inertias of bodies, explicit or computed from geoms.
+//! Inertias of bodies, given explicitly or computed from geoms.
 
 use super::attributes::Attributes;
 use super::compiler::{Compiler, ORIENTATIONS, from_to};
@@ -10,12 +10,12 @@ use condyle_spatial::{Act, Inertia, Mat3, Se3, Sym3, Vec3};
 use core::f64::consts::PI;
 use nalgebra::Matrix3;
 
-/// Density of a geom that has neither mass nor density (kg/m³).
+/// Density of a geom for which neither mass nor density is given (kg/m³).
 const DENSITY: f64 = 1000.0;
-/// Minimum volume (m³), area (m²) and mass (kg) of a geom that counts, as in MuJoCo.
+/// Minimum volume (m³), area (m²) and mass (kg) of a geom that contributes to inertia, as in MuJoCo.
 const LEAST_VOLUME: f64 = 1e-14;
 
-/// Inertia in principal axes.
+/// Inertia, given by its principal axes and moments.
 #[derive(Clone, Copy)]
 pub(super) struct Weight {
     /// Mass (kg).
@@ -31,13 +31,13 @@ impl Weight {
         self.pose.act(Inertia::from_com(self.mass, Vec3::zero(), diagonal(self.moments)))
     }
 
-    /// Returns the same weight, expressed in a frame in which its current frame has the pose X.
+    /// Returns the same weight in another frame, in which the current frame has the pose X.
     pub(super) fn seen_from(self, X: Se3<f64>) -> Self {
         Self { pose: X * self.pose, ..self }
     }
 
-    /// Returns the sum of weights and its principal axes. A single weight keeps its axes; the axes of a sum follow
-    /// MuJoCo's method.
+    /// Returns the sum of weights, and its principal axes. A single weight keeps its axes. The axes of a sum are
+    /// computed by MuJoCo's method.
     pub(super) fn sum(weights: &[Self]) -> Option<(Inertia<f64>, Se3<f64>)> {
         let sum = weights.iter().fold(Inertia::zero(), |sum, w| sum + w.inertia());
         match weights {
@@ -54,13 +54,13 @@ fn axes(I: Inertia<f64>) -> Se3<f64> {
     Se3::new(principal(about).1, com)
 }
 
-/// Returns the centre of mass, and the rotational inertia about it.
+/// Returns the centre of mass, and the rotational inertia about the centre of mass.
 fn central(I: Inertia<f64>) -> (Vec3<f64>, Sym3<f64>) {
     let com = if I.mass > 0.0 { I.mass_com.scale(1.0 / I.mass) } else { Vec3::zero() };
     (com, I.rotational - Inertia::from_com(I.mass, com, Sym3::zero()).rotational)
 }
 
-/// Returns the inertia of an `<inertial>` in the body's frame, and the pose of its principal axes.
+/// Returns the inertia of an `<inertial>` in the body's frame, and the pose of the principal axes of this inertia.
 pub(super) fn inertial(compiler: &Compiler, a: &Attributes) -> Result<(Inertia<f64>, Se3<f64>), Error> {
     let needed = |name: &str| a.element.lacks(name);
     a.get("pos").ok_or_else(|| needed("pos"))?;
@@ -84,8 +84,8 @@ pub(super) fn inertial(compiler: &Compiler, a: &Attributes) -> Result<(Inertia<f
     Ok((X.act(Inertia::from_com(mass, Vec3::zero(), I)), X * Se3::new(R, Vec3::zero())))
 }
 
-/// Returns a body's inertia with the corrections of the compiler. Mass and principal moments are raised to their
-/// bounds, and physically impossible moments are balanced.
+/// Returns a body's inertia with the corrections that `<compiler>` sets. Mass and principal moments are raised to their
+/// minimum, and physically impossible moments are balanced.
 pub(super) fn corrected(compiler: &Compiler, body: &Element, I: Inertia<f64>) -> Result<Inertia<f64>, Error> {
     let ([least_mass, least_moment], balance) = (compiler.bounds, compiler.balance);
     if least_mass <= 0.0 && least_moment <= 0.0 && !balance {
@@ -107,7 +107,7 @@ pub(super) fn corrected(compiler: &Compiler, body: &Element, I: Inertia<f64>) ->
     Ok(Inertia::from_com(I.mass.max(least_mass), com, about))
 }
 
-/// Returns whether a geom counts for the inertia of its body, and has mass.
+/// Returns whether a geom has mass and contributes to the inertia of its body.
 pub(super) fn is_heavy(compiler: &Compiler, a: &Attributes) -> Result<bool, Error> {
     let group = a.number("group")?.unwrap_or(0.0);
     let (mass, density) = (a.number("mass")?, a.number("density")?.unwrap_or(DENSITY));
@@ -115,8 +115,8 @@ pub(super) fn is_heavy(compiler: &Compiler, a: &Attributes) -> Result<bool, Erro
     Ok(heavy && (compiler.groups[0]..=compiler.groups[1]).contains(&group))
 }
 
-/// Returns the weight of a heavy geom, in the frame in which the geom's pose is given. `mesh` is the mesh of the geom;
-/// `field` contains the half sides of the box of its height field.
+/// Returns the weight of a geom that has mass, in the frame in which the pose of the geom is given. `mesh` is the mesh
+/// of the geom. `field` contains half the sides of the box of the geom's height field.
 pub(super) fn geom(
     compiler: &Compiler,
     a: &Attributes,
@@ -175,8 +175,8 @@ fn sized(compiler: &Compiler, a: &Attributes, kind: &str) -> Result<(Se3<f64>, V
     Ok((X, size))
 }
 
-/// Returns the pose and the size of a primitive that is fitted to a mesh: to the box with the mesh's inertia, or to its
-/// bounding box.
+/// Returns the pose and the size of a primitive that is fitted to a mesh: either to the box with the inertia of the
+/// mesh, or to the bounding box of the mesh.
 fn fitted(compiler: &Compiler, a: &Attributes, kind: &str, mesh: &Solid) -> Result<(Se3<f64>, Vec<f64>), Error> {
     let (center, [x, y, z]) = if compiler.fit_box { mesh.bounding_box() } else { (Vec3::zero(), mesh.inertia_box()) };
     let round = if compiler.fit_box { x.max(y) } else { (x + y) / 2.0 };
@@ -204,7 +204,8 @@ fn solid(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
             let across = a * a / 4.0 + h * h / 12.0;
             (PI * a * a * h, [across, across, a * a / 2.0])
         }
-        // capsule: a cylinder of height h between two half balls, whose centres of mass are 3a/8 beyond its ends
+        // A capsule is a cylinder of height h between two half balls, whose centres of mass are 3a/8 beyond the ends of
+        // the cylinder.
         "capsule" => {
             let h = 2.0 * size[1];
             let (tube, ball) = (PI * a * a * h, 4.0 / 3.0 * PI * a * a * a);
@@ -237,13 +238,13 @@ fn hollow(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
             let h = 2.0 * size[1];
             let (tube, ball) = (2.0 * PI * a * h, 4.0 * PI * a * a);
             let (t, b) = (tube / (tube + ball), ball / (tube + ball));
-            // the centre of mass of a half shell is at a/2
+            // The centre of mass of a half shell of radius a is at a/2.
             let (center, far) = (a / 2.0, h / 2.0 + a / 2.0);
             let ends = 2.0 / 3.0 * a * a + far * far - center * center;
             let across = t * (a * a / 2.0 + h * h / 12.0) + b * ends;
             (tube + ball, [across, across, t * a * a + b * 2.0 / 3.0 * a * a])
         }
-        // Thomsen's formula for the area; moments of a layer of 1 µm, as in MuJoCo
+        // The area is computed by Thomsen's formula. The moments are the moments of a layer of 1 µm, as in MuJoCo.
         "ellipsoid" => {
             let (b, c, p) = (size[1], size[2], 1.6075);
             let area = 4.0 * PI * (((a * b).powf(p) + (b * c).powf(p) + (c * a).powf(p)) / 3.0).powf(1.0 / p);
@@ -253,10 +254,10 @@ fn hollow(kind: &str, size: &[f64]) -> (f64, [f64; 3]) {
         }
         _ => {
             let [x, y, z] = [a, size[1], size[2]];
-            let areas = [y * z, z * x, x * y].map(|area| 8.0 * area); // both sides across each axis
+            let areas = [y * z, z * x, x * y].map(|area| 8.0 * area); // areas of both sides across each axis
             let total: f64 = areas.iter().sum();
             let [across_x, across_y, across_z] = areas.map(|area| area / total);
-            // ∫ x² over the sides: x² on the sides across x, x²/3 on the others
+            // The mean of x² over the sides of the box is x² for the two sides across x, and x²/3 for the other sides.
             let square = |half: f64, across: f64| half * half * (across + (1.0 - across) / 3.0);
             let [xx, yy, zz] = [square(x, across_x), square(y, across_y), square(z, across_z)];
             (total, [yy + zz, xx + zz, xx + yy])

@@ -1,4 +1,4 @@
-//! Files in files: included ones, and attached ones with their own settings.
+//! Files that are used by other files: included files, and attached files with their own settings.
 
 use super::expand;
 use super::keywords;
@@ -10,15 +10,15 @@ use crate::warning::Warning;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Known attributes and elements that a model cannot represent, and the effect of their absence.
+/// Known attributes and elements that a model cannot represent, and the effect of each missing feature.
 const LEFT_OUT: &LeftOut = &[];
 
-/// A file with its own settings, after all `<include>`, `<replicate>` and `<attach>` elements have been replaced.
+/// File with its own settings, in which all `<include>`, `<replicate>` and `<attach>` elements have been replaced.
 pub(super) struct File {
     pub(super) root: Element,
     /// Folder of the file; `None` for a string.
     pub(super) folder: Option<PathBuf>,
-    /// Elements of its sections, after the file has been attached.
+    /// Elements of the sections of the file; `None` until the file is attached.
     pub(super) sections: Option<Sections>,
 }
 
@@ -30,7 +30,7 @@ pub(super) struct Files {
     /// Files that are being read, outermost first.
     open: Vec<PathBuf>,
     pub(super) amount: Amount,
-    /// Number of `<attach>` elements so far.
+    /// Number of `<attach>` elements that have been read.
     pub(super) attachments: usize,
     pub(super) warnings: Vec<Warning>,
 }
@@ -41,13 +41,13 @@ impl Files {
         Self { known, files: Vec::new(), open: Vec::new(), amount, attachments: 0, warnings: Vec::new() }
     }
 
-    /// Reads a file with its own settings, and returns its index.
+    /// Reads a file that has its own settings, and returns the index of the file.
     pub(super) fn read(&mut self, path: &Path) -> Result<usize, Error> {
         let text = self.amount.read(path)?;
         self.read_text(path, &text)
     }
 
-    /// Reads a text instead of the file at `path`, as [`read`](Self::read) does.
+    /// Reads a text instead of the file at `path`; otherwise does the same as [`read`](Self::read).
     pub(super) fn read_text(&mut self, path: &Path, text: &str) -> Result<usize, Error> {
         let own = path.canonicalize().unwrap_or(path.to_owned());
         if self.open.contains(&own) {
@@ -60,20 +60,20 @@ impl Files {
         Ok(index)
     }
 
-    /// Reads a text, as [`read`](Self::read) does; without a folder it cannot refer to files.
+    /// Reads a text, as [`read`](Self::read) reads a file. Without a folder, the text cannot refer to files.
     pub(super) fn parse(&mut self, text: &str, file: &str, folder: Option<&Path>) -> Result<usize, Error> {
         let root = Element::parse(text, file, &mut self.amount)?;
         self.add(root, folder)
     }
 
-    /// Reads a text, as [`parse`](Self::parse) does, and forgets the lines of its elements.
+    /// Reads a text without a folder, as [`parse`](Self::parse) does, and removes the line numbers of its elements.
     pub(super) fn parse_without_lines(&mut self, text: &str, file: &str) -> Result<usize, Error> {
         let mut root = Element::parse(text, file, &mut self.amount)?;
         root.forget_lines();
         self.add(root, None)
     }
 
-    /// Adds a file with its own settings, given its root, and returns its index.
+    /// Adds a file with its own settings, given its root element, and returns the index of the file.
     fn add(&mut self, mut root: Element, folder: Option<&Path>) -> Result<usize, Error> {
         let seen = self.open.last().cloned().into_iter().collect();
         Includes { top: folder, seen, amount: &mut self.amount, warnings: &mut self.warnings }
@@ -102,8 +102,8 @@ impl Files {
 /// Attributes whose values may be empty.
 const EMPTY: [&str; 8] = ["class", "childclass", "prefix", "sep", "file", "assetdir", "meshdir", "texturedir"];
 
-/// Marks an element and its content as part of the file with index `source`. Removes numbers and names that are empty:
-/// in MuJoCo they do not override a default.
+/// Marks an element and its content as part of the file with index `source`. Removes attributes with empty numbers and
+/// names, which do not override a default in MuJoCo.
 fn belongs_to(element: &mut Element, source: usize) {
     element.source = source;
     element.attributes.retain(|(name, value)| !value.trim().is_empty() || EMPTY.contains(&&**name));
@@ -116,15 +116,16 @@ fn belongs_to(element: &mut Element, source: usize) {
 struct Includes<'a> {
     /// Folder of the main file.
     top: Option<&'a Path>,
-    /// Files so far, with links resolved.
+    /// Paths of all files that have been read, with links resolved.
     seen: HashSet<PathBuf>,
     amount: &'a mut Amount,
-    /// Things outside of the root elements.
+    /// Warnings about elements outside of the root elements.
     warnings: &'a mut Vec<Warning>,
 }
 
 impl Includes<'_> {
-    /// Replaces all `<include>` elements inside an element at depth `level`, whose file is in `folder`.
+    /// Replaces all `<include>` elements inside an element. The element is at depth `level`, and its file is in
+    /// `folder`.
     fn resolve(&mut self, element: &mut Element, folder: Option<&Path>, level: usize) -> Result<(), Error> {
         if level > MAX_DEPTH {
             let what = format!("stands at level {level}, files included: at most {MAX_DEPTH} are allowed");
@@ -140,7 +141,8 @@ impl Includes<'_> {
             let (Some(top), Some(folder)) = (self.top, folder) else {
                 return Err(child.wrong(format!("a string has no folder to find `{file}` in")));
             };
-            // as MuJoCo does: in the main file's folder, or else next to the including file
+            // The file is searched in the same folders as in MuJoCo: in the main file's folder, then in the folder of
+            // the including file.
             let path = Some(top.join(file)).filter(|path| path.exists()).unwrap_or_else(|| folder.join(file));
             if !self.seen.insert(path.canonicalize().unwrap_or(path.clone())) {
                 return Err(child.wrong(format!("`{file}` is already part of the model")));
@@ -148,7 +150,7 @@ impl Includes<'_> {
             let text = self.amount.read(&path).map_err(|e| child.wrong(e.to_string()))?;
             let mut included = Element::parse(&text, &path.display().to_string(), self.amount)?;
             self.warnings.extend(included.outside());
-            // its children come to stand where it was included
+            // The children of the included file replace the `<include>` element.
             self.resolve(&mut included, Some(path.parent().unwrap_or(Path::new(""))), level)?;
             element.children.append(&mut included.children);
         }

@@ -1,4 +1,4 @@
-//! Joints: kind, poses and limits.
+//! Joints of MJCF: their kinds, poses and limits.
 
 use super::Reader;
 use super::attributes::Attributes;
@@ -9,8 +9,8 @@ use crate::joint::Joint;
 use condyle_spatial::{Mat3, Se3, Vec3};
 
 impl Reader<'_> {
-    /// Returns the joint, the poses before it (which undoes `ref`) and after it, and its options: lXl(q) = lXj X_J(q)
-    /// jXl. `X` is the pose of the surrounding `<frame>`.
+    /// Returns the joint, its options, and the poses lXj before the joint (which undoes `ref`) and jXl after it: lXl(q)
+    /// = lXj X_J(q) jXl. `X` is the pose of the surrounding `<frame>`.
     pub(super) fn joint(
         &mut self,
         a: &Attributes,
@@ -29,7 +29,7 @@ impl Reader<'_> {
             _ => return Err(wrong(format!("type: `{kind}` is none of hinge, slide, ball and free"))),
         };
         let joint = joint.normalized().map_err(wrong)?;
-        // the module `beside` adds limits of effort, damping and friction
+        // Limits of effort, damping and friction are added later, by the module `beside`.
         let mut options = JointOptions { armature: number("armature")?, ..JointOptions::default() };
         if joint == Joint::FreeFlyer {
             return Ok((joint, Se3::identity(), Se3::identity(), options));
@@ -53,7 +53,8 @@ impl Reader<'_> {
         Ok((joint, lXj, jXl, options))
     }
 
-    /// Returns a range if it is a limit. Without a flag, a range whose bounds are in ascending order is a limit.
+    /// Returns the range of a joint if it is a limit. Without a flag, a range is a limit if its bounds are in ascending
+    /// order.
     fn limits(&self, a: &Attributes, range: &str, limited: &str, is_ball: bool) -> Result<Option<[f64; 2]>, Error> {
         let bounds = a.array::<2>(range)?.unwrap_or_default();
         let [lower, upper] = bounds;

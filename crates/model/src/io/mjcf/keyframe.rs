@@ -1,4 +1,4 @@
-//! Keyframes: named states, in MuJoCo's coordinates.
+//! Keyframes of MJCF: named states, in MuJoCo's coordinates.
 
 use super::attributes::Attributes;
 use super::spring::Joints;
@@ -16,8 +16,8 @@ use std::collections::HashSet;
 /// Maximum number of coordinates of all keyframes together.
 const MAX_NUMBERS: usize = 1 << 22;
 
-/// Adds the keyframes of a file. As in MuJoCo, joints for which a list has no numbers are as the file draws them, and
-/// at rest, and controls are 0. `driven` has the index in the file of each of the model's actuators.
+/// Adds the keyframes of a file. As in MuJoCo, missing positions are taken from the initial configuration of the file,
+/// and missing velocities and controls are 0. `driven` contains, for each actuator of the model, its index in the file.
 pub(super) fn add(
     model: &mut Model,
     root: &Element,
@@ -77,7 +77,7 @@ pub(super) fn add(
                 position[at..].copy_from_slice(&unit);
             }
             if let (Joint::FreeFlyer, &[.., x, y, z, w]) = (joint.joint, &position[..]) {
-                // v is along the body's axes, qvel along the world's axes: v = Rᵀ qvel
+                // v is along the axes of the body and qvel along the axes of the world, so v = Rᵀ qvel.
                 let R = Quaternion::new(x, y, z, w).to_rotation();
                 let turned = R.transpose_mul(Vec3::new(velocity[0], velocity[1], velocity[2]));
                 velocity[..3].copy_from_slice(&turned.to_array());
@@ -93,7 +93,7 @@ pub(super) fn add(
     Ok(())
 }
 
-/// Returns the control of each of the model's actuators. That of an integrator is its activation.
+/// Returns the control of each actuator of the model. The control of an integrator is its activation.
 fn control(e: &Element, inputs: &[Inputs], driven: &[usize], warnings: &mut Vec<Warning>) -> Result<Vec<f64>, Error> {
     let list = |attribute: &str, expected: Option<usize>| {
         let found = Attributes::plain(e).list(attribute)?.unwrap_or_default();
@@ -130,13 +130,13 @@ fn control(e: &Element, inputs: &[Inputs], driven: &[usize], warnings: &mut Vec<
     Ok(found)
 }
 
-/// Returns the name that a keyframe has in its file.
+/// Returns the name that the file gives a keyframe.
 fn own(e: &Element) -> Option<&str> {
     e.attribute("name").filter(|name| !name.is_empty())
 }
 
-/// Returns x, y, z, w of a quaternion w, x, y, z, normalized. A quaternion of length 0 becomes the identity, as in
-/// MuJoCo.
+/// Normalizes a quaternion w, x, y, z, and returns it as x, y, z, w. A quaternion of length 0 becomes the identity, as
+/// in MuJoCo.
 fn unit(quaternion: &[f64]) -> [f64; 4] {
     let [w, x, y, z] = [0, 1, 2, 3].map(|k| quaternion[k]);
     let norm = (w * w + x * x + y * y + z * z).sqrt();

@@ -3,8 +3,8 @@
 use crate::error::Error;
 use crate::io::xml::Element;
 
-/// Elements, an attribute of theirs, and its keywords, as in MuJoCo 4.0. Other modules check the keywords of
-/// `<compiler>`, `<flag>` and joints, and those that are true or false.
+/// Tags of elements, one of their attributes, and the keywords that this attribute may have, as in MuJoCo 4.0. Other
+/// modules check the keywords of `<compiler>`, `<flag>` and joints, and attributes that are `true` or `false`.
 const KEYWORDS: [(&str, &str, &str); 16] = [
     ("option", "integrator", "Euler RK4 implicit implicitfast"),
     ("option", "cone", "pyramidal elliptic"),
@@ -28,7 +28,7 @@ const KEYWORDS: [(&str, &str, &str); 16] = [
 const ACTUATORS: &str =
     "general motor position velocity intvelocity orientation pid damper cylinder muscle adhesion dcmotor plugin";
 
-/// Keywords of `input`, which may contain several.
+/// Keywords of the attribute `input`, which may contain several keywords.
 const INPUTS: [&str; 7] = ["none", "expmap", "quat", "pos", "vel", "ff", "voltage"];
 
 /// Checks the keywords of an element and of its content.

@@ -1,5 +1,5 @@
-//! Laws of actuators: the force as a function of control, length and velocity. Each kind of element sets the parameters
-//! of one general law, and each kind has its own defaults in a class.
+//! Laws of actuators: the force as a function of control, length and velocity. All kinds of actuators have the same
+//! general law, and each kind sets other parameters. In a default class, each kind has its own defaults.
 
 use super::attributes::Attributes;
 use crate::error::Error;
@@ -7,10 +7,10 @@ use crate::io::xml::{Element, numbers};
 use core::f64::consts::PI;
 use std::rc::Rc;
 
-/// Number of parameters of dynamics, gain and bias.
+/// Number of parameters in each of `dynprm`, `gainprm` and `biasprm`.
 const PARAMETERS: usize = 10;
 
-/// Kinds of actuators: tags of elements in `<actuator>` and in a default class.
+/// Kinds of actuators. They are the tags of elements in `<actuator>` and in a default class.
 pub(super) const KINDS: [&str; 13] = [
     "general",
     "motor",
@@ -27,7 +27,7 @@ pub(super) const KINDS: [&str; 13] = [
     "plugin",
 ];
 
-/// Features of a DC motor that a model cannot represent, and the effect of their absence.
+/// Attributes of a DC motor that a model cannot represent, and the effect of each missing feature.
 const EXTRAS: [(&str, &str); 5] = [
     ("inductance", "inductance: its current follows the voltage at once"),
     ("thermal", "thermal: its resistance does not change with the temperature"),
@@ -36,7 +36,7 @@ const EXTRAS: [(&str, &str); 5] = [
     ("cogging", "cogging: it has no cogging torque"),
 ];
 
-/// Law of an actuator with length l and activation a, which follows the control u:
+/// Law of an actuator with length l and activation a. The activation follows the control u:
 ///
 /// ```text
 /// f = gain(l, l̇) · a + bias(l, l̇)
@@ -50,11 +50,12 @@ pub(super) struct Law<'a> {
     pub(super) gainprm: [f64; PARAMETERS],
     /// Coefficients b of an affine bias b₀ + b₁ l + b₂ l̇. A positive b₂ of a servo is a damping ratio.
     pub(super) biasprm: [f64; PARAMETERS],
-    /// Ratio of the control range to the range of the driven joint or tendon; 0 if the range is not inherited.
+    /// Ratio of the control range to the range of the driven joint or tendon; 0 if the control range does not depend on
+    /// that range.
     pub(super) inherit: f64,
-    /// Selected inputs of a kind that has several.
+    /// Selected inputs, for a kind of actuator that has several inputs.
     pub(super) input: Option<&'a str>,
-    /// Feature of a DC motor that a model cannot represent, and the effect of its absence.
+    /// Feature of a DC motor that a model cannot represent, and the effect of the missing feature.
     pub(super) extra: &'static str,
 }
 
@@ -67,7 +68,7 @@ impl Default for Law<'_> {
     }
 }
 
-/// Law of a default class: the law of its last default of any kind.
+/// Law of a default class. It is the law of the last element in the class, of any kind.
 struct ClassLaw<'a> {
     kind: &'a str,
     law: Law<'a>,
@@ -83,13 +84,13 @@ pub(super) struct Laws<'a> {
 }
 
 impl<'a> Laws<'a> {
-    /// Returns the initial laws of a class nested in this one, before its defaults are read.
+    /// Returns the laws with which a nested class begins, before its elements are read.
     pub(super) fn inner(&self) -> Self {
         Self { outer: self.own.clone().or_else(|| self.outer.clone()), own: None }
     }
 
-    /// Returns the law of an element of `<actuator>`. It inherits from the innermost class whose last default has the
-    /// same kind or is `<general>`. A `<general>` inherits from any class.
+    /// Returns the law of an element of `<actuator>`. The law inherits from the innermost class whose last element has
+    /// the same kind or is a `<general>`. A `<general>` inherits from any class.
     pub(super) fn of(&self, e: &'a Element, viscous: f64) -> Result<Law<'a>, Error> {
         let kind = e.tag.as_str();
         let mut class = self.own.as_ref().or(self.outer.as_ref());
@@ -115,7 +116,7 @@ impl<'a> Laws<'a> {
 }
 
 impl<'a> Law<'a> {
-    /// Returns the initial law of a kind that inherits from a general law.
+    /// Returns the law with which a kind begins, when it inherits from a general law.
     fn begin(&self, kind: &str) -> Self {
         let mut law = Self::default();
         let [fixed, affine] = ["fixed", "affine"].map(|gain| self.gain == gain);
@@ -143,7 +144,7 @@ impl<'a> Law<'a> {
         law
     }
 
-    /// Reads the attributes of an element of a kind.
+    /// Reads the attributes of an element of one kind.
     fn read(&mut self, kind: &str, e: &'a Element, viscous: f64) -> Result<(), Error> {
         let a = Attributes::plain(e);
         let number = |name: &str, or: f64| a.number(name).map(|x| x.unwrap_or(or));
@@ -221,7 +222,7 @@ impl<'a> Law<'a> {
         Ok(())
     }
 
-    /// Reads the gains of a servo.
+    /// Reads the gains of a servo from its attributes.
     fn servo(&mut self, a: &Attributes<'a>, kp: f64) -> Result<(), Error> {
         let wrong = |what: String| Err(a.element.wrong(what));
         self.biasprm[1] = -kp;
@@ -235,7 +236,7 @@ impl<'a> Law<'a> {
         Ok(())
     }
 
-    /// Reads a DC motor: with the resistance R and the motor constant K, f = K/R (u − K l̇).
+    /// Reads a DC motor with the resistance R and the motor constant K. Its force is f = K/R (u − K l̇).
     fn dc_motor(&mut self, a: &Attributes<'a>, viscous: f64) -> Result<(), Error> {
         let some = |name: &str, count: usize| -> Result<[f64; 6], Error> {
             let mut x = [0.0; 6];
@@ -250,7 +251,7 @@ impl<'a> Law<'a> {
             torque = K;
         }
         if volts > 0.0 && emf <= 0.0 && free > 0.0 {
-            // free = volts emf / (emf² + R viscous)
+            // The no-load speed satisfies free = volts emf / (emf² + R viscous).
             let root = volts * volts - 4.0 * R * viscous * free * free;
             let less = volts / free - if stall > 0.0 { volts * viscous / stall } else { 0.0 };
             emf = match viscous > 0.0 {
@@ -293,7 +294,8 @@ impl<'a> Law<'a> {
     }
 }
 
-/// Overwrites the first entries of an array with the numbers of an attribute; as in MuJoCo, it may have fewer numbers.
+/// Overwrites the first entries of an array with the numbers of an attribute. As in MuJoCo, the attribute may have
+/// fewer numbers than the array.
 pub(super) fn fill(a: &Attributes, name: &str, to: &mut [f64]) -> Result<(), Error> {
     for text in a.layers(name) {
         let wrong = |what: String| a.element.wrong(format!("{name}: {what}"));

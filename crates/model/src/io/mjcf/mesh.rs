@@ -13,28 +13,28 @@ const LEAST: f64 = 1e-15;
 /// Inertia of a mesh.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Solid {
-    /// Volume (m³), or the area of a shell (m²).
+    /// Volume (m³), or the area (m²) if the mesh is a shell.
     pub(super) volume: f64,
     /// Centre of mass and principal axes, in the frame of the mesh's points.
     pub(super) pose: Se3<f64>,
-    /// Principal moments per kilogram (m²), greatest first.
+    /// Principal moments per kilogram (m²), the largest first.
     pub(super) moments: [f64; 3],
     /// Minimum and maximum coordinates of the points along the principal axes (m).
     pub(super) bounds: [[f64; 3]; 2],
-    /// Number of corners, if the mesh is its convex hull.
+    /// Number of corners of the mesh if the mesh is its convex hull, otherwise `None`.
     pub(super) corners: Option<usize>,
-    /// Number of faces of its file of which triangles are left out.
+    /// Number of faces in the mesh's file with triangles that are left out.
     pub(super) lost: usize,
 }
 
 impl Solid {
-    /// Returns half the sides of the box that has the same inertia (m): Iₓ = m (y² + z²)/3.
+    /// Returns half the sides (m) of the box that has the same inertia as the mesh: Iₓ = m (y² + z²)/3.
     pub(super) fn inertia_box(&self) -> [f64; 3] {
         let [x, y, z] = self.moments;
         [y + z - x, x + z - y, x + y - z].map(|sum| 0.5 * (6.0 * sum).max(0.0).sqrt())
     }
 
-    /// Returns the centre and half the sides of the bounding box, along the principal axes (m).
+    /// Returns the centre and half the sides of the bounding box along the principal axes (m).
     pub(super) fn bounding_box(&self) -> (Vec3<f64>, [f64; 3]) {
         let [low, high] = self.bounds;
         let center = [0, 1, 2].map(|k| (low[k] + high[k]) / 2.0);
@@ -50,7 +50,7 @@ pub(super) enum Rule {
     Convex,
     /// Volume inside the surface.
     Exact,
-    /// Pyramids from the centroid of the surface to all triangles, each with positive volume.
+    /// Pyramids from the centroid of the surface to each triangle. The volume of each pyramid is positive.
     Legacy,
     /// Surface.
     Shell,
@@ -67,8 +67,8 @@ impl Rule {
 
 #[cfg(feature = "meshes")]
 impl Solid {
-    /// Computes the inertia of triangles, counter-clockwise seen from outside. Without triangles, it is the inertia of
-    /// the convex hull of the points.
+    /// Computes the inertia of a mesh. Corners of triangles are counter-clockwise if seen from outside. Without
+    /// triangles, the result is the inertia of the convex hull of the points.
     pub(super) fn new(points: &[Vec3<f64>], mut triangles: Vec<[u32; 3]>, rule: Rule) -> Result<Self, String> {
         let is_hull = triangles.is_empty() || rule == Rule::Convex;
         if is_hull {
@@ -76,7 +76,7 @@ impl Solid {
             triangles = condyle_meshes::hull(&plain).ok_or("its points lie in a plane")?;
         }
         let corners = |t: &[u32; 3], from: Vec3<f64>| t.map(|k| points[k as usize] - from);
-        // the centroid of the surface
+        // Computes the centroid of the surface.
         let (mut area, mut centroid) = (0.0, Vec3::zero());
         for t in &triangles {
             let [a, b, c] = corners(t, Vec3::zero());
@@ -87,7 +87,7 @@ impl Solid {
             return Err(format!("its surface of {area} m² is too small"));
         }
         centroid = centroid.scale(1.0 / area);
-        // volume of a pyramid, or area of a triangle
+        // Computes the volume of a pyramid, or the area of a triangle.
         let part = |[a, b, c]: [Vec3<f64>; 3]| match rule {
             Rule::Shell => (b - a).cross(c - a).norm_squared().sqrt() / 2.0,
             Rule::Legacy => (a.dot(b.cross(c)) / 6.0).abs(),
@@ -97,7 +97,7 @@ impl Solid {
         for t in &triangles {
             let t = corners(t, centroid);
             let v = part(t);
-            // centre of mass of a pyramid, relative to its tip; MuJoCo uses the same point for a triangle
+            // The centre of mass of a pyramid, relative to its tip. MuJoCo uses the same point for a triangle.
             (volume, com) = (volume + v, com + (t[0] + t[1] + t[2]).scale(v / 4.0));
         }
         if volume < LEAST {
@@ -105,7 +105,7 @@ impl Solid {
             return Err(format!("its volume of {volume} m³ is {what}"));
         }
         let com = centroid + com.scale(1.0 / volume);
-        // ∫ x xᵀ over pyramids from the centre of mass, or over triangles: Tonon (2004)
+        // Computes ∫ x xᵀ over pyramids from the centre of mass, or over triangles. Source: Tonon (2004).
         let (mut volume, mut P) = (0.0, Sym3::zero());
         for t in &triangles {
             let [a, b, c] = corners(t, com);
@@ -122,7 +122,7 @@ impl Solid {
         if !(moments[2] > 0.0 && moments.iter().all(|x| x.is_finite())) {
             return Err(format!("its least moment of inertia, {} m⁵, is not positive", moments[2]));
         }
-        let corners = is_hull.then(|| triangles.len() / 2 + 2); // Euler: C = T/2 + 2
+        let corners = is_hull.then(|| triangles.len() / 2 + 2); // Euler's formula: C = T/2 + 2
         let pose = Se3::new(R, com);
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         for p in points {

@@ -1,17 +1,18 @@
-//! Principal axes in MuJoCo's order and with its signs; frames of inertia and fitted geoms depend on them.
+//! Principal axes of inertias, in MuJoCo's order and with MuJoCo's signs. Frames of inertia and fitted geoms depend on
+//! order and signs.
 
 use condyle_spatial::{Mat3, Quaternion, Sym3};
 
-/// Threshold for off-diagonal entries, relative to the greatest moment, below which they are rounding errors. MuJoCo
-/// stops at 1e-7 for meshes.
+/// Threshold for off-diagonal entries, relative to the largest moment. Smaller entries are rounding errors. For meshes,
+/// MuJoCo stops at 1e-7.
 const ROUNDING: f64 = 1e-15;
-/// Relative difference below which moments are equal and keep their order.
+/// Relative difference of moments below which they are treated as equal and keep their order.
 const EQUAL: f64 = 1e-12;
-/// Maximum number of rotations, as in MuJoCo. Once small, the largest off-diagonal entry converges quadratically.
+/// Maximum number of rotations, as in MuJoCo. Once the largest off-diagonal entry is small, it converges quadratically.
 const MAX_ROTATIONS: usize = 500;
 
-/// Returns the principal moments, greatest first, and the rotation R with I = R diag(moments) Rᵀ. Jacobi's method: each
-/// rotation is about the axis of the largest off-diagonal entry.
+/// Returns the principal moments, the largest first, and the rotation R with I = R diag(moments) Rᵀ. The method is
+/// Jacobi's: each rotation makes the largest off-diagonal entry zero.
 pub(super) fn principal(I: Sym3<f64>) -> ([f64; 3], Mat3<f64>) {
     let full = I.full();
     let mut quaternion = Quaternion::identity();
@@ -38,7 +39,7 @@ pub(super) fn principal(I: Sym3<f64>) -> ([f64; 3], Mat3<f64>) {
         let t =
             if tau >= 0.0 { 1.0 / (tau + (1.0 + tau * tau).sqrt()) } else { -1.0 / (-tau + (1.0 + tau * tau).sqrt()) };
         let cos = 1.0 / (1.0 + t * t).sqrt();
-        // sin ½θ = ½ sin θ / cos ½θ
+        // The half angle follows from sin ½θ = ½ sin θ / cos ½θ.
         let half = 0.5 * t * cos / (0.5 + 0.5 * cos).sqrt();
         let sin = if axis == 1 { half } else { -half };
         let mut vector = [0.0; 3];
@@ -46,7 +47,7 @@ pub(super) fn principal(I: Sym3<f64>) -> ([f64; 3], Mat3<f64>) {
         let [x, y, z] = vector;
         quaternion = (quaternion * Quaternion::new(x, y, z, (1.0 - sin * sin).sqrt())).normalize();
     }
-    // greatest first; exchanging two axes is a quarter turn about the third one
+    // Sorts the moments, the largest first. A quarter turn about the third axis exchanges two axes.
     for first in [0, 1, 0] {
         if moments[first] < moments[first + 1] * (1.0 - EQUAL) {
             moments.swap(first, first + 1);

@@ -1,4 +1,5 @@
-//! Inertia along joints in the initial configuration of a file. Stiffness and damping may be specified relative to it.
+//! Inertia along lengths, such as joint positions, in the initial configuration of a file. Stiffness and damping may be
+//! specified relative to this inertia.
 
 use crate::body::Frame;
 use crate::joint::Joint;
@@ -40,8 +41,8 @@ impl<'m> Reference<'m> {
         Self { model, poses, S, U, D }
     }
 
-    /// Returns J M⁻¹ Jᵀ, given the entries of J at some columns: the acceleration of a length due to a unit force along
-    /// it. Its reciprocal is the effective mass along the length.
+    /// Returns J M⁻¹ Jᵀ: the acceleration of a length due to a unit force along this length. Its reciprocal is the
+    /// effective mass along the length. The entries of J that are not zero are given, with their columns.
     pub(super) fn response(&self, J: &[(usize, f64)]) -> f64 {
         let l = Single::<f64, f64>::new(self.model);
         let mut u = vec![0.0; self.S.len()];
@@ -66,7 +67,8 @@ impl<'m> Reference<'m> {
         J.iter().map(|&(k, moment)| moment * u[k]).sum()
     }
 
-    /// Returns the efforts of a wrench along the axes of a frame, linear first: the entries of J for a site.
+    /// Returns the joint efforts of a wrench along the axes of a frame, linear first. They are the entries of J for a
+    /// site.
     pub(super) fn along(&self, frame: &Frame, gear: [f64; 6]) -> Vec<(usize, f64)> {
         if frame.body == 0 {
             return Vec::new();

@@ -1,24 +1,24 @@
-//! Tendons, equality constraints and actuators; they are copied together with the part of the tree to which they refer.
+//! Tendons, equality constraints and actuators. They are copied together with the part of the tree to which they refer.
 
 use crate::io::xml::Element;
 use std::collections::{HashMap, HashSet};
 
-/// Sections, ordered so that each one refers only to itself and earlier ones.
+/// Sections, in an order in which each section refers only to itself and to earlier sections.
 const SECTIONS: [&str; 3] = ["tendon", "equality", "actuator"];
 
-/// Kind and name of a named element.
+/// Kind and name of an element.
 pub(super) type Name = (&'static str, String);
 
-/// Elements of the sections of a file.
+/// Elements of the three `SECTIONS` of a file.
 pub(super) struct Sections {
-    /// Elements by section; `None` after an element was replaced by copies.
+    /// Elements of each section. An element becomes `None` when copies replace it.
     elements: [Vec<Option<Element>>; 3],
-    /// Indices of the elements of each section, by the first name to which they refer.
+    /// Indices of the elements of each section, by the first name to which the element refers.
     by_reference: [HashMap<Name, Vec<usize>>; 3],
 }
 
 impl Sections {
-    /// Takes the elements out of a file.
+    /// Takes the elements of the sections out of a file.
     pub(super) fn take(root: &mut Element) -> Self {
         let mut sections = Self { elements: Default::default(), by_reference: Default::default() };
         for child in &mut root.children {
@@ -31,7 +31,7 @@ impl Sections {
         sections
     }
 
-    /// Puts the elements back, each kind into one section at the end of the file.
+    /// Puts the elements back into the file: each kind of element into one section at the end.
     pub(super) fn put_back(self, root: &mut Element) {
         root.children.retain(|child| !SECTIONS.contains(&&*child.tag));
         for (tag, elements) in SECTIONS.into_iter().zip(self.elements) {
@@ -51,7 +51,8 @@ impl Sections {
         self.elements[section].push(Some(element));
     }
 
-    /// Returns section and index of all elements that refer only to `names`, or to tendons that do so.
+    /// Returns the (section, index) of each element that refers to `names` and to nothing else. Tendons found this way
+    /// count as `names`, too.
     pub(super) fn of(&self, mut names: Vec<Name>) -> Vec<(usize, usize)> {
         let mut known: HashSet<Name> = names.iter().cloned().collect();
         let mut found = Vec::new();
@@ -80,7 +81,7 @@ impl Sections {
         self.elements[section][index].as_ref()
     }
 
-    /// Removes an element that copies replace.
+    /// Removes an element that was replaced by copies.
     pub(super) fn remove(&mut self, (section, index): (usize, usize)) {
         self.elements[section][index] = None;
     }
@@ -99,7 +100,7 @@ pub(super) fn kind_of(attribute: &str) -> Option<&'static str> {
     }
 }
 
-/// Returns the names to which an element of a section refers, except the world.
+/// Returns the names to which an element refers, except the world.
 fn references(element: &Element) -> Vec<Name> {
     let all = std::iter::once(element).chain(&element.children).flat_map(|e| &e.attributes);
     let named = all.filter_map(|(attribute, value)| Some((kind_of(attribute)?, value.clone())));

@@ -1,4 +1,4 @@
-//! Joints of a file, with their springs and losses, and lengths as linear functions of the model's coordinates.
+//! Joints of an MJCF with their springs and losses, and lengths as linear functions of the model's coordinates.
 
 use super::attributes::Attributes;
 use super::law::fill;
@@ -13,7 +13,7 @@ use condyle_spatial::{Quaternion, Se3};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Switches of `<option>`; MuJoCo does not compute features that are set to `disable`.
+/// Flags of `<option>`. MuJoCo does not compute a feature whose flag is `disable`.
 pub(super) struct Switches {
     pub(super) spring: bool,
     pub(super) damper: bool,
@@ -22,7 +22,7 @@ pub(super) struct Switches {
     pub(super) equality: bool,
     pub(super) actuation: bool,
     pub(super) clamp: bool,
-    /// Groups of disabled actuators.
+    /// Groups of actuators that are disabled.
     pub(super) groups: Vec<f64>,
 }
 
@@ -66,7 +66,8 @@ pub(super) struct FileJoint<'a> {
     stiffness: [f64; 3],
     /// Position at which the spring of a hinge or slide is at rest.
     rest: f64,
-    /// Time constant (s) and damping ratio that determine stiffness and damping, or zeros.
+    /// Time constant (s) and damping ratio, from which stiffness and damping are computed. They are 0 if they are not
+    /// given.
     spring_damper: [f64; 2],
     damping: [f64; 3],
     friction: f64,
@@ -76,12 +77,12 @@ pub(super) struct FileJoint<'a> {
     pub(super) range: [f64; 2],
     /// Whether the spring yields.
     is_plastic: bool,
-    /// Whether actuators carry the weight that is compensated.
+    /// Whether the actuators of the joint carry the weight that gravity compensation carries.
     carries_weight: bool,
 }
 
 impl<'a> FileJoint<'a> {
-    /// Reads the properties of a joint except its kinematics; `angle` is the unit of angle in radians.
+    /// Reads the properties of a joint except its kinematics. `angle` is the file's unit of angle, in radians.
     pub(super) fn read(a: &Attributes<'a>, joint: Joint, angle: f64, autolimits: bool) -> Result<Self, Error> {
         let plain = Attributes::plain(a.element);
         let a = if a.element.tag == "freejoint" { &plain } else { a };
@@ -119,7 +120,8 @@ impl<'a> FileJoint<'a> {
         })
     }
 
-    /// Returns the joint with the index of its body, and the body's pose in the initial configuration of the file.
+    /// Returns this joint, after storing the index of its body and the body's pose in the initial configuration of the
+    /// file.
     pub(super) fn on(self, body: usize, pose: Se3<f64>) -> Self {
         Self { body, pose, ..self }
     }
@@ -142,12 +144,12 @@ impl<'a> FileJoint<'a> {
         first..first + self.joint.nv()
     }
 
-    /// Computes stiffness and damping from a time constant and a damping ratio. `response` is the acceleration of a
-    /// column due to a unit effort.
+    /// Computes stiffness and damping from a time constant and a damping ratio. `response(k)` is the acceleration of
+    /// column k due to a unit effort.
     pub(super) fn find_spring(&mut self, columns: Range<usize>, response: &dyn Fn(usize) -> f64) {
         let [time, ratio] = self.spring_damper;
         if time > 0.0 {
-            // mean inertia along the joint, and the oscillator with this inertia
+            // Stiffness and damping are those with which the mean inertia along the joint oscillates as specified.
             let nv = columns.len() as f64;
             let sum: f64 = columns.map(response).sum();
             let inertia = nv / sum.max(LEAST);
@@ -185,13 +187,13 @@ impl<'a> FileJoint<'a> {
         self.spring_damper[0] > 0.0
     }
 
-    /// Returns the position at which the spring of a hinge or slide is at rest.
+    /// Returns the position of a hinge or slide at which its spring is at rest.
     pub(super) fn rest(&self) -> f64 {
         self.rest
     }
 }
 
-/// Smallest divisor that MuJoCo uses.
+/// Smallest number by which MuJoCo divides.
 const LEAST: f64 = 1e-15;
 
 /// Joints of a file, in MuJoCo's order.
@@ -223,20 +225,20 @@ impl<'a> Joints<'a> {
     }
 }
 
-/// Length that depends on one coordinate only: l = slope · q + offset.
+/// Length that depends on a single coordinate q: l = slope · q + offset.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// Index of the coordinate in v.
+    /// Index in v of the coordinate's degree of freedom.
     pub(super) dof: usize,
-    /// Index of the body whose joint has the coordinate.
+    /// Index of the body whose joint has this coordinate.
     leader: usize,
     pub(super) slope: f64,
     offset: f64,
 }
 
 impl Line {
-    /// Returns the position of the joint that carries a body, as a function of its leader's coordinate if it follows
-    /// another joint.
+    /// Returns the position of the joint that carries a body, as a function of the joint's coordinate. If the joint
+    /// follows another joint, it is the coordinate of the leader.
     pub(super) fn of(model: &Model, body: usize) -> Self {
         let Body { idx_v: dof, mimic, .. } = model.bodies[body];
         match mimic {
@@ -249,12 +251,13 @@ impl Line {
         }
     }
 
-    /// Returns the line of degree of freedom k of the same joint.
+    /// Returns the length that depends on degree of freedom k of the joint in the same way.
     pub(super) fn at(self, k: usize) -> Self {
         Self { dof: self.dof + k, ..self }
     }
 
-    /// Returns the sum of lengths, each times a coefficient; `None` unless all depend on the same coordinate.
+    /// Returns the sum of lengths, each times a coefficient. Returns `None` if the lengths depend on different
+    /// coordinates.
     pub(super) fn sum(lines: &[(Self, f64)]) -> Option<Self> {
         let &(first, _) = lines.first()?;
         let mut sum = Self { slope: 0.0, offset: 0.0, ..first };
@@ -265,8 +268,8 @@ impl Line {
         lines.iter().all(|(line, _)| line.dof == first.dof).then_some(sum)
     }
 
-    /// Adds damping d(l̇) = d₀ + d₁|l̇| + d₂l̇² and Coulomb friction of the length: with l̇ = k q̇, the effort is −k
-    /// d(k q̇) k q̇.
+    /// Adds damping d(l̇) = d₀ + d₁|l̇| + d₂l̇² and Coulomb friction of this length l. If l̇ = k q̇, the damping has
+    /// the effort −k d(k q̇) k q̇.
     pub(super) fn resist(self, model: &mut Model, [d0, d1, d2]: [f64; 3], friction: f64) {
         let k = self.slope.abs();
         model.damping[self.dof] += d0 * k * k;
@@ -276,12 +279,13 @@ impl Line {
         model.friction[self.dof] += friction * k;
     }
 
-    /// Adds an inertia that moves with the length.
+    /// Adds an inertia that moves with this length, as armature of its coordinate.
     pub(super) fn inertia(self, model: &mut Model, armature: f64) {
         model.armature[self.dof] += self.slope * self.slope * armature;
     }
 
-    /// Adds a spring with the given rest length: with x = l − rest = k Δ, the effort is −k (s₀ + s₁ x + s₂ x²) x.
+    /// Adds a spring with a rest length to this length l. If l − rest = k Δ = x, where Δ is a difference of positions,
+    /// the effort is −k (s₀ + s₁ x + s₂ x²) x.
     pub(super) fn spring(self, model: &mut Model, [s0, s1, s2]: [f64; 3], rest: f64) {
         let k = self.slope;
         if k != 0.0 {
@@ -290,8 +294,8 @@ impl Line {
         }
     }
 
-    /// Limits the length, and returns whether this was possible: limits that exclude the joint's own limits are
-    /// ignored.
+    /// Limits this length, and returns whether this was possible. Limits of the length that contradict the limits of
+    /// the joint are ignored.
     pub(super) fn limit(self, model: &mut Model, [lower, upper]: [f64; 2]) -> bool {
         if self.slope == 0.0 {
             return true;

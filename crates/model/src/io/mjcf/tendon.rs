@@ -1,5 +1,5 @@
-//! Tendons whose length is a sum of joint positions. A tendon that depends on a single coordinate acts on that
-//! coordinate.
+//! Tendons of MJCF whose length is a sum of joint positions. If this length depends on a single coordinate, the tendon
+//! acts on this coordinate.
 
 use super::Source;
 use super::actuator::Range;
@@ -16,10 +16,10 @@ use std::collections::HashMap;
 pub(super) struct Tendon<'a> {
     pub(super) element: &'a Element,
     pub(super) name: String,
-    /// Joints of a fixed tendon, each with its coefficient; empty for a spatial tendon.
+    /// Joints of a fixed tendon, each with its coefficient. The list is empty for a spatial tendon.
     pub(super) joints: Vec<(usize, f64)>,
     stiffness: [f64; 3],
-    /// Lengths between which the spring is slack.
+    /// Minimum and maximum length at which the spring is slack.
     rest: [f64; 2],
     pub(super) damping: [f64; 3],
     friction: f64,
@@ -42,7 +42,7 @@ pub(super) struct Tendons<'a> {
 impl<'a> Tendons<'a> {
     pub(super) fn read(root: &'a Element, sources: &'a [Source<'a>], joints: &Joints) -> Result<Self, Error> {
         let mut tendons = Self::default();
-        // the table of known elements reports others
+        // Other elements are reported by the table of known elements.
         let elements = root.all("tendon").flat_map(|section| &section.children);
         let elements: Vec<_> = elements.filter(|e| matches!(&*e.tag, "fixed" | "spatial")).collect();
         super::names(elements.iter().copied())?;
@@ -112,14 +112,14 @@ impl<'a> Tendon<'a> {
         })
     }
 
-    /// Returns the tendon's length as a line, if it depends on one coordinate only.
+    /// Returns the tendon's length as a [`Line`], if the length depends on a single coordinate.
     pub(super) fn line(&self, lines: &[Line]) -> Option<Line> {
         let over: Vec<_> = self.joints.iter().map(|&(joint, coefficient)| (lines[joint], coefficient)).collect();
         Line::sum(&over)
     }
 
-    /// Adds the tendon's effects to its coordinate, or warnings about effects that are left out. Adds the tendon's
-    /// armature to the armature of the columns.
+    /// Adds the effects of the tendon to its coordinate. Effects that are left out cause warnings. Also adds the
+    /// armature of the tendon to the armature of the columns.
     pub(super) fn add_to(
         &self,
         model: &mut Model,
@@ -135,7 +135,8 @@ impl<'a> Tendon<'a> {
         let springs = on.spring && self.stiffness != [0.0; 3];
         let slack = self.rest[0] < self.rest[1];
         let line = self.line(lines);
-        // M += a c cᵀ with the coefficients c; MuJoCo's M has no entries between joints on different branches
+        // The armature of the tendon adds the matrix armature · c cᵀ to M, where c contains the coefficients of the
+        // joints. MuJoCo's M has no entries between joints on different branches.
         let coupled = line.is_none() && self.armature != 0.0 && self.is_coupled(model, joints);
         if !coupled {
             for &(joint, coefficient) in &self.joints {
@@ -177,7 +178,7 @@ impl<'a> Tendon<'a> {
         }
     }
 
-    /// Returns whether one joint of the tendon carries another one.
+    /// Returns whether one joint of the tendon carries another joint of the tendon.
     fn is_coupled(&self, model: &Model, joints: &Joints) -> bool {
         let mut over = vec![false; model.bodies.len()];
         self.joints.iter().for_each(|(joint, _)| over[joints.all[*joint].body] = true);

@@ -1,4 +1,5 @@
-//! Transmissions of actuators: a model's list of actuators, and limits of effort, armature and damping at the joints.
+//! Transmissions of MJCF's actuators. They determine the actuators of a model, and the limits of effort, armature and
+//! damping of its joints.
 
 use super::Source;
 use super::actuator::{ALL, Classes, Mechanics, clipped, scaled};
@@ -17,7 +18,7 @@ use crate::warning::Warning;
 use condyle_spatial::Vec3;
 use std::collections::HashMap;
 
-/// Maximum number of joints of the tendons of all actuators together.
+/// Maximum number of joints in the tendons of all actuators together.
 const MAX_DRIVEN: usize = 1 << 20;
 
 /// Joint, tendon or site that an actuator drives.
@@ -26,7 +27,7 @@ enum Target<'a> {
     Tendon(usize),
     /// Name of a site.
     Site(&'a str),
-    /// Reason why a model does not have the driven thing.
+    /// Reason why a model does not have the item that the actuator drives.
     Else(&'static str),
 }
 
@@ -36,7 +37,7 @@ struct Drive<'a> {
     mechanics: Mechanics,
     law: Law<'a>,
     target: Target<'a>,
-    /// Whether the axes of a ball or free joint are fixed in the parent.
+    /// Whether the axes of a ball or free joint are fixed in the joint's parent.
     in_parent: bool,
     control: [f64; 2],
     force: [f64; 2],
@@ -48,8 +49,8 @@ pub(super) struct Drives<'a> {
     all: Vec<Drive<'a>>,
 }
 
-/// Maximum number of actuators whose velocity gain is a damping ratio; chosen because each one needs the acceleration
-/// of the whole robot.
+/// Maximum number of actuators whose velocity gain is given by a damping ratio; chosen because each such actuator needs
+/// the acceleration of the whole robot.
 const MAX_RATIOS: usize = 4096;
 
 impl<'a> Drives<'a> {
@@ -97,12 +98,12 @@ impl<'a> Drives<'a> {
         Ok(Self { all })
     }
 
-    /// Returns the numbers that each actuator has in a keyframe.
+    /// Returns, for each actuator, the numbers of controls and activations that it has in a keyframe.
     pub(super) fn inputs(&self) -> Result<Vec<Inputs>, Error> {
         self.all.iter().map(|drive| drive.law.inputs(drive.element)).collect()
     }
 
-    /// Adds armature and damping, which count gear² times at what is driven.
+    /// Adds the armature and damping of actuators, times gear², to the joints and tendons that they drive.
     pub(super) fn load(
         &self,
         model: &mut Model,
@@ -132,12 +133,12 @@ impl<'a> Drives<'a> {
         }
     }
 
-    /// Returns whether a velocity gain is specified by a damping ratio.
+    /// Returns whether the velocity gain of at least one actuator is given by a damping ratio.
     pub(super) fn has_ratios(&self) -> bool {
         self.all.iter().any(|drive| drive.law.has_ratio())
     }
 
-    /// Returns the number of actuators of each tendon.
+    /// Returns the number of enabled actuators of each tendon.
     fn on_tendons(&self, tendons: &Tendons, on: &Switches) -> Vec<usize> {
         let mut counts = vec![0; tendons.all.len()];
         for drive in self.all.iter().filter(|drive| drive.acts(on)) {
@@ -148,7 +149,8 @@ impl<'a> Drives<'a> {
         counts
     }
 
-    /// Returns the table of actuators, each with its index in the file, and says what is left out.
+    /// Returns the model's actuators, each with its index in the file. Adds warnings about actuators and effects that
+    /// are left out.
     pub(super) fn table(
         &self,
         model: &Model,
@@ -220,7 +222,7 @@ impl<'a> Drives<'a> {
                     }
                     _ => reference.response(&drive.moments(model, joints, tendons)),
                 });
-                // kv = 2 ratio √(kp m) with 1/m = J M⁻¹ Jᵀ
+                // The gain is kv = 2 ratio √(kp m), where the effective mass m is given by 1/m = J M⁻¹ Jᵀ.
                 kv = if inverse > 0.0 { -kv * 2.0 * (kp / inverse).max(0.0).sqrt() } else { 0.0 };
             }
             if let Some(x) = [gain, bias, kp, kv].iter().chain(gear).find(|x| !x.is_finite()) {
@@ -242,8 +244,8 @@ impl<'a> Drives<'a> {
         Ok(table)
     }
 
-    /// Sets the limits of effort of all coordinates. The efforts of the actuators of each joint are summed and clipped
-    /// to its `actuatorfrcrange`; the results are summed over the joints that depend on each coordinate.
+    /// Sets the limits of effort of all coordinates. For each joint, the efforts of its actuators are summed and
+    /// clipped to its `actuatorfrcrange`. If several joints depend on a coordinate, their results are summed.
     pub(super) fn limit(
         &self,
         model: &mut Model,
@@ -284,8 +286,9 @@ impl Drive<'_> {
         on.actuation && !on.groups.contains(&self.mechanics.group)
     }
 
-    /// Returns the range of the force that the tendon's `actuatorfrcrange` allows. `counts` is the number of actuators
-    /// of each tendon: the range of several actuators is the range of their sum, and limits no single one.
+    /// Returns the force range that the tendon's `actuatorfrcrange` allows for this actuator. `counts` is the number of
+    /// actuators of each tendon. If a tendon has several actuators, its range limits only their sum, and no single
+    /// actuator.
     fn share(&self, tendons: &Tendons, counts: &[usize]) -> [f64; 2] {
         match self.target {
             Target::Tendon(t) if counts[t] == 1 => tendons.all[t].effort.unwrap_or(ALL),
@@ -293,8 +296,8 @@ impl Drive<'_> {
         }
     }
 
-    /// Returns the columns on which a unit force acts, with the effort at each, as far as these do not depend on
-    /// positions.
+    /// Returns the columns on which a unit force of the actuator acts, and the effort at each column. Efforts that
+    /// depend on positions are left out.
     fn moments(&self, model: &Model, joints: &Joints, tendons: &Tendons) -> Vec<(usize, f64)> {
         let gear = self.mechanics.gear;
         let first = |j: usize| joints.all[j].columns(model).start;
@@ -302,7 +305,8 @@ impl Drive<'_> {
             Target::Joint(j) => match joints.all[j].joint {
                 Joint::Spherical | Joint::FreeFlyer if self.in_parent => Vec::new(),
                 Joint::Spherical => (0..3).map(|k| (first(j) + k, gear[k])).filter(|x| x.1 != 0.0).collect(),
-                // its force is along the world's axes, v along the body's axes
+                // Only the torque is constant: the force is along the axes of the world, but v is along the axes of the
+                // body.
                 Joint::FreeFlyer => (3..6).map(|k| (first(j) + k, gear[k])).filter(|x| x.1 != 0.0).collect(),
                 _ => vec![(first(j), gear[0])],
             },
@@ -315,20 +319,20 @@ impl Drive<'_> {
     }
 }
 
-/// Numbers of an actuator in a keyframe.
+/// Numbers of controls and activations that an actuator has in a keyframe.
 pub(super) struct Inputs {
     /// Number of controls.
     pub(super) controls: usize,
-    /// Index of the control that a model has, among these.
+    /// Index, among these controls, of the control that the model has.
     pub(super) own: usize,
     /// Number of activations, if it is known.
     pub(super) activations: Option<usize>,
-    /// Whether a model's control is the activation.
+    /// Whether the control in the model is the activation in the keyframe.
     pub(super) is_integrator: bool,
 }
 
 impl Law<'_> {
-    /// Returns the numbers that an actuator of this law has in a keyframe.
+    /// Returns the numbers of controls and activations that an actuator with this law has in a keyframe.
     fn inputs(&self, e: &Element) -> Result<Inputs, Error> {
         let (default, own) = if self.gain == "pid" { ("pos vel", "pos") } else { ("voltage", "voltage") };
         let several = matches!(self.gain, "pid" | "dcmotor");
@@ -348,12 +352,12 @@ impl Law<'_> {
         })
     }
 
-    /// Returns whether the gain of velocity of a servo is given by a damping ratio.
+    /// Returns whether the velocity gain of a servo is given by a damping ratio.
     fn has_ratio(&self) -> bool {
         matches!(self.affine(), Ok([gain, _, kp, kv]) if gain == kp && kv < 0.0)
     }
 
-    /// Returns the effect of the fact that a model has no activation and only one control.
+    /// Returns the effect that is lost because a model has no activations and only one control for each actuator.
     fn left_out(&self) -> &'static str {
         let inputs = self.input.unwrap_or(if self.gain == "pid" { "pos vel" } else { "voltage" });
         match self.dynamics {
@@ -392,7 +396,7 @@ fn target<'a>(e: &'a Element, joints: &Joints, tendons: &Tendons) -> Result<Targ
     })
 }
 
-/// Returns the range of the control that follows from the range of the driven joint or tendon.
+/// Returns the range of the control, which is inherited from the range of the driven joint or tendon.
 fn inherited(e: &Element, law: &Law, target: &Target, joints: &Joints, tendons: &Tendons) -> Result<[f64; 2], Error> {
     let [lower, upper] = match *target {
         Target::Joint(j) if joints.all[j].joint.nv() == 1 => joints.all[j].range,

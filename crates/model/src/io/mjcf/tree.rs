@@ -1,4 +1,4 @@
-//! Bodies: their joints, inertias and frames.
+//! Bodies of an MJCF: their joints, inertias and frames.
 
 use super::Reader;
 use super::attributes::{Attributes, MAIN};
@@ -13,7 +13,8 @@ use crate::io::xml::Element;
 use crate::joint::Joint;
 use condyle_spatial::{Act, Inertia, Se3};
 
-/// Parts of a body, including the content of its `<frame>`s, each with the pose of the surrounding `<frame>`.
+/// Elements of a body by kind, including the elements inside its `<frame>`s. Each element has the pose of the `<frame>`
+/// around it.
 #[derive(Default)]
 pub(super) struct Parts<'a> {
     inertial: Option<(&'a Element, Se3<f64>)>,
@@ -21,25 +22,25 @@ pub(super) struct Parts<'a> {
     geoms: Vec<(Attributes<'a>, Se3<f64>)>,
     sites: Vec<(Attributes<'a>, Se3<f64>)>,
     cameras: Vec<(Attributes<'a>, Se3<f64>)>,
-    /// Named frames, each with its own pose.
+    /// `<frame>`s with a name, each with its own pose.
     frames: Vec<(&'a Element, Se3<f64>)>,
-    /// Child bodies, each with its own pose and the class of its surroundings.
+    /// Child bodies, each with its own pose and the class of the element around it.
     bodies: Vec<(&'a Element, Se3<f64>, &'a str)>,
 }
 
-/// A body that is not yet added.
+/// Body that has not been added yet.
 struct Waiting<'a> {
     element: &'a Element,
     class: &'a str,
-    /// Body of the model to which the parent belongs.
+    /// Body of the model to which the parent element belongs.
     on: BodyId,
-    /// Pose in that body.
+    /// Pose of the parent element in that body.
     placement: Se3<f64>,
-    /// Whether the parent is the world itself.
+    /// Whether the parent element is the world itself.
     top: bool,
 }
 
-/// A named frame or camera, which becomes a frame when the names of all sites are known.
+/// Frame or camera with a name. It becomes a frame of the model when the names of all sites are known.
 pub(super) struct Placed<'a> {
     element: &'a Element,
     body: BodyId,
@@ -47,7 +48,7 @@ pub(super) struct Placed<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// Adds all bodies, parents first.
+    /// Adds all bodies, each after its parent.
     pub(super) fn tree(&mut self, builder: &mut ModelBuilder, root: &'a Element) -> Result<(), Error> {
         for world in root.all("worldbody") {
             let mut parts = Parts::default();
@@ -67,7 +68,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Sorts the content of a body by kind; `X` is the pose of the surrounding `<frame>`.
+    /// Sorts the content of an element by kind. `X` is the pose of the surrounding `<frame>`.
     fn gather(&self, inside: &'a Element, X: Se3<f64>, class: &'a str, parts: &mut Parts<'a>) -> Result<(), Error> {
         let defaults = |e: &Element| &self.source(e).defaults;
         let own = inside.attribute("childclass").map_or(Ok(class), |c| defaults(inside).known(inside, c))?;
@@ -91,13 +92,13 @@ impl<'a> Reader<'a> {
                     self.gather(e, pose, around, parts)?;
                 }
                 "composite" | "flexcomp" | "plugin" => return Err(e.wrong("is not supported")),
-                _ => {} // lights
+                _ => {} // lights are ignored
             }
         }
         Ok(())
     }
 
-    /// Adds a body. Returns its parts, the body of the model to which it belongs, and its pose there.
+    /// Adds a body of the file. Returns its elements, the body of the model to which it belongs, and its pose there.
     fn body(&mut self, builder: &mut ModelBuilder, w: &Waiting<'a>) -> Result<(Parts<'a>, BodyId, Se3<f64>), Error> {
         let mut parts = Parts::default();
         self.gather(w.element, Se3::identity(), w.class, &mut parts)?;
@@ -172,8 +173,8 @@ impl<'a> Reader<'a> {
         Ok((parts, body, bXl))
     }
 
-    /// Adds the named sites of a body, and stores its named frames and cameras for later. Checks the names of its
-    /// geoms.
+    /// Adds the sites of a body that have a name, and stores its frames and cameras that have a name for later. Also
+    /// checks the names of its geoms.
     fn frames(
         &mut self,
         builder: &mut ModelBuilder,
@@ -197,7 +198,7 @@ impl<'a> Reader<'a> {
             self.name("frame", element, "")?;
             self.placed.push(Placed { element, body, placement: bXl * X });
         }
-        // cameras of other modes follow a target and are not fixed to a body
+        // Cameras of other modes follow a target, so they are not fixed to a body.
         let is_fixed = |a: &Attributes| a.get("mode").is_none_or(|mode| mode == "fixed");
         for (a, X) in parts.cameras.iter().filter(|(a, _)| has_name(a) && is_fixed(a)) {
             self.name("camera", a.element, "")?;
@@ -207,8 +208,8 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Adds the named frames and cameras, frames first. If a name is taken, the frame is named `frame:name` or
-    /// `camera:name`.
+    /// Adds the stored frames and then the stored cameras. If a name is already used, the frame is named `frame:name`
+    /// or `camera:name`.
     pub(super) fn place(&mut self, builder: &mut ModelBuilder) {
         let mut placed = std::mem::take(&mut self.placed);
         placed.sort_by_key(|p| p.element.tag != "frame");
@@ -222,7 +223,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Returns the body's inertia in its own frame, and the pose of its principal axes there.
+    /// Returns the body's inertia in the body's frame, and the pose of the principal axes there.
     fn inertia(
         &mut self,
         element: &'a Element,
@@ -256,8 +257,8 @@ impl<'a> Reader<'a> {
         Ok((geometry::corrected(compiler, element, sum)?, axes))
     }
 
-    /// Returns the weight of a geom, in the frame of the body or of the surrounding `<frame>`; `None` if it has no
-    /// mass.
+    /// Returns the weight of a geom, in the frame of the body or of the surrounding `<frame>`. Returns `None` if the
+    /// geom has no mass.
     fn weight(&mut self, body: &Element, a: &Attributes<'a>, moves: bool) -> Result<Option<Weight>, Error> {
         let source = self.source(a.element);
         if moves && a.get("type") == Some("plane") {
@@ -314,7 +315,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Returns whether the weight of a body in an element is compensated.
+/// Returns whether the weight of at least one body in an element is compensated.
 pub(super) fn compensates(element: &Element) -> Result<bool, Error> {
     for child in element.children.iter().filter(|child| matches!(&*child.tag, "body" | "frame")) {
         if Attributes::plain(child).number("gravcomp")?.is_some_and(|x| x > 0.0) || compensates(child)? {
@@ -329,7 +330,7 @@ fn is_free(a: &Attributes) -> bool {
     a.element.tag == "freejoint" || a.get("type") == Some("free")
 }
 
-/// Adds the children of a body to the stack, the first child on top.
+/// Adds the children of a body to the stack, with the first child on top.
 fn wait<'a>(waiting: &mut Vec<Waiting<'a>>, parts: &Parts<'a>, on: BodyId, bXl: Se3<f64>, top: bool) {
     let next = parts.bodies.iter().rev();
     waiting.extend(next.map(|&(element, X, class)| Waiting { element, class, on, placement: bXl * X, top }));

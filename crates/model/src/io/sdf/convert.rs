@@ -1,5 +1,5 @@
-//! Versions of SDF. An older file is converted to the newest version, by the rules of the format's own library. All
-//! later stages handle the newest version only.
+//! Conversion of older SDF files to the newest version, by the rules of the format's own library. All later stages of
+//! the reader handle only the newest version.
 
 use super::values::flag;
 use crate::error::Error;
@@ -11,10 +11,10 @@ const VERSIONS: [u32; 12] = [0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12];
 pub(super) const NEWEST: u32 = VERSIONS[VERSIONS.len() - 1];
 /// Tag of the root element. Versions 1.0 to 1.2 may use `gazebo`.
 const ROOT: &str = "sdf";
-/// Name of the frame of the enclosing model.
+/// Name by which a model's elements refer to the frame of the model.
 pub(super) const MODEL: &str = "__model__";
 
-/// Attributes that became elements in version 1.2, by the tag that had them.
+/// Attributes that became elements in version 1.2, by the tag of the elements that had them.
 const ATTRIBUTES: &[(&str, &[&str])] = &[
     ("model", &["static"]),
     ("link", &["gravity", "self_collide", "kinematic"]),
@@ -26,7 +26,7 @@ const ATTRIBUTES: &[(&str, &[&str])] = &[
     ("limit", &["lower", "upper", "effort", "velocity"]),
 ];
 
-/// Elements whose only attribute became their text in version 1.2, with their new tag.
+/// Elements with a single attribute, which became the text of the element in version 1.2, with the new tag.
 const TEXTS: &[(&str, &str, &str)] = &[
     ("origin", "pose", "pose"),
     ("parent", "link", "parent"),
@@ -79,7 +79,7 @@ fn version(root: &Element) -> Result<u32, Error> {
     found.ok_or_else(|| root.wrong(format!("version `{text}` is unknown; known are {}", known())))
 }
 
-/// Element that specifies, up to version 1.6, whether an axis is in the frame of the model.
+/// Element that says, up to version 1.6, whether an axis is in the frame of the model.
 const FLAG: &str = "use_parent_model_frame";
 
 /// Returns the models of a root element and of its worlds.
@@ -91,14 +91,14 @@ fn models(root: &mut Element) -> impl Iterator<Item = &mut Element> {
     inside.filter(|child| child.tag == "model")
 }
 
-/// Applies a change to each axis of the joints of a model.
+/// Applies a change to each axis in the joints of a model.
 fn axes(model: &mut Element, change: &mut dyn FnMut(&mut Element)) {
     for joint in model.children.iter_mut().filter(|c| c.tag == "joint") {
         joint.children.iter_mut().filter(|c| matches!(&*c.tag, "axis" | "axis2")).for_each(&mut *change);
     }
 }
 
-/// Turns attributes into elements (conversion from version 1.0).
+/// Converts attributes into elements (conversion from version 1.0).
 fn attributes_to_elements(element: &mut Element) {
     if let Some((_, names)) = ATTRIBUTES.iter().find(|(tag, _)| *tag == element.tag) {
         for name in *names {
@@ -127,7 +127,7 @@ fn attributes_to_elements(element: &mut Element) {
     }
 }
 
-/// Moves the gravity from the physics of a world to the world (conversion from version 1.5).
+/// Moves gravity from the physics of a world to the world itself (conversion from version 1.5).
 fn gravity_of_physics(world: &mut Element) {
     let physics = world.children.iter_mut().find(|c| c.tag == "physics");
     let gravity = physics.and_then(|p| {
@@ -137,7 +137,8 @@ fn gravity_of_physics(world: &mut Element) {
     world.children.extend(gravity);
 }
 
-/// Renames the `frame` of poses, and turns the flag of axes into `expressed_in` (conversion from version 1.6).
+/// Renames the attribute `frame` of poses, and converts the flag of axes into `expressed_in` (conversion from version
+/// 1.6).
 fn frames(element: &mut Element) -> Result<(), Error> {
     if element.tag == "plugin" || element.tag.contains(':') {
         return Ok(());
@@ -172,7 +173,7 @@ fn frames(element: &mut Element) -> Result<(), Error> {
 }
 
 impl Element {
-    /// Returns a new element with a text, at the line of this one.
+    /// Returns a new element with a text. Its line number is the line number of this element.
     pub(super) fn with(&self, tag: &str, text: &str) -> Self {
         Self {
             tag: tag.to_owned(),

@@ -1,4 +1,5 @@
-//! Files of an SDF. Includes are replaced by their models, converted to one version, and unknown names are reported.
+//! Files of an SDF. Includes are replaced by the included models, all models are converted to one version, and unknown
+//! names are reported.
 
 use super::convert::convert;
 use super::schema::{HEAVY, KNOWN, LEFT_OUT};
@@ -12,23 +13,23 @@ use crate::io::xml::{Amount, Element, MAX_DEPTH};
 use crate::warning::Warning;
 use std::path::{Path, PathBuf};
 
-/// Name of the file that lists the model files of a folder, and its older name.
+/// Name of the file in a folder that lists the model files of this folder, and an older name for it.
 const CONFIGS: [&str; 2] = ["model.config", "manifest.xml"];
 
-/// Maximum number of included files; chosen because opening more takes longer than a second.
+/// Maximum number of included files; chosen because opening more files takes longer than a second.
 const MAX_INCLUDES: usize = 16_384;
 
-/// Reader of a robot's files.
+/// Reader of all files of a robot.
 pub(super) struct Includes<'o> {
     amount: Amount,
     known: Known,
     packages: &'o [PathBuf],
-    /// Files that are being read, each included by the previous one.
+    /// Files that are being read. Each file is included by the file before it.
     open: Vec<PathBuf>,
-    /// Number of includes so far.
+    /// Number of includes that have been read.
     count: usize,
     pub(super) warnings: Vec<Warning>,
-    /// Error of the first model of a world that was left out because its file was not found.
+    /// Error about the first model of a world that was left out because the file of this model was not found.
     pub(super) missing: Option<Error>,
 }
 
@@ -38,7 +39,7 @@ impl<'o> Includes<'o> {
         Self { amount, known, packages, open: Vec::new(), count: 0, warnings: Vec::new(), missing: None }
     }
 
-    /// Reads a file and all files that it includes; its root is at depth `level`.
+    /// Reads a file and all files that it includes. The root element of the file is at depth `level`.
     pub(super) fn file(&mut self, path: &Path, level: usize) -> Result<Element, Error> {
         let text = self.amount.read(path)?;
         let root = Element::parse(&text, &path.display().to_string(), &mut self.amount)?;
@@ -64,8 +65,8 @@ impl<'o> Includes<'o> {
         Ok(root)
     }
 
-    /// Adds warnings about unknown names in the collisions of all links inside an element. They have an effect only if
-    /// the inertia is computed from the collisions.
+    /// Adds warnings about unknown names in the collisions of all links inside an element. These names have an effect
+    /// only if inertias are computed from collisions.
     fn check_collisions(&mut self, element: &Element) {
         for child in &element.children {
             match &*child.tag {
@@ -92,7 +93,7 @@ impl<'o> Includes<'o> {
             match &*child.tag {
                 "include" => match self.include(&mut child, folder, level + 1) {
                     Ok(model) => element.children.extend(model),
-                    // a world is usable without its sun and ground
+                    // A world is usable without included models such as sun and ground.
                     Err(Fault::Missing(what)) if element.tag != "model" => {
                         self.warnings.push(child.left_out(format!("the included model is left out: {what}")));
                         self.missing = self.missing.take().or_else(|| Some(child.wrong(what)));
@@ -110,8 +111,8 @@ impl<'o> Includes<'o> {
         Ok(())
     }
 
-    /// Returns the model of an `<include>`, with the changes that the element specifies; `None` if the file has only
-    /// lights or actors.
+    /// Returns the model that an `<include>` names, with the changes that the `<include>` specifies. Returns `None` if
+    /// the file contains only lights or actors.
     fn include(
         &mut self,
         include: &mut Element,
@@ -170,7 +171,7 @@ impl<'o> Includes<'o> {
         Ok(Some(model))
     }
 
-    /// Returns the model file of a folder: the file with the newest known version.
+    /// Returns the model file in a folder: the file with the newest known version.
     fn model_of(&mut self, folder: &Path) -> Result<PathBuf, Fault> {
         let Some(config) = CONFIGS.iter().map(|name| folder.join(name)).find(|path| path.is_file()) else {
             let plain = folder.join("model.sdf");
@@ -183,7 +184,7 @@ impl<'o> Includes<'o> {
             let version = sdf.attribute("version")?.trim().strip_prefix("1.")?.parse::<u32>().ok()?;
             (version <= super::convert::NEWEST).then_some(version)
         };
-        // of two files with the same version, the first one
+        // If two files have the same version, the first one is used.
         let best = root.all("sdf").reduce(|best, sdf| if minor(sdf) > minor(best) { sdf } else { best });
         let name = best.map(|sdf| sdf.text.trim()).filter(|name| !name.is_empty());
         let name = name.ok_or_else(|| root.wrong("names no <sdf> file"))?;
@@ -191,7 +192,7 @@ impl<'o> Includes<'o> {
     }
 }
 
-/// Fault of an include.
+/// Fault of an `<include>`.
 enum Fault {
     /// The file was not found.
     Missing(String),

@@ -1,4 +1,4 @@
-//! Inertias of the links of an SDF: explicit, or computed from the shapes of a link.
+//! Inertias of the links of an SDF, given explicitly or computed from the shapes of a link.
 
 use super::scopes::Scopes;
 use super::values::{attribute, flag, number, pose, relative_to, three};
@@ -8,7 +8,7 @@ use crate::warning::Warning;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use core::f64::consts::PI;
 
-/// Density of a shape that does not specify one (kg/m³).
+/// Density of a shape for which no density is given (kg/m³).
 const WATER: f64 = 1000.0;
 
 /// Returns the inertia of a link, in the link's frame.
@@ -55,7 +55,8 @@ pub(super) fn inertia(scopes: &Scopes, item: usize, warnings: &mut Vec<Warning>)
     Ok(pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
 }
 
-/// Returns the sum of the inertias of a link's collision shapes, scaled to `mass` unless it is NaN.
+/// Returns the sum of the inertias of a link's collision shapes. The sum is scaled to the mass `mass`, unless `mass` is
+/// NaN.
 fn of_shapes(
     scopes: &Scopes,
     item: usize,
@@ -93,7 +94,7 @@ fn of_shapes(
     Ok(if mass.is_nan() { sum } else { sum.scale(mass / sum.mass) })
 }
 
-/// Returns the inertia of a collision's shape for a density of 1, in the shape's frame.
+/// Returns the inertia of the shape of a collision, for a density of 1, in the shape's frame.
 fn shape(collision: &Element) -> Result<Inertia<f64>, Error> {
     let found = collision.child("geometry").and_then(|g| g.children.first());
     let found = found.ok_or_else(|| collision.wrong("has no geometry"))?;
@@ -134,7 +135,7 @@ fn shape(collision: &Element) -> Result<Inertia<f64>, Error> {
             solid(PI * r * r * l, 0.0, across, across, r * r / 2.0)
         }
         "cone" => {
-            // centre of mass: a quarter of the height above the base, which is at −l/2
+            // The centre of mass is above the base, which is at −l/2, by a quarter of the height.
             let (r, l) = (length("radius")?, length("length")?);
             let across = 3.0 / 80.0 * (4.0 * r * r + l * l);
             solid(PI * r * r * l / 3.0, -l / 4.0, across, across, 0.3 * r * r)
@@ -142,7 +143,7 @@ fn shape(collision: &Element) -> Result<Inertia<f64>, Error> {
         "capsule" => {
             let (r, l) = (length("radius")?, length("length")?);
             let (rod, ball) = (PI * r * r * l, 4.0 / 3.0 * PI * r * r * r);
-            // the centres of mass of the half balls are 3 r/8 beyond the ends of the rod
+            // The centres of mass of the half balls are 3 r/8 beyond the ends of the rod.
             let across = rod * (r * r / 4.0 + l * l / 12.0) + ball * (0.4 * r * r + l * l / 4.0 + 0.375 * l * r);
             let along = rod * r * r / 2.0 + ball * 0.4 * r * r;
             let m = rod + ball;
@@ -155,7 +156,7 @@ fn shape(collision: &Element) -> Result<Inertia<f64>, Error> {
     })
 }
 
-/// Checks the flags of a model or link, and adds warnings about flags that change how it moves.
+/// Checks the flags of a model or link. Adds warnings about flags that change how the model or link moves.
 pub(super) fn flags(element: &Element, warnings: &mut Vec<Warning>) -> Result<(), Error> {
     for tag in ["static", "self_collide", "allow_auto_disable", "gravity", "must_be_base_link"] {
         flag(element, tag, false)?;

@@ -10,14 +10,14 @@ use crate::joint::Joint;
 use crate::warning::Warning;
 use condyle_spatial::Vec3;
 
-/// Motion with one degree of freedom of a joint, or with the three of a ball joint.
+/// Motion of a joint with one degree of freedom, or motion of a ball joint with three.
 pub(super) struct Motion {
     pub(super) joint: Joint,
     /// Tag of the element that describes the motion.
     pub(super) tag: &'static str,
 }
 
-/// Returns the motions of a joint, in order from the parent to the child.
+/// Returns the motions of a joint, in order from the parent link to the child link.
 pub(super) fn motions(scopes: &Scopes, edge: &Edge, warnings: &mut Vec<Warning>) -> Result<Vec<Motion>, Error> {
     let axis = |tag: &'static str| scopes.axis(edge.item, tag);
     let first =
@@ -40,7 +40,7 @@ pub(super) fn motions(scopes: &Scopes, edge: &Edge, warnings: &mut Vec<Warning>)
     })
 }
 
-/// Returns the joint that moves the parent relative to the child; q is the same, except for a ball joint.
+/// Returns the joint that moves the parent link relative to the child link. Its q is the same, except for a ball joint.
 pub(super) fn reversed(joint: Joint) -> Joint {
     match joint {
         Joint::Revolute { axis } => Joint::Revolute { axis: -axis },
@@ -59,7 +59,7 @@ fn pitch(joint: &Element, warnings: &mut Vec<Warning>) -> Result<f64, Error> {
         warnings.push(joint.assumed("has no screw_thread_pitch: 1 m for each turn, as SDF has it"));
         return Ok(1.0 / core::f64::consts::TAU);
     }
-    // thread_pitch: radians for each metre, positive for a left-handed thread
+    // `thread_pitch` is in radians per metre, and positive for a left-handed thread
     let pitch = if each_turn.is_nan() { -1.0 / radians } else { each_turn / core::f64::consts::TAU };
     if pitch.is_finite() { Ok(pitch) } else { Err(joint.wrong("has no finite screw_thread_pitch")) }
 }
@@ -67,13 +67,13 @@ fn pitch(joint: &Element, warnings: &mut Vec<Warning>) -> Result<f64, Error> {
 /// Limits, losses and spring of an axis.
 pub(super) struct Axis {
     pub(super) options: JointOptions,
-    /// Stiffness (N m/rad, N/m), and rest position.
+    /// Stiffness (N m/rad, N/m), and rest position (rad, m).
     pub(super) spring: (f64, f64),
 }
 
 impl Axis {
-    /// Reads the properties of an axis except its direction. In SDF, a limit of 1e16 or more is no limit, and neither
-    /// is a negative effort or velocity.
+    /// Reads the properties of an axis except its direction. In SDF, a limit with a magnitude of 1e16 or more is not a
+    /// limit, and a negative effort or velocity is not a limit either.
     pub(super) fn new(element: &Element, tag: &str, kind: Joint, warnings: &mut Vec<Warning>) -> Result<Self, Error> {
         let axis = element.child(tag);
         let (limit, dynamics) = (axis.and_then(|a| a.child("limit")), axis.and_then(|a| a.child("dynamics")));
@@ -106,7 +106,7 @@ impl Axis {
         Ok(Self { options, spring })
     }
 
-    /// Returns the names of properties that only a joint of the tree can have.
+    /// Returns the names of the properties of this axis that only a joint of the tree can have.
     pub(super) fn extras(&self) -> Vec<&'static str> {
         let (lower, upper) = self.options.position.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
         let has = [
@@ -120,8 +120,8 @@ impl Axis {
     }
 }
 
-/// Returns the inertia of the rotor as seen at a joint, ratio² times its own inertia. Its elements are specific to
-/// Drake, which reads them for joints with a motor.
+/// Returns the inertia of the rotor as seen at a joint: the gear ratio squared times the inertia of the rotor. The
+/// elements for it are specific to Drake, which reads them only for joints with a motor.
 fn rotor(joint: &Element, effort: Option<f64>, kind: Joint) -> Result<f64, Error> {
     if kind.nv() != 1 || effort == Some(0.0) {
         return Ok(0.0);

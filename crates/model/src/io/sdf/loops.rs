@@ -11,10 +11,12 @@ use condyle_spatial::{Se3, Vec3};
 use std::collections::HashMap;
 
 impl Reader<'_> {
-    /// Adds the constraints of a joint that closes a loop, and warnings about motions that they do not constrain.
+    /// Adds the constraints of a joint that closes a loop. Adds warnings about motions that these constraints do not
+    /// prevent.
     ///
-    /// A fixed joint constrains two frames, a ball joint two points. A revolute joint constrains two points of its
-    /// axis, 1 m apart. One of their six rows is redundant, because the distance of the points is constant.
+    /// A fixed joint constrains two frames, and a ball joint constrains two points. A revolute joint makes two
+    /// constraints, for two points 1 m apart on its axis. One of the six rows is redundant, because the distance
+    /// between the two points is constant.
     pub(super) fn close(&mut self, builder: &mut ModelBuilder, edge: &Edge) -> Result<(), Error> {
         let Edge { element, item, parent, child, .. } = *edge;
         let scope = self.scopes.items[item].scope;
@@ -67,7 +69,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Adds the couplings of gearboxes.
+    /// Adds the couplings that gearboxes describe.
     pub(super) fn gearboxes(&mut self, builder: &mut ModelBuilder) -> Result<(), Error> {
         let gearboxes = std::mem::take(&mut self.gearboxes);
         let mut turns: HashMap<[Place; 2], Vec<usize>> = HashMap::new();
@@ -78,10 +80,10 @@ impl Reader<'_> {
         gearboxes.iter().try_for_each(|edge| self.gearbox(builder, edge, &turns))
     }
 
-    /// Adds the coupling of a gearbox, θ₂ = −ratio θ₁, or a warning that it is left out.
+    /// Adds the coupling θ₂ = −ratio θ₁ of a gearbox, or a warning that the gearbox is left out.
     ///
-    /// θ₁ is the angle of the parent relative to the reference body about `<axis>`, and θ₂ the angle of the child about
-    /// `<axis2>`. Each is the angle of a joint between that link and the reference body.
+    /// The angles are relative to the reference body: θ₁ is the angle of the parent about `<axis>`, and θ₂ is the angle
+    /// of the child about `<axis2>`. Each angle is the position of a joint between the link and the reference body.
     fn gearbox(
         &mut self,
         builder: &mut ModelBuilder,
@@ -121,8 +123,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Returns the body of the first joint whose axis is parallel to an axis of a gearbox, and the sign of its
-    /// rotation.
+    /// Returns the body of the first joint whose axis is parallel to an axis of a gearbox. Also returns the sign of the
+    /// joint's rotation about the axis of the gearbox.
     fn turn(&self, gearbox: &Edge, tag: &'static str, joints: &[(usize, f64)]) -> Result<Option<(BodyId, f64)>, Error> {
         for &(i, sign) in joints {
             let edge = &self.edges[i];
@@ -140,10 +142,10 @@ impl Reader<'_> {
     }
 }
 
-/// Tolerance for 1 minus the cosine between two parallel axes; files have six digits.
+/// Tolerance for 1 minus the cosine of the angle between parallel axes; chosen because files have six digits.
 const PARALLEL: f64 = 1e-6;
 
-/// Returns a list of names with its verb: `limits, damping are`.
+/// Returns a list of names with the matching verb: `limits, damping are`.
 fn are(names: &[&str]) -> String {
     let verb = if names == ["limits"] || names.len() > 1 { "are" } else { "is" };
     format!("{} {verb}", names.join(", "))

@@ -1,4 +1,4 @@
-//! Axes of an SDF that follow others.
+//! Axes of an SDF that follow other axes.
 
 use super::scopes::Scopes;
 use super::values::number;
@@ -9,11 +9,11 @@ use crate::joint::Mimic;
 use crate::warning::Warning;
 use std::collections::HashMap;
 
-/// Bodies that move about or along each axis, by joint and tag of the axis, and the followers among them.
+/// Bodies that move about or along axes, by joint and tag of the axis, and the followers among these bodies.
 #[derive(Default)]
 pub(super) struct Axes<'a> {
     bodies: HashMap<(usize, &'static str), BodyId>,
-    /// Joint, its `<mimic>` element, and the body that follows.
+    /// For each follower, its joint, its `<mimic>` element, and its body.
     followers: Vec<(usize, &'a Element, BodyId)>,
 }
 
@@ -21,7 +21,7 @@ pub(super) struct Axes<'a> {
 const DRAKE: &str = "drake:mimic";
 
 impl<'a> Axes<'a> {
-    /// Adds an axis of a joint.
+    /// Adds the axis of a joint, and the body that moves about or along it.
     pub(super) fn add(&mut self, item: usize, joint: &'a Element, tag: &'static str, body: BodyId) {
         self.bodies.insert((item, tag), body);
         let mimic = joint.child(tag).and_then(|axis| axis.child("mimic")).or_else(|| joint.child(DRAKE));
@@ -33,7 +33,7 @@ impl<'a> Axes<'a> {
         self.bodies.get(&(item, tag)).copied()
     }
 
-    /// Couples the followers to their leaders, or adds warnings that they are free.
+    /// Couples the followers to their leaders, or adds warnings that the followers move freely.
     pub(super) fn follow(
         &self,
         scopes: &Scopes,
@@ -52,7 +52,7 @@ impl<'a> Axes<'a> {
             }
             return Ok(());
         }
-        builder.check_size()?; // before chains of followers are traversed
+        builder.check_size()?; // must come before chains of followers are traversed
         let mut rules: HashMap<usize, (BodyId, Mimic)> = HashMap::new();
         for &(item, mimic, follower) in &self.followers {
             let joint = scopes.items[item].element;
@@ -71,7 +71,7 @@ impl<'a> Axes<'a> {
                 None => number(joint, Some(mimic), tag, otherwise),
             };
             let (ratio, offset) = (read("multiplier", 1.0)?, read("offset", 0.0)?);
-            // follower = multiplier (leader − reference) + offset
+            // follower = multiplier · (leader − reference) + offset
             let offset = offset - ratio * read("reference", 0.0)?;
             rules.insert(follower.0, (leader, Mimic { ratio, offset }));
         }

@@ -1,4 +1,4 @@
-//! Poses in an SDF: each is relative to a named item.
+//! Poses in an SDF: each pose is relative to an item with a name.
 
 use super::convert::MODEL;
 use super::scopes::{Item, Place, Scopes, WORLD_SCOPE};
@@ -19,7 +19,8 @@ impl Scopes<'_> {
         self.find_in(scope, name).ok_or_else(|| element.wrong(self.missing(item, name)))
     }
 
-    /// Returns the frame that `placement_frame` names, which is placed at the pose of the model, and its scope.
+    /// Returns the frame named by `placement_frame`, and the scope of this frame; `None` if the attribute is missing.
+    /// The pose of the model is the pose of this frame.
     fn placement(&self, item: usize) -> Result<Option<(usize, usize)>, Error> {
         let Item { element, inside, .. } = self.items[item];
         let name = element.attribute("placement_frame").filter(|n| !n.is_empty());
@@ -33,9 +34,9 @@ impl Scopes<'_> {
         }
     }
 
-    /// Computes all poses, each after the poses on which it depends.
+    /// Computes all poses. Each pose is computed after the poses on which it depends.
     pub(super) fn resolve(&mut self) -> Result<(), Error> {
-        // 0: not visited, 1: being visited, 2: known
+        // State 0: not visited; 1: being visited; 2: the pose is known.
         let mut state = vec![0u8; self.items.len()];
         for first in 0..self.items.len() {
             let mut path = if state[first] == 0 { vec![(first, self.begin(first, &mut state)?)] } else { Vec::new() };
@@ -61,7 +62,7 @@ impl Scopes<'_> {
         Ok(())
     }
 
-    /// Returns the items on whose poses the pose of an item depends.
+    /// Marks an item as being visited, and returns the items on whose poses its pose depends.
     fn begin(&self, item: usize, state: &mut [u8]) -> Result<Vec<usize>, Error> {
         state[item] = 1;
         let mut found = Vec::new();
@@ -85,7 +86,7 @@ impl Scopes<'_> {
         })
     }
 
-    /// Adds the items whose poses determine the pose of an item in the frame of a scope.
+    /// Adds the items on whose poses the pose of an item in the frame of a scope depends.
     fn chain(&self, at: Place, scope: usize, found: &mut Vec<usize>) {
         if at == self.scopes[scope].own {
             return;
@@ -95,8 +96,8 @@ impl Scopes<'_> {
         self.climb(at, scope, up);
     }
 
-    /// Visits the scopes from the scope of an item, and from another scope, up to their first common scope. `visit`
-    /// receives the index of a scope, and whether it contains the item.
+    /// Visits the scopes on the path between the scope of an item and another scope, without their common scope.
+    /// `visit` receives the index of a scope, and whether this scope contains the item.
     fn climb(&self, at: Place, scope: usize, mut visit: impl FnMut(usize, bool)) {
         let (mut a, mut b) = (at.map_or(WORLD_SCOPE, |item| self.items[item].scope), scope);
         while a != b {
@@ -130,7 +131,8 @@ impl Scopes<'_> {
         self.in_scope(Some(item), WORLD_SCOPE)
     }
 
-    /// Returns cXj: the pose of a joint in its child link, exactly as in the file if the file specifies it.
+    /// Returns cXj: the pose of a joint in its child link. If the file specifies this pose, it is returned without
+    /// rounding errors.
     pub(super) fn joint_in_child(&self, joint: usize, child: usize) -> Result<Se3<f64>, Error> {
         let Item { element, scope, pose: mXj, .. } = self.items[joint];
         match self.reference(joint)? {

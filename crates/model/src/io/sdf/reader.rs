@@ -1,4 +1,4 @@
-//! Conversion of the links and joints of an SDF to bodies: the body and the placement of each link.
+//! Conversion of the links and joints of an SDF to bodies. Each link gets a body and a placement in this body.
 
 use super::SdfOptions;
 use super::inertia::{flags, inertia};
@@ -23,17 +23,17 @@ const ROOT_JOINT: &str = "root_joint";
 /// Reader of the models of a file.
 pub(super) struct Reader<'a> {
     pub(super) scopes: Scopes<'a>,
-    /// Joints in the order of the file, except gearboxes and joints between links that are fixed to the world.
+    /// Joints in the order of the file. Gearboxes, and joints between links that are fixed to the world, are left out.
     pub(super) edges: Vec<Edge<'a>>,
     pub(super) gearboxes: Vec<Edge<'a>>,
     pub(super) axes: Axes<'a>,
     pub(super) warnings: Vec<Warning>,
-    /// Body and placement of each item; valid for links that have been placed.
+    /// Body and placement of each item. They are valid for links that have been placed.
     placed: Vec<(BodyId, Se3<f64>)>,
 }
 
 impl<'a> Reader<'a> {
-    /// Reads names, poses and joints of models, and of the world around them.
+    /// Reads the names, poses and joints of models and of the world around these models.
     pub(super) fn new(world: &'a Element, models: &[&'a Element], warnings: Vec<Warning>) -> Result<Self, Error> {
         let mut scopes = Scopes::new(world, models)?;
         let placed = vec![(WORLD, Se3::identity()); scopes.items.len()];
@@ -57,7 +57,7 @@ impl<'a> Reader<'a> {
         Ok(Self { scopes, edges, gearboxes, axes: Axes::default(), warnings: reader_warnings, placed })
     }
 
-    /// Returns the body to which a link, or the world, belongs, and its placement there.
+    /// Returns the body to which a link or the world belongs, and the placement in this body.
     pub(super) fn place(&self, link: Place) -> (BodyId, Se3<f64>) {
         link.map_or((WORLD, Se3::identity()), |item| self.placed[item])
     }
@@ -95,7 +95,7 @@ impl<'a> Reader<'a> {
         builder.build().map_err(|e| self.at_element(e))
     }
 
-    /// Attaches the root links to their joints, or to the world, and adds their trees.
+    /// Attaches root links to their root joints or to the world, and adds the trees of these root links.
     fn roots(&mut self, builder: &mut ModelBuilder, tree: &Tree, root_joint: Option<Joint>) -> Result<(), Error> {
         let is_one = tree.roots.len() == 1 && !self.edges.iter().any(|e| e.parent.is_none());
         let taken: HashSet<String> = self.scopes.all("joint").map(|item| self.scopes.name(item).to_owned()).collect();
@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Fixes a link to the world at its pose. The inertia of a static link has no effect, so it causes no warnings.
+    /// Fixes a link to the world at its pose. The inertia of such a link has no effect, so it causes no warnings.
     fn fix(&mut self, builder: &mut ModelBuilder, link: usize) -> Result<(), Error> {
         let mut unsaid = Vec::new();
         let warnings = if self.scopes.is_static(link) { &mut unsaid } else { &mut self.warnings };
@@ -139,8 +139,8 @@ impl<'a> Reader<'a> {
         self.put(builder, link, (WORLD, oXl), Some(inertia))
     }
 
-    /// Stores the body and placement of a link, and adds the link's frame. `merged` is the inertia of a link that is
-    /// merged into its body, in the link's frame.
+    /// Stores the body and placement of a link, and adds the link's frame. If the link is merged into the body,
+    /// `merged` is the link's inertia, in the link's frame.
     fn put(
         &mut self,
         builder: &mut ModelBuilder,
@@ -158,7 +158,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Adds the joints and links that some links, or the world, carry, depth first.
+    /// Adds the joints and links that some links or the world carry, in depth-first order.
     fn walk(&mut self, builder: &mut ModelBuilder, tree: &Tree, from: &[Place]) -> Result<(), Error> {
         let on = |at: Place| tree.on.get(&at).into_iter().flatten().rev().copied();
         let mut waiting: Vec<(usize, bool)> = from.iter().rev().flat_map(|&at| on(at)).collect();
@@ -186,7 +186,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Adds a joint at bXj on a body, and the link that it carries.
+    /// Adds a joint to a body, at the placement bXj, and the link that the joint carries.
     fn joint(
         &mut self,
         builder: &mut ModelBuilder,
@@ -244,7 +244,7 @@ impl<'a> Reader<'a> {
         self.put(builder, link, (body, at * jXl), (count == 0).then_some(in_link))
     }
 
-    /// Adds the frames of the file and of nested models.
+    /// Adds frames for the `<frame>` elements and nested models of the file.
     fn frames(&mut self, builder: &mut ModelBuilder) -> Result<(), Error> {
         for item in 0..self.scopes.items.len() {
             let element = self.scopes.items[item].element;
@@ -264,7 +264,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Replaces an error of the builder by one that names the element in the file.
+    /// Replaces an error of the builder by an error that names the element in the file.
     fn at_element(&self, error: Error) -> Error {
         let (tag, name, what) = match &error {
             Error::Body { body, what } => ("link", body, what),

@@ -1,5 +1,5 @@
-//! Known elements and attributes of SDF 1.2 to 1.12, after the conversion of older versions, and those that a model
-//! cannot represent.
+//! Known elements and attributes of SDF 1.2 to 1.12, after older versions have been converted, and features that a
+//! model cannot represent.
 
 use crate::io::known::LeftOut;
 
@@ -50,7 +50,7 @@ frame: name attached_to ; pose
 /// Type of a collision that gives its link mass.
 pub(super) const HEAVY: &str = "heavy_collision";
 
-/// Features of SDF that a model cannot represent.
+/// Features of SDF that a model cannot represent, and the effect of each missing feature.
 pub(super) const LEFT_OUT: &LeftOut = &[
     ("world", "population", "the models of a population are left out"),
     ("world", "state", "the positions of a saved state are left out: models stand where their <pose> puts them"),

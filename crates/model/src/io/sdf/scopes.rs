@@ -1,5 +1,5 @@
-//! Names and poses of an SDF. Each model is a scope: names in it are relative to the model, `inner::link` for a link of
-//! a nested model, and poses are in the frame of the model.
+//! Names and poses of an SDF. Each model is a scope. Names in a scope are relative to the model, for example
+//! `inner::link` for a link of a nested model. Poses in a scope are in the frame of the model.
 
 use super::convert::MODEL;
 use super::values::{flag, text};
@@ -9,11 +9,13 @@ use crate::names::{near, nearest};
 use condyle_spatial::Se3;
 use std::collections::HashMap;
 
-/// Name of the world in every scope.
+/// Name by which each scope refers to the world.
 pub(super) const WORLD_LINK: &str = "world";
-/// Attribute of a model whose elements belong to the enclosing scope: an `<include merge="true">`.
+/// Attribute of a model whose elements belong to the enclosing scope, because it was included with `<include
+/// merge="true">`.
 pub(super) const MERGED: &str = "__merge__";
-/// Maximum number of bytes of all full names; the name of an item in nested models contains the names of these models.
+/// Maximum size of all full names together (bytes). The full name of an item contains the names of all models around
+/// the item.
 const MAX_NAMES: usize = 64 << 20;
 /// Index of the scope of the world.
 pub(super) const WORLD_SCOPE: usize = 0;
@@ -23,27 +25,27 @@ pub(super) struct Scope<'a> {
     element: &'a Element,
     /// Prefix of the names in the scope, for example `robot::arm::`.
     prefix: String,
-    /// Item of the model itself; `None` for the world.
+    /// Index of the item that is the model of this scope; `None` for the world.
     pub(super) own: Option<usize>,
-    /// Enclosing scope, and number of all enclosing scopes.
+    /// Index of the enclosing scope, and number of all scopes around this scope.
     pub(super) parent: usize,
     pub(super) depth: usize,
-    /// Whether the links of the scope are fixed to the world, because the model or an enclosing one is static.
+    /// Whether the links of the scope are fixed to the world, because the model or a model around it is static.
     is_static: bool,
-    /// First link and first model of the scope.
+    /// First link and first model of the scope, as indices of items.
     first: [Option<usize>; 2],
 }
 
-/// Link, joint, frame or model.
+/// Item of an SDF: link, joint, frame or model.
 pub(super) struct Item<'a> {
     pub(super) element: &'a Element,
     /// Scope that contains the item.
     pub(super) scope: usize,
-    /// Full name, from the world.
+    /// Full name, which begins with the names of the models around the item.
     name: String,
-    /// Scope of the item, if it is a model.
+    /// Index of the scope that the item opens, if the item is a model.
     pub(super) inside: Option<usize>,
-    /// Pose in the frame of the scope.
+    /// Pose of the item in the frame of its scope.
     pub(super) pose: Se3<f64>,
 }
 
@@ -54,17 +56,17 @@ pub(super) struct Scopes<'a> {
     names: HashMap<String, usize>,
     joints: HashMap<String, usize>,
     bytes: usize,
-    /// Prefix that is removed from all names: the name of the only model of a file.
+    /// Prefix that is removed from all names. It is the name of the model, if a file has only one model.
     single: String,
-    /// Links to which items are attached, as far as they were computed; `None` is the world.
+    /// Links to which items are attached, for items whose link has been computed; `None` is the world.
     attached: HashMap<usize, Option<usize>>,
 }
 
-/// An item with a pose; `None` is the world.
+/// Index of an item with a pose; `None` is the world.
 pub(super) type Place = Option<usize>;
 
 impl<'a> Scopes<'a> {
-    /// Collects the names in models, and in the world around them, and computes the poses.
+    /// Collects the names in models and in the world around these models, and computes the poses.
     pub(super) fn new(world: &'a Element, models: &[&'a Element]) -> Result<Self, Error> {
         let mut scopes = Self {
             scopes: Vec::new(),
@@ -93,7 +95,7 @@ impl<'a> Scopes<'a> {
         }
         if let [model] = models {
             let single = format!("{}::", model.attribute("name").unwrap_or_default());
-            // unless the world has an item of the same name
+            // The prefix stays if an item of the world has the same name without it.
             let mut in_world = scopes.items.iter().filter(|item| item.scope == WORLD_SCOPE && item.inside.is_none());
             if !in_world.any(|item| scopes.names.contains_key(&format!("{single}{}", item.name))) {
                 scopes.single = single;
@@ -103,7 +105,7 @@ impl<'a> Scopes<'a> {
         Ok(scopes)
     }
 
-    /// Adds a model and its content.
+    /// Adds a model and everything in it.
     fn model(&mut self, element: &'a Element, parent: usize) -> Result<(), Error> {
         let own = self.insert(element, parent)?;
         let is_merged = element.attribute(MERGED).is_some();
@@ -130,7 +132,7 @@ impl<'a> Scopes<'a> {
         Ok(())
     }
 
-    /// Adds an item.
+    /// Adds an item to a scope.
     fn insert(&mut self, element: &'a Element, scope: usize) -> Result<usize, Error> {
         let name = element.attribute("name").filter(|n| !n.is_empty()).ok_or_else(|| element.lacks("name"))?;
         if [WORLD_LINK, MODEL].contains(&name) {
@@ -150,7 +152,7 @@ impl<'a> Scopes<'a> {
         let index = self.items.len();
         let tag = &*element.tag;
         if let Some(&other) = self.names.get(&full) {
-            // up to SDF 1.6 a link and a joint may share a name; the name then refers to the link
+            // Up to SDF 1.6, a link and a joint may have the same name. The name then refers to the link.
             let found = self.items[other].element;
             if found.tag == tag || ![tag, &found.tag].iter().any(|t| matches!(*t, "link" | "joint")) {
                 let what = format!("the name is taken by the {} on line {}", found.tag, found.line);
@@ -175,18 +177,18 @@ impl<'a> Scopes<'a> {
         Ok(index)
     }
 
-    /// Returns the name of an item in the resulting model.
+    /// Returns the name that an item has in the resulting model.
     pub(super) fn name(&self, item: usize) -> &str {
         let name = &*self.items[item].name;
         name.strip_prefix(&self.single).unwrap_or(name)
     }
 
-    /// Returns the indices of all items with a tag, in the order of the file.
+    /// Returns the indices of all items with a given tag, in the order of the file.
     pub(super) fn all(&self, tag: &'static str) -> impl Iterator<Item = usize> + '_ {
         self.items.iter().enumerate().filter(move |(_, item)| item.element.tag == tag).map(|(i, _)| i)
     }
 
-    /// Returns whether an item is the frame of a merged model, or of the only model of a file.
+    /// Returns whether an item is the frame of a merged model, or the frame of the only model of a file.
     pub(super) fn is_hidden(&self, item: usize) -> bool {
         self.items[item].element.attribute(MERGED).is_some()
             || self.single.strip_suffix("::") == Some(&self.items[item].name)
@@ -207,7 +209,7 @@ impl<'a> Scopes<'a> {
         self.joints.get(&format!("{}{name}", self.scopes[self.items[beside].scope].prefix)).copied()
     }
 
-    /// Returns the message that no joint has a name in the scope of an item.
+    /// Returns the message that no joint has a given name in the scope of an item.
     pub(super) fn no_joint(&self, beside: usize, name: &str) -> String {
         format!("no joint is named `{name}`{}", self.near(self.items[beside].scope, name, "joint"))
     }
@@ -220,12 +222,13 @@ impl<'a> Scopes<'a> {
         }
         let full = format!("{}{name}", self.scopes[scope].prefix);
         let get = |name: &str| self.names.get(name).copied();
-        // the frame of a nested model; older files name it `inner::__model__`
+        // The name may refer to the frame of a nested model, which older files name `inner::__model__`.
         let inner = || full.strip_suffix(MODEL).and_then(|n| n.strip_suffix("::")).and_then(get);
         get(&full).or_else(inner).or_else(|| get(&format!("{full}::{MODEL}"))).map(Some)
     }
 
-    /// Returns the end of a message about an unknown name: the nearest name with a tag in a scope.
+    /// Returns the end of a message about an unknown name: the nearest name among the items in a scope that have a
+    /// given tag.
     pub(super) fn near(&self, scope: usize, name: &str, tag: &str) -> String {
         let prefix = &self.scopes[scope].prefix;
         let fits = |item: &&Item| tag.is_empty() || item.element.tag == tag;
@@ -240,7 +243,8 @@ impl<'a> Scopes<'a> {
         format!("no link, joint or frame is named `{name}`{near}")
     }
 
-    /// Returns the link to which a joint's parent or child refers, possibly through frames; `None` is the world.
+    /// Returns the link to which the parent or child of a joint refers, directly or by way of frames; `None` is the
+    /// world.
     pub(super) fn link(&mut self, joint: usize, tag: &str) -> Result<Place, Error> {
         let Item { element, scope, .. } = self.items[joint];
         let name = text(element, tag).ok_or_else(|| element.lacks(tag))?;
@@ -250,7 +254,7 @@ impl<'a> Scopes<'a> {
         }
     }
 
-    /// Returns the link to which an item is attached; `None` is the world. Errors name `of`.
+    /// Returns the link to which an item is attached; `None` is the world. Error messages name the element `of`.
     pub(super) fn attached(&mut self, at: Place, of: &Element) -> Result<Place, Error> {
         let (mut at, mut path) = (at, Vec::new());
         let link = loop {

@@ -5,12 +5,12 @@ use crate::error::Error;
 use crate::io::xml::Element;
 use std::collections::{HashMap, HashSet, VecDeque};
 
-/// Types of joints, except gearboxes, which only couple two other joints.
+/// Types of joints. A gearbox is not among them, because it only couples two other joints.
 const KINDS: [&str; 8] = ["fixed", "revolute", "continuous", "prismatic", "screw", "ball", "universal", "revolute2"];
-/// Type of a joint that couples two other joints.
+/// Type of joint that only couples two other joints.
 pub(super) const GEARBOX: &str = "gearbox";
 
-/// A joint, and the links that it connects; no link is the world.
+/// Joint, and the links that it connects. A link that is `None` is the world.
 #[derive(Clone)]
 pub(super) struct Edge<'a> {
     pub(super) element: &'a Element,
@@ -22,7 +22,7 @@ pub(super) struct Edge<'a> {
 }
 
 impl<'a> Edge<'a> {
-    /// Reads a joint.
+    /// Reads a joint of the file.
     pub(super) fn new(scopes: &mut Scopes<'a>, item: usize) -> Result<Self, Error> {
         let element = scopes.items[item].element;
         let kind = element.attribute("type").ok_or_else(|| element.wrong("has no type"));
@@ -43,22 +43,22 @@ impl<'a> Edge<'a> {
     }
 }
 
-/// A spanning tree, and the joints that close loops.
+/// Spanning tree, and the joints that close loops.
 #[derive(Default)]
 pub(super) struct Tree {
-    /// Root links, which no joint carries; each is the root of its own tree.
+    /// Root links, which no joint carries. Each root link is the root of its own tree.
     pub(super) roots: Vec<usize>,
-    /// Joints that each link, or the world, carries, and whether they are reversed: in a reversed joint the child
-    /// carries the parent.
+    /// Joints that each link or the world carries, and whether each joint is reversed. A reversed joint carries its
+    /// parent link, and its child link carries the joint.
     pub(super) on: HashMap<Place, Vec<(usize, bool)>>,
     /// Joints that close loops.
     pub(super) loops: Vec<usize>,
 }
 
 impl Tree {
-    /// Visits the joints breadth first in the order of the file: first from the world and the links fixed to it, then
-    /// from each link that is no child of a joint. A joint is visited from its child only if its parent is not reached
-    /// otherwise.
+    /// Visits the joints breadth first, in the order of the file: first from the world and the links fixed to it, then
+    /// from each link that is not the child of a joint. A joint is visited from its child link only if its parent link
+    /// is not reached otherwise.
     pub(super) fn new(edges: &[Edge], links: &[usize], fixed: &[usize]) -> Self {
         let (mut below, mut above): (HashMap<Place, Vec<usize>>, HashMap<usize, Vec<usize>>) = Default::default();
         for (i, edge) in edges.iter().enumerate() {

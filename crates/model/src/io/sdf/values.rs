@@ -16,7 +16,7 @@ pub(super) fn truth(text: &str) -> Result<bool, String> {
     }
 }
 
-/// Reads the boolean in a child; `otherwise` if the child is missing or empty.
+/// Returns the boolean in a child element, or `otherwise` if the child is missing or empty.
 pub(super) fn flag(of: &Element, tag: &str, otherwise: bool) -> Result<bool, Error> {
     match of.child(tag).filter(|e| !e.text.trim().is_empty()) {
         Some(e) => truth(&e.text).map_err(|what| of.wrong_inside(e, format!("{tag}: {what}"))),
@@ -24,7 +24,7 @@ pub(super) fn flag(of: &Element, tag: &str, otherwise: bool) -> Result<bool, Err
     }
 }
 
-/// Reads the boolean of an attribute; false if it is missing.
+/// Returns the boolean of an attribute, or `false` if the attribute is missing.
 pub(super) fn attribute(of: &Element, inside: &Element, name: &str) -> Result<bool, Error> {
     match inside.attribute(name) {
         Some(text) => truth(text).map_err(|what| of.wrong_inside(inside, format!("{}: {name}: {what}", inside.tag))),
@@ -32,13 +32,13 @@ pub(super) fn attribute(of: &Element, inside: &Element, name: &str) -> Result<bo
     }
 }
 
-/// Reads the name in a child; `None` if the child is missing or empty.
+/// Returns the name in a child element; `None` if the child is missing or empty.
 pub(super) fn text<'a>(of: &'a Element, tag: &str) -> Option<&'a str> {
     of.child(tag).map(|e| e.text.trim()).filter(|t| !t.is_empty())
 }
 
-/// Reads the `<pose>` in an element: x y z, then roll pitch yaw or a quaternion x y z w. Without a `<pose>`, returns
-/// the identity. Errors name `of`.
+/// Reads the `<pose>` in an element: x y z, then roll pitch yaw or a quaternion x y z w. Returns the identity if there
+/// is no `<pose>`. Error messages name the element `of`.
 pub(super) fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
     let Some(pose) = inside.child("pose") else { return Ok(Se3::identity()) };
     let wrong = |what: String| of.wrong_inside(pose, format!("pose: {what}"));
@@ -68,19 +68,20 @@ pub(super) fn pose(of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
     Ok(Se3::new(rotation, Vec3::new(x, y, z)))
 }
 
-/// Returns the frame to which the pose of an element is relative, if it names one.
+/// Returns the frame to which the pose of an element is relative; `None` if the pose does not name one.
 pub(super) fn relative_to(of: &Element) -> Option<&str> {
     of.child("pose")?.attribute("relative_to").map(str::trim).filter(|n| !n.is_empty())
 }
 
-/// Reads the three numbers in an element. Errors name `of`.
+/// Reads the three numbers in an element. Error messages name the element `of`.
 pub(super) fn three(of: &Element, element: &Element) -> Result<Vec3<f64>, Error> {
     Ok(Vec3::from(
         xml::array::<3>(&element.text).map_err(|what| of.wrong_inside(element, format!("{}: {what}", element.tag)))?,
     ))
 }
 
-/// Reads the number in a child, which may be infinite; `otherwise` if the child is missing or empty. Errors name `of`.
+/// Returns the number in a child element, which may be infinite, or `otherwise` if the child is missing or empty. Error
+/// messages name the element `of`.
 pub(super) fn number(of: &Element, inside: Option<&Element>, tag: &str, otherwise: f64) -> Result<f64, Error> {
     let child = inside.and_then(|e| e.child(tag)).filter(|e| !e.text.trim().is_empty());
     let Some(e) = child else { return Ok(otherwise) };

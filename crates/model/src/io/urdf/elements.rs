@@ -1,12 +1,12 @@
-//! Children and attributes of elements. Errors name the link or joint (`of`), and the line inside it. If a tag occurs
-//! several times, the first element counts, as in urdfdom; [`check_repeated`] warns about the others.
+//! Children and attributes of elements. Error messages name the link or joint (`of`), and the line inside it. If a tag
+//! occurs several times, the first element counts, as in urdfdom; [`check_repeated`] adds warnings about the others.
 
 use crate::error::Error;
 use crate::io::xml::{self, Element};
 use crate::warning::Warning;
 use condyle_spatial::Vec3;
 
-/// Adds a warning about the second child with a tag, unless it is equal to the first.
+/// Adds a warning if an element has a second child with the same tag, unless both children are equal.
 pub(super) fn check_repeated(of: &Element, element: &Element, warnings: &mut Vec<Warning>) {
     for tag in REPEATED {
         let mut all = element.all(tag);
@@ -40,12 +40,12 @@ fn is_equal(a: &Element, b: &Element) -> bool {
     (&a.tag, &a.attributes) == (&b.tag, &b.attributes) && a.children.len() == b.children.len() && children()
 }
 
-/// Returns the child with a tag; an error if it is missing.
+/// Returns the child with a given tag, or an error if it is missing.
 pub(super) fn needed<'a>(of: &'a Element, tag: &str) -> Result<&'a Element, Error> {
     of.child(tag).ok_or_else(|| of.lacks(tag))
 }
 
-/// Returns the text of an attribute; an error if it is missing.
+/// Returns the text of an attribute, or an error if the attribute is missing.
 pub(super) fn text<'a>(of: &Element, inside: &'a Element, name: &str) -> Result<&'a str, Error> {
     inside.attribute(name).ok_or_else(|| lacks(of, inside, name))
 }
@@ -55,8 +55,8 @@ pub(super) fn lacks(of: &Element, inside: &Element, name: &str) -> Error {
     of.wrong_inside(inside, format!("{} {}", inside.tag, inside.missing(name)))
 }
 
-/// Converts the value of an attribute with `f`; `None` if the attribute is missing. Errors name the attribute and its
-/// value.
+/// Converts the value of an attribute with `f`. Returns `None` if the attribute is missing. Error messages name the
+/// attribute and its value.
 pub(super) fn read<T>(
     of: &Element,
     inside: &Element,

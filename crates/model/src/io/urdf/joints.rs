@@ -1,4 +1,4 @@
-//! Joints of a URDF: kinds, axes, limits, losses.
+//! Joints of a URDF: their kinds, axes, limits and losses.
 
 use super::elements::{array, lacks, read, text, vector};
 use crate::body::JointOptions;
@@ -8,16 +8,17 @@ use crate::joint::Joint;
 use crate::warning::Warning;
 use condyle_spatial::{Mat3, Vec3};
 
-/// A moving joint, and the rotation of its frame in its link's frame.
+/// Moving joint, and the rotation of the joint's frame in the frame of its link.
 pub(super) struct Moving {
-    /// First joint of a universal joint.
+    /// First of the two joints that represent a universal joint; `None` for other joints.
     pub(super) first: Option<Joint>,
     pub(super) joint: Joint,
-    /// Rotation R_lj of a planar joint, whose z axis is the joint's axis. Other joints use the link's frame.
+    /// Rotation R_lj of the frame of a planar joint, whose z axis is the axis of the joint. Other joints use the link's
+    /// frame.
     pub(super) rotation: Option<Mat3<f64>>,
 }
 
-/// Returns the joint; `None` if it is fixed.
+/// Returns the moving joint; `None` if the joint is fixed.
 pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Option<Moving>, Error> {
     let axis = || match joint.child("axis") {
         Some(axis) => vector(joint, axis, "xyz")?.ok_or_else(|| lacks(joint, axis, "xyz")),
@@ -71,7 +72,7 @@ pub(super) fn kind(joint: &Element, warnings: &mut Vec<Warning>) -> Result<Optio
 }
 
 /// Returns the shortest rotation that maps z to a unit vector u: I + \[v\]× + \[v\]×² / (1 + u_z), with v = z × u. It
-/// is exact for x, y and z. It is equal to Drake's, also for −z, where it is a half turn about x.
+/// is exact if u is x, y or z. The rotation is equal to Drake's, also if u is −z: then it is a half turn about x.
 fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
     let Vec3 { x, y, z } = u;
     let v2 = x * x + y * y; // |v|² = (1 + z)(1 − z)
@@ -83,7 +84,7 @@ fn from_z_to(u: Vec3<f64>) -> Mat3<f64> {
     Mat3 { x: Vec3::new(1.0 - k * x * x, xy, -x), y: Vec3::new(xy, 1.0 - k * y * y, -y), z: u }
 }
 
-/// Returns the limits and losses of a moving joint, or of each of its two joints.
+/// Returns the limits and losses of a moving joint. For a universal joint, returns them for each of its two joints.
 pub(super) fn options(
     joint: &Element,
     Moving { first, joint: kind, .. }: &Moving,
@@ -96,7 +97,8 @@ pub(super) fn options(
         let number = |name| Ok(array(joint, dynamics, name)?.map_or(0.0, |[x]| x));
         (options.damping, options.friction) = (number("damping")?, number("friction")?);
     }
-    // the numbers of joints with several degrees of freedom have no unit, except losses of joints that only turn
+    // If a joint has several degrees of freedom, units of its numbers are not defined, except for losses of joints that
+    // only turn.
     if first.is_some() || kind.nv() > 1 {
         let has = |inside: &Element| {
             inside.attributes.iter().any(|(_, x)| x.split_whitespace().any(|x| x.parse() != Ok(0.0)))

@@ -1,6 +1,6 @@
-//! Known elements and attributes of a URDF: of its schema, versions 1.0 to 1.2, and of the programs that write and read
-//! it (ROS control, Gazebo, Drake, Bullet, MuJoCo). Shapes, sensors, controllers, soft limits and calibrations do not
-//! affect a model. They are known and cause no warning.
+//! Known elements and attributes of a URDF. They are defined in its schema, versions 1.0 to 1.2, and by programs that
+//! write or read URDFs (ROS control, Gazebo, Drake, Bullet, MuJoCo). Shapes, sensors, controllers, soft limits and
+//! calibrations do not affect a model; they are known and cause no warning.
 
 use super::elements::check_repeated;
 use crate::io::known::{Known, LeftOut};
@@ -81,7 +81,7 @@ pub(super) fn check(robot: &Element, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Adds warnings about text in links and joints, because all their values are attributes.
+/// Adds warnings about text in links and joints, whose values must be attributes.
 fn check_text(element: &Element, warnings: &mut Vec<Warning>) {
     let text = element.text.trim();
     if !text.is_empty() {
@@ -100,8 +100,8 @@ fn check_text(element: &Element, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Returns a warning about an entry of `<gazebo>` that changes the robot there. Other entries concern contact, looks
-/// and numerics.
+/// Returns a warning about an entry of `<gazebo>` that changes the robot in Gazebo. Other entries only affect contact,
+/// looks and numerics.
 fn changed_by_gazebo(entry: &Element) -> Option<Warning> {
     let is_on = matches!(entry.text.trim(), "1" | "true" | "True" | "TRUE");
     let what = match &*entry.tag {

@@ -6,18 +6,19 @@ use crate::io::from_rpy;
 use crate::io::xml::Element;
 use condyle_spatial::{Mat3, Quaternion, Se3, Vec3};
 
-/// Allowed difference between the length of a quaternion and 1; three digits, such as 0.707 for √½, are enough.
+/// Allowed difference between the length of a quaternion and 1. With this tolerance, three digits, such as 0.707 for
+/// √½, are enough.
 const UNIT_ROUNDING: f64 = 1e-3;
 
-/// Rules for the placements of a robot, by the version of its URDF.
+/// Rules for the placements of a robot, which depend on the version of the URDF.
 #[derive(Clone, Copy)]
 pub(super) struct Origins {
-    /// Whether `quat_xyzw` is allowed: in versions 1.1 and 1.2, but not in 1.0.
+    /// Whether `quat_xyzw` is allowed: in versions 1.1 and 1.2 it is, in version 1.0 it is not.
     quaternions: bool,
 }
 
 impl Origins {
-    /// Returns the rules for the version of a robot; without a version, it is 1.0.
+    /// Returns the rules for the version of a robot. A robot without a version has version 1.0.
     pub(super) fn of(robot: &Element) -> Result<Self, Error> {
         match robot.attribute("version").unwrap_or("1.0") {
             "1.0" => Ok(Self { quaternions: false }),
@@ -26,12 +27,13 @@ impl Origins {
         }
     }
 
-    /// Returns the pose of the `<origin>` in an element, or the identity if it is missing. Errors name `of`.
+    /// Returns the pose of the `<origin>` in an element, or the identity if the `<origin>` is missing. Error messages
+    /// name the element `of`.
     pub(super) fn pose(self, of: &Element, inside: &Element) -> Result<Se3<f64>, Error> {
         inside.child("origin").map_or(Ok(Se3::identity()), |origin| self.pose_of(of, origin))
     }
 
-    /// Returns the placement that the attributes of an element specify. Errors name `of`.
+    /// Returns the placement that the attributes of an element specify. Error messages name the element `of`.
     pub(super) fn pose_of(self, of: &Element, origin: &Element) -> Result<Se3<f64>, Error> {
         let rotation = match (array(of, origin, "rpy")?, array(of, origin, "quat_xyzw")?) {
             (Some(_), Some(_)) => return Err(of.wrong_inside(origin, "origin has both rpy and quat_xyzw")),
@@ -46,7 +48,7 @@ impl Origins {
     }
 }
 
-/// Returns the rotation of a quaternion whose length must be 1, up to rounding.
+/// Returns the rotation of a quaternion. The length of the quaternion must be 1, up to rounding.
 fn unit(xyzw: [f64; 4]) -> Result<Mat3<f64>, String> {
     let length = xyzw.iter().map(|x| x * x).sum::<f64>().sqrt();
     if (length - 1.0).abs() > UNIT_ROUNDING {

@@ -1,4 +1,4 @@
-//! Tree of a URDF: links, joints and frames, and the model built from them.
+//! Tree of links, joints and frames in a URDF, and the model that is built from this tree.
 
 use super::UrdfOptions;
 use super::elements::{array, needed, text};
@@ -17,10 +17,10 @@ use crate::warning::Warning;
 use condyle_spatial::{Act, Inertia, Se3, Sym3, Vec3};
 use std::collections::{HashMap, HashSet};
 
-/// The link that a joint may have as its parent without being in the file.
+/// Name of a link that a joint may have as its parent even if the file does not contain this link.
 const WORLD_LINK: &str = "world";
 
-/// A joint, and the links that it connects.
+/// Joint, and the links that it connects.
 struct Edge<'a> {
     element: &'a Element,
     parent: &'a str,
@@ -37,9 +37,9 @@ pub(super) struct Reader<'a> {
     joints: HashMap<&'a str, Edge<'a>>,
     /// Name of the root link.
     root: &'a str,
-    /// The first joint on a link `world` that the file does not have.
+    /// First joint whose parent is `world`, if the file does not contain such a link.
     on_world: Option<&'a Element>,
-    /// The joints on each link, in the order of their names.
+    /// Joints that each link carries, in the order of their names.
     children: HashMap<&'a str, Vec<&'a str>>,
 }
 
@@ -72,8 +72,8 @@ impl<'a> Reader<'a> {
         Ok(reader)
     }
 
-    /// Finds root and children. Every link except the root must be the child of exactly one joint, and all links must
-    /// be connected.
+    /// Finds the root link and the children of each link. Every link except the root must be the child of exactly one
+    /// joint, and all links must be connected.
     fn find_tree(&mut self) -> Result<(), Error> {
         let mut links: Vec<&str> = self.robot.all("link").filter_map(|l| l.attribute("name")).collect();
         let mut parent: HashMap<&str, &str> = HashMap::new();
@@ -143,7 +143,8 @@ impl<'a> Reader<'a> {
             }
         };
         builder.frame_of_kind(self.root, FrameKind::Link, root, Se3::identity());
-        // depth first: each entry has a joint, the body that carries it, and the placement of its parent link there
+        // The joints are visited depth first. Each entry of the stack has a joint, the body that carries the joint, and
+        // the placement of the joint's parent link in this body.
         let (mut bodies, mut links) = (HashMap::new(), HashMap::from([(self.root, (root, Se3::identity()))]));
         let mut waiting: Vec<(&str, BodyId, Se3<f64>)> = Vec::new();
         let wait = |waiting: &mut Vec<_>, link: &str, body: BodyId, bXl: Se3<f64>| {
@@ -153,7 +154,7 @@ impl<'a> Reader<'a> {
         wait(&mut waiting, self.root, root, Se3::identity());
         while let Some((name, parent, pXl)) = waiting.pop() {
             let Edge { element, child: link, .. } = self.joints[name];
-            let pXl = pXl * self.origins.pose(element, element)?; // the child's
+            let pXl = pXl * self.origins.pose(element, element)?; // pXl of the child
             let inertia = self.inertia(link, &mut warnings)?;
             let (body, bXl) = match joints::kind(element, &mut warnings)? {
                 None => {
@@ -207,8 +208,8 @@ impl<'a> Reader<'a> {
         self.robot.accepted(model, options.strict, &options.allow)
     }
 
-    /// Returns the name of the joint between the world and the root link: `root_joint`, or `root_joint_2`, … if the
-    /// robot has a joint of that name.
+    /// Returns the name of the joint between the world and the root link. It is `root_joint`, or `root_joint_2`, … if
+    /// the robot has a joint with that name.
     fn root_joint(&self) -> String {
         let mut name = String::from("root_joint");
         for k in 2.. {
@@ -220,7 +221,7 @@ impl<'a> Reader<'a> {
         name
     }
 
-    /// Adds Drake's `<frame>`s.
+    /// Adds frames for the `<frame>` elements of Drake.
     fn add_frames(&self, builder: &mut ModelBuilder, links: &HashMap<&str, (BodyId, Se3<f64>)>) -> Result<(), Error> {
         for frame in self.robot.all("frame") {
             let (name, link) = (text(frame, frame, "name")?, text(frame, frame, "link")?);
@@ -237,12 +238,12 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Returns the message that no joint has a name.
+    /// Returns the message that no joint has a given name.
     fn no_joint(&self, name: &str) -> String {
         format!("no joint is named `{name}`{}", near(&nearest(name, self.order.iter().copied())))
     }
 
-    /// Couples followers to their leaders, or adds warnings that they are free.
+    /// Couples followers to their leaders, or adds warnings that the followers move freely.
     fn add_mimics(
         &self,
         builder: &mut ModelBuilder,
@@ -275,7 +276,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Returns the link's inertia in the link's frame. Parts that are missing are 0, as Drake has it, with a warning.
+    /// Returns the link's inertia in the link's frame. Missing elements are 0, as in Drake, and cause a warning.
     fn inertia(&self, link: &str, warnings: &mut Vec<Warning>) -> Result<Inertia<f64>, Error> {
         let Some(&link) = self.links.get(link) else { return Ok(Inertia::zero()) };
         let Some(inertial) = link.child("inertial") else { return Ok(Inertia::zero()) };
@@ -307,7 +308,7 @@ impl<'a> Reader<'a> {
         Ok(self.origins.pose(link, inertial)?.act(Inertia::from_com(mass, Vec3::zero(), rotational)))
     }
 
-    /// Adds the line of the link or joint to an error of the builder.
+    /// Adds the line number of the link or joint to an error of the builder.
     fn locate(&self, error: Error) -> Error {
         let own = "the name belongs to the library";
         let (link, joint) =

@@ -1,19 +1,19 @@
-//! Transmissions: the inertia of a rotor, as seen at its joint.
+//! Transmissions of a URDF: the inertia of a rotor, as seen at the joint that it drives.
 
 use crate::io::xml::{Element, array};
 use crate::warning::Warning;
 use std::collections::BTreeMap;
 
-/// Tags of a rotor's inertia about its axis (kg m²).
+/// Tags of elements that contain a rotor's inertia about its axis (kg m²).
 const ROTOR: [&str; 5] = ["drake:rotor_inertia", "rotorInertia", "rotor_inertia", "motorInertia", "motor_inertia"];
-/// Tags of the number of turns of a rotor per turn of its joint.
+/// Tags of elements that contain the number of turns of a rotor per turn of its joint.
 const RATIO: [&str; 5] = ["drake:gear_ratio", "mechanicalReduction", "mechanical_reduction", "gearRatio", "gear_ratio"];
 
-/// Armatures by the name of the joint (kg m²), each with its transmission.
+/// Armature (kg m²) and `<transmission>` of each joint, by the name of the joint.
 pub(super) type Armatures<'a> = BTreeMap<&'a str, (f64, &'a Element)>;
 
 /// Returns the armature n² J of each joint whose transmission has both a reduction n and a rotor's inertia J. Adds
-/// warnings about others, unless their reduction is 1 and they have no rotor.
+/// warnings about other transmissions, unless they have no rotor and their reduction is 1.
 pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> Armatures<'a> {
     let mut found = BTreeMap::new();
     for transmission in robot.all("transmission") {
@@ -22,7 +22,7 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
         let is_simple = joints.next().is_none() && actuators.next().is_none();
         let inside = [actuator, joint, Some(transmission)];
         let find = |tags: &[&str]| {
-            // Drake reads its own elements in an actuator only
+            // Drake reads its own elements only inside an `<actuator>`.
             let counts = |of: &Element, tag: &str| of.tag == "actuator" || !tag.starts_with("drake:");
             let mut elements = inside
                 .iter()
@@ -61,7 +61,7 @@ pub(super) fn armatures<'a>(robot: &'a Element, warnings: &mut Vec<Warning>) -> 
     found
 }
 
-/// Returns the number of an element: its attribute `value`, or its text.
+/// Returns the number of an element. It is the attribute `value` or the text of the element.
 fn number(element: &Element) -> Option<f64> {
     let [x] = array(element.attribute("value").unwrap_or(&element.text)).ok()?;
     Some(x)

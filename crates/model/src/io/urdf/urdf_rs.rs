@@ -1,4 +1,5 @@
-//! Conversion of robots that urdf-rs has read: they become URDF elements for the reader of this crate.
+//! Conversion of robots that urdf-rs has read. They become elements of a URDF, which the reader of this crate then
+//! reads.
 
 use super::UrdfOptions;
 use super::reader::Reader;
@@ -9,14 +10,14 @@ use ::urdf_rs::{Inertial, Joint, JointType, Link, Pose, Robot};
 use std::rc::Rc;
 
 impl Model {
-    /// Converts a robot that urdf-rs has read. The result is the model that [`from_urdf`](Self::from_urdf) reads from
-    /// the same file, except for information that `urdf_rs::Robot` lacks.
+    /// Converts a robot that urdf-rs has read. The result is the same model as [`from_urdf`](Self::from_urdf) reads
+    /// from the same file, except for information that `urdf_rs::Robot` lacks:
     ///
-    /// - A limit that is missing has zeros there. Zeros of a continuous joint are taken as no limit; zeros of a
-    ///   revolute or prismatic joint stay, and warn.
-    /// - A planar joint without an axis has 1 0 0, and no warning that says so.
-    /// - Versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions, frames and joints of
-    ///   Drake, and all that is unknown or left out are not there: they have neither effect nor warning.
+    /// - A missing limit consists of zeros in `urdf_rs::Robot`. Zeros of a continuous joint are treated as no limit.
+    ///   Zeros of a revolute or prismatic joint stay, and cause a warning.
+    /// - A planar joint without an axis has the axis 1 0 0, without a warning about this default.
+    /// - `urdf_rs::Robot` lacks versions and quaternions (`quat_xyzw`), limits of acceleration and jerk, transmissions,
+    ///   frames and joints of Drake, and unknown or unsupported names. They have no effect and cause no warning.
     ///
     /// Needs the feature `urdf-rs`.
     ///
@@ -28,8 +29,8 @@ impl Model {
     /// ```
     ///
     /// # Errors
-    /// The errors of [`from_urdf`](Self::from_urdf). In a message, the file is `<urdf-rs>`, and the line is the index
-    /// of the link or joint, counted from 1.
+    /// Returns the errors of [`from_urdf`](Self::from_urdf). In a message, the file is `<urdf-rs>`, and the line number
+    /// is the index of the link or joint, counted from 1.
     pub fn from_urdf_robot(robot: &Robot, options: &UrdfOptions) -> Result<Self, Error> {
         let file: Rc<str> = "<urdf-rs>".into();
         let links = robot.links.iter().map(link);
@@ -41,7 +42,7 @@ impl Model {
     }
 }
 
-/// Sets the line of each element to its index, counted from 1.
+/// Sets the line number of each element to the element's index, counted from 1.
 fn numbered(elements: impl Iterator<Item = Element>) -> impl Iterator<Item = Element> {
     (1..).zip(elements).map(|(line, element)| with_line(element, line))
 }
@@ -72,7 +73,8 @@ fn element(tag: &str, attributes: &[(&str, &str)], children: Vec<Element>) -> El
     }
 }
 
-/// Returns an element whose attributes are numbers, each written with enough digits to read the same number again.
+/// Returns an element whose attributes are lists of numbers. Each number is written with enough digits to read the same
+/// number again.
 fn numbers(tag: &str, attributes: &[(&str, &[f64])]) -> Element {
     let mut element = element(tag, &[], Vec::new());
     let words = |x: &[f64]| x.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");

@@ -9,19 +9,19 @@ use std::sync::mpsc::{Receiver, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// Programs that expand xacro, in the order in which they are tried: the first is part of ROS, the second is from PyPI
-/// and needs no ROS.
+/// Programs that expand xacro files, in the order in which they are tried. The first one is part of ROS. The second one
+/// is on PyPI and does not need ROS.
 const PROGRAMS: [&str; 2] = ["xacro", "xacrodoc"];
-/// Words in a message of `xacro` that it does not find packages without ROS.
+/// Words in error messages of `xacro`. They show that `xacro` did not find a package because ROS is missing.
 const ROS: [&str; 4] = ["ament_index_python", "rospkg", "PackageNotFoundError", "$(find"];
-/// Advice for a file that refers to packages.
+/// Advice in the error message for a file that refers to packages.
 const ADVICE: &str = "\nThe program `xacro` resolves `$(find …)` by ROS only. `pip install xacrodoc` installs a program \
     that finds packages in the folders of `packages`.";
-/// Maximum running time of a program; large robots take a few seconds.
+/// Maximum running time of a program. The expansion of large robots takes a few seconds.
 const MAX_TIME: Duration = Duration::from_secs(60);
-/// Maximum length of a program's output (bytes); one more than the limit for a robot's files.
+/// Maximum length of a program's output that is read (bytes). It is one more than the limit for a robot's files.
 const MAX_BYTES: u64 = (64 << 20) + 1;
-/// Maximum number of bytes of a program's message in an error.
+/// Maximum number of bytes of a program's message that an error contains.
 const MESSAGE: usize = 2000;
 
 /// Returns whether a path is the path of a xacro file.
@@ -29,7 +29,7 @@ pub(super) fn is_xacro(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "xacro")
 }
 
-/// Returns the URDF of a xacro file.
+/// Returns the URDF to which a xacro file expands.
 pub(super) fn expand(path: &Path, arguments: &[(String, String)], packages: &[PathBuf]) -> Result<String, Error> {
     let wrong = |what: String| Error::File { file: path.display().to_string(), what };
     for (name, _) in arguments {
@@ -70,7 +70,7 @@ fn run(program: &str, path: &Path, arguments: &[(String, String)], packages: &[P
         _ => Failure::Said(e.to_string()),
     };
     let mut command = Command::new(program);
-    // a path that begins with a dash would be parsed as an option
+    // A path that begins with a dash would be parsed as an option.
     command.arg(if path.is_absolute() { path.to_owned() } else { Path::new(".").join(path) });
     if program == PROGRAMS[1] {
         command.args(packages.iter().flat_map(|folder| [OsStr::new("--pkg-dir"), folder.as_os_str()]));
@@ -93,7 +93,7 @@ fn run(program: &str, path: &Path, arguments: &[(String, String)], packages: &[P
         let _ = child.wait();
         return Err(Failure::Said(format!("is not done after {} s", MAX_TIME.as_secs())));
     };
-    // a pipe may stay open if another process holds it
+    // A pipe may stay open if another process still holds it.
     let text = |from: Receiver<Vec<u8>>| from.recv_timeout(Duration::from_secs(1)).unwrap_or_default();
     if status.success() {
         return String::from_utf8(text(output)).map_err(|e| Failure::Said(e.to_string()));
@@ -103,7 +103,7 @@ fn run(program: &str, path: &Path, arguments: &[(String, String)], packages: &[P
     Err(Failure::Said(if message.is_empty() { status.to_string() } else { message }))
 }
 
-/// Reads a pipe on a separate thread, up to [`MAX_BYTES`].
+/// Reads a pipe on a separate thread, up to [`MAX_BYTES`] bytes.
 fn read(pipe: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
     let (sender, receiver) = channel();
     thread::spawn(move || {
@@ -116,7 +116,7 @@ fn read(pipe: Option<impl Read + Send + 'static>) -> Receiver<Vec<u8>> {
     receiver
 }
 
-/// Returns the search path: the folders of packages, followed by the folders of the environment.
+/// Returns the search path of packages: first the folders in `packages`, then the folders in the environment variable.
 fn search_path(packages: &[PathBuf]) -> OsString {
     let ros = std::env::var_os("ROS_PACKAGE_PATH").unwrap_or_default();
     let folders = packages.iter().cloned().chain(std::env::split_paths(&ros));

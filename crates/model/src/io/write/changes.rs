@@ -9,15 +9,17 @@ use condyle_spatial::{Act, Inertia, Se3};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Maximum relative difference that counts as rounding; chosen because inertias are transformed between the frames of
-/// several links.
+/// Maximum relative difference that is treated as a rounding error; chosen because inertias are transformed between the
+/// frames of several links.
 pub(super) const ROUNDING: f64 = 1e-9;
-/// Maximum relative difference that is certainly rounding, and not the contribution of another element.
+/// Maximum relative difference that is certainly a rounding error. A larger difference may be the contribution of
+/// another element.
 pub(super) const NO_SHARE: f64 = 1e-14;
-/// Maximum relative difference of numbers that are not written; chosen because MuJoCo's compiler and our reader round
-/// differently.
+/// Maximum relative difference up to which numbers are treated as equal and not written; chosen because MuJoCo's
+/// compiler and this crate's reader round differently.
 const EQUAL: f64 = 1e-12;
-/// Minimum fraction of a body's mass that a link may keep; with less, its centre of mass would have few digits.
+/// Minimum fraction of a body's mass that a link may keep; chosen because the centre of mass of a lighter link would
+/// have few digits.
 const LEAST_SHARE: f64 = 1e-3;
 
 /// Numbers that must change in a file.
@@ -26,12 +28,12 @@ pub(super) struct Changes {
     pub(super) joints: Vec<JointChange>,
 }
 
-/// New inertia of a body, distributed over its links.
+/// New inertia of a body, distributed over the links of the body.
 pub(super) struct LinkChange {
     body: usize,
-    /// Name of the link that takes the difference.
+    /// Name of the link that takes the difference between the body's new and old inertia.
     pub(super) link: String,
-    /// Pose in the body of the link that takes the difference.
+    /// Pose, in the body, of the link that takes the difference.
     placement: Se3<f64>,
     /// New inertia of the link that takes the difference, in the body's frame.
     inertia: Inertia<f64>,
@@ -49,11 +51,12 @@ pub(super) struct JointChange {
     pub(super) is_prismatic: bool,
     /// Numbers of the joint, in the order of [`NUMBERS`].
     values: [f64; 10],
-    /// Whether each number differs from the number in the file.
+    /// For each number, whether it differs from the number in the file.
     differs: [bool; 10],
 }
 
-/// Names of the numbers that a file has for each joint; the first two belong to q, the others to v.
+/// Names of the numbers that a file has for each joint. The first two are limits of coordinates in q, the others belong
+/// to degrees of freedom in v.
 pub(super) const NUMBERS: [&str; 10] = [
     "lower limit",
     "upper limit",
@@ -66,7 +69,8 @@ pub(super) const NUMBERS: [&str; 10] = [
     "friction",
     "armature",
 ];
-/// Index of the damping in [`NUMBERS`]; from this index on, several elements of a file may add up.
+/// Index of the damping in [`NUMBERS`]. A number with this or a larger index may be a sum over several elements of a
+/// file.
 const LOSSES: usize = 5;
 
 /// Returns the numbers of a model, in the order of [`NUMBERS`].
@@ -87,13 +91,13 @@ pub(super) fn numbers(model: &Model) -> [Vec<f64>; 10] {
     ]
 }
 
-/// Returns the slots of a joint in the k-th of its [`numbers`].
+/// Returns the slots of a joint in the k-th list of [`numbers`].
 pub(super) fn slots(body: &Body, k: usize) -> Range<usize> {
     if k < 2 { body.idx_q..body.idx_q + body.joint.nq() } else { body.idx_v..body.idx_v + body.joint.nv() }
 }
 
 impl JointChange {
-    /// Returns N numbers from index `first` on; `None` if none of them differs.
+    /// Returns N numbers, from index `first` on; `None` if none of these numbers differs.
     fn some<const N: usize>(&self, first: usize) -> Option<[f64; N]> {
         let differs = self.differs[first..first + N].contains(&true);
         differs.then(|| std::array::from_fn(|k| self.values[first + k]))
@@ -114,7 +118,8 @@ impl JointChange {
         self.some(3)
     }
 
-    /// Returns the coefficients of damping: constant, with the speed, and with its square.
+    /// Returns the coefficients of damping: the constant, the coefficient of the speed, and the coefficient of the
+    /// squared speed.
     pub(super) fn damping(&self) -> Option<[f64; 3]> {
         self.some(LOSSES)
     }
@@ -129,7 +134,7 @@ impl JointChange {
         self.some(9).map(|[x]| x)
     }
 
-    /// Returns the maximum speed, and the minimum and maximum effort, even if they do not differ.
+    /// Returns the maximum speed, and the minimum and maximum effort, even if they do not differ from the file.
     pub(super) fn all_limits(&self) -> (f64, [f64; 2]) {
         (self.values[2], [self.values[3], self.values[4]])
     }
@@ -143,7 +148,7 @@ impl LinkChange {
 }
 
 impl Changes {
-    /// Compares two models of one robot; `masses` are the masses of its links (kg), by name.
+    /// Compares two models of the same robot. `masses` contains the masses of its links (kg), by name.
     pub(super) fn new(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Self, Difference> {
         match different_robot(model, was) {
             Some(difference) => Err(difference),
@@ -155,8 +160,8 @@ impl Changes {
         self.links.is_empty() && self.joints.is_empty()
     }
 
-    /// Subtracts the contributions of other elements, given the model that the changed file describes. Returns whether
-    /// there are changes.
+    /// Subtracts the contributions of other elements. `now` is the model that the changed file describes. Returns
+    /// whether there are changes.
     pub(super) fn take_shares_off(&mut self, model: &Model, now: &Model) -> bool {
         for change in &mut self.links {
             let (wanted, found) = (model.bodies[change.body].inertia, now.bodies[change.body].inertia);
@@ -179,7 +184,7 @@ impl Changes {
     }
 }
 
-/// Finds the bodies whose inertia differs.
+/// Finds the bodies whose inertia differs, and the link of each body that takes the difference.
 fn links(model: &Model, was: &Model, masses: &HashMap<String, f64>) -> Result<Vec<LinkChange>, String> {
     let mut changes = Vec::new();
     for (i, (body, before)) in model.bodies.iter().zip(&was.bodies).enumerate() {
@@ -230,14 +235,14 @@ fn joints(model: &Model, was: &Model) -> Result<Vec<JointChange>, String> {
     Ok(changes)
 }
 
-/// Returns whether two numbers are equal up to rounding. The tolerance of numbers below 0.001, such as sums of small
-/// armatures, is the tolerance of 0.001.
+/// Returns whether two numbers are equal up to rounding. Numbers below 0.001, such as sums of small armatures, have the
+/// same tolerance as 0.001.
 pub(super) fn close(a: f64, b: f64, rounding: f64) -> bool {
     let tolerance = rounding * a.abs().max(b.abs()).max(1e-3);
     a == b || tolerance.is_finite() && (a - b).abs() <= tolerance
 }
 
-/// Returns whether two inertias are equal up to rounding: |m c| is at most √(m tr Ī).
+/// Returns whether two inertias are equal up to rounding. The scale of m c is its upper bound √(m tr Ī).
 pub(super) fn alike(a: Inertia<f64>, b: Inertia<f64>, rounding: f64) -> bool {
     let size = |I: Inertia<f64>| (I.rotational.xx.abs() + I.rotational.yy.abs() + I.rotational.zz.abs()).max(1e-300);
     let (mass, size) = (a.mass.abs().max(b.mass.abs()), size(a).max(size(b)));

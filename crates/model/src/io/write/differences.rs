@@ -12,13 +12,13 @@ use condyle_spatial::{Inertia, Se3, Vec3};
 
 /// First difference between a model and the model in a file.
 pub(super) struct Difference {
-    /// Differing thing, with both numbers.
+    /// Name of the differing quantity, with both values.
     what: String,
-    /// Attributes by which the number depends on other numbers of the file.
+    /// Attributes that may be the cause: with them, a number depends on other numbers of the file.
     causes: &'static [&'static str],
 }
 
-/// Attributes by which a number depends on other numbers of a file, with an explanation.
+/// Attributes with which a number depends on other numbers of a file, each with an explanation.
 const CAUSES: [(&str, &str); 5] = [
     ("springdamper", "`springdamper` makes stiffness and damping depend on the inertia"),
     ("dampratio", "`dampratio` makes kv depend on the inertia"),
@@ -34,7 +34,7 @@ impl From<String> for Difference {
 }
 
 impl Difference {
-    /// Returns the difference as text, with the cause if an attribute of the file is one.
+    /// Returns the difference as text. If the file contains one of the attributes in `causes`, adds an explanation.
     pub(super) fn text(self, root: &Element) -> String {
         let cause = CAUSES.iter().find(|(name, _)| self.causes.contains(name) && mentions(root, name));
         match cause {
@@ -44,12 +44,12 @@ impl Difference {
     }
 }
 
-/// Returns whether an element, or an element in it, has an attribute.
+/// Returns whether an element, or an element inside it, has a given attribute.
 fn mentions(element: &Element, name: &str) -> bool {
     element.attribute(name).is_some() || element.children.iter().any(|child| mentions(child, name))
 }
 
-/// Returns the first property, except numbers that can be written, in which two models differ.
+/// Returns the first property in which two models differ. Numbers that can be written to a file are not compared.
 pub(super) fn different_robot(model: &Model, file: &Model) -> Option<Difference> {
     let names = |b: &Body| (b.name.clone(), b.joint_name.clone());
     for (a, b) in model.bodies.iter().zip(&file.bodies) {
@@ -167,7 +167,8 @@ fn different_actuators(model: &Model, file: &Model) -> Option<Difference> {
     None
 }
 
-/// Returns the thing that an actuator drives, and the coefficients of the joints if that is a tendon.
+/// Returns the name of the joint, tendon or frame that an actuator drives, and the coefficients of the joints for a
+/// tendon.
 fn drives(model: &Model, actuator: &Actuator) -> (String, Vec<f64>) {
     let joint = |body: usize| format!("joint `{}`", model.bodies[body].joint_name);
     match &actuator.transmission {
@@ -192,7 +193,7 @@ fn different_keyframes(model: &Model, file: &Model) -> Option<Difference> {
     })
 }
 
-/// Returns the first difference between constraints; the poses of their frames are compared with all frames.
+/// Returns the first difference between constraints. The poses of their frames are compared elsewhere, with all frames.
 fn different_constraints(model: &Model, file: &Model) -> Option<Difference> {
     let names = |m: &Model| m.constraints.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
     if let Some(what) = different_names("constraints", &names(model), &names(file)) {
@@ -216,14 +217,14 @@ fn different_constraints(model: &Model, file: &Model) -> Option<Difference> {
     })
 }
 
-/// Returns a difference between the names of parts of the model and of the file.
+/// Returns the difference between two lists of names, in the model and in the file. `parts` says what is named.
 fn different_names(parts: &str, model: &[String], file: &[String]) -> Option<String> {
     let list = |names: &[String]| names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
     let said = |names: &[String]| if names.is_empty() { "none".to_owned() } else { list(names) };
     (model != file).then(|| format!("{parts}: {} in the model and {} in the file", said(model), said(file)))
 }
 
-/// Returns a difference between numbers of the model and of the file.
+/// Returns the difference between two lists of numbers, in the model and in the file.
 fn different_numbers(name: &str, model: &[f64], file: &[f64]) -> Option<String> {
     let same = model.len() == file.len() && model.iter().zip(file).all(|(&a, &b)| close(a, b, ROUNDING));
     let said = |numbers: &[f64]| match numbers {
@@ -239,7 +240,7 @@ fn pose(X: Se3<f64>) -> Vec<f64> {
     [X.translation].into_iter().chain(X.rotation.columns()).flat_map(Vec3::to_array).collect()
 }
 
-/// Returns the first difference between a model and the model in a file that exceeds a relative rounding error.
+/// Returns the first difference between a model and the model in a file that is larger than a relative rounding error.
 pub(super) fn difference(model: &Model, file: &Model, rounding: f64) -> Option<Difference> {
     if let Some(difference) = different_robot(model, file) {
         return Some(difference);

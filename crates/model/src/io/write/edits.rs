@@ -1,10 +1,10 @@
-//! Edits of an XML text by byte ranges; all other bytes are kept.
+//! Edits of an XML text. Byte ranges are replaced, and all other bytes are kept.
 
 use crate::io::xml::Element;
 use condyle_spatial::{Inertia, Sym3, Vec3};
 use std::ops::Range;
 
-/// Replaced pieces of a text, each a byte range with its new text.
+/// Replaced parts of a text: byte ranges, and the new text for each of them.
 pub(super) struct Edits<'a> {
     text: &'a str,
     pieces: Vec<(Range<usize>, String)>,
@@ -16,12 +16,13 @@ impl<'a> Edits<'a> {
         Self { text, pieces: Vec::new() }
     }
 
-    /// Sets an attribute of an element to numbers, with the fewest digits from which each number can be read back.
+    /// Sets an attribute of an element to numbers. Each number has the fewest digits with which the same number is read
+    /// again.
     pub(super) fn set(&mut self, element: &Element, name: &str, numbers: &[f64]) {
         self.set_text(element, name, &words(numbers));
     }
 
-    /// Sets an attribute of an element to a text without characters that XML escapes.
+    /// Sets an attribute of an element to a text. The text must not contain characters that XML escapes.
     pub(super) fn set_text(&mut self, element: &Element, name: &str, value: &str) {
         let tag = StartTag::new(self.text, element);
         match tag.attribute(name) {
@@ -33,7 +34,7 @@ impl<'a> Edits<'a> {
         }
     }
 
-    /// Removes an attribute of an element, with the white space before it.
+    /// Removes an attribute of an element, and the white space before the attribute.
     pub(super) fn remove(&mut self, element: &Element, name: &str) {
         if let Some(old) = StartTag::new(self.text, element).attribute(name) {
             let start = self.text[..old.start].trim_end().len();
@@ -41,10 +42,10 @@ impl<'a> Edits<'a> {
         }
     }
 
-    /// Inserts an element as the first child of another one, on its own line if the other children have their own
-    /// lines.
+    /// Inserts an element as the first child of another element. The new element is on its own line if the other
+    /// children are on their own lines.
     ///
-    /// An element without an end tag gets one, so only one child can be inserted into it.
+    /// An element without an end tag gets one. Only one child can be inserted into such an element.
     pub(super) fn insert(&mut self, element: &Element, xml: &str) {
         let (tag, own) = (StartTag::new(self.text, element), self.indent(element));
         let child = element.children.first().map(|child| self.indent(child));
@@ -73,7 +74,8 @@ impl<'a> Edits<'a> {
         new + &self.text[end..]
     }
 
-    /// Returns the line break and the white space before an element; `None` if other text precedes it on its line.
+    /// Returns the line break and the white space before an element. Returns `None` if other text precedes the element
+    /// on its line.
     fn indent(&self, element: &Element) -> Option<&'a str> {
         let before = &self.text[..element.at];
         let line = before.trim_end_matches([' ', '\t']);
@@ -84,16 +86,16 @@ impl<'a> Edits<'a> {
 
 /// Start tag of an element in its text.
 struct StartTag {
-    /// Name and byte range of each attribute, from its name to its closing quote.
+    /// Name of each attribute, and the byte range from this name to the closing quote.
     attributes: Vec<(String, Range<usize>)>,
-    /// Byte index after the last attribute, or after the name of the tag.
+    /// Byte index of the end of the last attribute, or of the end of the tag's name if there are no attributes.
     content_end: usize,
     /// Byte index after the `>`.
     end: usize,
 }
 
 impl StartTag {
-    /// Finds the parts of a tag that the parser has accepted.
+    /// Finds the parts of a start tag. The parser must have accepted this tag before.
     fn new(text: &str, element: &Element) -> Self {
         let (mut at, mut attributes) = (element.at + 1 + element.tag.len(), Vec::new());
         let mut content_end = at;
@@ -120,7 +122,7 @@ impl StartTag {
     }
 }
 
-/// Writes numbers separated by spaces, with the fewest digits from which each can be read back.
+/// Writes numbers separated by spaces. Each number has the fewest digits with which the same number is read again.
 pub(super) fn words(numbers: &[f64]) -> String {
     let word = |x: &f64| {
         let text = format!("{x:?}");
@@ -129,7 +131,8 @@ pub(super) fn words(numbers: &[f64]) -> String {
     numbers.iter().map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// Returns mass (kg), centre of mass (m), and inertia about it (kg m²), the form used in files.
+/// Returns the mass (kg), the centre of mass (m), and the inertia about the centre of mass (kg m²). This is the form
+/// used in files.
 pub(super) fn about_com(I: Inertia<f64>) -> Result<(f64, [f64; 3], Sym3<f64>), String> {
     if I.mass == 0.0 {
         return match I.mass_com == Vec3::zero() {

@@ -1,4 +1,4 @@
-//! Numbers of a robot in the text of an MJCF.
+//! Editing of the numbers of a robot in the text of an MJCF.
 
 use super::Format;
 use super::changes::{Changes, JointChange};
@@ -11,26 +11,26 @@ use condyle_spatial::{Act, Inertia, Se3};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// An MJCF: the path relative to which files are included, and options of the reader.
+/// MJCF format, with the path relative to which files are included, and the options of the reader.
 pub(super) struct Mjcf<'a> {
     pub(super) path: &'a Path,
     pub(super) options: MjcfOptions,
 }
 
-/// Bodies and joints of a document, by the names that the reader gives them.
+/// Bodies and joints of a document, by the names that the reader gives these bodies and joints.
 #[derive(Default)]
 struct Elements<'a> {
     bodies: HashMap<String, Parts<'a>>,
     joints: HashMap<String, &'a Element>,
-    /// Number of bodies so far.
+    /// Number of bodies that have been found.
     count: usize,
 }
 
-/// Parts of a body, including the parts in its `<frame>`s.
+/// Elements of a body by kind, including the elements inside its `<frame>`s.
 struct Parts<'a> {
     body: &'a Element,
     inertial: Option<&'a Element>,
-    /// Frames around the inertial, outermost first.
+    /// Frames around the `<inertial>`, outermost first.
     frames: Vec<&'a Element>,
     has_geom: bool,
     joints: Vec<&'a Element>,
@@ -64,7 +64,7 @@ impl<'a> Elements<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// Finds the parts of a body.
+    /// Finds the elements of a body.
     fn new(body: &'a Element) -> Self {
         let [frames, joints, inside] = [const { Vec::new() }; 3];
         let mut parts = Self { body, inertial: None, frames, has_geom: false, joints, inside };
@@ -72,7 +72,7 @@ impl<'a> Parts<'a> {
         parts
     }
 
-    /// Adds the content of the body, or of a frame inside other ones.
+    /// Adds the elements inside the body, or inside a frame. `frames` are the frames around these elements.
     fn gather(&mut self, element: &'a Element, frames: &mut Vec<&'a Element>) {
         for child in &element.children {
             match &*child.tag {
@@ -91,12 +91,12 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// Returns the name of an element, or another name if it has none.
+/// Returns the name of an element. If the element has no name, returns `otherwise()`.
 fn name(element: &Element, otherwise: impl Fn() -> String) -> String {
     element.attribute("name").filter(|n| !n.is_empty()).map_or_else(otherwise, str::to_owned)
 }
 
-/// Returns the value of a compiler's attribute; the last one counts.
+/// Returns the value of an attribute of `<compiler>`. If it occurs several times, the last one counts.
 fn compiler<'a>(root: &'a Element, name: &str) -> Option<&'a str> {
     let sections = root.children.iter().filter(|section| section.tag == "compiler");
     sections.rev().find_map(|section| section.attribute(name))
@@ -110,7 +110,7 @@ impl Format for Mjcf<'_> {
     fn masses(&self, root: &Element) -> HashMap<String, f64> {
         let mass = |parts: &Parts| match parts.inertial {
             Some(inertial) => inertial.attribute("mass")?.trim().parse().ok(),
-            None => parts.has_geom.then_some(f64::MIN_POSITIVE), // some mass, which an <inertial> replaces
+            None => parts.has_geom.then_some(f64::MIN_POSITIVE), // any positive mass, which an <inertial> replaces
         };
         let bodies = Elements::new(root).bodies.into_iter();
         bodies.filter_map(|(name, parts)| Some((name, mass(&parts)?))).collect()
@@ -147,10 +147,10 @@ impl Format for Mjcf<'_> {
     }
 }
 
-/// Sets the inertia of a body, in the frame around its `<inertial>`.
+/// Sets the inertia of a body, in the frame that surrounds the body's `<inertial>`.
 fn inertial(edits: &mut Edits, parts: &Parts, I: Inertia<f64>) -> Result<(), String> {
     let (mass, com, J) = about_com(I)?;
-    // MuJoCo accepts a full inertia only if it is positive definite
+    // MuJoCo accepts a full inertia matrix only if it is positive definite.
     let (moments, numbers) = match [J.xy, J.xz, J.yz] {
         [0.0, 0.0, 0.0] => ("diaginertia", vec![J.xx, J.yy, J.zz]),
         [xy, xz, yz] => ("fullinertia", vec![J.xx, J.yy, J.zz, xy, xz, yz]),
@@ -163,7 +163,7 @@ fn inertial(edits: &mut Edits, parts: &Parts, I: Inertia<f64>) -> Result<(), Str
     edits.set(inertial, "pos", &com);
     edits.set(inertial, "mass", &[mass]);
     edits.set(inertial, moments, &numbers);
-    // the axes of the new inertia are the axes of that frame
+    // The new inertia is along the axes of that frame, so attributes for other axes are removed.
     let others = ["diaginertia", "fullinertia", "quat", "axisangle", "xyaxes", "zaxis", "euler"];
     others.into_iter().filter(|name| *name != moments).for_each(|name| edits.remove(inertial, name));
     Ok(())

@@ -1,4 +1,4 @@
-//! Numbers of a robot in the text of a URDF.
+//! Editing of the numbers of a robot in the text of a URDF.
 
 use super::Format;
 use super::changes::{Changes, JointChange};
@@ -10,19 +10,19 @@ use crate::model::Model;
 use condyle_spatial::Inertia;
 use std::collections::{HashMap, HashSet};
 
-/// A URDF, with the options of its reader.
+/// URDF format, with the options of the reader.
 pub(super) struct Urdf {
     pub(super) options: UrdfOptions,
 }
 
-/// Returns the name of the link that is no child of a joint.
+/// Returns the name of the link that is not the child of any joint.
 pub(super) fn root(robot: &Element) -> Option<&str> {
     let children: HashSet<&str> =
         named(robot, "joint").into_values().filter_map(|j| j.child("child")?.attribute("link")).collect();
     named(robot, "link").into_keys().find(|link| !children.contains(link))
 }
 
-/// Returns the links or joints of a robot by name.
+/// Returns the links or joints of a robot, by name.
 fn named<'a>(robot: &'a Element, tag: &'a str) -> HashMap<&'a str, &'a Element> {
     robot.all(tag).filter_map(|element| Some((element.attribute("name")?, element))).collect()
 }
@@ -75,7 +75,7 @@ fn inertial(edits: &mut Edits, link: &Element, I: Inertia<f64>) -> Result<(), St
     match inertial.child("origin") {
         Some(origin) => {
             edits.set(origin, "xyz", &com);
-            // the axes of the new inertia are the axes of the link
+            // The new inertia is along the axes of the link, so other axes are removed.
             let turned = |name: &&str| {
                 let numbers = origin.attribute(name).unwrap_or_default().split_whitespace();
                 numbers.map(str::parse::<f64>).any(|x| x != Ok(0.0))
@@ -118,7 +118,7 @@ fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange) -> Resul
     } else if let Some(limit) = limit {
         limits.into_iter().for_each(|(name, x)| edits.set(limit, name, &[x]));
     } else {
-        // a new element has both
+        // A new `<limit>` needs both velocity and effort.
         let (velocity, effort) = (finite("velocity", velocity)?, one(effort)?);
         let position = limits.into_iter().filter(|(name, _)| matches!(*name, "lower" | "upper"));
         edits.insert(joint, &element("limit", &position.chain([effort, velocity]).collect::<Vec<_>>()));
@@ -138,12 +138,13 @@ fn edit_joint(edits: &mut Edits, joint: &Element, change: &JointChange) -> Resul
     Ok(())
 }
 
-/// Tag of the rotor inertia of a transmission, for Drake and our reader.
+/// Tag of the rotor inertia in a transmission. Drake and the reader of this crate read it.
 const ROTOR: &str = "drake:rotor_inertia";
-/// Tag of the number of turns of the rotor per turn of its joint; 1 if it is missing.
+/// Tag of the number of turns of the rotor per turn of its joint. The number is 1 if the element is missing.
 const RATIO: &str = "drake:gear_ratio";
 
-/// Sets the armature of a joint: the rotor inertia J of its transmission, where the armature is n² J.
+/// Sets the armature of a joint. It is written as the rotor inertia J of the joint's transmission, with the armature n²
+/// J.
 fn transmission(edits: &mut Edits, robot: &Element, joint: &str, armature: f64) {
     let drives = |t: &&Element| t.all("joint").map(|j| j.attribute("name")).eq([Some(joint)]);
     let own = robot.all("transmission").filter(drives).find(|t| t.all("actuator").count() == 1);
@@ -156,7 +157,7 @@ fn transmission(edits: &mut Edits, robot: &Element, joint: &str, armature: f64) 
         (_, Some(old)) => edits.set(old, "value", &[inertia]),
         (Some(actuator), None) => edits.insert(actuator, &rotor),
         (None, None) => {
-            let kind = "<type>transmission_interface/SimpleTransmission</type>"; // without it, Drake refuses the file
+            let kind = "<type>transmission_interface/SimpleTransmission</type>"; // without this element, Drake refuses the file
             let inside = format!("{kind}<joint name=\"{joint}\"/><actuator name=\"{joint}\">{rotor}</actuator>");
             edits.insert(robot, &format!("<transmission name=\"{joint}\">{inside}</transmission>"));
         }

@@ -1,7 +1,7 @@
-//! Encodings of XML files, given by the byte order mark or the declaration.
+//! Encodings of XML files. The byte order mark or the XML declaration gives the encoding of a file.
 
-/// Returns the text of a file. A byte that is invalid in its encoding becomes U+FFFD; the parser accepts it in comments
-/// only.
+/// Returns the text of a file. A byte that is invalid in the file's encoding becomes U+FFFD, which the parser accepts
+/// only in comments.
 pub(super) fn decode(bytes: Vec<u8>) -> String {
     match &bytes[..] {
         [0xef, 0xbb, 0xbf, ..] => utf8(bytes),
@@ -10,7 +10,7 @@ pub(super) fn decode(bytes: Vec<u8>) -> String {
         [b'<', 0, ..] => utf16(&bytes, u16::from_le_bytes),
         [0, b'<', ..] => utf16(&bytes, u16::from_be_bytes),
         _ => match declared(&bytes).map(|name| name.to_ascii_lowercase()).as_deref() {
-            // a file that declares UTF-16 but is readable here is in ASCII or UTF-8
+            // A file that declares UTF-16 but could be read as bytes up to here is in ASCII or UTF-8.
             None | Some(b"utf-8" | b"utf8" | b"us-ascii" | b"ascii" | b"utf-16" | b"utf16") => utf8(bytes),
             Some(
                 b"iso-8859-1" | b"iso8859-1" | b"iso_8859-1" | b"latin1" | b"latin-1" | b"windows-1252" | b"cp1252",
@@ -32,7 +32,7 @@ fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> String {
     char::decode_utf16(units).map(|c| c.unwrap_or(INVALID)).collect()
 }
 
-/// Returns the character of a byte in windows-1252, which contains ISO-8859-1 except its control characters.
+/// Returns the character of a byte in windows-1252. This encoding contains ISO-8859-1, except its control characters.
 fn western(byte: u8) -> char {
     const CONTROLS: &str = "€\u{81}‚ƒ„…†‡ˆ‰Š‹Œ\u{8d}Ž\u{8f}\u{90}‘’“”•–—˜™š›œ\u{9d}žŸ";
     match byte {
@@ -41,7 +41,7 @@ fn western(byte: u8) -> char {
     }
 }
 
-/// Returns the name of the encoding in the declaration; spaces and comments may precede the declaration.
+/// Returns the name of the encoding in the XML declaration. Spaces and comments may precede the declaration.
 pub(super) fn declared(text: &[u8]) -> Option<&[u8]> {
     let find = |text: &[u8], what: &[u8]| text.windows(what.len()).position(|window| window == what);
     let mut rest = text.trim_ascii_start();

@@ -1,7 +1,9 @@
-//! Parser of XML: one pass from a text to elements. It accepts the same files as tinyxml2, on which the usual readers
-//! of robots are based: prefixes without a declaration, dashes in comments, a declaration that is not at the beginning.
+//! Parser of XML, which reads a text in one pass. It accepts the same files as tinyxml2, on which the usual readers of
+//! robots are based: prefixes without a declaration, dashes in comments, and a declaration that is not at the
+//! beginning.
 //!
-//! Elements inside a document type have no effect, and its entities are not expanded, so a text cannot grow.
+//! Elements inside a document type have no effect. The entities of a document type are not expanded, so a text cannot
+//! grow.
 
 use super::encoding::{INVALID, declared};
 use super::{EXPAND, Element, MAX_ATTRIBUTES, MAX_DEPTH};
@@ -14,22 +16,22 @@ const MAX_ENTITY: usize = 64;
 /// Parser state: the position in a text, and the open elements.
 struct Parser<'a> {
     text: &'a str,
-    /// Number of bytes read so far.
+    /// Number of bytes that have been read.
     at: usize,
-    /// Line of the byte at index `counted`.
+    /// Line number of the byte at index `counted`.
     line: u32,
     counted: usize,
     file: Rc<str>,
-    /// Tag and line of each open element.
+    /// Tag and line number of each open element.
     tags: Vec<(&'a str, u32)>,
     /// Open elements, at most [`MAX_DEPTH`].
     open: Vec<Element>,
     root: Option<Element>,
-    /// Line and description of the first thing outside of the root element.
+    /// Line number and description of the first item outside of the root element.
     stray: Option<Box<(u32, String)>>,
-    /// First element below the deepest level, and the number of levels.
+    /// First element that is nested too deeply, and its depth.
     too_deep: Option<(Element, usize)>,
-    /// Prefixes of xacro macros.
+    /// Prefixes whose elements are xacro macros.
     macros: Vec<&'a str>,
     /// Whether a byte of the file was invalid in its encoding.
     is_damaged: bool,
@@ -65,7 +67,7 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Element, Error> {
 }
 
 impl<'a> Parser<'a> {
-    /// Reads text and the next tag after it. Returns whether there was a tag.
+    /// Reads text and the tag that follows it. Returns whether there was a tag.
     fn step(&mut self) -> Result<bool, Error> {
         let rest = &self.text[self.at..];
         let length = rest.find('<').unwrap_or(rest.len());
@@ -119,14 +121,14 @@ impl<'a> Parser<'a> {
         Ok(true)
     }
 
-    /// Moves past an end marker, and returns the text before it.
+    /// Moves past an end marker, and returns the text before this marker.
     fn skip(&mut self, begin: usize, rest: &'a str, end: &str, what: &str) -> Result<&'a str, Error> {
         let Some(length) = rest.find(end) else { return Err(self.wrong(format!("{what} is never closed"))) };
         self.at += begin + length + end.len();
         Ok(&rest[..length])
     }
 
-    /// Reads a tag that opens an element; `rest` begins with its name.
+    /// Reads a tag that opens an element. `rest` begins with the tag's name.
     fn open(&mut self, rest: &'a str) -> Result<(), Error> {
         let name = self.name(rest)?;
         if self.root.is_some() && self.tags.is_empty() {
@@ -232,7 +234,8 @@ impl<'a> Parser<'a> {
         Ok(())
     }
 
-    /// Notes a thing outside of the root element, as the readers that robots are written for accept it.
+    /// Stores the description of an item outside of the root element. Other readers of robots accept such items, so it
+    /// is not an error.
     fn stray(&mut self, what: String) {
         if self.stray.is_none() {
             self.stray = Some(Box::new((self.count_lines(), what)));
@@ -258,7 +261,8 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Decodes character references and the five entities of a text. In an attribute, white space becomes spaces.
+    /// Decodes character references and the five entities in a text. In an attribute, line breaks and tabs become
+    /// spaces.
     fn decoded(&self, text: &str, is_attribute: bool) -> Result<String, Error> {
         let special = |b: &u8| *b == b'&' || *b == b'\r' || is_attribute && matches!(*b, b'\n' | b'\t');
         self.check_encoding(text)?;
@@ -314,7 +318,7 @@ impl<'a> Parser<'a> {
     }
 }
 
-/// Returns the length of a document type including its `>`; `None` if its end is missing.
+/// Returns the length of a document type, including its `>`. Returns `None` if its end is missing.
 fn end_of_type(text: &str) -> Option<usize> {
     let (mut at, mut is_subset) = (0, false);
     loop {
@@ -338,8 +342,8 @@ pub(super) fn count(bytes: &[u8], byte: u8) -> usize {
     bytes.iter().filter(|&&b| b == byte).count()
 }
 
-/// Returns whether the text between `&` and `;` is the name of an entity or the number of a character. Any other `&` is
-/// literal.
+/// Returns whether the text between `&` and `;` is the name of an entity or the number of a character. If it is
+/// neither, the `&` is literal.
 fn is_entity(name: &str) -> bool {
     let name = name.strip_prefix('#').unwrap_or(name);
     !name.is_empty() && name.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b))

@@ -1,4 +1,4 @@
-//! XML for other parsers: the text of a robot, without constructs that they refuse.
+//! Text of a robot's file for other XML parsers, without constructs that they refuse.
 
 use super::{Amount, Element};
 use crate::error::Error;
@@ -11,8 +11,8 @@ impl Model {
         super::encoding::decode(bytes)
     }
 
-    /// Returns a text with the same elements on the same lines that every XML parser can read: without a document type,
-    /// comments and prefixes.
+    /// Returns a text that every XML parser can read: without a document type, comments and prefixes. The elements are
+    /// the same, on the same lines.
     #[doc(hidden)]
     pub fn well_formed(text: &str) -> Result<String, Error> {
         let mut written = Written { text: String::with_capacity(text.len()), line: 1 };
@@ -27,7 +27,7 @@ struct Written {
 }
 
 impl Written {
-    /// Writes an element on its line, or on the first free line after it.
+    /// Writes an element on its line, or on the first later line that is free.
     fn element(&mut self, element: &Element) {
         let name = |name: &str| match name.strip_prefix(':') {
             Some(rest) => format!("_{}", rest.replace(':', "-")), // no name begins with a dash
@@ -60,7 +60,7 @@ impl Written {
                 '&' => self.text += "&amp;",
                 '<' => self.text += "&lt;",
                 '"' => self.text += "&quot;",
-                '\n' => self.text += "&#10;", // so that no line is added
+                '\n' => self.text += "&#10;", // this way, no line is added
                 '\t' => self.text += "&#9;",
                 c if c.is_control() => {}
                 c => self.text.push(c),

@@ -1,5 +1,5 @@
-//! Lanes for a processor whose vector instructions are not supported here: arrays, which the compiler may vectorize. No
-//! SIMD level uses them. They exist so that code on lanes needs no second version.
+//! Lanes for processors whose vector instructions this crate does not support. They are arrays, which the compiler may
+//! vectorize. No SIMD level uses these lanes. They exist so that code on lanes needs no second version.
 
 use super::{Element, Lanes, Register};
 use crate::scalar::number::Number;
@@ -17,7 +17,7 @@ impl Element<8> for f32 {
     type Register = [Self; 8];
 }
 
-/// Defines functions that compute lane k from the numbers in lane k.
+/// Defines functions that compute lane k of the result from lane k of the arguments.
 macro_rules! each {
     ($(fn $name:ident($($x:ident: $type:ty),*) -> $out:ty = [$first:expr; $k:ident => $lane:expr])*) => {$(
         #[inline(always)]
@@ -62,14 +62,14 @@ impl<T: Number, const N: usize> Register<T, N> for [T; N] {
     }
 }
 
-/// Moves of numbers between the lanes of a vector of four.
+/// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
     use super::{Lanes, Witness};
 
     /// Assignment of source lanes to target lanes. A target lane without a source becomes 0.
     #[derive(Clone, Copy, Debug)]
     pub struct Move {
-        /// Source lane of each target lane; 4 if it has no source.
+        /// Source lane of each target lane; 4 if the target lane has no source.
         from: [usize; 4],
     }
 

@@ -1,14 +1,15 @@
 //! SIMD lanes: several numbers side by side in vector registers.
 //!
-//! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 and FMA, or NEON or SIMD128, where each uses two registers.
-//! `Lanes<f64, 8>` and `Lanes<f32, 16>` need AVX-512. [`Fused`](super::Fused) is a single `f64` with fused products and
-//! sums.
+//! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 with FMA, NEON, or SIMD128. With NEON and SIMD128, each
+//! vector uses two registers. `Lanes<f64, 8>` and `Lanes<f32, 16>` need AVX-512. [`Fused`](super::Fused) is a single
+//! `f64` with fused products and sums.
 //!
 //! Use these types only in code that was entered through a function compiled for their
-//! [`Level`](crate::simd::level::Level). Elsewhere each operation would be a function call, and an illegal instruction
-//! on a processor that lacks it. So only a [`Witness`](crate::simd::pack::Witness) can name these types.
+//! [`Level`](crate::simd::level::Level). In other code, each operation would be a function call, and an illegal
+//! instruction on a processor without this level. So only a [`Witness`](crate::simd::pack::Witness) can name these
+//! types.
 //!
-//! Every operation treats each lane separately: the content of one lane (NaN included) never affects another.
+//! Every operation treats each lane separately. The content of one lane, even NaN, never affects another lane.
 //!
 //! Each architecture implements [`Register`] in its own file: x86.rs, neon.rs or wasm.rs.
 #![allow(unsafe_code)]
@@ -38,14 +39,14 @@ mod processor;
 
 /// Number type for which vectors of N lanes exist.
 pub trait Element<const N: usize>: Number {
-    /// Register or registers that hold the vector.
+    /// Register, or pair of registers, that holds the vector.
     type Register: Register<Self, N>;
 }
 
-/// N numbers in one or two vector registers. They are used only in code that is compiled for their level and that runs
-/// on a processor with this level.
+/// N numbers in one or two vector registers. The registers are used only in code that is compiled for their SIMD level
+/// and that runs on a processor with this level.
 pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
-    /// Result of a comparison.
+    /// Result of a comparison: one truth value per lane.
     type Mask: Copy;
 
     /// Runs a kernel with the instructions of these registers.
@@ -56,8 +57,9 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn store(a: Self) -> [T; N];
     /// Returns x in every lane.
     fn splat(x: T) -> Self;
-    /// Returns 0 in every lane, as zero bits; [`splat`](Self::splat) is an instruction. Code compiled for any processor
-    /// fills workspaces with this value. There, an instruction of these registers would be a function call.
+    /// Returns 0 in every lane. Code that is compiled for any processor fills workspaces with this value. In such code,
+    /// an instruction of these registers, as in [`splat`](Self::splat), would be a function call; zero bits need no
+    /// instruction.
     fn zero() -> Self;
     /// Returns a + b.
     fn add(a: Self, b: Self) -> Self;
@@ -67,7 +69,7 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn mul(a: Self, b: Self) -> Self;
     /// Returns a / b.
     fn div(a: Self, b: Self) -> Self;
-    /// Returns a b + c, rounded once; in WebAssembly, which has no such instruction, rounded twice.
+    /// Returns a b + c, rounded once. WebAssembly does not have such an instruction and rounds twice.
     fn mul_add(a: Self, b: Self, c: Self) -> Self;
     /// Returns √a.
     fn sqrt(a: Self) -> Self;
@@ -77,7 +79,7 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
     fn abs(a: Self) -> Self;
     /// Returns a < b.
     fn lt(a: Self, b: Self) -> Self::Mask;
-    /// Returns a where the mask holds, b elsewhere.
+    /// Returns a in lanes in which the mask holds, and b in other lanes.
     fn select(mask: Self::Mask, a: Self, b: Self) -> Self;
     /// Returns whether both masks hold.
     fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask;
@@ -106,7 +108,7 @@ pub trait Register<T: Number, const N: usize>: Copy + Send + Sync + 'static {
 #[repr(transparent)]
 pub struct Lanes<T: Element<N>, const N: usize>(T::Register);
 
-/// Defines functions that consist of instructions of a processor.
+/// Defines functions that consist of vector instructions of the processor.
 #[allow(unused_macros)] // unused without vector instructions
 macro_rules! instructions {
     ($($(#[$doc:meta])* fn $name:ident($($x:ident: $type:ty),*) $(-> $out:ty)? { $body:expr })*) => {$(
@@ -114,7 +116,8 @@ macro_rules! instructions {
         #[inline(always)]
         #[allow(unused_unsafe)]
         fn $name($($x: $type),*) $(-> $out)? {
-            // SAFETY: the level is supported: only code that was entered through `Scalar::enter` has these numbers.
+            // SAFETY: the processor has the level: only code that was entered through `Scalar::enter` has these
+            // numbers.
             unsafe { $body }
         }
     )*};
@@ -173,10 +176,10 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
     /// Transposes N vectors: number i of vector k becomes number k of vector i.
     #[inline(always)]
     pub(crate) fn transpose(rows: &mut [Self; N]) {
-        // SAFETY: these are transparent wrappers.
+        // SAFETY: `Lanes` is a transparent wrapper of its register.
         T::Register::transpose(unsafe { &mut *core::ptr::from_mut(rows).cast() });
     }
-    /// Computes (sin x, cos x) of K vectors.
+    /// Computes (sin x, cos x) for each of K vectors x.
     #[inline(always)]
     pub(crate) fn sines_and_cosines<const K: usize>(x: [Self; K]) -> ([Self; K], [Self; K]) {
         let largest = Self::splat(T::LARGEST);
@@ -193,7 +196,7 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
         }
         (sin, cos)
     }
-    /// Applies a function of one number to each lane.
+    /// Applies a function of one number to the number in each lane.
     #[inline(always)]
     fn each(self, f: fn(T) -> (T, T)) -> (Self, Self) {
         let x = self.to_array();
@@ -205,8 +208,8 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
     }
 }
 
-/// Second target of [`Constant`] for `[T; N]`. It stops type inference from selecting the lane type, which only a
-/// [`Witness`](crate::simd::pack::Witness) may name.
+/// Second type to which the constant `[T; N]` can be converted. Without it, type inference would select the lane type,
+/// which only a [`Witness`](crate::simd::pack::Witness) may name.
 #[derive(Clone, Copy)]
 pub struct Unused<T, const N: usize>([T; N]);
 
@@ -220,7 +223,7 @@ impl<T: Number, const N: usize> Constant<Unused<T, N>> for [T; N] {
     }
 }
 
-/// Model constant with a different value in each lane.
+/// Model constant that has a different value in each lane.
 #[doc(hidden)]
 impl<T: Element<N>, const N: usize> Constant<Lanes<T, N>> for [T; N] {
     #[inline(always)]

@@ -1,5 +1,5 @@
-//! Lanes with NEON, which every 64-bit Arm has. A vector is two registers, so it has as many lanes as with AVX2. The
-//! same source code, and the same assignment of limbs to lanes, serve both.
+//! Lanes with NEON, which every 64-bit Arm processor has. A vector is two registers, so it has as many lanes as with
+//! AVX2. So the source code and the assignment of limbs to lanes are the same for both.
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, short};
@@ -11,7 +11,8 @@ pub(crate) type LongF64 = Lanes<f64, 4>;
 /// Widest vector of `f32`.
 pub(crate) type LongF32 = Lanes<f32, 8>;
 
-/// Implements a pair of registers. A mask is two vectors; all bits of a lane are 1 where it holds, else 0.
+/// Implements `Register` for a pair of registers. A mask is two vectors: all bits of a lane are 1 if the mask holds in
+/// this lane, otherwise 0.
 macro_rules! pair {
     (
         $pair:ident of $n:literal $float:ident, $mask:ident:
@@ -59,7 +60,7 @@ macro_rules! pair {
 }
 
 instructions! {
-    /// Returns the largest 32-bit half of two 64-bit numbers.
+    /// Returns the largest of the four 32-bit halves of two 64-bit numbers.
     fn largest_half(x: uint64x2_t) -> u32 { vmaxvq_u32(vreinterpretq_u32_u64(x)) }
 }
 
@@ -83,15 +84,15 @@ pair! {
     vabsq_f32 vcltq_f32 vbslq_f32 vandq_u32 vorrq_u32 vmaxvq_u32;
 }
 
-/// Moves of numbers between the lanes of a vector of four.
+/// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 
     /// Assignment of source lanes to target lanes. A target lane without a source becomes 0.
     #[derive(Clone, Copy, Debug)]
     pub struct Move {
-        /// Indices of the eight bytes of the source number, for each target lane; an index outside the vector if it has
-        /// no source.
+        /// Indices of the eight bytes of the source number, for each target lane. If a target lane has no source, the
+        /// indices are outside the vector.
         from: [[u8; 8]; 4],
     }
 
@@ -108,7 +109,8 @@ pub mod moves {
         /// Returns the numbers in their new lanes.
         #[inline(always)]
         pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
-            // SAFETY: a vector of this kind exists, so the level is supported; two rows of the array have 16 bytes.
+            // SAFETY: a vector of this kind exists, so the processor has the level. Two rows of the array have 16
+            // bytes.
             unsafe {
                 let bytes = uint8x16x2_t(vreinterpretq_u8_f64(x.0.0), vreinterpretq_u8_f64(x.0.1));
                 let first = vqtbl2q_u8(bytes, vld1q_u8(self.from.as_ptr().cast()));
@@ -121,7 +123,7 @@ pub mod moves {
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
     pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
-        // SAFETY: a vector of this kind exists, so the level is supported.
+        // SAFETY: a vector of this kind exists, so the processor has the level.
         unsafe {
             let pairs = vaddq_f64(x.0.0, x.0.1);
             let sum = vpaddq_f64(pairs, pairs);

@@ -1,5 +1,5 @@
-//! Lanes with SIMD128 of WebAssembly: a vector is two registers, as with NEON. There are no fused products: `mul_add`
-//! rounds the product before the sum, in lanes and in single numbers alike.
+//! Lanes with SIMD128 of WebAssembly. A vector is two registers, as with NEON. There are no fused products: `mul_add`
+//! rounds the product before the sum, for lanes and for single numbers.
 
 use super::{Element, Lanes, Register, instructions};
 use crate::simd::kernel::{Kernel, short};
@@ -11,7 +11,7 @@ pub(crate) type LongF64 = Lanes<f64, 4>;
 /// Widest vector of `f32`.
 pub(crate) type LongF32 = Lanes<f32, 8>;
 
-/// Mask of two registers; all bits of a lane are 1 where it holds, else 0.
+/// Mask of two registers: all bits of a lane are 1 if the mask holds in this lane, otherwise 0.
 #[derive(Clone, Copy)]
 pub struct Mask(v128, v128);
 
@@ -85,15 +85,15 @@ pair! {
     f32x4_splat f32x4_add f32x4_sub f32x4_mul f32x4_div f32x4_sqrt f32x4_neg f32x4_abs f32x4_lt;
 }
 
-/// Moves of numbers between the lanes of a vector of four.
+/// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 
     /// Assignment of source lanes to target lanes. A target lane without a source becomes 0.
     #[derive(Clone, Copy, Debug)]
     pub struct Move {
-        /// Indices of the eight bytes of the source number, for each source register and target lane. The index is
-        /// outside the register if the source number is not in this register.
+        /// Indices of the eight bytes of the source number, for each source register and target lane. If the source
+        /// number is not in this register, the indices are outside the register.
         from: [[[u8; 8]; 4]; 2],
     }
 

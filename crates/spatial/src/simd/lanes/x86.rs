@@ -27,7 +27,7 @@ fn long(kernel: impl Kernel) {
     unsafe { with_instructions(kernel) }
 }
 
-/// Implements `Register` for a register type, given the names of its instructions.
+/// Implements `Register` for a register type, given the names of the instructions for this type.
 macro_rules! register {
     (
         $register:ident of $n:literal $float:ident, $mask:ident, $enter:ident;
@@ -65,7 +65,8 @@ macro_rules! register {
     };
 }
 
-/// Implements an AVX2 register. A mask is a vector; all bits of a lane are 1 where it holds, else 0.
+/// Implements `Register` for an AVX2 register. A mask is a vector: all bits of a lane are 1 if the mask holds in this
+/// lane, otherwise 0.
 macro_rules! avx2 {
     (
         $register:ident of $n:literal $float:ident: $($alike:ident)*;
@@ -84,7 +85,7 @@ macro_rules! avx2 {
     };
 }
 
-/// Implements an AVX-512 register. A mask is an integer with one bit per lane.
+/// Implements `Register` for an AVX-512 register. A mask is an integer with one bit per lane.
 macro_rules! avx512 {
     (
         $register:ident of $n:literal $float:ident, $mask:ident: $($alike:ident)*;
@@ -111,7 +112,7 @@ avx2! {
     fn transpose(rows: &mut [Self; 4]) {{
         let [a, b, c, d] = *rows;
         let (even, odd) = (_mm256_unpacklo_pd(a, b), _mm256_unpackhi_pd(a, b)); // numbers 0, 2 and 1, 3 of rows 0, 1
-        let (even2, odd2) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d)); // the same of rows 2, 3
+        let (even2, odd2) = (_mm256_unpacklo_pd(c, d), _mm256_unpackhi_pd(c, d)); // numbers 0, 2 and 1, 3 of rows 2, 3
         *rows = [
             _mm256_permute2f128_pd::<0x20>(even, even2),
             _mm256_permute2f128_pd::<0x20>(odd, odd2),
@@ -157,7 +158,8 @@ avx512! {
 }
 
 instructions! {
-    /// Returns numbers k, k + 2, k + 4, k + 6 of eight rows, given numbers (k, k + 2, …) of two rows in each vector.
+    /// Returns numbers k, k + 2, k + 4 and k + 6 of eight rows. Each given vector contains numbers k, k + 2, … of two
+    /// rows.
     fn columns(x: [__m512d; 4]) -> [__m512d; 4] {{
         let (low, high) = (_mm512_shuffle_f64x2::<0x88>(x[0], x[1]), _mm512_shuffle_f64x2::<0x88>(x[2], x[3]));
         let (low2, high2) = (_mm512_shuffle_f64x2::<0xdd>(x[0], x[1]), _mm512_shuffle_f64x2::<0xdd>(x[2], x[3]));
@@ -170,7 +172,7 @@ instructions! {
     }}
 }
 
-/// Moves of numbers between the lanes of a vector of four.
+/// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
     use super::*;
 
@@ -179,7 +181,7 @@ pub mod moves {
     pub struct Move {
         /// Indices of the two 32-bit halves of the source number, for each target lane.
         from: [i32; 8],
-        /// Mask: all bits set in a lane that receives a number, else 0.
+        /// Mask: all bits of a lane are 1 if this lane receives a number, otherwise 0.
         to: [i64; 4],
     }
 
@@ -197,7 +199,7 @@ pub mod moves {
         /// Returns the numbers in their new lanes.
         #[inline(always)]
         pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
-            // SAFETY: a vector of this kind exists, so the level is supported; the arrays have 32 bytes each.
+            // SAFETY: a vector of this kind exists, so the processor has the level. Each of the arrays has 32 bytes.
             unsafe {
                 let from = _mm256_loadu_si256(self.from.as_ptr().cast());
                 let to = _mm256_loadu_ps(self.to.as_ptr().cast());
@@ -210,7 +212,7 @@ pub mod moves {
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
     pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
-        // SAFETY: a vector of this kind exists, so the level is supported.
+        // SAFETY: a vector of this kind exists, so the processor has the level.
         unsafe {
             let pairs = _mm256_add_pd(x.0, _mm256_permute2f128_pd::<1>(x.0, x.0));
             Lanes(_mm256_add_pd(pairs, _mm256_permute_pd::<0b0101>(pairs)))

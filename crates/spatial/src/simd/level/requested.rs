@@ -1,4 +1,4 @@
-//! SIMD level that the environment requests.
+//! SIMD level that an environment variable requests.
 
 use super::{Level, Unsupported};
 use core::fmt;
@@ -32,7 +32,7 @@ impl fmt::Display for Refused {
 
 impl core::error::Error for Refused {}
 
-/// List of levels for a sentence.
+/// List of levels that is displayed in a sentence.
 struct List<'a>(&'a [Level]);
 
 impl fmt::Display for List<'_> {
