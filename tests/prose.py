@@ -71,6 +71,7 @@ def rust(path: str, text: str) -> Iterator[Passage]:
                 start, marker, code = number, match[1], False
             if match[2].strip().startswith("```"):
                 code = not code
+                block.append("")
             elif code:
                 block.append("")
             else:
