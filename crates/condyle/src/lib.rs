@@ -163,20 +163,20 @@ pub mod tree {
 /// Rust code blocks of the README and of the book, run as doctests.
 #[cfg(doctest)]
 mod book {
-    #[doc = include_str!("../README.md")]
+    #[doc = include_str!("../../../README.md")]
     mod readme {}
-    #[doc = include_str!("../docs/inspect.md")]
+    #[doc = include_str!("../../../docs/inspect.md")]
     mod inspect {}
-    #[doc = include_str!("../docs/simulate.md")]
+    #[doc = include_str!("../../../docs/simulate.md")]
     mod simulate {}
-    #[doc = include_str!("../docs/differentiate.md")]
+    #[doc = include_str!("../../../docs/differentiate.md")]
     mod differentiate {}
-    #[doc = include_str!("../docs/deploy.md")]
+    #[doc = include_str!("../../../docs/deploy.md")]
     mod deploy {}
-    #[doc = include_str!("../docs/lanes.md")]
+    #[doc = include_str!("../../../docs/lanes.md")]
     mod lanes {}
-    #[doc = include_str!("../docs/derivatives.md")]
+    #[doc = include_str!("../../../docs/derivatives.md")]
     mod derivatives {}
-    #[doc = include_str!("../docs/conversions.md")]
+    #[doc = include_str!("../../../docs/conversions.md")]
     mod conversions {}
 }
