@@ -2,12 +2,12 @@
 """Measures generated kernels on a GPU, in states per second, for many batch sizes, compared with MJX and MuJoCo Warp.
 
     python benches/cuda.py [--robots panda anymal talos] [--functions rnea aba ...] [--batches 10 12 14 16 18 20]
-                           [--shares 1 0]
+                           [--partitions 1 0]
 
 Batch sizes are powers of two. "Resident" means that all arrays are on the device; "copied" includes copying arguments
-to the device and results back. Shares are the number of threads that share a state; 0 lets the kernel choose it by the
-number of states. Each kernel is compared with the CPU first. MJX and MuJoCo Warp compute `forward`, which is forward
-dynamics and kinematics, in single precision, for the same robot without shapes; they are skipped if they are not
+to the device and results back. Partitions are the number of threads that share a state; 0 lets the kernel choose it by
+the number of states. Each kernel is first compared with the CPU. MJX and MuJoCo Warp compute `forward`, which is
+forward dynamics and kinematics, in single precision, for the same robot without shapes; they are skipped if not
 installed. Needs a GPU, NVIDIA's run-time compiler, the packages condyle and example-robot-data-loaders, and mujoco for
 the peers. Without a device, the program prints NOT RUN.
 """
@@ -95,17 +95,17 @@ def ours(model: condyle.Model, kernel: condyle.cuda.Kernel, n: int) -> tuple[flo
 
 
 def table(
-    model: condyle.Model, robot: str, functions: "list[str]", all_shares: "list[int]", batches: "list[int]"
+    model: condyle.Model, robot: str, functions: "list[str]", all_partitions: "list[int]", batches: "list[int]"
 ) -> None:
     for name, dtype in ((name, dtype) for name in functions for dtype in ("float32", "float64")):
-        made = {shares: condyle.cuda.compile(model, name, dtype=dtype, shares=shares or None) for shares in all_shares}
-        for shares, kernel in made.items():
-            if kernel.shares == 1 and shares != next(iter(made)):
+        made = {k: condyle.cuda.compile(model, name, dtype=dtype, partitions=k or None) for k in all_partitions}
+        for k, kernel in made.items():
+            if kernel.partitions == 1 and k != next(iter(made)):
                 continue  # the same as before
             apart = error(model, kernel)
             if dtype == "float64" and not apart <= ROUNDING:
                 sys.exit(f"{robot}, {name}: {apart:.1e} from the CPU, {ROUNDING} are allowed")
-            about = f"{robot} | {name} | {dtype} | {shares} | {kernel.registers} | {kernel.local_bytes} | {apart:.0e}"
+            about = f"{robot} | {name} | {dtype} | {k} | {kernel.registers} | {kernel.local_bytes} | {apart:.0e}"
             for n in batches:
                 try:
                     resident, copied = (f"{x:.3g}" for x in ours(model, kernel, n))
@@ -171,7 +171,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--robots", nargs="+", default=["panda", "anymal", "talos"], metavar="ROBOT")
     parser.add_argument("--functions", nargs="+", default=["rnea", "aba", "aba_derivatives"], metavar="FUNCTION")
-    parser.add_argument("--shares", nargs="+", type=int, default=[1, 0], metavar="N")
+    parser.add_argument("--partitions", nargs="+", type=int, default=[1, 0], metavar="N")
     parser.add_argument("--batches", nargs="+", type=int, default=[10, 12, 14, 16, 18, 20], metavar="POWER")
     options = parser.parse_args()
     try:
@@ -186,7 +186,7 @@ def main() -> None:
         "robot",
         "function",
         "type",
-        "shares",
+        "partitions",
         "registers",
         "bytes of stack",
         "error",
@@ -201,7 +201,7 @@ def main() -> None:
         path = Path(getModelPath(file)) / file
         model = condyle.Model.from_urdf(path, root_joint="free_flyer" if loader.free_flyer else None)
         batches = [1 << power for power in options.batches]
-        table(model, robot, options.functions, options.shares, batches)
+        table(model, robot, options.functions, options.partitions, batches)
         peers(robot, path, loader.free_flyer, batches)
 
 

@@ -43,14 +43,14 @@ pub struct Function {
     pub outputs: Vec<Array>,
     /// Values that the outputs need, each after the values from which it is computed.
     pub(crate) nodes: Vec<Node>,
-    /// Values of all outputs, one array after the other; in a share, only the share's values.
+    /// Values of all outputs, one array after the other; in a partition, only the partition's values.
     pub(crate) results: Vec<Id>,
     /// Output array of each result, and its index in the array.
     pub(crate) places: Vec<(usize, usize)>,
-    /// Limb of each result, 0 for the trunk; empty if unknown. Results are shared out by limbs (see `shares.rs`).
+    /// Limb of each result, 0 for the trunk; empty if unknown. Results are shared out by limbs (see `partitions.rs`).
     pub(crate) limbs: Vec<usize>,
-    /// Requested number of shares.
-    pub(crate) shares: Option<NonZero<usize>>,
+    /// Requested number of partitions.
+    pub(crate) partitions: Option<NonZero<usize>>,
 }
 
 /// Numbers of operations of a function.
@@ -196,7 +196,7 @@ pub fn record(name: &str, about: &str, f: impl FnOnce(&mut Recorder)) -> Functio
         nodes,
         results,
         limbs: Vec::new(),
-        shares: None,
+        partitions: None,
     }
 }
 

@@ -105,7 +105,7 @@ pub mod configuration {
 pub mod constraints {
     pub use condyle_dynamics::{
         Constrained, ConstrainedDerivatives, ConstrainedEquations, ConstrainedInverse, ConstrainedInverseDerivatives,
-        ConstraintKind, Impulse, ImpulseDerivatives, Proximal, Target, constrained_dynamics_equations,
+        ConstraintKind, Impulse, ImpulseDerivatives, ProximalSettings, Target, constrained_dynamics_equations,
         constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, impulse_dynamics,
         impulse_dynamics_derivatives,
     };

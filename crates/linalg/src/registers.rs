@@ -1,22 +1,22 @@
 //! Vector registers for the dense kernels, and selection of the registers of this machine.
 
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Real, Witness};
+use condyle_spatial::block::{Block, Real, SimdToken};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// Register of [`Level::Avx512`]; on other processors the same as `Short`.
-pub(crate) type Long = <f64 as Real>::Long<Gate>;
+/// Register of [`Level::Avx512`]; on other processors the same as `Narrow`.
+pub(crate) type Wide = <f64 as Real>::Wide<Gate>;
 /// Register of [`Level::Avx2`], [`Level::Neon`] or [`Level::Simd128`].
-pub(crate) type Short = <f64 as Real>::Short<Gate>;
+pub(crate) type Narrow = <f64 as Real>::Narrow<Gate>;
 
-/// Witness of this crate, which allows it to name register types.
+/// Token of this crate, which allows it to name register types.
 pub(crate) struct Gate;
 
 // SAFETY: registers are used only in functions called at their level, and in kernels entered through `enter`.
 #[allow(unsafe_code)]
-unsafe impl Witness for Gate {}
+unsafe impl SimdToken for Gate {}
 
 /// Register of N numbers.
 pub trait Vector: Copy {
@@ -152,7 +152,7 @@ pub trait Vectorized: Sized {
 pub fn at_level(work: impl Vectorized) {
     match level() {
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => Long::enter(On::<_, Long>(work, PhantomData)),
+        Level::Avx512 => Wide::enter(On::<_, Wide>(work, PhantomData)),
         _ => at_narrow_level(work),
     }
 }
@@ -162,7 +162,7 @@ pub fn at_level(work: impl Vectorized) {
 pub fn at_narrow_level(work: impl Vectorized) {
     match level() {
         Level::Baseline => work.run::<Pair>(),
-        _ => Short::enter(On::<_, Short>(work, PhantomData)),
+        _ => Narrow::enter(On::<_, Narrow>(work, PhantomData)),
     }
 }
 

@@ -18,7 +18,7 @@
 //! - 67 108 864 bytes in the files of a robot, including the files that it includes;
 //! - 1 048 576 tags in these files, including end tags and comments;
 //! - 4 194 304 equals signs in these files;
-//! - 256 levels of nested elements, where an included file counts at the depth of its include;
+//! - a depth of 256 nested elements, where an included file counts at the depth of its include;
 //! - 256 attributes of an element;
 //! - 16 384 included files of an SDF;
 //! - 67 108 864 bytes in the full names of an SDF, which contain the names of the enclosing models;

@@ -63,7 +63,7 @@ fn documents() {
     expect("<!-- no robot -->\n<sdf/>", "<string>:2: <sdf>: the root element of a URDF is <robot>");
     expect("<robot/>", "<string>:1: <robot>: has no links");
     let nested = format!("<robot>\n<link name='a'>{}{}</link></robot>", "<a>".repeat(1 << 16), "</a>".repeat(1 << 16));
-    expect(&nested, "<string>:2: <a>: elements are nested 65538 levels deep, at most 256 are allowed");
+    expect(&nested, "<string>:2: <a>: elements are nested 65538 deep, at most 256 are allowed");
 }
 
 /// Unexpanded macros are an error: ignoring them would give another robot.

@@ -44,7 +44,7 @@ impl fmt::Display for Backend {
 /// Unknowns in which the program is solved; the solution is the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Form {
+pub enum Formulation {
     /// The equalities of the base and of the contacts are eliminated first.
     Condensed,
     /// All of (q̈, f), with equalities, for comparison: slower. Clarabel gets additional unknowns, for limited torques
@@ -120,7 +120,7 @@ pub struct Settings {
     /// Solver of the programs.
     pub backend: Backend,
     /// Unknowns of the program.
-    pub form: Form,
+    pub formulation: Formulation,
     /// Whether the solver starts from the last tick's solution, if possible.
     pub warm_start: bool,
     /// Tolerance of the solver, absolute and relative, on feasibility and duality gap.
@@ -144,7 +144,7 @@ impl Default for Settings {
             hold_ticks: 5,
             damping: 0.02,
             backend: Backend::InteriorPoint,
-            form: Form::Condensed,
+            formulation: Formulation::Condensed,
             warm_start: true,
             tolerance: 1e-9,
             max_iterations: 50,

@@ -1,14 +1,14 @@
-//! Parts of a horizon that go through stages. Whichever thread comes first does a stage of a part.
+//! Parts of a horizon that go through phases. Whichever thread comes first does a phase of a part.
 #![allow(unsafe_code)]
 
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-/// State of a part: 2·stage while it waits for the stage, and 2·stage + `AT_WORK` while a thread works on it.
+/// State of a part: 2·phase while it waits for the phase, and 2·phase + `AT_WORK` while a thread works on it.
 const AT_WORK: u8 = 1;
 
-/// Parts of two slices of equal length, split at the same indices. Each part goes through the stages 0, 1, … in turn;
+/// Parts of two slices of equal length, split at the same indices. Each part goes through the phases 0, 1, … in turn;
 /// one thread at a time works on it.
 #[derive(Debug)]
 pub struct Parts<'a, A, B> {
@@ -26,7 +26,7 @@ pub struct Parts<'a, A, B> {
 unsafe impl<A: Send, B: Send> Sync for Parts<'_, A, B> {}
 
 impl<'a, A, B> Parts<'a, A, B> {
-    /// Splits two slices at the indices `cuts`; all parts wait for stage 0. `states` is scratch memory, which grows if
+    /// Splits two slices at the indices `cuts`; all parts wait for phase 0. `states` is scratch memory, which grows if
     /// it is too short.
     ///
     /// # Panics
@@ -48,10 +48,10 @@ impl<'a, A, B> Parts<'a, A, B> {
         self.states.len()
     }
 
-    /// Executes a stage on a part, if the part waits for this stage. Returns whether it did. The closure gets the index
+    /// Executes a phase on a part, if the part waits for this phase. Returns whether it did. The closure gets the index
     /// of the part's first item and the part of each slice.
-    pub fn work(&self, part: usize, stage: u8, work: impl FnOnce(usize, &mut [A], &mut [B])) -> bool {
-        let (state, waiting) = (&self.states[part], 2 * stage);
+    pub fn work(&self, part: usize, phase: u8, work: impl FnOnce(usize, &mut [A], &mut [B])) -> bool {
+        let (state, waiting) = (&self.states[part], 2 * phase);
         if state.compare_exchange(waiting, waiting + AT_WORK, Ordering::Acquire, Ordering::Relaxed).is_err() {
             return false;
         }
@@ -69,9 +69,9 @@ impl<'a, A, B> Parts<'a, A, B> {
         true
     }
 
-    /// Returns whether a stage of a part has yet to begin: the part waits for it, or an earlier stage is not finished.
-    pub fn awaits(&self, part: usize, stage: u8) -> bool {
-        self.states[part].load(Ordering::Relaxed) <= 2 * stage
+    /// Returns whether a phase of a part has yet to begin: the part waits for it, or an earlier phase is not finished.
+    pub fn awaits(&self, part: usize, phase: u8) -> bool {
+        self.states[part].load(Ordering::Relaxed) <= 2 * phase
     }
 
     /// Returns whether a thread has panicked during its work, so that its part will not advance.

@@ -25,7 +25,7 @@ const MAX_TAGS: usize = 1 << 20;
 const MAX_EQUALS: usize = 1 << 22;
 /// Maximum number of attributes of an element.
 const MAX_ATTRIBUTES: usize = 256;
-/// Maximum depth of nested elements; chosen because a chain in MJCF needs one level for each body.
+/// Maximum depth of nested elements; chosen because a chain in MJCF nests as deep as it has bodies.
 pub(crate) const MAX_DEPTH: usize = 256;
 
 /// Element with its content. A prefix is part of a name (`gz:note`); declarations of prefixes are dropped.

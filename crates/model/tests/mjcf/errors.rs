@@ -98,7 +98,7 @@ fn errors_name_file_line_and_element() {
     assert!(said("<mujoco>").starts_with("<string>:1: not well-formed XML"));
     assert!(said(&"<body>".repeat(300)).starts_with("<string>:"));
     let deep = format!("<mujoco>{}{}</mujoco>", "<worldbody>".repeat(300), "</worldbody>".repeat(300));
-    assert!(said(&deep).contains("elements are nested 301 levels deep, at most 256 are allowed"));
+    assert!(said(&deep).contains("elements are nested 301 deep, at most 256 are allowed"));
     let missing = Model::from_mjcf(data("nowhere.xml"), &MjcfOptions::default()).unwrap_err();
     assert!(matches!(missing, Error::File { .. }));
 }

@@ -1,7 +1,7 @@
 //! Contacts of a knot, by name, and what makes a set of them singular.
 
 use crate::Error;
-use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, Proximal};
+use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, ProximalSettings};
 use condyle_spatial::Scalar;
 use core::ops::Range;
 
@@ -51,7 +51,7 @@ pub(super) fn constraint_set<S: Scalar>(
     check_together(model, contacts, damping)?;
     let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
     let mut set = ConstraintSet::new(model, &constraints).map_err(|error| named(contacts, error))?;
-    set.proximal = Proximal { mu: damping, iterations: 1 };
+    set.proximal = ProximalSettings { mu: damping, iterations: 1 };
     Ok(set)
 }
 

@@ -5,8 +5,8 @@
 //!
 //! - For the common scalars, `f64` and its lanes, it is compiled once, in the crate that defines it. It uses the vector
 //!   instructions of the scalar. Users of the library call this compiled code.
-//! - A single `f64` uses fused products and sums where the processor has them: it is converted to [`Fused`], which has
-//!   the same 64 bits. Arguments, workspaces included, are reinterpreted as types over `Fused` ([`Alike`]).
+//! - A single `f64` uses fused products and sums where the processor has them: it is converted to [`FusedF64`], which
+//!   has the same 64 bits. Arguments, workspaces included, are reinterpreted as types over `FusedF64` ([`SameLayout`]).
 //! - A single `f32` is compiled there too, without vector instructions, so that users' debug builds do not slow it
 //!   down.
 //! - For all other scalars (dual numbers, lanes of `f32`, a user's own type) it is compiled in the crate that uses it.
@@ -17,17 +17,17 @@
 //! memory.
 #![allow(unsafe_code)]
 
-pub use crate::simd::alike::{Alike, Rename, same};
-pub use crate::simd::fused::Fused;
+pub use crate::simd::fused_f64::FusedF64;
 pub use crate::simd::kernel::Kernel;
 pub use crate::simd::level::{Level, level};
-pub use crate::simd::pack::{Real, Witness};
+pub use crate::simd::pack::{Real, SimdToken};
+pub use crate::simd::same_layout::{Rename, SameLayout, same};
 use core::any::TypeId;
 
 /// Vector of four numbers, with AVX2, NEON or SIMD128.
-pub type Short<W> = <f64 as Real>::Short<W>;
-/// Vector of eight numbers, with AVX-512; elsewhere the same as `Short`.
-pub type Long<W> = <f64 as Real>::Long<W>;
+pub type Narrow<W> = <f64 as Real>::Narrow<W>;
+/// Vector of eight numbers, with AVX-512; elsewhere the same as `Narrow`.
+pub type Wide<W> = <f64 as Real>::Wide<W>;
 
 /// Returns whether two types are the same.
 #[inline(always)]
@@ -90,18 +90,18 @@ macro_rules! kernel {
             $(assert!(is::<$R, f64>(), "model constants for f64 and its lanes are f64");)?
             let f64 = is::<$S, f64>();
             $crate::if_vectors!({
-                use $crate::simd::gate::{Fused, Level, level};
+                use $crate::simd::gate::{FusedF64, Level, level};
 
                 struct Gate;
                 // SAFETY: each scalar's code is entered through its `enter`.
-                unsafe impl $crate::simd::gate::Witness for Gate {}
-                type Short = $crate::simd::gate::Short<Gate>;
-                type Long = $crate::simd::gate::Long<Gate>;
+                unsafe impl $crate::simd::gate::SimdToken for Gate {}
+                type Narrow = $crate::simd::gate::Narrow<Gate>;
+                type Wide = $crate::simd::gate::Wide<Gate>;
 
                 let fused = f64 && level() > Level::Baseline;
-                $crate::kernel!(@call Fused, is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*), numbers if fused);
-                $crate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
-                $crate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
+                $crate::kernel!(@call FusedF64, is::<$S, FusedF64>(), $S $($R)?, ($($arg: $type),*), numbers if fused);
+                $crate::kernel!(@call Narrow, is::<$S, Narrow>(), $S $($R)?, ($($arg: $type),*));
+                $crate::kernel!(@call Wide, is::<$S, Wide>(), $S $($R)?, ($($arg: $type),*));
             } else {});
             $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
         }
@@ -172,14 +172,14 @@ macro_rules! register_kernel {
 
                 struct Gate;
                 // SAFETY: code for the registers is entered through their `enter`.
-                unsafe impl $crate::simd::gate::Witness for Gate {}
-                type Short = $crate::simd::gate::Short<Gate>;
-                type Long = $crate::simd::gate::Long<Gate>;
+                unsafe impl $crate::simd::gate::SimdToken for Gate {}
+                type Narrow = $crate::simd::gate::Narrow<Gate>;
+                type Wide = $crate::simd::gate::Wide<Gate>;
 
                 if level() >= Level::Avx512 {
-                    <Long as $crate::Scalar>::enter(Work::<_, Long>(work, ::core::marker::PhantomData));
+                    <Wide as $crate::Scalar>::enter(Work::<_, Wide>(work, ::core::marker::PhantomData));
                 } else {
-                    <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
+                    <Narrow as $crate::Scalar>::enter(Work::<_, Narrow>(work, ::core::marker::PhantomData));
                 }
             } else {
                 // never called on such targets, but correct
@@ -190,15 +190,15 @@ macro_rules! register_kernel {
 }
 
 /// Defines a function that is compiled for each SIMD level in the crate that defines it. `item` is its implementation.
-/// `long`, `short` and `baseline` are the functions to call for registers of eight numbers, of four numbers, and of the
-/// registers that every processor has.
+/// `wide`, `narrow` and `baseline` are the functions to call for registers of eight numbers, of four numbers, and of
+/// the registers that every processor has.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! level_function {
     (
         $(#[$doc:meta])*
         $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)?
-        { $item:item long: $long:expr, short: $short:expr, baseline: $baseline:expr $(,)? }
+        { $item:item wide: $wide:expr, narrow: $narrow:expr, baseline: $baseline:expr $(,)? }
     ) => {
         $(#[$doc])*
         #[allow(unsafe_code, unused_unsafe, clippy::extra_unused_type_parameters)]
@@ -216,21 +216,21 @@ macro_rules! level_function {
                 #[cfg(target_arch = "x86_64")]
                 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
                 #[inline(never)]
-                fn long($($arg: $type),*) $(-> $out)? {
-                    $long($($arg),*)
+                fn wide($($arg: $type),*) $(-> $out)? {
+                    $wide($($arg),*)
                 }
                 #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
                 #[inline(never)]
-                fn short($($arg: $type),*) $(-> $out)? {
-                    $short($($arg),*)
+                fn narrow($($arg: $type),*) $(-> $out)? {
+                    $narrow($($arg),*)
                 }
                 match level() {
                     // SAFETY: the processor has the level in use.
                     #[cfg(target_arch = "x86_64")]
-                    Level::Avx512 => return unsafe { long($($arg),*) },
+                    Level::Avx512 => return unsafe { wide($($arg),*) },
                     Level::Baseline => {}
                     // SAFETY: as above.
-                    _ => return unsafe { short($($arg),*) },
+                    _ => return unsafe { narrow($($arg),*) },
                 }
             } else {});
             baseline($($arg),*)

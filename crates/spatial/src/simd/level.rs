@@ -37,7 +37,7 @@ pub enum Level {
 }
 
 /// Level with vectors of four numbers, for the architecture that this is compiled for.
-pub(crate) const SHORT: Level = if cfg!(target_arch = "aarch64") {
+pub(crate) const NARROW: Level = if cfg!(target_arch = "aarch64") {
     Level::Neon
 } else if cfg!(target_arch = "wasm32") {
     Level::Simd128

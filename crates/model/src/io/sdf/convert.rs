@@ -1,5 +1,5 @@
 //! Versions of SDF. An older file is converted to the newest version, by the rules of the format's own library. All
-//! later stages handle the newest version only.
+//! later steps handle the newest version only.
 
 use super::values::flag;
 use crate::error::Error;

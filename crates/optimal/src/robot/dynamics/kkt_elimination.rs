@@ -36,7 +36,7 @@ pub(crate) struct Tableau {
     pub rows: usize,
 }
 
-condyle_spatial::alike!(Tableau);
+condyle_spatial::same_layout!(Tableau);
 
 impl Tableau {
     /// The distance from one row to the next.

@@ -18,7 +18,7 @@
 use super::kkt_elimination::{PREFERENCE, Tableau, own_coordinates};
 use crate::robot::contact::path;
 use condyle_dynamics::Model;
-use condyle_spatial::{Matrix, Scalar, alike, kernel};
+use condyle_spatial::{Matrix, Scalar, kernel, same_layout};
 use core::ops::Range;
 use std::sync::Arc;
 
@@ -112,7 +112,7 @@ pub(crate) struct LimbElimination {
     blocks: Vec<Block>,
 }
 
-alike!(LimbElimination);
+same_layout!(LimbElimination);
 
 impl LimbElimination {
     /// The limbs of a robot whose first `passive` coordinates are not driven, for contacts whose rows are moved by some

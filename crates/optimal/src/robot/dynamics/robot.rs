@@ -23,7 +23,7 @@ use condyle_dynamics::{
     integrate_jacobian_groups, neutral,
 };
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Real, Witness};
+use condyle_spatial::block::{Real, SimdToken};
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -33,10 +33,10 @@ struct Gate;
 
 // SAFETY: vectors are used by the kernels of `condyle_dynamics`, and by what enters through their door.
 #[allow(unsafe_code)]
-unsafe impl Witness for Gate {}
+unsafe impl SimdToken for Gate {}
 
-type Short = <f64 as Real>::Short<Gate>;
-type Long = <f64 as Real>::Long<Gate>;
+type Short = <f64 as Real>::Narrow<Gate>;
+type Long = <f64 as Real>::Wide<Gate>;
 
 /// So many postures are tried to find one that is not singular.
 const POSTURES: usize = 8;

@@ -2,14 +2,14 @@
 //! same source code, and the same assignment of limbs to lanes, serve both.
 
 use super::{Element, Lanes, Register, instructions};
-use crate::simd::kernel::{Kernel, short};
-use crate::simd::pack::Witness;
+use crate::simd::kernel::{Kernel, narrow};
+use crate::simd::pack::SimdToken;
 use core::arch::aarch64::*;
 
 /// Widest vector of `f64`.
-pub(crate) type LongF64 = Lanes<f64, 4>;
+pub(crate) type WideF64 = Lanes<f64, 4>;
 /// Widest vector of `f32`.
-pub(crate) type LongF32 = Lanes<f32, 8>;
+pub(crate) type WideF32 = Lanes<f32, 8>;
 
 /// Implements a pair of registers. A mask is two vectors; all bits of a lane are 1 where it holds, else 0.
 macro_rules! pair {
@@ -27,7 +27,7 @@ macro_rules! pair {
             type Mask = $mask;
 
             instructions! {
-                fn enter(kernel: impl Kernel) { short(kernel) }
+                fn enter(kernel: impl Kernel) { narrow(kernel) }
                 fn load(x: [$float; $n]) -> Self { $pair($load(x.as_ptr()), $load(x[$n / 2..].as_ptr())) }
                 fn store(a: Self) -> [$float; $n] {{
                     let mut x = [0.0; $n];
@@ -107,7 +107,7 @@ pub mod moves {
 
         /// Returns the numbers in their new lanes.
         #[inline(always)]
-        pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+        pub fn apply<W: SimdToken>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             // SAFETY: a vector of this kind exists, so the level is supported; two rows of the array have 16 bytes.
             unsafe {
                 let bytes = uint8x16x2_t(vreinterpretq_u8_f64(x.0.0), vreinterpretq_u8_f64(x.0.1));
@@ -120,7 +120,7 @@ pub mod moves {
 
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
-    pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+    pub fn sum<W: SimdToken>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         // SAFETY: a vector of this kind exists, so the level is supported.
         unsafe {
             let pairs = vaddq_f64(x.0.0, x.0.1);

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 /// Joints that turn about z, collected once so that passes need not inspect each joint.
 #[derive(Clone, Debug, Default)]
-pub struct Turns {
+pub struct RevoluteAngles {
     /// Runs of consecutive joints with consecutive angles in q: the first joint, the index of its angle, and the number
     /// of joints.
     pub(super) runs: Vec<[usize; 3]>,
@@ -15,7 +15,7 @@ pub struct Turns {
     pub(super) circles: Vec<usize>,
 }
 
-impl Turns {
+impl RevoluteAngles {
     /// Collects the joints that turn about z. `joints` yields for each body, from body 1 on: its joint, the index of
     /// its position in q, and whether it follows another joint.
     pub(crate) fn of(joints: impl Iterator<Item = (Joint, usize, bool)>) -> Self {

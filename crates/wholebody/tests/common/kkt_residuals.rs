@@ -1,9 +1,9 @@
 //! Optimality conditions of a step.
 #![allow(dead_code, unreachable_pub)] // each test file uses its part
 
-use condyle_wholebody::{Optimality, References, WholeBodyController};
+use condyle_wholebody::{KktResiduals, References, WholeBodyController};
 
-/// Tolerance of the optimality conditions, as described at [`Optimality`].
+/// Tolerance of the optimality conditions, as described at [`KktResiduals`].
 pub const OPTIMALITY: f64 = 1e-7;
 const GAP: f64 = 1e-6;
 
@@ -18,8 +18,8 @@ pub fn check_optimality(
     references: &References,
     place: &str,
 ) {
-    let errors = controller.optimality(q, v, references);
-    let Optimality { stationarity, primal, dual, complementarity } = errors;
+    let errors = controller.kkt_residuals(q, v, references);
+    let KktResiduals { stationarity, primal, dual, complementarity } = errors;
     let good = [stationarity, primal, dual].into_iter().all(|e| e < OPTIMALITY) && complementarity < GAP;
     assert!(good, "{place}: {errors:?}");
 }
