@@ -3,10 +3,10 @@
 Warp.
 
     python benches/cuda.py [--robots panda anymal talos] [--functions rnea aba ...] [--batches 10 12 14 16 18 20]
-                           [--shares 1 0]
+                           [--partitions 1 0]
 
 Batch sizes are powers of two. "Resident" means that all arrays are on the device. "Copied" means that arguments are
-copied to the device, and results are copied back. `--shares` gives numbers of threads that share a state; with 0 the
+copied to the device, and results are copied back. `--partitions` gives numbers of threads that share a state; with 0 the
 kernel chooses this number by the number of states. Each kernel is compared with the CPU first. MJX and MuJoCo Warp
 compute `forward`, which is forward dynamics and kinematics, in single precision, for the same robot without shapes.
 They are skipped if they are not installed. The program needs a GPU, NVIDIA's run-time compiler, the packages condyle
@@ -96,17 +96,17 @@ def ours(model: condyle.Model, kernel: condyle.cuda.Kernel, n: int) -> tuple[flo
 
 
 def table(
-    model: condyle.Model, robot: str, functions: "list[str]", all_shares: "list[int]", batches: "list[int]"
+    model: condyle.Model, robot: str, functions: "list[str]", all_partitions: "list[int]", batches: "list[int]"
 ) -> None:
     for name, dtype in ((name, dtype) for name in functions for dtype in ("float32", "float64")):
-        made = {shares: condyle.cuda.compile(model, name, dtype=dtype, shares=shares or None) for shares in all_shares}
-        for shares, kernel in made.items():
-            if kernel.shares == 1 and shares != next(iter(made)):
+        made = {k: condyle.cuda.compile(model, name, dtype=dtype, partitions=k or None) for k in all_partitions}
+        for k, kernel in made.items():
+            if kernel.partitions == 1 and k != next(iter(made)):
                 continue  # the kernel is the same as before
             apart = error(model, kernel)
             if dtype == "float64" and not apart <= ROUNDING:
                 sys.exit(f"{robot}, {name}: {apart:.1e} from the CPU, {ROUNDING} are allowed")
-            about = f"{robot} | {name} | {dtype} | {shares} | {kernel.registers} | {kernel.local_bytes} | {apart:.0e}"
+            about = f"{robot} | {name} | {dtype} | {k} | {kernel.registers} | {kernel.local_bytes} | {apart:.0e}"
             for n in batches:
                 try:
                     resident, copied = (f"{x:.3g}" for x in ours(model, kernel, n))
@@ -172,7 +172,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--robots", nargs="+", default=["panda", "anymal", "talos"], metavar="ROBOT")
     parser.add_argument("--functions", nargs="+", default=["rnea", "aba", "aba_derivatives"], metavar="FUNCTION")
-    parser.add_argument("--shares", nargs="+", type=int, default=[1, 0], metavar="N")
+    parser.add_argument("--partitions", nargs="+", type=int, default=[1, 0], metavar="N")
     parser.add_argument("--batches", nargs="+", type=int, default=[10, 12, 14, 16, 18, 20], metavar="POWER")
     options = parser.parse_args()
     try:
@@ -187,7 +187,7 @@ def main() -> None:
         "robot",
         "function",
         "type",
-        "shares",
+        "partitions",
         "registers",
         "bytes of stack",
         "error",
@@ -202,7 +202,7 @@ def main() -> None:
         path = Path(getModelPath(file)) / file
         model = condyle.Model.from_urdf(path, root_joint="free_flyer" if loader.free_flyer else None)
         batches = [1 << power for power in options.batches]
-        table(model, robot, options.functions, options.shares, batches)
+        table(model, robot, options.functions, options.partitions, batches)
         peers(robot, path, loader.free_flyer, batches)
 
 

@@ -488,7 +488,8 @@ def filled(path: Path, text: str, figures: Figures) -> str:
 
 
 def pages() -> list[Path]:
-    return [ROOT / "README.md", ROOT / "DESIGN.md", ROOT / "crates" / "guide.md", *sorted((ROOT / "docs").glob("*.md"))]
+    guide = ROOT / "crates" / "condyle" / "src" / "guide.md"
+    return [ROOT / "README.md", ROOT / "DESIGN.md", guide, *sorted((ROOT / "docs").glob("*.md"))]
 
 
 def main() -> None:

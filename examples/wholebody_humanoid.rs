@@ -77,7 +77,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
         let command = controller.step(&world.q, &world.v, &references).solved()?;
         let (tau, com) = (command.tau.clone(), command.com_acceleration);
-        error = controller.optimality(&world.q, &world.v, &references).worst().max(error);
+        error = controller.kkt_residuals(&world.q, &world.v, &references).worst().max(error);
         let forces = world.step(&tau, &[], DT);
         if tick % 250 == 0 {
             let now = controller.hold(&world.q)?;

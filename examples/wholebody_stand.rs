@@ -50,7 +50,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let clock = Instant::now();
         let tau = controller.step(&world.q, &world.v, &references).solved()?.tau.clone();
         times.push(1e6 * clock.elapsed().as_secs_f64());
-        error = controller.optimality(&world.q, &world.v, &references).worst().max(error);
+        error = controller.kkt_residuals(&world.q, &world.v, &references).worst().max(error);
 
         let pushed = (200..600).contains(&tick);
         f_ext[1].linear = if pushed { PUSH } else { Vec3::zero() }; // along the axes of the trunk, which hardly rotates

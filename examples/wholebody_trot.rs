@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let command = controller.step(&world.q, &world.v, &references);
         unsolved += usize::from(command.status != Status::Solved);
         let tau = command.tau.clone();
-        error = controller.optimality(&world.q, &world.v, &references).worst().max(error);
+        error = controller.kkt_residuals(&world.q, &world.v, &references).worst().max(error);
         let forces = world.step(&tau, &[], DT);
         for (f, _) in forces.iter().zip(&references.contacts).filter(|(f, c)| c.activation == 1.0 && f.z > 0.0) {
             (loaded, slips) = (loaded + 1, slips + usize::from(f.x.hypot(f.y) > FRICTION * f.z));

@@ -110,7 +110,7 @@ ARGUMENTS = {
     'Literal["link", "joint", "user"]': "ModelBuilder.frame.kind",
     "int": """
         facets frame_id grain iterations k knot last max_iterations moved n nu nv nx priority seed size steps threads
-        Plan.contact _generate.shares _lend.address _lend.bits _lend.device _casadi_hold.states""",
+        Plan.contact _generate.partitions _lend.address _lend.bits _lend.device _casadi_hold.states""",
     "float": """
         bias damping dt eps1 eps1eps2 eps2 epsilon gain greatest kp kv least mu offset passive pitch ratio re
         regularisation
@@ -254,7 +254,7 @@ RESULTS = {
     "Settings": "WholeBodyController.settings",
     "References": "WholeBodyController.hold",
     "Command": "WholeBodyController.command WholeBodyController.step",
-    "Optimality": "WholeBodyController.optimality",
+    "KktResiduals": "WholeBodyController.kkt_residuals",
     "None": """
         _SpelledData._leave _casadi_release forwardKinematics framesForwardKinematics updateFramePlacements
         Simulation.__setstate__

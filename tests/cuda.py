@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 """Compiles generated CUDA for robots of several sizes, without a GPU, and prints the resources that each kernel uses.
 
-    python tests/cuda.py [--install] [--shares [ROBOT ...]]
+    python tests/cuda.py [--install] [--partitions [ROBOT ...]]
 
 The program needs the installed package `condyle`, and NVIDIA's wheels with the run-time compiler and the assembler;
 --install installs these wheels into this Python. Without them the program prints NOT RUN. It fails if a kernel does not
 compile, or if an expected kernel is missing.
 
-With --shares the program prints the table of docs/generated.md instead, for robots of example-robot-data. For kernels
+With --partitions the program prints the table of docs/generated.md instead, for robots of example-robot-data. For kernels
 that are split among several threads, the table shows the instructions per state in the machine code, and the bytes that
 are spilled to and from a thread's memory. NVIDIA's disassembler shows both. The machine code has no branches, except
 for large angles and for quotients of tiny numbers; these branches are counted once.
@@ -74,7 +74,7 @@ def used(said: str, kernel: str) -> tuple[int, int, int]:
 
 
 def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
-    """Returns the instructions of each share, and the bytes that the share moves between registers and the thread's
+    """Returns the instructions of each partition, and the bytes that the share moves to and from the thread's
     memory."""
     with NamedTemporaryFile(suffix=".cubin") as file:
         file.write(cubin)
@@ -82,27 +82,27 @@ def counted(nvdisasm: Path, cubin: bytes) -> tuple[list[int], list[int]]:
         call = [nvdisasm, "--print-code", file.name]
         text = subprocess.run(call, capture_output=True, text=True, check=True).stdout
     counts: dict[str, list[int]] = {}
-    share = ""
+    partition = ""
     for line in text.splitlines():
         if (label := LABEL.match(line)) is not None:
-            share = (re.findall(r"_share(\d+)", label[1]) or [""])[-1]
+            partition = (re.findall(r"_partition(\d+)", label[1]) or [""])[-1]
         if (found := INSTRUCTION.match(line)) is not None:
             operation = found[1]
             width = 16 if ".128" in operation else 8 if ".64" in operation else 4
-            sums = counts.setdefault(share, [0, 0])
+            sums = counts.setdefault(partition, [0, 0])
             sums[0] += 1
             sums[1] += width if operation.startswith(("LDL", "STL")) else 0
     if len(counts) > 1:
-        counts.pop("", None)  # the code that calls the shares is not counted
+        counts.pop("", None)  # the code that calls the partitions is not counted
     instructions, moved = zip(*counts.values(), strict=True)
     return list(instructions), list(moved)
 
 
 def table(robots: list[str], ptxas: Path, nvdisasm: Path) -> None:
-    """Prints the resources of kernels for each number of shares. The default number is in brackets."""
+    """Prints the resources of kernels for each number of partitions. The default number is in brackets."""
     from example_robot_data.robots_loader import ROBOTS, getModelPath
 
-    print("| robot, function, type | shares | registers | stack | instructions | bytes moved |")
+    print("| robot, function, type | partitions | registers | stack | instructions | bytes moved |")
     print("| --- | --- | --- | --- | --- | --- |")
     for robot in robots:
         loader = ROBOTS[robot]
@@ -112,12 +112,12 @@ def table(robots: list[str], ptxas: Path, nvdisasm: Path) -> None:
         for name in SPLIT:
             for dtype, language in (("float32", "cuda-float"), ("float64", "cuda")):
                 code, _, [(*_, best)] = condyle._condyle._generate(model, [name], language)
-                for shares in sorted({1, 2, best}):
-                    made = condyle.cuda.ptx(model, name, dtype=dtype, capability=CAPABILITY, shares=shares)
+                for partitions in sorted({1, 2, best}):
+                    made = condyle.cuda.ptx(model, name, dtype=dtype, capability=CAPABILITY, partitions=partitions)
                     said, cubin = assembled(ptxas, made)
                     registers, stack, _ = used(said, f"{code}_{name}")
                     each = [f"{max(x)}" if len(x) == 1 else f"{max(x)} of {sum(x)}" for x in counted(nvdisasm, cubin)]
-                    number = f"**{shares}**" if shares == best else f"{shares}"
+                    number = f"**{partitions}**" if partitions == best else f"{partitions}"
                     print(
                         f"| {robot}, {name}, {dtype} | {number} | {registers} | {stack} | {each[0]} | {each[1]} |",
                         flush=True,
@@ -127,7 +127,7 @@ def table(robots: list[str], ptxas: Path, nvdisasm: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--install", action="store_true", help="install NVIDIA's wheels first")
-    parser.add_argument("--shares", nargs="*", metavar="ROBOT", help="print the table of shares")
+    parser.add_argument("--partitions", nargs="*", metavar="ROBOT", help="print the table of partitions")
     options = parser.parse_args()
     if options.install:
         call = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *WHEELS]
@@ -138,8 +138,8 @@ def main() -> None:
     if ptxas is None or nvdisasm is None or wheel("cuda_nvrtc/lib/libnvrtc.so.*") is None:
         print(f"NOT RUN: NVIDIA's compilers are not installed (pip install {' '.join(WHEELS)})")
         return
-    if options.shares is not None:
-        table(options.shares or ["panda", "anymal", "talos"], ptxas, nvdisasm)
+    if options.partitions is not None:
+        table(options.partitions or ["panda", "anymal", "talos"], ptxas, nvdisasm)
         return
     print("robot, kernel, type: registers, bytes of stack, of spills")
     for robot, names in FUNCTIONS.items():

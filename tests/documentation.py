@@ -16,7 +16,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 LARGEST = 70
 """Maximum number of names on the first page: modules, types, traits, functions and constants together."""
-INTERNAL = re.compile(r"\b(Alike|Fused|LaneDual|Lanes|Rename|Unused|Witness)\b")
+INTERNAL = re.compile(r"\b(SameLayout|FusedF64|LaneDual|Lanes|Rename|NotALane|SimdToken)\b")
 CRATES = ["condyle", "condyle_dynamics", "condyle_model", "condyle_optimal", "condyle_spatial", "condyle_wholebody"]
 REEXPORTED = {"nalgebra", "num_dual", "rand"}
 """Names of re-exported modules of other crates."""

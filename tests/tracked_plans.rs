@@ -5,15 +5,15 @@
 
 #[path = "../examples/support/ground.rs"]
 mod ground;
-#[path = "../crates/wholebody/tests/common/optimality.rs"]
-mod optimality;
+#[path = "../crates/wholebody/tests/common/kkt_residuals.rs"]
+mod kkt_residuals;
 #[path = "../examples/support/mod.rs"]
 mod support;
 
 use condyle::wholebody::{Command, FrictionContact, Gains, Settings, Status, Task, WholeBodyController};
 use condyle::{ContactConstraint, Force, Model, Vec3, neutral, plan_of, robots};
 use ground::Ground;
-use optimality::check_optimality;
+use kkt_residuals::check_optimality;
 use std::sync::Arc;
 use support::{Foot, Gait};
 

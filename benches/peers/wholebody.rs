@@ -13,7 +13,7 @@
 mod workload;
 
 use condyle_wholebody::inspection::Program;
-use condyle_wholebody::{Backend, Form, Friction, Settings, Status, WholeBodyController};
+use condyle_wholebody::{Backend, Formulation, Friction, Settings, Status, WholeBodyController};
 use serde_json::json;
 use std::error::Error;
 use std::fs::File;
@@ -148,13 +148,13 @@ fn time(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
 
 /// Times Condyle's back ends without the assembly, with pyramids, for comparison with other solvers.
 fn time_solves(robot: &Robot, motion: &str, ticks: &[Tick], replays: usize) {
-    for (backend, form, name, form_name) in [
-        (Backend::InteriorPoint, Form::Full, "condyle", "full"),
-        (Backend::InteriorPoint, Form::Condensed, "condyle", "condensed"),
-        (Backend::Clarabel, Form::Full, "clarabel", "full"),
-        (Backend::Clarabel, Form::Condensed, "clarabel", "condensed"),
+    for (backend, formulation, name, form_name) in [
+        (Backend::InteriorPoint, Formulation::Full, "condyle", "full"),
+        (Backend::InteriorPoint, Formulation::Condensed, "condyle", "condensed"),
+        (Backend::Clarabel, Formulation::Full, "clarabel", "full"),
+        (Backend::Clarabel, Formulation::Condensed, "clarabel", "condensed"),
     ] {
-        let settings = Settings { friction: PYRAMID, backend, form, ..Robot::settings() };
+        let settings = Settings { friction: PYRAMID, backend, formulation, ..Robot::settings() };
         let times = replay(
             ticks,
             replays,

@@ -50,7 +50,7 @@ from ._types import (
     Spring,
     SweepResult,
 )
-from ._wholebody import Command, Gains, Optimality, References, Settings
+from ._wholebody import Command, Gains, KktResiduals, References, Settings
 
 __all__ = [
     "ARM7",
@@ -775,7 +775,7 @@ def _generate(
     constraints: list[ContactConstraint] = ...,
     external_forces: bool = False,
     inputs: list[str] = ...,
-    shares: int | None = None,
+    partitions: int | None = None,
 ) -> tuple[str, list[tuple[str, str]], list[tuple[str, _Shapes, _Shapes, int, int]]]:
     """Generates the code of functions of a robot; returns its name, its files, and its functions with their arguments and
     results.
@@ -1390,13 +1390,13 @@ class DivideConquer:
     >>> np.allclose(divided.aba(arm, q, v, tau), condyle.aba(arm, condyle.Data(arm), q, v, tau))
     True
     >>> divided.size
-    AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, levels=4)
+    AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, depth=4)
     """
 
     def __new__(cls, model: Model, grain: int) -> DivideConquer: ...
     @property
     def size(self) -> AssemblySize:
-        """The work of the assembly, and the number of its levels, which run one after the other, as `AssemblySize`."""
+        """The work of the assembly, and the depth of its pieces, which run one after the other, as `AssemblySize`."""
 
     def aba(
         self,
@@ -4217,8 +4217,8 @@ class WholeBodyController:
         not 1.
         """
 
-    def optimality(self, q: ArrayLike, v: ArrayLike, references: References) -> Optimality:
-        """Returns the distance of the last step from the optimum of its first-priority program, as `Optimality`: the
+    def kkt_residuals(self, q: ArrayLike, v: ArrayLike, references: References) -> KktResiduals:
+        """Returns the distance of the last step from the optimum of its first-priority program, as `KktResiduals`: the
         errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the same state
         and references as to the last step. For tests: it assembles the program anew.
 

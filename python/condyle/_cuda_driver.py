@@ -252,8 +252,8 @@ class Event:
 class Function:
     """A loaded kernel; its module is unloaded with this object."""
 
-    def __init__(self, device: Device, symbol: str, image: bytes, shares: int, *, always: bool) -> None:
-        self.device, self.shares = device, shares
+    def __init__(self, device: Device, symbol: str, image: bytes, partitions: int, *, always: bool) -> None:
+        self.device, self.partitions = device, partitions
         self._module, self._handle = c_void_p(), c_void_p()
         log = ctypes.create_string_buffer(_LOG)
         options = (c_int * 2)(_ERROR_LOG, _ERROR_LOG_BYTES)
@@ -267,7 +267,7 @@ class Function:
             driver.call("cuOccupancyMaxPotentialBlockSize", byref(blocks), byref(threads), self._handle, None, 0, 0)
             self.threads = max(32, threads.value)
             at_a_time = blocks.value * self.threads
-            self._most_shared = sys.maxsize if always else at_a_time // shares
+            self._most_partitioned = sys.maxsize if always else at_a_time // partitions
             self.registers, self.local_bytes = (self._attribute(a) for a in (_REGISTERS, _LOCAL_BYTES))
 
     def _attribute(self, attribute: int) -> int:
@@ -276,13 +276,13 @@ class Function:
         return value.value
 
     def launch(self, stream: int, n: int, addresses: Sequence[int]) -> None:
-        """Launches one thread per state, or one per share of a state if all of these fit on the device at a time.
+        """Launches one thread per state, or one per partition of a state if all of these fit on the device at a time.
 
         Blocks are smaller than the optimal size for many states if that size would leave multiprocessors idle.
         """
-        rows = self.shares if n <= self._most_shared else 1
-        share = -(-rows * n // self.device.multiprocessors)
-        threads = min(self.threads, -(-share // 32) * 32)
+        rows = self.partitions if n <= self._most_partitioned else 1
+        portion = -(-rows * n // self.device.multiprocessors)
+        threads = min(self.threads, -(-portion // 32) * 32)
         states, values = c_int(n), (c_uint64 * len(addresses))(*addresses)
         first, size = ctypes.addressof(values), ctypes.sizeof(c_uint64)
         each = [ctypes.addressof(states), *(first + k * size for k in range(len(addresses)))]

@@ -402,7 +402,7 @@ class AssemblySize(NamedTuple):
     """The number of pairs of pieces that are joined in series, one below the other."""
     gathers: int
     """The number of pairs of pieces on the same body, whose contributions are added."""
-    levels: int
+    depth: int
     """The length of the longest chain of pieces, from a run to the whole, that must be computed one after the other."""
 
 

@@ -96,7 +96,7 @@ class Settings(NamedTuple):
     """The damping of the safe command after that: −D v. D at 1 rad/s is this fraction of the maximum effort (s/rad)."""
     backend: Literal["interior_point", "clarabel"] = "interior_point"
     """The solver: our own dense interior point method, warm-started from the last tick, or clarabel."""
-    form: Literal["condensed", "full"] = "condensed"
+    formulation: Literal["condensed", "full"] = "condensed"
     """The unknowns: those that remain after elimination of base and contacts, or, for comparison, all of (q̈, f)."""
     warm_start: bool = True
     """Whether the solver starts from the last tick's solution if possible."""
@@ -108,7 +108,7 @@ class Settings(NamedTuple):
     """The time after which a step fails (s). Results that depend on it depend on the machine's load."""
 
 
-class Optimality(NamedTuple):
+class KktResiduals(NamedTuple):
     """The errors of the Karush–Kuhn–Tucker conditions at a step."""
 
     stationarity: float

@@ -66,7 +66,7 @@ def source(
     constraints: Sequence[ContactConstraint] = (),
     external_forces: bool = False,
     inputs: Sequence[str] = (),
-    shares: int | None = None,
+    partitions: int | None = None,
 ) -> dict[str, str]:
     """Generates the code of functions of a robot: a dictionary from file names to texts.
 
@@ -74,7 +74,7 @@ def source(
         `external`; 'rust' or 'rust-float'; 'cuda' or 'cuda-float'. frames: the frames of the function 'frames';
         constraints: the constraints of 'constrained_dynamics' and 'impulse_dynamics', and of their derivatives;
         external_forces: whether dynamics takes external forces; inputs: which of 'inertia', 'armature' and 'gravity'
-        are arguments instead of constants. shares: the number of threads per state in CUDA, as for
+        are arguments instead of constants. partitions: the number of threads per state in CUDA, as for
         `condyle.cuda.compile`. Names of C and CUDA functions begin with the name of their files: the robot's name, then
         '_float' and '_x4' or '_x8' if the language has these.
 
@@ -93,7 +93,7 @@ def source(
         constraints=list(constraints),
         external_forces=external_forces,
         inputs=list(inputs),
-        shares=shares,
+        partitions=partitions,
     )
     return dict(files)
 

@@ -137,9 +137,9 @@ class Kernel:
         return self._function.device.ordinal
 
     @property
-    def shares(self) -> int:
+    def partitions(self) -> int:
         """The number of threads that can share a state, each computing some of the results."""
-        return self._function.shares
+        return self._function.partitions
 
     @property
     def registers(self) -> int:
@@ -251,7 +251,7 @@ def ptx(
     constraints: Sequence[ContactConstraint] = (),
     external_forces: bool = False,
     inputs: Sequence[str] = (),
-    shares: int | None = None,
+    partitions: int | None = None,
 ) -> bytes:
     """Compiles a kernel to NVIDIA's intermediate language, for `compile` on a machine without NVIDIA's run-time
     compiler.
@@ -261,7 +261,7 @@ def ptx(
 
     Raises `RuntimeError` if the compiler is missing or fails.
     """
-    options = _options(frames, constraints, external_forces, inputs, shares)
+    options = _options(frames, constraints, external_forces, inputs, partitions)
     symbol, text, _ = _generated(model, name, dtype, options)
     return _cuda_driver.compiler().compile(symbol, text, f"compute_{capability[0]}{capability[1]}")
 
@@ -271,14 +271,14 @@ def _options(
     constraints: Sequence[ContactConstraint],
     external_forces: bool,
     inputs: Sequence[str],
-    shares: int | None,
+    partitions: int | None,
 ) -> dict[str, Any]:
     return {
         "frames": list(frames),
         "constraints": list(constraints),
         "external_forces": external_forces,
         "inputs": list(inputs),
-        "shares": shares,
+        "partitions": partitions,
     }
 
 
@@ -292,15 +292,15 @@ def compile(  # noqa: A001
     constraints: Sequence[ContactConstraint] = (),
     external_forces: bool = False,
     inputs: Sequence[str] = (),
-    shares: int | None = None,
+    partitions: int | None = None,
     ptx: bytes | None = None,
     cache: "str | os.PathLike[str] | None" = None,
 ) -> Kernel:
     """Compiles a function of a robot to a kernel with NVIDIA's run-time compiler, or reads it from the cache.
 
     name: one of `condyle.codegen.functions`; frames, constraints, external_forces, inputs: as for these. dtype: the
-        kind of numbers in the computation. shares: the number of threads per state, each computing some of the results,
-        at most one for each limb and one for the trunk. The default is one, or the fastest number under two
+        kind of numbers in the computation. partitions: the number of threads per state, each computing some of the
+        results, at most one for each limb and one for the trunk. The default is one, or the fastest number under two
         conditions: one thread would need more registers than it has, and all threads fit on the device at a time. ptx:
         the result of `ptx` for the same model, name, dtype and options: the compiler is not needed then. cache: a
         folder; by default the environment variable CONDYLE_CACHE, else `~/.cache/condyle`.
@@ -308,11 +308,11 @@ def compile(  # noqa: A001
     Raises `RuntimeError` if the driver, a device or the compiler is missing, or if it fails; `ValueError` if the device
     does not exist; and the exceptions of `condyle.codegen.source`.
     """
-    options = _options(frames, constraints, external_forces, inputs, shares)
+    options = _options(frames, constraints, external_forces, inputs, partitions)
     symbol, text, (_, given, made, _, rows) = _generated(model, name, dtype, options)
     on = _cuda_driver.device(device)
     image = ptx if ptx is not None else _image(symbol, text, on, cache)
-    return Kernel(name, dtype, Function(on, symbol, image, rows, always=shares is not None), given, made)
+    return Kernel(name, dtype, Function(on, symbol, image, rows, always=partitions is not None), given, made)
 
 
 def _image(symbol: str, text: str, device: Device, cache: "str | os.PathLike[str] | None") -> bytes:

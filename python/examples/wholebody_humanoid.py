@@ -59,7 +59,7 @@ def main() -> None:
         references.contacts[1].activation = 1.0 - ramp(t, 1.4, 1.6)[0] + ramp(t, 3.3, 3.5)[0]
 
         command = controller.step(world.q, world.v, references).solved()
-        error = max(error, *controller.optimality(world.q, world.v, references))
+        error = max(error, *controller.kkt_residuals(world.q, world.v, references))
         forces = world.step(command.tau, DT)
         if tick % 250 == 0:
             now = controller.hold(world.q)

@@ -40,7 +40,7 @@ def main() -> None:
         clock = time.perf_counter()
         command = controller.step(world.q, world.v, references).solved()
         times.append(1e6 * (time.perf_counter() - clock))
-        error = max(error, *controller.optimality(world.q, world.v, references))
+        error = max(error, *controller.kkt_residuals(world.q, world.v, references))
 
         f_ext[1, 1] = PUSH if 200 <= tick < 600 else 0.0  # along the trunk's axes, which rotate only little
         forces = world.step(command.tau, DT, f_ext)

@@ -47,7 +47,7 @@ def main() -> None:
         controller.track(plan, t, references)
         command = controller.step(world.q, world.v, references)
         unsolved += command.status != "solved"
-        error = max(error, *controller.optimality(world.q, world.v, references))
+        error = max(error, *controller.kkt_residuals(world.q, world.v, references))
         forces = world.step(command.tau, DT)
         for f, contact in zip(forces, references.contacts, strict=True):
             if contact.activation == 1.0 and f[2] > 0.0:

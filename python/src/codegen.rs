@@ -14,7 +14,7 @@ use std::num::NonZero;
 type Arrays = Vec<(String, usize, usize)>;
 
 /// The name of the code, its files as (name, text), and its functions as (name, arguments, results, operations,
-/// shares).
+/// partitions).
 type Generated = (String, Vec<(String, String)>, Vec<(String, Arrays, Arrays, usize, usize)>);
 
 fn arrays(arrays: &[Array]) -> Arrays {
@@ -27,7 +27,8 @@ fn arrays(arrays: &[Array]) -> Arrays {
 #[pyo3(
     name = "_generate",
     signature = (
-        model, names, language, *, frames=vec![], constraints=vec![], external_forces=false, inputs=vec![], shares=None
+        model, names, language, *, frames=vec![], constraints=vec![], external_forces=false, inputs=vec![],
+        partitions=None
     )
 )]
 pub(crate) fn generate(
@@ -39,7 +40,7 @@ pub(crate) fn generate(
     constraints: Vec<Bound<'_, PyAny>>,
     external_forces: bool,
     inputs: Vec<String>,
-    shares: Option<usize>,
+    partitions: Option<usize>,
 ) -> PyResult<Generated> {
     let robot = &model.get().inner;
     let known = |name: &&String| !["inertia", "armature", "gravity"].contains(&&***name);
@@ -49,11 +50,11 @@ pub(crate) fn generate(
     let is_input = |name: &str| inputs.iter().any(|other| other == name);
     let expected = || Language::NAMES.map(|name| format!("'{name}'")).join(", ");
     let written = Language::named(language).ok_or_else(|| wrong_word("language", &expected(), language))?;
-    if let Some(number) = shares {
-        let has_shares = matches!(written, Language::Cuda | Language::CudaFloat);
-        let expected = if has_shares { "None or at least 1" } else { "None" };
-        if number == 0 || !has_shares {
-            let said = format!("shares: expected {expected} for '{language}', found {number}");
+    if let Some(number) = partitions {
+        let has_partitions = matches!(written, Language::Cuda | Language::CudaFloat);
+        let expected = if has_partitions { "None or at least 1" } else { "None" };
+        if number == 0 || !has_partitions {
+            let said = format!("partitions: expected {expected} for '{language}', found {number}");
             return Err(PyValueError::new_err(said));
         }
     }
@@ -64,7 +65,7 @@ pub(crate) fn generate(
         inertia_is_input: is_input("inertia"),
         armature_is_input: is_input("armature"),
         gravity_is_input: is_input("gravity"),
-        shares: shares.and_then(NonZero::new),
+        partitions: partitions.and_then(NonZero::new),
     };
     let names: Vec<&str> = names.iter().map(|name| &**name).collect();
     if let Some(other) = names.iter().find(|name| !FUNCTIONS.contains(name)) {
@@ -86,7 +87,7 @@ pub(crate) fn generate(
     };
     let files = files.into_iter().map(|file| (file.name, file.text)).collect();
     let about = |f: &Function| {
-        (f.name.clone(), arrays(&f.inputs), arrays(&f.outputs), f.operations().total(), f.shares(written))
+        (f.name.clone(), arrays(&f.inputs), arrays(&f.outputs), f.operations().total(), f.partitions(written))
     };
     Ok((name, files, all.iter().map(about).collect()))
 }

@@ -9,7 +9,7 @@ use crate::made_for::MadeFor;
 use crate::model::{Model, frame_index, members_of};
 use condyle::{
     ContactConstraint, Motion, Scalar,
-    constraints::{ConstraintKind, Proximal, Target},
+    constraints::{ConstraintKind, ProximalSettings, Target},
     tree::ModelConstraintKind,
 };
 use nalgebra::DMatrix;
@@ -149,7 +149,11 @@ pub(crate) struct ConstraintSet {
 }
 
 impl ConstraintSet {
-    fn make(model: &Bound<'_, Model>, constraints: Vec<ContactConstraint>, proximal: Proximal) -> PyResult<Self> {
+    fn make(
+        model: &Bound<'_, Model>,
+        constraints: Vec<ContactConstraint>,
+        proximal: ProximalSettings,
+    ) -> PyResult<Self> {
         let (made_for, robot) = (MadeFor::with_geometry(model.get()), model.get().inner.clone());
         let mut inner = condyle::ConstraintSet::new(&robot, &constraints).map_err(exception)?;
         inner.proximal = proximal;
@@ -215,13 +219,13 @@ impl ConstraintSet {
         let constraints = members_of("constraints", "`ContactConstraint`s", constraints)?;
         let robot = &model.get().inner;
         let constraints = constraints.iter().map(|c| constraint(robot, c)).collect::<PyResult<Vec<_>>>()?;
-        Self::make(model, constraints, Proximal { mu, iterations })
+        Self::make(model, constraints, ProximalSettings { mu, iterations })
     }
 
     /// Returns the parts of a pickle: the robot, and the constraints with their current targets.
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let this = slf.borrow();
-        let Proximal { mu, iterations } = this.inner.proximal;
+        let ProximalSettings { mu, iterations } = this.inner.proximal;
         let text = serde_json::to_string(&this.constraints)
             .map_err(|error| ModelError::new_err(format!("these constraints cannot be pickled: {error}")))?;
         let arguments = (Model::from((*this.robot).clone()), text, mu, iterations);
@@ -232,7 +236,7 @@ impl ConstraintSet {
     fn _from_json(model: &Bound<'_, Model>, text: &str, mu: f64, iterations: usize) -> PyResult<Self> {
         let wrong = |error| ModelError::new_err(format!("no constraints: {error}"));
         let constraints = serde_json::from_str(text).map_err(wrong)?;
-        Self::make(model, constraints, Proximal { mu, iterations })
+        Self::make(model, constraints, ProximalSettings { mu, iterations })
     }
 
     /// Returns the robot's name, and the numbers of constraints and rows.

@@ -210,7 +210,7 @@ Cholesky {
 /// >>> np.allclose(divided.aba(arm, q, v, tau), condyle.aba(arm, condyle.Data(arm), q, v, tau))
 /// True
 /// >>> divided.size
-/// AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, levels=4)
+/// AssemblySize(bodies=7, runs=7, longest_run=1, joins=6, gathers=0, depth=4)
 #[pyclass(module = "condyle")]
 pub(crate) struct DivideConquer {
     inner: condyle::divide_conquer::DivideConquer<f64>,
@@ -234,11 +234,11 @@ impl DivideConquer {
         format!("<condyle.DivideConquer of '{}': {} bodies in {} runs>", self.made_for.name, size.bodies, size.runs)
     }
 
-    /// The work of the assembly, and the number of its levels, which run one after the other, as `AssemblySize`.
+    /// The work of the assembly, and the depth of its pieces, which run one after the other, as `AssemblySize`.
     #[getter]
     fn size<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let s = self.inner.size();
-        let numbers = (s.bodies, s.runs, s.longest_run, s.joins, s.gathers, s.levels);
+        let numbers = (s.bodies, s.runs, s.longest_run, s.joins, s.gathers, s.depth);
         class!(py, "AssemblySize")?.call1(numbers)
     }
 

@@ -131,8 +131,8 @@ def test_what_is_wrong_is_said(quadruped: Robot, tmp_path: Path) -> None:
         condyle.codegen.source(model, "abba")
     with pytest.raises(ValueError, match="language: expected 'c', .*, found 'fortran'"):
         condyle.codegen.source(model, "aba", "fortran")
-    with pytest.raises(ValueError, match="shares: expected None for 'c', found 2"):
-        condyle.codegen.source(model, "aba", shares=2)
+    with pytest.raises(ValueError, match="partitions: expected None for 'c', found 2"):
+        condyle.codegen.source(model, "aba", partitions=2)
     with pytest.raises(ValueError, match="inputs: expected 'inertia', 'armature' or 'gravity', found 'mass'"):
         condyle.codegen.source(model, "aba", inputs=["mass"])
     with pytest.raises(ValueError, match="constrained_dynamics: needs constraints"):

@@ -70,17 +70,17 @@ def test_single_precision(gpu: Gpu) -> None:
 def test_limbs_are_shared_out_while_states_are_few(gpu: Gpu, quadruped: Robot) -> None:
     """As long as all threads fit on the device at a time: eight blocks of 256."""
     kernel = condyle.cuda.compile(quadruped.model, "rnea_derivatives")
-    assert kernel.shares > 2
-    assert condyle.cuda.compile(ARM, "rnea_derivatives").shares == 1
-    asked = condyle.cuda.compile(quadruped.model, "rnea_derivatives", shares=2)
-    ptx = condyle.cuda.ptx(quadruped.model, "rnea_derivatives", shares=1, capability=(7, 0))
-    alone = condyle.cuda.compile(quadruped.model, "rnea_derivatives", shares=1, ptx=ptx)
-    assert (asked.shares, alone.shares) == (2, 1)
-    most = 2048 // kernel.shares
+    assert kernel.partitions > 2
+    assert condyle.cuda.compile(ARM, "rnea_derivatives").partitions == 1
+    asked = condyle.cuda.compile(quadruped.model, "rnea_derivatives", partitions=2)
+    ptx = condyle.cuda.ptx(quadruped.model, "rnea_derivatives", partitions=1, capability=(7, 0))
+    alone = condyle.cuda.compile(quadruped.model, "rnea_derivatives", partitions=1, ptx=ptx)
+    assert (asked.partitions, alone.partitions) == (2, 1)
+    most = 2048 // kernel.partitions
     for n in (1, most, most + 1, 1500):
         given = states(quadruped.model, n)
         wanted = expected(quadruped.model, "rnea_derivatives", *given)
-        for each, rows in ((kernel, kernel.shares if n <= most else 1), (asked, 2), (alone, 1)):
+        for each, rows in ((kernel, kernel.partitions if n <= most else 1), (asked, 2), (alone, 1)):
             found = each(*(condyle.cuda.array(x) for x in given))
             assert gpu.rows() == rows
             for one, other in zip(found, wanted, strict=True):

@@ -52,8 +52,8 @@ def test_what_cannot_be_made_is_said(gpu: Gpu, tmp_path: Path, monkeypatch: pyte
         condyle.cuda.compile(ARM, "rnea", dtype="float16")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="functions: expected 'rnea', .*, found 'abba'"):
         condyle.cuda.compile(ARM, "abba")
-    with pytest.raises(ValueError, match="shares: expected None or at least 1 for 'cuda', found 0"):
-        condyle.cuda.compile(ARM, "rnea", shares=0)
+    with pytest.raises(ValueError, match="partitions: expected None or at least 1 for 'cuda', found 0"):
+        condyle.cuda.compile(ARM, "rnea", partitions=0)
     with pytest.raises(RuntimeError, match="arm7_rnea: not loaded: CUDA_ERROR_INVALID_PTX, .*: ptxas: this is no code"):
         condyle.cuda.compile(ARM, "rnea", ptx=b"no code")
     monkeypatch.setenv("CXX", "sh -c 'echo no such option; exit 1'")

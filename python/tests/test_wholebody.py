@@ -67,7 +67,7 @@ def effort(model: condyle.Model, q: np.ndarray, v: np.ndarray, contacts: list[Fr
 
 
 @pytest.mark.parametrize(
-    "settings", [None, Settings(backend="clarabel"), Settings(form="full"), Settings(friction=Pyramid())]
+    "settings", [None, Settings(backend="clarabel"), Settings(formulation="full"), Settings(friction=Pyramid())]
 )
 def test_the_feet_carry_the_weight(settings: Settings | None) -> None:
     controller = WholeBodyController(QUADRUPED, points(), TASKS, settings)
@@ -194,7 +194,7 @@ def test_settings_are_the_library_s() -> None:
     assert WholeBodyController(QUADRUPED, [], []).settings == Settings()
     limits = JointLimits(0.1, 50.0, velocity=np.full(18, 3.0))
     given = Settings(1e-4, 1e-3, Gains(1.0, 2.0), 9.0, Pyramid(6, False), np.full(18, 40.0), limits, 3, 0.1, "clarabel")
-    given = given._replace(form="full", warm_start=False, tolerance=1e-7, max_iterations=99, time_limit=1.0)
+    given = given._replace(formulation="full", warm_start=False, tolerance=1e-7, max_iterations=99, time_limit=1.0)
     found = WholeBodyController(QUADRUPED, [], [], given).settings
     for name, one, other in zip(Settings._fields, given, found, strict=True):
         if name == "joint_limits":

@@ -45,7 +45,7 @@ pub(crate) enum Error {
     Write { file: String, source: std::io::Error },
     /// Negative answer to the question of a command, for example if a check failed.
     #[error("{0}")]
-    No(String),
+    NegativeAnswer(String),
     /// Interruption by Ctrl-C.
     #[error("interrupted")]
     Interrupted,
@@ -55,7 +55,7 @@ impl Error {
     /// Returns the exit status of the error.
     pub(crate) fn status(&self) -> ExitCode {
         match self {
-            Self::No(_) => ExitCode::from(1),
+            Self::NegativeAnswer(_) => ExitCode::from(1),
             Self::Interrupted => ExitCode::from(130),
             _ => ExitCode::from(2),
         }

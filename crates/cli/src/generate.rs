@@ -14,7 +14,7 @@ use std::path::PathBuf;
   condyle generate panda.urdf --functions aba,aba_derivatives --out panda/
   condyle generate quadruped --functions rnea --language rust --out src/
   condyle generate quadruped --functions constrained_dynamics --contacts LF_foot,RH_foot --out .
-  condyle generate quadruped --functions rnea_derivatives --language cuda --shares 5 --out .
+  condyle generate quadruped --functions rnea_derivatives --language cuda --partitions 5 --out .
   condyle generate arm7 --functions rnea,frames --frames tool --inputs inertia,gravity --out .")]
 pub(crate) struct Arguments {
     #[command(flatten)]
@@ -48,7 +48,7 @@ pub(crate) struct Arguments {
     /// CUDA only: number of threads per state, each for a part of the results; at most one per limb and one for the
     /// trunk [default: several if one thread has too few registers and there are few states]
     #[arg(long, value_name = "N")]
-    shares: Option<NonZero<usize>>,
+    partitions: Option<NonZero<usize>>,
 }
 
 /// Returns the name if it is in the list of valid names.
@@ -64,9 +64,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
         known("inputs", input, &["inertia", "armature", "gravity"])?;
     }
     let language = Language::named(known("language", &arguments.language, &Language::NAMES)?).unwrap_or_default();
-    if arguments.shares.is_some() && !matches!(language, Language::Cuda | Language::CudaFloat) {
+    if arguments.partitions.is_some() && !matches!(language, Language::Cuda | Language::CudaFloat) {
         let what = format!("only cuda and cuda-float have them, not {}", arguments.language);
-        return Err(Error::Option { option: "shares", what });
+        return Err(Error::Option { option: "partitions", what });
     }
     let model = robot::load(&arguments.robot.robot, &arguments.robot.options)?.model;
     let points = frames(&model, &arguments.contacts)?.into_iter().map(ContactConstraint::point);
@@ -79,7 +79,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
         inertia_is_input: is_input("inertia"),
         armature_is_input: is_input("armature"),
         gravity_is_input: is_input("gravity"),
-        shares: arguments.shares,
+        partitions: arguments.partitions,
     };
     let paths = generate(&model, &names, &settings, language, &arguments.out).map_err(|error| match error {
         condyle_codegen::Error::Model(error) => Error::Model(error),

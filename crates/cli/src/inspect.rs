@@ -123,7 +123,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     }
     match report.warnings.iter().filter(|finding| !arguments.allow.iter().any(|kind| kind == finding.kind)).count() {
         n if n > 0 && arguments.strict => {
-            Err(Error::No(format!("{} has {n} warning{}", robot.source, if n == 1 { "" } else { "s" })))
+            Err(Error::NegativeAnswer(format!("{} has {n} warning{}", robot.source, if n == 1 { "" } else { "s" })))
         }
         _ => Ok(()),
     }

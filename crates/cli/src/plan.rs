@@ -186,15 +186,15 @@ fn finish(arguments: &Arguments, plan: &Plan, record: Option<(&Path, record::For
         };
         let frame = &plan.model.frames()[*frame].name;
         let what = format!("`{frame}` ends {miss:.4} m from the target, more than --tolerance {tolerance} m: {hint}");
-        return Err(Error::No(what));
+        return Err(Error::NegativeAnswer(what));
     }
     match violations.first() {
-        Some(v) => Err(Error::No(format!(
+        Some(v) => Err(Error::NegativeAnswer(format!(
             "the {} of `{}` is {:.2e} beyond its limit {} at knot {}: more knots, or more time, may help",
             v.what, v.joint, v.amount, v.limit, v.at_knot
         ))),
         None if plan.goal.is_none() && !plan.is_solved() => {
-            Err(Error::No(format!("the solver stopped: {}", report::status(plan))))
+            Err(Error::NegativeAnswer(format!("the solver stopped: {}", report::status(plan))))
         }
         None => Ok(()),
     }

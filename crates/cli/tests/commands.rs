@@ -315,12 +315,13 @@ fn generate_writes_code() {
         said(&["generate", "arm7", "--functions", "aba", "--language", "rust", "--inputs", "gravity", "--out", out], 0);
     let rust = std::fs::read_to_string(rust.trim()).unwrap();
     assert!(rust.contains("pub fn aba(q: &[f64; 7], gravity_vector: &[f64; 3], v: &[f64; 7], "), "{rust}");
-    let split = ["generate", "quadruped", "--functions", "rnea", "--language", "cuda", "--shares", "3", "--out", out];
+    let split =
+        ["generate", "quadruped", "--functions", "rnea", "--language", "cuda", "--partitions", "3", "--out", out];
     let cuda = std::fs::read_to_string(said(&split, 0).trim()).unwrap();
-    assert!(cuda.contains("// Shares: 3, of "), "{cuda}");
-    let refused = condyle(&["generate", "arm7", "--functions", "aba", "--shares", "3", "--out", out]);
+    assert!(cuda.contains("// Partitions: 3, of "), "{cuda}");
+    let refused = condyle(&["generate", "arm7", "--functions", "aba", "--partitions", "3", "--out", out]);
     let error = String::from_utf8(refused.stderr).unwrap();
-    assert!(refused.status.code() == Some(2) && error.contains("--shares: only cuda and cuda-float"), "{error}");
+    assert!(refused.status.code() == Some(2) && error.contains("--partitions: only cuda and cuda-float"), "{error}");
     for (flags, words) in [
         (["--functions", "abba"], "--functions: `abba` is none of"),
         (["--functions", "frames"], "--functions: frames: needs frames"),

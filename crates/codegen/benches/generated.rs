@@ -163,14 +163,14 @@ fn measure(model: &Model, folder: &Path) {
         let generated = start.elapsed().as_secs_f64() * 1e3;
         let f = &all[0];
         let Compiled { text_kb, seconds, object_kb, ns } = compiled(model, f, Language::C, 1, folder);
-        let (own, in_turn) = (library(model, name), library(&model.clone().with_limbs(false), name));
+        let (own, serial) = (library(model, name), library(&model.clone().with_limbs(false), name));
         let vectors = compiled(model, f, Language::CEight, 8, folder).ns / 8.0;
         let batch = batch(model, name);
         println!(
-            "| {name} | {} | {generated:.0} | {text_kb} | {seconds:.1} | {object_kb} | {own:.0} | {in_turn:.0} | {ns:.0} | {:.2} \
+            "| {name} | {} | {generated:.0} | {text_kb} | {seconds:.1} | {object_kb} | {own:.0} | {serial:.0} | {ns:.0} | {:.2} \
              | {batch:.0} | {vectors:.0} | {:.2} |",
             f.operations().total(),
-            ns / in_turn,
+            ns / serial,
             vectors / batch
         );
     }

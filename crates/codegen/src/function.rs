@@ -43,14 +43,15 @@ pub struct Function {
     pub outputs: Vec<Array>,
     /// Values that the outputs need. Each value is after the values from which it is computed.
     pub(crate) nodes: Vec<Node>,
-    /// Values of all outputs, one array after the other. A share has only its own values.
+    /// Values of all outputs, one array after the other. A partition has only its own values.
     pub(crate) results: Vec<Id>,
     /// For each result, its output array and its index in this array.
     pub(crate) places: Vec<(usize, usize)>,
-    /// Limb of each result, 0 for the trunk; empty if unknown. Shares divide the results by limbs (see `shares.rs`).
+    /// Limb of each result, 0 for the trunk; empty if unknown. Shares divide the results by limbs (see
+    /// `partitions.rs`).
     pub(crate) limbs: Vec<usize>,
-    /// Number of shares that the settings request.
-    pub(crate) shares: Option<NonZero<usize>>,
+    /// Number of partitions that the settings request.
+    pub(crate) partitions: Option<NonZero<usize>>,
 }
 
 /// Numbers of operations in a function, by kind.
@@ -196,7 +197,7 @@ pub fn record(name: &str, about: &str, f: impl FnOnce(&mut Recorder)) -> Functio
         nodes,
         results,
         limbs: Vec::new(),
-        shares: None,
+        partitions: None,
     }
 }
 

@@ -5,7 +5,7 @@ use crate::expression::Expression;
 use crate::forms::{aba, aba_derivatives, crba, minv};
 use crate::function::{Function, Recorder, record};
 use crate::identifiers::identifiers;
-use crate::shares::limbs_of_results;
+use crate::partitions::limbs_of_results;
 use condyle_dynamics::{
     ConstraintSet, ContactConstraint, Data, ReferenceFrame, aba_hessian, centroidal_map_rate, constrained_dynamics,
     constrained_dynamics_derivatives, forward_kinematics, forward_velocities, gravity, impulse_dynamics,
@@ -67,9 +67,9 @@ pub struct Settings {
     /// Whether the gravitational acceleration is an argument `gravity_vector` of three numbers instead of a constant.
     pub gravity_is_input: bool,
     /// Number of threads that share every state in CUDA kernels: at most one for each limb and one for the trunk. By
-    /// default, functions for which it is worthwhile ([`Function::shares`]) can be computed in shares, and a launch
-    /// uses the shares if there are few states. Other languages ignore this setting.
-    pub shares: Option<NonZero<usize>>,
+    /// default, functions for which it is worthwhile ([`Function::partitions`]) can be computed in partitions, and a
+    /// launch uses the partitions if there are few states. Other languages ignore this setting.
+    pub partitions: Option<NonZero<usize>>,
 }
 
 /// Records functions of a robot, given by names in [`FUNCTIONS`]. Arguments and results are the same as in the
@@ -131,7 +131,7 @@ fn function(model: &Model, name: &str, settings: &Settings) -> Result<Function, 
         });
     });
     result?;
-    Ok(Function { limbs: limbs_of_results(model, &function), shares: settings.shares, ..function })
+    Ok(Function { limbs: limbs_of_results(model, &function), partitions: settings.partitions, ..function })
 }
 
 /// Returns the description of a function, with the robot's name.

@@ -213,9 +213,9 @@ fn kernels_compute_what_the_library_computes() {
     fake.end();
 }
 
-/// Returns functions whose kernels have this number of shares, or fewer if there are not enough limbs.
-fn in_shares(model: &Model, names: &[&str], shares: usize) -> Vec<Function> {
-    functions(model, names, &Settings { shares: NonZero::new(shares), ..Settings::default() }).unwrap()
+/// Returns functions whose kernels have this number of partitions, or fewer if there are not enough limbs.
+fn in_partitions(model: &Model, names: &[&str], partitions: usize) -> Vec<Function> {
+    functions(model, names, &Settings { partitions: NonZero::new(partitions), ..Settings::default() }).unwrap()
 }
 
 #[test]
@@ -225,11 +225,11 @@ fn limbs_are_computed_by_threads_of_their_own() {
     let names = ["rnea", "crba", "minv", "rnea_derivatives"];
     // A quadruped has four legs and a trunk. A humanoid has two legs, two arms, a head and a trunk.
     for (model, number) in [(robots::quadruped(), 2), (robots::quadruped(), 5), (robots::humanoid(), 4)] {
-        let all = in_shares(&model, &names, number);
+        let all = in_partitions(&model, &names, number);
         let double = device.compile::<f64>(&fake.compiler, "robot", &all).unwrap();
         let single = device.compile::<f32>(&fake.compiler, "robot", &all).unwrap();
         for name in names {
-            assert_eq!(double.kernel(name).unwrap().shares(), number);
+            assert_eq!(double.kernel(name).unwrap().partitions(), number);
             for n in [1, 77, 2500] {
                 check(&device, &double, &model, name, &[n]);
                 assert_eq!(fake.launches().0[2] as usize, number);
@@ -247,11 +247,11 @@ fn states_are_shared_out_while_they_are_few() {
     let Some(fake) = Fake::new() else { return };
     let (device, quadruped) = (fake.driver.device(0).unwrap(), robots::quadruped());
     let kernels = device.compile::<f64>(&fake.compiler, "quadruped", &of(&quadruped, &["rnea_derivatives"])).unwrap();
-    let shares = kernels.kernel("rnea_derivatives").unwrap().shares();
-    assert_eq!(shares, of(&quadruped, &["rnea_derivatives"])[0].shares(Language::Cuda));
+    let partitions = kernels.kernel("rnea_derivatives").unwrap().partitions();
+    assert_eq!(partitions, of(&quadruped, &["rnea_derivatives"])[0].partitions(Language::Cuda));
     // The device runs eight blocks of 256 threads at the same time.
-    let most = 2048 / shares;
-    for (n, rows) in [(1, shares), (most, shares), (most + 1, 1), (3000, 1)] {
+    let most = 2048 / partitions;
+    for (n, rows) in [(1, partitions), (most, partitions), (most + 1, 1), (3000, 1)] {
         check(&device, &kernels, &quadruped, "rnea_derivatives", &[n]);
         assert_eq!(fake.launches().0[2] as usize, rows, "{n} states");
     }
@@ -261,18 +261,18 @@ fn states_are_shared_out_while_they_are_few() {
 
 #[test]
 fn shares_are_as_many_as_pay() {
-    let shares = |model: &Model, name: &str| {
+    let partitions = |model: &Model, name: &str| {
         let function = &of(model, &[name])[0];
-        [Language::Cuda, Language::CudaFloat, Language::C, Language::Rust].map(|language| function.shares(language))
+        [Language::Cuda, Language::CudaFloat, Language::C, Language::Rust].map(|language| function.partitions(language))
     };
     // An arm has one limb. For efforts of the trunk and for all accelerations, every limb must be computed.
-    assert_eq!(shares(&robots::arm7(), "aba_derivatives"), [1; 4]);
+    assert_eq!(partitions(&robots::arm7(), "aba_derivatives"), [1; 4]);
     for model in [robots::quadruped(), robots::humanoid()] {
         for name in ["rnea", "aba", "gravity", "nonlinear_effects"] {
-            assert_eq!(shares(&model, name), [1; 4], "{name}");
+            assert_eq!(partitions(&model, name), [1; 4], "{name}");
         }
         for name in ["rnea_derivatives", "aba_derivatives"] {
-            let [double, single, others @ ..] = shares(&model, name);
+            let [double, single, others @ ..] = partitions(&model, name);
             assert!(double > 2 && single > 2 && others == [1; 2], "{name}: {double}, {single}, {others:?}");
         }
     }
@@ -281,9 +281,12 @@ fn shares_are_as_many_as_pay() {
     let two = &of(&arm.append(0, Se3::identity(), &arm, "other_").unwrap(), &["aba_derivatives"])[0];
     let text = Language::Cuda.text("robot", core::slice::from_ref(two)).remove(0).text;
     let all = two.operations().total();
-    assert!(text.contains(&format!("// Shares: 2, of {0}, {0} operations; all results together take {all}.", all / 2)));
-    // The requested number of shares is used, up to the number of limbs.
-    let asked = |model: &Model, name: &str, number| in_shares(model, &[name], number)[0].shares(Language::CudaFloat);
+    let half = all / 2;
+    let head = format!("// Partitions: 2, of {half}, {half} operations; all results together take {all}.");
+    assert!(text.contains(&head));
+    // The requested number of partitions is used, up to the number of limbs.
+    let asked =
+        |model: &Model, name: &str, number| in_partitions(model, &[name], number)[0].partitions(Language::CudaFloat);
     assert_eq!([1, 2, 3, 9].map(|number| asked(&robots::quadruped(), "rnea", number)), [1, 2, 3, 5]);
     assert_eq!([1, 2, 9].map(|number| asked(&robots::arm7(), "aba_derivatives", number)), [1; 3]);
 }
@@ -291,15 +294,18 @@ fn shares_are_as_many_as_pay() {
 #[test]
 fn a_split_kernel_says_how_it_is_launched() {
     let quadruped = robots::quadruped();
-    let text = |shares| {
-        Language::CudaFloat.text("robot", &in_shares(&quadruped, &["rnea_derivatives"], shares)).remove(0).text
+    let text = |partitions| {
+        Language::CudaFloat.text("robot", &in_partitions(&quadruped, &["rnea_derivatives"], partitions)).remove(0).text
     };
     let split = text(3);
     assert!(
-        split.contains("// Shares: 3, of ") && split.contains("name<<<dim3((n + 127) / 128, shares), 128>>>(n, ...).")
+        split.contains("// Partitions: 3, of ")
+            && split.contains("name<<<dim3((n + 127) / 128, partitions), 128>>>(n, ...).")
     );
     assert!(
-        split.contains("share < 3;") && split.contains("_share2(int n, int i, ") && !split.contains("gridDim.y == 1")
+        split.contains("partition < 3;")
+            && split.contains("_partition2(int n, int i, ")
+            && !split.contains("gridDim.y == 1")
     );
     assert_eq!(split, text(3), "the same functions give the same text");
     let whole = text(1);
@@ -309,12 +315,12 @@ fn a_split_kernel_says_how_it_is_launched() {
     assert!(as_pays.contains("if (gridDim.y == 1) return robot_float_rnea_derivatives_whole(n, i, q, v, a, "));
 }
 
-/// If a launch has fewer rows of blocks than shares, all shares are computed nevertheless.
+/// If a launch has fewer rows of blocks than partitions, all partitions are computed nevertheless.
 #[test]
 fn shares_without_a_row_of_their_own_are_not_left_out() {
     let Some(fake) = Fake::new() else { return };
     let quadruped = robots::quadruped();
-    let all = in_shares(&quadruped, &["crba"], 5);
+    let all = in_partitions(&quadruped, &["crba"], 5);
     let image = String::from_utf8(fake.compiler.ptx::<f64>("robot", &all, (7, 0)).unwrap()).unwrap();
     let path = image.split_whitespace().nth(4).unwrap(); // the path follows the words FAKE, PTX and 70
     type Thread = unsafe extern "C" fn(*mut *mut c_void, *const c_uint, *const c_uint, c_uint, c_uint);
@@ -351,12 +357,12 @@ fn trees_of_any_form_are_shared_out() {
         let tree = if seed % 2 == 0 { Tree::random(rng) } else { Tree::random_with_mimics(rng) };
         let model = tree.build();
         for (number, names) in [(2, &["rnea", "crba"][..]), (20, &["rnea_derivatives"])] {
-            let all = in_shares(&model, names, number);
+            let all = in_partitions(&model, names, number);
             let kernels = device.compile::<f64>(&fake.compiler, "tree", &all).unwrap();
             for function in &all {
-                let shares = kernels.kernel(&function.name).unwrap().shares();
-                assert!(shares <= number);
-                split += usize::from(shares > 1);
+                let partitions = kernels.kernel(&function.name).unwrap().partitions();
+                assert!(partitions <= number);
+                split += usize::from(partitions > 1);
                 check(&device, &kernels, &model, &function.name, &[5]);
             }
         }
@@ -378,7 +384,7 @@ fn blocks_keep_every_multiprocessor_busy() {
     }
     // Rows of blocks also occupy multiprocessors.
     let quadruped = robots::quadruped();
-    let split = device.compile::<f64>(&fake.compiler, "quadruped", &in_shares(&quadruped, &["rnea"], 4)).unwrap();
+    let split = device.compile::<f64>(&fake.compiler, "quadruped", &in_partitions(&quadruped, &["rnea"], 4)).unwrap();
     for (n, [blocks, threads]) in [(1, [1, 32]), (30, [1, 32]), (100, [1, 128]), (129, [1, 160]), (3000, [12, 256])] {
         check(&device, &split, &quadruped, "rnea", &[n]);
         assert_eq!(fake.launches().0, [blocks, threads, 4], "{n} states");

@@ -8,14 +8,14 @@ use crate::passes::kinematics::{Moving, World};
 use crate::passes::{
     aba, all_terms, centroidal, coriolis, crba, energy, factored_dynamics, minv, regressor, rnea, statics,
 };
-use crate::workspace::{Long, Short, Size};
+use crate::workspace::{Narrow, Size, Wide};
 use alloc::boxed::Box;
 use condyle_model::Model;
 use condyle_spatial::gate::{is, same};
-use condyle_spatial::{Scalar, alike};
+use condyle_spatial::{Scalar, same_layout};
 
 /// Defines [`Data`] from its workspaces and their arguments: the struct, its construction and cloning, and the check
-/// that it may be read under both names of `f64` ([`alike!`]).
+/// that it may be read under both names of `f64` ([`same_layout!`]).
 macro_rules! data {
     (
         $(#[$doc:meta])* ($size:ident, $model:ident)
@@ -33,7 +33,7 @@ macro_rules! data {
             pub(crate) limbs: Option<Box<Scratch>>,
         }
 
-        alike!(Data { $($name),* } same { size, tree, limbs });
+        same_layout!(Data { $($name),* } same { size, tree, limbs });
 
         impl<S: Scalar> Data<S> {
             fn allocate<R>($model: &Model<R>) -> Self {
@@ -98,10 +98,10 @@ impl<S: Scalar> Data<S> {
                 same(new_single(same(model)))
             } else if is::<S, f32>() {
                 same(new_single_f32(same(model)))
-            } else if is::<S, Short>() {
-                same(new_short(same(model)))
+            } else if is::<S, Narrow>() {
+                same(new_narrow(same(model)))
             } else {
-                same(new_long(same(model)))
+                same(new_wide(same(model)))
             }
         }
     }
@@ -114,10 +114,10 @@ fn new_single(model: &Model) -> Data<f64> {
 fn new_single_f32(model: &Model) -> Data<f32> {
     Data::allocate(model)
 }
-fn new_short(model: &Model) -> Data<Short> {
+fn new_narrow(model: &Model) -> Data<Narrow> {
     Data::allocate(model)
 }
-fn new_long(model: &Model) -> Data<Long> {
+fn new_wide(model: &Model) -> Data<Wide> {
     Data::allocate(model)
 }
 fn clone_single(data: &Data<f64>) -> Data<f64> {
@@ -126,10 +126,10 @@ fn clone_single(data: &Data<f64>) -> Data<f64> {
 fn clone_single_f32(data: &Data<f32>) -> Data<f32> {
     data.copy()
 }
-fn clone_short(data: &Data<Short>) -> Data<Short> {
+fn clone_narrow(data: &Data<Narrow>) -> Data<Narrow> {
     data.copy()
 }
-fn clone_long(data: &Data<Long>) -> Data<Long> {
+fn clone_wide(data: &Data<Wide>) -> Data<Wide> {
     data.copy()
 }
 
@@ -151,10 +151,10 @@ impl<S: Scalar> Clone for Data<S> {
                 same(clone_single(same(self)))
             } else if is::<S, f32>() {
                 same(clone_single_f32(same(self)))
-            } else if is::<S, Short>() {
-                same(clone_short(same(self)))
+            } else if is::<S, Narrow>() {
+                same(clone_narrow(same(self)))
             } else {
-                same(clone_long(same(self)))
+                same(clone_wide(same(self)))
             }
         }
     }

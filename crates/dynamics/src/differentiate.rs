@@ -11,7 +11,7 @@
 //! faster.
 
 use crate::data::Data;
-use crate::workspace::{Long, Short};
+use crate::workspace::{Narrow, Wide};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use condyle_linalg::check;
@@ -126,8 +126,8 @@ pub struct LaneJacobian {
 
 #[derive(Debug)]
 enum Width {
-    Long(Box<Directions<Long>>),
-    Short(Box<Directions<Short>>),
+    Wide(Box<Directions<Wide>>),
+    Narrow(Box<Directions<Narrow>>),
     One(Box<Directions<f64>>),
 }
 
@@ -141,8 +141,8 @@ impl LaneJacobian {
     pub fn new<R: 'static>(model: &Model<R>, n: usize, results: usize) -> Self {
         assert!(n >= model.nq(), "n: expected at least {}, found {n}", model.nq());
         let width = match level() {
-            Level::Avx512 => Width::Long(Box::new(Directions::new(model, n, results))),
-            Level::Simd128 | Level::Neon | Level::Avx2 => Width::Short(Box::new(Directions::new(model, n, results))),
+            Level::Avx512 => Width::Wide(Box::new(Directions::new(model, n, results))),
+            Level::Simd128 | Level::Neon | Level::Avx2 => Width::Narrow(Box::new(Directions::new(model, n, results))),
             Level::Baseline => Width::One(Box::new(Directions::new(model, n, results))),
         };
         Self { width, value: DVector::zeros(results), J: DMatrix::zeros(results, n - model.nq() + model.nv()) }
@@ -207,8 +207,8 @@ impl LaneJacobian {
         let Self { width, value, J } = self;
         assert!(f.len() == value.len(), "f: expected {} results, found {}", value.len(), f.len());
         match width {
-            Width::Long(d) => d.run(model, x, f, columns, value, J),
-            Width::Short(d) => d.run(model, x, f, columns, value, J),
+            Width::Wide(d) => d.run(model, x, f, columns, value, J),
+            Width::Narrow(d) => d.run(model, x, f, columns, value, J),
             Width::One(d) => d.run(model, x, f, columns, value, J),
         }
         (value, J)

@@ -112,7 +112,7 @@ pub use condyle_spatial::{
 };
 pub use constraints::constraint::{ConstraintKind, ContactConstraint, Target};
 pub use constraints::constraint_set::ConstraintSet;
-pub use constraints::plan::Proximal;
+pub use constraints::plan::ProximalSettings;
 pub use data::Data;
 pub use derivatives::centroidal_derivatives::CentroidalDerivatives;
 #[cfg(feature = "std")]

@@ -7,7 +7,7 @@ use crate::passes::factored_dynamics::ForwardDynamicsMethod;
 use condyle_model::Model;
 use condyle_model::tree::Column;
 use condyle_spatial::Scalar;
-use condyle_spatial::gate::{Fused, is};
+use condyle_spatial::gate::{FusedF64, is};
 
 /// Maximum mean length of the rows of M's factor for which M⁻¹ is computed from the factor. Measured by
 /// `benches/factorisation.rs`: both methods are equally fast at 12.5 on a chain of 24. The humanoid has 9.7, the arm 4.
@@ -48,7 +48,7 @@ pub(crate) fn solve_by_tree(columns: &[Column], nv: usize) -> bool {
 /// vectors of four.
 #[inline(always)]
 pub(crate) fn pairs_by_rows<S: Scalar, R>(model: &Model<R>) -> bool {
-    is::<S, Fused>() && !model.has_mimic() && model.support_len() > LONG_SUPPORT * model.columns().len()
+    is::<S, FusedF64>() && !model.has_mimic() && model.support_len() > LONG_SUPPORT * model.columns().len()
 }
 
 /// Returns the fastest method of forward dynamics: ABA, unless joints share a coordinate, for which ABA's recursion

@@ -5,7 +5,7 @@
 //! this.
 
 use condyle_model::Model;
-use condyle_spatial::gate::{self, Witness};
+use condyle_spatial::gate::{self, SimdToken};
 use condyle_spatial::{Array, Matrix, Scalar, matrix};
 
 /// Marker with which this crate may name vector types.
@@ -14,12 +14,12 @@ pub(crate) struct Gate;
 // SAFETY: vectors are created and used in two places only: in kernels, which are entered through their entry functions,
 // and in functions that choose the vectors of the current SIMD level.
 #[allow(unsafe_code)]
-unsafe impl Witness for Gate {}
+unsafe impl SimdToken for Gate {}
 
 /// Four numbers in one vector, with AVX2, NEON or SIMD128.
-pub(crate) type Short = gate::Short<Gate>;
-/// Eight numbers in one vector, with AVX-512; otherwise the same as `Short`.
-pub(crate) type Long = gate::Long<Gate>;
+pub(crate) type Narrow = gate::Narrow<Gate>;
+/// Eight numbers in one vector, with AVX-512; otherwise the same as `Narrow`.
+pub(crate) type Wide = gate::Wide<Gate>;
 
 /// Sizes of the arrays of a workspace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,7 @@ pub(crate) struct Size {
     /// Number of columns on the longest path from the root.
     pub depth: usize,
     /// Number of bodies on the longest path from the root, including the world.
-    pub levels: usize,
+    pub body_depth: usize,
     /// Number of coordinates.
     pub nv: usize,
 }
@@ -43,7 +43,7 @@ impl Size {
             bodies: model.nodes().len(),
             columns: model.columns().len(),
             depth: model.columns().iter().map(|c| c.depth + 1).max().unwrap_or(0),
-            levels: model.nodes().iter().map(|n| n.level + 1).max().unwrap_or(1),
+            body_depth: model.nodes().iter().map(|n| n.body_depth + 1).max().unwrap_or(1),
             nv: model.nv(),
         }
     }
@@ -65,7 +65,7 @@ pub(crate) fn zero_matrix<S: Scalar>(rows: usize, columns: usize) -> Matrix<S> {
 
 /// Defines a workspace. Each field has a type and an initial value, which may use the sizes of a model and the fields
 /// above it. Fields after `same` do not depend on the scalar. The macro defines the struct, its `new`, and the check
-/// that it may be read under both names of `f64` ([`alike!`](condyle_spatial::alike)).
+/// that it may be read under both names of `f64` ([`same_layout!`](condyle_spatial::same_layout)).
 macro_rules! workspace {
     (
         $(#[$doc:meta])*
@@ -83,7 +83,7 @@ macro_rules! workspace {
             $($($(#[$same_doc])* $same_vis $same: $Same,)*)?
         }
 
-        condyle_spatial::alike!($Workspace { $($field),* } $(same { $($same),* })?);
+        condyle_spatial::same_layout!($Workspace { $($field),* } $(same { $($same),* })?);
 
         impl<$S: condyle_spatial::Scalar> $Workspace<$S> {
             pub(crate) fn new$(<$R>)?($size: crate::workspace::Size $(, $model: &Model<$R>)?) -> Self {

@@ -287,7 +287,7 @@ fn single_calls(model: &Model) {
 fn batches(model: &Model) -> BTreeSet<&'static str> {
     let States { q, v, x, f_ext } = &States::new(model, STATES);
     let (m, b) = (model, &mut Batch::new(model, STATES, 1));
-    let c: &mut BatchConstraints = &mut b.constraints(model, &contacts(model), Proximal::default()).unwrap();
+    let c: &mut BatchConstraints = &mut b.constraints(model, &contacts(model), ProximalSettings::default()).unwrap();
     let (lambda, axes) = (&numbers(STATES * m.nv(), 7), ReferenceFrame::LocalWorldAligned);
     let (body, frame) = (m.bodies().len() - 1, m.frames().len().wrapping_sub(1));
     let mut called = BTreeSet::new();

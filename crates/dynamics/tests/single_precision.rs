@@ -9,7 +9,7 @@ mod table;
 use common::embedded;
 use common::table::Input;
 use condyle_dynamics::level::{Level, pin};
-use condyle_dynamics::{Batch, ContactConstraint, Data, Model, Proximal, crba};
+use condyle_dynamics::{Batch, ContactConstraint, Data, Model, ProximalSettings, crba};
 use table::{Found, States, table};
 
 /// Tolerance: 1e3 roundings of the largest number, for sums over some twenty bodies with terms that cancel.
@@ -68,8 +68,8 @@ fn every_function_in_single_precision() {
             }
             let (mut batch, mut reference) =
                 (Batch::<f32>::new(&model, STATES, 2), Batch::<f64>::new(&model, STATES, 1));
-            let mut touch = batch.constraints(&model, &held, Proximal::default()).unwrap();
-            let mut held = reference.constraints(&model, &held, Proximal::default()).unwrap();
+            let mut touch = batch.constraints(&model, &held, ProximalSettings::default()).unwrap();
+            let mut held = reference.constraints(&model, &held, ProximalSettings::default()).unwrap();
             for (row, exact) in table::<f32>().iter().zip(table::<f64>()) {
                 let (mut found, mut expected) = (Found::default(), Found::default());
                 (row.many)(&model, &mut batch, &mut touch, &narrow, &mut found);

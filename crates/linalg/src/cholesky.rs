@@ -4,7 +4,7 @@
 
 use crate::axpy::{axpy, dot};
 use crate::check;
-use condyle_spatial::{Dense, DenseMatrix, Matrix, Scalar, alike, matrix};
+use condyle_spatial::{Dense, DenseMatrix, Matrix, Scalar, matrix, same_layout};
 
 /// Replaces the lower triangle of M by L, as long as `go_on` returns `true`. Returns whether L is complete.
 #[inline(always)]
@@ -77,7 +77,7 @@ pub struct Cholesky<S> {
     L: Matrix<S>,
 }
 
-alike!(Cholesky { L });
+same_layout!(Cholesky { L });
 
 impl<S: Scalar> Cholesky<S> {
     /// Maximum number of rows; the factor then takes 128 MiB in doubles.

@@ -10,7 +10,7 @@
 use crate::axpy::{axpy, dot};
 use crate::elimination_tree::{ColumnTree, EliminationTree, NONE};
 use crate::{check, check_index};
-use condyle_spatial::{Array, Dense, DenseMatrix, Scalar, alike};
+use condyle_spatial::{Array, Dense, DenseMatrix, Scalar, same_layout};
 
 /// Returns the step: row lengths are rounded up to a multiple of it, so that the innermost loop has no remainder. The
 /// padding after a row's end has no meaning.
@@ -112,7 +112,7 @@ pub struct Ltdl<S> {
     D_inv: Array<S>,
 }
 
-alike!(Ltdl { rows, D_inv } same { tree });
+same_layout!(Ltdl { rows, D_inv } same { tree });
 
 impl<S: Scalar> Ltdl<S> {
     /// Finds the zeros of a matrix, given its tree (for example a robot's model), and allocates the factor.

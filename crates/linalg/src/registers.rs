@@ -1,23 +1,23 @@
 //! Vector registers for the dense kernels, and selection of the registers that this machine has.
 
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Real, Witness};
+use condyle_spatial::block::{Block, Real, SimdToken};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// Register of [`Level::Avx512`]. On other processors, it is the same type as `Short`.
-pub(crate) type Long = <f64 as Real>::Long<Gate>;
+/// Register of [`Level::Avx512`]. On other processors, it is the same type as `Narrow`.
+pub(crate) type Wide = <f64 as Real>::Wide<Gate>;
 /// Register of [`Level::Avx2`], [`Level::Neon`] or [`Level::Simd128`].
-pub(crate) type Short = <f64 as Real>::Short<Gate>;
+pub(crate) type Narrow = <f64 as Real>::Narrow<Gate>;
 
-/// Witness of this crate. With it, the crate may name register types.
+/// Token of this crate. With it, the crate may name register types.
 pub(crate) struct Gate;
 
 // SAFETY: registers are used only in functions that are called at the level of the registers, and in kernels entered
 // through `enter`.
 #[allow(unsafe_code)]
-unsafe impl Witness for Gate {}
+unsafe impl SimdToken for Gate {}
 
 /// Register of N numbers.
 pub trait Vector: Copy {
@@ -153,7 +153,7 @@ pub trait Vectorized: Sized {
 pub fn at_level(work: impl Vectorized) {
     match level() {
         #[cfg(target_arch = "x86_64")]
-        Level::Avx512 => Long::enter(On::<_, Long>(work, PhantomData)),
+        Level::Avx512 => Wide::enter(On::<_, Wide>(work, PhantomData)),
         _ => at_narrow_level(work),
     }
 }
@@ -163,7 +163,7 @@ pub fn at_level(work: impl Vectorized) {
 pub fn at_narrow_level(work: impl Vectorized) {
     match level() {
         Level::Baseline => work.run::<Pair>(),
-        _ => Short::enter(On::<_, Short>(work, PhantomData)),
+        _ => Narrow::enter(On::<_, Narrow>(work, PhantomData)),
     }
 }
 

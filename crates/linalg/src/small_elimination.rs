@@ -29,9 +29,9 @@ narrow! {
         if size == 0 {
             return Ok(());
         }
-        let slack = rows + V::N.max(COLUMNS) - 1;
+        let padding = rows + V::N.max(COLUMNS) - 1;
         assert!(m <= size && size <= rows && reach <= rows, "a triangle with more columns than rows");
-        assert!(holds(h, stride, [slack, size]), "a matrix ends before the last of its entries");
+        assert!(holds(h, stride, [padding, size]), "a matrix ends before the last of its entries");
         assert!(count == 0 || holds(x.data, x.stride, [rows + 4 * V::N, count]), "a row without padding");
         let sum = Sum { x, count, reach };
         for j in 0..m {

@@ -11,7 +11,7 @@ pub struct NonzeroRows {
     pub same_pattern: usize,
 }
 
-condyle_spatial::alike!(NonzeroRows);
+condyle_spatial::same_layout!(NonzeroRows);
 
 impl NonzeroRows {
     /// Returns the `NonzeroRows` of each column of a matrix, given the rows of each column.

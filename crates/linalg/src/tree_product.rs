@@ -3,7 +3,7 @@
 
 use crate::axpy::axpy;
 use crate::cast::{as_f64, as_f64_mut};
-use crate::registers::{Long, Short};
+use crate::registers::{Narrow, Wide};
 use crate::sparsity::NonzeroRows;
 use condyle_spatial::Scalar;
 use condyle_spatial::block::Block;
@@ -18,7 +18,7 @@ use core::ops::Range;
 /// stays in registers while the sums accumulate. For other columns, terms of four columns of A are added at once, so
 /// that sums are loaded and stored a quarter as often.
 #[inline(always)]
-pub fn minus_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
+pub fn neg_product<S: Scalar>(A: &[S], B: &[S], C: &mut [S], nonzero_rows: &[NonzeroRows]) {
     minus_block_product(A, B, C, nonzero_rows, 0..nonzero_rows.len());
 }
 
@@ -51,8 +51,8 @@ pub fn minus_block_product<S: Scalar>(
     }
 }
 
-/// Computes [`minus_product`] for two matrices B and one symmetric A. It is used for lanes, because their matrices are
-/// too large for the first-level cache.
+/// Computes [`neg_product`] for two matrices B and one symmetric A. It is used for lanes, because their matrices are
+/// too large for the L1 cache.
 #[inline(always)]
 fn minus_product_twice<S: Scalar>(A: &[S], B: [&[S]; 2], [C0, C1]: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
     let (n, mut j) = (nonzero_rows.len(), 0);
@@ -212,7 +212,7 @@ fn four_columns<S: Scalar, const N: usize>(A: &[S], B: &[S], C: &mut [S], rows: 
 /// Computes X = −A B for two matrices B and one symmetric A. Column j of both B is zero except in the rows of
 /// `nonzero_rows[j]`.
 #[inline]
-pub fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+pub fn neg_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
     let [X0, X1] = X;
     if nonzero_rows.len() >= 4
         && level() > Level::Baseline
@@ -221,16 +221,16 @@ pub fn minus_products<S: Scalar>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzer
     {
         return in_registers(A, [B0, B1], [X0, X1], nonzero_rows);
     }
-    one_by_one(A, B, [X0, X1], nonzero_rows);
+    run_serially(A, B, [X0, X1], nonzero_rows);
 }
 
 kernel! {
     /// Computes [`minus_products`] for any scalar, one entry after another.
-    fn one_by_one<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
+    fn run_serially<S>(A: &[S], B: [&[S]; 2], X: [&mut [S]; 2], nonzero_rows: &[NonzeroRows]) {
         if S::LANES > 1 {
             minus_product_twice(A, B, X, nonzero_rows);
         } else {
-            B.into_iter().zip(X).for_each(|(B, X)| minus_product(A, B, X, nonzero_rows));
+            B.into_iter().zip(X).for_each(|(B, X)| neg_product(A, B, X, nonzero_rows));
         }
     }
 }
@@ -238,9 +238,9 @@ kernel! {
 /// Computes [`minus_products`] for `f64`, in the vector registers of the SIMD level.
 fn in_registers(A: &[f64], B: [&[f64]; 2], X: [&mut [f64]; 2], nonzero_rows: &[NonzeroRows]) {
     if level() >= Level::Avx512 && nonzero_rows.len() >= 8 {
-        Long::enter(InRegisters::<Long> { A, B, X, nonzero_rows, vector: PhantomData });
+        Wide::enter(InRegisters::<Wide> { A, B, X, nonzero_rows, vector: PhantomData });
     } else {
-        Short::enter(InRegisters::<Short> { A, B, X, nonzero_rows, vector: PhantomData });
+        Narrow::enter(InRegisters::<Narrow> { A, B, X, nonzero_rows, vector: PhantomData });
     }
 }
 
@@ -253,7 +253,7 @@ const UNDER_WAY: usize = 8;
 ///
 /// The entries of four columns of X stay in registers while their sums accumulate, as many as fit. The last group of
 /// rows ends at the last row and overlaps the group before it, so some entries are computed twice. Each entry is the
-/// same sum in the same order as in `minus_product`.
+/// same sum in the same order as in `neg_product`.
 struct InRegisters<'a, V> {
     A: &'a [f64],
     B: [&'a [f64]; 2],

@@ -5,11 +5,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// Four threads compete for every stage of every part. Each stage of a part is executed once and in order, and each
+/// Four threads compete for every phase of every part. Each phase of a part is executed once and in order, and each
 /// thread sees the data that the previous thread wrote.
 #[test]
 fn each_stage_of_each_part_is_done_once() {
-    let (cuts, stages) = ([0, 3, 3, 4, 9, 16, 40], 5);
+    let (cuts, phases) = ([0, 3, 3, 4, 9, 16, 40], 5);
     let (mut first, mut second, mut states) = (vec![0_usize; 40], vec![String::new(); 40], Vec::new());
     for _ in 0..50 {
         first.fill(0);
@@ -19,13 +19,13 @@ fn each_stage_of_each_part_is_done_once() {
         thread::scope(|scope| {
             for _ in 0..4 {
                 scope.spawn(|| {
-                    while (0..parts.count()).any(|part| parts.awaits(part, stages - 1)) {
-                        for (part, stage) in (0..parts.count()).flat_map(|part| (0..stages).map(move |s| (part, s))) {
-                            let worked = parts.work(part, stage, |start, first, second| {
+                    while (0..parts.count()).any(|part| parts.awaits(part, phases - 1)) {
+                        for (part, phase) in (0..parts.count()).flat_map(|part| (0..phases).map(move |s| (part, s))) {
+                            let worked = parts.work(part, phase, |start, first, second| {
                                 for (i, (x, text)) in first.iter_mut().zip(second).enumerate() {
-                                    assert_eq!(*x, usize::from(stage) * (start + i));
+                                    assert_eq!(*x, usize::from(phase) * (start + i));
                                     *x += start + i;
-                                    text.push(char::from(b'0' + stage));
+                                    text.push(char::from(b'0' + phase));
                                 }
                             });
                             done.fetch_add(usize::from(worked), Ordering::Relaxed);
@@ -36,7 +36,7 @@ fn each_stage_of_each_part_is_done_once() {
             }
         });
         assert!(!parts.is_abandoned());
-        assert_eq!(done.into_inner(), parts.count() * usize::from(stages));
+        assert_eq!(done.into_inner(), parts.count() * usize::from(phases));
         assert!(first.iter().enumerate().all(|(i, x)| *x == 5 * i));
         assert!(second.iter().all(|text| text == "01234"));
     }

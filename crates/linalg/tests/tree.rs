@@ -2,7 +2,7 @@
 #![allow(non_snake_case)]
 
 use condyle_linalg::sparsity::NonzeroRows;
-use condyle_linalg::tree_product::{minus_product, minus_products};
+use condyle_linalg::tree_product::{neg_product, neg_products};
 use condyle_linalg::{Cholesky, ColumnTree, Ltdl};
 use nalgebra::{DMatrix, DVector};
 
@@ -104,9 +104,9 @@ fn products_agree() {
     let (B0, B1) = (B(0), B(5));
     let zeros = || DMatrix::from_element(n, n, f64::NAN);
     let (mut X, mut Y, mut Z) = (zeros(), zeros(), zeros());
-    minus_product(A.as_slice(), B0.as_slice(), X.as_mut_slice(), &nonzero_rows);
+    neg_product(A.as_slice(), B0.as_slice(), X.as_mut_slice(), &nonzero_rows);
     let out = [Y.as_mut_slice(), Z.as_mut_slice()];
-    minus_products(A.as_slice(), [B0.as_slice(), B1.as_slice()], out, &nonzero_rows);
+    neg_products(A.as_slice(), [B0.as_slice(), B1.as_slice()], out, &nonzero_rows);
     for (found, expected) in [(X, -&A * &B0), (Y, -&A * &B0), (Z, -&A * &B1)] {
         assert!((found - expected).amax() < ROUNDING * n as f64);
     }

@@ -61,7 +61,7 @@ impl<'a, 'i> Scene<'a, 'i> {
     fn visit(&mut self, node: Node<'a, 'i>, mut to_world: Matrix4<f64>, depth: usize) -> Result<(), String> {
         self.nodes += 1;
         if depth > DEEPEST || self.nodes > MOST_NODES {
-            return Err(format!("has more than {DEEPEST} levels or {MOST_NODES} instances of nodes"));
+            return Err(format!("is nested deeper than {DEEPEST}, or has more than {MOST_NODES} instances of nodes"));
         }
         for inner in node.children() {
             if let Some(transform) = transform(inner)? {
@@ -245,7 +245,7 @@ mod tests {
             ("<vcount>4", "<vcount>x", "<vcount>"),
             ("90</rotate>", "</rotate>", "<rotate> has 3"),
             (r##"#v" offset="0"/><p>"##, r##"#v" offset="99999999"/><p>"##, "offset"),
-            (node, &(node.to_owned() + r##"<instance_node url="#n1"/>"##), "levels"),
+            (node, &(node.to_owned() + r##"<instance_node url="#n1"/>"##), "deeper"),
             ("</COLLADA>", "", "never closed"),
         ] {
             let text = TEXT.replace(from, to);

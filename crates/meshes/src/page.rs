@@ -138,7 +138,7 @@ impl Meshes {
     /// Returns all parts, simplified for a page. Points and triangles are 16-bit numbers in base64. A number n of a
     /// point means the coordinate `low + side n / 65535`.
     pub fn written(self) -> Vec<Value> {
-        let most = level(self.parts.iter().map(|part| part.triangles.len()).collect());
+        let most = triangles_kept(self.parts.iter().map(|part| part.triangles.len()).collect());
         let small = |part: Part| {
             if part.triangles.len() > most { simplify::simplify(&part, most.max(FEWEST)) } else { part }
         };
@@ -148,7 +148,7 @@ impl Meshes {
 
 /// Returns the maximum number of triangles per part. With this maximum, all parts together have at most [`MOST`]
 /// triangles.
-fn level(mut counts: Vec<usize>) -> usize {
+fn triangles_kept(mut counts: Vec<usize>) -> usize {
     counts.sort_unstable();
     let mut left = MOST;
     for (k, &count) in counts.iter().enumerate() {
@@ -191,7 +191,7 @@ fn base64(numbers: impl Iterator<Item = u16>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{MOST, base64, level};
+    use super::{MOST, base64, triangles_kept};
 
     #[test]
     fn letters_as_everybody_writes_them() {
@@ -203,10 +203,10 @@ mod tests {
 
     #[test]
     fn small_parts_stay_whole() {
-        assert_eq!(level(vec![]), MOST);
-        assert_eq!(level(vec![100, 200]), MOST);
+        assert_eq!(triangles_kept(vec![]), MOST);
+        assert_eq!(triangles_kept(vec![100, 200]), MOST);
         let counts = vec![10, 50_000, 20_000, 50_000];
-        let most = level(counts.clone());
+        let most = triangles_kept(counts.clone());
         assert!(most == 19_996 && counts.iter().map(|&n| n.min(most)).sum::<usize>() <= MOST);
     }
 }

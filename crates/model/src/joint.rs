@@ -8,7 +8,7 @@
 mod group;
 pub mod kinematics;
 mod motion;
-pub mod turns;
+pub mod revolute_angles;
 
 use alloc::borrow::ToOwned;
 use alloc::string::String;

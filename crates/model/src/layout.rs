@@ -15,7 +15,7 @@
 //! methods like [`set_row`](Columns::set_row) apply Gᵀ · G. Algorithms need no other knowledge of shared coordinates.
 
 use crate::joint::Joint;
-use crate::joint::turns::Turns;
+use crate::joint::revolute_angles::RevoluteAngles;
 use crate::model::Model;
 use crate::tree::{Node, Tree};
 use condyle_spatial::{Act, Constant, Force, Inertia, Scalar, Se3, Vec3};
@@ -34,7 +34,7 @@ pub trait Layout {
     /// Returns the kind of the joint that carries body i, with its axis turned to z.
     fn joint(&self, i: usize) -> Joint;
     /// Returns the joints that turn about z.
-    fn turns(&self) -> &Turns;
+    fn revolute_angles(&self) -> &RevoluteAngles;
     /// Returns X_T: the pose of the joint's frame in the parent's frame.
     fn placement(&self, i: usize) -> Se3<Self::S>;
     /// Returns the inertia of body i in the body's frame.
@@ -57,7 +57,7 @@ pub trait Layout {
     /// closed.
     fn stack_index(&self, i: usize) -> usize;
     /// Returns the bodies whose subtrees end with body i, each before its parent.
-    fn closed_by(&self, i: usize) -> &[usize];
+    fn subtrees_ending_at(&self, i: usize) -> &[usize];
     /// Returns the entry of the parent of body i on the stack.
     fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T;
     /// Adds x to the entry of the parent of body i on the stack.
@@ -126,7 +126,7 @@ pub struct Single<'m, S, R> {
     /// every store.
     nodes: &'m [Node<R>],
     closed: &'m [usize],
-    turns: &'m Turns,
+    revolute_angles: &'m RevoluteAngles,
     support: &'m [usize],
     armature: &'m [R],
     tree: &'m Tree<R>,
@@ -142,9 +142,21 @@ impl<'m, S: Scalar, R: Constant<S>> Single<'m, S, R> {
     #[inline(always)]
     pub fn new(model: &'m Model<R>) -> Self {
         let Model { tree, armature, gravity, geometry, .. } = model;
-        let Tree { nodes, closed, turns, support, nv, .. } = tree;
+        let Tree { nodes, closed, revolute_angles, support, nv, .. } = tree;
         let (nv, has_mimic, geometry) = (*nv, tree.has_mimic(), *geometry);
-        Self { nodes, closed, turns, support, armature, tree, gravity, nv, has_mimic, geometry, scalar: PhantomData }
+        Self {
+            nodes,
+            closed,
+            revolute_angles,
+            support,
+            armature,
+            tree,
+            gravity,
+            nv,
+            has_mimic,
+            geometry,
+            scalar: PhantomData,
+        }
     }
 }
 
@@ -164,8 +176,8 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
         self.nodes[i].joint
     }
     #[inline(always)]
-    fn turns(&self) -> &Turns {
-        self.turns
+    fn revolute_angles(&self) -> &RevoluteAngles {
+        self.revolute_angles
     }
     #[inline(always)]
     fn placement(&self, i: usize) -> Se3<S> {
@@ -200,20 +212,20 @@ impl<S: Scalar, R: Constant<S>> Layout for Single<'_, S, R> {
 
     #[inline(always)]
     fn stack_index(&self, i: usize) -> usize {
-        self.nodes[i].level
+        self.nodes[i].body_depth
     }
     #[inline(always)]
-    fn closed_by(&self, i: usize) -> &[usize] {
+    fn subtrees_ending_at(&self, i: usize) -> &[usize] {
         let (first, end) = self.nodes[i].closed;
         &self.closed[first..end]
     }
     #[inline(always)]
     fn parent_on_stack<T: Copy>(&self, of: &[T], i: usize) -> T {
-        of[self.nodes[i].level - 1]
+        of[self.nodes[i].body_depth - 1]
     }
     #[inline(always)]
     fn add_to_parent_on_stack<T: Copy + AddAssign>(&self, onto: &mut [T], i: usize, x: T) {
-        onto[self.nodes[i].level - 1] += x;
+        onto[self.nodes[i].body_depth - 1] += x;
     }
     #[inline(always)]
     fn sum_lanes<T>(&self, _: usize, _: &mut T) {}

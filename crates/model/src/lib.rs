@@ -20,7 +20,7 @@
 //! - 67 108 864 bytes in all files of a robot, including the files that these files include;
 //! - 1 048 576 tags in these files, including end tags and comments;
 //! - 4 194 304 equals signs in these files;
-//! - 256 levels of nested elements; the depth of an included file is added to the depth of its include;
+//! - a depth of 256 nested elements; the depth of an included file is added to the depth of its include;
 //! - 256 attributes of an element;
 //! - 16 384 included files of an SDF;
 //! - 67 108 864 bytes in the full names of an SDF; a full name contains the names of all models around an item;

@@ -12,7 +12,7 @@ pub mod column_map;
 pub mod schedule;
 pub mod steps;
 
-use crate::joint::turns::Turns;
+use crate::joint::revolute_angles::RevoluteAngles;
 use crate::tree::Tree;
 use alloc::vec::Vec;
 use column_map::ColumnMap;
@@ -31,7 +31,7 @@ pub struct Plan {
     /// Indices of all steps except the world. The last step comes first.
     pub closed: Vec<usize>,
     /// Steps whose joints turn about z.
-    pub turns: Turns,
+    pub revolute_angles: RevoluteAngles,
     /// Indices from which the numbers in lanes are read.
     pub state: StateMap,
     /// Indices of columns and of matrix entries.
@@ -47,8 +47,8 @@ impl Plan {
         let schedule = Schedule::new(&tree.nodes)?;
         let (mut steps, state) = steps::new(tree, &schedule);
         let columns = ColumnMap::new(tree, &schedule, &mut steps);
-        let turns = Turns::of(steps[1..].iter().map(|step| (step.joint, step.idx_q, false)));
-        Some(Self { closed: (1..steps.len()).rev().collect(), schedule, steps, turns, state, columns })
+        let revolute_angles = RevoluteAngles::of(steps[1..].iter().map(|step| (step.joint, step.idx_q, false)));
+        Some(Self { closed: (1..steps.len()).rev().collect(), schedule, steps, revolute_angles, state, columns })
     }
 
     /// Returns the step and lane of a body.

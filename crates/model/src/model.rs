@@ -68,7 +68,7 @@ pub struct Model<R = f64> {
     pub(crate) singular: Vec<usize>,
 }
 
-condyle_spatial::alike!(Model);
+condyle_spatial::same_layout!(Model);
 
 /// Copies the model into an `Arc`. So an object that owns an `Arc` of a model, such as a simulation, can be created
 /// from `&model`.

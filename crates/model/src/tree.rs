@@ -4,7 +4,7 @@
 //! shares the coordinate of that joint, so several columns may have the same coordinate.
 
 use crate::body::Body;
-use crate::joint::turns::Turns;
+use crate::joint::revolute_angles::RevoluteAngles;
 use crate::joint::{Joint, Mimic};
 use alloc::vec::Vec;
 use condyle_linalg::sparsity::NonzeroRows;
@@ -33,7 +33,7 @@ pub struct Node<R> {
     /// Number of columns on the path from the root to this joint, including the columns of this joint.
     pub depth: usize,
     /// Depth of the body: the number of bodies on the path from the world to this body, including this body.
-    pub level: usize,
+    pub body_depth: usize,
     /// Range (first, end) in `Tree::closed` of the bodies whose subtrees end with this body.
     pub closed: (usize, usize),
     /// X_T: pose of the joint's frame in the parent's frame, where both frames are turned.
@@ -59,7 +59,7 @@ pub struct Column {
     pub depth: usize,
 }
 
-condyle_spatial::alike!(Column);
+condyle_spatial::same_layout!(Column);
 
 /// Coordinates of one joint, or of several consecutive joints whose positions are vectors.
 #[derive(Clone, Debug)]
@@ -83,7 +83,7 @@ pub(crate) struct Tree<R> {
     /// Bodies, children before parents.
     pub closed: Vec<usize>,
     /// Joints that turn about z.
-    pub turns: Turns,
+    pub revolute_angles: RevoluteAngles,
     /// For each coordinate, the coordinates in which efforts are needed to accelerate it: its ancestors and descendants
     /// in the tree, and the coordinate itself. Shape: nv.
     pub nonzero_rows: Vec<NonzeroRows>,
@@ -111,14 +111,15 @@ impl Tree<f64> {
             columns: Vec::new(),
             support: Vec::new(),
             closed: Vec::new(),
-            turns: Turns::default(),
+            revolute_angles: RevoluteAngles::default(),
             nonzero_rows: Vec::new(),
             spaces: Vec::new(),
             hash: 0,
         };
         tree.add_nodes(bodies);
         tree.close_subtrees();
-        tree.turns = Turns::of(tree.nodes[1..].iter().map(|n| (n.joint, n.idx_q, n.mimic.is_some())));
+        tree.revolute_angles =
+            RevoluteAngles::of(tree.nodes[1..].iter().map(|n| (n.joint, n.idx_q, n.mimic.is_some())));
         tree.add_nonzero_rows();
         tree.add_spaces();
         let structure = tree.columns.iter().flat_map(|c| [c.coordinate, c.parent.map_or(0, |p| p + 1)]);
@@ -142,12 +143,12 @@ impl Tree<f64> {
                     (joint, joint.mimic_offset(mimic))
                 }
             };
-            let (mut pXz, mut level) = (Se3::identity(), 0);
+            let (mut pXz, mut body_depth) = (Se3::identity(), 0);
             let first = self.columns.len();
             let mut parent = None;
             if i > 0 {
                 pXz = Se3::new(self.nodes[body.parent].axis_rotation, Vec3::zero());
-                level = self.nodes[body.parent].level + 1;
+                body_depth = self.nodes[body.parent].body_depth + 1;
                 parent = last_column[body.parent];
                 for k in 0..body.joint.nv() {
                     let depth = parent.map_or(0, |p| self.columns[p].depth + 1);
@@ -168,7 +169,7 @@ impl Tree<f64> {
                 column: first,
                 support: self.support.len(),
                 depth: path.len(),
-                level,
+                body_depth,
                 closed: (0, 0),
                 placement: pXz.inverse() * body.placement * bXz * offset,
                 inertia: bXz.act_inv(body.inertia),
@@ -191,7 +192,7 @@ impl Tree<f64> {
         let mut open = Vec::new();
         for i in 1..self.nodes.len() {
             open.push(i);
-            let next = self.nodes.get(i + 1).map_or(0, |next| next.level.saturating_sub(1));
+            let next = self.nodes.get(i + 1).map_or(0, |next| next.body_depth.saturating_sub(1));
             let first = self.closed.len();
             self.closed.extend(open.drain(next..).rev());
             self.nodes[i].closed = (first, self.closed.len());
@@ -270,7 +271,7 @@ impl<R> Tree<R> {
             column: n.column,
             support: n.support,
             depth: n.depth,
-            level: n.level,
+            body_depth: n.body_depth,
             closed: n.closed,
             placement: lift(n.placement),
             inertia: inertia(i),
@@ -283,7 +284,7 @@ impl<R> Tree<R> {
             columns: self.columns.clone(),
             support: self.support.clone(),
             closed: self.closed.clone(),
-            turns: self.turns.clone(),
+            revolute_angles: self.revolute_angles.clone(),
             nonzero_rows: self.nonzero_rows.clone(),
             spaces: self.spaces.clone(),
             hash: self.hash,

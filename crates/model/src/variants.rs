@@ -244,8 +244,8 @@ impl Model {
     ///
     /// ```
     /// let quadruped = condyle_model::robots::quadruped();
-    /// let in_turn = quadruped.clone().with_limbs(false); // rnea(&in_turn, …) is rnea(&quadruped, …) but for rounding
-    /// assert_eq!(in_turn.nv(), quadruped.nv());
+    /// let serial = quadruped.clone().with_limbs(false); // rnea(&serial, …) is rnea(&quadruped, …) but for rounding
+    /// assert_eq!(serial.nv(), quadruped.nv());
     /// ```
     #[must_use]
     pub fn with_limbs(mut self, side_by_side: bool) -> Self {

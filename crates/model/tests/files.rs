@@ -80,7 +80,7 @@ fn deep_elements() {
     let nested = |root: &str, tag: &str, count: usize| {
         format!("<{root}>{}{}</{root}>", format!("<{tag}>").repeat(count), format!("</{tag}>").repeat(count))
     };
-    let said = "elements are nested 100001 levels deep, at most 256 are allowed";
+    let said = "elements are nested 100001 deep, at most 256 are allowed";
     for tag in ["link", "gazebo"] {
         refused(urdf(&nested("robot", tag, 100_000)), said);
     }
@@ -259,7 +259,7 @@ fn large_parts() {
     let nested = |inside: &str| format!("<mujoco>{}{inside}{}</mujoco>", "<a>".repeat(200), "</a>".repeat(200));
     write("main.xml", &nested("<include file='a.xml'/>"));
     write("a.xml", &nested(""));
-    refused(read(), "stands at level 257, files included: at most 256 are allowed");
+    refused(read(), "is at depth 257, files included: at most 256 are allowed");
 }
 
 #[cfg(unix)]

@@ -1,13 +1,13 @@
-//! Storage of workspaces: arrays and matrices whose memory layout is the same for `f64` and for `Fused`.
+//! Storage of workspaces: arrays and matrices whose memory layout is the same for `f64` and for `FusedF64`.
 //!
-//! The standard library and nalgebra do not guarantee that `Vec<f64>` and `Vec<Fused>` have the same layout. A
-//! workspace with such fields could not be reinterpreted ([`Alike`](crate::simd::alike::Alike)). The types in this
-//! module are `repr(C)`.
+//! The standard library and nalgebra do not guarantee that `Vec<f64>` and `Vec<FusedF64>` have the same layout. A
+//! workspace with such fields could not be reinterpreted ([`SameLayout`](crate::simd::same_layout::SameLayout)). The
+//! types in this module are `repr(C)`.
 #![allow(unsafe_code)]
 
-use crate::alike;
-use crate::simd::Fused;
-use crate::simd::alike::{Alike, Rename};
+use crate::same_layout;
+use crate::simd::FusedF64;
+use crate::simd::same_layout::{Rename, SameLayout};
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 use core::fmt;
@@ -136,10 +136,10 @@ impl<'a, T> IntoIterator for &'a mut Array<T> {
 // SAFETY: the struct is `repr(C)` and consists of a thin pointer, a number and a zero-sized field. If it is dropped as
 // an array of B, entries that are alike are dropped, and memory of the same layout is freed.
 #[doc(hidden)]
-unsafe impl<A: Alike<B>, B> Alike<Array<B>> for Array<A> {}
+unsafe impl<A: SameLayout<B>, B> SameLayout<Array<B>> for Array<A> {}
 
 #[doc(hidden)]
-impl<A: Alike<B>, B> Rename<Array<B>> for Array<A> {
+impl<A: SameLayout<B>, B> Rename<Array<B>> for Array<A> {
     #[inline(always)]
     fn renamed(self) -> Array<B> {
         let this = ManuallyDrop::new(self);
@@ -204,24 +204,24 @@ pub struct MatrixStorage<T> {
     columns: Dyn,
 }
 
-alike!(MatrixStorage { numbers } same { rows, columns });
+same_layout!(MatrixStorage { numbers } same { rows, columns });
 
 // SAFETY: nalgebra's matrix is `repr(C)` and contains only its storage, as the assertions below check.
 #[doc(hidden)]
-unsafe impl Alike<Matrix<Fused>> for Matrix<f64> {}
+unsafe impl SameLayout<Matrix<FusedF64>> for Matrix<f64> {}
 
 #[doc(hidden)]
-impl Rename<Matrix<Fused>> for Matrix<f64> {
+impl Rename<Matrix<FusedF64>> for Matrix<f64> {
     #[inline(always)]
-    fn renamed(self) -> Matrix<Fused> {
+    fn renamed(self) -> Matrix<FusedF64> {
         Matrix::from_data(self.data.renamed())
     }
 }
 
 const _: () = {
-    assert!(offset_of!(Matrix<f64>, data) == 0 && offset_of!(Matrix<Fused>, data) == 0);
+    assert!(offset_of!(Matrix<f64>, data) == 0 && offset_of!(Matrix<FusedF64>, data) == 0);
     assert!(size_of::<Matrix<f64>>() == size_of::<MatrixStorage<f64>>());
-    assert!(size_of::<Matrix<Fused>>() == size_of::<MatrixStorage<Fused>>());
+    assert!(size_of::<Matrix<FusedF64>>() == size_of::<MatrixStorage<FusedF64>>());
 };
 
 // SAFETY: there are rows · columns numbers, stored column by column, and the number of entries cannot change.

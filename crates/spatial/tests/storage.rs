@@ -1,7 +1,7 @@
 //! Tests of arrays and matrices in workspaces, and of types that are alike.
 #![allow(non_snake_case, unsafe_code)] // M
 
-use condyle_spatial::gate::{self, Fused, Rename, Witness};
+use condyle_spatial::gate::{self, FusedF64, Rename, SimdToken};
 use condyle_spatial::level::Level;
 use condyle_spatial::{Array, Matrix, Motion, matrix};
 use nalgebra::{DMatrix, RawStorage, Storage, dmatrix};
@@ -58,19 +58,19 @@ fn arrays_hold_entries_without_size() {
 fn arrays_align_their_entries() {
     #[derive(Clone, Debug, PartialEq)]
     #[repr(align(64))]
-    struct Wide([f64; 8]);
-    let array: Array<Wide> = (0..3).map(|k| Wide([f64::from(k); 8])).collect();
+    struct CacheLine([f64; 8]);
+    let array: Array<CacheLine> = (0..3).map(|k| CacheLine([f64::from(k); 8])).collect();
     let copy = array.clone();
     assert!(array.as_ptr().addr().is_multiple_of(64) && copy.as_ptr().addr().is_multiple_of(64));
     assert_eq!((array[2].0[7], copy), (2.0, array.clone()));
 
     struct Gate;
     // SAFETY: vectors are created only where the processor supports them.
-    unsafe impl Witness for Gate {}
-    type Long = gate::Long<Gate>;
+    unsafe impl SimdToken for Gate {}
+    type Wide = gate::Wide<Gate>;
     if !cfg!(target_arch = "x86_64") || Level::Avx512.is_supported() {
-        let lanes: Array<Long> = vec![condyle_spatial::Scalar::splat(1.5); 3].into();
-        assert!(lanes.as_ptr().addr().is_multiple_of(align_of::<Long>()));
+        let lanes: Array<Wide> = vec![condyle_spatial::Scalar::splat(1.5); 3].into();
+        assert!(lanes.as_ptr().addr().is_multiple_of(align_of::<Wide>()));
     }
 }
 
@@ -84,21 +84,21 @@ fn arrays_cross_threads() {
 #[test]
 fn alike_types_are_reinterpreted() {
     let mut M: Matrix<f64> = matrix(2, 2, 3.0);
-    let same: &mut Matrix<Fused> = Rename::renamed(&mut M);
-    same[(1, 0)] = Fused(5.0);
+    let same: &mut Matrix<FusedF64> = Rename::renamed(&mut M);
+    same[(1, 0)] = FusedF64(5.0);
     assert_eq!(M, dmatrix![3.0, 3.0; 5.0, 3.0]);
-    let same: Matrix<Fused> = M.renamed();
-    assert_eq!((same.shape(), same[1]), ((2, 2), Fused(5.0)));
+    let same: Matrix<FusedF64> = M.renamed();
+    assert_eq!((same.shape(), same[1]), ((2, 2), FusedF64(5.0)));
 
     let mut array: Array<Motion<f64>> = vec![Motion::zero(); 3].into();
-    let same: &mut Array<Motion<Fused>> = Rename::renamed(&mut array);
-    same[2].angular.y = Fused(7.0);
-    let same: &[Motion<Fused>] = Rename::renamed(&array[1..]);
-    assert_eq!((same.len(), same[1].angular.y), (2, Fused(7.0)));
-    let [same, none]: [Option<&[Fused]>; 2] = Rename::renamed([Some(&[1.0, 2.0][..]), None]);
-    assert_eq!((same, none), (Some(&[Fused(1.0), Fused(2.0)][..]), None));
-    let array: Array<Motion<Fused>> = array.renamed();
-    assert_eq!(array[2].angular.y, Fused(7.0));
+    let same: &mut Array<Motion<FusedF64>> = Rename::renamed(&mut array);
+    same[2].angular.y = FusedF64(7.0);
+    let same: &[Motion<FusedF64>] = Rename::renamed(&array[1..]);
+    assert_eq!((same.len(), same[1].angular.y), (2, FusedF64(7.0)));
+    let [same, none]: [Option<&[FusedF64]>; 2] = Rename::renamed([Some(&[1.0, 2.0][..]), None]);
+    assert_eq!((same, none), (Some(&[FusedF64(1.0), FusedF64(2.0)][..]), None));
+    let array: Array<Motion<FusedF64>> = array.renamed();
+    assert_eq!(array[2].angular.y, FusedF64(7.0));
 }
 
 #[test]

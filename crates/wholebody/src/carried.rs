@@ -10,10 +10,10 @@
 use crate::command::{Command, CommandSource};
 use crate::controller::WholeBodyController;
 use crate::error::{InvalidRotation, Status};
-use crate::levels::Levels;
-use crate::memory::Memory;
 use crate::numbers::{Reader, flag};
 use crate::safety::Safety;
+use crate::task_hierarchy::TaskHierarchy;
+use crate::warm_start::WarmStart;
 use condyle_spatial::{Force, Vec3};
 
 /// Names of arguments and references in a [`Status`]; a name is written as its index in this list.
@@ -43,7 +43,7 @@ impl WholeBodyController {
         let mut numbers = Vec::new();
         numbers.extend(self.equations.contacts.iter().map(|contact| flag(contact.active)));
         self.safety.write(&mut numbers);
-        self.levels.write(&mut numbers);
+        self.hierarchy.write(&mut numbers);
         write_command(&self.command, &mut numbers);
         numbers
     }
@@ -59,7 +59,7 @@ impl WholeBodyController {
     fn read(&mut self, from: &mut Reader<'_>) -> Option<()> {
         self.equations.contacts.iter_mut().try_for_each(|contact| from.flag().map(|active| contact.active = active))?;
         self.safety.read(from)?;
-        self.levels.read(from)?;
+        self.hierarchy.read(from)?;
         read_command(&mut self.command, from)
     }
 }
@@ -83,10 +83,10 @@ impl Safety {
     }
 }
 
-impl Levels {
+impl TaskHierarchy {
     fn write(&self, out: &mut Vec<f64>) {
-        for (memory, given) in self.memories.iter().zip(&self.given) {
-            memory.write(out);
+        for (warm_start, given) in self.warm_starts.iter().zip(&self.given) {
+            warm_start.write(out);
             if let Some(elimination) = given.elimination() {
                 elimination.write(out);
             }
@@ -94,15 +94,15 @@ impl Levels {
     }
 
     fn read(&mut self, from: &mut Reader<'_>) -> Option<()> {
-        for (memory, given) in self.memories.iter_mut().zip(&mut self.given) {
-            memory.read(from)?;
+        for (warm_start, given) in self.warm_starts.iter_mut().zip(&mut self.given) {
+            warm_start.read(from)?;
             given.read_elimination(from)?;
         }
         Some(())
     }
 }
 
-impl Memory {
+impl WarmStart {
     fn write(&self, out: &mut Vec<f64>) {
         out.push(flag(self.known));
         self.all.parts().into_iter().for_each(|part| out.extend(part));

@@ -15,7 +15,7 @@
 use crate::basis::{Basis, Elimination};
 use crate::cone_program::{ConeProgram, Size};
 use crate::least_squares::LeastSquares;
-use crate::memory::Places;
+use crate::warm_start::Places;
 use condyle_linalg::{SLACK, View, add_product_lower, add_scaled_product};
 use nalgebra::DMatrix;
 

@@ -4,11 +4,10 @@
 use crate::command::{Command, CommandSource};
 use crate::cone_program::Status as Stopped;
 use crate::contact::FrictionContact;
-use crate::contact_numbers::ContactNumbers;
+use crate::contact_rows::ContactRows;
 use crate::equations::Equations;
 use crate::error::{Error, Status, finite};
 use crate::kinematics::Kinematics;
-use crate::levels::Levels;
 use crate::objective::{Objective, ResolvedTask};
 use crate::plan::{Plan, PlannedState};
 use crate::references::{
@@ -17,6 +16,7 @@ use crate::references::{
 use crate::safety::Safety;
 use crate::settings::Settings;
 use crate::task::{Task, TaskKind};
+use crate::task_hierarchy::TaskHierarchy;
 use condyle_dynamics::{Force, Model, Motion, Vec3, neutral};
 use condyle_linalg::check;
 use std::fmt;
@@ -51,7 +51,7 @@ pub struct WholeBodyController {
     pub(crate) settings: Settings,
     pub(crate) equations: Equations,
     pub(crate) objective: Objective,
-    pub(crate) levels: Levels,
+    pub(crate) hierarchy: TaskHierarchy,
     pub(crate) safety: Safety,
     pub(crate) command: Command,
     /// Scratch: the state of a plan at one time.
@@ -76,13 +76,13 @@ impl WholeBodyController {
                 frames.len() - 1
             }))
         };
-        let mut touching: Vec<ContactNumbers> = Vec::new();
+        let mut touching: Vec<ContactRows> = Vec::new();
         for contact in contacts {
             let frame = place(&contact.frame)?;
             if touching.iter().any(|c| c.frame == frame) {
                 return Err(Error::DuplicateContact { frame: contact.frame.clone() });
             }
-            touching.push(ContactNumbers::new(contact, contact.check()?, frame, model.nv()));
+            touching.push(ContactRows::new(contact, contact.check()?, frame, model.nv()));
         }
         let mut resolved: Vec<ResolvedTask> = Vec::new();
         for task in tasks {
@@ -103,7 +103,7 @@ impl WholeBodyController {
         let kinematics = Kinematics::new(model, &frames);
         let unknowns = model.nv() + touching.iter().map(|c| c.geometry.unknowns()).sum::<usize>();
         let objective = Objective::new(resolved, model.nv(), unknowns);
-        let rows: Vec<usize> = objective.levels.iter().map(|level| level.b.len()).collect();
+        let rows: Vec<usize> = objective.priorities.iter().map(|priority| priority.b.len()).collect();
         let held = match rows.len() {
             1 => 0,
             priorities => rows.iter().sum::<usize>() + (priorities - 1) * model.nv(),
@@ -123,9 +123,9 @@ impl WholeBodyController {
         let Settings { damping, hold_ticks, .. } = settings;
         let safety = Safety::new(&kinematics, &neutral(model), settings.effort(model), damping, hold_ticks);
         let equations = Equations::new(kinematics, touching, &settings, held);
-        let levels = Levels::new(equations.program.capacity(), equations.limited.len(), &rows, &settings);
+        let hierarchy = TaskHierarchy::new(equations.program.capacity(), equations.limited.len(), &rows, &settings);
         let planned = PlannedState { q: neutral(model), v: vec![0.0; model.nv()], a: vec![0.0; model.nv()] };
-        Ok(Self { settings, equations, objective, levels, safety, command, planned })
+        Ok(Self { settings, equations, objective, hierarchy, safety, command, planned })
     }
 
     /// Returns references that keep the robot at rest at position q. All tasks keep their present values. Each contact
@@ -149,7 +149,7 @@ impl WholeBodyController {
         let (zero, still) = (Vec3::zero(), Motion::zero());
         let moved = self.objective.tasks.iter().filter_map(|task| task.frame);
         let target = |frame: usize| FrameTarget { pose: k.frames[frame].pose, velocity: still, acceleration: still };
-        let contact = |c: &ContactNumbers| {
+        let contact = |c: &ContactRows| {
             let force = Force::new(share, c.centre_arm(&k.frames[c.frame]).cross(share));
             ContactTarget { activation: 1.0, pose: k.frames[c.frame].pose, force }
         };
@@ -281,20 +281,20 @@ impl WholeBodyController {
     /// Computes the command; returns `Err` if no iterate satisfies all constraints.
     fn solve(&mut self, q: &[f64], v: &[f64], references: &References) -> Result<Status, Status> {
         self.update(q, v, references);
-        let Self { equations, objective, levels, safety, command, .. } = self;
+        let Self { equations, objective, hierarchy, safety, command, .. } = self;
         let n = equations.program.size.unknowns;
 
         let (mut outcome, mut done) = {
             let (program, kinds) = equations.program();
-            levels.solve(program, kinds, &objective.levels)
+            hierarchy.solve(program, kinds, &objective.priorities)
         };
         let failed = matches!(outcome.stopped, Some(Stopped::Infeasible | Stopped::NumericalError)) && done == 0;
         command.limits_relaxed = failed && !equations.bounds.bounds.is_empty();
         if command.limits_relaxed {
-            equations.relax(&mut objective.levels[0], PULL);
+            equations.relax(&mut objective.priorities[0], PULL);
             let iterations = outcome.iterations;
             let (program, kinds) = equations.program();
-            (outcome, done) = levels.solve(program, kinds, &objective.levels);
+            (outcome, done) = hierarchy.solve(program, kinds, &objective.priorities);
             outcome.iterations += iterations;
         }
         command.iterations = outcome.iterations;
@@ -302,7 +302,7 @@ impl WholeBodyController {
         let status = outcome.stopped.map_or(Status::Solved, Status::from);
         // Use an iterate that satisfies all constraints, or the result of an earlier priority, as the solution.
         let may_serve = done > 0 || matches!(status, Status::IterationLimit | Status::TimeLimit);
-        let x = &levels.x[..n];
+        let x = &hierarchy.x[..n];
         let violation = equations.violation(x);
         let holds = violation <= FEASIBLE * (1.0 + equations.weight) && x.iter().all(|x| x.is_finite());
         if !(may_serve && holds) {

@@ -4,13 +4,13 @@
 
 use crate::condense::Known;
 use crate::cone_program::{ConeProgram, Size};
-use crate::contact_numbers::ContactNumbers;
+use crate::contact_rows::ContactRows;
 use crate::kinematics::Kinematics;
 use crate::least_squares::{LeastSquares, dot};
 use crate::limits::AccelerationBounds;
-use crate::memory::Places;
 use crate::references::References;
 use crate::settings::Settings;
+use crate::warm_start::Places;
 use condyle_dynamics::{Joint, Model};
 use nalgebra::DMatrix;
 
@@ -20,7 +20,7 @@ const LEAST_ACTIVATION: f64 = 1e-6;
 /// Quantities that determine the constraints, and memory for the constraints.
 pub(crate) struct Equations {
     pub kinematics: Kinematics,
-    pub contacts: Vec<ContactNumbers>,
+    pub contacts: Vec<ContactRows>,
     /// Coordinates of free-flyers, which have no motor.
     pub free: Vec<usize>,
     /// Coordinates that are not in `free`.
@@ -41,10 +41,10 @@ pub(crate) struct Equations {
 }
 
 impl Equations {
-    /// Allocates memory, with space for `held` additional equalities.
+    /// Allocates warm_start, with space for `held` additional equalities.
     pub(crate) fn new(
         kinematics: Kinematics,
-        mut contacts: Vec<ContactNumbers>,
+        mut contacts: Vec<ContactRows>,
         settings: &Settings,
         held: usize,
     ) -> Self {

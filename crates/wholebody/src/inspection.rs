@@ -78,13 +78,13 @@ impl WholeBodyController {
         self.check_lengths(q, v, references);
         self.update(q, v, references);
         let (program, kinds) = self.equations.program();
-        self.levels.assemble(program, kinds, &self.objective.levels[0]);
+        self.hierarchy.assemble(program, kinds, &self.objective.priorities[0]);
     }
 
     /// Solves the program that the last call assembled.
     #[doc(hidden)]
     pub fn solve_assembled(&mut self) {
-        self.levels.solve_assembled(self.equations.program().1);
+        self.hierarchy.solve_assembled(self.equations.program().1);
     }
 
     /// Computes the program of the first priority, before any elimination.
@@ -93,7 +93,7 @@ impl WholeBodyController {
     pub fn program(&mut self, q: &[f64], v: &[f64], references: &References) -> Program {
         self.check_lengths(q, v, references);
         self.update(q, v, references);
-        self.objective.levels[0].write(&mut self.equations.program);
+        self.objective.priorities[0].write(&mut self.equations.program);
         Program::new(&self.equations.program)
     }
 
@@ -102,16 +102,16 @@ impl WholeBodyController {
     #[track_caller]
     pub fn reduced_program(&mut self, q: &[f64], v: &[f64], references: &References) -> Program {
         self.assemble(q, v, references);
-        Program::new(self.levels.program())
+        Program::new(self.hierarchy.program())
     }
 
     /// Returns the optimum found by the first priority's solver in the last step.
     #[doc(hidden)]
     pub fn optimum(&self) -> Optimum {
-        let solver = self.levels.first_solver();
+        let solver = self.hierarchy.first_solver();
         let multipliers = solver.multipliers();
         Optimum {
-            x: DVector::from_column_slice(&self.levels.x[..self.equations.program.size.unknowns]),
+            x: DVector::from_column_slice(&self.hierarchy.x[..self.equations.program.size.unknowns]),
             z: DVector::from_column_slice(solver.x()),
             equalities: DVector::from_column_slice(multipliers.equalities),
             rows: DVector::from_column_slice(multipliers.rows),

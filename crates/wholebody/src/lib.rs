@@ -27,7 +27,7 @@
 //! - A contact is a point, an edge or a convex polygon in a frame. Its force acts from the environment on the robot.
 //! - Positions, velocities and accelerations of tasks and contacts are along the world's axes. Accelerations are
 //!   classical: the second derivative of the position.
-//! - [`WholeBodyController::new`] allocates the memory.
+//! - [`WholeBodyController::new`] allocates the warm_start.
 //! - An invalid description makes `new` return an [`Error`]; an argument of the wrong length causes a panic.
 //!
 //! # Features
@@ -46,28 +46,28 @@ mod command;
 mod condense;
 mod cone_program;
 mod contact;
-mod contact_numbers;
+mod contact_rows;
 mod controller;
 mod equations;
 mod error;
 #[doc(hidden)]
 pub mod inspection;
 mod kinematics;
+mod kkt_residuals;
 mod least_squares;
-mod levels;
 #[cfg(feature = "clarabel")]
 mod lifted;
 mod limits;
-mod memory;
 mod numbers;
 mod objective;
-mod optimality;
 mod plan;
 mod reason;
 mod references;
 mod safety;
 mod settings;
 mod task;
+mod task_hierarchy;
+mod warm_start;
 
 /// Solver that [`Backend::Clarabel`] uses, for programs that also call it directly.
 #[cfg(feature = "clarabel")]
@@ -76,10 +76,10 @@ pub use command::{Command, CommandSource};
 pub use contact::{FrictionContact, Normal, Shape, SurfaceForces};
 pub use controller::WholeBodyController;
 pub use error::{Error, InvalidRotation, Status};
-pub use optimality::Optimality;
+pub use kkt_residuals::KktResiduals;
 pub use plan::{Plan, PlanData};
 pub use references::{ComTarget, ContactTarget, FrameTarget, MomentumTarget, PostureTarget, References};
-pub use settings::{Backend, Form, Friction, JointLimits, Settings};
+pub use settings::{Backend, Formulation, Friction, JointLimits, Settings};
 pub use task::{Axes, Gains, Task, TaskKind};
 
 /// Code block of the README, run as a doctest.

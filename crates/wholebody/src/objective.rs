@@ -1,6 +1,6 @@
 //! Tasks at one state, row by row: J q̈ = a* − J̇ v.
 
-use crate::contact_numbers::ContactNumbers;
+use crate::contact_rows::ContactRows;
 use crate::kinematics::{FrameMotion, Kinematics};
 use crate::least_squares::LeastSquares;
 use crate::references::{FrameTarget, PostureTarget, References};
@@ -32,7 +32,7 @@ impl ResolvedTask {
     }
 
     /// Adds the rows of the task, one for each axis that the mask selects.
-    fn add(&self, k: &Kinematics, contacts: &[ContactNumbers], references: &References, out: &mut LeastSquares) {
+    fn add(&self, k: &Kinematics, contacts: &[ContactRows], references: &References, out: &mut LeastSquares) {
         let Gains { stiffness, damping } = self.task.gains;
         let axes = self.axes.map_or(Mat3::identity(), |frame| k.frames[frame].pose.rotation);
         let frame = || (&k.frames[self.frame.expect("resolved")], &references.frames[self.target]);
@@ -156,15 +156,15 @@ pub(crate) struct Objective {
     /// q_ref ⊖ q, nv numbers.
     pub error: Vec<f64>,
     /// Objective of each priority.
-    pub levels: Vec<LeastSquares>,
+    pub priorities: Vec<LeastSquares>,
 }
 
 impl Objective {
     pub(crate) fn new(tasks: Vec<ResolvedTask>, nv: usize, unknowns: usize) -> Self {
         let count = tasks.iter().map(|t| t.task.priority + 1).max().unwrap_or(1);
         let rows = |p| tasks.iter().filter(|t| t.task.priority == p).map(ResolvedTask::max_rows).sum();
-        let levels = (0..count).map(|p| LeastSquares::new(unknowns, rows(p))).collect();
-        Self { levels, error: vec![0.0; nv], tasks }
+        let priorities = (0..count).map(|p| LeastSquares::new(unknowns, rows(p))).collect();
+        Self { priorities, error: vec![0.0; nv], tasks }
     }
 
     /// Computes the rows of all tasks at the state (q, v).
@@ -175,45 +175,45 @@ impl Objective {
         q: &[f64],
         v: &[f64],
         k: &Kinematics,
-        contacts: &[ContactNumbers],
+        contacts: &[ContactRows],
         references: &References,
         settings: &Settings,
         actuated: &[usize],
         unknowns: usize,
     ) {
-        let Self { tasks, error, levels } = self;
+        let Self { tasks, error, priorities } = self;
         let PostureTarget { q: q_ref, v: v_ref, a: a_ref } = &references.posture;
         if tasks.iter().any(|task| task.task.kind == TaskKind::Posture) {
             difference(&k.model, q, q_ref, error); // q_ref ⊖ q
         }
-        for level in levels.iter_mut() {
-            level.clear(unknowns);
+        for objective in priorities.iter_mut() {
+            objective.clear(unknowns);
         }
         for resolved in tasks.iter() {
             let Task { weight, joints, gains: Gains { stiffness, damping }, priority, .. } = &resolved.task;
-            let level = &mut levels[*priority];
+            let objective = &mut priorities[*priority];
             if *weight == 0.0 {
                 continue;
             }
-            resolved.add(k, contacts, references, level);
+            resolved.add(k, contacts, references, objective);
             if resolved.task.kind == TaskKind::Posture {
                 for &i in actuated {
                     let a = a_ref[i] + stiffness * error[i] + damping * (v_ref[i] - v[i]);
                     let factor = joints.get(i).copied().unwrap_or(1.0);
                     if factor > 0.0 {
-                        level.add_single(i, weight * factor, a); // ½ w (q̈ᵢ − a*ᵢ)²
-                        level.single.push(i);
+                        objective.add_single(i, weight * factor, a); // ½ w (q̈ᵢ − a*ᵢ)²
+                        objective.single.push(i);
                     }
                 }
             }
         }
-        for level in levels {
+        for objective in priorities {
             for i in 0..v.len() {
-                level.add_single(i, settings.acceleration_weight, 0.0); // ½ w_a q̈ᵢ²
+                objective.add_single(i, settings.acceleration_weight, 0.0); // ½ w_a q̈ᵢ²
             }
             for contact in contacts.iter().filter(|contact| contact.active) {
                 for (j, (&f, weight)) in contact.reference.iter().zip(&contact.weights).enumerate() {
-                    level.add_single(contact.column + j, weight * settings.force_weight, f); // ½ w_f (f − f_ref)²
+                    objective.add_single(contact.column + j, weight * settings.force_weight, f); // ½ w_f (f − f_ref)²
                 }
             }
         }

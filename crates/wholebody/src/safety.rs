@@ -1,7 +1,7 @@
 //! Safe command for ticks without a solution. For some ticks it repeats the last solution; then it is gravity
 //! compensation with damping.
 
-use crate::contact_numbers::ContactNumbers;
+use crate::contact_rows::ContactRows;
 use crate::kinematics::Kinematics;
 use condyle_dynamics::{Data, gravity};
 use nalgebra::{Matrix6, Vector6};
@@ -74,7 +74,7 @@ impl Safety {
     pub(crate) fn command(
         &mut self,
         kinematics: &mut Kinematics,
-        contacts: &[ContactNumbers],
+        contacts: &[ContactRows],
         free: &[usize],
         tau: &mut [f64],
     ) -> bool {
@@ -103,7 +103,7 @@ impl Safety {
     fn gravity_compensation(
         &mut self,
         kinematics: &mut Kinematics,
-        contacts: &[ContactNumbers],
+        contacts: &[ContactRows],
         free: &[usize],
         tau: &mut [f64],
     ) {
@@ -112,7 +112,7 @@ impl Safety {
         let Ok(base) = <[usize; 6]>::try_from(free) else { return };
         kinematics.update(q, v);
         let frames = &kinematics.frames;
-        let rows = |c: &ContactNumbers| if c.geometry.motion.len() == 3 { 3 } else { 6 };
+        let rows = |c: &ContactRows| if c.geometry.motion.len() == 3 { 3 } else { 6 };
         let active = || contacts.iter().filter(|c| c.active);
         // f = J_b λ, where (Σ J_bᵀ J_b) λ = g_b
         let mut gram = Matrix6::identity() * 1e-9;

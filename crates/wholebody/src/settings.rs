@@ -44,7 +44,7 @@ impl fmt::Display for Backend {
 /// Unknowns of the program that the solver receives. The solution does not depend on them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Form {
+pub enum Formulation {
     /// The equalities of the base and of the contacts are eliminated first.
     Condensed,
     /// All unknowns (q̈, f), with equalities. This form is slower; it is for comparison. Clarabel gets additional
@@ -122,7 +122,7 @@ pub struct Settings {
     /// Solver of the programs.
     pub backend: Backend,
     /// Unknowns of the program that the solver receives.
-    pub form: Form,
+    pub formulation: Formulation,
     /// Whether the solver starts from the last tick's solution, if possible.
     pub warm_start: bool,
     /// Tolerance of the solver for feasibility and for the duality gap, absolute and relative.
@@ -146,7 +146,7 @@ impl Default for Settings {
             hold_ticks: 5,
             damping: 0.02,
             backend: Backend::InteriorPoint,
-            form: Form::Condensed,
+            formulation: Formulation::Condensed,
             warm_start: true,
             tolerance: 1e-9,
             max_iterations: 50,

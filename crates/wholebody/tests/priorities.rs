@@ -5,7 +5,7 @@ mod common;
 
 use common::*;
 use condyle_dynamics::{Vec3, robots};
-use condyle_wholebody::{Axes, Backend, Form, Gains, Settings, Task, TaskKind, WholeBodyController};
+use condyle_wholebody::{Axes, Backend, Formulation, Gains, Settings, Task, TaskKind, WholeBodyController};
 
 /// Tolerance of q̈, relative to 1 and the largest number of q̈. It is slightly above the square root of the solver's
 /// tolerance of 1e-11, because only the regularisation determines some directions of q̈.
@@ -84,8 +84,9 @@ fn forms_agree_on_priorities() {
     ] {
         for seed in 0..3 {
             let (q, v) = near(model, &centre, seed, 0.02, 0.1);
-            let command = |backend, form| {
-                let settings = Settings { form, backend, tolerance: 1e-11, force_weight: 1e-5, ..Settings::default() };
+            let command = |backend, formulation| {
+                let settings =
+                    Settings { formulation, backend, tolerance: 1e-11, force_weight: 1e-5, ..Settings::default() };
                 let mut controller = WholeBodyController::new(model, &contacts, &tasks, settings).unwrap();
                 let mut references = controller.hold(&q).unwrap();
                 references.com.acceleration.x = push;
@@ -93,16 +94,19 @@ fn forms_agree_on_priorities() {
                 check(model, &contacts, &q, &v, &references, &command);
                 command
             };
-            let reference = command(Backend::InteriorPoint, Form::Condensed);
-            for (backend, form) in [
-                (Backend::InteriorPoint, Form::Full),
-                (Backend::Clarabel, Form::Condensed),
-                (Backend::Clarabel, Form::Full),
+            let reference = command(Backend::InteriorPoint, Formulation::Condensed);
+            for (backend, formulation) in [
+                (Backend::InteriorPoint, Formulation::Full),
+                (Backend::Clarabel, Formulation::Condensed),
+                (Backend::Clarabel, Formulation::Full),
             ] {
-                let found = command(backend, form);
+                let found = command(backend, formulation);
                 let apart = max_abs(found.a.iter().zip(&reference.a).map(|(a, b)| a - b));
                 let bound = AGREEMENT * (1.0 + max_abs(reference.a.iter().copied()));
-                assert!(apart < bound, "push {push}, seed {seed}, {backend:?}, {form:?}: {apart:.1e} of {bound:.1e}");
+                assert!(
+                    apart < bound,
+                    "push {push}, seed {seed}, {backend:?}, {formulation:?}: {apart:.1e} of {bound:.1e}"
+                );
             }
         }
     }

@@ -143,7 +143,7 @@ fn panics_point_at_the_caller() {
         ("v: expected 18 numbers, found 3", &mut |c| drop(c.step(&q, &v[..3], &references).clone())),
         ("references.contacts: expected 4 numbers, found 3", &mut |c| drop(c.step(&q, &v, &short).clone())),
         ("references.contacts: expected 4 numbers, found 3", &mut |c| c.track(&plan, 0.0, &mut short.clone())),
-        ("references.contacts: expected 4 numbers, found 3", &mut |c| _ = c.optimality(&q, &v, &short)),
+        ("references.contacts: expected 4 numbers, found 3", &mut |c| _ = c.kkt_residuals(&q, &v, &short)),
         ("contact: expected one of 4, found 4", &mut |_| _ = plan.activation(4, 0.0)),
         ("controls: the plan has none", &mut |_| drop(plan.feedback(0.0, &q, &v, &mut [0.0; 18]))),
     ];

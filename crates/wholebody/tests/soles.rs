@@ -6,7 +6,7 @@ mod common;
 use common::*;
 use condyle_dynamics::{Model, Vec3, robots};
 use condyle_wholebody::{
-    Backend, Command, Form, Friction, FrictionContact, Normal, References, Settings, Shape, Status, Task,
+    Backend, Command, Formulation, Friction, FrictionContact, Normal, References, Settings, Shape, Status, Task,
     WholeBodyController,
 };
 
@@ -99,23 +99,23 @@ fn all_ways_agree() {
     ] {
         for seed in 0..5 {
             let (q, v) = near(model, &centre, seed, 0.02, 0.1);
-            let command = |backend, form| {
+            let command = |backend, formulation| {
                 let tolerance = if backend == Backend::Clarabel { 1e-11 } else { 1e-10 };
-                let settings = Settings { form, backend, tolerance, force_weight: 1e-5, ..Settings::default() };
+                let settings = Settings { formulation, backend, tolerance, force_weight: 1e-5, ..Settings::default() };
                 let (references, command) =
                     solve(model, &contacts, &tasks, settings, &q, &v, |r| r.com.acceleration.x = 2.0);
                 check(model, &contacts, &q, &v, &references, &command);
                 command
             };
-            let reference = command(Backend::Clarabel, Form::Full);
-            for (backend, form) in [
-                (Backend::Clarabel, Form::Condensed),
-                (Backend::InteriorPoint, Form::Condensed),
-                (Backend::InteriorPoint, Form::Full),
+            let reference = command(Backend::Clarabel, Formulation::Full);
+            for (backend, formulation) in [
+                (Backend::Clarabel, Formulation::Condensed),
+                (Backend::InteriorPoint, Formulation::Condensed),
+                (Backend::InteriorPoint, Formulation::Full),
             ] {
-                let apart = max_abs(command(backend, form).a.iter().zip(&reference.a).map(|(a, b)| a - b));
+                let apart = max_abs(command(backend, formulation).a.iter().zip(&reference.a).map(|(a, b)| a - b));
                 let bound = AGREEMENT * (1.0 + max_abs(reference.a.iter().copied()));
-                assert!(apart < bound, "q̈ of seed {seed} by {backend:?}, {form:?}: {apart:.1e}");
+                assert!(apart < bound, "q̈ of seed {seed} by {backend:?}, {formulation:?}: {apart:.1e}");
             }
         }
     }

@@ -2,8 +2,8 @@
 #![allow(non_snake_case)]
 
 mod common;
-#[path = "common/optimality.rs"]
-mod optimality;
+#[path = "common/kkt_residuals.rs"]
+mod kkt_residuals;
 
 use common::*;
 use condyle_dynamics::{Force, Model, integrate, robots};
@@ -95,7 +95,7 @@ fn fading_contacts_do_not_jerk() {
         before = Some(command.tau.clone());
         let a = command.a.clone();
         if tick % 16 == 0 {
-            optimality::check_optimality(&mut controller, &q, &v, &references, &format!("tick {tick}"));
+            kkt_residuals::check_optimality(&mut controller, &q, &v, &references, &format!("tick {tick}"));
         }
         advance(&model, &mut q, &mut v, &a, dt);
     }

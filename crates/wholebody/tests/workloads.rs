@@ -2,14 +2,14 @@
 #![allow(non_snake_case)]
 
 mod common;
-#[path = "common/optimality.rs"]
-mod optimality;
+#[path = "common/kkt_residuals.rs"]
+mod kkt_residuals;
 #[path = "common/workload.rs"]
 mod workload;
 
 use common::{check_forces, max_abs};
-use condyle_wholebody::{Backend, Command, Form, Friction, Settings, Status};
-use optimality::{OPTIMALITY, check_optimality};
+use condyle_wholebody::{Backend, Command, Formulation, Friction, Settings, Status};
+use kkt_residuals::{OPTIMALITY, check_optimality};
 use workload::{Robot, Tick, record};
 
 /// Number of recorded ticks: the first step of each foot of a biped, or nine steps of a quadruped.
@@ -56,9 +56,10 @@ fn every_command_is_optimal() {
 #[test]
 fn back_ends_agree_on_every_command() {
     all(|robot, what, ticks| {
-        let settings = |backend, form, tolerance| Settings { backend, form, tolerance, ..Robot::settings() };
-        let mut ours = robot.controller(settings(Backend::InteriorPoint, Form::Condensed, 1e-14));
-        let mut theirs = robot.controller(settings(Backend::Clarabel, Form::Full, 3e-13));
+        let settings =
+            |backend, formulation, tolerance| Settings { backend, formulation, tolerance, ..Robot::settings() };
+        let mut ours = robot.controller(settings(Backend::InteriorPoint, Formulation::Condensed, 1e-14));
+        let mut theirs = robot.controller(settings(Backend::Clarabel, Formulation::Full, 3e-13));
         let (mut compared, mut reduced) = (0, 0);
         for (k, Tick { q, v, references }) in ticks.iter().enumerate() {
             let Command { a, status, reduced_accuracy, .. } = ours.step(q, v, references).clone();

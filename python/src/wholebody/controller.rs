@@ -160,13 +160,13 @@ impl WholeBodyController {
         give(py, controller)
     }
 
-    /// Returns the distance of the last step from the optimum of its first-priority program, as `Optimality`: the
+    /// Returns the distance of the last step from the optimum of its first-priority program, as `KktResiduals`: the
     /// errors of the Karush–Kuhn–Tucker conditions, below 1e-5 at the default tolerance. Pass the same state
     /// and references as to the last step. For tests: it assembles the program anew.
     ///
     /// q: nq numbers; v: nv.
     /// references: `References` of this controller.
-    fn optimality<'py>(
+    fn kkt_residuals<'py>(
         &self,
         py: Python<'py>,
         q: &Bound<'_, PyAny>,
@@ -179,9 +179,9 @@ impl WholeBodyController {
         position.copy_from_slice(&q);
         velocity.copy_from_slice(&v);
         references::read(references, numbers)?;
-        let errors = py.detach(|| controller.optimality(position, velocity, numbers));
-        let rust::Optimality { stationarity, primal, dual, complementarity } = errors;
-        class!(py, "condyle._wholebody", "Optimality")?.call1((stationarity, primal, dual, complementarity))
+        let errors = py.detach(|| controller.kkt_residuals(position, velocity, numbers));
+        let rust::KktResiduals { stationarity, primal, dual, complementarity } = errors;
+        class!(py, "condyle._wholebody", "KktResiduals")?.call1((stationarity, primal, dual, complementarity))
     }
 
     /// The last `Command`; zeros before the first step.

@@ -5,7 +5,7 @@ use crate::exceptions::wrong_word;
 use condyle::wholebody as rust;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use rust::{Backend, Form, Friction, JointLimits, Settings};
+use rust::{Backend, Formulation, Friction, JointLimits, Settings};
 
 /// Reads gains, given as a pair.
 pub(super) fn gains(argument: &str, given: &Bound<'_, PyAny>) -> PyResult<rust::Gains> {
@@ -60,10 +60,10 @@ pub(super) fn read(given: &Bound<'_, PyAny>) -> PyResult<Settings> {
             "clarabel" => Backend::Clarabel,
             other => return Err(wrong_word("backend", "'interior_point' or 'clarabel'", other)),
         },
-        form: match get("form")?.extract::<String>()?.as_str() {
-            "condensed" => Form::Condensed,
-            "full" => Form::Full,
-            other => return Err(wrong_word("form", "'condensed' or 'full'", other)),
+        formulation: match get("formulation")?.extract::<String>()?.as_str() {
+            "condensed" => Formulation::Condensed,
+            "full" => Formulation::Full,
+            other => return Err(wrong_word("formulation", "'condensed' or 'full'", other)),
         },
         warm_start: get("warm_start")?.extract()?,
         tolerance: get("tolerance")?.extract()?,
@@ -102,7 +102,7 @@ pub(super) fn give<'py>(py: Python<'py>, s: &Settings) -> PyResult<Bound<'py, Py
         s.hold_ticks.into_pyobject(py)?.into_any(),
         s.damping.give(py, None)?,
         if s.backend == Backend::Clarabel { "clarabel" } else { "interior_point" }.into_pyobject(py)?.into_any(),
-        if s.form == Form::Full { "full" } else { "condensed" }.into_pyobject(py)?.into_any(),
+        if s.formulation == Formulation::Full { "full" } else { "condensed" }.into_pyobject(py)?.into_any(),
         s.warm_start.into_pyobject(py)?.to_owned().into_any(),
         s.tolerance.give(py, None)?,
         s.max_iterations.into_pyobject(py)?.into_any(),

@@ -176,7 +176,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
         say(&report.text(arguments));
     }
     match report.verdicts.iter().find(|v| v.fits == Some(false)) {
-        Some(v) => Err(Error::No(format!(
+        Some(v) => Err(Error::NegativeAnswer(format!(
             "over budget: {} knots take {:.3} ms for {} iterations {}, the period is {:.3} ms",
             v.knots,
             1e3 * v.iteration_s * f64::from(arguments.iterations),

@@ -80,7 +80,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Error> {
     }
     match report.rows.iter().filter(|row| !row.pass).count() {
         0 => Ok(()),
-        n => Err(Error::No(format!("{}: {n} of {} checks failed", report.robot, report.rows.len()))),
+        n => Err(Error::NegativeAnswer(format!("{}: {n} of {} checks failed", report.robot, report.rows.len()))),
     }
 }
 

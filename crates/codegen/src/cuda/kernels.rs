@@ -117,7 +117,7 @@ impl<T: Real> Kernels<T> {
     }
 }
 
-/// Function of a robot on a GPU. Each thread computes one state, or a share of one state.
+/// Function of a robot on a GPU. Each thread computes one state, or a partition of one state.
 pub struct Kernel<T: Real> {
     name: String,
     inputs: Vec<Array>,
@@ -125,9 +125,9 @@ pub struct Kernel<T: Real> {
     module: Arc<Module>,
     handle: Handle,
     /// Number of threads that can share a state; each of them is in another row of blocks.
-    shares: usize,
-    /// Largest number of states for which each state is split among `shares` threads.
-    most_shared: usize,
+    partitions: usize,
+    /// Largest number of states for which each state is split among `partitions` threads.
+    most_partitioned: usize,
     /// Number of threads in a block, chosen so that the most warps run on a multiprocessor at the same time.
     threads: usize,
     registers: usize,
@@ -162,15 +162,15 @@ impl<T: Real> Kernel<T> {
         };
         let threads = usize::try_from(threads).unwrap_or(0).max(WARP);
         let at_a_time = threads * usize::try_from(blocks).unwrap_or(0);
-        let shares = function.shares(T::LANGUAGE);
+        let partitions = function.partitions(T::LANGUAGE);
         Ok(Self {
             name: function.name.clone(),
             inputs: function.inputs.clone(),
             outputs: function.outputs.clone(),
             module: module.clone(),
             handle,
-            shares,
-            most_shared: if function.shares.is_some() { usize::MAX } else { at_a_time / shares },
+            partitions,
+            most_partitioned: if function.partitions.is_some() { usize::MAX } else { at_a_time / partitions },
             threads,
             registers: attribute(REGISTERS)?,
             local_bytes: attribute(LOCAL_BYTES)?,
@@ -188,9 +188,9 @@ impl<T: Real> Kernel<T> {
         &self.outputs
     }
 
-    /// Returns the number of threads that share a state if there are few states; see [`Function::shares`].
-    pub fn shares(&self) -> usize {
-        self.shares
+    /// Returns the number of threads that share a state if there are few states; see [`Function::partitions`].
+    pub fn partitions(&self) -> usize {
+        self.partitions
     }
 
     /// Returns the number of registers per thread.
@@ -239,7 +239,7 @@ impl<T: Real> Kernel<T> {
             inputs.iter().map(|a| a.address).chain(outputs.iter().map(|a| a.address)).collect();
         let mut parameters = vec![(&raw mut states).cast::<c_void>()];
         parameters.extend(addresses.iter_mut().map(|a| (&raw mut *a).cast()));
-        let rows = if n > self.most_shared { 1 } else { self.shares };
+        let rows = if n > self.most_partitioned { 1 } else { self.partitions };
         let threads = self.threads_for(rows * n);
         let blocks = n.div_ceil(threads) as c_uint;
         let (_current, rows, threads) = (device.0.current()?, rows as c_uint, threads as c_uint);
@@ -252,8 +252,8 @@ impl<T: Real> Kernel<T> {
     /// Returns the number of threads in a block, for n threads in all blocks together. It is smaller than the optimum
     /// for large n if larger blocks would leave multiprocessors idle.
     fn threads_for(&self, n: usize) -> usize {
-        let share = n.div_ceil(self.module.device.0.multiprocessors).next_multiple_of(WARP);
-        share.min(self.threads)
+        let portion = n.div_ceil(self.module.device.0.multiprocessors).next_multiple_of(WARP);
+        portion.min(self.threads)
     }
 
     fn check<'a>(

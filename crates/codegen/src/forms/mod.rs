@@ -13,7 +13,7 @@ use branches::Branches;
 use condyle_dynamics::selection::{SHORT_CHAIN, inverse_by_factor, is_short_chain};
 use condyle_dynamics::{Data, forward_kinematics, rnea, rnea_derivatives, subtract_armature_bias};
 use condyle_linalg::gauss_jordan::gauss_jordan;
-use condyle_linalg::tree_product::minus_products;
+use condyle_linalg::tree_product::neg_products;
 use condyle_linalg::{Ltdl, check};
 use condyle_model::Model;
 use condyle_model::layout::Single;
@@ -112,7 +112,7 @@ pub fn aba_derivatives<S: Scalar, R: Constant<S>>(
     let floating = floating::<S, R>(model);
     let known = |numbers: usize| floating.iter().flat_map(|&(_, first)| first..first + numbers).collect::<Vec<_>>();
     // ∂q̈ = −M⁻¹ ∂τ
-    let [mut da_dq, mut da_dv] = inverse.minus_products(model, [(d.dtau_dq, known(6)), (d.dtau_dv, known(3))]);
+    let [mut da_dq, mut da_dv] = inverse.neg_products(model, [(d.dtau_dq, known(6)), (d.dtau_dv, known(3))]);
     for (body, first) in floating {
         let turned = forward_kinematics(model, data, q).body(body).rotation.transpose_mul(model.gravity().lift());
         let omega = Vec3::new(v[first + 3], v[first + 4], v[first + 5]);
@@ -189,7 +189,7 @@ impl<S: Scalar> Inverse<S> {
 
     /// Computes −M⁻¹ B, except for known columns, which stay zero. It uses the factor if this takes fewer products and
     /// sums than M⁻¹: twice the number of the factor's entries, compared with nv².
-    fn minus_products<R>(&self, model: &Model<R>, B: [(&Matrix<S>, Vec<usize>); 2]) -> [DMatrix<S>; 2] {
+    fn neg_products<R>(&self, model: &Model<R>, B: [(&Matrix<S>, Vec<usize>); 2]) -> [DMatrix<S>; 2] {
         let n = model.nv();
         let mut all = B.map(|(B, known)| {
             let mut B = B.clone_owned();
@@ -205,7 +205,7 @@ impl<S: Scalar> Inverse<S> {
             _ => {
                 let [mut X, mut Y] = [zeros(model), zeros(model)];
                 let both = [X.as_mut_slice(), Y.as_mut_slice()];
-                minus_products(self.Minv.as_slice(), [0, 1].map(|k| all[k].as_slice()), both, model.nonzero_rows());
+                neg_products(self.Minv.as_slice(), [0, 1].map(|k| all[k].as_slice()), both, model.nonzero_rows());
                 [X, Y]
             }
         }

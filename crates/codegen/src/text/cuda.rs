@@ -1,10 +1,10 @@
-//! Writes CUDA code. A thread computes a state or one of the state's shares. In memory, the first numbers of all states
-//! come first.
+//! Writes CUDA code. A thread computes a state or one of the state's partitions. In memory, the first numbers of all
+//! states come first.
 
 use super::{Dialect, SourceFile, Writer, description, heading, interface, prefixed};
 use crate::function::{Array, Function};
+use crate::partitions::split;
 use crate::program::Program;
-use crate::shares::split;
 use crate::text::c::C;
 use core::fmt::Write;
 
@@ -55,31 +55,31 @@ fn parameters(real: &str, reads: &[&Array], work: bool, writes: &[&Array]) -> St
 
 /// Returns the file that contains the kernels.
 pub(crate) fn files(name: &str, programs: &[Program], real: &'static str, registers: usize) -> Vec<SourceFile> {
-    let shares: Vec<Vec<Function>> = programs.iter().map(|program| split(program, registers)).collect();
+    let partitions: Vec<Vec<Function>> = programs.iter().map(|program| split(program, registers)).collect();
     let mut lines = heading(name, programs);
     lines.extend([
         String::new(),
         "A thread computes one of n states. Number k of an array of state i stands at [k * n + i].".to_owned(),
         "Launch with at least n threads: name<<<(n + 127) / 128, 128>>>(n, ...).".to_owned(),
     ]);
-    if shares.iter().any(|shares| !shares.is_empty()) {
+    if partitions.iter().any(|partitions| !partitions.is_empty()) {
         lines.extend([
             String::new(),
-            "Where a kernel says that it has shares, as many threads may compute a state, each some of the results, and what".to_owned(),
-            "several of them need each for itself: name<<<dim3((n + 127) / 128, shares), 128>>>(n, ...). That is for few states.".to_owned(),
+            "Where a kernel says that it has partitions, as many threads may compute a state, each some of the results, and what".to_owned(),
+            "several of them need each for itself: name<<<dim3((n + 127) / 128, partitions), 128>>>(n, ...). That is for few states.".to_owned(),
         ]);
     }
     let mut text = format!("{}\n", prefixed("// ", &lines));
-    for (program, shares) in programs.iter().zip(&shares) {
-        let shares: Vec<Program> = shares.iter().map(Program::new).collect();
+    for (program, partitions) in programs.iter().zip(&partitions) {
+        let partitions: Vec<Program> = partitions.iter().map(Program::new).collect();
         let writer = |program| Writer::new(program, Cuda(C { real, lanes: 1, name: name.to_owned() }));
-        text += &kernel(&writer(program), &shares.iter().map(writer).collect::<Vec<_>>(), name);
+        text += &kernel(&writer(program), &partitions.iter().map(writer).collect::<Vec<_>>(), name);
     }
     vec![SourceFile { name: format!("{name}.cu"), text }]
 }
 
-/// Returns a kernel and its parts, or a kernel and the functions of its shares.
-fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
+/// Returns a kernel and its parts, or a kernel and the functions of its partitions.
+fn kernel(whole: &Writer<Cuda>, partitions: &[Writer<Cuda>], name: &str) -> String {
     let (real, function) = (whole.dialect.0.real, whole.program.function);
     let (inputs, outputs): (Vec<&Array>, Vec<&Array>) =
         (function.inputs.iter().collect(), function.outputs.iter().collect());
@@ -87,7 +87,7 @@ fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
     let symbol = format!("{name}_{}", function.name);
     let mut body =
         ["const int i = blockIdx.x * blockDim.x + threadIdx.x;", "if (i >= n) return;"].map(str::to_owned).to_vec();
-    let (mut text, about) = if shares.is_empty() {
+    let (mut text, about) = if partitions.is_empty() {
         let (parts, lines) = computation(whole, name);
         body.extend(lines);
         (parts, description(whole.program))
@@ -100,23 +100,25 @@ fn kernel(whole: &Writer<Cuda>, shares: &[Writer<Cuda>], name: &str) -> String {
             format!("{symbol}(n, i{names});")
         };
         let mut text = String::new();
-        if function.shares.is_none() {
+        if function.partitions.is_none() {
             let call = device_function(&mut text, whole, &format!("{symbol}_whole"));
             body.push(format!("if (gridDim.y == 1) return {call}"));
         }
-        // The existing rows of blocks also compute the shares that have no row of their own.
-        let count = shares.len();
-        body.push(format!("for (int share = blockIdx.y; share < {count}; share += gridDim.y) switch (share) {{"));
-        for (k, share) in shares.iter().enumerate() {
-            let call = device_function(&mut text, share, &format!("{symbol}_share{k}"));
+        // The existing rows of blocks also compute the partitions that have no row of their own.
+        let count = partitions.len();
+        body.push(format!(
+            "for (int partition = blockIdx.y; partition < {count}; partition += gridDim.y) switch (partition) {{"
+        ));
+        for (k, partition) in partitions.iter().enumerate() {
+            let call = device_function(&mut text, partition, &format!("{symbol}_partition{k}"));
             body.push(format!("case {k}: {call} break;"));
         }
         body.push("}".to_owned());
         let operations = |program: &Program| program.steps.operations().total().to_string();
-        let each: Vec<String> = shares.iter().map(|share| operations(share.program)).collect();
+        let each: Vec<String> = partitions.iter().map(|partition| operations(partition.program)).collect();
         let mut about = interface(function);
         let all = operations(whole.program);
-        about.push(format!("Shares: {count}, of {} operations; all results together take {all}.", each.join(", ")));
+        about.push(format!("Partitions: {count}, of {} operations; all results together take {all}.", each.join(", ")));
         (text, about)
     };
     let head = format!("extern \"C\" __global__ void {symbol}(int n{parameters})");

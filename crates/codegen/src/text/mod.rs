@@ -7,8 +7,8 @@ mod rust;
 
 use crate::function::{Array, Function, places};
 use crate::graph::{Id, Node};
+use crate::partitions::split;
 use crate::program::{Place, Program};
-use crate::shares::split;
 use crate::step::{Angle, Entries, Step, Term};
 use core::fmt::Write;
 
@@ -47,8 +47,8 @@ pub enum Language {
     Rust,
     /// A module of Rust with `f32`, without `std`.
     RustFloat,
-    /// CUDA with `double`. A thread computes a state, or one of the state's shares ([`Function::shares`]). In memory,
-    /// the first numbers of all states come first.
+    /// CUDA with `double`. A thread computes a state, or one of the state's partitions ([`Function::partitions`]). In
+    /// memory, the first numbers of all states come first.
     Cuda,
     /// CUDA with `float`.
     CudaFloat,
@@ -163,21 +163,22 @@ impl Function {
     /// CUDA.
     ///
     /// A robot's function is split by limbs if one thread would need more values than it has registers. In addition,
-    /// the largest share must shrink by a larger factor than the factor by which the sum of all shares grows.
-    /// [`Settings::shares`](crate::Settings::shares) can set the number. If a kernel is launched with this number of
-    /// rows of blocks (`blockIdx.y`), each row computes one share. With one row, each thread computes a whole state.
+    /// the largest partition must shrink by a larger factor than the factor by which the sum of all partitions grows.
+    /// [`Settings::partitions`](crate::Settings::partitions) can set the number. If a kernel is launched with this
+    /// number of rows of blocks (`blockIdx.y`), each row computes one partition. With one row, each thread computes a
+    /// whole state.
     ///
     /// ```
     /// use condyle_codegen::{Language, Settings, functions};
     /// use condyle_dynamics::robots;
     /// let all = functions(&robots::quadruped(), &["rnea", "rnea_derivatives"], &Settings::default())?;
-    /// assert_eq!(all[0].shares(Language::Cuda), 1); // the trunk's efforts need what all limbs do
-    /// assert!(all[1].shares(Language::Cuda) > 1);
+    /// assert_eq!(all[0].partitions(Language::Cuda), 1); // the trunk's efforts need what all limbs do
+    /// assert!(all[1].partitions(Language::Cuda) > 1);
     /// # Ok::<(), condyle_codegen::Error>(())
     /// ```
-    pub fn shares(&self, language: Language) -> usize {
-        let shares = language.registers_of_number().map(|registers| split(&Program::new(self), registers));
-        shares.map_or(1, |shares| shares.len().max(1))
+    pub fn partitions(&self, language: Language) -> usize {
+        let partitions = language.registers_of_number().map(|registers| split(&Program::new(self), registers));
+        partitions.map_or(1, |partitions| partitions.len().max(1))
     }
 }
 
@@ -210,8 +211,8 @@ pub(crate) trait Dialect {
     /// Returns the definition of variables for the sine and the cosine of an angle.
     fn sin_cos(&self, sin: &str, cos: &str, angle: &str) -> String;
     /// Returns the code of ± a b ± c with these signs.
-    fn mul_add(&self, minus_product: bool, a: &str, b: &str, minus: bool, c: &str) -> String {
-        match (minus_product, minus) {
+    fn mul_add(&self, neg_product: bool, a: &str, b: &str, minus: bool, c: &str) -> String {
+        match (neg_product, minus) {
             (false, false) => format!("{a} * {b} + {c}"),
             (false, true) => format!("{a} * {b} - {c}"),
             _ => format!("{c} - {a} * {b}"),
@@ -303,8 +304,8 @@ impl<'p, D: Dialect> Writer<'p, D> {
                 lines.extend(self.dialect.fence().map(str::to_owned));
             }
             let number = |id| self.value(p, id, false);
-            let fused = |[a, b, c]: [Id; 3], minus_product, minus| {
-                self.dialect.mul_add(minus_product, &number(a), &number(b), minus, &number(c))
+            let fused = |[a, b, c]: [Id; 3], neg_product, minus| {
+                self.dialect.mul_add(neg_product, &number(a), &number(b), minus, &number(c))
             };
             let (id, text, is_mask) = match *step {
                 Step::Plain(id, node) => (id, self.expression(p, node), node.is_mask()),

@@ -3,7 +3,7 @@
 use super::{Batch, InLanes};
 use crate::constraints::constraint::{ContactConstraint, Target};
 use crate::constraints::constraint_set::ConstraintSet;
-use crate::constraints::plan::Proximal;
+use crate::constraints::plan::ProximalSettings;
 use crate::workspace::Gate;
 use alloc::borrow::ToOwned;
 use alloc::vec::Vec;
@@ -15,11 +15,11 @@ use core::ops::Range;
 /// Constraints of one model, with the scratch that one [`Batch`] needs for them: see [`ConstraintSet`].
 ///
 /// ```
-/// use condyle_dynamics::{Batch, ContactConstraint, Proximal, robots};
+/// use condyle_dynamics::{Batch, ContactConstraint, ProximalSettings, robots};
 /// let arm = robots::arm7();
 /// let mut batch = Batch::new(&arm, 10, 1);
 /// let touch = [ContactConstraint::point(arm.frame("tool")?)];
-/// let mut touch = batch.constraints(&arm, &touch, Proximal::default())?;
+/// let mut touch = batch.constraints(&arm, &touch, ProximalSettings::default())?;
 /// let (q, v, tau) = (vec![0.3; 70], vec![0.1; 70], vec![1.0; 70]);
 /// let d = batch.constrained_dynamics(&arm, &mut touch, &q, &v, &tau, &[]);
 /// assert_eq!((d.a.len(), d.lambda.len(), d.residual.len()), (70, 30, 10));
@@ -35,8 +35,8 @@ pub struct BatchConstraints<T: Real = f64> {
 #[derive(Clone, Debug)]
 pub(super) enum Sets<T: Real> {
     Single(Vec<ConstraintSet<T>>),
-    Short(Vec<ConstraintSet<T::Short<Gate>>>),
-    Long(Vec<ConstraintSet<T::Long<Gate>>>),
+    Narrow(Vec<ConstraintSet<T::Narrow<Gate>>>),
+    Wide(Vec<ConstraintSet<T::Wide<Gate>>>),
 }
 
 impl<T: Real> Batch<T> {
@@ -48,13 +48,13 @@ impl<T: Real> Batch<T> {
         &self,
         model: &Model,
         constraints: &[ContactConstraint],
-        proximal: Proximal,
+        proximal: ProximalSettings,
     ) -> Result<BatchConstraints<T>, Error> {
         ConstraintSet::<T>::check_all(model, constraints)?;
         let sets = match &self.lanes {
             InLanes::Single(group) => Sets::Single(made(model, constraints, group.threads())?),
-            InLanes::Short(group) => Sets::Short(made(model, constraints, group.threads())?),
-            InLanes::Long(group) => Sets::Long(made(model, constraints, group.threads())?),
+            InLanes::Narrow(group) => Sets::Narrow(made(model, constraints, group.threads())?),
+            InLanes::Wide(group) => Sets::Wide(made(model, constraints, group.threads())?),
         };
         let mut constraints = BatchConstraints { sets };
         constraints.set_proximal(proximal);
@@ -86,7 +86,7 @@ impl<T: Real> BatchConstraints<T> {
     }
 
     /// Sets how redundant constraints share their forces.
-    pub fn set_proximal(&mut self, proximal: Proximal) {
+    pub fn set_proximal(&mut self, proximal: ProximalSettings) {
         each!(Sets, &mut self.sets, sets => sets.iter_mut().for_each(|set| set.proximal = proximal));
     }
 
@@ -111,8 +111,8 @@ impl<T: Real> BatchConstraints<T> {
     pub fn fits(&self, batch: &Batch<T>) -> bool {
         match (&self.sets, &batch.lanes) {
             (Sets::Single(sets), InLanes::Single(group)) => sets.len() == group.threads(),
-            (Sets::Short(sets), InLanes::Short(group)) => sets.len() == group.threads(),
-            (Sets::Long(sets), InLanes::Long(group)) => sets.len() == group.threads(),
+            (Sets::Narrow(sets), InLanes::Narrow(group)) => sets.len() == group.threads(),
+            (Sets::Wide(sets), InLanes::Wide(group)) => sets.len() == group.threads(),
             _ => false,
         }
     }

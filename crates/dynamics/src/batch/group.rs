@@ -48,9 +48,9 @@ pub(super) const FORCES: usize = ARGUMENTS - 1;
 #[derive(Debug)]
 struct Worker<S: Block> {
     data: Data<S>,
-    /// Arguments, one state per lane. Shape: nq, nv, nv, nv. Written by: `one_by_one`.
+    /// Arguments, one state per lane. Shape: nq, nv, nv, nv. Written by: `run_serially`.
     numbers: [Array<S>; FORCES],
-    /// External forces. Shape: bodies, or empty. Written by: `one_by_one`.
+    /// External forces. Shape: bodies, or empty. Written by: `run_serially`.
     f_ext: Vec<Force<S>>,
     /// Scratch of passes. Shape: 6 × nv.
     six: [Matrix<S>; 2],
@@ -172,7 +172,7 @@ fn spread<T: Real, S: Block<Number = T>>(
 ) {
     let (groups, count) = (states.div_ceil(S::LANES), team.workers.len());
     if count == 1 || groups < 2 {
-        return one_by_one(work, model, team, states, from, to);
+        return run_serially(work, model, team, states, from, to);
     }
     let (some, others) = team.workers.split_at_mut(count / 2);
     let sets = team.sets.split_at_mut(some.len().min(team.sets.len()));
@@ -186,7 +186,7 @@ fn spread<T: Real, S: Block<Number = T>>(
 }
 
 /// Runs the work on all groups, on one thread.
-fn one_by_one<T: Real, S: Block<Number = T>>(
+fn run_serially<T: Real, S: Block<Number = T>>(
     work: &Work<'_, T, S>,
     model: &Model,
     Team { workers, sets }: Team<'_, S>,

@@ -14,8 +14,8 @@ macro_rules! each {
     ($Of:ident, $of:expr, $some:ident => $body:expr) => {
         match $of {
             $Of::Single($some) => $body,
-            $Of::Short($some) => $body,
-            $Of::Long($some) => $body,
+            $Of::Narrow($some) => $body,
+            $Of::Wide($some) => $body,
         }
     };
 }
@@ -90,8 +90,8 @@ impl BatchNumber for f32 {}
 #[derive(Clone, Debug)]
 enum InLanes<T: Real> {
     Single(Group<T>),
-    Short(Group<T::Short<Gate>>),
-    Long(Group<T::Long<Gate>>),
+    Narrow(Group<T::Narrow<Gate>>),
+    Wide(Group<T::Wide<Gate>>),
 }
 
 impl<T: Real> Batch<T> {
@@ -119,8 +119,8 @@ impl<T: Real> Batch<T> {
             states,
             lanes: match level() {
                 Level::Baseline => InLanes::Single(Group::new(model, states, threads)),
-                Level::Simd128 | Level::Neon | Level::Avx2 => InLanes::Short(Group::new(model, states, threads)),
-                Level::Avx512 => InLanes::Long(Group::new(model, states, threads)),
+                Level::Simd128 | Level::Neon | Level::Avx2 => InLanes::Narrow(Group::new(model, states, threads)),
+                Level::Avx512 => InLanes::Wide(Group::new(model, states, threads)),
             },
             slots: core::array::from_fn(|k| if k == 0 { vec![T::zero(); states * model.nv()] } else { Vec::new() }),
             last: Last::default(),
@@ -261,8 +261,8 @@ impl<T: Real> Batch<T> {
         }
         match &mut self.lanes {
             InLanes::Single(group) => run!(group, Single),
-            InLanes::Short(group) => run!(group, Short),
-            InLanes::Long(group) => run!(group, Long),
+            InLanes::Narrow(group) => run!(group, Narrow),
+            InLanes::Wide(group) => run!(group, Wide),
         }
     }
 }

@@ -37,10 +37,10 @@ pub struct Constrained<'d, S> {
 /// the rows. Allocates nothing.
 ///
 /// If constraints contradict each other, or a constraint cannot be satisfied at a singular posture, the result is
-/// finite and `residual` is not zero. [`Proximal`](crate::Proximal) settings decide how redundant constraints share
-/// their forces. Source: Carpentier, Budhiraja, Mansard (2021), with the factorisation of Featherstone (2005); Wensing,
-/// Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the operational-space inertia
-/// matrix* (2012).
+/// finite and `residual` is not zero. [`ProximalSettings`](crate::ProximalSettings) decide how redundant constraints
+/// share their forces. Source: Carpentier, Budhiraja, Mansard (2021), with the factorisation of Featherstone (2005);
+/// Wensing, Featherstone, Orin, *A reduced-order recursive algorithm for the computation of the operational-space
+/// inertia matrix* (2012).
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, constrained_dynamics, neutral, robots};

@@ -1,7 +1,7 @@
 //! First derivatives of inverse and forward dynamics, of momentum and of energies.
 
 use super::differentiated::State;
-use super::forward_dynamics::one_by_one as accelerate;
+use super::forward_dynamics;
 use super::inverse_dynamics::check_arguments;
 use super::kinematics::{forward_accelerations, forward_kinematics, forward_velocities};
 use super::limbs::{Task, run as run_limbs};
@@ -14,7 +14,7 @@ use crate::passes::energy::{self, EnergyDerivatives};
 use crate::passes::kinematics::{PlacementCache, positions};
 use crate::passes::{minv, statics};
 use condyle_linalg::check;
-use condyle_linalg::tree_product::minus_products;
+use condyle_linalg::tree_product::neg_products;
 use condyle_model::Model;
 use condyle_spatial::{Constant, Force, Matrix, Scalar, Vec3};
 
@@ -123,14 +123,18 @@ pub fn rnea_derivatives<'d, S: Scalar, R: Constant<S>>(
         data.rnea_derivatives.qd.copy_from_slice(v);
         data.rnea_derivatives.qdd.copy_from_slice(a);
     } else {
-        one_by_one(model, data, arguments);
+        run_rnea_serially(model, data, arguments);
     }
     view(model, data)
 }
 
 /// Computes the derivatives body by body and keeps the terms needed for second derivatives. The arguments must be
 /// valid.
-pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
+pub(crate) fn run_rnea_serially<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    arguments: Arguments<'_, S>,
+) {
     let Arguments { q, v, x: a, f_ext } = arguments;
     positions(model, &mut data.world, q);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, a, f_ext, &[]);
@@ -232,7 +236,7 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
     model.check_regular();
     check_arguments(model, data, "tau", arguments);
     if data.minv.by_factor
-        && !data.aba_derivatives.solve.pays()
+        && !data.aba_derivatives.solve.is_used()
         && run_limbs(Task::AbaDerivatives, model, data, arguments)
     {
         data.aba_derivatives.a.copy_from_slice(&data.aba.qdd);
@@ -240,16 +244,20 @@ pub fn aba_derivatives<'d, S: Scalar, R: Constant<S>>(
         data.rnea_derivatives.qdd.copy_from_slice(&data.aba.qdd);
         multiply(model, data);
     } else {
-        in_turn(model, data, arguments);
+        run_aba_serially(model, data, arguments);
     }
     view_of_aba(model, data)
 }
 
 /// Computes the derivatives body by body and keeps the terms needed for second derivatives. The arguments must be
 /// valid.
-pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
+pub(crate) fn run_aba_serially<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    arguments: Arguments<'_, S>,
+) {
     let Arguments { v, f_ext, .. } = arguments;
-    accelerate(model, data, arguments);
+    forward_dynamics::run_serially(model, data, arguments);
     let mut a_kept = core::mem::take(&mut data.aba_derivatives.a);
     a_kept.copy_from_slice(&data.aba.qdd);
     rnea::run(model, &data.world, &mut data.rnea_derivatives, v, &a_kept, f_ext, &[]);
@@ -259,7 +267,7 @@ pub(crate) fn in_turn<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Da
     } else {
         minv::from_factors(model.columns(), &data.world, &data.aba, &mut data.minv); // the factors of `aba`
     }
-    if data.aba_derivatives.solve.pays() {
+    if data.aba_derivatives.solve.is_used() {
         let dtau = [data.rnea_derivatives.dtau_dq.as_slice(), data.rnea_derivatives.dtau_dv.as_slice()];
         aba::solves(&data.world, &data.aba, &mut data.aba_derivatives, dtau);
     } else {
@@ -274,9 +282,9 @@ fn multiply<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>) {
     let nonzero_rows = if float_freely { &out.nonzero_rows } else { model.nonzero_rows() };
     let dtau = [d.dtau_dq.as_slice(), d.dtau_dv.as_slice()];
     let da = [out.da_dq.as_mut_slice(), out.da_dv.as_mut_slice()];
-    minus_products(data.minv.Minv.as_slice(), dtau, da, nonzero_rows);
+    neg_products(data.minv.Minv.as_slice(), dtau, da, nonzero_rows);
     if float_freely {
-        aba::boost(out, &d.qd);
+        aba::set_floating_columns(out, &d.qd);
     }
 }
 

@@ -5,7 +5,7 @@ use crate::lanes::limbs::LaneView;
 use crate::passes::frames::Placements;
 use crate::passes::kinematics::World;
 use condyle_model::Model;
-use condyle_spatial::gate::{Fused, Rename};
+use condyle_spatial::gate::{FusedF64, Rename};
 use condyle_spatial::{Constant, Inertia, Motion, Scalar, Se3, Vec3};
 
 /// State at which inverse dynamics was differentiated.
@@ -18,9 +18,9 @@ pub(crate) struct State<'d, S, R> {
     pub limbs: Option<LaneView<'d>>,
 }
 
-impl<'d> Rename<State<'d, Fused, f64>> for State<'d, f64, f64> {
+impl<'d> Rename<State<'d, FusedF64, f64>> for State<'d, f64, f64> {
     #[inline(always)]
-    fn renamed(self) -> State<'d, Fused, f64> {
+    fn renamed(self) -> State<'d, FusedF64, f64> {
         let Self { model, world, pass, limbs } = self;
         State { model, world: world.renamed(), pass: pass.renamed(), limbs }
     }

@@ -50,13 +50,17 @@ pub fn aba<'d, S: Scalar, R: Constant<S>>(
     model.check_regular();
     check_arguments(model, data, "tau", arguments);
     if !run_limbs(Task::Aba, model, data, arguments) {
-        one_by_one(model, data, arguments);
+        run_serially(model, data, arguments);
     }
     &data.aba.qdd
 }
 
 /// Computes q̈ body by body and keeps the quantities that depend on q. The arguments must be valid.
-pub(crate) fn one_by_one<S: Scalar, R: Constant<S>>(model: &Model<R>, data: &mut Data<S>, arguments: Arguments<'_, S>) {
+pub(crate) fn run_serially<S: Scalar, R: Constant<S>>(
+    model: &Model<R>,
+    data: &mut Data<S>,
+    arguments: Arguments<'_, S>,
+) {
     if model.has_mimic() {
         by_factor(model, data, arguments, ForwardDynamicsMethod::Sparse);
         data.aba.qdd.copy_from_slice(&data.forward_dynamics.qdd);

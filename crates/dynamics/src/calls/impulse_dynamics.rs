@@ -31,8 +31,8 @@ pub struct Impulse<'d, S> {
 /// q: nq numbers; v: nv; restitution: ε, 0 for frames that stick, 1 for an impact that loses no energy. Only the
 /// constraints' frames and reference frames matter. Gains and targets are ignored, except that targets locate the point
 /// on the other frame. Like [`constrained_dynamics`](crate::constrained_dynamics()), it uses the sparsity of the tree
-/// and the same [`Proximal`](crate::Proximal) settings. Allocates nothing. Source: Featherstone, *Rigid Body Dynamics
-/// Algorithms* (2008), section 11.7.
+/// and the same [`ProximalSettings`](crate::ProximalSettings). Allocates nothing. Source: Featherstone, *Rigid Body
+/// Dynamics Algorithms* (2008), section 11.7.
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ConstraintSet, Data, impulse_dynamics, neutral, robots};

@@ -13,7 +13,7 @@ use crate::passes::kinematics::{PlacementCache, World, place};
 use crate::passes::{aba, crba, free_armature, rnea};
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Layout, Single};
-use condyle_spatial::gate::{Fused, Level, is, level, same};
+use condyle_spatial::gate::{FusedF64, Level, is, level, same};
 use condyle_spatial::register_kernel;
 use condyle_spatial::{Constant, Scalar};
 
@@ -34,15 +34,15 @@ register_kernel! {
         model: &Model,
         plan: &Plan,
         s: &mut Scratch,
-        moving: [&[Fused]; 2],
+        moving: [&[FusedF64]; 2],
         f_ext: bool,
-        tau: &mut [Fused],
+        tau: &mut [FusedF64],
     ) {
         let l = Limbs::new(plan, model);
         rnea::pass(&l, &mut s.world.sin_cos, &mut s.rnea, &s.q, &s.v, &s.x, given(f_ext, &s.f_ext));
         scatter(plan, &s.rnea.tau, tau);
         let [v, a] = moving;
-        Single::<Fused, f64>::new(model).add_armature_torque(a, tau);
+        Single::<FusedF64, f64>::new(model).add_armature_torque(a, tau);
         free_armature::add_armature_bias(model, v, tau);
     }
 }
@@ -65,7 +65,7 @@ register_kernel! {
 
 register_kernel! {
     /// Computes M by steps whose placements are known.
-    fn crba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, M: &mut [Fused]) {
+    fn crba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, M: &mut [FusedF64]) {
         crba::pass(&Limbs::new(plan, model), &s.world, &mut s.IC, M);
     }
 }
@@ -79,7 +79,7 @@ register_kernel! {
 
 register_kernel! {
     /// Computes q̈ by steps whose placements are known.
-    fn aba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool, qdd: &mut [Fused]) {
+    fn aba_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, f_ext: bool, qdd: &mut [FusedF64]) {
         aba::pass(&Limbs::new(plan, model), &s.world, &mut s.aba, &s.v, &s.x, given(f_ext, &s.f_ext));
         scatter(plan, &s.aba.qdd, qdd);
     }
@@ -87,7 +87,7 @@ register_kernel! {
 
 register_kernel! {
     /// Computes M⁻¹ from the factors of the articulated bodies.
-    fn inverse_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, Minv: &mut [Fused]) {
+    fn inverse_by_steps<V>(model: &Model, plan: &Plan, s: &mut Scratch, Minv: &mut [FusedF64]) {
         let l = Limbs::new(plan, model);
         l.broadcast(&mut s.aba.D_inv);
         s.inverted.inverse::<V>(&l, &s.world, &s.aba, &plan.columns.blocks, Minv);
@@ -102,9 +102,9 @@ register_kernel! {
         plan: &Plan,
         s: &mut Scratch,
         after_aba: bool,
-        v: &[Fused],
+        v: &[FusedF64],
         f_ext: bool,
-        matrices: [&mut [Fused]; 3],
+        matrices: [&mut [FusedF64]; 3],
     ) {
         let l = Limbs::new(plan, model);
         let a = if after_aba { &s.aba.qdd } else { &s.x };
@@ -158,21 +158,21 @@ fn enter(task: Task, model: &Model, plan: &Plan, data: &mut Data<f64>, arguments
     if let Task::Rnea = task {
         data.world.placed = PlacementCache::Nowhere;
         let [v, a] = [arguments.v, arguments.x];
-        return rnea_by_steps(model, plan, s, [v, a], f_ext, Fused::of_mut(&mut data.rnea.tau));
+        return rnea_by_steps(model, plan, s, [v, a], f_ext, FusedF64::of_mut(&mut data.rnea.tau));
     }
     place_steps(model, plan, s);
     data.world.placed = PlacementCache::Limbs(model.geometry_hash());
     match task {
-        Task::Crba => crba_by_steps(model, plan, s, Fused::of_mut(data.crba.M.as_mut_slice())),
+        Task::Crba => crba_by_steps(model, plan, s, FusedF64::of_mut(data.crba.M.as_mut_slice())),
         Task::Minv => factorize_by_steps(model, plan, s),
-        Task::Aba | Task::AbaDerivatives => aba_by_steps(model, plan, s, f_ext, Fused::of_mut(&mut data.aba.qdd)),
+        Task::Aba | Task::AbaDerivatives => aba_by_steps(model, plan, s, f_ext, FusedF64::of_mut(&mut data.aba.qdd)),
         Task::Rnea | Task::RneaDerivatives => {}
     }
     if let Task::Minv | Task::AbaDerivatives = task {
-        inverse_by_steps(model, plan, s, Fused::of_mut(data.minv.Minv.as_mut_slice()));
+        inverse_by_steps(model, plan, s, FusedF64::of_mut(data.minv.Minv.as_mut_slice()));
     }
     if let Task::RneaDerivatives | Task::AbaDerivatives = task {
-        let matrices = data.rnea_derivatives.parts().1.map(Fused::of_mut);
+        let matrices = data.rnea_derivatives.parts().1.map(FusedF64::of_mut);
         let after_aba = matches!(task, Task::AbaDerivatives);
         rnea_derivatives_by_steps(model, plan, s, after_aba, arguments.v, f_ext, matrices);
     }
@@ -189,7 +189,7 @@ pub(super) fn load_free(
     if model.free_armature().is_empty() {
         return load_steps(plan, s, arguments);
     }
-    let effort = Fused::of_mut(&mut d.effort);
+    let effort = FusedF64::of_mut(&mut d.effort);
     free_armature::without_bias(model, arguments.v, arguments.x, effort);
     load_steps(plan, s, Arguments { x: effort, ..arguments });
 }

@@ -12,7 +12,7 @@ use crate::lanes::limbs::pass::{Arguments, Scratch, scatter};
 use crate::passes::aba;
 use crate::passes::kinematics::PlacementCache;
 use condyle_model::Model;
-use condyle_spatial::gate::{Fused, Rename, same};
+use condyle_spatial::gate::{FusedF64, Rename, same};
 use condyle_spatial::{Constant, Scalar};
 use condyle_spatial::{kernel, register_kernel};
 
@@ -31,12 +31,12 @@ register_kernel! {
         plan: &Plan,
         s: &Scratch,
         lanes: &mut ConstraintLanes,
-        set: &mut ConstraintSet<Fused>,
+        set: &mut ConstraintSet<FusedF64>,
     ) {
         let left = Left::new(plan, model, &s.world, &s.aba);
         if V::LANES == WIDE { lanes.carry::<V, 1>(left, set) } else { lanes.carry::<V, 2>(left, set) }
         for r in 0..set.lambda.len() {
-            set.lambda[r] = Fused(-lanes.all.x[r]);
+            set.lambda[r] = FusedF64(-lanes.all.x[r]);
         }
     }
 }
@@ -58,8 +58,8 @@ register_kernel! {
         plan: &Plan,
         s: &mut Scratch,
         lanes: &mut ConstraintLanes,
-        set: &mut ConstraintSet<Fused>,
-        qdd: &mut [Fused],
+        set: &mut ConstraintSet<FusedF64>,
+        qdd: &mut [FusedF64],
     ) {
         for r in 0..set.lambda.len() {
             lanes.all.x[r] = set.lambda[r].0;
@@ -74,7 +74,7 @@ register_kernel! {
             let [one, other] = constraint.bodies;
             let error = of.error([six(a, plan.place(one)), six(a, plan.place(other))]);
             for r in 0..constraint.rows() {
-                set.error[constraint.row + r] = Fused(error[r]);
+                set.error[constraint.row + r] = FusedF64(error[r]);
             }
         }
     }
@@ -99,7 +99,13 @@ pub(crate) fn run<S: Scalar, R: Constant<S>>(
 }
 
 /// Runs the call. The arguments must be valid.
-fn enter(model: &Model, plan: &Plan, data: &mut Data<f64>, set: &mut ConstraintSet<Fused>, arguments: Arguments<'_>) {
+fn enter(
+    model: &Model,
+    plan: &Plan,
+    data: &mut Data<f64>,
+    set: &mut ConstraintSet<FusedF64>,
+    arguments: Arguments<'_>,
+) {
     let (Some(s), Some(mut lanes)) = (data.limbs.as_deref_mut(), set.limbs.take()) else { return };
     load_free(model, plan, s, &mut data.aba, arguments);
     place_steps(model, plan, s);
@@ -107,6 +113,6 @@ fn enter(model: &Model, plan: &Plan, data: &mut Data<f64>, set: &mut ConstraintS
     articulate(model, plan, s, !arguments.f_ext.is_empty());
     carry_forces(model, plan, s, &mut lanes, set);
     decompose(set);
-    accelerate(model, plan, s, &mut lanes, set, Fused::of_mut(&mut data.constrained_dynamics.qdd));
+    accelerate(model, plan, s, &mut lanes, set, FusedF64::of_mut(&mut data.constrained_dynamics.qdd));
     set.limbs = Some(lanes);
 }

@@ -21,7 +21,7 @@ use condyle_linalg::check_index;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
 use condyle_spatial::elementary::tanh;
-use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Mat3, Matrix, Scalar, Vec3, alike, kernel};
+use condyle_spatial::{Act, Constant, Dense, DenseMatrix, Mat3, Matrix, Scalar, Vec3, kernel, same_layout};
 
 /// Input of the dynamics other than position, velocity, acceleration and effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,7 +46,7 @@ pub enum Input {
     },
 }
 
-alike!(Input);
+same_layout!(Input);
 
 impl Input {
     /// Returns the length of the input, which is the number of columns of a derivative with respect to it.

@@ -1,6 +1,6 @@
 //! Second derivatives of inverse and forward dynamics, contracted with a vector or as tensors.
 
-use super::derivatives::{AbaDerivatives, RneaDerivatives, in_turn, one_by_one, view, view_of_aba};
+use super::derivatives::{AbaDerivatives, RneaDerivatives, run_aba_serially, run_rnea_serially, view, view_of_aba};
 use super::inverse_dynamics::check_arguments;
 use crate::data::Data;
 use crate::derivatives::{aba_hessian as aba, rnea_hessian as rnea};
@@ -67,7 +67,7 @@ pub fn rnea_hessian<'d, S: Scalar, R: Constant<S>>(
     check("lambda", lambda.len(), model.nv());
     let arguments = Arguments { q, v, x: a, f_ext };
     check_arguments(model, data, "a", arguments);
-    one_by_one(model, data, arguments);
+    run_rnea_serially(model, data, arguments);
     rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, lambda);
     let first = view(model, data);
     let rnea::Workspace { dqdq, dvdq, dvdv, dadq, .. } = &data.rnea_hessian;
@@ -146,7 +146,7 @@ pub(crate) fn each_unit_hessian<S: Scalar, R: Constant<S>>(
     mut give: impl FnMut(usize, [&Matrix<S>; 4]),
 ) {
     check_arguments(model, data, "a", arguments);
-    one_by_one(model, data, arguments);
+    run_rnea_serially(model, data, arguments);
     lambda.fill(S::zero());
     for i in 0..model.nv() {
         lambda[i] = S::one();
@@ -208,7 +208,7 @@ pub fn aba_hessian<'d, S: Scalar, R: Constant<S>>(
     let arguments = Arguments { q, v, x: tau, f_ext };
     model.check_regular();
     check_arguments(model, data, "tau", arguments);
-    in_turn(model, data, arguments);
+    run_aba_serially(model, data, arguments);
     let mut mu = core::mem::take(&mut data.aba_hessian.mu);
     aba::multiply(&data.minv.Minv, lambda, &mut mu); // μ = M⁻¹ λ
     rnea::run(model, &data.world, &data.rnea_derivatives.bodies, &mut data.rnea_hessian, &mu);

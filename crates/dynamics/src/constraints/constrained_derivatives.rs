@@ -19,7 +19,7 @@ use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::axpy;
 use condyle_linalg::tree_product::{minus_block_product, subtract_column};
 use condyle_spatial::kernel;
-use condyle_spatial::{Array, Force, Matrix, Scalar, alike};
+use condyle_spatial::{Array, Force, Matrix, Scalar, same_layout};
 use core::ops::Range;
 
 workspace! {
@@ -114,7 +114,7 @@ pub(crate) enum By {
     Velocity,
 }
 
-alike!(By);
+same_layout!(By);
 
 kernel! {
     /// Computes the derivatives of acceleration and forces, in the entries that may be nonzero. Inputs are the blocks

@@ -3,7 +3,7 @@
 use crate::passes::frames::ReferenceFrame;
 use alloc::borrow::ToOwned;
 use condyle_model::{Error, Model, ModelConstraint, ModelConstraintKind};
-use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, alike};
+use condyle_spatial::{Constant, Mat3, Motion, Scalar, Se3, same_layout};
 use core::any::Any;
 
 /// Kind of motion that a constraint holds.
@@ -48,7 +48,7 @@ pub struct Target<S> {
     pub acceleration: Motion<S>,
 }
 
-alike!(Target { placement, velocity, acceleration });
+same_layout!(Target { placement, velocity, acceleration });
 
 impl<S: Scalar> Target<S> {
     /// Returns the target with coinciding frames, at rest.
@@ -171,7 +171,8 @@ impl ContactConstraint {
     /// of the initial state, decays with the gains kp and kd.
     ///
     /// ```
-    /// use condyle_dynamics::{ConstraintSet, ContactConstraint, Data, Inertia, Joint, ModelBuilder, Proximal, Se3};
+    /// use condyle_dynamics::{ConstraintSet, ContactConstraint, Data, Inertia, Joint, ModelBuilder, ProximalSettings,
+    /// Se3};
     /// use condyle_dynamics::{Sym3, Vec3, WORLD, constrained_dynamics, forward_kinematics, integrate};
     /// // a four-bar linkage: two cranks on the world, and a coupler on the first one, which a pin holds to the second
     /// let at = |x, z| Se3 { translation: Vec3::new(x, 0.0, z), ..Se3::identity() };
@@ -187,7 +188,7 @@ impl ContactConstraint {
     /// let stiff = |loop_: ContactConstraint| ContactConstraint { kp: 400.0, kd: 40.0, ..loop_ };
     /// let loops: Vec<_> = robot.constraints().iter().filter_map(ContactConstraint::of).map(stiff).collect();
     /// let (mut loops, mut data) = (ConstraintSet::new(&robot, &loops)?, Data::new(&robot));
-    /// loops.proximal = Proximal { mu: 1e-8, iterations: 5 }; // the third row of a pin in a plane is redundant
+    /// loops.proximal = ProximalSettings { mu: 1e-8, iterations: 5 }; // the third row of a pin in a plane is redundant
     /// let (mut q, mut v, dt) = (vec![0.0; 3], vec![0.0; 3], 1e-3);
     /// for _ in 0..1000 {
     ///     let a = constrained_dynamics(&robot, &mut data, &mut loops, &q, &v, &[1.0, 0.0, 0.0], &[]).a;

@@ -4,7 +4,7 @@ use crate::constraints::constraint::{ContactConstraint, Target};
 use crate::constraints::constraint_lanes::ConstraintLanes;
 use crate::constraints::delassus::Delassus;
 use crate::constraints::islands::Island;
-use crate::constraints::plan::{Plan, Proximal, nonzero_rows, touching};
+use crate::constraints::plan::{Plan, ProximalSettings, nonzero_rows, touching};
 use crate::workspace::{filled, zero_matrix};
 use alloc::borrow::ToOwned;
 use alloc::boxed::Box;
@@ -13,7 +13,7 @@ use condyle_linalg::check_index;
 use condyle_linalg::sparsity::NonzeroRows;
 use condyle_model::Error;
 use condyle_model::Model;
-use condyle_spatial::{Array, Dense, DenseMatrix, Matrix, Scalar, alike};
+use condyle_spatial::{Array, Dense, DenseMatrix, Matrix, Scalar, same_layout};
 use core::ops::Range;
 
 /// Constraints of one model, contacts and loops, with the scratch and results of [`constrained_dynamics`] and similar
@@ -39,7 +39,7 @@ use core::ops::Range;
 #[repr(C)]
 pub struct ConstraintSet<S> {
     /// Settings that decide how redundant constraints share their forces; may be changed between calls.
-    pub proximal: Proximal,
+    pub proximal: ProximalSettings,
     pub(crate) plans: Vec<Plan>,
     pub(crate) islands: Vec<Island>,
     pub(crate) targets: Array<Target<S>>,
@@ -75,7 +75,7 @@ pub struct ConstraintSet<S> {
     pub(crate) limbs: Option<Box<ConstraintLanes>>,
 }
 
-alike!(ConstraintSet {
+same_layout!(ConstraintSet {
     targets, J, gamma, delassus, lambda, error, dgamma_dq, dgamma_dv, U, Jbar, dlambda_dq, dlambda_dv, dlambda_dtau,
 } same { proximal, plans, islands, nv, geometry, nonzero_rows, touching, limbs });
 
@@ -92,7 +92,7 @@ impl<S: Scalar> ConstraintSet<S> {
         let nv = model.nv();
         let (o, wide, tall) = (S::zero(), zero_matrix(rows, nv), (nv, rows));
         Ok(Self {
-            proximal: Proximal::default(),
+            proximal: ProximalSettings::default(),
             targets: constraints.iter().map(|c| c.target.lift()).collect(),
             islands: Island::of(model, &plans),
             nv,

@@ -7,11 +7,11 @@
 //! in operational-space dynamics* (2010); Golub and Van Loan, *Matrix Computations* (4th edition), section 4.1.
 
 use crate::constraints::islands::Island;
-use crate::constraints::plan::{Plan, Proximal};
+use crate::constraints::plan::{Plan, ProximalSettings};
 use crate::workspace::{filled, zero_matrix};
 use condyle_linalg::Ltdl;
 use condyle_linalg::axpy::{axpy, dot};
-use condyle_spatial::{Array, Matrix, Scalar, alike};
+use condyle_spatial::{Array, Matrix, Scalar, same_layout};
 use core::ops::Range;
 
 /// Minimum pivot, in rounding errors of its diagonal entry; smaller pivots count as zero.
@@ -51,7 +51,7 @@ pub(crate) struct Delassus<S> {
     pub inverse: Matrix<S>,
 }
 
-alike!(Delassus { Y, Z, CE, rows, E_inv, redundant, x, y, inverse } same { stride });
+same_layout!(Delassus { Y, Z, CE, rows, E_inv, redundant, x, y, inverse } same { stride });
 
 /// Returns the machine epsilon, the distance from 1 to the next number.
 #[inline(always)]
@@ -128,7 +128,7 @@ impl<S: Scalar> Delassus<S> {
     /// Factorises J M⁻¹ Jᵀ + μ 1 = C E Cᵀ of an island and solves for λ, as `solve` does. `CE` holds J M⁻¹ Jᵀ on entry,
     /// and `lambda` holds b. b is processed as one more row. Adds the number of rows without a pivot to `redundant`.
     #[inline(always)]
-    pub(crate) fn decompose(&mut self, island: &Island, proximal: Proximal, lambda: &mut [S]) {
+    pub(crate) fn decompose(&mut self, island: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         let Self { CE, rows, E_inv, stride, .. } = self;
         let (Range { start, end: n }, stride) = (island.rows.clone(), *stride);
         let smallest = epsilon::<S>() * S::splat(ROUNDINGS);
@@ -158,7 +158,7 @@ impl<S: Scalar> Delassus<S> {
 
     /// Solves J M⁻¹ Jᵀ λ = b of an island, by proximal iterations if there are any. `lambda` holds b on entry.
     #[inline(always)]
-    pub(crate) fn solve(&mut self, island: &Island, proximal: Proximal, lambda: &mut [S]) {
+    pub(crate) fn solve(&mut self, island: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         self.x[island.rows.clone()].copy_from_slice(&lambda[island.rows.clone()]);
         self.substitute(&island.rows, island.rows.start);
         self.back_substitute(&island.rows);
@@ -167,7 +167,7 @@ impl<S: Scalar> Delassus<S> {
 
     /// Runs the remaining proximal iterations. `lambda` holds b on entry, and x holds the first solution.
     #[inline(always)]
-    fn repeat(&mut self, Island { rows, .. }: &Island, proximal: Proximal, lambda: &mut [S]) {
+    fn repeat(&mut self, Island { rows, .. }: &Island, proximal: ProximalSettings, lambda: &mut [S]) {
         let mu = S::splat(proximal.mu);
         for _ in 1..rounds(proximal) {
             for r in rows.clone() {
@@ -181,7 +181,7 @@ impl<S: Scalar> Delassus<S> {
 
     /// Computes Λ of an island, the map from b to λ. Entries outside of the island are zero.
     #[inline(always)]
-    pub(crate) fn invert(&mut self, Island { rows, .. }: &Island, proximal: Proximal) {
+    pub(crate) fn invert(&mut self, Island { rows, .. }: &Island, proximal: ProximalSettings) {
         let (n, mu) = (self.E_inv.len(), S::splat(proximal.mu));
         for j in rows.clone() {
             self.x[rows.clone()].fill(S::zero());
@@ -269,6 +269,6 @@ fn subtract<S: Scalar>(columns: &[S], stride: usize, first: usize, s: &[S], E_in
 }
 
 /// Returns the number of solves: without μ, one solve is exact.
-fn rounds(proximal: Proximal) -> usize {
+fn rounds(proximal: ProximalSettings) -> usize {
     if proximal.mu > 0.0 { proximal.iterations.max(1) } else { 1 }
 }

@@ -15,7 +15,7 @@ use condyle_model::{Error, Model};
 use condyle_spatial::{Mat3, Se3, Vec3};
 use core::ops::Range;
 
-/// Regularisation of J M⁻¹ Jᵀ, which makes redundant constraints share their forces.
+/// Regularisation of the Delassus matrix J M⁻¹ Jᵀ, which makes redundant constraints share their forces.
 ///
 /// With μ > 0 the forces solve (J M⁻¹ Jᵀ + μ 1) λ = b + μ λ', first with λ' = 0, then with λ' the last solution. Each
 /// iteration multiplies the error of the motion by μ/(σ + μ) (σ: the smallest nonzero singular value of J M⁻¹ Jᵀ).
@@ -23,14 +23,14 @@ use core::ops::Range;
 /// get no force. The number of iterations is fixed, so that all lanes and dual numbers do the same. Source: Carpentier,
 /// Budhiraja, Mansard, *Proximal and sparse resolution of constrained dynamic equations* (2021).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Proximal {
-    /// μ (1/kg): small compared with J M⁻¹ Jᵀ, large compared with its rounding errors, for example 1e-8.
+pub struct ProximalSettings {
+    /// μ (1/kg): small compared with the Delassus matrix, large compared with its rounding errors, for example 1e-8.
     pub mu: f64,
     /// Number of iterations; 0 counts as 1.
     pub iterations: usize,
 }
 
-impl Default for Proximal {
+impl Default for ProximalSettings {
     /// Returns μ = 0 and one iteration.
     fn default() -> Self {
         Self { mu: 0.0, iterations: 1 }

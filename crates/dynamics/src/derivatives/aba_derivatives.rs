@@ -65,7 +65,7 @@ impl<S: Scalar> Workspace<S> {
 
 kernel! {
     /// Writes ∂v̇₀/∂v₀ of floating bodies. All other entries of these columns are zero.
-    pub(crate) fn boost<S>(d: &mut Workspace<S>, v: &[S]) {
+    pub(crate) fn set_floating_columns<S>(d: &mut Workspace<S>, v: &[S]) {
         let n = v.len();
         for &first in &d.floating {
             let omega = Vec3::new(v[first + 3], v[first + 4], v[first + 5]);

@@ -15,7 +15,7 @@ use crate::derivatives::aba_derivatives::{self};
 use crate::derivatives::rnea_hessian;
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_linalg::sparsity::NonzeroRows;
-use condyle_linalg::tree_product::minus_product;
+use condyle_linalg::tree_product::neg_product;
 use condyle_spatial::kernel;
 use condyle_spatial::{Array, Matrix, Scalar};
 
@@ -76,7 +76,7 @@ kernel! {
         let (n, G) = (coupled.len(), phi.dadq.as_slice());
         let product = &mut product[..];
         transpose_to(first.da_dq.as_slice(), transpose, n);
-        minus_product(transpose, G, product, coupled); // −(∂q̈/∂q)ᵀ G
+        neg_product(transpose, G, product, coupled); // −(∂q̈/∂q)ᵀ G
         let (qq, vv) = (dqdq.as_mut_slice(), dvdv.as_mut_slice());
         let (phi_qq, phi_vv) = (phi.dqdq.as_slice(), phi.dvdv.as_slice());
         for j in 0..n {
@@ -87,10 +87,10 @@ kernel! {
         }
         transpose_to(first.da_dv.as_slice(), transpose, n);
         let (vq, phi_vq) = (dvdq.as_mut_slice(), phi.dvdq.as_slice());
-        minus_product(transpose, G, vq, coupled); // −(∂q̈/∂v)ᵀ G
+        neg_product(transpose, G, vq, coupled); // −(∂q̈/∂v)ᵀ G
         for k in 0..n * n {
             vq[k] -= phi_vq[k];
         }
-        minus_product(Minv.as_slice(), G, dtaudq.as_mut_slice(), coupled); // −M⁻¹ G
+        neg_product(Minv.as_slice(), G, dtaudq.as_mut_slice(), coupled); // −M⁻¹ G
     }
 }

@@ -21,7 +21,7 @@ use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, alike};
+use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3, same_layout};
 
 /// Derivatives with respect to the coordinate of a column, about the world's origin.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +33,7 @@ struct Column<S> {
     F_a: Force<S>,
 }
 
-alike!(Column { h_q, F_q, F_v, F_a });
+same_layout!(Column { h_q, F_q, F_v, F_a });
 
 impl<S: Scalar> Column<S> {
     fn zero() -> Self {

@@ -10,7 +10,7 @@ use crate::selection::solve_by_tree;
 use crate::workspace::filled;
 use alloc::vec::Vec;
 use condyle_model::tree::Column;
-use condyle_spatial::{Array, Scalar, alike};
+use condyle_spatial::{Array, Scalar, same_layout};
 
 /// Number of columns of B that are processed together.
 const SIDE: usize = 16;
@@ -45,7 +45,7 @@ pub(crate) struct Workspace<S> {
     pub A: Array<S>,
 }
 
-alike!(Workspace { x, P, A } same { paths });
+same_layout!(Workspace { x, P, A } same { paths });
 
 impl<S: Scalar> Workspace<S> {
     pub(crate) fn new(columns: &[Column], nv: usize) -> Self {
@@ -57,7 +57,7 @@ impl<S: Scalar> Workspace<S> {
     }
 
     /// Returns whether this method is used.
-    pub(crate) fn pays(&self) -> bool {
+    pub(crate) fn is_used(&self) -> bool {
         !self.paths.is_empty()
     }
 }

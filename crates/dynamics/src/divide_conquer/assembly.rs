@@ -6,7 +6,7 @@
 //! Here a tree is divided into heavy paths (Sleator and Tarjan, *A data structure for dynamic trees*, 1983): from each
 //! body the path continues to the child that carries most bodies. A path is cut so that both halves, including the
 //! bodies that they carry, have nearly the same weight. The halves are cut in the same way. The other subtrees attached
-//! to a body are separate paths. So a chain of n bodies has ⌈log₂ n⌉ levels of joins, and any tree O(log n).
+//! to a body are separate paths. So a chain of n bodies has joins nested ⌈log₂ n⌉ deep, and any tree O(log n).
 //!
 //! No cut is made below a body whose own inertia would not resist its joint, such as a massless body. The piece above
 //! such a cut could not be solved separately.
@@ -48,7 +48,7 @@ pub(crate) struct Piece {
     /// Number of pieces of which it consists, including itself.
     pub pieces: usize,
     /// Number of pieces on the longest path from it to a run, including itself.
-    levels: usize,
+    depth: usize,
 }
 
 /// Body in the order of the pieces.
@@ -68,7 +68,7 @@ pub(crate) struct Link {
 /// ```
 /// use condyle_dynamics::{AssemblySize, DivideConquer, robots};
 /// let arm = DivideConquer::<f64>::new(&robots::arm7(), 1);
-/// assert_eq!(arm.size(), AssemblySize { bodies: 7, runs: 7, longest_run: 1, joins: 6, gathers: 0, levels: 4 });
+/// assert_eq!(arm.size(), AssemblySize { bodies: 7, runs: 7, longest_run: 1, joins: 6, gathers: 0, depth: 4 });
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AssemblySize {
@@ -83,7 +83,7 @@ pub struct AssemblySize {
     /// Number of pairs of pieces that are added, both on one body.
     pub gathers: usize,
     /// Number of pieces that must be assembled one after the other, from a run to the whole.
-    pub levels: usize,
+    pub depth: usize,
 }
 
 /// All pieces, beginning with the whole.
@@ -126,7 +126,7 @@ impl Assembly {
             longest_run: self.pieces.iter().map(run).max().unwrap_or(0),
             joins: count(Kind::Join),
             gathers: count(Kind::Gather),
-            levels: self.pieces.first().map_or(0, |p| p.levels),
+            depth: self.pieces.first().map_or(0, |p| p.depth),
         }
     }
 }
@@ -147,12 +147,12 @@ impl Planner {
     /// Adds a piece with the parts that `parts` appends.
     fn piece(&mut self, kind: Kind, open: bool, parts: impl FnOnce(&mut Self)) {
         let (at, first) = (self.pieces.len(), self.links.len());
-        self.pieces.push(Piece { kind, open, links: 0, dofs: 0, pieces: 0, levels: 0 });
+        self.pieces.push(Piece { kind, open, links: 0, dofs: 0, pieces: 0, depth: 0 });
         parts(self);
         let links = &self.links[first..];
         let dofs = links.iter().map(|l| self.nv[l.body]).sum();
-        let levels = 1 + self.pieces[at + 1..].iter().map(|p| p.levels).max().unwrap_or(0);
-        self.pieces[at] = Piece { kind, open, links: links.len(), dofs, pieces: self.pieces.len() - at, levels };
+        let depth = 1 + self.pieces[at + 1..].iter().map(|p| p.depth).max().unwrap_or(0);
+        self.pieces[at] = Piece { kind, open, links: links.len(), dofs, pieces: self.pieces.len() - at, depth };
     }
 
     /// Adds the subtrees attached to one body.

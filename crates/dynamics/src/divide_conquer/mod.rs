@@ -29,8 +29,8 @@ use condyle_spatial::{Act, ArticulatedInertia, Constant, Cross, Force, Mat3, Mot
 
 /// Forward dynamics by divide and conquer: the plan for one model, and its scratch.
 ///
-/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps:
-/// ⌈log₂ n⌉ + 1 levels for a chain of n bodies. A join of two pieces costs about six times as much as the elimination
+/// The robot is assembled from runs of at most `grain` bodies. With `grain` = 1 the algorithm takes O(log n) steps: a
+/// depth of ⌈log₂ n⌉ + 1 for a chain of n bodies. A join of two pieces costs about six times as much as the elimination
 /// of a body. A body of a run between two handles costs 1.5 times as much as a body in [`aba`](crate::aba()). So with
 /// few processors the runs must be long (n divided by the number of threads). On two threads this is faster than `aba`
 /// from about 200 bodies on; on one thread it is never faster (`benches/divide_conquer.rs`). If joints share
@@ -102,7 +102,7 @@ impl<S: Scalar> DivideConquer<S> {
         }
     }
 
-    /// Returns the cost of the assembly, and the number of levels that must be computed one after the other.
+    /// Returns the cost of the assembly, and its depth, the number of pieces that must be computed one after the other.
     pub fn size(&self) -> AssemblySize {
         self.assembly.size()
     }

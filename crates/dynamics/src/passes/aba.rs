@@ -17,19 +17,19 @@ workspace! {
     /// Quantities in the world's frame.
     pub(crate) struct Workspace<S>(size) {
         /// Articulated inertia. Written by: `factorize`, `inward`.
-        pub IA: Array<ArticulatedInertia<S>> = filled(ArticulatedInertia::zero, size.levels),
+        pub IA: Array<ArticulatedInertia<S>> = filled(ArticulatedInertia::zero, size.body_depth),
         /// U = Iᴬ S of each column. Written by: `factorize`, `inward`.
         pub U: Array<Force<S>> = filled(Force::zero, size.columns),
         /// 1/D, D = Sᵀ U + armature. Written by: `factorize`, `inward`.
         pub D_inv: Array<S> = filled(S::zero, size.columns),
         /// Velocity; the world's velocity stays 0. Written by: `inward`.
-        pub v: Array<Motion<S>> = filled(Motion::zero, size.levels),
+        pub v: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
         /// Acceleration, including gravity as the world's acceleration. Written by: `outward`.
-        pub a: Array<Motion<S>> = filled(Motion::zero, size.levels),
+        pub a: Array<Motion<S>> = filled(Motion::zero, size.body_depth),
         /// v × v_J. Written by: `inward`.
         pub c: Array<Motion<S>> = filled(Motion::zero, size.bodies),
         /// Articulated bias force. Written by: `inward`.
-        pub pA: Array<Force<S>> = filled(Force::zero, size.levels),
+        pub pA: Array<Force<S>> = filled(Force::zero, size.body_depth),
         /// τ − Sᵀ pᴬ. Written by: `inward`.
         pub u: Array<S> = filled(S::zero, size.columns),
         /// Joint accelerations. Written by: `outward`.
@@ -68,7 +68,7 @@ pub(crate) fn factorize<L: Layout>(l: &L, w: &World<L::S>, d: &mut Workspace<L::
     let (IA, U, D_inv, oX, S) = (&mut IA[..], &mut U[..], &mut D_inv[..], &w.oX[..], &w.S[..]);
     for i in l.bodies() {
         IA[l.stack_index(i)] = ArticulatedInertia::from(oX[i].act(l.inertia(i)));
-        for &j in l.closed_by(i) {
+        for &j in l.subtrees_ending_at(i) {
             let Ia = eliminate(l, S, U, D_inv, j, IA[l.stack_index(j)]);
             l.add_to_parent_on_stack(IA, j, Ia); // Iᴬ_λ += Iᵃ
         }
@@ -118,7 +118,7 @@ pub(crate) fn inward<L: Layout>(
             pi -= oX[i].act(external);
         }
         pA[here] = pi;
-        for &j in l.closed_by(i) {
+        for &j in l.subtrees_ending_at(i) {
             let here = l.stack_index(j);
             let Ia = eliminate(l, S, U, D_inv, j, IA[here]);
             l.sum_lanes(j, &mut pA[here]);

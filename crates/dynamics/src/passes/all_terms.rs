@@ -13,7 +13,7 @@ use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Pairs, Single};
-use condyle_spatial::gate::{Fused, Rename};
+use condyle_spatial::gate::{FusedF64, Rename};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Motion, Scalar, Vec3};
 
@@ -109,9 +109,9 @@ pub struct AllTerms<'d, S, R = f64> {
 }
 
 #[doc(hidden)]
-impl<'d> Rename<AllTerms<'d, Fused>> for AllTerms<'d, f64> {
+impl<'d> Rename<AllTerms<'d, FusedF64>> for AllTerms<'d, f64> {
     #[inline(always)]
-    fn renamed(self) -> AllTerms<'d, Fused> {
+    fn renamed(self) -> AllTerms<'d, FusedF64> {
         AllTerms {
             kinematics: self.kinematics.renamed(),
             M: self.M.renamed(),

@@ -14,7 +14,7 @@ use crate::passes::kinematics::{Moving, World};
 use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Layout, Single};
-use condyle_spatial::gate::{Fused, Rename};
+use condyle_spatial::gate::{FusedF64, Rename};
 use condyle_spatial::kernel;
 use condyle_spatial::{Act, Array, Cross, Force, Inertia, Matrix, Scalar, Se3, Vec3};
 
@@ -190,9 +190,9 @@ pub struct CentroidalMapRate<'d, S> {
 }
 
 #[doc(hidden)]
-impl<'d> Rename<CentroidalMapRate<'d, Fused>> for CentroidalMapRate<'d, f64> {
+impl<'d> Rename<CentroidalMapRate<'d, FusedF64>> for CentroidalMapRate<'d, f64> {
     #[inline(always)]
-    fn renamed(self) -> CentroidalMapRate<'d, Fused> {
+    fn renamed(self) -> CentroidalMapRate<'d, FusedF64> {
         CentroidalMapRate {
             Ag: self.Ag.renamed(),
             dAg: self.dAg.renamed(),

@@ -18,7 +18,7 @@ use crate::workspace::{filled, workspace, zero_matrix};
 use condyle_model::Model;
 use condyle_model::layout::{Pairs, Single};
 use condyle_spatial::kernel;
-use condyle_spatial::{Act, Array, Force, Inertia, Matrix, Motion, Scalar, Sym3, Vec3, alike};
+use condyle_spatial::{Act, Array, Force, Inertia, Matrix, Motion, Scalar, Sym3, Vec3, same_layout};
 
 /// Matrix 2B of a body, or summed over all bodies that a joint carries.
 #[derive(Clone, Copy, Debug)]
@@ -30,7 +30,7 @@ pub(crate) struct Coriolis<S> {
     pub rate: Sym3<S>,
 }
 
-alike!(Coriolis { momentum, rate });
+same_layout!(Coriolis { momentum, rate });
 
 impl<S: Scalar> core::ops::AddAssign for Coriolis<S> {
     #[inline(always)]

@@ -14,8 +14,8 @@ use crate::passes::kinematics::{Moving, World};
 use condyle_linalg::check_index;
 use condyle_model::Model;
 use condyle_model::layout::{Columns, Single};
-use condyle_spatial::gate::{Fused, Rename};
-use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Motion, Scalar, Se3, Vec3, alike, kernel};
+use condyle_spatial::gate::{FusedF64, Rename};
+use condyle_spatial::{Act, Constant, Cross, Dense, DenseMatrix, Mat3, Motion, Scalar, Se3, Vec3, kernel, same_layout};
 use core::ops::Deref;
 
 /// Frame in which a quantity of a frame is expressed. For a quantity of a body, `Local` means the body's frame.
@@ -31,7 +31,7 @@ pub enum ReferenceFrame {
     LocalWorldAligned,
 }
 
-alike!(ReferenceFrame);
+same_layout!(ReferenceFrame);
 
 impl ReferenceFrame {
     /// Returns oXr, the pose of the reference frame for a frame at oXf.
@@ -79,25 +79,25 @@ pub struct Accelerations<'d, S, R = f64> {
 }
 
 #[doc(hidden)]
-impl<'d> Rename<Placements<'d, Fused>> for Placements<'d, f64> {
+impl<'d> Rename<Placements<'d, FusedF64>> for Placements<'d, f64> {
     #[inline(always)]
-    fn renamed(self) -> Placements<'d, Fused> {
+    fn renamed(self) -> Placements<'d, FusedF64> {
         Placements { model: self.model, world: self.world.renamed() }
     }
 }
 
 #[doc(hidden)]
-impl<'d> Rename<Velocities<'d, Fused>> for Velocities<'d, f64> {
+impl<'d> Rename<Velocities<'d, FusedF64>> for Velocities<'d, f64> {
     #[inline(always)]
-    fn renamed(self) -> Velocities<'d, Fused> {
+    fn renamed(self) -> Velocities<'d, FusedF64> {
         Velocities { placements: self.placements.renamed(), moving: self.moving.renamed() }
     }
 }
 
 #[doc(hidden)]
-impl<'d> Rename<Accelerations<'d, Fused>> for Accelerations<'d, f64> {
+impl<'d> Rename<Accelerations<'d, FusedF64>> for Accelerations<'d, f64> {
     #[inline(always)]
-    fn renamed(self) -> Accelerations<'d, Fused> {
+    fn renamed(self) -> Accelerations<'d, FusedF64> {
         Accelerations { velocities: self.velocities.renamed() }
     }
 }

@@ -35,13 +35,13 @@ workspace! {
     /// Scratch in the bodies' turned frames.
     pub(crate) struct Workspace<S>(size) {
         /// λXi. Written by: `pass`.
-        pub X: Array<Se3<S>> = filled(Se3::identity, size.levels),
+        pub X: Array<Se3<S>> = filled(Se3::identity, size.body_depth),
         /// Angular velocity and acceleration of the body, and acceleration of its origin, with gravity as the world's
         /// acceleration. Written by: `pass`.
         pub motion: Array<ClassicalMotion<S>> =
-            filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.levels),
+            filled(|| ClassicalMotion { w: Vec3::zero(), dw: Vec3::zero(), a: Vec3::zero() }, size.body_depth),
         /// Force through the joint. Written by: `pass`.
-        pub f: Array<Force<S>> = filled(Force::zero, size.levels),
+        pub f: Array<Force<S>> = filled(Force::zero, size.body_depth),
         /// Joint efforts. Written by: `pass`.
         pub tau: Array<S> = filled(S::zero, size.nv),
         /// Zeros, used as accelerations or velocities that are not given. Never overwritten.
@@ -85,7 +85,7 @@ pub(crate) fn pass<L: Layout>(
             fi -= external;
         }
         f[here] = fi;
-        for &j in l.closed_by(i) {
+        for &j in l.subtrees_ending_at(i) {
             let here = l.stack_index(j);
             l.sum_lanes(j, &mut f[here]);
             let fj = f[here];

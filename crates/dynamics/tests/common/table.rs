@@ -8,7 +8,7 @@ use condyle_dynamics::inertial_parameters::{self, from_log_cholesky, log_cholesk
 use condyle_dynamics::simulation::{Integrator, Settings, Simulation};
 use condyle_dynamics::{
     Cholesky, ConstraintSet, ContactConstraint, Data, DifferenceArgument, Force, ForwardDynamicsMethod,
-    IntegrateArgument, Ltdl, Model, Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, Vec3, aba,
+    IntegrateArgument, Ltdl, Model, ProximalSettings, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, Vec3, aba,
     aba_derivatives, aba_hessian, body_jacobian, centroidal_derivatives, centroidal_map, centroidal_map_rate,
     compute_all_terms, constrained_dynamics, constrained_dynamics_derivatives, constrained_inverse_dynamics,
     constrained_inverse_dynamics_derivatives, coriolis_derivatives, coriolis_matrix, crba, difference,
@@ -124,7 +124,7 @@ fn constraints<S: Scalar>(model: &Model) -> ConstraintSet<S> {
     let contact = ContactConstraint { reference, kp: 2.0, kd: 3.0, ..ContactConstraint::point(frame(bodies - 1)) };
     let closure = ContactConstraint { other, kp: 2.0, kd: 3.0, ..ContactConstraint::rigid(frame(bodies - 1)) };
     let mut set = ConstraintSet::new(model, &[contact, closure]).expect("the frames are on different bodies");
-    set.proximal = Proximal { mu: 1e-6, iterations: 2 };
+    set.proximal = ProximalSettings { mu: 1e-6, iterations: 2 };
     set
 }
 

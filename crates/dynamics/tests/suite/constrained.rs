@@ -6,7 +6,7 @@ use common::contacts::{cases, random_constraint};
 use common::{State, Worst, all_models, dual, lift, moved, normal, rng};
 use condyle_dynamics::{
     Act, ConstraintKind, ConstraintSet, ContactConstraint, Data, Error, Force, Inertia, Joint, Model, ModelBuilder,
-    Motion, Proximal, ReferenceFrame, Se3, Sym3, Target, Vec3, WORLD, aba, constrained_dynamics,
+    Motion, ProximalSettings, ReferenceFrame, Se3, Sym3, Target, Vec3, WORLD, aba, constrained_dynamics,
     constrained_dynamics_derivatives, crba, forward_accelerations, forward_kinematics, forward_velocities,
     impulse_dynamics, impulse_dynamics_derivatives, lie, minv, rnea, robots,
 };
@@ -190,7 +190,7 @@ fn redundant_constraints() {
     let reference = constrained_dynamics_derivatives(&model, &mut data, &mut single, &s.q, &s.v, &s.tau, &[]);
     assert_eq!(reference.redundant, 0.0);
     let (a, da_dq) = (reference.a.to_vec(), reference.da_dq.clone());
-    for proximal in [Proximal::default(), Proximal { mu: 1e-8, iterations: 4 }] {
+    for proximal in [ProximalSettings::default(), ProximalSettings { mu: 1e-8, iterations: 4 }] {
         let mut set = ConstraintSet::new(&model, &twice).unwrap();
         set.proximal = proximal;
         let d = constrained_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, &[]);
@@ -222,7 +222,7 @@ fn smallest_forces() {
     let d = constrained_dynamics(&model, &mut data, &mut set, &q, &[0.0; 6], &[0.0; 6], &[]);
     assert_eq!(d.redundant, 4.0, "a line of points holds all but its own rotation");
     assert!(d.residual < 1e-12 && d.a.iter().all(|a: &f64| a.abs() < 1e-12));
-    set.proximal = Proximal { mu: 1e-6, iterations: 5 };
+    set.proximal = ProximalSettings { mu: 1e-6, iterations: 5 };
     let d = constrained_dynamics(&model, &mut data, &mut set, &q, &[0.0; 6], &[0.0; 6], &[]);
     assert!(d.redundant == 0.0 && d.residual < CONDITIONED);
     let lambda = DVector::from_row_slice(d.lambda);

@@ -151,9 +151,9 @@ fn derivatives_of_constrained_dynamics() {
     for (model, s, constraints) in cases(TREES) {
         let mut data = Data::new(&model);
         let mut set = ConstraintSet::new(&model, &constraints).unwrap();
-        let in_turn = model.clone().with_limbs(false);
+        let serial = model.clone().with_limbs(false);
         for f_ext in [&[][..], &s.f_ext] {
-            let value = constrained_dynamics(&in_turn, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
+            let value = constrained_dynamics(&serial, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
             let value = [value.a, value.lambda].concat();
             let d = constrained_dynamics_derivatives(&model, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
             assert_eq!([d.a, d.lambda].concat(), value);

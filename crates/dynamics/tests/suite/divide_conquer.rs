@@ -236,24 +236,24 @@ fn same_bits_for_any_number_of_threads() {
     }
 }
 
-/// A chain of n bodies has ⌈log₂ n⌉ levels of joins; other trees have at most about twice as many (heavy paths, cut by
-/// weight).
+/// A chain of n bodies has joins nested ⌈log₂ n⌉ deep; other trees have at most about twice as many (heavy paths, cut
+/// by weight).
 #[test]
-fn levels() {
+fn depth() {
     let log2 = |n: usize| n.next_power_of_two().ilog2() as usize;
     for n in [1, 2, 3, 4, 5, 8, 31, 32, 33, 300, 1000] {
         let size = DivideConquer::<f64>::new(&chain(n), 1).size();
-        assert_eq!((size.levels, size.joins, size.runs, size.longest_run), (1 + log2(n), n - 1, n, 1));
+        assert_eq!((size.depth, size.joins, size.runs, size.longest_run), (1 + log2(n), n - 1, n, 1));
         for model in shapes(n, false) {
             let size = DivideConquer::<f64>::new(&model, 1).size();
-            assert!(size.levels <= 3 + 2 * log2(n), "{size:?} on {n} bodies");
+            assert!(size.depth <= 3 + 2 * log2(n), "{size:?} on {n} bodies");
             assert_eq!(size.bodies, n);
             for grain in [4, 30] {
                 let size = DivideConquer::<f64>::new(&model, grain).size();
                 assert!(size.longest_run <= grain, "{size:?}");
             }
             let size = DivideConquer::<f64>::new(&model, n).size();
-            assert_eq!((size.levels, size.runs, size.longest_run), (1, 1, n));
+            assert_eq!((size.depth, size.runs, size.longest_run), (1, 1, n));
         }
     }
 }

@@ -2,9 +2,9 @@
 
 use crate::common::{Worst, normal, random_pose, rng};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, Matrix, Model, ModelBuilder, Proximal, Se3, WORLD, constrained_dynamics,
-    constrained_dynamics_derivatives, constrained_dynamics_equations, impulse_dynamics, impulse_dynamics_derivatives,
-    random_configuration, robots,
+    ConstraintSet, ContactConstraint, Data, Matrix, Model, ModelBuilder, ProximalSettings, Se3, WORLD,
+    constrained_dynamics, constrained_dynamics_derivatives, constrained_dynamics_equations, impulse_dynamics,
+    impulse_dynamics_derivatives, random_configuration, robots,
 };
 use nalgebra::DMatrix;
 use std::ops::Range;
@@ -172,7 +172,7 @@ fn the_order_of_constraints_changes_nothing() {
     turned.swap(1, middle);
     let mut found = [all.clone(), turned.clone()].map(|constraints| {
         let (mut data, mut set) = (Data::new(&whole), ConstraintSet::new(&whole, &constraints).unwrap());
-        set.proximal = Proximal { mu: 1e-3, iterations: 3 };
+        set.proximal = ProximalSettings { mu: 1e-3, iterations: 3 };
         let mut order: Vec<usize> = Vec::new();
         for constraint in &all {
             let k = constraints.iter().position(|other| other == constraint).unwrap();

@@ -45,5 +45,4 @@ mod simulation;
 mod single_calls_f32;
 mod springs;
 mod urdf;
-mod urdf_errors;
 mod validity;

@@ -5,9 +5,10 @@ use crate::common::rng;
 use crate::common::table::{Input, Output, functions};
 use condyle_dynamics::ReferenceFrame::World;
 use condyle_dynamics::{
-    Batch, Cholesky, ConstraintSet, ContactConstraint, Data, DivideConquer, Ltdl, Mimic, ModelBuilder, Proximal,
-    Scalar, Se3, Target, aba, aba_derivatives, body_jacobian, compute_all_terms, constrained_dynamics,
-    forward_accelerations, forward_kinematics, frame_jacobian, jacobian, rnea, rnea_derivatives, robots,
+    Batch, Cholesky, ConstraintSet, ContactConstraint, Data, DivideConquer, Ltdl, Mimic, ModelBuilder,
+    ProximalSettings, Scalar, Se3, Target, aba, aba_derivatives, body_jacobian, compute_all_terms,
+    constrained_dynamics, forward_accelerations, forward_kinematics, frame_jacobian, jacobian, rnea, rnea_derivatives,
+    robots,
 };
 use nalgebra::{DMatrix, DVector};
 use num_dual::Dual64;
@@ -189,7 +190,7 @@ fn mistakes_with_batches_are_reported_at_the_call() {
     assert_panic(HERE, "tau: expected 14 numbers", || _ = batch.aba(&arm, &q, &v, &[0.0; 13], &[]));
     assert_panic(HERE, "to[0]: expected length 98", || batch.writer(&mut [&mut [0.0; 97]]).crba(&arm, &q));
 
-    let mut constraints = batch.constraints(&arm, &[ContactConstraint::point(1)], Proximal::default()).unwrap();
+    let mut constraints = batch.constraints(&arm, &[ContactConstraint::point(1)], ProximalSettings::default()).unwrap();
     let one = "k: expected an index below 1, the number of constraints, found 1";
     assert_panic(HERE, one, || _ = constraints.range(1));
     assert_panic(HERE, one, || _ = constraints.set_target(1, Target::identity()));

@@ -54,9 +54,9 @@ fn inverse_dynamics() {
     for (seed, model) in all_models(TREES).iter().enumerate() {
         let State { q, v, a, tau: lambda, f_ext } = State::random(model, &mut rng(seed as u64));
         let mut data = Data::new(model);
-        let in_turn = model.clone().with_limbs(false); // the same sums in the same order
+        let serial = model.clone().with_limbs(false); // the same sums in the same order
         for f in [&[][..], &f_ext] {
-            let first = rnea_derivatives(&in_turn, &mut data, &q, &v, &a, f).dtau_dq.clone();
+            let first = rnea_derivatives(&serial, &mut data, &q, &v, &a, f).dtau_dq.clone();
             let hessian = rnea_hessian(model, &mut data, &q, &v, &a, f, &lambda);
             assert_eq!(hessian.first.dtau_dq, &first);
             let found = [hessian.dqdq, hessian.dvdq, hessian.dvdv, hessian.dadq];
@@ -76,8 +76,8 @@ fn forward_dynamics() {
     for (seed, model) in all_models(TREES).iter().enumerate() {
         let State { q, v, tau, a: lambda, f_ext } = State::random(model, &mut rng(seed as u64));
         let mut data = Data::new(model);
-        let in_turn = model.clone().with_limbs(false); // the same sums in the same order
-        let first = aba_derivatives(&in_turn, &mut data, &q, &v, &tau, &f_ext).da_dq.clone();
+        let serial = model.clone().with_limbs(false); // the same sums in the same order
+        let first = aba_derivatives(&serial, &mut data, &q, &v, &tau, &f_ext).da_dq.clone();
         let hessian = aba_hessian(model, &mut data, &q, &v, &tau, &f_ext, &lambda);
         assert_eq!(hessian.first.da_dq, &first);
         let found = [hessian.dqdq, hessian.dvdq, hessian.dvdv, hessian.dtaudq];

@@ -7,8 +7,8 @@ use crate::counting::{allocations, bytes};
 use crate::table::{Found, States, constraints, table};
 use crate::{best_level, each_level, models};
 use condyle_dynamics::{
-    Batch, ConstraintSet, ContactConstraint, Data, Force, Matrices, Model, Proximal, ReferenceFrame, Se3, Target,
-    robots,
+    Batch, ConstraintSet, ContactConstraint, Data, Force, Matrices, Model, ProximalSettings, ReferenceFrame, Se3,
+    Target, robots,
 };
 
 fn random(model: &Model, n: usize, seed: u64) -> Vec<Input<f64>> {
@@ -320,14 +320,14 @@ fn targets_of_constraints() {
     let s = States::of(&inputs);
     let target = Target { placement: Se3::new(Se3::identity().rotation, [0.1, 0.2, 0.3].into()), ..Target::identity() };
     let mut batch = Batch::new(model, 5, 2);
-    let mut constraints = batch.constraints(model, &[tool], Proximal::default()).unwrap();
+    let mut constraints = batch.constraints(model, &[tool], ProximalSettings::default()).unwrap();
     let before = batch.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a.to_vec();
     constraints.set_target(0, target).unwrap();
     assert_eq!((constraints.rows(), constraints.range(0)), (3, 0..3));
     let after = batch.constrained_dynamics(model, &mut constraints, &s.q, &s.v, &s.x, &[]).a.to_vec();
     assert!(before.iter().zip(&after).all(|(x, y)| x != y));
     let tool = ContactConstraint { target, ..tool };
-    let mut anew = batch.constraints(model, &[tool], Proximal::default()).unwrap();
+    let mut anew = batch.constraints(model, &[tool], ProximalSettings::default()).unwrap();
     assert_eq!(after, batch.constrained_dynamics(model, &mut anew, &s.q, &s.v, &s.x, &[]).a);
     let wrong = Target { placement: Se3::new(target.placement.rotation, [f64::NAN; 3].into()), ..target };
     assert!(constraints.set_target(0, wrong).is_err());
@@ -338,7 +338,7 @@ fn targets_of_constraints() {
 #[should_panic(expected = "constraints: made for another batch")]
 fn constraints_of_another_batch() {
     let model = &robots::arm7();
-    let mut constraints = Batch::<f64>::new(model, 2, 2).constraints(model, &[], Proximal::default()).unwrap();
+    let mut constraints = Batch::<f64>::new(model, 2, 2).constraints(model, &[], ProximalSettings::default()).unwrap();
     let (q, v) = ([0.0; 7], [0.0; 7]);
     _ = Batch::<f64>::new(model, 2, 1).constrained_dynamics(model, &mut constraints, &q, &v, &v, &[]);
 }

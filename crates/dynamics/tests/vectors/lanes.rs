@@ -5,7 +5,7 @@ use crate::common::{long_branches, rng};
 use crate::{each_level, models};
 use condyle_dynamics::level::Level;
 use condyle_dynamics::{Data, Force, Model, Scalar};
-use condyle_spatial::block::{Block, Real, Witness};
+use condyle_spatial::block::{Block, Real, SimdToken};
 
 /// Vector of numbers, with the operations that the tests need.
 trait Vector: Scalar {
@@ -24,12 +24,12 @@ impl<S: Block<Number = f64>> Vector for S {
     }
 }
 
-/// Witness that vectors may be used at their SIMD level.
+/// Permission that vectors may be used at their SIMD level.
 struct Here;
 
 // SAFETY: `each_level` runs what this processor has.
 #[allow(unsafe_code)]
-unsafe impl Witness for Here {}
+unsafe impl SimdToken for Here {}
 
 fn side_by_side<S: Vector>(knots: &[Input<f64>]) -> Input<S> {
     let pack = |part: fn(&Input<f64>) -> &[f64]| -> Vec<S> {
@@ -81,7 +81,7 @@ fn every_lane_is_a_single_call() {
     let all: Vec<Model> = models(4).into_iter().chain(long).collect();
     each_level(|level| match level {
         Level::Baseline => {}
-        Level::Simd128 | Level::Neon | Level::Avx2 => knots_are_single_calls::<<f64 as Real>::Short<Here>>(&all),
-        Level::Avx512 => knots_are_single_calls::<<f64 as Real>::Long<Here>>(&all),
+        Level::Simd128 | Level::Neon | Level::Avx2 => knots_are_single_calls::<<f64 as Real>::Narrow<Here>>(&all),
+        Level::Avx512 => knots_are_single_calls::<<f64 as Real>::Wide<Here>>(&all),
     });
 }

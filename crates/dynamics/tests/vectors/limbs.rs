@@ -6,9 +6,9 @@ use crate::common::contacts::random_constraints;
 use crate::common::panics::assert_panic;
 use crate::common::{State, Tree, Worst, all_models, relative, rng};
 use condyle_dynamics::{
-    ConstraintSet, ContactConstraint, Data, Inertia, Input, Joint, Model, ModelBuilder, Proximal, ReferenceFrame, Se3,
-    Sym3, Vec3, WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv, neutral,
-    nonlinear_effects, rnea, rnea_derivatives, robots,
+    ConstraintSet, ContactConstraint, Data, Inertia, Input, Joint, Model, ModelBuilder, ProximalSettings,
+    ReferenceFrame, Se3, Sym3, Vec3, WORLD, aba, aba_derivatives, constrained_dynamics, crba, forward_kinematics, minv,
+    neutral, nonlinear_effects, rnea, rnea_derivatives, robots,
 };
 use nalgebra::DMatrix;
 
@@ -55,28 +55,28 @@ fn sums_and_inverses() -> [Worst; 2] {
 }
 
 fn compare(model: &Model, worst: &mut [Worst; 2], seed: u64) {
-    let in_turn = model.clone().with_limbs(false);
-    let (mut data, mut one) = (Data::new(model), Data::new(&in_turn));
+    let serial = model.clone().with_limbs(false);
+    let (mut data, mut one) = (Data::new(model), Data::new(&serial));
     let (m, mut rng) = (model, rng(seed));
     for _ in 0..3 {
         let state = State::random(model, &mut rng);
         let State { q, v, a, tau, f_ext, .. } = state.clone();
         for f_ext in [&f_ext[..], &[]] {
-            let expected = rnea(&in_turn, &mut one, &q, &v, &a, f_ext).to_vec();
+            let expected = rnea(&serial, &mut one, &q, &v, &a, f_ext).to_vec();
             worst[0].see(m, rnea(m, &mut data, &q, &v, &a, f_ext), &expected);
             if model.singular_joints().is_empty() {
-                let expected = aba(&in_turn, &mut one, &q, &v, &tau, f_ext).to_vec();
+                let expected = aba(&serial, &mut one, &q, &v, &tau, f_ext).to_vec();
                 worst[1].see(m, aba(m, &mut data, &q, &v, &tau, f_ext), &expected);
             }
         }
-        let expected = nonlinear_effects(&in_turn, &mut one, &q, &v).to_vec();
+        let expected = nonlinear_effects(&serial, &mut one, &q, &v).to_vec();
         worst[0].see(m, nonlinear_effects(m, &mut data, &q, &v), &expected);
-        let expected = crba(&in_turn, &mut one, &q);
+        let expected = crba(&serial, &mut one, &q);
         let found = crba(m, &mut data, &q);
         assert_eq!(found, &found.transpose());
         worst[0].see(m, found.as_slice(), expected.as_slice());
         for f_ext in [&f_ext[..], &[]] {
-            let expected = rnea_derivatives(&in_turn, &mut one, &q, &v, &a, f_ext);
+            let expected = rnea_derivatives(&serial, &mut one, &q, &v, &a, f_ext);
             let found = rnea_derivatives(m, &mut data, &q, &v, &a, f_ext);
             worst[0].see(m, found.dtau_dq.as_slice(), expected.dtau_dq.as_slice());
             worst[0].see(m, found.dtau_dv.as_slice(), expected.dtau_dv.as_slice());
@@ -89,7 +89,7 @@ fn compare(model: &Model, worst: &mut [Worst; 2], seed: u64) {
             }
         }
         if model.singular_joints().is_empty() {
-            compare_inverses(model, &in_turn, [&mut data, &mut one], worst, &state);
+            compare_inverses(model, &serial, [&mut data, &mut one], worst, &state);
         }
     }
 }
@@ -111,18 +111,18 @@ fn inputs(model: &Model) -> impl Iterator<Item = Input> {
 
 fn compare_inverses(
     m: &Model,
-    in_turn: &Model,
+    serial: &Model,
     [data, one]: [&mut Data<f64>; 2],
     worst: &mut [Worst; 2],
     state: &State,
 ) {
     let State { q, v, tau, f_ext, .. } = state;
-    let expected = minv(in_turn, one, q);
+    let expected = minv(serial, one, q);
     let found = minv(m, data, q);
     assert_eq!(found, &found.transpose());
     worst[1].see(m, found.as_slice(), expected.as_slice());
     for f_ext in [&f_ext[..], &[]] {
-        let expected = aba_derivatives(in_turn, one, q, v, tau, f_ext);
+        let expected = aba_derivatives(serial, one, q, v, tau, f_ext);
         let found = aba_derivatives(m, data, q, v, tau, f_ext);
         worst[1].see(m, found.a, expected.a);
         worst[1].see(m, found.da_dq.as_slice(), expected.da_dq.as_slice());
@@ -155,16 +155,16 @@ fn the_numbers_of_body_after_body() {
 fn compare_constrained(
     m: &Model,
     constraints: &[ContactConstraint],
-    proximal: Proximal,
+    proximal: ProximalSettings,
     worst: &mut [Worst; 2],
     s: &State,
 ) {
-    let in_turn = m.clone().with_limbs(false);
-    let (mut data, mut one) = (Data::new(m), Data::new(&in_turn));
-    let [mut set, mut other] = [m, &in_turn].map(|m| ConstraintSet::new(m, constraints).expect("they are right"));
+    let serial = m.clone().with_limbs(false);
+    let (mut data, mut one) = (Data::new(m), Data::new(&serial));
+    let [mut set, mut other] = [m, &serial].map(|m| ConstraintSet::new(m, constraints).expect("they are right"));
     (set.proximal, other.proximal) = (proximal, proximal);
     for f_ext in [&s.f_ext[..], &[]] {
-        let expected = constrained_dynamics(&in_turn, &mut one, &mut other, &s.q, &s.v, &s.tau, f_ext);
+        let expected = constrained_dynamics(&serial, &mut one, &mut other, &s.q, &s.v, &s.tau, f_ext);
         let found = constrained_dynamics(m, &mut data, &mut set, &s.q, &s.v, &s.tau, f_ext);
         worst[1].see(m, found.a, expected.a);
         worst[1].see(m, found.lambda, expected.lambda);
@@ -190,7 +190,7 @@ fn constrained_dynamics_of_body_after_body() {
         let state = State::random(&model, &mut rng);
         let mut constraints = random_constraints(&model, &state, &mut rng);
         constraints.retain(|c| c.kind.rows() >= 3); // lines and planes do not support lanes
-        for proximal in [Proximal::default(), Proximal { mu: 1e-6, iterations: 3 }] {
+        for proximal in [ProximalSettings::default(), ProximalSettings { mu: 1e-6, iterations: 3 }] {
             compare_constrained(&model, &constraints, proximal, &mut worst, &state);
         }
     }
@@ -208,8 +208,8 @@ fn redundant_constraints_of_body_after_body() {
     let constraints =
         [ContactConstraint::rigid(left), ContactConstraint::point(right), ContactConstraint::rigid(again)];
     let state = State::random(&model, &mut rng(0));
-    compare_constrained(&model, &constraints, Proximal::default(), &mut worst, &state);
-    compare_constrained(&model, &[], Proximal::default(), &mut worst, &state);
+    compare_constrained(&model, &constraints, ProximalSettings::default(), &mut worst, &state);
+    compare_constrained(&model, &[], ProximalSettings::default(), &mut worst, &state);
 }
 
 /// The same `Data` works with changed armature, gravity or inertia.
@@ -228,10 +228,10 @@ fn of_the_model_that_is_given() {
         let found = rnea(&other, &mut data, &q, &v, &a, &[]).to_vec();
         let M = crba(&other, &mut data, &q).clone();
         let Minv = minv(&other, &mut data, &q).clone();
-        let in_turn = other.with_limbs(false);
-        assert!(relative(&found, rnea(&in_turn, &mut data, &q, &v, &a, &[])) < TOLERANCE);
-        assert!(relative(M.as_slice(), crba(&in_turn, &mut data, &q).as_slice()) < TOLERANCE);
-        assert!(relative(Minv.as_slice(), minv(&in_turn, &mut data, &q).as_slice()) < TOLERANCE_ABA);
+        let serial = other.with_limbs(false);
+        assert!(relative(&found, rnea(&serial, &mut data, &q, &v, &a, &[])) < TOLERANCE);
+        assert!(relative(M.as_slice(), crba(&serial, &mut data, &q).as_slice()) < TOLERANCE);
+        assert!(relative(Minv.as_slice(), minv(&serial, &mut data, &q).as_slice()) < TOLERANCE_ABA);
     }
 }
 
@@ -307,7 +307,7 @@ fn calls_leave_their_placements() {
         let (mut data, mut own) = (Data::new(m), Data::new(m));
         assert!(data.placements(m).is_none(), "{}: nothing was computed yet", m.name());
         let mut set = ConstraintSet::new(m, &random_constraints(m, &State::random(m, &mut rng), &mut rng)).unwrap();
-        set.proximal = Proximal { mu: 1e-6, ..Proximal::default() };
+        set.proximal = ProximalSettings { mu: 1e-6, ..ProximalSettings::default() };
         for call in 0..4 {
             let State { q, v, tau, .. } = State::random(m, &mut rng);
             match call {

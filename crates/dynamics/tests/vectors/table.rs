@@ -3,14 +3,14 @@
 use crate::common::table::Input;
 use condyle_dynamics::{
     Batch, BatchConstraints, ConstraintSet, ContactConstraint, Data, Dense, DenseMatrix, Force, ForwardDynamicsMethod,
-    Inertia, Matrices, Model, Motion, Poses, Proximal, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3, Vec3, aba,
-    aba_derivatives, aba_hessian, body_jacobian, centroidal_derivatives, centroidal_map, centroidal_map_rate,
-    compute_all_terms, constrained_dynamics, constrained_dynamics_derivatives, constrained_dynamics_equations,
-    coriolis_derivatives, coriolis_matrix, crba, energy_derivatives, forward_accelerations, forward_dynamics,
-    forward_kinematics, forward_velocities, frame_jacobian, gravity, impulse_dynamics, impulse_dynamics_derivatives,
-    joint_torque_regressor, kinetic_energy_regressor, minv, nonlinear_effects, passive_torque,
-    passive_torque_derivatives, potential_energy_regressor, rnea, rnea_derivatives, rnea_hessian,
-    rnea_second_derivatives, static_torque, static_torque_derivative,
+    Inertia, Matrices, Model, Motion, Poses, ProximalSettings, ReferenceFrame, RneaSecondDerivatives, Scalar, Se3,
+    Vec3, aba, aba_derivatives, aba_hessian, body_jacobian, centroidal_derivatives, centroidal_map,
+    centroidal_map_rate, compute_all_terms, constrained_dynamics, constrained_dynamics_derivatives,
+    constrained_dynamics_equations, coriolis_derivatives, coriolis_matrix, crba, energy_derivatives,
+    forward_accelerations, forward_dynamics, forward_kinematics, forward_velocities, frame_jacobian, gravity,
+    impulse_dynamics, impulse_dynamics_derivatives, joint_torque_regressor, kinetic_energy_regressor, minv,
+    nonlinear_effects, passive_torque, passive_torque_derivatives, potential_energy_regressor, rnea, rnea_derivatives,
+    rnea_hessian, rnea_second_derivatives, static_torque, static_torque_derivative,
 };
 use condyle_spatial::block::Real;
 use nalgebra::DMatrix;
@@ -248,8 +248,8 @@ fn inputs(model: &Model) -> impl Iterator<Item = condyle_dynamics::Input> {
 }
 
 /// Returns a contact and a loop, with one more iteration than needed; no constraints for a robot that cannot move.
-pub(crate) fn constraints(model: &Model) -> (Vec<ContactConstraint>, Proximal) {
-    let (bodies, proximal) = (model.bodies().len(), Proximal { mu: 1e-6, iterations: 2 });
+pub(crate) fn constraints(model: &Model) -> (Vec<ContactConstraint>, ProximalSettings) {
+    let (bodies, proximal) = (model.bodies().len(), ProximalSettings { mu: 1e-6, iterations: 2 });
     if bodies == 1 {
         return (Vec::new(), proximal);
     }

@@ -1,15 +1,15 @@
-//! Parts of a horizon that go through stages. The first free thread does the next stage of a part.
+//! Parts of a horizon that go through phases. The first free thread does the next phase of a part.
 #![allow(unsafe_code)]
 
 use alloc::vec::Vec;
 use core::marker::PhantomData;
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-/// Bit of a part's state that is set while a thread works on the part. The state is 2·stage while the part waits for
-/// the stage, and 2·stage + `AT_WORK` during the stage.
+/// Bit of a part's state that is set while a thread works on the part. The state is 2·phase while the part waits for
+/// the phase, and 2·phase + `AT_WORK` during the phase.
 const AT_WORK: u8 = 1;
 
-/// Parts of two slices of equal length, which are split at the same indices. Each part goes through the stages 0, 1, …
+/// Parts of two slices of equal length, which are split at the same indices. Each part goes through the phases 0, 1, …
 /// in turn, and only one thread at a time works on a part.
 #[derive(Debug)]
 pub struct Parts<'a, A, B> {
@@ -27,7 +27,7 @@ pub struct Parts<'a, A, B> {
 unsafe impl<A: Send, B: Send> Sync for Parts<'_, A, B> {}
 
 impl<'a, A, B> Parts<'a, A, B> {
-    /// Splits two slices at the indices `cuts`. All parts wait for stage 0. `states` is scratch memory, which grows if
+    /// Splits two slices at the indices `cuts`. All parts wait for phase 0. `states` is scratch memory, which grows if
     /// it is too short.
     ///
     /// # Panics
@@ -49,10 +49,10 @@ impl<'a, A, B> Parts<'a, A, B> {
         self.states.len()
     }
 
-    /// Executes a stage on a part if the part waits for this stage, and returns whether it did. The closure receives
+    /// Executes a phase on a part if the part waits for this phase, and returns whether it did. The closure receives
     /// the index of the part's first item, and the items of the part in both slices.
-    pub fn work(&self, part: usize, stage: u8, work: impl FnOnce(usize, &mut [A], &mut [B])) -> bool {
-        let (state, waiting) = (&self.states[part], 2 * stage);
+    pub fn work(&self, part: usize, phase: u8, work: impl FnOnce(usize, &mut [A], &mut [B])) -> bool {
+        let (state, waiting) = (&self.states[part], 2 * phase);
         if state.compare_exchange(waiting, waiting + AT_WORK, Ordering::Acquire, Ordering::Relaxed).is_err() {
             return false;
         }
@@ -71,10 +71,10 @@ impl<'a, A, B> Parts<'a, A, B> {
         true
     }
 
-    /// Returns whether a stage of a part has yet to begin: the part waits for this stage, or an earlier stage is not
+    /// Returns whether a phase of a part has yet to begin: the part waits for this phase, or an earlier phase is not
     /// finished.
-    pub fn awaits(&self, part: usize, stage: u8) -> bool {
-        self.states[part].load(Ordering::Relaxed) <= 2 * stage
+    pub fn awaits(&self, part: usize, phase: u8) -> bool {
+        self.states[part].load(Ordering::Relaxed) <= 2 * phase
     }
 
     /// Returns whether a thread has panicked during its work, so that the thread's part will not advance.

@@ -26,7 +26,7 @@ const MAX_TAGS: usize = 1 << 20;
 const MAX_EQUALS: usize = 1 << 22;
 /// Maximum number of attributes of an element.
 const MAX_ATTRIBUTES: usize = 256;
-/// Maximum depth of nested elements; chosen because an MJCF of a chain needs one level for each body.
+/// Maximum depth of nested elements; chosen because an MJCF of a chain nests as deep as it has bodies.
 pub(crate) const MAX_DEPTH: usize = 256;
 
 /// XML element with its content. A prefix is part of a name (`gz:note`). Declarations of prefixes are dropped.

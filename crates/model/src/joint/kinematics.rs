@@ -1,9 +1,9 @@
 //! Kinematics of joints: the placement and the motion of a body, and the joint efforts of a force.
 
-use super::turns::Turns;
+use super::revolute_angles::RevoluteAngles;
 use super::{Joint, JointMotion, rotated_about_z};
 use crate::layout::Layout;
-use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, alike};
+use condyle_spatial::{Act, Array, Force, Motion, Quaternion, Scalar, Se3, Vec3, same_layout};
 
 /// Sines and cosines of the angles of all joints: see [`Joint::sin_cos`]. Entries of bodies without such an angle, and
 /// entries after the last body, have no meaning.
@@ -16,7 +16,7 @@ pub struct JointSinCos<S> {
     pub cos: Array<S>,
 }
 
-alike!(JointSinCos { sin, cos });
+same_layout!(JointSinCos { sin, cos });
 
 impl<S: Scalar> JointSinCos<S> {
     /// Number of entries that are computed at once; they fill two vectors.
@@ -34,7 +34,7 @@ impl Joint {
     /// Computes the sines and cosines of the angles of all joints that turn about z, several at once.
     #[inline(always)]
     pub fn sin_cos<L: Layout>(l: &L, q: &[L::S], JointSinCos { sin, cos }: &mut JointSinCos<L::S>) {
-        let (Turns { runs, followers, circles }, sin, cos) = (l.turns(), &mut sin[..], &mut cos[..]);
+        let (RevoluteAngles { runs, followers, circles }, sin, cos) = (l.revolute_angles(), &mut sin[..], &mut cos[..]);
         for &[first, at, count] in runs {
             sin[first..first + count].copy_from_slice(&q[at..at + count]);
         }

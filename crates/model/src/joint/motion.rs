@@ -53,7 +53,7 @@ impl<S: Scalar> ClassicalMotion<S> {
     }
 }
 
-condyle_spatial::alike!(ClassicalMotion { w, dw, a });
+condyle_spatial::same_layout!(ClassicalMotion { w, dw, a });
 
 impl<S: Scalar> JointMotion<S> {
     /// Returns all six numbers of the motion.

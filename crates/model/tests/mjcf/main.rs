@@ -7,6 +7,7 @@ use condyle_model::{Body, Error, MjcfOptions, Model, Se3, WarningKind};
 use std::path::PathBuf;
 
 mod copies;
+mod errors;
 mod frames;
 mod inertias;
 mod joints;

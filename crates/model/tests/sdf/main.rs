@@ -8,6 +8,7 @@ use condyle_model::{Error, FrameKind, Joint, Model, ModelConstraintKind, SdfOpti
 use std::fs;
 use std::path::PathBuf;
 
+mod errors;
 mod files;
 mod tree;
 mod values;

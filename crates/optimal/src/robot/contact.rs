@@ -1,16 +1,17 @@
 //! Contacts of a knot, by name, and what makes a set of them singular.
 
 use crate::Error;
-use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, Proximal};
+use condyle_dynamics::{ConstraintSet, ContactConstraint, Model, ProximalSettings};
 use condyle_spatial::Scalar;
 use core::ops::Range;
 
 /// A contact of a frame with the world, and the name by which residuals call it.
 ///
 /// The constraint says which frame, whether its origin ([`ContactConstraint::point`]) or all of it
-/// ([`ContactConstraint::rigid`]) is held, along which axes its rows and its force are, and the gains of its stabilisation.
-/// Crocoddyl's `ContactModel3D` and `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is `LocalWorldAligned`
-/// here. Its `ContactModel1D` and `ContactModel2D` are [`ContactConstraint::line`] and [`ContactConstraint::plane`].
+/// ([`ContactConstraint::rigid`]) is held, along which axes its rows and its force are, and the gains of its
+/// stabilisation. Crocoddyl's `ContactModel3D` and `ContactModel6D` are these with `gains = [kp, kd]`; its `WORLD` is
+/// `LocalWorldAligned` here. Its `ContactModel1D` and `ContactModel2D` are [`ContactConstraint::line`] and
+/// [`ContactConstraint::plane`].
 ///
 /// ```
 /// use condyle_dynamics::{ContactConstraint, ReferenceFrame, robots};
@@ -51,7 +52,7 @@ pub(super) fn constraint_set<S: Scalar>(
     check_together(model, contacts, damping)?;
     let constraints: Vec<_> = contacts.iter().map(|c| c.constraint).collect();
     let mut set = ConstraintSet::new(model, &constraints).map_err(|error| named(contacts, error))?;
-    set.proximal = Proximal { mu: damping, iterations: 1 };
+    set.proximal = ProximalSettings { mu: damping, iterations: 1 };
     Ok(set)
 }
 

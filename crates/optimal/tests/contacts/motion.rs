@@ -2,7 +2,7 @@
 
 use super::*;
 use condyle_dynamics::{
-    ConstraintSet, Proximal, aba, constrained_dynamics, crba, frame_jacobian, impulse_dynamics, rnea,
+    ConstraintSet, ProximalSettings, aba, constrained_dynamics, crba, frame_jacobian, impulse_dynamics, rnea,
 };
 use condyle_optimal::robot::{
     ContactInverseDynamics, ContinuousModel, ControlPolynomial, Derivatives, KnotInput, KnotMotion,
@@ -158,7 +158,7 @@ fn forces_of_contacts_balance_the_robot() {
         let ((q, v), mut data) = (x.split_at(nq), Data::new(&model));
         let constraints: Vec<_> = contacts.iter().map(|contact| contact.constraint).collect();
         let mut set = ConstraintSet::new(&model, &constraints).unwrap();
-        set.proximal = Proximal { mu: 0.0, iterations: 1 };
+        set.proximal = ProximalSettings { mu: 0.0, iterations: 1 };
         let tau = [vec![0.0; 6], u.clone()].concat();
         let by_hand = constrained_dynamics(&model, &mut data, &mut set, q, v, &tau, &[]);
         let (a, lambda) = (by_hand.a.to_vec(), by_hand.lambda.to_vec());
@@ -193,7 +193,7 @@ fn impulses_change_velocities() {
         let ((q, v), mut data) = (x.split_at(nq), Data::new(&model));
         let constraints: Vec<_> = contacts.iter().map(|contact| contact.constraint).collect();
         let mut set = ConstraintSet::new(&model, &constraints).unwrap();
-        set.proximal = Proximal { mu: 0.0, iterations: 1 };
+        set.proximal = ProximalSettings { mu: 0.0, iterations: 1 };
         let after = impulse_dynamics(&model, &mut data, &mut set, q, v, 0.2).v.to_vec();
         let change: Vec<_> = after.iter().zip(v).map(|(after, before)| after - before).collect();
         let impact = ImpulseDynamics::new(model.clone(), &contacts, 0.2, 0.0, vec![]).unwrap();

@@ -6,8 +6,9 @@
 //!
 //! - For the common scalars, `f64` and its lanes, the function is compiled once, in the crate that defines it, with the
 //!   vector instructions of the scalar. Users of the library call this compiled code.
-//! - A single `f64` uses fused products and sums if the processor has them: the number is converted to [`Fused`], which
-//!   has the same 64 bits. Arguments, including workspaces, are reinterpreted as types over `Fused` ([`Alike`]).
+//! - A single `f64` uses fused products and sums if the processor has them: the number is converted to [`FusedF64`],
+//!   which has the same 64 bits. Arguments, including workspaces, are reinterpreted as types over `FusedF64`
+//!   ([`SameLayout`]).
 //! - For a single `f32`, the function is also compiled in the crate that defines it, without vector instructions. So
 //!   users' debug builds do not slow it down.
 //! - For all other scalars (dual numbers, lanes of `f32`, a user's own type), the function is compiled in the crate
@@ -19,17 +20,17 @@
 //! value in memory.
 #![allow(unsafe_code)]
 
-pub use crate::simd::alike::{Alike, Rename, same};
-pub use crate::simd::fused::Fused;
+pub use crate::simd::fused_f64::FusedF64;
 pub use crate::simd::kernel::Kernel;
 pub use crate::simd::level::{Level, level};
-pub use crate::simd::pack::{Real, Witness};
+pub use crate::simd::pack::{Real, SimdToken};
+pub use crate::simd::same_layout::{Rename, SameLayout, same};
 use core::any::TypeId;
 
 /// Vector of four numbers, for AVX2, NEON or SIMD128.
-pub type Short<W> = <f64 as Real>::Short<W>;
-/// Vector of eight numbers, for AVX-512; on other processors the same type as `Short`.
-pub type Long<W> = <f64 as Real>::Long<W>;
+pub type Narrow<W> = <f64 as Real>::Narrow<W>;
+/// Vector of eight numbers, for AVX-512; on other processors the same type as `Narrow`.
+pub type Wide<W> = <f64 as Real>::Wide<W>;
 
 /// Returns whether two types are the same.
 #[inline(always)]
@@ -92,18 +93,18 @@ macro_rules! kernel {
             $(assert!(is::<$R, f64>(), "model constants for f64 and its lanes are f64");)?
             let f64 = is::<$S, f64>();
             $crate::if_vectors!({
-                use $crate::simd::gate::{Fused, Level, level};
+                use $crate::simd::gate::{FusedF64, Level, level};
 
                 struct Gate;
                 // SAFETY: the code for each scalar is entered through the scalar's `enter`.
-                unsafe impl $crate::simd::gate::Witness for Gate {}
-                type Short = $crate::simd::gate::Short<Gate>;
-                type Long = $crate::simd::gate::Long<Gate>;
+                unsafe impl $crate::simd::gate::SimdToken for Gate {}
+                type Narrow = $crate::simd::gate::Narrow<Gate>;
+                type Wide = $crate::simd::gate::Wide<Gate>;
 
                 let fused = f64 && level() > Level::Baseline;
-                $crate::kernel!(@call Fused, is::<$S, Fused>(), $S $($R)?, ($($arg: $type),*), numbers if fused);
-                $crate::kernel!(@call Short, is::<$S, Short>(), $S $($R)?, ($($arg: $type),*));
-                $crate::kernel!(@call Long, is::<$S, Long>(), $S $($R)?, ($($arg: $type),*));
+                $crate::kernel!(@call FusedF64, is::<$S, FusedF64>(), $S $($R)?, ($($arg: $type),*), numbers if fused);
+                $crate::kernel!(@call Narrow, is::<$S, Narrow>(), $S $($R)?, ($($arg: $type),*));
+                $crate::kernel!(@call Wide, is::<$S, Wide>(), $S $($R)?, ($($arg: $type),*));
             } else {});
             $crate::kernel!(@call f64, f64, $S $($R)?, ($($arg: $type),*));
         }
@@ -174,14 +175,14 @@ macro_rules! register_kernel {
 
                 struct Gate;
                 // SAFETY: the code for a kind of register is entered through the `enter` of these registers.
-                unsafe impl $crate::simd::gate::Witness for Gate {}
-                type Short = $crate::simd::gate::Short<Gate>;
-                type Long = $crate::simd::gate::Long<Gate>;
+                unsafe impl $crate::simd::gate::SimdToken for Gate {}
+                type Narrow = $crate::simd::gate::Narrow<Gate>;
+                type Wide = $crate::simd::gate::Wide<Gate>;
 
                 if level() >= Level::Avx512 {
-                    <Long as $crate::Scalar>::enter(Work::<_, Long>(work, ::core::marker::PhantomData));
+                    <Wide as $crate::Scalar>::enter(Work::<_, Wide>(work, ::core::marker::PhantomData));
                 } else {
-                    <Short as $crate::Scalar>::enter(Work::<_, Short>(work, ::core::marker::PhantomData));
+                    <Narrow as $crate::Scalar>::enter(Work::<_, Narrow>(work, ::core::marker::PhantomData));
                 }
             } else {
                 // This code is never executed on targets without vectors, but it would be correct.
@@ -192,15 +193,15 @@ macro_rules! register_kernel {
 }
 
 /// Defines a function that is compiled for each SIMD level in the crate that defines it. `item` is the implementation.
-/// `long`, `short` and `baseline` name the function to call for each kind of register: eight numbers, four numbers, and
-/// the registers that every processor has.
+/// `wide`, `narrow` and `baseline` name the function to call for each kind of register: eight numbers, four numbers,
+/// and the registers that every processor has.
 #[macro_export]
 #[doc(hidden)]
 macro_rules! level_function {
     (
         $(#[$doc:meta])*
         $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $out:ty)?
-        { $item:item long: $long:expr, short: $short:expr, baseline: $baseline:expr $(,)? }
+        { $item:item wide: $wide:expr, narrow: $narrow:expr, baseline: $baseline:expr $(,)? }
     ) => {
         $(#[$doc])*
         #[allow(unsafe_code, unused_unsafe, clippy::extra_unused_type_parameters)]
@@ -218,21 +219,21 @@ macro_rules! level_function {
                 #[cfg(target_arch = "x86_64")]
                 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
                 #[inline(never)]
-                fn long($($arg: $type),*) $(-> $out)? {
-                    $long($($arg),*)
+                fn wide($($arg: $type),*) $(-> $out)? {
+                    $wide($($arg),*)
                 }
                 #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
                 #[inline(never)]
-                fn short($($arg: $type),*) $(-> $out)? {
-                    $short($($arg),*)
+                fn narrow($($arg: $type),*) $(-> $out)? {
+                    $narrow($($arg),*)
                 }
                 match level() {
                     // SAFETY: the processor has the SIMD level in use.
                     #[cfg(target_arch = "x86_64")]
-                    Level::Avx512 => return unsafe { long($($arg),*) },
+                    Level::Avx512 => return unsafe { wide($($arg),*) },
                     Level::Baseline => {}
                     // SAFETY: as above.
-                    _ => return unsafe { short($($arg),*) },
+                    _ => return unsafe { narrow($($arg),*) },
                 }
             } else {});
             baseline($($arg),*)

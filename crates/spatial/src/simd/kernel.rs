@@ -1,7 +1,7 @@
 //! Work that is compiled for the instructions of a SIMD level, and the functions that enter it.
 #![allow(unsafe_code)]
 
-use crate::simd::level::{SHORT, assert_supported};
+use crate::simd::level::{NARROW, assert_supported};
 
 /// Work that is compiled for a SIMD level. `run` is always inlined, so it is compiled for the SIMD level of the
 /// function that calls it.
@@ -10,7 +10,7 @@ pub trait Kernel: Sized {
     fn run(self);
 }
 
-/// Runs a kernel with the instructions of [`Real::Short`](crate::simd::pack::Real::Short).
+/// Runs a kernel with the instructions of [`Real::Narrow`](crate::simd::pack::Real::Narrow).
 ///
 /// On x86-64, these instructions belong to [`Level::Avx2`](crate::simd::level::Level::Avx2). Other processors have only
 /// one level.
@@ -18,13 +18,13 @@ pub trait Kernel: Sized {
 /// # Panics
 /// If the processor does not have these instructions.
 #[inline(always)]
-pub fn short(kernel: impl Kernel) {
+pub fn narrow(kernel: impl Kernel) {
     #[inline(never)]
     #[cfg_attr(target_arch = "x86_64", target_feature(enable = "avx2,fma"))]
     fn with_instructions(kernel: impl Kernel) {
         kernel.run();
     }
-    assert_supported(SHORT);
+    assert_supported(NARROW);
     // SAFETY: the processor has the instructions.
     #[allow(unused_unsafe)] // except on x86-64, every processor has the instructions
     unsafe {

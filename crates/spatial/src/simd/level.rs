@@ -38,7 +38,7 @@ pub enum Level {
 }
 
 /// SIMD level with vectors of four numbers, on the architecture for which this crate is compiled.
-pub(crate) const SHORT: Level = if cfg!(target_arch = "aarch64") {
+pub(crate) const NARROW: Level = if cfg!(target_arch = "aarch64") {
     Level::Neon
 } else if cfg!(target_arch = "wasm32") {
     Level::Simd128

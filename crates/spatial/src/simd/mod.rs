@@ -1,12 +1,12 @@
 //! Vector instructions: detection of the SIMD level, lanes in registers, and the gate to code compiled for a level.
 
-pub mod alike;
-pub mod fused;
+pub mod fused_f64;
 pub mod gate;
 pub mod kernel;
 pub(crate) mod lanes;
 pub mod level;
 pub mod pack;
+pub mod same_layout;
 
-pub use fused::Fused;
+pub use fused_f64::FusedF64;
 pub use kernel::Kernel;

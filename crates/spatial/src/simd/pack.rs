@@ -350,7 +350,7 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
 ///
 /// ```compile_fail
 /// use condyle_spatial::{Scalar, block::Real};
-/// type Eight = <f64 as Real>::Long<()>; // the promise was not made
+/// type Eight = <f64 as Real>::Wide<()>; // the promise was not made
 /// let sum = Eight::splat(1.0) + Eight::splat(2.0);
 /// ```
 ///
@@ -369,23 +369,23 @@ impl<T: Element<N>, const N: usize> Block for Lanes<T, N> {
 /// # Safety
 /// The implementing crate uses vectors only where the processor has their instructions: in kernels that were entered
 /// through `Scalar::enter`, and in functions that were called at the SIMD level of the vectors.
-pub unsafe trait Witness: 'static {}
+pub unsafe trait SimdToken: 'static {}
 
 /// Number type for which vector types exist.
 pub trait Real: Block<Number = Self> {
     /// Vector of [`Level::Avx2`](crate::simd::level::Level::Avx2), [`Level::Neon`](crate::simd::level::Level::Neon) or
     /// [`Level::Simd128`](crate::simd::level::Level::Simd128).
-    type Short<W: Witness>: Block<Number = Self>;
-    /// Vector of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as `Short` where this level does not
-    /// exist.
-    type Long<W: Witness>: Block<Number = Self>;
+    type Narrow<W: SimdToken>: Block<Number = Self>;
+    /// Vector of [`Level::Avx512`](crate::simd::level::Level::Avx512), or the same as `Narrow` where this level does
+    /// not exist.
+    type Wide<W: SimdToken>: Block<Number = Self>;
 }
 
 impl Real for f64 {
-    type Short<W: Witness> = Lanes<Self, 4>;
-    type Long<W: Witness> = lanes::LongF64;
+    type Narrow<W: SimdToken> = Lanes<Self, 4>;
+    type Wide<W: SimdToken> = lanes::WideF64;
 }
 impl Real for f32 {
-    type Short<W: Witness> = Lanes<Self, 8>;
-    type Long<W: Witness> = lanes::LongF32;
+    type Narrow<W: SimdToken> = Lanes<Self, 8>;
+    type Wide<W: SimdToken> = lanes::WideF32;
 }

@@ -3,20 +3,20 @@
 mod packers;
 
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Block, Real, Witness};
+use condyle_spatial::block::{Block, Real, SimdToken};
 use condyle_spatial::level::{Level, Unsupported};
 use condyle_spatial::moves::{Move, sum};
 use condyle_spatial::simd::Kernel;
 use core::marker::PhantomData;
 
-/// Witness that allows the tests to name vector types.
+/// Token that allows the tests to name vector types.
 struct Here;
 
 // SAFETY: each level is checked before its vectors are used.
 #[allow(unsafe_code)]
-unsafe impl Witness for Here {}
+unsafe impl SimdToken for Here {}
 
-type Four = <f64 as Real>::Short<Here>;
+type Four = <f64 as Real>::Narrow<Here>;
 
 /// Number type of the lanes, with functions for the tests.
 trait Number: Real<Mask = bool> {
@@ -156,13 +156,13 @@ fn each_lane_is_a_number() {
             _ if !level.is_supported() => eprintln!("NOT RUN: {}", Unsupported(level)),
             Level::Baseline => {}
             Level::Simd128 | Level::Neon | Level::Avx2 => {
-                operations::<<f64 as Real>::Short<Here>>();
-                operations::<<f32 as Real>::Short<Here>>();
+                operations::<<f64 as Real>::Narrow<Here>>();
+                operations::<<f32 as Real>::Narrow<Here>>();
                 Four::enter(Moves);
             }
             Level::Avx512 => {
-                operations::<<f64 as Real>::Long<Here>>();
-                operations::<<f32 as Real>::Long<Here>>();
+                operations::<<f64 as Real>::Wide<Here>>();
+                operations::<<f32 as Real>::Wide<Here>>();
             }
         }
     }

@@ -83,12 +83,12 @@ fn rows_to_vectors_and_back() {
                 back::<f32>();
             }
             Level::Simd128 | Level::Neon | Level::Avx2 => {
-                back::<<f64 as Real>::Short<Here>>();
-                back::<<f32 as Real>::Short<Here>>();
+                back::<<f64 as Real>::Narrow<Here>>();
+                back::<<f32 as Real>::Narrow<Here>>();
             }
             Level::Avx512 => {
-                back::<<f64 as Real>::Long<Here>>();
-                back::<<f32 as Real>::Long<Here>>();
+                back::<<f64 as Real>::Wide<Here>>();
+                back::<<f32 as Real>::Wide<Here>>();
             }
         }
     }

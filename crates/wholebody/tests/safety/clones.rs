@@ -2,7 +2,7 @@
 
 use crate::common::*;
 use condyle_dynamics::robots;
-use condyle_wholebody::{Backend, Command, Form, Settings, Task, WholeBodyController};
+use condyle_wholebody::{Backend, Command, Formulation, Settings, Task, WholeBodyController};
 
 /// Makes step k near the stance. In the course of the steps, contacts appear and disappear, and some states and
 /// references are invalid. Tasks have two priorities.
@@ -27,8 +27,10 @@ fn described(settings: Settings) -> WholeBodyController {
 /// With Condyle's own solver, clones continue with the same bits from any tick, with and without warm starts.
 #[test]
 fn a_clone_has_the_same_bits() {
-    for (warm_start, form) in [(true, Form::Condensed), (false, Form::Condensed), (true, Form::Full)] {
-        let mut controller = described(Settings { warm_start, form, ..Settings::default() });
+    for (warm_start, formulation) in
+        [(true, Formulation::Condensed), (false, Formulation::Condensed), (true, Formulation::Full)]
+    {
+        let mut controller = described(Settings { warm_start, formulation, ..Settings::default() });
         for k in 0..24 {
             let mut clone = controller.clone();
             assert_eq!(format!("{:?}", clone.command()), format!("{:?}", controller.command()));
@@ -42,7 +44,7 @@ fn a_clone_has_the_same_bits() {
             tick(&mut controller, k);
         }
         // Earlier clones have not changed the controller: one that was never cloned gives the same command.
-        let mut alone = described(Settings { warm_start, form, ..Settings::default() });
+        let mut alone = described(Settings { warm_start, formulation, ..Settings::default() });
         let last = (0..24).map(|k| tick(&mut alone, k)).last().unwrap();
         assert_eq!(format!("{last:?}"), format!("{:?}", controller.command()));
     }

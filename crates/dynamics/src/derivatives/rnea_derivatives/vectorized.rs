@@ -8,8 +8,8 @@ use crate::derivatives::rnea_derivatives::{Bodies, Workspace};
 use crate::passes::kinematics::World;
 use crate::workspace::filled;
 use condyle_model::Model;
-use condyle_spatial::gate::Fused;
-use condyle_spatial::{Array, Force, Scalar, Vec3, alike};
+use condyle_spatial::gate::FusedF64;
+use condyle_spatial::{Array, Force, Scalar, Vec3, same_layout};
 use core::any::Any;
 
 /// Number of columns that are processed together.
@@ -25,7 +25,7 @@ pub(crate) struct Rows<S> {
     sides: Array<[[S; SIDE]; NUMBERS]>,
 }
 
-alike!(Rows { sides });
+same_layout!(Rows { sides });
 
 impl<S: Scalar> Rows<S> {
     pub(crate) fn new(columns: usize) -> Self {
@@ -49,8 +49,8 @@ impl<S: Scalar> Rows<S> {
 /// Computes all pairs of columns of different joints, from the parts stored in `Rows`.
 #[inline(always)]
 pub(crate) fn pairs<S: Scalar, R>(model: &Model<R>, w: &World<S>, d: &mut Workspace<S>) {
-    let w = (w as &dyn Any).downcast_ref::<World<Fused>>();
-    let d = (d as &mut dyn Any).downcast_mut::<Workspace<Fused>>();
+    let w = (w as &dyn Any).downcast_ref::<World<FusedF64>>();
+    let d = (d as &mut dyn Any).downcast_mut::<Workspace<FusedF64>>();
     if let (Some(w), Some(d)) = (w, d) {
         vectors::pairs(model, w, d);
     }
@@ -58,13 +58,13 @@ pub(crate) fn pairs<S: Scalar, R>(model: &Model<R>, w: &World<S>, d: &mut Worksp
 
 mod vectors {
     use super::*;
-    use crate::workspace::Short as Four;
+    use crate::workspace::Narrow as Four;
     use condyle_spatial::Motion;
 
     const _: () = assert!(Four::LANES == SIDE);
 
     #[inline(always)]
-    pub(super) fn pairs<R>(model: &Model<R>, w: &World<Fused>, d: &mut Workspace<Fused>) {
+    pub(super) fn pairs<R>(model: &Model<R>, w: &World<FusedF64>, d: &mut Workspace<FusedF64>) {
         let n = model.nv();
         let (Bodies { rows, Psid, Psidd, PsidSd, .. }, [dq, dv, da]) = d.parts();
         for node in &model.nodes()[1..] {
@@ -103,25 +103,25 @@ mod vectors {
 
     /// Returns four vectors whose numbers begin at index k.
     #[inline(always)]
-    fn vector(side: &[[Fused; SIDE]; NUMBERS], k: usize) -> Vec3<Four> {
+    fn vector(side: &[[FusedF64; SIDE]; NUMBERS], k: usize) -> Vec3<Four> {
         Vec3::new(Four::from_fused(&side[k]), Four::from_fused(&side[k + 1]), Four::from_fused(&side[k + 2]))
     }
 
     /// Returns four forces whose numbers begin at index k.
     #[inline(always)]
-    fn force(side: &[[Fused; SIDE]; NUMBERS], k: usize) -> Force<Four> {
+    fn force(side: &[[FusedF64; SIDE]; NUMBERS], k: usize) -> Force<Four> {
         Force::new(vector(side, k), vector(side, k + 3))
     }
 
     /// Copies a vector to all lanes.
     #[inline(always)]
-    fn all3(v: Vec3<Fused>) -> Vec3<Four> {
+    fn all3(v: Vec3<FusedF64>) -> Vec3<Four> {
         Vec3::new(Four::splat(v.x.0), Four::splat(v.y.0), Four::splat(v.z.0))
     }
 
     /// Copies a motion to all lanes.
     #[inline(always)]
-    fn all(m: Motion<Fused>) -> Motion<Four> {
+    fn all(m: Motion<FusedF64>) -> Motion<Four> {
         Motion::new(all3(m.linear), all3(m.angular))
     }
 }

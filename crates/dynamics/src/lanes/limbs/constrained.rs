@@ -26,7 +26,7 @@ use crate::constraints::constraint_set::ConstraintSet;
 use crate::constraints::plan::Plan as ConstraintPlan;
 use crate::workspace::Gate;
 use condyle_spatial::block::Block;
-use condyle_spatial::gate::Fused;
+use condyle_spatial::gate::FusedF64;
 use condyle_spatial::gate::Rename;
 use condyle_spatial::{Scalar, moves};
 
@@ -46,7 +46,7 @@ impl ConstraintLanes {
     pub(crate) fn carry<V: Block<Number = f64>, const N: usize>(
         &mut self,
         left: Left<'_>,
-        set: &mut ConstraintSet<Fused>,
+        set: &mut ConstraintSet<FusedF64>,
     ) {
         let Self { rows, Y, YD, all } = self;
         all.end::<V, N>(set.lambda.len());

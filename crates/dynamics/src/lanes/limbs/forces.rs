@@ -11,7 +11,7 @@ use crate::passes::aba;
 use crate::passes::kinematics::World;
 use condyle_model::Model;
 use condyle_spatial::block::Block;
-use condyle_spatial::gate::Fused;
+use condyle_spatial::gate::FusedF64;
 use condyle_spatial::{Mat3, Motion, Scalar, Se3, Vec3};
 
 /// Results of the articulated-body algorithm, as slices of numbers.
@@ -41,13 +41,13 @@ impl<'a> Left<'a> {
 
     /// Returns ₀X of a body.
     #[inline(always)]
-    pub(crate) fn pose(self, body: usize) -> Se3<Fused> {
+    pub(crate) fn pose(self, body: usize) -> Se3<FusedF64> {
         let (step, lane) = self.plan.place(body);
         let x = &self.oX[12 * LANES * step + lane..][..11 * LANES + 1];
         let mut columns = [Vec3::zero(); 4];
         for k in 0..4 {
             let at = 3 * LANES * k;
-            columns[k] = Vec3::new(Fused(x[at]), Fused(x[at + LANES]), Fused(x[at + 2 * LANES]));
+            columns[k] = Vec3::new(FusedF64(x[at]), FusedF64(x[at + LANES]), FusedF64(x[at + 2 * LANES]));
         }
         let [x, y, z, translation] = columns;
         Se3::new(Mat3 { x, y, z }, translation)
@@ -55,11 +55,11 @@ impl<'a> Left<'a> {
 
     /// Returns the velocity of a body.
     #[inline(always)]
-    pub(crate) fn velocity(self, body: usize) -> Motion<Fused> {
+    pub(crate) fn velocity(self, body: usize) -> Motion<FusedF64> {
         let x = six(self.v, self.plan.place(body));
-        let mut v = [Fused(0.0); 6];
+        let mut v = [FusedF64(0.0); 6];
         for k in 0..6 {
-            v[k] = Fused(x[k * LANES]);
+            v[k] = FusedF64(x[k * LANES]);
         }
         v.into()
     }
@@ -171,7 +171,7 @@ fn add_world<V: Block<Number = f64>, const N: usize>(f: &Forces<V, N>, a: [f64; 
 impl Rows {
     /// Computes the unit forces and γ'.
     #[inline(always)]
-    pub(crate) fn begin(&mut self, plan: &ConstraintPlan, ends: &FramePair<Fused>, gamma: [Fused; 6]) {
+    pub(crate) fn begin(&mut self, plan: &ConstraintPlan, ends: &FramePair<FusedF64>, gamma: [FusedF64; 6]) {
         let rigid = plan.kind == ConstraintKind::Rigid;
         let axes = if plan.aligned() { Mat3::identity() } else { ends.x1.rotation }.columns();
         for (end, (x, sign)) in [(ends.x1, 1.0), (ends.x2, -1.0)].into_iter().enumerate() {
@@ -179,7 +179,7 @@ impl Rows {
             // each body.
             let p = if rigid { ends.x1.translation } else { x.translation };
             for r in 0..3 {
-                let n = axes[r].scale(Fused(sign));
+                let n = axes[r].scale(FusedF64(sign));
                 let (n, moment) = (n.to_array(), p.cross(n).to_array());
                 for k in 0..3 {
                     self.forces[end][k][r] = n[k].0;
@@ -203,7 +203,7 @@ impl Rows {
         left: Left<'_>,
         [Y, YD]: [&mut [f64]; 2],
         all: &mut All,
-        J: &mut [Fused],
+        J: &mut [FusedF64],
     ) {
         let (mut x, mut whole, mut rest) = (read::<V, N>(&self.gamma), [[V::zero(); N]; 6], [[V::zero(); N]; 6]);
         for (k, way) in self.ways.iter().enumerate() {
@@ -223,7 +223,7 @@ impl Rows {
                     let mut numbers = [0.0; WIDE];
                     write(dot(&f_whole, six(left.S, (slot, lane))), &mut numbers);
                     for r in 0..plan.rows() {
-                        J[plan.start + r * plan.places.len() + place] = Fused(numbers[r]);
+                        J[plan.start + r * plan.places.len() + place] = FusedF64(numbers[r]);
                     }
                     let [y, yd] = take(left, (slot, lane), &mut f, &mut x);
                     write(y, &mut Y[self.start + place * self.wide..]);
@@ -310,7 +310,7 @@ impl All {
         &mut self,
         plans: &[ConstraintPlan],
         left: Left<'_>,
-        J: &mut [Fused],
+        J: &mut [FusedF64],
     ) {
         let stride = self.stride;
         let (step, lane) = left.plan.place(self.root);
@@ -332,7 +332,7 @@ impl All {
         for plan in plans {
             for r in 0..plan.rows() {
                 for k in 0..self.nv {
-                    J[plan.start + r * plan.places.len() + k] = Fused(self.J[k * stride + plan.row + r]);
+                    J[plan.start + r * plan.places.len() + k] = FusedF64(self.J[k * stride + plan.row + r]);
                 }
             }
         }

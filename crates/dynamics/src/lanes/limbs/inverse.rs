@@ -21,7 +21,7 @@ use alloc::vec::Vec;
 use condyle_model::layout::Layout;
 use condyle_model::limbs::column_map::{ColumnBlock, Sizes};
 use condyle_spatial::block::Block;
-use condyle_spatial::gate::Fused;
+use condyle_spatial::gate::FusedF64;
 use condyle_spatial::{Motion, Scalar};
 
 /// Number of vectors of each row that are summed at once.
@@ -67,7 +67,7 @@ impl Scratch {
         w: &World<Four>,
         aba: &aba::Workspace<Four>,
         blocks: &[ColumnBlock],
-        Minv: &mut [Fused],
+        Minv: &mut [FusedF64],
     ) {
         self.carry(l, w, aba);
         for block in blocks {
@@ -177,7 +177,7 @@ fn put(to: &mut [f64], at: &[u32; LANES], x: Four) {
 
 /// Computes a symmetric matrix from its rows up to the diagonal.
 #[inline(always)]
-fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [Fused]) {
+fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [FusedF64]) {
     assert!(n <= width && rows.len() >= n * width && X.len() >= n * n);
     let whole = n - n % LANES;
     for k in (0..whole).step_by(LANES) {
@@ -197,13 +197,13 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [Fused]
         }
         for r in 1..LANES {
             for j in 0..r {
-                X[(k + j) * n + k + r] = Fused(rows[(k + r) * width + k + j]);
+                X[(k + j) * n + k + r] = FusedF64(rows[(k + r) * width + k + j]);
             }
         }
     }
     for r in whole..n {
         for j in 0..=r {
-            let x = Fused(rows[r * width + j]);
+            let x = FusedF64(rows[r * width + j]);
             (X[r * n + j], X[j * n + r]) = (x, x);
         }
     }
@@ -214,7 +214,7 @@ fn mirror(rows: &[f64], Sizes { rows: n, Zt: width, .. }: Sizes, X: &mut [Fused]
 /// # Safety
 /// X has at least the entries up to the end of the last row.
 #[inline(always)]
-unsafe fn write(X: &mut [Fused], at: usize, n: usize, block: &[Four; LANES]) {
+unsafe fn write(X: &mut [FusedF64], at: usize, n: usize, block: &[Four; LANES]) {
     for r in 0..LANES {
         debug_assert!(at + r * n + LANES <= X.len());
         // SAFETY: by the caller.

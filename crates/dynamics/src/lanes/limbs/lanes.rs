@@ -2,20 +2,20 @@
 #![allow(unsafe_code)]
 
 use super::{LANES, Plan};
-use crate::workspace::{Gate, Short};
+use crate::workspace::{Gate, Narrow};
 use alloc::vec::Vec;
 use condyle_model::Model;
 use condyle_model::joint::Joint;
-use condyle_model::joint::turns::Turns;
+use condyle_model::joint::revolute_angles::RevoluteAngles;
 use condyle_model::layout::{Columns, Layout};
 use condyle_model::limbs::column_map::{ColumnMap, LaneColumn, Pair, Predecessor};
 use condyle_model::limbs::steps::{Parents, Source, Step};
 use condyle_spatial::moves::{Move, sum};
-use condyle_spatial::simd::Fused;
+use condyle_spatial::simd::FusedF64;
 use condyle_spatial::{Act, Force, Inertia, Scalar, Se3, Vec3};
 use core::ops::{AddAssign, Range};
 
-pub(crate) type Four = Short;
+pub(crate) type Four = Narrow;
 const _: () = assert!(<Four as Scalar>::LANES == LANES);
 
 /// Layout of a robot with limbs: steps instead of bodies, lanes instead of numbers.
@@ -26,7 +26,7 @@ pub(crate) struct Limbs<'a> {
     copies: &'a [Vec<(usize, Move)>],
     predecessors: &'a [Predecessor],
     closed: &'a [usize],
-    turns: &'a Turns,
+    revolute_angles: &'a RevoluteAngles,
     coordinates: &'a [Source],
     pub armature: &'a [f64],
     pub gravity: Vec3<f64>,
@@ -107,8 +107,8 @@ impl Layout for Limbs<'_> {
         self.steps[i].joint
     }
     #[inline(always)]
-    fn turns(&self) -> &Turns {
-        self.turns
+    fn revolute_angles(&self) -> &RevoluteAngles {
+        self.revolute_angles
     }
     #[inline(always)]
     fn placement(&self, i: usize) -> Se3<Four> {
@@ -163,7 +163,7 @@ impl Layout for Limbs<'_> {
     }
     /// Returns all bodies after the last step, and none before.
     #[inline(always)]
-    fn closed_by(&self, i: usize) -> &[usize] {
+    fn subtrees_ending_at(&self, i: usize) -> &[usize] {
         if i + 1 == self.steps.len() { self.closed } else { &[] }
     }
     #[inline(always)]
@@ -210,11 +210,23 @@ impl Layout for Limbs<'_> {
 impl<'a> Limbs<'a> {
     #[inline(always)]
     pub(crate) fn new(plan: &'a Plan, model: &'a Model) -> Self {
-        let Plan { steps, closed, turns, state, columns, .. } = plan;
+        let Plan { steps, closed, revolute_angles, state, columns, .. } = plan;
         let ColumnMap { support, pairs, copies, predecessors, .. } = columns;
         let (armature, gravity, geometry) = (model.armature(), *model.gravity(), model.geometry_hash());
         let coordinates = &state.coordinates;
-        Self { steps, support, pairs, copies, predecessors, closed, turns, coordinates, armature, gravity, geometry }
+        Self {
+            steps,
+            support,
+            pairs,
+            copies,
+            predecessors,
+            closed,
+            revolute_angles,
+            coordinates,
+            armature,
+            gravity,
+            geometry,
+        }
     }
 
     /// Returns the value at the predecessor of an entry of the support.
@@ -236,7 +248,7 @@ impl<'a> Limbs<'a> {
 
     /// Sets the entries of a pair, the first lane's last.
     #[inline(always)]
-    fn put(matrix: &mut [Fused], at: &[u32; LANES], value: Four) {
+    fn put(matrix: &mut [FusedF64], at: &[u32; LANES], value: Four) {
         let value = value.to_fused();
         for lane in (0..LANES).rev() {
             debug_assert!((at[lane] as usize) < matrix.len());
@@ -251,7 +263,7 @@ impl Columns for Limbs<'_> {
     type Column = LaneColumn;
     /// Index of the column within its joint.
     type OwnColumn = usize;
-    type Number = Fused;
+    type Number = FusedF64;
 
     #[inline(always)]
     fn support(&self, i: usize) -> &[LaneColumn] {
@@ -273,21 +285,21 @@ impl Columns for Limbs<'_> {
         }
     }
     #[inline(always)]
-    fn clear(&self, matrix: &mut [Fused]) {
+    fn clear(&self, matrix: &mut [FusedF64]) {
         assert!(matrix.len() == self.armature.len() * self.armature.len());
     }
     #[inline(always)]
-    fn set_row(&self, matrix: &mut [Fused], k: usize, e: LaneColumn, value: Four) {
+    fn set_row(&self, matrix: &mut [FusedF64], k: usize, e: LaneColumn, value: Four) {
         Self::put(matrix, &self.pair(e, k).in_row, value);
     }
     #[inline(always)]
-    fn set_column(&self, matrix: &mut [Fused], k: usize, e: LaneColumn, value: Four) {
+    fn set_column(&self, matrix: &mut [FusedF64], k: usize, e: LaneColumn, value: Four) {
         Self::put(matrix, &self.pair(e, k).in_column, value);
     }
     #[inline(always)]
-    fn add_armature(&self, matrix: &mut [Fused]) {
+    fn add_armature(&self, matrix: &mut [FusedF64]) {
         for (k, &armature) in self.armature.iter().enumerate() {
-            matrix[k * (self.armature.len() + 1)] += Fused(armature);
+            matrix[k * (self.armature.len() + 1)] += FusedF64(armature);
         }
     }
 }

@@ -12,7 +12,7 @@ use alloc::boxed::Box;
 use condyle_model::Model;
 use condyle_model::limbs::steps::Source;
 use condyle_spatial::block::lanes;
-use condyle_spatial::gate::{Fused, Rename, is, same};
+use condyle_spatial::gate::{FusedF64, Rename, is, same};
 use condyle_spatial::level::{Level, level};
 use condyle_spatial::{Array, Force, Inertia, Scalar};
 
@@ -25,7 +25,7 @@ pub(crate) struct Scratch {
     pub x: Array<Four>,
     pub f_ext: Array<Force<Four>>,
     /// Copy of an argument, with a 0 for lanes without a joint. Shape: max(nq, nv) + 1. Written by: `gather`.
-    padded: Array<Fused>,
+    padded: Array<FusedF64>,
     pub world: World<Four>,
     pub rnea: rnea::Workspace<Four>,
     pub aba: aba::Workspace<Four>,
@@ -40,14 +40,14 @@ impl Scratch {
     pub(crate) fn new<S: 'static, R>(model: &Model<R>) -> Option<Box<Self>> {
         let plan = model.limbs().filter(|_| is::<S, f64>() && level() > Level::Baseline)?;
         let (steps, nv) = (plan.steps.len(), plan.state.coordinates.len());
-        let size = Size { bodies: steps, columns: nv + plan.columns.copies.len(), depth: 0, levels: steps, nv };
+        let size = Size { bodies: steps, columns: nv + plan.columns.copies.len(), depth: 0, body_depth: steps, nv };
         let zeros = filled(Four::zero, nv);
         Some(Box::new(Self {
             q: filled(Four::zero, plan.state.positions.len()),
             v: zeros.clone(),
             x: zeros,
             f_ext: filled(Force::zero, steps),
-            padded: filled(|| Fused(0.0), model.nq().max(model.nv()) + 1),
+            padded: filled(|| FusedF64(0.0), model.nq().max(model.nv()) + 1),
             world: World::new(size),
             rnea: rnea::Workspace::new(size),
             aba: aba::Workspace::new(size),
@@ -72,7 +72,7 @@ impl Scratch {
 
 /// Arguments of inverse or forward dynamics.
 #[derive(Clone, Copy)]
-pub(crate) struct Arguments<'a, S = Fused> {
+pub(crate) struct Arguments<'a, S = FusedF64> {
     pub q: &'a [S],
     pub v: &'a [S],
     /// Acceleration or effort.
@@ -81,7 +81,7 @@ pub(crate) struct Arguments<'a, S = Fused> {
 }
 
 impl<'a, S> Arguments<'a, S> {
-    /// Returns the same numbers as `Fused`.
+    /// Returns the same numbers as `FusedF64`.
     ///
     /// # Safety
     /// `S` is `f64`.
@@ -127,9 +127,9 @@ pub(crate) fn load(plan: &Plan, to: &mut Scratch, from: Arguments<'_>) {
 
 /// Gathers a vector of the robot into lanes.
 #[inline(always)]
-fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]) {
+fn gather(sources: &[Source], padded: &mut [FusedF64], x: &[FusedF64], to: &mut [Four]) {
     padded[..x.len()].copy_from_slice(x);
-    padded[x.len()] = Fused(0.0);
+    padded[x.len()] = FusedF64(0.0);
     let padded = &padded[..=x.len()];
     for (Source { from: [i, j, k, l], ratio, offset }, to) in sources.iter().zip(to) {
         let number = |at: &usize| {
@@ -144,15 +144,15 @@ fn gather(sources: &[Source], padded: &mut [Fused], x: &[Fused], to: &mut [Four]
 
 /// Copies a vector in coordinates out of the lanes: the transpose of `gather`.
 #[inline(always)]
-pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [Fused]) {
+pub(crate) fn scatter(plan: &Plan, from: &[Four], to: &mut [FusedF64]) {
     let numbers = lanes(from);
     assert!(numbers.len() == LANES * plan.state.coordinates.len(), "lanes of another robot");
     for (to, &at) in to.iter_mut().zip(&plan.state.leaders) {
         debug_assert!(at < numbers.len());
         // SAFETY: the plan's indices locate its coordinates in the lanes, and the lanes hold all coordinates.
-        *to = Fused(unsafe { *numbers.get_unchecked(at) });
+        *to = FusedF64(unsafe { *numbers.get_unchecked(at) });
     }
     for &(k, at, ratio) in &plan.state.followers {
-        to[k] += Fused(numbers[at] * ratio);
+        to[k] += FusedF64(numbers[at] * ratio);
     }
 }

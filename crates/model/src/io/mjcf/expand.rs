@@ -81,19 +81,19 @@ struct Expansion<'f> {
 }
 
 impl Expansion<'_> {
-    /// Expands the content of an element at depth `level`. `class` is the class of the element around it.
-    fn inside(&mut self, element: &mut Element, class: Option<&str>, level: usize) -> Result<(), Error> {
+    /// Expands the content of an element at this depth. `class` is the class of the element around it.
+    fn inside(&mut self, element: &mut Element, class: Option<&str>, depth: usize) -> Result<(), Error> {
         let own = element.attribute("childclass").map(str::to_owned);
         let class = own.as_deref().or(class);
         for mut child in std::mem::take(&mut element.children) {
             match &*child.tag {
                 "replicate" => {
-                    self.inside(&mut child, class, level + 1)?;
-                    self.replicate(&child, &mut element.children, class, level)?;
+                    self.inside(&mut child, class, depth + 1)?;
+                    self.replicate(&child, &mut element.children, class, depth)?;
                 }
-                "attach" => self.attach(&child, &mut element.children, class, level)?,
+                "attach" => self.attach(&child, &mut element.children, class, depth)?,
                 "body" | "frame" => {
-                    self.inside(&mut child, class, level + 1)?;
+                    self.inside(&mut child, class, depth + 1)?;
                     self.remember(&child, class)?;
                     element.children.push(child);
                 }
@@ -131,7 +131,7 @@ impl Expansion<'_> {
         element: &Element,
         to: &mut Vec<Element>,
         class: Option<&str>,
-        level: usize,
+        depth: usize,
     ) -> Result<(), Error> {
         if let Some(child) = element.children.iter().find(|c| matches!(&*c.tag, "joint" | "freejoint" | "inertial")) {
             return Err(child.wrong("cannot be in a <replicate>"));
@@ -155,7 +155,7 @@ impl Expansion<'_> {
             frame.attributes.push(("pos".to_owned(), words(&position.to_array())));
             frame.attributes.push(("xyaxes".to_owned(), words(&[R.x.to_array(), R.y.to_array()].concat())));
             for child in &element.children {
-                let copy = copied(child, &rename, level + 1)?;
+                let copy = copied(child, &rename, depth + 1)?;
                 self.remember_inside(&copy, own)?;
                 frame.children.push(copy);
             }
@@ -184,7 +184,7 @@ impl Expansion<'_> {
         element: &Element,
         to: &mut Vec<Element>,
         class: Option<&str>,
-        level: usize,
+        depth: usize,
     ) -> Result<(), Error> {
         self.files.attachments += 1;
         if self.files.attachments > MAX_ATTACHMENTS {
@@ -201,7 +201,7 @@ impl Expansion<'_> {
             let none = || element.wrong(format!("{kind}: no {kind} before this element is named `{name}`"));
             let (found, around) = found.ok_or_else(none)?;
             self.files.amount.add_copies(&found, 1)?;
-            let copy = with_class(copied(&found, &rename, level)?, around.as_deref());
+            let copy = with_class(copied(&found, &rename, depth)?, around.as_deref());
             self.remember_inside(&copy, class)?;
             to.push(copy);
             let referring = self.sections.of(names(std::slice::from_ref(&found)));
@@ -224,7 +224,7 @@ impl Expansion<'_> {
         };
         for &(part, around) in &found {
             self.files.amount.add_copies(part, 1)?;
-            copy.children.push(with_class(copied(part, &rename, level + 1)?, around));
+            copy.children.push(with_class(copied(part, &rename, depth + 1)?, around));
         }
         to.push(copy);
         let all = found.iter().flat_map(|(part, _)| names(std::slice::from_ref(*part))).collect();
@@ -303,13 +303,13 @@ fn names(elements: &[Element]) -> Vec<Name> {
     names
 }
 
-/// Returns a copy of an element for depth `level`. Names and references to names are changed by `rename`.
-fn copied(element: &Element, rename: &dyn Fn(&str) -> String, level: usize) -> Result<Element, Error> {
-    if level > MAX_DEPTH {
-        let what = format!("stands at level {level}, copies counted: at most {MAX_DEPTH} are allowed");
+/// Returns a copy of an element for this depth. Names and references to names are changed by `rename`.
+fn copied(element: &Element, rename: &dyn Fn(&str) -> String, depth: usize) -> Result<Element, Error> {
+    if depth > MAX_DEPTH {
+        let what = format!("is at depth {depth}, copies counted: at most {MAX_DEPTH} are allowed");
         return Err(element.wrong(what));
     }
-    let children = element.children.iter().map(|child| copied(child, rename, level + 1)).collect::<Result<_, _>>()?;
+    let children = element.children.iter().map(|child| copied(child, rename, depth + 1)).collect::<Result<_, _>>()?;
     let renamed = |(name, value): &(String, String)| {
         let refers = kind_of(name).is_some() && value != "world";
         let is_name = (name == "name" || refers) && !value.is_empty();

@@ -124,16 +124,16 @@ struct Includes<'a> {
 }
 
 impl Includes<'_> {
-    /// Replaces all `<include>` elements inside an element. The element is at depth `level`, and its file is in
+    /// Replaces all `<include>` elements inside an element. The element is at this depth, and its file is in
     /// `folder`.
-    fn resolve(&mut self, element: &mut Element, folder: Option<&Path>, level: usize) -> Result<(), Error> {
-        if level > MAX_DEPTH {
-            let what = format!("stands at level {level}, files included: at most {MAX_DEPTH} are allowed");
+    fn resolve(&mut self, element: &mut Element, folder: Option<&Path>, depth: usize) -> Result<(), Error> {
+        if depth > MAX_DEPTH {
+            let what = format!("is at depth {depth}, files included: at most {MAX_DEPTH} are allowed");
             return Err(element.wrong(what));
         }
         for mut child in std::mem::take(&mut element.children) {
             if child.tag != "include" {
-                self.resolve(&mut child, folder, level + 1)?;
+                self.resolve(&mut child, folder, depth + 1)?;
                 element.children.push(child);
                 continue;
             }
@@ -151,7 +151,7 @@ impl Includes<'_> {
             let mut included = Element::parse(&text, &path.display().to_string(), self.amount)?;
             self.warnings.extend(included.outside());
             // The children of the included file replace the `<include>` element.
-            self.resolve(&mut included, Some(path.parent().unwrap_or(Path::new(""))), level)?;
+            self.resolve(&mut included, Some(path.parent().unwrap_or(Path::new(""))), depth)?;
             element.children.append(&mut included.children);
         }
         Ok(())

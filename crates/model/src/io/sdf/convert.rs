@@ -1,4 +1,4 @@
-//! Conversion of older SDF files to the newest version, by the rules of the format's own library. All later stages of
+//! Conversion of older SDF files to the newest version, by the rules of the format's own library. All later steps of
 //! the reader handle only the newest version.
 
 use super::values::flag;

@@ -39,13 +39,13 @@ impl<'o> Includes<'o> {
         Self { amount, known, packages, open: Vec::new(), count: 0, warnings: Vec::new(), missing: None }
     }
 
-    /// Reads a file and all files that it includes. The root element of the file is at depth `level`.
-    pub(super) fn file(&mut self, path: &Path, level: usize) -> Result<Element, Error> {
+    /// Reads a file and all files that it includes. The root element of the file is at this depth.
+    pub(super) fn file(&mut self, path: &Path, depth: usize) -> Result<Element, Error> {
         let text = self.amount.read(path)?;
         let root = Element::parse(&text, &path.display().to_string(), &mut self.amount)?;
         self.open.push(path.canonicalize().unwrap_or_else(|_| path.to_owned()));
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let root = self.expand(root, Some(folder), level)?;
+        let root = self.expand(root, Some(folder), depth)?;
         self.open.pop();
         Ok(root)
     }
@@ -56,12 +56,12 @@ impl<'o> Includes<'o> {
         self.expand(root, None, 1)
     }
 
-    fn expand(&mut self, mut root: Element, folder: Option<&Path>, level: usize) -> Result<Element, Error> {
+    fn expand(&mut self, mut root: Element, folder: Option<&Path>, depth: usize) -> Result<Element, Error> {
         convert(&mut root)?;
         self.known.check(&root, LEFT_OUT, &mut self.warnings);
         self.check_collisions(&root);
         tidy(&mut root, &mut self.warnings);
-        self.children(&mut root, folder, level)?;
+        self.children(&mut root, folder, depth)?;
         Ok(root)
     }
 
@@ -83,15 +83,15 @@ impl<'o> Includes<'o> {
         }
     }
 
-    /// Replaces the includes inside an element at depth `level` by the included models.
-    fn children(&mut self, element: &mut Element, folder: Option<&Path>, level: usize) -> Result<(), Error> {
-        if level > MAX_DEPTH {
-            let what = format!("stands at level {level}, files included: at most {MAX_DEPTH} are allowed");
+    /// Replaces the includes inside an element at this depth by the included models.
+    fn children(&mut self, element: &mut Element, folder: Option<&Path>, depth: usize) -> Result<(), Error> {
+        if depth > MAX_DEPTH {
+            let what = format!("is at depth {depth}, files included: at most {MAX_DEPTH} are allowed");
             return Err(element.wrong(what));
         }
         for mut child in std::mem::take(&mut element.children) {
             match &*child.tag {
-                "include" => match self.include(&mut child, folder, level + 1) {
+                "include" => match self.include(&mut child, folder, depth + 1) {
                     Ok(model) => element.children.extend(model),
                     // A world is usable without included models such as sun and ground.
                     Err(Fault::Missing(what)) if element.tag != "model" => {
@@ -102,7 +102,7 @@ impl<'o> Includes<'o> {
                     Err(Fault::Other(error)) => return Err(error),
                 },
                 "world" | "model" => {
-                    self.children(&mut child, folder, level + 1)?;
+                    self.children(&mut child, folder, depth + 1)?;
                     element.children.push(child);
                 }
                 _ => element.children.push(child),
@@ -117,7 +117,7 @@ impl<'o> Includes<'o> {
         &mut self,
         include: &mut Element,
         folder: Option<&Path>,
-        level: usize,
+        depth: usize,
     ) -> Result<Option<Element>, Fault> {
         let wrong = |what: String| Fault::Other(include.wrong(what));
         self.count += 1;
@@ -134,7 +134,7 @@ impl<'o> Includes<'o> {
         if self.open.contains(&path.canonicalize().unwrap_or_else(|_| path.clone())) {
             return Err(wrong(format!("{} includes itself", path.display())));
         }
-        let mut root = self.file(&path, level)?;
+        let mut root = self.file(&path, depth)?;
         if let Some(second) = root.all("model").nth(1) {
             return Err(wrong(format!("expected one model in {}, found a second: {}", path.display(), second.label())));
         }

@@ -55,8 +55,8 @@ pub(super) fn parse(text: &str, file: &str) -> Result<Element, Error> {
         is_damaged: text.contains(INVALID),
     };
     while parser.step()? {}
-    if let Some((first, levels)) = parser.too_deep {
-        let what = format!("elements are nested {levels} levels deep, at most {MAX_DEPTH} are allowed");
+    if let Some((first, depth)) = parser.too_deep {
+        let what = format!("elements are nested {depth} deep, at most {MAX_DEPTH} are allowed");
         return Err(first.wrong(what));
     }
     match (parser.tags.last(), parser.root.take()) {
@@ -152,11 +152,11 @@ impl<'a> Parser<'a> {
             return Err(element.wrong(format!("belongs to xacro: {EXPAND}")));
         }
         self.tags.push((name, line));
-        let levels = self.tags.len();
-        if levels <= MAX_DEPTH {
+        let depth = self.tags.len();
+        if depth <= MAX_DEPTH {
             self.open.push(element);
         } else {
-            let deepest = self.too_deep.as_ref().map_or(0, |(_, deepest)| *deepest).max(levels);
+            let deepest = self.too_deep.as_ref().map_or(0, |(_, deepest)| *deepest).max(depth);
             self.too_deep = Some((self.too_deep.take().map_or(element, |(first, _)| first), deepest));
         }
         if is_empty { self.close(name) } else { Ok(()) }

@@ -8,11 +8,11 @@
 //! M_j δa − J_jᵀ δf + r_v δv + r_q δq = δu        the joints               → δu
 //! ```
 //!
-//! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those that
-//! it may best do without. A contact's rows prefer joints that move no other contact; where these are close to singular
-//! (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are redundant is there
-//! no pivot, and the knot stays explicit. What the limbs in contact do, and then the base, is mostly solved before, for several
-//! knots side by side: see [`limb_elimination`](super::limb_elimination).
+//! Each of the first two groups of rows is solved for one of its unknowns (Gauss and Jordan), the largest among those
+//! that it may best do without. A contact's rows prefer joints that move no other contact; where these are close to
+//! singular (a straight knee) any acceleration will do. Rows of the base prefer forces. Only where contacts are
+//! redundant is there no pivot, and the knot stays explicit. What the limbs in contact do, and then the base, is mostly
+//! solved before, for several knots side by side: see [`limb_elimination`](super::limb_elimination).
 #![allow(non_snake_case)] // J, M, T, U, D
 
 use crate::lq::InverseDynamicsForm;
@@ -36,7 +36,7 @@ pub(crate) struct Tableau {
     pub rows: usize,
 }
 
-condyle_spatial::alike!(Tableau);
+condyle_spatial::same_layout!(Tableau);
 
 impl Tableau {
     /// The distance from one row to the next.
@@ -112,7 +112,8 @@ impl KktElimination {
         elimination
     }
 
-    /// What is solved before, from now on: see [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
+    /// What is solved before, from now on: see
+    /// [`LimbElimination::solved`](super::limb_elimination::LimbElimination::solved).
     pub(crate) fn follow(&mut self, before: Vec<Vec<(usize, usize)>>) {
         self.before = before;
     }
@@ -129,8 +130,8 @@ impl KktElimination {
         self.tableau.rows + self.passive
     }
 
-    /// Writes U and D for steps of Δt, from a tableau of which so many stages are solved; says whether there were pivots.
-    /// Overwrites the tableau.
+    /// Writes U and D for steps of Δt, from a tableau of which so many stages are solved; says whether there were
+    /// pivots. Overwrites the tableau.
     pub(crate) fn run(&mut self, tableau: &mut [f64], stages: usize, dt: f64, form: &mut InverseDynamicsForm) -> bool {
         let mut done = false;
         at_level(Run { elimination: self, T: tableau, stages, dt, form, done: &mut done });

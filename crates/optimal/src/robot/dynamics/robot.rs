@@ -23,7 +23,7 @@ use condyle_dynamics::{
     integrate_jacobian_groups, neutral,
 };
 use condyle_spatial::Scalar;
-use condyle_spatial::block::{Real, Witness};
+use condyle_spatial::block::{Real, SimdToken};
 use core::ops::Range;
 use nalgebra::DMatrix;
 use std::sync::Arc;
@@ -33,10 +33,10 @@ struct Gate;
 
 // SAFETY: vectors are used by the kernels of `condyle_dynamics`, and by what enters through their door.
 #[allow(unsafe_code)]
-unsafe impl Witness for Gate {}
+unsafe impl SimdToken for Gate {}
 
-type Short = <f64 as Real>::Short<Gate>;
-type Long = <f64 as Real>::Long<Gate>;
+type Short = <f64 as Real>::Narrow<Gate>;
+type Long = <f64 as Real>::Wide<Gate>;
 
 /// So many postures are tried to find one that is not singular.
 const POSTURES: usize = 8;
@@ -83,8 +83,8 @@ pub(crate) struct Work {
     da_du: Vec<f64>,
 }
 
-/// The dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for derivatives
-/// they are not: too rarely used to stay in the caches.
+/// The dynamics of as many knots as this processor has lanes. Few trials take few lanes, which are faster; for
+/// derivatives they are not: too rarely used to stay in the caches.
 #[derive(Debug)]
 struct VectorBatches {
     short: KnotBatch<Short>,
@@ -200,8 +200,9 @@ impl RobotDynamics {
     /// A robot with some drives whose accelerations obey a law.
     ///
     /// # Errors
-    /// [`Error::Contact`] for contacts that do not fit, [`Error::Actuation`] for drives of another robot, [`Error::Cost`]
-    /// for a term that does not fit, [`Error::Actuation`] for a robot of which forward dynamics has no solution.
+    /// [`Error::Contact`] for contacts that do not fit, [`Error::Actuation`] for drives of another robot,
+    /// [`Error::Cost`] for a term that does not fit, [`Error::Actuation`] for a robot of which forward dynamics has no
+    /// solution.
     pub(crate) fn new(
         model: Arc<Model>,
         actuation: Actuation,
@@ -379,8 +380,8 @@ impl RobotDynamics {
         }
     }
 
-    /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺ g(q); and
-    /// where accelerations are controls, none of these.
+    /// The smallest controls, and forces of contacts, that come nearest to holding the robot still: (u, λ) = [S Jᵀ]⁺
+    /// g(q); and where accelerations are controls, none of these.
     #[track_caller]
     pub(crate) fn hold(&mut self, x: &[f64]) -> Vec<f64> {
         let (nq, nv) = (self.model.nq(), self.model.nv());

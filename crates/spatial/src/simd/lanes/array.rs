@@ -4,12 +4,12 @@
 use super::{Element, Lanes, Register};
 use crate::scalar::number::Number;
 use crate::simd::kernel::Kernel;
-use crate::simd::pack::Witness;
+use crate::simd::pack::SimdToken;
 
 /// Widest vector of `f64`.
-pub(crate) type LongF64 = Lanes<f64, 4>;
+pub(crate) type WideF64 = Lanes<f64, 4>;
 /// Widest vector of `f32`.
-pub(crate) type LongF32 = Lanes<f32, 8>;
+pub(crate) type WideF32 = Lanes<f32, 8>;
 impl Element<4> for f64 {
     type Register = [Self; 4];
 }
@@ -64,7 +64,7 @@ impl<T: Number, const N: usize> Register<T, N> for [T; N] {
 
 /// Functions that move numbers between the lanes of a vector of four.
 pub mod moves {
-    use super::{Lanes, Witness};
+    use super::{Lanes, SimdToken};
 
     /// Assignment of source lanes to target lanes. A target lane without a source becomes 0.
     #[derive(Clone, Copy, Debug)]
@@ -85,7 +85,7 @@ pub mod moves {
 
         /// Returns the numbers in their new lanes.
         #[inline(always)]
-        pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+        pub fn apply<W: SimdToken>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             let [a, b, c, d] = x.0;
             let numbers = [a, b, c, d, 0.0];
             Lanes(self.from.map(|k| numbers[k]))
@@ -94,7 +94,7 @@ pub mod moves {
 
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
-    pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+    pub fn sum<W: SimdToken>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         let [a, b, c, d] = x.0;
         Lanes([(a + c) + (b + d); 4])
     }

@@ -1,12 +1,12 @@
 //! SIMD lanes: several numbers side by side in vector registers.
 //!
 //! [`Lanes<f64, 4>`](Lanes) and `Lanes<f32, 8>` need AVX2 with FMA, NEON, or SIMD128. With NEON and SIMD128, each
-//! vector uses two registers. `Lanes<f64, 8>` and `Lanes<f32, 16>` need AVX-512. [`Fused`](super::Fused) is a single
-//! `f64` with fused products and sums.
+//! vector uses two registers. `Lanes<f64, 8>` and `Lanes<f32, 16>` need AVX-512. [`FusedF64`](super::FusedF64) is a
+//! single `f64` with fused products and sums.
 //!
 //! Use these types only in code that was entered through a function compiled for their
 //! [`Level`](crate::simd::level::Level). In other code, each operation would be a function call, and an illegal
-//! instruction on a processor without this level. So only a [`Witness`](crate::simd::pack::Witness) can name these
+//! instruction on a processor without this level. So only a [`SimdToken`](crate::simd::pack::SimdToken) can name these
 //! types.
 //!
 //! Every operation treats each lane separately. The content of one lane, even NaN, never affects another lane.
@@ -22,7 +22,7 @@ use crate::simd::level::VECTORS;
 use core::fmt;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 pub use processor::moves;
-pub(crate) use processor::{LongF32, LongF64};
+pub(crate) use processor::{WideF32, WideF64};
 
 #[cfg_attr(target_arch = "x86_64", path = "x86.rs")]
 #[cfg_attr(target_arch = "aarch64", path = "neon.rs")]
@@ -209,14 +209,14 @@ impl<T: Element<N>, const N: usize> Lanes<T, N> {
 }
 
 /// Second type to which the constant `[T; N]` can be converted. Without it, type inference would select the lane type,
-/// which only a [`Witness`](crate::simd::pack::Witness) may name.
+/// which only a [`SimdToken`](crate::simd::pack::SimdToken) may name.
 #[derive(Clone, Copy)]
-pub struct Unused<T, const N: usize>([T; N]);
+pub struct NotALane<T, const N: usize>([T; N]);
 
 #[doc(hidden)]
-impl<T: Number, const N: usize> Constant<Unused<T, N>> for [T; N] {
-    fn lift(self) -> Unused<T, N> {
-        Unused(self)
+impl<T: Number, const N: usize> Constant<NotALane<T, N>> for [T; N] {
+    fn lift(self) -> NotALane<T, N> {
+        NotALane(self)
     }
     fn of(x: f64) -> Self {
         [T::splat(x); N]

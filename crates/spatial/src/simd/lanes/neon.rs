@@ -2,14 +2,14 @@
 //! AVX2. So the source code and the assignment of limbs to lanes are the same for both.
 
 use super::{Element, Lanes, Register, instructions};
-use crate::simd::kernel::{Kernel, short};
-use crate::simd::pack::Witness;
+use crate::simd::kernel::{Kernel, narrow};
+use crate::simd::pack::SimdToken;
 use core::arch::aarch64::*;
 
 /// Widest vector of `f64`.
-pub(crate) type LongF64 = Lanes<f64, 4>;
+pub(crate) type WideF64 = Lanes<f64, 4>;
 /// Widest vector of `f32`.
-pub(crate) type LongF32 = Lanes<f32, 8>;
+pub(crate) type WideF32 = Lanes<f32, 8>;
 
 /// Implements `Register` for a pair of registers. A mask is two vectors: all bits of a lane are 1 if the mask holds in
 /// this lane, otherwise 0.
@@ -28,7 +28,7 @@ macro_rules! pair {
             type Mask = $mask;
 
             instructions! {
-                fn enter(kernel: impl Kernel) { short(kernel) }
+                fn enter(kernel: impl Kernel) { narrow(kernel) }
                 fn load(x: [$float; $n]) -> Self { $pair($load(x.as_ptr()), $load(x[$n / 2..].as_ptr())) }
                 fn store(a: Self) -> [$float; $n] {{
                     let mut x = [0.0; $n];
@@ -108,7 +108,7 @@ pub mod moves {
 
         /// Returns the numbers in their new lanes.
         #[inline(always)]
-        pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+        pub fn apply<W: SimdToken>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             // SAFETY: a vector of this kind exists, so the processor has the level. Two rows of the array have 16
             // bytes.
             unsafe {
@@ -122,7 +122,7 @@ pub mod moves {
 
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
-    pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+    pub fn sum<W: SimdToken>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         // SAFETY: a vector of this kind exists, so the processor has the level.
         unsafe {
             let pairs = vaddq_f64(x.0.0, x.0.1);

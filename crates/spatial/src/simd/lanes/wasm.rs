@@ -2,14 +2,14 @@
 //! rounds the product before the sum, for lanes and for single numbers.
 
 use super::{Element, Lanes, Register, instructions};
-use crate::simd::kernel::{Kernel, short};
-use crate::simd::pack::Witness;
+use crate::simd::kernel::{Kernel, narrow};
+use crate::simd::pack::SimdToken;
 use core::arch::wasm32::*;
 
 /// Widest vector of `f64`.
-pub(crate) type LongF64 = Lanes<f64, 4>;
+pub(crate) type WideF64 = Lanes<f64, 4>;
 /// Widest vector of `f32`.
-pub(crate) type LongF32 = Lanes<f32, 8>;
+pub(crate) type WideF32 = Lanes<f32, 8>;
 
 /// Mask of two registers: all bits of a lane are 1 if the mask holds in this lane, otherwise 0.
 #[derive(Clone, Copy)]
@@ -32,7 +32,7 @@ macro_rules! pair {
             type Mask = Mask;
 
             instructions! {
-                fn enter(kernel: impl Kernel) { short(kernel) }
+                fn enter(kernel: impl Kernel) { narrow(kernel) }
                 fn load(x: [$float; $n]) -> Self {
                     $pair(v128_load(x.as_ptr().cast()), v128_load(x[$n / 2..].as_ptr().cast()))
                 }
@@ -109,7 +109,7 @@ pub mod moves {
 
         /// Returns the numbers in their new lanes.
         #[inline(always)]
-        pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+        pub fn apply<W: SimdToken>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             let [first, second] = &self.from;
             // SAFETY: two rows of an array have 16 bytes.
             let bytes = |rows: &[[u8; 8]]| unsafe { v128_load(rows[..2].as_ptr().cast()) };
@@ -122,7 +122,7 @@ pub mod moves {
 
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
-    pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+    pub fn sum<W: SimdToken>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         let pairs = f64x2_add(x.0.0, x.0.1);
         let sum = f64x2_add(pairs, i64x2_shuffle::<1, 0>(pairs, pairs));
         Lanes(Doubles(sum, sum))

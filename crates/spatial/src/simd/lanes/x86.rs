@@ -1,22 +1,22 @@
 //! Lanes with AVX2 and FMA, and with AVX-512.
 
 use super::{Element, Lanes, Register, instructions};
-use crate::simd::kernel::{Kernel, short};
+use crate::simd::kernel::{Kernel, narrow};
 use crate::simd::level::{Level, assert_supported};
-use crate::simd::pack::Witness;
+use crate::simd::pack::SimdToken;
 use core::arch::x86_64::*;
 
 /// Widest vector of `f64`.
-pub(crate) type LongF64 = Lanes<f64, 8>;
+pub(crate) type WideF64 = Lanes<f64, 8>;
 /// Widest vector of `f32`.
-pub(crate) type LongF32 = Lanes<f32, 16>;
+pub(crate) type WideF32 = Lanes<f32, 16>;
 
 /// Runs a kernel with the instructions of [`Level::Avx512`](crate::simd::level::Level::Avx512).
 ///
 /// # Panics
 /// If the processor does not have these instructions.
 #[inline(always)]
-fn long(kernel: impl Kernel) {
+fn wide(kernel: impl Kernel) {
     #[inline(never)]
     #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
     fn with_instructions(kernel: impl Kernel) {
@@ -74,7 +74,7 @@ macro_rules! avx2 {
         $($transpose:tt)*
     ) => {
         register! {
-            $register of $n $float, $register, short; $($alike)*;
+            $register of $n $float, $register, narrow; $($alike)*;
             fn lt(a: Self, b: Self) -> Self { $cmp::<_CMP_LT_OQ>(a, b) }
             fn select(mask: Self, a: Self, b: Self) -> Self { $blendv(b, a, mask) }
             fn and(a: Self, b: Self) -> Self { $and(a, b) }
@@ -93,7 +93,7 @@ macro_rules! avx512 {
         $($transpose:tt)*
     ) => {
         register! {
-            $register of $n $float, $mask, long; $($alike)*;
+            $register of $n $float, $mask, wide; $($alike)*;
             fn lt(a: Self, b: Self) -> $mask { $cmp::<_CMP_LT_OQ>(a, b) }
             fn select(mask: $mask, a: Self, b: Self) -> Self { $blend(mask, b, a) }
             fn and(a: $mask, b: $mask) -> $mask { a & b }
@@ -198,7 +198,7 @@ pub mod moves {
 
         /// Returns the numbers in their new lanes.
         #[inline(always)]
-        pub fn apply<W: Witness>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+        pub fn apply<W: SimdToken>(&self, x: Lanes<f64, 4>) -> Lanes<f64, 4> {
             // SAFETY: a vector of this kind exists, so the processor has the level. Each of the arrays has 32 bytes.
             unsafe {
                 let from = _mm256_loadu_si256(self.from.as_ptr().cast());
@@ -211,7 +211,7 @@ pub mod moves {
 
     /// Returns the sum of the numbers in every lane: (x₀ + x₂) + (x₁ + x₃).
     #[inline(always)]
-    pub fn sum<W: Witness>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
+    pub fn sum<W: SimdToken>(x: Lanes<f64, 4>) -> Lanes<f64, 4> {
         // SAFETY: a vector of this kind exists, so the processor has the level.
         unsafe {
             let pairs = _mm256_add_pd(x.0, _mm256_permute2f128_pd::<1>(x.0, x.0));

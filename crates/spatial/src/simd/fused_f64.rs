@@ -4,9 +4,9 @@
 use crate::scalar::Scalar;
 use crate::scalar::number::Number;
 use crate::scalar::operators::operators;
-use crate::simd::kernel::{Kernel, short};
+use crate::simd::kernel::{Kernel, narrow};
 use crate::simd::lanes::{Element, Lanes};
-use crate::simd::level::{Level, SHORT, VECTORS, assert_supported, level};
+use crate::simd::level::{Level, NARROW, VECTORS, assert_supported, level};
 use crate::simd::pack::Block;
 use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
@@ -14,17 +14,17 @@ use core::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 /// WebAssembly does not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(transparent)]
-pub struct Fused(pub f64);
+pub struct FusedF64(pub f64);
 
-impl Fused {
-    /// Reinterprets a slice of `f64` as a slice of `Fused`.
+impl FusedF64 {
+    /// Reinterprets a slice of `f64` as a slice of `FusedF64`.
     #[inline(always)]
     pub fn of(x: &[f64]) -> &[Self] {
-        // SAFETY: `Fused` is a transparent wrapper of `f64`.
+        // SAFETY: `FusedF64` is a transparent wrapper of `f64`.
         unsafe { core::slice::from_raw_parts(x.as_ptr().cast(), x.len()) }
     }
 
-    /// Reinterprets a mutable slice of `f64` as a slice of `Fused`.
+    /// Reinterprets a mutable slice of `f64` as a slice of `FusedF64`.
     #[inline(always)]
     pub fn of_mut(x: &mut [f64]) -> &mut [Self] {
         // SAFETY: as for `of`.
@@ -33,7 +33,7 @@ impl Fused {
 }
 
 #[doc(hidden)]
-impl Block for Fused {
+impl Block for FusedF64 {
     type Number = f64;
     #[inline(always)]
     fn load(from: &[f64]) -> Self {
@@ -49,7 +49,7 @@ impl Block for Fused {
 
 macro_rules! fused_operators {
     ($($trait:ident $name:ident),*) => {$(
-        impl $trait for Fused {
+        impl $trait for FusedF64 {
             type Output = Self;
             #[inline(always)]
             fn $name(self, o: Self) -> Self {
@@ -59,10 +59,10 @@ macro_rules! fused_operators {
     )*};
 }
 fused_operators!(Add add, Sub sub, Mul mul, Div div);
-operators!(Fused);
+operators!(FusedF64);
 
 #[doc(hidden)]
-impl Neg for Fused {
+impl Neg for FusedF64 {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -71,7 +71,7 @@ impl Neg for Fused {
 }
 
 #[doc(hidden)]
-impl Scalar for Fused {
+impl Scalar for FusedF64 {
     type Mask = bool;
     const LANES: usize = 1;
     const COMPILED: bool = VECTORS;
@@ -79,7 +79,7 @@ impl Scalar for Fused {
     #[inline(always)]
     fn enter(kernel: impl Kernel) {
         assert!(level() > Level::Baseline, "there are no lanes at the baseline");
-        short(kernel);
+        narrow(kernel);
     }
     #[inline(always)]
     fn splat(x: f64) -> Self {
@@ -109,10 +109,10 @@ impl Scalar for Fused {
         let (sin, cos) = self.0.far();
         (Self(sin), Self(cos))
     }
-    /// Uses two vectors of four numbers at a time. Code on `Fused` runs only at a SIMD level that has these vectors.
+    /// Uses two vectors of four numbers at a time. Code on `FusedF64` runs only at a SIMD level that has these vectors.
     #[inline(always)]
     fn sin_cos_of_all(angles: &mut [Self], cosines: &mut [Self]) {
-        assert_supported(SHORT);
+        assert_supported(NARROW);
         let (angles, others) = angles.as_chunks_mut::<8>();
         let (cosines, other_cosines) = cosines.as_chunks_mut::<8>();
         for (x, y) in angles.iter_mut().zip(cosines) {
@@ -159,13 +159,13 @@ where
 {
     /// Creates a vector from one number per lane.
     #[inline(always)]
-    pub fn from_fused(x: &[Fused; N]) -> Self {
-        // SAFETY: `Fused` is a transparent wrapper of `f64`.
+    pub fn from_fused(x: &[FusedF64; N]) -> Self {
+        // SAFETY: `FusedF64` is a transparent wrapper of `f64`.
         Self::from_array(unsafe { *core::ptr::from_ref(x).cast() })
     }
     /// Returns the number in each lane.
     #[inline(always)]
-    pub fn to_fused(self) -> [Fused; N] {
+    pub fn to_fused(self) -> [FusedF64; N] {
         let x = self.to_array();
         // SAFETY: as for `from_fused`.
         unsafe { *core::ptr::from_ref(&x).cast() }

@@ -14,9 +14,9 @@ use crate::cone_program::{
 use crate::least_squares::LeastSquares;
 #[cfg(feature = "clarabel")]
 use crate::lifted::Lifted;
-use crate::memory::Memory;
 use crate::numbers::Reader;
-use crate::settings::{Backend, Form, Settings};
+use crate::settings::{Backend, Formulation, Settings};
+use crate::warm_start::WarmStart;
 use condyle_linalg::max_abs;
 
 /// Amount by which bounds and cones are widened for later priorities: relative to 1 + |bound| for rows, in N for cones.
@@ -40,17 +40,17 @@ pub(crate) enum Given {
 }
 
 /// Solvers of all priorities, and their last solution.
-pub(crate) struct Levels {
+pub(crate) struct TaskHierarchy {
     solvers: Vec<Box<dyn Solver + Send + Sync>>,
     pub given: Vec<Given>,
     /// Last solution of each solver.
-    pub memories: Vec<Memory>,
+    pub warm_starts: Vec<WarmStart>,
     warm: bool,
     /// x of the last solution.
     pub x: Vec<f64>,
 }
 
-impl Levels {
+impl TaskHierarchy {
     /// Allocates memory for programs up to this size, whose first `dense` rows have few zeros, and for objectives with
     /// these numbers of rows.
     pub(crate) fn new(
@@ -59,15 +59,15 @@ impl Levels {
         rows: &[usize],
         settings: &Settings,
     ) -> Self {
-        let Settings { tolerance, max_iterations, time_limit, form, .. } = *settings;
-        let given = |(level, &objective): (usize, &usize)| match (form, settings.backend) {
+        let Settings { tolerance, max_iterations, time_limit, formulation, .. } = *settings;
+        let given = |(priority, &objective): (usize, &usize)| match (formulation, settings.backend) {
             // Equalities that keep the results of earlier priorities may depend on the equalities of contacts and base.
             // Only an elimination handles dependent equalities.
-            _ if level > 0 => Given::condensed(capacity, objective),
-            (Form::Condensed, _) => Given::condensed(capacity, objective),
+            _ if priority > 0 => Given::condensed(capacity, objective),
+            (Formulation::Condensed, _) => Given::condensed(capacity, objective),
             #[cfg(feature = "clarabel")]
-            (Form::Full, Backend::Clarabel) => Given::Lifted(Lifted::new(capacity, dense, objective)),
-            (Form::Full, Backend::InteriorPoint) => Given::Full(ConeProgram::new(capacity)),
+            (Formulation::Full, Backend::Clarabel) => Given::Lifted(Lifted::new(capacity, dense, objective)),
+            (Formulation::Full, Backend::InteriorPoint) => Given::Full(ConeProgram::new(capacity)),
         };
         let given: Vec<Given> = rows.iter().enumerate().map(given).collect();
         let solver_settings = SolverSettings { tolerance, max_iterations, time_limit };
@@ -80,8 +80,8 @@ impl Levels {
             }
         };
         let solvers = given.iter().map(solver).collect();
-        let memories = rows.iter().map(|_| Memory::new(capacity)).collect();
-        Self { solvers, given, memories, warm: settings.warm_start, x: vec![0.0; capacity.unknowns] }
+        let warm_starts = rows.iter().map(|_| WarmStart::new(capacity)).collect();
+        Self { solvers, given, warm_starts, warm: settings.warm_start, x: vec![0.0; capacity.unknowns] }
     }
 
     /// Minimises one objective after the other subject to a program, and returns the number of minimised objectives. x
@@ -95,8 +95,8 @@ impl Levels {
         let (n, equalities) = (program.size.unknowns, program.size.equalities);
         let mut all = Outcome { iterations: 0, warm: true, reduced: false, stopped: None };
         let mut done = 0;
-        for (level, objective) in objectives.iter().enumerate() {
-            let outcome = self.minimise(program, known, objective, level);
+        for (priority, objective) in objectives.iter().enumerate() {
+            let outcome = self.minimise(program, known, objective, priority);
             all.iterations += outcome.iterations;
             all.warm &= outcome.warm;
             all.reduced |= outcome.reduced;
@@ -105,7 +105,7 @@ impl Levels {
                 break;
             }
             done += 1;
-            if level + 1 < objectives.len() {
+            if priority + 1 < objectives.len() {
                 hold(program, objective, &self.x[..n]);
             }
         }
@@ -132,25 +132,31 @@ impl Levels {
         &*self.solvers[0]
     }
 
-    fn minimise(&mut self, program: &ConeProgram, known: Known<'_>, objective: &LeastSquares, level: usize) -> Outcome {
-        let given = &mut self.given[level];
+    fn minimise(
+        &mut self,
+        program: &ConeProgram,
+        known: Known<'_>,
+        objective: &LeastSquares,
+        priority: usize,
+    ) -> Outcome {
+        let given = &mut self.given[priority];
         given.write(program, known, objective);
-        if level > 0 {
+        if priority > 0 {
             given.widen(program);
         }
-        self.solve_given(known, level)
+        self.solve_given(known, priority)
     }
 
     /// Solves the program of one priority, starting from the last solution.
-    fn solve_given(&mut self, known: Known<'_>, level: usize) -> Outcome {
-        let Self { solvers, given, memories, x, warm } = self;
-        let (solver, given, memory) = (&mut solvers[level], &mut given[level], &mut memories[level]);
+    fn solve_given(&mut self, known: Known<'_>, priority: usize) -> Outcome {
+        let Self { solvers, given, warm_starts, x, warm } = self;
+        let (solver, given, warm_start) = (&mut solvers[priority], &mut given[priority], &mut warm_starts[priority]);
         let x = &mut x[..known.places.unknowns.len()];
         if given.program().size.unknowns == 0 {
             given.read(&[], x);
             return Outcome { iterations: 0, warm: true, reduced: false, stopped: None };
         }
-        let start = match memory.recall(known.places).filter(|_| *warm) {
+        let start = match warm_start.recall(known.places).filter(|_| *warm) {
             Some((last, multipliers)) => {
                 given.start_from(last, multipliers, &mut **solver);
                 Start::Warm
@@ -158,12 +164,12 @@ impl Levels {
             None => Start::Cold,
         };
         let outcome = solver.solve(given.program(), start);
-        if outcome.stopped.is_none() || level == 0 {
+        if outcome.stopped.is_none() || priority == 0 {
             given.read(solver.x(), x);
         }
         match outcome.stopped {
-            None => memory.keep(known.places, x, solver.multipliers()),
-            Some(_) => memory.forget(),
+            None => warm_start.keep(known.places, x, solver.multipliers()),
+            Some(_) => warm_start.forget(),
         }
         outcome
     }

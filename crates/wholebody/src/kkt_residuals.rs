@@ -10,7 +10,7 @@ use nalgebra::{DVector, DVectorView};
 /// solver's tolerance applies to numbers scaled to size one; here forces of 1000 N are compared with accelerations of 1
 /// m/s².
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Optimality {
+pub struct KktResiduals {
     /// Gradient P x + c − Aᵀ y − Gᵀ z − Fᵀ w, relative to the largest of its terms.
     pub stationarity: f64,
     /// Violation of the worst equality, bound or cone, relative to the norm of its row and to the unknowns.
@@ -21,7 +21,7 @@ pub struct Optimality {
     pub complementarity: f64,
 }
 
-impl Optimality {
+impl KktResiduals {
     /// Returns the largest of the errors.
     pub fn worst(&self) -> f64 {
         let Self { stationarity, primal, dual, complementarity } = *self;
@@ -48,17 +48,17 @@ impl WholeBodyController {
     /// let mut controller = WholeBodyController::new(&robot, &feet, &tasks, Settings::default())?;
     /// let references = controller.hold(&q)?;
     /// controller.step(&q, &[0.0; 18], &references).solved().unwrap();
-    /// assert!(controller.optimality(&q, &[0.0; 18], &references).worst() < 1e-6);
+    /// assert!(controller.kkt_residuals(&q, &[0.0; 18], &references).worst() < 1e-6);
     /// # Ok::<(), condyle_wholebody::Error>(())
     /// ```
     #[track_caller]
-    pub fn optimality(&mut self, q: &[f64], v: &[f64], references: &References) -> Optimality {
+    pub fn kkt_residuals(&mut self, q: &[f64], v: &[f64], references: &References) -> KktResiduals {
         let optimum = self.optimum();
         errors(&self.program(q, v, references), &optimum)
     }
 }
 
-fn errors(program: &Program, optimum: &Optimum) -> Optimality {
+fn errors(program: &Program, optimum: &Optimum) -> KktResiduals {
     let Optimum { x, rows: z, cones: w, .. } = optimum;
     let Program { P, c, A, b, G, lower, upper, F, h, cones } = program;
     // At the optimum, P x + c = Aᵀ y + Gᵀ z + Fᵀ w for some y.
@@ -94,5 +94,5 @@ fn errors(program: &Program, optimum: &Optimum) -> Optimality {
         first += dim;
     }
     let objective = 0.5 * x.dot(&(P * x)) + c.dot(x).abs();
-    Optimality { stationarity, primal, dual, complementarity: gap.abs() / (1.0 + objective) }
+    KktResiduals { stationarity, primal, dual, complementarity: gap.abs() / (1.0 + objective) }
 }

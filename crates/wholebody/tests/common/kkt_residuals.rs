@@ -1,9 +1,9 @@
 //! Optimality conditions at a step.
 #![allow(dead_code, unreachable_pub)] // each test file uses only some of the functions
 
-use condyle_wholebody::{Optimality, References, WholeBodyController};
+use condyle_wholebody::{KktResiduals, References, WholeBodyController};
 
-/// Tolerance of the first three errors in [`Optimality`]; its documentation explains the number.
+/// Tolerance of the first three errors in [`KktResiduals`]; its documentation explains the number.
 pub const OPTIMALITY: f64 = 1e-7;
 const GAP: f64 = 1e-6;
 
@@ -18,8 +18,8 @@ pub fn check_optimality(
     references: &References,
     place: &str,
 ) {
-    let errors = controller.optimality(q, v, references);
-    let Optimality { stationarity, primal, dual, complementarity } = errors;
+    let errors = controller.kkt_residuals(q, v, references);
+    let KktResiduals { stationarity, primal, dual, complementarity } = errors;
     let good = [stationarity, primal, dual].into_iter().all(|e| e < OPTIMALITY) && complementarity < GAP;
     assert!(good, "{place}: {errors:?}");
 }

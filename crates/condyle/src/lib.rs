@@ -105,7 +105,7 @@ pub mod configuration {
 pub mod constraints {
     pub use condyle_dynamics::{
         Constrained, ConstrainedDerivatives, ConstrainedEquations, ConstrainedInverse, ConstrainedInverseDerivatives,
-        ConstraintKind, Impulse, ImpulseDerivatives, Proximal, Target, constrained_dynamics_equations,
+        ConstraintKind, Impulse, ImpulseDerivatives, ProximalSettings, Target, constrained_dynamics_equations,
         constrained_inverse_dynamics, constrained_inverse_dynamics_derivatives, impulse_dynamics,
         impulse_dynamics_derivatives,
     };
@@ -163,20 +163,20 @@ pub mod tree {
 /// Rust code blocks of the README and of the book, run as doctests.
 #[cfg(doctest)]
 mod book {
-    #[doc = include_str!("../README.md")]
+    #[doc = include_str!("../../../README.md")]
     mod readme {}
-    #[doc = include_str!("../docs/inspect.md")]
+    #[doc = include_str!("../../../docs/inspect.md")]
     mod inspect {}
-    #[doc = include_str!("../docs/simulate.md")]
+    #[doc = include_str!("../../../docs/simulate.md")]
     mod simulate {}
-    #[doc = include_str!("../docs/differentiate.md")]
+    #[doc = include_str!("../../../docs/differentiate.md")]
     mod differentiate {}
-    #[doc = include_str!("../docs/deploy.md")]
+    #[doc = include_str!("../../../docs/deploy.md")]
     mod deploy {}
-    #[doc = include_str!("../docs/lanes.md")]
+    #[doc = include_str!("../../../docs/lanes.md")]
     mod lanes {}
-    #[doc = include_str!("../docs/derivatives.md")]
+    #[doc = include_str!("../../../docs/derivatives.md")]
     mod derivatives {}
-    #[doc = include_str!("../docs/conversions.md")]
+    #[doc = include_str!("../../../docs/conversions.md")]
     mod conversions {}
 }

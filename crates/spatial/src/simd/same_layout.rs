@@ -1,4 +1,4 @@
-//! Types with the same memory layout for two scalars: `f64`, and [`Fused`], which is a transparent wrapper of `f64`.
+//! Types with the same memory layout for two scalars: `f64`, and [`FusedF64`], which is a transparent wrapper of `f64`.
 #![allow(unsafe_code)]
 
 use crate::algebra::inertia::{ArticulatedInertia, Inertia};
@@ -6,19 +6,19 @@ use crate::algebra::motion::{Force, Motion};
 use crate::algebra::quaternion::Quaternion;
 use crate::algebra::se3::Se3;
 use crate::algebra::vector::{Mat3, Sym3, Vec3};
-use crate::simd::fused::Fused;
+use crate::simd::fused_f64::FusedF64;
 use core::mem::ManuallyDrop;
 
 /// Type whose values in memory may be read and written as values of type `B`.
 ///
 /// Kernels take only arguments of such types. The compiler accepts an [`Array`](crate::storage::Array) in a workspace.
-/// It rejects a `Vec<S>`, whose layout is not guaranteed. The macro [`alike!`](crate::alike) implements this trait for
-/// a struct.
+/// It rejects a `Vec<S>`, whose layout is not guaranteed. The macro [`same_layout!`](crate::same_layout) implements
+/// this trait for a struct.
 ///
 /// # Safety
 /// Both types have the same size, the same alignment, and fields at the same offsets. The fields at each offset have
 /// the same type or are alike. So a valid value of one type is a valid value of the other.
-pub unsafe trait Alike<B>: Rename<B> {}
+pub unsafe trait SameLayout<B>: Rename<B> {}
 
 /// Value that can be converted to a `B` without changing its bits. Arguments of kernels have this trait.
 pub trait Rename<B> {
@@ -29,7 +29,7 @@ pub trait Rename<B> {
 /// Reinterprets a value as another type.
 ///
 /// # Safety
-/// `A` and `B` are the same type, as the generic caller has checked; or they are [`Alike`].
+/// `A` and `B` are the same type, as the generic caller has checked; or they are [`SameLayout`].
 #[inline(always)]
 pub unsafe fn same<A, B>(a: A) -> B {
     assert!(size_of::<A>() == size_of::<B>() && align_of::<A>() == align_of::<B>());
@@ -38,7 +38,7 @@ pub unsafe fn same<A, B>(a: A) -> B {
 }
 
 #[doc(hidden)]
-impl<'a, A: Alike<B>, B> Rename<&'a B> for &'a A {
+impl<'a, A: SameLayout<B>, B> Rename<&'a B> for &'a A {
     #[inline(always)]
     fn renamed(self) -> &'a B {
         // SAFETY: the value is a valid B as well.
@@ -47,7 +47,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a B> for &'a A {
 }
 
 #[doc(hidden)]
-impl<'a, A: Alike<B>, B> Rename<&'a mut B> for &'a mut A {
+impl<'a, A: SameLayout<B>, B> Rename<&'a mut B> for &'a mut A {
     #[inline(always)]
     fn renamed(self) -> &'a mut B {
         // SAFETY: the value is a valid B as well, and each B that is written through the reference is a valid A.
@@ -56,7 +56,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a mut B> for &'a mut A {
 }
 
 #[doc(hidden)]
-impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
+impl<'a, A: SameLayout<B>, B> Rename<&'a [B]> for &'a [A] {
     #[inline(always)]
     fn renamed(self) -> &'a [B] {
         // SAFETY: as for a reference to one value. The entries have the same size, and so the same distance.
@@ -65,7 +65,7 @@ impl<'a, A: Alike<B>, B> Rename<&'a [B]> for &'a [A] {
 }
 
 #[doc(hidden)]
-impl<'a, A: Alike<B>, B> Rename<&'a mut [B]> for &'a mut [A] {
+impl<'a, A: SameLayout<B>, B> Rename<&'a mut [B]> for &'a mut [A] {
     #[inline(always)]
     fn renamed(self) -> &'a mut [B] {
         // SAFETY: as for a reference to one value. The entries have the same size, and so the same distance.
@@ -91,34 +91,34 @@ impl<A: Rename<B>, B, const N: usize> Rename<[B; N]> for [A; N] {
 
 // SAFETY: an array stores its entries one after another, without gaps.
 #[doc(hidden)]
-unsafe impl<A: Alike<B>, B, const N: usize> Alike<[B; N]> for [A; N] {}
+unsafe impl<A: SameLayout<B>, B, const N: usize> SameLayout<[B; N]> for [A; N] {}
 
-// SAFETY: `Fused` is a transparent wrapper.
+// SAFETY: `FusedF64` is a transparent wrapper.
 #[doc(hidden)]
-unsafe impl Alike<Fused> for f64 {}
+unsafe impl SameLayout<FusedF64> for f64 {}
 
 #[doc(hidden)]
-impl Rename<Fused> for f64 {
+impl Rename<FusedF64> for f64 {
     #[inline(always)]
-    fn renamed(self) -> Fused {
-        Fused(self)
+    fn renamed(self) -> FusedF64 {
+        FusedF64(self)
     }
 }
 
-// SAFETY: `Fused` is a transparent wrapper.
+// SAFETY: `FusedF64` is a transparent wrapper.
 #[doc(hidden)]
-unsafe impl Alike<f64> for Fused {}
+unsafe impl SameLayout<f64> for FusedF64 {}
 
 #[doc(hidden)]
-impl Rename<f64> for Fused {
+impl Rename<f64> for FusedF64 {
     #[inline(always)]
     fn renamed(self) -> f64 {
         self.0
     }
 }
 
-/// Implements [`Alike`] for a struct over a scalar: it declares that the struct over `f64` is alike the struct over
-/// [`Fused`].
+/// Implements [`SameLayout`] for a struct over a scalar: it declares that the struct over `f64` is alike the struct
+/// over [`FusedF64`].
 ///
 /// Name first the fields that depend on the scalar and, after `same`, the other fields. The compiler checks three
 /// things: no field is missing, each field is alike or the same, and each field has the same offset in both structs.
@@ -127,37 +127,37 @@ impl Rename<f64> for Fused {
 /// A type that does not depend on a scalar is declared to be alike itself.
 ///
 /// ```
-/// use condyle_spatial::{Array, Motion, alike};
+/// use condyle_spatial::{Array, Motion, same_layout};
 /// #[repr(C)]
 /// struct Workspace<S> { v: Array<Motion<S>>, tau: Array<S>, order: Vec<usize> }
-/// alike!(Workspace { v, tau } same { order });
+/// same_layout!(Workspace { v, tau } same { order });
 /// ```
 ///
 /// A field with a different layout, or a missing field, does not compile:
 ///
 /// ```compile_fail,E0277
-/// # use condyle_spatial::{Array, alike};
+/// # use condyle_spatial::{Array, same_layout};
 /// #[repr(C)]
 /// struct Workspace<S> { tau: Vec<S> }
-/// alike!(Workspace { tau });
+/// same_layout!(Workspace { tau });
 /// ```
 ///
 /// ```compile_fail,E0027
-/// # use condyle_spatial::{Array, alike};
+/// # use condyle_spatial::{Array, same_layout};
 /// #[repr(C)]
 /// struct Workspace<S> { tau: Array<S>, order: Vec<usize> }
-/// alike!(Workspace { tau });
+/// same_layout!(Workspace { tau });
 /// ```
 #[macro_export]
 #[doc(hidden)]
-macro_rules! alike {
+macro_rules! same_layout {
     ($($type:ty),+ $(,)?) => {$(
         // SAFETY: both types are the same.
         #[doc(hidden)]
         #[allow(unsafe_code)]
-        unsafe impl $crate::simd::alike::Alike<$type> for $type {}
+        unsafe impl $crate::simd::same_layout::SameLayout<$type> for $type {}
         #[doc(hidden)]
-        impl $crate::simd::alike::Rename<$type> for $type {
+        impl $crate::simd::same_layout::Rename<$type> for $type {
             #[inline(always)]
             fn renamed(self) -> $type {
                 self
@@ -169,27 +169,27 @@ macro_rules! alike {
         // compile.
         #[doc(hidden)]
         #[allow(unsafe_code)]
-        unsafe impl $crate::simd::alike::Alike<$name<$crate::simd::Fused>> for $name<f64> {}
+        unsafe impl $crate::simd::same_layout::SameLayout<$name<$crate::simd::FusedF64>> for $name<f64> {}
         #[doc(hidden)]
-        impl $crate::simd::alike::Rename<$name<$crate::simd::Fused>> for $name<f64> {
+        impl $crate::simd::same_layout::Rename<$name<$crate::simd::FusedF64>> for $name<f64> {
             #[inline(always)]
-            fn renamed(self) -> $name<$crate::simd::Fused> {
+            fn renamed(self) -> $name<$crate::simd::FusedF64> {
                 // SAFETY: they are alike.
                 #[allow(unsafe_code)]
                 unsafe {
-                    $crate::simd::alike::same(self)
+                    $crate::simd::same_layout::same(self)
                 }
             }
         }
         const _: () = {
             type One = $name<f64>;
-            type Other = $name<$crate::simd::Fused>;
+            type Other = $name<$crate::simd::FusedF64>;
             #[allow(dead_code)]
             fn look(one: &One, other: &Other) {
-                fn alike<A: $crate::simd::alike::Alike<B>, B>(_: &A, _: &B) {}
+                fn check<A: $crate::simd::same_layout::SameLayout<B>, B>(_: &A, _: &B) {}
                 fn same<T>(_: &T, _: &T) {}
                 let $name { $($field: _,)* $($($same: _,)*)? } = one;
-                $(alike(&one.$field, &other.$field);)*
+                $(check(&one.$field, &other.$field);)*
                 $($(same(&one.$same, &other.$same);)*)?
             }
             assert!(size_of::<One>() == size_of::<Other>() && align_of::<One>() == align_of::<Other>());
@@ -199,13 +199,13 @@ macro_rules! alike {
     };
 }
 
-alike!(bool, usize, f64);
-alike!(Vec3 { x, y, z });
-alike!(Mat3 { x, y, z });
-alike!(Sym3 { xx, xy, yy, xz, yz, zz });
-alike!(Quaternion { vector, scalar });
-alike!(Motion { linear, angular });
-alike!(Force { linear, angular });
-alike!(Inertia { mass, mass_com, rotational });
-alike!(ArticulatedInertia { linear, coupling, rotational });
-alike!(Se3 { rotation, translation });
+same_layout!(bool, usize, f64);
+same_layout!(Vec3 { x, y, z });
+same_layout!(Mat3 { x, y, z });
+same_layout!(Sym3 { xx, xy, yy, xz, yz, zz });
+same_layout!(Quaternion { vector, scalar });
+same_layout!(Motion { linear, angular });
+same_layout!(Force { linear, angular });
+same_layout!(Inertia { mass, mass_com, rotational });
+same_layout!(ArticulatedInertia { linear, coupling, rotational });
+same_layout!(Se3 { rotation, translation });

@@ -36,7 +36,7 @@ impl Places {
 }
 
 /// The last solution with entries for all contacts, and a copy of the entries that the present program needs.
-pub(crate) struct Memory {
+pub(crate) struct WarmStart {
     /// Whether a solution is stored.
     pub known: bool,
     pub all: Point,
@@ -71,7 +71,7 @@ impl Point {
     }
 }
 
-impl Memory {
+impl WarmStart {
     pub(crate) fn new(capacity: Size) -> Self {
         Self { known: false, all: Point::new(capacity), asked: Point::new(capacity) }
     }

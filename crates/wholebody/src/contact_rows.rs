@@ -4,14 +4,14 @@
 use crate::cone_program::{ConeProgram, Size};
 use crate::contact::{FrictionContact, Geometry, Normal, norm};
 use crate::kinematics::FrameMotion;
-use crate::memory::Places;
 use crate::references::ContactTarget;
 use crate::settings::{Friction, Settings};
+use crate::warm_start::Places;
 use condyle_dynamics::{Force, Mat3, Motion, Quaternion, Vec3, lie};
 use nalgebra::DMatrix;
 
 /// A contact with its numbers. The rows are along the contact's axes (t₁, t₂, n), at its centre.
-pub(crate) struct ContactNumbers {
+pub(crate) struct ContactRows {
     pub description: FrictionContact,
     pub geometry: Geometry,
     /// Index of the contact's frame among the frames of the kinematics.
@@ -42,7 +42,7 @@ pub(crate) struct ContactNumbers {
     bounds: [f64; 2],
 }
 
-impl ContactNumbers {
+impl ContactRows {
     pub(crate) fn new(description: &FrictionContact, geometry: Geometry, frame: usize, nv: usize) -> Self {
         Self {
             description: description.clone(),

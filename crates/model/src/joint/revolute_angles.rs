@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 /// Joints that turn about z. They are collected once, so that passes need not inspect each joint.
 #[derive(Clone, Debug, Default)]
-pub struct Turns {
+pub struct RevoluteAngles {
     /// Runs of consecutive joints with consecutive angles in q. Each run has its first joint, the index of this joint's
     /// angle, and the number of joints.
     pub(super) runs: Vec<[usize; 3]>,
@@ -15,7 +15,7 @@ pub struct Turns {
     pub(super) circles: Vec<usize>,
 }
 
-impl Turns {
+impl RevoluteAngles {
     /// Collects the joints that turn about z. For each body, from body 1 on, `joints` yields its joint, the index of
     /// its position in q, and whether it follows another joint.
     pub(crate) fn of(joints: impl Iterator<Item = (Joint, usize, bool)>) -> Self {

@@ -1,6 +1,6 @@
 //! Mistakes in a URDF or in calls of a builder: each has its message, with line and element.
 
-use condyle_dynamics::{
+use condyle_model::{
     Error, Inertia, Joint, JointOptions, Mimic, Model, ModelBuilder, Se3, Sym3, UrdfOptions, Vec3, WORLD,
 };
 
@@ -63,7 +63,7 @@ fn documents() {
     expect("<!-- no robot -->\n<sdf/>", "<string>:2: <sdf>: the root element of a URDF is <robot>");
     expect("<robot/>", "<string>:1: <robot>: has no links");
     let nested = format!("<robot>\n<link name='a'>{}{}</link></robot>", "<a>".repeat(1 << 16), "</a>".repeat(1 << 16));
-    expect(&nested, "<string>:2: <a>: elements are nested 65538 levels deep, at most 256 are allowed");
+    expect(&nested, "<string>:2: <a>: elements are nested 65538 deep, at most 256 are allowed");
 }
 
 /// Unexpanded macros are an error: ignoring them would give another robot.
@@ -313,7 +313,7 @@ fn builders() {
     heavy.gravity(Vec3::new(0.0, nan, 0.0));
     assert_eq!(heavy.build().unwrap_err().to_string(), "gravity: (0, NaN, 0) m/s² is not finite");
 
-    let build = |change: fn(&mut ModelBuilder, condyle_dynamics::BodyId, condyle_dynamics::BodyId)| {
+    let build = |change: fn(&mut ModelBuilder, condyle_model::BodyId, condyle_model::BodyId)| {
         let mut builder = ModelBuilder::new("r");
         let a = builder.body("a", WORLD, hinge, Se3::identity(), ball);
         let b = builder.body("b", a, Joint::Spherical, Se3::identity(), ball);

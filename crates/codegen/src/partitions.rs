@@ -1,5 +1,5 @@
-//! Shares of a function. If one thread would need more registers than it has, several threads compute one state; each
-//! thread computes some of the results.
+//! Partitions of a function. If one thread would need more registers than it has, several threads compute one state;
+//! each thread computes some of the results.
 //!
 //! Results are divided by limbs. A limb is a subtree without forks that is attached to a body with several children, or
 //! to the world. The bodies that carry limbs are the trunk. In matrices a limb owns the columns of its coordinates, and
@@ -7,24 +7,24 @@
 //! a symmetric matrix, is computed once. It belongs to the limb of the first such index. Only if the trunk owns all of
 //! these indices does the value belong to the trunk.
 //!
-//! A share is a function like any other: the original function without the results of the other shares, and without the
-//! values that only these results need. So threads neither wait for each other nor share memory. Values that several
-//! shares need, such as values along the trunk, are computed by each of these shares. The size of this common part
-//! determines the value of a split. With few states, the GPU is not full, and a call takes as long as the largest
-//! share. With many states, a call takes as long as all shares together:
+//! A partition is a function like any other: the original function without the results of the other partitions, and
+//! without the values that only these results need. So threads neither wait for each other nor share memory. Values
+//! that several partitions need, such as values along the trunk, are computed by each of these partitions. The size of
+//! this common part determines the value of a split. With few states, the GPU is not full, and a call takes as long as
+//! the largest share. With many states, a call takes as long as all partitions together:
 //!
 //! ```text
-//! gain = whole / largest share        loss = sum of shares / whole        worth = gain / loss        in operations
+//! gain = whole / largest partition      loss = sum of partitions / whole      worth = gain / loss      in operations
 //! ```
 //!
-//! The search begins with a share for each limb, and repeatedly merges the two shares whose union gives the greatest
-//! worth. The best of all these splits is used; the last split is the whole function. For efforts and accelerations the
-//! whole function is best, since the trunk needs the values of all limbs. For derivatives, most limbs have their own
-//! share.
+//! The search begins with a partition for each limb, and repeatedly merges the two partitions whose union gives the
+//! greatest worth. The best of all these splits is used; the last split is the whole function. For efforts and
+//! accelerations the whole function is best, since the trunk needs the values of all limbs. For derivatives, most limbs
+//! have their own partition.
 //!
-//! All shares together cost more than the whole function. So a kernel contains both the whole function and its shares,
-//! and each launch selects one of these forms. States are split as long as all threads fit on the device at the same
-//! time.
+//! All partitions together cost more than the whole function. So a kernel contains both the whole function and its
+//! partitions, and each launch selects one of these forms. States are split as long as all threads fit on the device at
+//! the same time.
 
 use crate::function::{Function, is_needed, needed};
 use crate::graph::{Id, Node};
@@ -86,14 +86,14 @@ fn limbs(model: &Model) -> Vec<usize> {
 
 /// One or several limbs, and the operations that their results need.
 #[derive(Clone)]
-struct Share {
+struct Partition {
     limbs: Vec<usize>,
-    /// Whether each value is an operation of this share.
+    /// Whether each value is an operation of this partition.
     operations: Vec<bool>,
     count: usize,
 }
 
-impl Share {
+impl Partition {
     fn new(function: &Function, limb: usize) -> Self {
         let results = function.results.iter().zip(&function.limbs).filter(|&(_, &of)| of == limb);
         let is_needed = is_needed(&function.nodes, results.map(|(&id, _)| id));
@@ -117,55 +117,57 @@ fn is_operation(node: Node) -> bool {
     !matches!(node, Node::Constant(_) | Node::Input(_) | Node::Neg(_) | Node::Minus(_))
 }
 
-/// Returns the cost of a split: the size of the largest share times the sum of all sizes. The smallest cost is best.
+/// Returns the cost of a split: the size of the largest partition times the sum of all sizes. The smallest cost is
+/// best.
 fn cost(counts: impl Iterator<Item = usize> + Clone) -> u128 {
     counts.clone().max().unwrap_or(0) as u128 * counts.sum::<usize>() as u128
 }
 
-/// Returns the two shares whose union gives the smallest cost, and this cost.
-fn best_pair(shares: &[Share]) -> Option<(u128, [usize; 2])> {
-    let pairs = (0..shares.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
+/// Returns the two partitions whose union gives the smallest cost, and this cost.
+fn best_pair(partitions: &[Partition]) -> Option<(u128, [usize; 2])> {
+    let pairs = (0..partitions.len()).flat_map(|b| (0..b).map(move |a| [a, b]));
     let costs = pairs.map(|[a, b]| {
-        let others = shares.iter().enumerate().filter(move |&(k, _)| k != a && k != b).map(|(_, share)| share.count);
-        (cost(others.chain([shares[a].merged(&shares[b]).count])), [a, b])
+        let others =
+            partitions.iter().enumerate().filter(move |&(k, _)| k != a && k != b).map(|(_, partition)| partition.count);
+        (cost(others.chain([partitions[a].merged(&partitions[b]).count])), [a, b])
     });
     costs.min()
 }
 
-/// Returns the shares of a function, the largest first. The list is empty if the function is not split. Each number
+/// Returns the partitions of a function, the largest first. The list is empty if the function is not split. Each number
 /// takes `registers_of_number` registers.
 pub(crate) fn split(program: &Program, registers_of_number: usize) -> Vec<Function> {
     let function = program.function;
     let spills = registers_of_number * program.most_alive > REGISTERS;
-    if function.shares.map_or(!spills, |number| number.get() == 1) {
+    if function.partitions.map_or(!spills, |number| number.get() == 1) {
         return Vec::new();
     }
     let limbs: BTreeSet<usize> = function.limbs.iter().copied().collect();
-    let mut shares: Vec<Share> = limbs.into_iter().map(|limb| Share::new(function, limb)).collect();
-    let mut best = shares.clone();
-    let mut least = cost(shares.iter().map(|share| share.count));
-    while let Some((cost, [a, b])) = best_pair(&shares) {
-        let other = shares.remove(b);
-        shares[a] = shares[a].merged(&other);
-        if function.shares.map_or(cost <= least, |number| best.len() > number.get()) {
-            (least, best) = (cost, shares.clone());
+    let mut partitions: Vec<Partition> = limbs.into_iter().map(|limb| Partition::new(function, limb)).collect();
+    let mut best = partitions.clone();
+    let mut least = cost(partitions.iter().map(|partition| partition.count));
+    while let Some((cost, [a, b])) = best_pair(&partitions) {
+        let other = partitions.remove(b);
+        partitions[a] = partitions[a].merged(&other);
+        if function.partitions.map_or(cost <= least, |number| best.len() > number.get()) {
+            (least, best) = (cost, partitions.clone());
         }
     }
     if best.len() < 2 {
         return Vec::new();
     }
-    best.sort_by_key(|share| Reverse(share.count));
-    best.iter().enumerate().map(|(k, share)| function.share(k, &share.limbs)).collect()
+    best.sort_by_key(|partition| Reverse(partition.count));
+    best.iter().enumerate().map(|(k, partition)| function.partition(k, &partition.limbs)).collect()
 }
 
 impl Function {
     /// Returns the function with only the results of these limbs.
-    fn share(&self, k: usize, limbs: &[usize]) -> Self {
+    fn partition(&self, k: usize, limbs: &[usize]) -> Self {
         let kept = || (0..self.results.len()).filter(|&k| limbs.contains(&self.limbs[k]));
         let results: Vec<Id> = kept().map(|k| self.results[k]).collect();
         let (nodes, results) = needed(&self.nodes, &results);
         Self {
-            name: format!("{}_share{k}", self.name),
+            name: format!("{}_partition{k}", self.name),
             about: self.about.clone(),
             inputs: self.inputs.clone(),
             outputs: self.outputs.clone(),
@@ -173,7 +175,7 @@ impl Function {
             results,
             places: kept().map(|k| self.places[k]).collect(),
             limbs: Vec::new(),
-            shares: None,
+            partitions: None,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Robots with `package://` addresses: given folders, folders of the environment, and the error for a package that none
 //! of them contains.
 
-use condyle_dynamics::{Error, Model, UrdfOptions, robots};
+use condyle_model::{Error, Model, UrdfOptions, robots};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
