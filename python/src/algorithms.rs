@@ -45,8 +45,9 @@ batch b: any(q: Position, v: Tangent, a: Tangent, f_ext: Forces) -> One { b.rnea
 ///
 /// q: nq numbers; v, tau: nv; f_ext: as for `rnea`.
 ///
-/// Raises `ModelError` if M is singular at every position. If M is singular only at this position, as for a point mass
-/// on the axis about which it turns, the result is not finite, or is a large number caused by rounding errors.
+/// Raises `ModelError` if M is singular at every position. M may also be singular only at this position, as for a point
+/// mass on the axis about which it turns. Then the result is not finite, or is a large number caused by rounding
+/// errors.
 ///
 /// >>> quadruped = condyle.robots.quadruped()
 /// >>> q, zero = condyle.neutral(quadruped), [0.0] * 18

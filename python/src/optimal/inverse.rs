@@ -17,7 +17,8 @@ use pyo3::types::PyDict;
 /// model: the robot.
 /// dt: Δt in seconds.
 /// costs: a list of `Cost`. In these, `Residual.joint_effort` depends on τ, and `Residual.undriven_effort` on the
-/// efforts without actuators. integrator, lower, upper, limits, controls: as for `FreeDynamics`.
+///     efforts without actuators.
+/// integrator, lower, upper, limits, controls: as for `FreeDynamics`.
 ///
 /// Raises `ProblemError` for a cost or a limit that does not fit the robot.
 #[pyclass(frozen, module = "condyle.optimal")]

@@ -216,7 +216,7 @@ impl Residual {
     /// so the term is weight · ℓ.
     ///
     /// calc: a function of (t, x, u) that returns ℓ; x = (q, v); u is empty at the terminal knot.
-    /// calc_diff: a function of (t, x, u) that returns a dict of those of q, r, Q, S, R that are not zero: gradient and
+    /// calc_diff: a function of (t, x, u) that returns a dict of the nonzero arrays among q, r, Q, S, R: gradient and
     ///     Hessian of ℓ with respect to x, in the tangent space of the state, and to u. Without calc_diff, calc is
     ///     differentiated as for `Action`.
     ///

@@ -287,12 +287,13 @@ macro_rules! solver {
 }
 
 solver! {
-/// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or not, with the equations and
+/// The solver FDDP or DDP: differential dynamic programming, feasibility-driven or plain, with the equations and
 /// constants of Crocoddyl.
 ///
 /// If controls are bounded, the solver has the equations of Crocoddyl's box solvers.
 ///
-/// problem: any of these, by name. `method`: "fddp" (default), whose trial steps keep a fraction of the gaps, or "ddp",
+/// problem: the problem to solve; all memory is allocated for its shape, once.
+/// settings: any of these, by name. `method`: "fddp" (default), whose trial steps keep a fraction of the gaps, or "ddp",
 /// whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of the dynamics if the
 /// models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations of inverse dynamics at
 /// knots of robots, if possible (default: yes). The steps are the same and take less time. `project_warm_start`:

@@ -67,8 +67,9 @@ impl FrictionContact {
     /// corners: the frame is held).
     ///
     /// corners: positions in the frame (m), (n, 3), in order around the polygon, in one plane perpendicular to the
-    /// normal. forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a
-    /// bounded moment about the normal; or 'corners', a force with a friction cone at each corner.
+    ///     normal.
+    /// forces: 'wrench', one force with one friction cone, a centre of pressure within the polygon and a bounded moment
+    ///     about the normal; or 'corners', a force with a friction cone at each corner.
     /// normal: the direction in which the environment pushes, in the frame's axes, 3 numbers of any nonzero length;
     ///     None is z.
     /// yaw_friction: γ (m): the moment of a wrench about the normal is at most γ f_n. None is ⅔ μ r, where r is the

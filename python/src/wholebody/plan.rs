@@ -23,8 +23,8 @@ use rust::PlanData;
 /// times: N + 1 times in ascending order (s); two may be equal.
 /// states: (q, v) of the knots, (N + 1, nq + nv).
 /// touches: for each interval between two knots, which of the controller's contacts touch, (N, contacts).
-/// controls: for each interval between two knots, the efforts of the actuated coordinates (all except those of a
-///     free-flyer), (N, nu); None for no controls.
+/// controls: for each interval between two knots, the efforts of the actuated coordinates (all coordinates except a
+///     free-flyer's), (N, nu); None for no controls.
 /// gains: K of u = ū + K (x ⊖ x̄), (N, nu, 2 nv); None for no gains.
 /// fade: the time (s) during which a contact is loaded after it begins to touch, and unloaded before it ends to touch.
 ///
