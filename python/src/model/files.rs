@@ -44,8 +44,8 @@ impl Model {
     /// mimic: whether joints with a `<mimic>` share the coordinate of the joint that they follow. Otherwise they have
     ///     their own coordinates.
     /// strict: whether a warning (`warnings`) is an error.
-    /// packages: folders that contain packages, or are packages. They are searched before the folders in the environment
-    ///     variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
+    /// packages: folders that contain packages, or are packages. They are searched before the folders in the
+    ///     environment variables `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`.
     /// allow: kinds of warnings that are not errors even if `strict` is set: 'massless', 'negative', 'triangle',
     ///     'singular', 'unlikely', 'limit', 'unknown', 'left_out', 'assumed' or 'mimic'.
     /// arguments: values of xacro's `<xacro:arg>`s by name, for files that end in `.xacro`.
@@ -200,9 +200,8 @@ impl Model {
     ///
     /// The names, q and v are the same as with `from_mjcf`, but MuJoCo does not keep named `<frame>`s. The results of
     /// MuJoCo's compiler are included: meshes, `replicate`, `attach`, composites, `settotalmass`. If numbers were
-    /// changed after compilation, the changed numbers are used.
-    /// Contents that a model cannot represent are reported in `warnings`, or are an error, in the same cases as for
-    /// `from_mjcf`. MuJoCo itself is not imported.
+    /// changed after compilation, the changed numbers are used. Contents that a model cannot represent are reported in
+    /// `warnings`, or are an error, in the same cases as for `from_mjcf`. MuJoCo itself is not imported.
     ///
     /// mimic, strict, allow: as for `from_mjcf`.
     ///

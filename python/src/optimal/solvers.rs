@@ -293,22 +293,22 @@ solver! {
 /// If controls are bounded, the solver has the equations of Crocoddyl's box solvers.
 ///
 /// problem: the problem to solve; all memory is allocated for its shape, once.
-/// settings: any of these, by name. `method`: "fddp" (default), whose trial steps keep a fraction of the gaps, or "ddp",
-/// whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of the dynamics if the
-/// models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations of inverse dynamics at
-/// knots of robots, if possible (default: yes). The steps are the same and take less time. `project_warm_start`:
-/// whether `solve` and `resume` move controls of a warm start into their bounds (default: yes). Crocoddyl does not move
-/// them; for the iterates of Crocoddyl, use False. `time_budget` (s): a solve that has used it up returns its current
-/// result, with the status "time_limit". The first iteration always runs, unless the budget is 0. A later phase of an
-/// iteration runs only if the median of its last five durations fits into the budget. If a solve takes longer than the
-/// budget, `timings.overrun` is the excess. `segments`: the number of segments of the horizon on which a sweep works at
-/// the same time, at most 1024, default 1. The sweep uses as many threads as are available. The number of segments
-/// changes the results by rounding errors; the number of threads does not change them. `threads`: the number of threads
-/// that share an iteration on a robot (derivatives and gains, in parallel with the sweep), at most 1024, default 1. The
-/// results are bit-identical. `max_iterations`, `tolerance`, `tolerance_bounded` (if controls are bounded),
-/// `step_lengths`, `accept`, `accept_ascent`, `flat`, `regularisation_start`, `regularisation_min`,
-/// `regularisation_max`, `regularisation_factor`, `regularisation_decrease_above`, `regularisation_increase_below`: the
-/// thresholds of the method.
+/// settings: any of these, by name. `method`: "fddp" (default), whose trial steps keep a fraction of the gaps, or
+///     "ddp", whose trial steps are rollouts without gaps. `second_order`: whether to use the curvature of the dynamics
+///     if the models provide it (full DDP). `inverse_dynamics_form`: whether the sweep uses the equations of inverse
+///     dynamics at knots of robots, if possible (default: yes). The steps are the same and take less time.
+///     `project_warm_start`: whether `solve` and `resume` move controls of a warm start into their bounds (default:
+///     yes). Crocoddyl does not move them; for the iterates of Crocoddyl, use False. `time_budget` (s): a solve that
+///     has used it up returns its current result, with the status "time_limit". The first iteration always runs, unless
+///     the budget is 0. A later phase of an iteration runs only if the median of its last five durations fits into the
+///     budget. If a solve takes longer than the budget, `timings.overrun` is the excess. `segments`: the number of
+///     segments of the horizon on which a sweep works at the same time, at most 1024, default 1. The sweep uses as many
+///     threads as are available. The number of segments changes the results by rounding errors; the number of threads
+///     does not change them. `threads`: the number of threads that share an iteration on a robot (derivatives and
+///     gains, in parallel with the sweep), at most 1024, default 1. The results are bit-identical. `max_iterations`,
+///     `tolerance`, `tolerance_bounded` (if controls are bounded), `step_lengths`, `accept`, `accept_ascent`, `flat`,
+///     `regularisation_start`, `regularisation_min`, `regularisation_max`, `regularisation_factor`,
+///     `regularisation_decrease_above`, `regularisation_increase_below`: the thresholds of the method.
 Fddp {
     #[new]
     #[pyo3(signature = (problem, **settings))]
