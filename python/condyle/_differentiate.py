@@ -40,7 +40,8 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
     """Computes the value f(x) and the exact Jacobian ∂f(x ⊕ δ)/∂δ, as `(value, J)`: m numbers, and (m, nv + others).
 
     x: a position of nq numbers, then any other numbers; ⊕ is `integrate` for the position and addition for the others.
-    f: a function of an array like x, of `HyperDual`s, that returns a vector; it is called once for every two directions.
+    f: a function of an array like x, of `HyperDual`s, that returns a vector. It is called once for every two
+    directions.
 
     >>> arm = condyle.robots.arm7()
     >>> data = condyle.Data(arm)

@@ -1,8 +1,9 @@
-"""A quadruped stands on four point feet, is pushed, sways and comes back.
+"""A quadruped stands on four point feet. A push makes it sway, and it returns to its posture.
 
-Each millisecond one cone program gives the torques: whole-body control with true friction cones. The controller does
-not know the push; it measures only the state. The ground holds each touching foot as long as the force pushes. Its
-friction is unlimited, so the example checks each force and reports how close the worst one came to its cone.
+Each millisecond one cone program gives the torques: whole-body control with exact friction cones. The controller does
+not know the push; it measures only the state. The ground holds each touching foot as long as the ground pushes it. The
+ground's friction is unlimited, so the example checks each force, and reports the largest fraction of the friction limit
+that was used.
 
     python python/examples/wholebody_stand.py
 """
@@ -42,7 +43,7 @@ def main() -> None:
         times.append(1e6 * (time.perf_counter() - clock))
         error = max(error, *controller.optimality(world.q, world.v, references))
 
-        f_ext[1, 1] = PUSH if 200 <= tick < 600 else 0.0  # along the trunk's axes, which rotate only little
+        f_ext[1, 1] = PUSH if 200 <= tick < 600 else 0.0  # along the trunk's axes; the trunk turns only a little
         forces = world.step(command.tau, DT, f_ext)
         used = np.max(np.hypot(forces[:, 0], forces[:, 1]) / (FRICTION * forces[:, 2]))
         assert used < 1.0 and forces[:, 2].min() > 0.0, f"a foot slips or lifts at tick {tick}"
