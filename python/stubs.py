@@ -432,7 +432,7 @@ class Writer:
         for member in sorted(k for k, v in members.items() if inspect.isdatadescriptor(v)):
             head = f"    @property\n    def {member}(self) -> {self.results.find(f'{name}.{member}')}:\n"
             text += head + docstring(members[member], "        ") + "\n\n"
-        for member, value in sorted(members.items()):  # sorted: their order depends on the linker
+        for member, value in sorted(members.items()):  # otherwise the linker determines the order
             special = member.startswith("__") and name not in known and f"{name}.{member}" not in known
             if callable(value) and not special and member not in ("__new__", "__repr__"):
                 method = self.function(getattr(item, member), member, name, "    ")

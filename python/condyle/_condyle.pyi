@@ -896,8 +896,8 @@ class ConstraintSet:
     with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on earlier rows get no force.
     Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained dynamic equations (2021).
 
-    model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations
-    that are always made, 1 to 10000.
+    model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
+    to 10000; none of them is skipped.
 
     Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
     the same. Also raises `ModelError` if a reference frame is 'world', a gain is negative or not finite, a target is
@@ -2039,7 +2039,7 @@ class Model:
     @property
     def damping_polynomial(self) -> _Array:
         """The coefficients d₁ and d₂ of speed-dependent damping, (nv, 2): the damping coefficient is d₀ + d₁|v| + d₂v²,
-        with d₀ in `damping`. The same functions use it as use `damping`.
+        with d₀ in `damping`. It is used by the same functions as `damping`.
         """
 
     @property
@@ -2513,9 +2513,9 @@ class Model:
         """Returns the same robot with one more frame of kind 'user', which is the last of `frames`. Everything else is
         unchanged.
 
-        name: the new frame's name; parent: the name or index of the frame to which it is attached, or the name of a
-        body; None is the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the
-        identity.
+        name: the new frame's name; parent: the name or index of the frame to which the new frame is attached, or the
+        name of a body; None is the world; placement: the pose of the new frame in the parent's frame, a homogeneous (4,
+        4) matrix; None is the identity.
 
         Raises `ModelError` if the parent does not exist, the placement is not a homogeneous matrix, or another frame of
         kind 'user' has this name.

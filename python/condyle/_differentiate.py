@@ -41,7 +41,7 @@ def jacobian(model: Model, x: ArrayLike, f: Function) -> tuple[NDArray[np.float6
 
     x: a position of nq numbers, then any other numbers; ⊕ is `integrate` for the position and addition for the others.
     f: a function of an array like x, of `HyperDual`s, that returns a vector. It is called once for every two
-    directions.
+        directions.
 
     >>> arm = condyle.robots.arm7()
     >>> data = condyle.Data(arm)

@@ -94,7 +94,7 @@ class Inertia(NamedTuple):
         """
         r, l = _lengths("radius", radius, 1), _lengths("length", length, 1)  # noqa: E741
         ball = 4.0 * r / (4.0 * r + 3.0 * l)  # fraction of the mass in the half balls: 4/3 π r³ of 4/3 π r³ + π r² l
-        # half balls: the centre of mass is 3/8 r from the cylinder; 2/5 r² + l²/4 + 3/8 l r about the capsule's centre
+        # a half ball's centre of mass is 3/8 r from the cylinder, so its inertia per mass is 2/5 r² + l²/4 + 3/8 l r
         across = ball * (0.4 * r * r + 0.25 * l * l + 0.375 * l * r) + (1.0 - ball) * (3.0 * r * r + l * l) / 12.0
         along = ball * 0.4 * r * r + (1.0 - ball) * 0.5 * r * r
         return _solid(mass, np.array([across, across, along]))

@@ -261,7 +261,7 @@ class Impulse(NamedTuple):
     (N s, N m s).
     """
     residual: float
-    """The largest number in J (v⁺ + ε v) (m/s, rad/s)."""
+    """The largest magnitude in J (v⁺ + ε v) (m/s, rad/s)."""
     redundant: float
     """The number of rows of J that depend linearly on earlier rows, up to rounding. These rows have no impulse."""
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from ._condyle import ControllerError, _check_pose, _check_rotations
 
 _Array: TypeAlias = NDArray[np.float64]
-_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # joint; range of its quaternion or (cos, sin) in q
+_Rotations: TypeAlias = tuple[tuple[str, int, int], ...]  # joint, and range in q of its rotation
 
 
 class Gains(NamedTuple):

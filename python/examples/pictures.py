@@ -28,7 +28,7 @@ q[7:] = [0.0, 0.7, -1.4] * 4  # knees bent
 
 gait = Gait(robot, q, FEET, DT)
 gait.stand(10)
-gait.step([1, 2], 0.08, 0.06, 20)  # right front and left hind
+gait.step([1, 2], 0.08, 0.06, 20)  # moves the right front and the left hind foot
 gait.step([0, 3], 0.08, 0.06, 20)
 gait.stand(20)
 solution = gait.solve()

@@ -24,7 +24,7 @@ PUSH = 50.0  # N, to the left, from 0.2 s to 0.6 s
 
 def main() -> None:
     model = condyle.robots.quadruped()
-    knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # inwards, feet on the ground
+    knees = [0.0, 0.7, -1.4, 0.0, -0.7, 1.4] * 2  # knees bent inwards; the feet are on the ground
     q = np.r_[0.0, 0.0, 0.7 * np.cos(0.7), 0.0, 0.0, 0.0, 1.0, knees]
 
     gains = Gains.critical(60.0)

@@ -121,8 +121,8 @@ fn aim(
 /// with J M⁻¹ Jᵀ, such as 1e-8. With μ = 0 one iteration is exact, and rows that depend on earlier rows get no force.
 /// Source: Carpentier, Budhiraja, Mansard, Proximal and sparse resolution of constrained dynamic equations (2021).
 ///
-/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations
-/// that are always made, 1 to 10000.
+/// model: the robot; constraints: a list of `ContactConstraint`s; mu: μ (1/kg); iterations: the number of iterations, 1
+/// to 10000; none of them is skipped.
 ///
 /// Raises `ModelError` if a frame does not exist, two frames do not move relative to each other, or two constraints are
 /// the same. Also raises `ModelError` if a reference frame is 'world', a gain is negative or not finite, a target is

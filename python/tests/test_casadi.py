@@ -352,8 +352,8 @@ def test_swing_up_by_ipopt() -> None:
 
 
 def test_actions_of_expressions_are_those_that_are_written() -> None:
-    """Compares an action of a pendulum made from expressions with one made from a Python function: iterates,
-    derivatives, bounds.
+    """Compares two actions of a pendulum, one from expressions and one from a Python function: iterates, derivatives,
+    bounds.
     """
     from condyle.optimal import Action, Fddp, Problem
 

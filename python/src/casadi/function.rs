@@ -115,7 +115,7 @@ impl Kind {
         Ok(Scratch { data, constraints, tensors, J: DMatrix::from_element(6, nv, zero), zeros: vec![zero; nv] })
     }
 
-    /// Computes all results, one after the other, each by columns.
+    /// Computes all results. They are written to `y` one after the other, each by columns.
     pub(super) fn value(&self, model: &Model, s: &mut Scratch<f64>, x: &[Vec<f64>], y: &mut [f64]) {
         let data = &mut s.data;
         match self {

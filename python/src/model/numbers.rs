@@ -76,7 +76,7 @@ impl Model {
     }
 
     /// The coefficients d₁ and d₂ of speed-dependent damping, (nv, 2): the damping coefficient is d₀ + d₁|v| + d₂v²,
-    /// with d₀ in `damping`. The same functions use it as use `damping`.
+    /// with d₀ in `damping`. It is used by the same functions as `damping`.
     #[getter]
     fn damping_polynomial<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let polynomial = || read_only(py, self.inner.damping_polynomial(), "with_damping");

@@ -122,9 +122,9 @@ impl Model {
     /// Returns the same robot with one more frame of kind 'user', which is the last of `frames`. Everything else is
     /// unchanged.
     ///
-    /// name: the new frame's name; parent: the name or index of the frame to which it is attached, or the name of a
-    /// body; None is the world; placement: the new frame in the parent's, a homogeneous (4, 4) matrix; None is the
-    /// identity.
+    /// name: the new frame's name; parent: the name or index of the frame to which the new frame is attached, or the
+    /// name of a body; None is the world; placement: the pose of the new frame in the parent's frame, a homogeneous (4,
+    /// 4) matrix; None is the identity.
     ///
     /// Raises `ModelError` if the parent does not exist, the placement is not a homogeneous matrix, or another frame of
     /// kind 'user' has this name.
